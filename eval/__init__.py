@@ -1,0 +1,1 @@
+"""Evaluation: tracking metrics, motion errors, baselines, benchmarks."""

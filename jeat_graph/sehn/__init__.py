@@ -1,0 +1,1 @@
+"""The synthetic event + RGB highway: scene, camera, traffic, sensors."""

@@ -1,0 +1,1 @@
+"""Smoothers of single tracks."""
