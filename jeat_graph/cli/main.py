@@ -1,0 +1,70 @@
+"""Entry point of the command `jeat-graph`: finds the command's module and reports errors in one line."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+from jeat_graph.errors import JeatGraphError
+from jeat_graph.version import __version__
+
+# Each module has HELP (one line), add_arguments(parser) and run(args). Modules are imported only when their
+# command is asked for, so that one command does not pay for another's libraries.
+COMMANDS = ("demo", "simulate", "track", "eval", "calibrate", "benchmark")
+
+
+def build_parser(command: str | None = None) -> argparse.ArgumentParser:
+    """Build the parser; only `command`, if given, gets its full set of arguments."""
+    parser = argparse.ArgumentParser(
+        prog="jeat-graph",
+        description="Track vehicles from asynchronous event and RGB detections, causally and smoothed.",
+    )
+    parser.add_argument("--version", action="version", version=f"jeat-graph {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for name in COMMANDS:
+        if command is not None and name != command:
+            commands.add_parser(name, add_help=False)
+            continue
+        module = import_module(f"jeat_graph.cli.{name}_command")
+        sub = commands.add_parser(name, help=module.HELP, description=module.HELP)
+        module.add_arguments(sub)
+        sub.set_defaults(run=module.run)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Returns:
+        0 on success, 1 where a check did not hold, 2 on bad input or usage, 130 when interrupted.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    command = next((a for a in arguments if a in COMMANDS), None)
+    args = build_parser(command).parse_args(arguments)
+    try:
+        return int(args.run(args) or 0)
+    except JeatGraphError as error:
+        print(f"jeat-graph {args.command}: {_one_line(error)}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        if isinstance(error, BrokenPipeError):
+            # The reader of our output went away (`| head`): not an error. Python would complain once more
+            # when it flushes at exit, so its stdout is pointed elsewhere.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 0
+        print(f"jeat-graph {args.command}: {_one_line(error)}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print(f"jeat-graph {args.command}: interrupted", file=sys.stderr)
+        return 130
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())
+
+
+if __name__ == "__main__":
+    sys.exit(main())
