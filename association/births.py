@@ -1,0 +1,67 @@
+"""Births: which of the detections that no track took start new tracks."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from jeat_graph.association.boxes import overlap
+from jeat_graph.detections import FloatArray, IntArray
+
+
+@njit(cache=True)
+def choose_births(
+    boxes: FloatArray,
+    precision: FloatArray,
+    sensor: IntArray,
+    taken: IntArray,
+    track_boxes: FloatArray,
+    min_precision: float,
+    max_overlap: float,
+) -> tuple[IntArray, IntArray]:
+    """Choose the leftover detections that start tracks, the surest first.
+
+    A detection that coincides with a living track, or with a birth by the same sensor, is a duplicate and starts
+    none. One that coincides with a birth by another sensor is a second view of the new vehicle and joins it.
+
+    Args:
+        boxes: (M, 4) left, top, width, height (px).
+        precision: (M,) calibrated precision of each detection.
+        sensor: (M,) sensor of each detection.
+        taken: (M,) not zero where a track took the detection.
+        track_boxes: (N, 4) boxes of the living tracks.
+        min_precision: least precision of a birth.
+        max_overlap: IoU above which two boxes coincide; 1 refuses none.
+
+    Returns:
+        parents (B,) detections that start tracks; partner (M,) the index into `parents` of the birth that a
+        detection joins, or -1.
+    """
+    num = len(precision)
+    parents = np.empty(num, dtype=np.int64)
+    partner = np.full(num, -1, dtype=np.int64)
+    count = 0
+    order = np.argsort(-precision, kind="mergesort")
+    for j in order:
+        if taken[j] or precision[j] < min_precision:
+            continue
+        refused = False
+        if max_overlap < 1.0:
+            for i in range(track_boxes.shape[0]):
+                if overlap(boxes[j], track_boxes[i]) > max_overlap:
+                    refused = True
+                    break
+            if refused:
+                continue
+            for b in range(count):
+                # Two sensors see one vehicle less exactly than one sensor sees it twice.
+                other = sensor[parents[b]] != sensor[j]
+                if overlap(boxes[j], boxes[parents[b]]) > (0.5 * max_overlap if other else max_overlap):
+                    refused = True
+                    if other:
+                        partner[j] = b
+                    break
+        if not refused:
+            parents[count] = j
+            count += 1
+    return parents[:count], partner

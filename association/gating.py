@@ -1,0 +1,123 @@
+"""Gates: which detections may belong to which tracks (χ² gates of paper section on joint association)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from jeat_graph.detections import FloatArray, IntArray
+
+
+@njit(cache=True)
+def gated_pairs(
+    position: FloatArray,
+    position_var: FloatArray,
+    noise: FloatArray,
+    log_size: FloatArray,
+    log_size_var: FloatArray,
+    size_noise: FloatArray,
+    z: FloatArray,
+    z_log_size: FloatArray,
+    weight: FloatArray,
+    sensor: IntArray,
+    gate: float,
+    size_gate: float,
+) -> tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray]:
+    """List the pairs of track and detection inside the gates.
+
+    The detections are sorted by x once and each track looks only at those within its gate's width, so the
+    full N x M matrix is never built.
+
+    Args:
+        position: (N, 2) predicted centre of each track (px).
+        position_var: (N, 2) its variances (px²).
+        noise: (N, S, 2) measurement variances of a detection of sensor s on track i, at weight 1 (px²).
+        log_size: (N, 2) predicted ln width, ln height.
+        log_size_var: (N, 2) their variances.
+        size_noise: (S, 2) measurement variances of ln width, ln height.
+        z: (M, 2) detected centres (px).
+        z_log_size: (M, 2) detected ln width, ln height.
+        weight: (M,) factor on a detection's measurement variance (g of the paper).
+        sensor: (M,) sensor of each detection, 0 … S − 1.
+        gate: χ² bound on the Mahalanobis distance d² of the centre (2 degrees of freedom).
+        size_gate: χ² bound on that of the size; +inf for no size gate.
+
+    Returns:
+        rows (P,) tracks and cols (P,) detections in ascending order of both; d2 (P,) squared Mahalanobis
+        distance of the centres (paper eq. 6); log_density (P,) ln N(y; 0, S); log_size_density (P,)
+        ln N of the size residual.
+    """
+    num_tracks = position.shape[0]
+    num_dets = z.shape[0]
+    capacity = 4 * (num_tracks + num_dets) + 16
+    rows = np.empty(capacity, dtype=np.int64)
+    cols = np.empty(capacity, dtype=np.int64)
+    d2 = np.empty(capacity)
+    log_density = np.empty(capacity)
+    log_size_density = np.empty(capacity)
+    count = 0
+    if num_dets == 0 or num_tracks == 0:
+        return rows[:0], cols[:0], d2[:0], log_density[:0], log_size_density[:0]
+    order = np.argsort(z[:, 0], kind="mergesort")
+    x_sorted = z[order, 0]
+    heaviest = np.max(weight)
+    log_2pi = np.log(2.0 * np.pi)
+    for i in range(num_tracks):
+        widest = 0.0
+        for s in range(noise.shape[1]):
+            widest = max(widest, noise[i, s, 0])
+        half = np.sqrt(gate * (position_var[i, 0] + widest * heaviest))
+        k = np.searchsorted(x_sorted, position[i, 0] - half)
+        first = count
+        while k < num_dets and x_sorted[k] <= position[i, 0] + half:
+            j = order[k]
+            k += 1
+            s = sensor[j]
+            dy = z[j, 1] - position[i, 1]
+            Sy = position_var[i, 1] + noise[i, s, 1] * weight[j]
+            ny = dy * dy / Sy
+            if ny > gate:
+                continue
+            dx = z[j, 0] - position[i, 0]
+            Sx = position_var[i, 0] + noise[i, s, 0] * weight[j]
+            distance = dx * dx / Sx + ny
+            if not distance <= gate:
+                continue
+            size_distance = 0.0
+            size_det = 1.0
+            for side in range(2):
+                e = z_log_size[j, side] - log_size[i, side]
+                V = log_size_var[i, side] + size_noise[s, side]
+                size_distance += e * e / V
+                size_det *= V
+            if size_distance > size_gate:
+                continue
+            if count == capacity:
+                capacity *= 2
+                rows = _grown(rows, capacity)
+                cols = _grown(cols, capacity)
+                d2 = _grown(d2, capacity)
+                log_density = _grown(log_density, capacity)
+                log_size_density = _grown(log_size_density, capacity)
+            # Insertion keeps each track's detections in ascending order: a gate holds few of them.
+            at = count
+            while at > first and cols[at - 1] > j:
+                cols[at] = cols[at - 1]
+                d2[at] = d2[at - 1]
+                log_density[at] = log_density[at - 1]
+                log_size_density[at] = log_size_density[at - 1]
+                at -= 1
+            rows[count] = i
+            cols[at] = j
+            d2[at] = distance
+            log_density[at] = -0.5 * (distance + np.log(Sx * Sy)) - log_2pi
+            log_size_density[at] = -0.5 * (size_distance + np.log(size_det)) - log_2pi
+            count += 1
+    return rows[:count], cols[:count], d2[:count], log_density[:count], log_size_density[:count]
+
+
+@njit(cache=True)
+def _grown(array: np.ndarray, capacity: int) -> np.ndarray:  # type: ignore[type-arg]
+    out = np.empty(capacity, dtype=array.dtype)
+    out[: len(array)] = array
+    return out

@@ -1,0 +1,134 @@
+"""The extended Kalman filter of all tracks at once (paper eq. 2, 4 and the innovation of eq. 5).
+
+Arrays of tracks have one row a track; the functions change their first arguments in place, because the
+state of all tracks lives in one preallocated block. The measurement is the box centre, so H picks the
+position of each axis and every update is two scalar updates.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from jeat_graph.detections import FloatArray
+from jeat_graph.filters.motion import process_noise, size_process_noise
+
+# Below this a covariance entry is rounding dust; it would sink into subnormals, which slow every kernel.
+_FLUSH = 1e-250
+
+
+@njit(cache=True)
+def predict(mean: FloatArray, cov: FloatArray, jerk: FloatArray, dt: float) -> None:
+    """Predict all tracks by `dt` seconds, in place (paper eq. 2): m ← F m, P ← F P Fᵀ + Q.
+
+    Args:
+        mean: (N, 2, 3) per axis [p, v, a] (px, px/s, px/s²).
+        cov: (N, 2, 3, 3) covariance per axis.
+        jerk: (N,) root spectral density of each track's jerk (px/s^2.5).
+        dt: time step (s), >= 0.
+    """
+    h = 0.5 * dt * dt
+    Q = process_noise(dt, 1.0)
+    for i in range(mean.shape[0]):
+        q = jerk[i] * jerk[i]
+        for k in range(2):
+            m = mean[i, k]
+            m[0] += dt * m[1] + h * m[2]
+            m[1] += dt * m[2]
+            P = cov[i, k]
+            p00, p01, p02 = P[0, 0], P[0, 1], P[0, 2]
+            p11, p12, p22 = P[1, 1], P[1, 2], P[2, 2]
+            # Rows of F P, then the columns times Fᵀ; P is symmetric, so six entries do.
+            a00 = p00 + dt * p01 + h * p02
+            a01 = p01 + dt * p11 + h * p12
+            a02 = p02 + dt * p12 + h * p22
+            a11 = p11 + dt * p12
+            a12 = p12 + dt * p22
+            P[0, 0] = a00 + dt * a01 + h * a02 + q * Q[0, 0]
+            P[0, 1] = a01 + dt * a02 + q * Q[0, 1]
+            P[0, 2] = a02 + q * Q[0, 2]
+            P[1, 1] = a11 + dt * a12 + q * Q[1, 1]
+            P[1, 2] = a12 + q * Q[1, 2]
+            P[2, 2] = p22 + q * Q[2, 2]
+            P[1, 0] = P[0, 1]
+            P[2, 0] = P[0, 2]
+            P[2, 1] = P[1, 2]
+
+
+@njit(cache=True)
+def predict_size(mean: FloatArray, cov: FloatArray, density: float, dt: float) -> None:
+    """Predict ln width and ln height of all tracks by `dt` seconds, in place.
+
+    Args:
+        mean: (N, 2, 2) per side [ln s, rate] (ln px, 1/s).
+        cov: (N, 2, 2, 2) covariance per side.
+        density: root spectral density of the rate's driving noise (1/s^1.5).
+        dt: time step (s), >= 0.
+    """
+    Q = size_process_noise(dt, density)
+    for i in range(mean.shape[0]):
+        for k in range(2):
+            mean[i, k, 0] += dt * mean[i, k, 1]
+            P = cov[i, k]
+            p01 = P[0, 1] + dt * P[1, 1]
+            P[0, 0] += dt * (P[0, 1] + p01) + Q[0, 0]
+            P[0, 1] = p01 + Q[0, 1]
+            P[1, 0] = P[0, 1]
+            P[1, 1] += Q[1, 1]
+
+
+@njit(cache=True)
+def update_block(m: FloatArray, P: FloatArray, z: float, R: float) -> float:
+    """Update one block with a scalar measurement of its first component, in place (paper eq. 4).
+
+    Joseph form, P ← (I − KH) P (I − KH)ᵀ + K R Kᵀ, written out for H = [1, 0, …]:
+    P_ij − K_i P_0j − K_j P_0i + K_i K_j (P_00 + R).
+
+    Args:
+        m: (D,) mean.
+        P: (D, D) covariance, symmetric.
+        z: measurement of m[0].
+        R: variance of the measurement, > 0.
+
+    Returns:
+        The block's share of the normalised innovation squared, y² / S.
+    """
+    n = m.shape[0]
+    S = P[0, 0] + R
+    y = z - m[0]
+    p0 = P[0].copy()
+    K = p0 / S
+    for i in range(n):
+        m[i] += K[i] * y
+        for j in range(i, n):
+            value = P[i, j] - K[i] * p0[j] - K[j] * p0[i] + K[i] * K[j] * S
+            if abs(value) < _FLUSH:
+                value = 0.0
+            P[i, j] = value
+            P[j, i] = value
+    return float(y * y / S)
+
+
+@njit(cache=True)
+def update(mean: FloatArray, cov: FloatArray, z: FloatArray, R: FloatArray) -> float:
+    """Update one track with a measurement of its box centre, in place (paper eq. 4).
+
+    Args:
+        mean: (2, 3) per axis [p, v, a].
+        cov: (2, 3, 3).
+        z: (2,) measured centre (px).
+        R: (2,) variances of the measurement (px²).
+
+    Returns:
+        The normalised innovation squared ε = yᵀ S⁻¹ y, χ² with 2 degrees of freedom for a consistent filter.
+    """
+    nis = 0.0
+    for k in range(2):
+        nis += update_block(mean[k], cov[k], z[k], R[k])
+    return nis
+
+
+@njit(cache=True)
+def log_gaussian(y: float, S: float) -> float:
+    """Logarithm of the density of N(0, S) at `y`."""
+    return float(-0.5 * (y * y / S + np.log(2.0 * np.pi * S)))
