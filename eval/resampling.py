@@ -1,0 +1,205 @@
+"""Tracks at the times of the truth: causal tables predicted forward, smoothed ones interpolated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from jeat_graph.detections import FloatArray, IntArray
+from jeat_graph.errors import DataError
+from jeat_graph.trajectories import Trajectories
+
+# Two clocks that agree to a microsecond are one: times are often written with few digits.
+TIME_TOLERANCE_S = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Resampled:
+    """Tracks at given times, in the order of those times.
+
+    Attributes:
+        frame: (M,) index into the times asked for, not decreasing.
+        track_id: (M,) identity.
+        boxes: (M, 4) left, top, width, height (px).
+        mean: (M, 6) x, y, vx, vy, ax, ay of the centre (px, px/s, px/s²).
+        var: (M, 6) variances; NaN where the table has none.
+        age_s: (M,) time from the table's row to the frame: since the row a causal estimate was predicted
+            from, or to the nearer of the two rows that a smoothed one lies between.
+    """
+
+    frame: IntArray
+    track_id: IntArray
+    boxes: FloatArray
+    mean: FloatArray
+    var: FloatArray
+    age_s: FloatArray
+
+
+def expand_ranges(start: IntArray, count: IntArray) -> tuple[IntArray, IntArray]:
+    """List the members of ranges, one range after the other.
+
+    Args:
+        start: (K,) first member of each range.
+        count: (K,) number of its members.
+
+    Returns:
+        The range each member belongs to (sum of count,) and the member itself (sum of count,).
+    """
+    owner = np.repeat(np.arange(len(count), dtype=np.int64), count)
+    first = np.cumsum(count) - count
+    return owner, np.arange(len(owner), dtype=np.int64) - first[owner] + start[owner]
+
+
+def check_unique(table: Trajectories) -> None:
+    """Refuse a table in which one track stands twice at one time.
+
+    Raises:
+        DataError: naming the track and the time.
+    """
+    order = np.lexsort((table.t, table.track_id))
+    twice = (np.diff(table.track_id[order]) == 0) & (np.diff(table.t[order]) == 0)
+    if twice.any():
+        row = order[int(np.argmax(twice))]
+        raise DataError(f"track {table.track_id[row]} has two rows at t = {table.t[row]:g} s; one is allowed")
+
+
+def predict_to(
+    table: Trajectories,
+    times: FloatArray,
+    *,
+    max_age_s: float = 0.15,
+    instants: FloatArray | None = None,
+) -> Resampled:
+    """Causal estimates at given times, from nothing that came later.
+
+    At a time t the tracks are those of the latest instant t' <= t of the table, if t - t' <= `max_age_s`.
+    Their centres move on with constant acceleration, `x + v Δ + a Δ²/2`, their sizes stay; tracks without
+    known motion stay where they were. Variances grow by the terms that need no covariance between
+    position and velocity (a table has none), which is exact at Δ = 0.
+
+    Args:
+        table: rows in any order.
+        times: (T,) ascending (s).
+        max_age_s: how far estimates may be predicted; beyond it there is no track.
+        instants: (I,) all the times at which the tracker gave output, if known: at an instant without rows
+            it reported no track. Without them such an instant cannot be told from one at which the tracker
+            did not run, and earlier rows are predicted across it.
+    """
+    order = np.argsort(table.t, kind="stable")
+    row_t = table.t[order]
+    known = row_t if instants is None else np.concatenate((row_t, np.asarray(instants, dtype=np.float64)))
+    instant_t = np.unique(known)
+    if not len(instant_t):
+        return _gather(table, *(np.zeros(0, dtype=np.int64),) * 2, np.zeros(0))
+    latest = np.searchsorted(instant_t, times + TIME_TOLERANCE_S, side="right") - 1
+    age = times - instant_t[np.maximum(latest, 0)]
+    alive = (latest >= 0) & (age <= max_age_s + TIME_TOLERANCE_S)
+    first = np.searchsorted(row_t, instant_t, side="left")
+    last = np.searchsorted(row_t, instant_t, side="right")
+    count = np.where(alive, (last - first)[latest], 0)
+    frame, member = expand_ranges(first[latest], count)
+    return _gather(table, order[member], frame, np.maximum(age, 0.0)[frame])
+
+
+def _gather(table: Trajectories, row: IntArray, frame: IntArray, age: FloatArray) -> Resampled:
+    mean = np.nan_to_num(table.mean[row])
+    dt = age[:, None]
+    shift = mean[:, 2:4] * dt + mean[:, 4:6] * (0.5 * dt * dt)
+    boxes = table.boxes[row].copy()
+    boxes[:, :2] += shift
+    mean[:, 0:2] += shift
+    mean[:, 2:4] += mean[:, 4:6] * dt
+    var = table.var[row].copy()
+    var[:, 0:2] += var[:, 2:4] * dt**2 + var[:, 4:6] * (0.25 * dt**4)
+    var[:, 2:4] += var[:, 4:6] * dt**2
+    return Resampled(frame=frame, track_id=table.track_id[row], boxes=boxes, mean=mean, var=var, age_s=age)
+
+
+def interpolate_to(table: Trajectories, times: FloatArray, *, max_gap_s: float | None = None) -> Resampled:
+    """Smoothed trajectories at given times, between the two neighbouring rows of each track.
+
+    Nothing is said before a track's first row or after its last. The centre follows the quintic through
+    position, velocity and acceleration of both rows, which is the mean of the white-jerk motion model
+    between two known states (Barfoot, State Estimation for Robotics, ch. 11); a track without known motion
+    moves in a straight line. The box keeps its offset from the centre (it may be clipped) and its log size
+    linear in time. Variances are linear in time, which is exact at the rows.
+
+    Args:
+        table: rows in any order, at most one a track and time.
+        times: (T,) ascending (s).
+        max_gap_s: rows further apart than this are not joined; any gap is bridged by default.
+    """
+    order = np.lexsort((table.t, table.track_id))
+    t = table.t[order]
+    _, first, count = np.unique(table.track_id[order], return_index=True, return_counts=True)
+    begin = np.searchsorted(times, t[first] - TIME_TOLERANCE_S, side="left")
+    end = np.searchsorted(times, t[first + count - 1] + TIME_TOLERANCE_S, side="right")
+    track, frame = expand_ranges(begin.astype(np.int64), (end - begin).astype(np.int64))
+
+    # One search over all tracks: rank the times, and let (track, rank) be a single ascending number.
+    moments = np.unique(t)
+    rank = np.searchsorted(moments, t)
+    row_key = np.repeat(np.arange(len(first)), count) * len(moments) + rank
+    now = np.searchsorted(moments, times[frame] + TIME_TOLERANCE_S, side="right") - 1
+    before = np.searchsorted(row_key, track * len(moments) + now, side="right") - 1
+    before = np.maximum(before, first[track])
+    after = np.minimum(before + 1, (first + count - 1)[track])
+
+    step = t[after] - t[before]
+    into = np.clip(times[frame] - t[before], 0.0, step)
+    ok = np.ones(len(frame), dtype=bool)
+    if max_gap_s is not None:
+        ok = (step <= max_gap_s + TIME_TOLERANCE_S) | (into <= TIME_TOLERANCE_S)
+    ok_rows = np.flatnonzero(ok)
+    ok_rows = ok_rows[np.argsort(frame[ok_rows], kind="stable")]
+    frame, before, after = frame[ok_rows], before[ok_rows], after[ok_rows]
+    step, into = step[ok_rows], into[ok_rows]
+    return _between(table, order[before], order[after], frame, step, into)
+
+
+def _between(
+    table: Trajectories, a: IntArray, b: IntArray, frame: IntArray, step: FloatArray, into: FloatArray
+) -> Resampled:
+    h = np.where(step > 0.0, step, 1.0)[:, None]
+    s = into[:, None] / h
+    mean_a, mean_b = np.nan_to_num(table.mean[a]), np.nan_to_num(table.mean[b])
+    still = (mean_a[:, 2:] == 0.0).all(axis=1) & (mean_b[:, 2:] == 0.0).all(axis=1)
+    p, v, acc = _quintic(mean_a, mean_b, h, s)
+    line = mean_a[:, :2] + s * (mean_b[:, :2] - mean_a[:, :2])
+    mean = np.concatenate((np.where(still[:, None], line, p), v, acc), axis=1)
+    mean[still, 2:] = 0.0
+
+    box_a, box_b = table.boxes[a], table.boxes[b]
+    offset_a = box_a[:, :2] + 0.5 * box_a[:, 2:] - mean_a[:, :2]
+    offset_b = box_b[:, :2] + 0.5 * box_b[:, 2:] - mean_b[:, :2]
+    with np.errstate(divide="ignore"):
+        log_a, log_b = np.log(box_a[:, 2:]), np.log(box_b[:, 2:])
+        # At the ends the rows' own sizes are taken, so that a box without area stays one.
+        size = np.exp(log_a + np.where(s > 0.0, s * np.nan_to_num(log_b - log_a), 0.0))
+    centre = mean[:, :2] + offset_a + s * (offset_b - offset_a)
+    var = table.var[a] + s * (table.var[b] - table.var[a])
+    return Resampled(
+        frame=frame,
+        track_id=table.track_id[a],
+        boxes=np.concatenate((centre - 0.5 * size, size), axis=1),
+        mean=mean,
+        var=var,
+        age_s=np.minimum(into, step - into),
+    )
+
+
+def _quintic(a: FloatArray, b: FloatArray, h: FloatArray, s: FloatArray) -> tuple[FloatArray, ...]:
+    """Position, velocity, acceleration (N, 2 each) at the fraction `s` (N, 1) of a step `h` (N, 1) s."""
+    p0, v0, a0 = a[:, 0:2], a[:, 2:4] * h, a[:, 4:6] * h * h
+    p1, v1, a1 = b[:, 0:2], b[:, 2:4] * h, b[:, 4:6] * h * h
+    d = p1 - p0 - v0 - 0.5 * a0
+    e = v1 - v0 - a0
+    f = a1 - a0
+    c3 = 10.0 * d - 4.0 * e + 0.5 * f
+    c4 = -15.0 * d + 7.0 * e - f
+    c5 = 6.0 * d - 3.0 * e + 0.5 * f
+    position = p0 + s * (v0 + s * (0.5 * a0 + s * (c3 + s * (c4 + s * c5))))
+    velocity = v0 + s * (a0 + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)))
+    acceleration = a0 + s * (6.0 * c3 + s * (12.0 * c4 + s * 20.0 * c5))
+    return position, velocity / h, acceleration / (h * h)
