@@ -16,12 +16,12 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-
-from jeat_graph.detections import FloatArray, IntArray
-from jeat_graph.errors import DataError
 from jeat_graph.eval.overlap import pairwise_covered, pairwise_iou
 from jeat_graph.eval.pairing import check_pair, check_truth
 from jeat_graph.eval.resampling import TIME_TOLERANCE_S, Resampled, check_unique, interpolate_to, predict_to
+
+from jeat_graph.detections import FloatArray, IntArray
+from jeat_graph.errors import DataError
 from jeat_graph.trajectories import GroundTruth, Trajectories
 
 Kind = Literal["causal", "smoothed"]

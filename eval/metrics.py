@@ -13,11 +13,14 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from jeat_graph.eval.frames import Frames, Kind, build_frames
 
 from jeat_graph.detections import FloatArray
 from jeat_graph.errors import DataError
-from jeat_graph.eval.frames import Frames, Kind, build_frames
 from jeat_graph.trajectories import GroundTruth, Trajectories
+
+# Scores in per cent; the others are counts.
+SHARES = ("MOTA", "MOTP", "HOTA", "DetA", "AssA", "LocA", "IDF1", "IDP", "IDR")
 
 
 @dataclass(frozen=True)
@@ -168,13 +171,11 @@ def pooled_scores(data: Sequence[dict[str, Any]], *, iou: float = 0.5) -> Scores
     def total(name: str) -> int:
         return int(sum(d[name] for d in data))
 
+    values: dict[str, Any] = {name: percent(name) for name in SHARES}
+    values |= {name: int(results[f"CLR_{name}"]) for name in ("TP", "FP", "FN")}
+    values |= {name: int(results[name]) for name in ("IDSW", "MT", "PT", "ML", "Frag")}
     return Scores(
-        **{
-            name: percent(name)
-            for name in ("MOTA", "MOTP", "HOTA", "DetA", "AssA", "LocA", "IDF1", "IDP", "IDR")
-        },
-        **{name: int(results[f"CLR_{name}"]) for name in ("TP", "FP", "FN")},
-        **{name: int(results[name]) for name in ("IDSW", "MT", "PT", "ML", "Frag")},
+        **values,
         truth_boxes=total("num_gt_dets"),
         truth_ids=total("num_gt_ids"),
         track_boxes=total("num_tracker_dets"),
