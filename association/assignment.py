@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from jeat_graph.detections import FloatArray, IntArray
+from jeat_graph.arrays import FloatArray, IntArray
 
 
 @njit(cache=True)
@@ -159,9 +159,7 @@ def solve_dense(cost: FloatArray, unassigned_cost: float) -> IntArray:
 
 
 @njit(cache=True)
-def _components(
-    num_rows: int, num_cols: int, rows: IntArray, cols: IntArray
-) -> tuple[IntArray, IntArray]:
+def _components(num_rows: int, num_cols: int, rows: IntArray, cols: IntArray) -> tuple[IntArray, IntArray]:
     """Group the pairs by connected component: their order (P,) and where each group starts (G + 1,)."""
     parent = np.arange(num_rows + num_cols)
     for p in range(len(rows)):

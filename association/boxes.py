@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numba import njit
 
-from jeat_graph.detections import FloatArray
+from jeat_graph.arrays import FloatArray
 
 
 @njit(cache=True)

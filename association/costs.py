@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from jeat_graph.detections import FloatArray, IntArray
+from jeat_graph.arrays import FloatArray, IntArray
 
 
 @njit(cache=True)
@@ -70,7 +70,12 @@ def log_evidence(
 
 @njit(cache=True)
 def likelihood_cost(
-    rows: IntArray, cols: IntArray, evidence: FloatArray, existence: FloatArray, p_detect: FloatArray, sensor: IntArray
+    rows: IntArray,
+    cols: IntArray,
+    evidence: FloatArray,
+    existence: FloatArray,
+    p_detect: FloatArray,
+    sensor: IntArray,
 ) -> FloatArray:
     """Cost of a pair against leaving the track missed and the detection to clutter; negative where it pays.
 

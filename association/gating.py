@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from jeat_graph.detections import FloatArray, IntArray
+from jeat_graph.arrays import FloatArray, IntArray
 
 
 @njit(cache=True)

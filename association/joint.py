@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.association.assignment import assign
-from jeat_graph.detections import FloatArray, IntArray
+from jeat_graph.arrays import FloatArray, IntArray
 
 SLOTS = 0
 JOINT = 1

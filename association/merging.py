@@ -7,7 +7,7 @@ import numpy.typing as npt
 from numba import njit
 
 from jeat_graph.association.boxes import overlap
-from jeat_graph.detections import FloatArray
+from jeat_graph.arrays import FloatArray
 
 
 @njit(cache=True)

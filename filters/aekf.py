@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from jeat_graph.detections import FloatArray
+from jeat_graph.arrays import FloatArray
 from jeat_graph.filters.motion import process_noise, size_process_noise
 
 # Below this a covariance entry is rounding dust; it would sink into subnormals, which slow every kernel.

@@ -66,7 +66,9 @@ class SensorConfig:
     precision: float = number(0.9, "1", "fraction of its boxes that are vehicles", 0.001, 0.999)
     score_precision: tuple[tuple[float, float], ...] = field(
         default=((0.0, 0.02), (1.0, 0.98)),
-        metadata={"doc": "calibrated precision of a box of this score: (score, precision) knots, both rising"},
+        metadata={
+            "doc": "calibrated precision of a box of this score: (score, precision) knots, both rising"
+        },
     )
     tempering: float = number(
         1.0, "1", "exponent on evidence, below 1 where false boxes repeat in time", 0.01, 1.0
@@ -81,7 +83,9 @@ class SensorConfig:
         ok = len(knots) >= 1 and all(0 <= s <= 1 and 0 <= p <= 1 for s, p in knots)
         rising = all(b[0] > a[0] and b[1] >= a[1] for a, b in zip(knots, knots[1:], strict=False))
         if not (ok and rising):
-            raise ConfigError("sensor.score_precision: scores must rise, precisions must not fall, all in [0, 1]")
+            raise ConfigError(
+                "sensor.score_precision: scores must rise, precisions must not fall, all in [0, 1]"
+            )
 
 
 @dataclass(frozen=True)
@@ -97,7 +101,9 @@ class MotionConfig:
     """Constant acceleration driven by white jerk (paper eq. 2) and the prior of a new track."""
 
     jerk_px: float = number(0.0, "px/s^2.5", "root spectral density of jerk that does not depend on size")
-    jerk_per_size: float = number(10.0, "1/s^2.5", "root spectral density of jerk per px of box size sqrt(w h)")
+    jerk_per_size: float = number(
+        10.0, "1/s^2.5", "root spectral density of jerk per px of box size sqrt(w h)"
+    )
     velocity_std_px: float = number(20.0, "px/s", "std of a new track's velocity")
     velocity_std_per_size: float = number(3.0, "1/s", "std of a new track's velocity per px of box size")
     acceleration_std_px: float = number(1.0, "px/s²", "std of a new track's acceleration", open_low=True)
@@ -144,8 +150,12 @@ class AssociationConfig:
     priority: tuple[str, ...] = field(
         default=(), metadata={"doc": "order of sensors for `sequential`; those not named follow by name"}
     )
-    new_object_density: float = number(
-        0.1, "1", "expected unborn vehicles a scan, against which taking a detection is weighed", open_low=True
+    second_pass: bool = field(
+        default=True,
+        metadata={"doc": "joint and sequential: a matched track takes another sensor's leftover"},
+    )
+    clutter_memory_s: float = number(
+        10.0, "s", "memory of the running estimate of each sensor's clutter; 0 keeps the configured one"
     )
     log_size_range: float = number(
         3.0, "ln px", "range of ln width and of ln height over which false boxes spread", open_low=True
@@ -159,23 +169,38 @@ class LifecycleConfig:
     method: str = choice("existence", ("existence", "hits"), "Bernoulli existence, or the paper's hit counts")
     confirm_existence: float = number(0.9, "1", "confirmed at this probability of existence", 0.0, 1.0)
     delete_existence: float = number(0.02, "1", "deleted below this probability of existence", 0.0, 1.0)
-    lifetime_s: float = number(20.0, "s", "mean time a vehicle stays in the picture (decay of existence)", open_low=True)
+    lifetime_s: float = number(
+        20.0, "s", "mean time a vehicle stays in the picture (decay of existence)", open_low=True
+    )
     p_detect_weight: float = number(0.05, "1", "weight of one look in a track's own P_D per sensor", 0.0, 1.0)
     p_detect_min: float = number(0.05, "1", "least P_D of a track", 0.001, 0.999)
     p_detect_max: float = number(0.98, "1", "greatest P_D of a track", 0.001, 0.999)
     confirm_age_s: float = number(0.5, "s", "paper: age before confirmation")
     confirm_hits: int = number(5, "1", "paper: hits before confirmation", low=1)
-    max_gap_confirmed_s: float = number(1.0, "s", "a confirmed track without update is deleted after this (paper .5)")
-    max_gap_tentative_s: float = number(0.3, "s", "a tentative track without update is deleted after this (paper .2)")
+    max_gap_confirmed_s: float = number(
+        1.0, "s", "a confirmed track without update is deleted after this (paper .5)"
+    )
+    leave_picture: bool = field(
+        default=True, metadata={"doc": "a track whose centre leaves the picture ends"}
+    )
+    max_gap_tentative_s: float = number(
+        0.3, "s", "a tentative track without update is deleted after this (paper .2)"
+    )
 
 
 @dataclass(frozen=True)
 class BirthConfig:
     """When a detection that no track took starts a new one."""
 
-    min_precision: float = number(0.05, "1", "least calibrated precision of a detection that starts a track", 0.0, 1.0)
+    min_precision: float = number(
+        0.05, "1", "least calibrated precision of a detection that starts a track", 0.0, 1.0
+    )
     max_overlap: float = number(
-        0.7, "1", "no birth where the IoU with a track, or with another birth of this batch, is above", 0.0, 1.0
+        0.7,
+        "1",
+        "no birth where the IoU with a track, or with another birth of this batch, is above",
+        0.0,
+        1.0,
     )
 
 
@@ -185,7 +210,9 @@ class MergeConfig:
 
     enabled: bool = field(default=True, metadata={"doc": "merge duplicates"})
     min_overlap: float = number(0.7, "1", "IoU above which two tracks may be one", 0.0, 1.0)
-    gate_probability: float = number(0.99, "1", "χ² mass within which their velocities agree", 0.5, 1.0 - 1e-12)
+    gate_probability: float = number(
+        0.99, "1", "χ² mass within which their velocities agree", 0.5, 1.0 - 1e-12
+    )
 
 
 @dataclass(frozen=True)
@@ -193,7 +220,9 @@ class OutputConfig:
     """Which tracks the causal table reports."""
 
     min_existence: float = number(0.5, "1", "reported only above this probability of existence", 0.0, 1.0)
-    max_gap_s: float = number(0.25, "s", "reported only if updated within this time (paper: as long as it lives)")
+    max_gap_s: float = number(
+        0.25, "s", "reported only if updated within this time (paper: as long as it lives)"
+    )
     clip: bool = field(default=True, metadata={"doc": "clip boxes to the picture; drop those outside it"})
     min_visible: float = number(
         0.3, "1", "reported only if this fraction of the box lies in the picture", 0.0, 1.0
@@ -221,8 +250,10 @@ class Config:
         if len(self.sensors) > 63:
             raise ConfigError(f"sensors: at most 63, not {len(self.sensors)}")
         for name in self.sensors:
-            if not name or any(c in name for c in "|,\n\r\"") or name != name.strip():
-                raise ConfigError(f"sensors: {name!r} cannot be a name (empty, or holds | , quote or newline)")
+            if not name or any(c in name for c in '|,\n\r"') or name != name.strip():
+                raise ConfigError(
+                    f"sensors: {name!r} cannot be a name (empty, or holds | , quote or newline)"
+                )
         unknown = [name for name in self.association.priority if name not in self.sensors]
         if unknown:
             raise ConfigError(f"association.priority: {unknown[0]!r} is not a declared sensor")

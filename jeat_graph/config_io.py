@@ -51,7 +51,9 @@ def config_from_dict(tree: Mapping[str, Any]) -> Config:
     if not isinstance(sensors, Mapping) or not sensors:
         raise ConfigError("sensors: at least one sensor must be declared")
     parts: dict[str, Any] = {
-        "sensors": {str(name): _build(SensorConfig, value, f"sensors.{name}.") for name, value in sensors.items()}
+        "sensors": {
+            str(name): _build(SensorConfig, value, f"sensors.{name}.") for name, value in sensors.items()
+        }
     }
     _check_keys(tree, [f.name for f in dataclasses.fields(Config)], "")
     hints = typing.get_type_hints(Config)
@@ -131,7 +133,9 @@ def _apply_override(tree: dict[str, Any], text: str) -> None:
             child = {}  # a section the preset leaves at its defaults; an unknown one is refused later
         elif child is None:
             near = difflib.get_close_matches(step, [str(k) for k in node], 1)
-            raise ConfigError(f"--set {key}: {step!r} is not declared" + (f"; did you mean {near[0]}?" if near else ""))
+            raise ConfigError(
+                f"--set {key}: {step!r} is not declared" + (f"; did you mean {near[0]}?" if near else "")
+            )
         if not isinstance(child, dict):
             raise ConfigError(f"--set {key}: {step!r} has no keys below it")
         node[step] = dict(child)

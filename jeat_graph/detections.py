@@ -12,10 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.errors import DataError
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 
 def check_boxes(boxes: npt.ArrayLike, scores: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -210,7 +208,9 @@ class Detections:
 
     def to_rows(
         self,
-    ) -> tuple[FloatArray, npt.NDArray[np.str_], FloatArray, FloatArray, npt.NDArray[np.bool_], npt.NDArray[np.str_]]:
+    ) -> tuple[
+        FloatArray, npt.NDArray[np.str_], FloatArray, FloatArray, npt.NDArray[np.bool_], npt.NDArray[np.str_]
+    ]:
         """Flatten to one row a detection, and one row for each empty scan.
 
         Returns:
@@ -262,9 +262,7 @@ class Detections:
         """Keep the scans of some sensors only; names that do not occur are passed over."""
         wanted = set(sensors)
         keep = np.array([name in wanted for name in self.sensors], dtype=bool)
-        return Detections.from_scans(
-            self.scan(k) for k in range(self.num_scans) if keep[self.scan_sensor[k]]
-        )
+        return Detections.from_scans(self.scan(k) for k in range(self.num_scans) if keep[self.scan_sensor[k]])
 
 
 def _trusted_scan(t: float, sensor: str, boxes: FloatArray, scores: FloatArray) -> Scan:

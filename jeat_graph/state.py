@@ -1,0 +1,77 @@
+"""State of all tracks at once: a structure of preallocated arrays, one row a track, the oldest first."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.arrays import FloatArray, IntArray
+
+
+class TrackArrays(NamedTuple):
+    """Arrays of capacity C for tracks and S sensors; rows beyond the number of living tracks are unused.
+
+    Attributes:
+        mean: (C, 2, 3) per axis [p, v, a] of the box centre (px, px/s, px/s²).
+        cov: (C, 2, 3, 3) covariance per axis; the axes are independent.
+        size_mean: (C, 2, 2) ln width and ln height, each with its rate (1/s).
+        size_cov: (C, 2, 2, 2) covariance of each.
+        scale: (C, S) noise scale s of paper eq. 5.
+        p_detect: (C, S) running estimate of each sensor's probability of detecting this track.
+        existence: (C,) probability that the track is a vehicle.
+        confirmed: (C,) whether it has been confirmed.
+        track_id: (C,) identity, ascending.
+        hits: (C,) number of detections taken.
+        t_birth: (C,) time of the first detection (s).
+        t_update: (C,) time of the last one (s).
+        used: (C,) bit s is set where sensor s's detection was taken in the last step.
+    """
+
+    mean: FloatArray
+    cov: FloatArray
+    size_mean: FloatArray
+    size_cov: FloatArray
+    scale: FloatArray
+    p_detect: FloatArray
+    existence: FloatArray
+    confirmed: npt.NDArray[np.bool_]
+    track_id: IntArray
+    hits: IntArray
+    t_birth: FloatArray
+    t_update: FloatArray
+    used: IntArray
+
+
+def allocate(capacity: int, num_sensors: int) -> TrackArrays:
+    """Allocate zeroed arrays for `capacity` tracks and `num_sensors` sensors."""
+    return TrackArrays(
+        mean=np.zeros((capacity, 2, 3)),
+        cov=np.zeros((capacity, 2, 3, 3)),
+        size_mean=np.zeros((capacity, 2, 2)),
+        size_cov=np.zeros((capacity, 2, 2, 2)),
+        scale=np.zeros((capacity, num_sensors)),
+        p_detect=np.zeros((capacity, num_sensors)),
+        existence=np.zeros(capacity),
+        confirmed=np.zeros(capacity, dtype=np.bool_),
+        track_id=np.zeros(capacity, dtype=np.int64),
+        hits=np.zeros(capacity, dtype=np.int64),
+        t_birth=np.zeros(capacity),
+        t_update=np.zeros(capacity),
+        used=np.zeros(capacity, dtype=np.int64),
+    )
+
+
+def grow(tracks: TrackArrays, num_tracks: int, capacity: int) -> TrackArrays:
+    """Return arrays of at least `capacity` rows that hold the first `num_tracks` rows of `tracks`.
+
+    Capacity grows by doubling, so that n births cost O(n) copies in all.
+    """
+    old = len(tracks.existence)
+    if capacity <= old:
+        return tracks
+    larger = allocate(max(capacity, 2 * old), tracks.scale.shape[1])
+    for source, target in zip(tracks, larger, strict=True):
+        target[:num_tracks] = source[:num_tracks]
+    return larger

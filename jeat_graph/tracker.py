@@ -1,0 +1,161 @@
+"""The online tracker: scans in, the tracks of the moment out, nothing kept that grows."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.config import Config
+from jeat_graph.detections import Detections, Scan
+from jeat_graph.errors import TimeOrderError, UnknownSensorError
+from jeat_graph.reporting import report
+from jeat_graph.settings import kernel_settings, priority_order, sensor_arrays
+from jeat_graph.state import allocate, grow
+from jeat_graph.step import step
+from jeat_graph.trajectories import Trajectories
+
+ScanLike: TypeAlias = Scan | tuple[float, str, npt.ArrayLike, npt.ArrayLike]
+
+_FIRST_CAPACITY = 64
+
+
+class Tracker:
+    """Joint tracker of all vehicles over any number of asynchronous sensors (paper algorithm 1).
+
+    Feed it scans in time order. Each step sees only what has arrived: the table it returns is causal. Memory does
+    not grow with time.
+
+    Args:
+        config: sensors and settings, from `load_config`.
+
+    Example:
+        >>> from jeat_graph import Tracker, load_config
+        >>> tracker = Tracker(load_config("default"))
+        >>> table = tracker.step((0.0, "rgb", [[100, 100, 40, 30]], [0.9]))
+        >>> tracker.num_tracks
+        1
+    """
+
+    def __init__(self, config: Config) -> None:
+        self.config = config
+        self.sensor_names = config.sensor_names
+        self._index = {name: k for k, name in enumerate(self.sensor_names)}
+        self._sensors = sensor_arrays(config)
+        self._settings = kernel_settings(config)
+        self._priority = priority_order(config)
+        self._tracks = allocate(_FIRST_CAPACITY, len(self.sensor_names))
+        self._clutter = self._sensors.clutter.copy()
+        self._num_tracks = 0
+        self._next_id = 1
+        self._t: float | None = None
+
+    @property
+    def num_tracks(self) -> int:
+        """Number of living tracks, the tentative ones included."""
+        return self._num_tracks
+
+    @property
+    def num_born(self) -> int:
+        """Number of tracks started so far."""
+        return self._next_id - 1
+
+    @property
+    def time(self) -> float | None:
+        """Time of the last step (s), or None before the first."""
+        return self._t
+
+    def step(self, scans: ScanLike | Sequence[ScanLike]) -> Trajectories:
+        """Take in one scan, or several of one and the same time, which are associated jointly.
+
+        Args:
+            scans: a `Scan` or a tuple (t, sensor, boxes (M, 4), scores (M,)), or a sequence of these. A scan that
+                found nothing (M = 0) is information too.
+
+        Returns:
+            The tracks that are reported now, one row each.
+
+        Raises:
+            DataError: boxes or scores that are not valid.
+            UnknownSensorError: a sensor that the configuration does not declare.
+            TimeOrderError: a time before that of the last step. In all three cases the state is as before.
+        """
+        batch = _as_scans(scans)
+        t = batch[0].t
+        if any(scan.t != t for scan in batch):
+            raise TimeOrderError("the scans of one step must have one and the same time")
+        if self._t is not None and t < self._t:
+            raise TimeOrderError(f"scan at t = {t} s is older than the last one at {self._t} s")
+        codes = [self._sensor_index(scan.sensor) for scan in batch]
+        if len(batch) == 1:
+            boxes, scores = batch[0].boxes, batch[0].scores
+            sensor = np.full(len(scores), codes[0], dtype=np.int64)
+        else:
+            boxes = np.concatenate([scan.boxes for scan in batch])
+            scores = np.concatenate([scan.scores for scan in batch])
+            sensor = np.repeat(np.array(codes, dtype=np.int64), [len(scan) for scan in batch])
+        present = np.zeros(len(self.sensor_names), dtype=np.bool_)
+        present[codes] = True
+
+        self._tracks = grow(self._tracks, self._num_tracks, self._num_tracks + len(scores))
+        self._num_tracks, self._next_id = step(
+            self._tracks,
+            self._num_tracks,
+            self._next_id,
+            0.0 if self._t is None else t - self._t,
+            t,
+            boxes,
+            scores,
+            sensor,
+            present,
+            self._clutter,
+            self._sensors,
+            self._settings,
+            self._priority,
+        )
+        self._t = t
+        return self.causal()
+
+    def causal(self) -> Trajectories:
+        """Return the tracks that are reported now, as the last step did."""
+        t = 0.0 if self._t is None else self._t
+        columns = report(self._tracks, self._num_tracks, t, self._settings)
+        return Trajectories(*columns, sensors=self.sensor_names)
+
+    def run(self, detections: Detections) -> Iterator[Trajectories]:
+        """Step through a recording and yield the table of each time; scans of one time are taken jointly."""
+        for batch in detections.batches():
+            yield self.step(batch)
+
+    def _sensor_index(self, name: str) -> int:
+        index = self._index.get(name)
+        if index is None:
+            near = difflib.get_close_matches(name, self.sensor_names, 1)
+            hint = f"did you mean {near[0]!r}?" if near else f"declared: {', '.join(self.sensor_names)}"
+            raise UnknownSensorError(f"sensor {name!r} is not declared in the configuration; {hint}")
+        return index
+
+
+def track(config: Config, detections: Detections) -> Trajectories:
+    """Track a recording from beginning to end and return the whole causal table.
+
+    Args:
+        config: sensors and settings.
+        detections: the recording.
+    """
+    return Trajectories.concatenate(list(Tracker(config).run(detections)) or [Trajectories.empty()])
+
+
+def _as_scans(scans: Any) -> list[Scan]:
+    if isinstance(scans, Scan):
+        return [scans]
+    if isinstance(scans, tuple) and len(scans) == 4 and isinstance(scans[1], str):
+        return [Scan(*scans)]
+    if isinstance(scans, Iterable):
+        out = [scan if isinstance(scan, Scan) else Scan(*scan) for scan in scans]
+        if out:
+            return out
+    raise TypeError("step takes a Scan, a tuple (t, sensor, boxes, scores), or a sequence of these")
