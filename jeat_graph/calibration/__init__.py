@@ -1,0 +1,1 @@
+"""Calibration: what a configuration says of sensors and motion, estimated from recordings."""

@@ -1,0 +1,157 @@
+"""Motion model from data: jerk density and the prior of a new track, by the innovation likelihood."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from scipy.optimize import minimize
+
+from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.config import MotionConfig, SizeConfig
+from jeat_graph.errors import DataError
+from jeat_graph.filters.aekf import update_block
+from jeat_graph.filters.motion import (
+    process_noise,
+    size_process_noise,
+    size_transition,
+    transition,
+)
+
+# Innovations beyond this many standard deviations are outliers and count as if they were this large.
+_HUBER = 3.0
+_MAX_GAP_S = 1.0
+
+
+@njit(cache=True)
+def innovation_loss(
+    t: FloatArray,
+    z: FloatArray,
+    R: FloatArray,
+    side: FloatArray,
+    start: IntArray,
+    jerk_per_size: float,
+    velocity_std_per_size: float,
+    acceleration_std_per_size: float,
+) -> float:
+    """Robust negative log likelihood of the innovations of many tracks, one axis.
+
+    Args:
+        t: (K,) times (s), ascending within a track.
+        z: (K,) measured coordinate (px).
+        R: (K,) its variance (px²).
+        side: (K,) box size sqrt(w h) (px).
+        start: (T + 1,) track i owns the rows start[i]:start[i + 1].
+        jerk_per_size: root spectral density of jerk per px of size (1/s^2.5).
+        velocity_std_per_size: std of a new track's velocity per px of size (1/s).
+        acceleration_std_per_size: the same of its acceleration (1/s²).
+    """
+    loss = 0.0
+    for i in range(len(start) - 1):
+        m = np.zeros(3)
+        P = np.zeros((3, 3))
+        for k in range(start[i], start[i + 1]):
+            dt = t[k] - t[k - 1] if k > start[i] else 0.0
+            if k == start[i] or dt > _MAX_GAP_S:
+                m[:] = 0.0
+                m[0] = z[k]
+                P[:] = 0.0
+                P[0, 0] = R[k]
+                P[1, 1] = (velocity_std_per_size * side[k]) ** 2
+                P[2, 2] = (acceleration_std_per_size * side[k]) ** 2
+                continue
+            F = transition(dt)
+            m = F @ m
+            P = F @ P @ F.T + process_noise(dt, jerk_per_size * side[k])
+            S = P[0, 0] + R[k]
+            e = abs(z[k] - m[0]) / np.sqrt(S)
+            loss += 0.5 * np.log(S) + (0.5 * e * e if e < _HUBER else _HUBER * e - 0.5 * _HUBER**2)
+            update_block(m, P, z[k], R[k] if e < _HUBER else R[k] * (e / _HUBER) ** 2)
+    return loss
+
+
+@njit(cache=True)
+def size_loss(
+    t: FloatArray, z: FloatArray, R: FloatArray, start: IntArray, rate_density: float, rate_std: float
+) -> float:
+    """Robust negative log likelihood of the innovations of ln width or ln height; arguments as above."""
+    loss = 0.0
+    for i in range(len(start) - 1):
+        m = np.zeros(2)
+        P = np.zeros((2, 2))
+        for k in range(start[i], start[i + 1]):
+            dt = t[k] - t[k - 1] if k > start[i] else 0.0
+            if k == start[i] or dt > _MAX_GAP_S:
+                m[0] = z[k]
+                m[1] = 0.0
+                P[:] = 0.0
+                P[0, 0] = R[k]
+                P[1, 1] = rate_std**2
+                continue
+            F = size_transition(dt)
+            m = F @ m
+            P = F @ P @ F.T + size_process_noise(dt, rate_density)
+            S = P[0, 0] + R[k]
+            e = abs(z[k] - m[0]) / np.sqrt(S)
+            loss += 0.5 * np.log(S) + (0.5 * e * e if e < _HUBER else _HUBER * e - 0.5 * _HUBER**2)
+            update_block(m, P, z[k], R[k] if e < _HUBER else R[k] * (e / _HUBER) ** 2)
+    return loss
+
+
+def fit_motion(
+    t: FloatArray, z: FloatArray, R: FloatArray, side: FloatArray, start: IntArray
+) -> MotionConfig:
+    """Fit the motion model to measured tracks.
+
+    Args:
+        t: (K,) times (s), ascending within a track.
+        z: (K, 2) measured centres (px), bias removed.
+        R: (K, 2) variances (px²).
+        side: (K,) box size sqrt(w h) (px).
+        start: (T + 1,) track i owns the rows start[i]:start[i + 1].
+
+    Raises:
+        DataError: no track has three measurements.
+    """
+    if len(start) < 2 or np.diff(start).max(initial=0) < 3:
+        raise DataError("no object was detected three times; motion cannot be estimated")
+
+    def loss(log_parameters: FloatArray) -> float:
+        jerk, velocity, acceleration = np.exp(np.clip(log_parameters, -8.0, 8.0))
+        total = 0.0
+        for axis in range(2):
+            total += innovation_loss(t, z[:, axis], R[:, axis], side, start, jerk, velocity, acceleration)
+        # A weak pull to one keeps a parameter that the data say nothing of from running away.
+        return total + 0.02 * float(np.sum(np.asarray(log_parameters) ** 2))
+
+    found = minimize(
+        loss, np.log([2.0, 1.0, 1.0]), method="Nelder-Mead", options={"xatol": 1e-2, "fatol": 1e-2}
+    )
+    jerk, velocity, acceleration = np.exp(np.clip(found.x, -8.0, 8.0))
+    return MotionConfig(
+        jerk_px=0.0,
+        jerk_per_size=float(jerk),
+        velocity_std_px=0.0,
+        velocity_std_per_size=float(velocity),
+        acceleration_std_px=1e-3,
+        acceleration_std_per_size=float(acceleration),
+    )
+
+
+def fit_size(t: FloatArray, z: FloatArray, R: FloatArray, start: IntArray) -> SizeConfig:
+    """Fit the size filter to measured tracks.
+
+    Args:
+        t: (K,) times (s), ascending within a track.
+        z: (K, 2) measured ln width, ln height, bias removed.
+        R: (K, 2) variances.
+        start: (T + 1,) track i owns the rows start[i]:start[i + 1].
+    """
+
+    def loss(log_parameters: FloatArray) -> float:
+        density, rate = np.exp(np.clip(log_parameters, -8.0, 4.0))
+        total = sum(size_loss(t, z[:, side], R[:, side], start, density, rate) for side in range(2))
+        return float(total + 0.02 * np.sum(np.asarray(log_parameters) ** 2))
+
+    found = minimize(loss, np.log([0.3, 0.3]), method="Nelder-Mead", options={"xatol": 1e-2, "fatol": 1e-2})
+    density, rate = np.exp(np.clip(found.x, -8.0, 4.0))
+    return SizeConfig(rate_density=float(density), rate_std=float(rate))

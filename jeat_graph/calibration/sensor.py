@@ -1,0 +1,166 @@
+"""One sensor's noise, bias, score curve, detection probability and clutter, from matched detections."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import isotonic_regression, minimize, minimize_scalar
+
+from jeat_graph.arrays import FloatArray
+from jeat_graph.calibration.matches import SensorMatches
+from jeat_graph.config import SensorConfig
+from jeat_graph.errors import DataError
+
+_MIN_PAIRS = 20
+_MAX_KNOTS = 12
+
+
+def calibrate_sensor(matches: SensorMatches, rate_hz: float) -> SensorConfig:
+    """Estimate all that the configuration says of one sensor.
+
+    Args:
+        matches: its detections beside the truth.
+        rate_hz: its rate (Hz).
+
+    Raises:
+        DataError: fewer than 20 detections of vehicles.
+    """
+    if int(matches.correct.sum()) < _MIN_PAIRS:
+        raise DataError(
+            f"only {int(matches.correct.sum())} detections match the truth; at least {_MIN_PAIRS} are needed"
+        )
+    bias = np.median(matches.residual, axis=0)
+    centred = matches.residual - bias
+    sigma_x, rho_x = fit_noise(centred[:, 0] * matches.side[:, 0], matches.side[:, 0])
+    sigma_y, rho_y = fit_noise(centred[:, 1] * matches.side[:, 1], matches.side[:, 1])
+    p_detect, blind = fit_detection(matches.seen, matches.speed)
+    precision = np.clip((matches.correct.sum() + 0.5) / (len(matches.correct) + 1.0), 0.001, 0.999)
+    false = ~matches.correct
+    return SensorConfig(
+        rate_hz=rate_hz,
+        # One floor for both axes; each axis' own part goes with its side.
+        sigma_px=float(max(np.sqrt(0.5 * (sigma_x**2 + sigma_y**2)), 0.1)),
+        rho_x=rho_x,
+        rho_y=rho_y,
+        sigma_log_width=float(max(robust_std(centred[:, 2]), 0.005)),
+        sigma_log_height=float(max(robust_std(centred[:, 3]), 0.005)),
+        bias=(float(bias[0]), float(bias[1]), float(bias[2]), float(bias[3])),
+        p_detect=float(np.clip(p_detect, 0.05, 0.99)),
+        clutter_per_scan=float((false.sum() + 0.5) / matches.scans),
+        precision=float(precision),
+        score_precision=fit_precision(matches.score, matches.correct),
+        tempering=fit_tempering(matches),
+        blind_speed=blind,
+    )
+
+
+def robust_std(values: FloatArray) -> float:
+    """Standard deviation after values beyond 3.5 times the scaled median absolute deviation are left out."""
+    middle = np.median(values)
+    spread = 1.4826 * np.median(np.abs(values - middle))
+    kept = values[np.abs(values - middle) <= max(3.5 * spread, 1e-9)]
+    return float(np.sqrt(np.mean((kept - middle) ** 2)))
+
+
+def fit_noise(residual: FloatArray, side: FloatArray) -> tuple[float, float]:
+    """Fit var = σ² + (ρ side)² by maximum likelihood under a Student-t of 5 degrees of freedom.
+
+    Args:
+        residual: (C,) errors of a coordinate (px).
+        side: (C,) width or height (px).
+
+    Returns:
+        σ (px) and ρ (1), scaled so that they give the variance of the bulk of the errors.
+    """
+    nu = 5.0
+
+    def loss(log_parameters: FloatArray) -> float:
+        sigma, rho = np.exp(log_parameters)
+        var = sigma**2 + (rho * side) ** 2
+        return float(np.sum(0.5 * np.log(var) + 0.5 * (nu + 1.0) * np.log1p(residual**2 / (nu * var))))
+
+    spread = max(robust_std(residual), 1e-3)
+    first = np.log([0.7 * spread, 0.7 * spread / np.median(side)])
+    found = minimize(
+        loss, first, method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-4, "maxiter": 2000}
+    )
+    sigma, rho = np.exp(found.x)
+    # The scale of a t is smaller than the deviation of its bulk; the whitened errors tell by how much.
+    ratio = robust_std(residual / np.sqrt(sigma**2 + (rho * side) ** 2))
+    return float(sigma * ratio), float(np.clip(rho * ratio, 0.0, 1.0))
+
+
+def fit_precision(score: FloatArray, correct: np.ndarray) -> tuple[tuple[float, float], ...]:  # type: ignore[type-arg]
+    """Calibrate score → precision: isotonic regression on quantile bins, each shrunk to the overall precision.
+
+    Args:
+        score: (D,) in [0, 1].
+        correct: (D,) whether the detection is of a vehicle.
+
+    Returns:
+        Up to 12 knots (score, precision) with rising scores and precisions that do not fall.
+    """
+    order = np.argsort(score, kind="stable")
+    s, c = score[order], correct[order].astype(float)
+    overall = (c.sum() + 0.5) / (len(c) + 1.0)
+    bins = np.array_split(np.arange(len(s)), min(_MAX_KNOTS, max(len(s) // 25, 1)))
+    centre = np.array([s[b].mean() for b in bins])
+    weight = np.array([float(len(b)) for b in bins])
+    # Two pseudo-observations at the overall precision keep a bin from claiming certainty.
+    value = np.array([(c[b].sum() + 2.0 * overall) / (len(b) + 2.0) for b in bins])
+    rising = isotonic_regression(value, weights=weight).x
+    keep = np.concatenate(([True], np.diff(centre) > 1e-6))
+    return tuple(
+        (round(float(a), 6), round(float(np.clip(b, 0.002, 0.998)), 5))
+        for a, b in zip(centre[keep], rising[keep], strict=True)
+    )
+
+
+def fit_tempering(matches: SensorMatches) -> float:
+    """Exponent on evidence for false boxes that repeat: one over the mean number of repeats of a false box.
+
+    Evidence of false boxes that come n in a row is worth one box, not n. The mean is over false boxes, so long
+    runs weigh as much as they hurt.
+    """
+    run = matches.run[~matches.correct]
+    if len(run) == 0:
+        return 1.0
+    return float(np.clip(1.0 / run.mean(), 0.1, 1.0))
+
+
+def fit_detection(seen: np.ndarray, speed: FloatArray) -> tuple[float, float]:  # type: ignore[type-arg]
+    """Fit P_D and, if the data speak for it, the speed below which the sensor is blind.
+
+    P_D(v) = P₀ (1 − exp(−(v / v_blind)²)), accepted over a constant P_D where it raises the log likelihood by more
+    than 10 (a Bayes factor no chance explains).
+
+    Args:
+        seen: (G,) whether each true box was detected.
+        speed: (G,) its image speed (px/s), NaN where not known.
+
+    Returns:
+        P₀ and v_blind (px/s), 0 for a sensor that sees what stands still.
+    """
+    flat = float((seen.sum() + 1.0) / (len(seen) + 2.0))
+    known = np.isfinite(speed)
+    if known.sum() < 100:
+        return flat, 0.0
+    y, v = seen[known].astype(float), speed[known]
+
+    def log_likelihood(p: FloatArray | float) -> float:
+        q = np.clip(p, 1e-6, 1.0 - 1e-6)
+        return float(np.sum(y * np.log(q) + (1.0 - y) * np.log1p(-q)))
+
+    def best_p0(blind: float) -> float:
+        factor = 1.0 - np.exp(-((v / blind) ** 2))
+        # The ratio of means is the moment estimate of P₀ and close to the most likely one.
+        return float(np.clip(y[factor > 0.5].mean() if (factor > 0.5).any() else 0.5, 0.05, 0.99))
+
+    def loss(log_blind: float) -> float:
+        blind = float(np.exp(log_blind))
+        return -log_likelihood(best_p0(blind) * (1.0 - np.exp(-((v / blind) ** 2))))
+
+    found = minimize_scalar(loss, bounds=(np.log(0.5), np.log(100.0)), method="bounded")
+    if -found.fun - log_likelihood(float(y.mean())) < 10.0:
+        return flat, 0.0
+    blind = float(np.exp(found.x))
+    return best_p0(blind), blind
