@@ -1,0 +1,239 @@
+"""Detections from and to files, whatever the format."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jeat_graph.arrays import BoolArray, FloatArray
+from jeat_graph.detections import Detections, find_bad_row
+from jeat_graph.errors import DataError
+from jeat_graph.io import coco, kitti, motchallenge, prophesee
+from jeat_graph.io.formats import recognise
+from jeat_graph.io.frames import check_rate, fill_frames, gap_times, scale_scores, score_hint
+from jeat_graph.io.plain_text import frames_of
+from jeat_graph.io.table_writer import round_decimals, write_columns
+from jeat_graph.io.tables import Table, read_table
+
+DEFAULT_SENSOR = "rgb"
+_BOX = ("left", "top", "width", "height")
+_COLUMNS = ("t", "sensor", *_BOX, "score")
+
+
+def read_detections(
+    path: str | Path,
+    *,
+    sensor: str | None = None,
+    rate_hz: float | None = None,
+    fmt: str | None = None,
+    score_scale: str = "unit",
+    fill_empty: bool = True,
+    images: str | Path | None = None,
+) -> Detections:
+    """Read detections from a file of any known format.
+
+    ============  ==========================================================================================
+    csv, parquet  `t, sensor, left, top, width, height, score[, class]`, rows in any order; a row with only
+                  `t` and `sensor` is an empty scan. Other columns are passed over.
+    motchallenge  `frame, id, left, top, width, height, conf, …`, frames from 1; rate from `rate_hz` or
+                  `seqinfo.ini`.
+    kitti         tracking labels with a score (18 columns), frames from 0; 10 Hz unless `rate_hz` says else.
+    prophesee     structured `.npy` with `t` or `ts` (µs), `x, y, w, h`, `class_confidence` or `confidence`.
+    coco          results JSON; times from `images`, else image_id / `rate_hz`.
+    ============  ==========================================================================================
+
+    Only CSV and Parquet can say that a scan found nothing. For the others, with `fill_empty`, frames between
+    the first and the last that have no box become empty scans (to the length in `seqinfo.ini`, if there is
+    one; by `rate_hz` for `prophesee`, and only if it is given; all listed images for `coco`).
+
+    Args:
+        path: the file.
+        sensor: the sensor's name where the format has none (default `rgb`); renames the one sensor of a CSV
+            or Parquet file, or names it if the file has no such column.
+        rate_hz: frames per second.
+        fmt: the format, if it should not be recognised from the file.
+        score_scale: `unit` if scores are in [0, 1], `percent`, or `logistic` for raw scores of any size.
+        fill_empty: whether frames without boxes are empty scans rather than no scans.
+        images: COCO data set JSON with the list of images.
+
+    Raises:
+        DataError: names the file, the line or row, and what is wrong.
+    """
+    kind = recognise(path, fmt)
+    if kind in ("csv", "parquet"):
+        return _read_contract(path, sensor, score_scale)
+    name = DEFAULT_SENSOR if sensor is None else sensor
+    if kind == "coco":
+        return _read_coco(path, name, rate_hz, score_scale, fill_empty, images)
+    classes: Any
+    missing: FloatArray = np.zeros(0)
+    if kind == "motchallenge":
+        table = motchallenge.read_lines(path)
+        rate, length = motchallenge.sequence_rate(path, rate_hz)
+        frame = frames_of(table, motchallenge.FIRST_FRAME) - motchallenge.FIRST_FRAME
+        t, boxes, classes = frame / rate, motchallenge.boxes_of(table), motchallenge.class_names(table)
+        scores = _scores(table, "conf", "column 7 (confidence)")
+        if fill_empty:
+            wanted = fill_frames(frame + 1, path, length) - 1
+            missing = np.setdiff1d(wanted, frame) / rate
+    elif kind == "kitti":
+        table = kitti.read_lines(path)
+        rate = check_rate(kitti.RATE_HZ if rate_hz is None else rate_hz, path)
+        frame = frames_of(table, kitti.FIRST_FRAME)
+        t, boxes, classes = frame / rate, kitti.boxes_of(table), table.text("type")
+        scores = _scores(table, "score", "column 18 (score)")
+        if fill_empty:
+            missing = np.setdiff1d(fill_frames(frame, path), frame) / rate
+    else:
+        table = prophesee.read_array(path)
+        t, boxes, classes = prophesee.times_of(table), prophesee.boxes_of(table), prophesee.class_names(table)
+        scores = _scores(table, "class_confidence", "the field class_confidence (or confidence)")
+        if fill_empty and rate_hz is not None:
+            missing = gap_times(t, rate_hz, path)
+    return _assemble(t, name, boxes, scale_scores(scores, score_scale, path), classes, missing, table.error)
+
+
+def read_many(paths: Sequence[str | Path], **options: Any) -> Detections:
+    """Read several files of one scene, such as one a sensor, into one.
+
+    Args:
+        paths: files, each alone or as `NAME=path` to name its sensor.
+        options: as `read_detections`, for all files.
+
+    Raises:
+        DataError: as `read_detections`; or two files whose format does not name sensors are not told apart.
+    """
+    if not paths:
+        raise DataError("no detections file given")
+    parts: list[Detections] = []
+    unnamed: str | Path | None = None
+    for item in paths:
+        name, path = split_name(item)
+        name = name if name is not None else options.get("sensor")
+        if name is None and recognise(path, options.get("fmt")) not in ("csv", "parquet"):
+            if unnamed is not None:
+                raise DataError(f"does not name its sensor, nor does {unnamed}; give NAME=path", path)
+            unnamed = path
+        parts.append(read_detections(path, **{**options, "sensor": name}))
+    return parts[0] if len(parts) == 1 else Detections.concatenate(parts)
+
+
+def split_name(item: str | Path) -> tuple[str | None, str | Path]:
+    """Split `NAME=path` into the name and the path; a file that is called so goes first."""
+    match = re.fullmatch(r"([^=/\\]+)=(.+)", str(item))
+    if match is None or Path(item).exists():
+        return None, item
+    return match[1], match[2]
+
+
+def write_detections(detections: Detections, path: str | Path, decimals: int | None = None) -> None:
+    """Write detections as CSV, or as Parquet where the name ends so; empty scans are rows without a box.
+
+    Args:
+        detections: what to write.
+        path: the file; it appears only when it is complete.
+        decimals: decimals (px) to which boxes are rounded; by default every number is kept to the last bit.
+    """
+    t, sensor, boxes, scores, _, classes = detections.to_rows()
+    if decimals is not None:
+        boxes = round_decimals(boxes, decimals)
+    columns: dict[str, Any] = {"t": t, "sensor": sensor}
+    columns |= {name: boxes[:, k] for k, name in enumerate(_BOX)}
+    columns["score"] = scores
+    if detections.classes is not None:
+        columns["class"] = classes
+    write_columns(columns, path)
+
+
+def _read_contract(path: str | Path, sensor: str | None, score_scale: str) -> Detections:
+    required = _COLUMNS if sensor is None else tuple(name for name in _COLUMNS if name != "sensor")
+    table = read_table(path, required, ("class", "sensor"), short=2)
+    t = table.number("t")
+    names = table.text("sensor", blank_ok=sensor is not None) if "sensor" in table else np.zeros(len(t), "U1")
+    if sensor is not None:
+        several = np.unique(names)
+        if len(several) > 1:
+            raise DataError(f"holds the sensors {', '.join(several)}; none can be renamed to {sensor}", path)
+        names = np.full(len(t), sensor)
+    values = [*_BOX, "score"]
+    blanks = np.stack([table.blank(name) for name in values], axis=1)
+    empty: BoolArray = np.asarray(blanks.all(axis=1))
+    torn = blanks.any(axis=1) & ~empty
+    if torn.any():
+        row = int(np.argmax(torn))
+        which = values[int(np.argmax(blanks[row]))]
+        raise table.error(row, f"{which} is missing; a scan that found nothing has only t and sensor")
+    columns = [table.number(name, blank_ok=True) for name in values]
+    boxes, scores = np.stack(columns[:4], axis=1), scale_scores(columns[4], score_scale, path)
+    classes = table.text("class", blank_ok=True) if "class" in table else None
+    if classes is not None and not (classes != "").any():
+        classes = None
+    _check(boxes, scores, ~empty, table.error)
+    return Detections.from_rows(t, names, boxes, scores, empty, classes)
+
+
+def _read_coco(
+    path: str | Path,
+    sensor: str,
+    rate_hz: float | None,
+    score_scale: str,
+    fill_empty: bool,
+    images: str | Path | None,
+) -> Detections:
+    found = coco.read_results(path, rate_hz, images)
+    missing = np.zeros(0)
+    if fill_empty and found.recorded is not None:
+        missing = np.setdiff1d(found.recorded, found.t)
+    elif fill_empty and rate_hz is not None:
+        missing = gap_times(found.t, rate_hz, path)
+
+    def error(row: int, message: str) -> DataError:
+        return DataError(f"entry {row + 1}: {message}", path)
+
+    scores = scale_scores(found.scores, score_scale, path)
+    return _assemble(found.t, sensor, found.boxes, scores, found.classes, missing, error)
+
+
+def _scores(table: Table, name: str, spoken: str) -> FloatArray:
+    if name not in table:
+        raise DataError(f"{spoken} is missing; detections need a score", table.path)
+    return table.number(name)
+
+
+def _check(
+    boxes: FloatArray, scores: FloatArray, rows: BoolArray, error: Callable[[int, str], DataError]
+) -> None:
+    """Refuse the first of the chosen rows that is no detection, at its place in the file."""
+    index = np.flatnonzero(rows)
+    bad = find_bad_row(boxes[index], scores[index])
+    if bad is not None:
+        row = int(index[bad[0]])
+        what = score_hint(float(scores[row])) if bad[1].startswith("score") else bad[1]
+        raise error(row, what)
+
+
+def _assemble(
+    t: FloatArray,
+    sensor: str,
+    boxes: FloatArray,
+    scores: FloatArray,
+    classes: Any,
+    missing: FloatArray,
+    error: Callable[[int, str], DataError],
+) -> Detections:
+    """Check boxes of one sensor and put empty scans at the `missing` times."""
+    n, gaps = len(t), len(missing)
+    _check(boxes, scores, np.ones(n, dtype=bool), error)
+    blank = np.full(gaps, np.nan)
+    return Detections.from_rows(
+        t=np.concatenate([t, missing]),
+        sensor=np.full(n + gaps, sensor),
+        boxes=np.concatenate([boxes, np.full((gaps, 4), np.nan)]),
+        scores=np.concatenate([scores, blank]),
+        empty=np.arange(n + gaps) >= n,
+        classes=None if classes is None else np.concatenate([classes, np.zeros(gaps, dtype="U1")]),
+    )

@@ -1,0 +1,75 @@
+"""Recognise a file's format, by what it says of itself first, then by its name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from jeat_graph.errors import DataError
+
+FORMATS = ("csv", "parquet", "motchallenge", "kitti", "prophesee", "coco")
+_MAGIC = {b"PAR1": "parquet", b"\x93NUMPY": "prophesee"}
+_SUFFIX = {".csv": "csv", ".parquet": "parquet", ".pq": "parquet", ".npy": "prophesee", ".json": "coco"}
+_HEAD_BYTES = 4096
+_KITTI_FIELDS = 17
+_MOT_FIELDS = 6
+
+
+def recognise(path: str | Path, fmt: str | None = None, allowed: Sequence[str] = FORMATS) -> str:
+    """Return the format of a file, one of `FORMATS`.
+
+    The first bytes decide for Parquet and NumPy files; then the suffix; a file of any other name is COCO if
+    it begins like JSON, KITTI if its first line is 17 or more words of which the third is no number,
+    MOTChallenge if its first line is numbers only, and else CSV.
+
+    Args:
+        path: the file.
+        fmt: the format, if the caller knows it; only checked.
+        allowed: the formats that make sense here.
+
+    Raises:
+        DataError: the file is missing, or the format is unknown or makes no sense here.
+    """
+    if fmt is None:
+        fmt = _guess(Path(path))
+    if fmt not in FORMATS:
+        raise DataError(f"unknown format {fmt!r}; known: {', '.join(allowed)}", path)
+    if fmt not in allowed:
+        raise DataError(f"is {fmt}; here only {', '.join(allowed)} can be read", path)
+    return fmt
+
+
+def _guess(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            head = file.read(_HEAD_BYTES)
+    except FileNotFoundError:
+        raise DataError("no such file", path) from None
+    except IsADirectoryError:
+        raise DataError("is a folder; give a file", path) from None
+    except (OSError, ValueError) as error:
+        raise DataError(f"cannot be read: {error}", path) from None
+    for magic, name in _MAGIC.items():
+        if head.startswith(magic):
+            return name
+    suffix = path.suffix.lower()
+    if suffix in _SUFFIX:
+        return _SUFFIX[suffix]
+    text = head.removeprefix(b"\xef\xbb\xbf").lstrip().decode("utf-8", errors="replace")
+    if text[:1] in ("[", "{"):
+        return "coco"
+    line = re.split(r"[\r\n]", text, maxsplit=1)[0]
+    words = line.split()
+    if len(words) >= _KITTI_FIELDS and "," not in line and not _is_number(words[2]):
+        return "kitti"
+    fields = re.split(r"\s*,\s*|\s+", line.strip())
+    return "motchallenge" if len(fields) >= _MOT_FIELDS and all(map(_is_number, fields)) else "csv"
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

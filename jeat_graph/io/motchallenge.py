@@ -1,0 +1,104 @@
+"""MOTChallenge text: `frame, id, left, top, width, height, conf, …`, frames counted from 1.
+
+Frame k is at time (k - 1) / rate. The rate is not in the file: it is the caller's, or that of the
+`seqinfo.ini` that MOTChallenge keeps beside (or in the folder above) its text files.
+
+What stands in columns 8 and up differs by year and is told by their number: with 9 columns the file is of
+2016 or later and column 8 is the class and 9 the visibility; with 10 columns, 8 to 10 are world coordinates,
+often -1, and there is no class. Column 7 is a detection's confidence; in truth, 0 there marks an object that
+is not to be judged.
+"""
+
+from __future__ import annotations
+
+import configparser
+from pathlib import Path
+
+import numpy as np
+
+from jeat_graph.arrays import FloatArray
+from jeat_graph.errors import DataError
+from jeat_graph.io.frames import check_rate
+from jeat_graph.io.plain_text import read_plain
+from jeat_graph.io.tables import Table
+
+FIRST_FRAME = 1
+_BASE = ("frame", "id", "left", "top", "width", "height")
+_COLUMNS = {
+    6: _BASE,
+    7: (*_BASE, "conf"),
+    8: (*_BASE, "conf", "class"),
+    9: (*_BASE, "conf", "class", "visibility"),
+    10: (*_BASE, "conf", "x", "y", "z"),
+}
+# The labels of the 2016 and later challenges, from 1.
+_CLASSES = (
+    "pedestrian",
+    "person_on_vehicle",
+    "car",
+    "bicycle",
+    "motorbike",
+    "non_motorized_vehicle",
+    "static_person",
+    "distractor",
+    "occluder",
+    "occluder_on_the_ground",
+    "occluder_full",
+    "reflection",
+    "crowd",
+)
+
+
+def read_lines(path: str | Path) -> Table:
+    """Read the columns `frame, id, left, top, width, height` and, if there, `conf` and `class`.
+
+    Raises:
+        DataError: names the first line with a wrong number of fields.
+    """
+    return read_plain(path, _COLUMNS, "MOTChallenge")
+
+
+def boxes_of(table: Table) -> FloatArray:
+    """Return left, top, width, height (R, 4) in px.
+
+    Raises:
+        DataError: names the first line where one of them is not a finite number.
+    """
+    return np.stack([table.number(name) for name in _BASE[2:]], axis=1)
+
+
+def class_names(table: Table) -> np.typing.NDArray[np.str_] | None:
+    """Return the class of each line (R,) by name (a number without a name as such), or None without one."""
+    if "class" not in table:
+        return None
+    number = table.whole("class")
+    distinct, index = np.unique(number, return_inverse=True)
+    names = [_CLASSES[k - 1] if 1 <= k <= len(_CLASSES) else "" if k < 0 else str(k) for k in distinct]
+    return np.asarray(names, dtype=np.str_)[index.reshape(-1)]
+
+
+def sequence_rate(path: str | Path, rate_hz: float | None) -> tuple[float, int | None]:
+    """Return the frame rate (Hz) and the number of frames, if that is known.
+
+    Args:
+        path: the text file; `seqinfo.ini` is looked for in its folder and the one above.
+        rate_hz: the caller's rate, which goes before that of the file.
+
+    Raises:
+        DataError: no rate is known, or it is not a positive number.
+    """
+    folder = Path(path).resolve().parent
+    info = next((p for p in (folder / "seqinfo.ini", folder.parent / "seqinfo.ini") if p.is_file()), None)
+    rate, length = None, None
+    if info is not None:
+        parser = configparser.ConfigParser(interpolation=None)
+        try:
+            parser.read(info, encoding="utf-8")
+            rate = parser.getfloat("Sequence", "frameRate", fallback=None)
+            length = parser.getint("Sequence", "seqLength", fallback=None)
+        except (configparser.Error, ValueError, OSError) as error:
+            raise DataError(f"cannot be read: {' '.join(str(error).split())}", info) from None
+    rate = rate if rate_hz is None else rate_hz
+    if rate is None:
+        raise DataError("MOTChallenge text has frame numbers only; give the frame rate (rate_hz)", path)
+    return check_rate(rate, path), length

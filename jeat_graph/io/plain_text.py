@@ -1,0 +1,75 @@
+"""Text files without a header, one box a line: what MOTChallenge and KITTI have in common."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.errors import DataError
+from jeat_graph.io.csv_text import CsvBody, read_text
+from jeat_graph.io.tables import Table, table_of
+
+
+def read_plain(path: str | Path, names: Mapping[int, Sequence[str]], kind: str) -> Table:
+    """Read lines of fields separated by commas or white space.
+
+    Args:
+        path: the file.
+        names: the column names by number of fields; the first line's count of fields decides.
+        kind: the format's name, for messages.
+
+    Raises:
+        DataError: names the first line with a wrong number of fields.
+    """
+    file = Path(path)
+    data = read_text(file)
+    data = re.sub(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)", b"", data)
+    data = re.sub(rb"[ \t]*,[ \t]*|[ \t]+", b",", data)
+    blank_lines = len(data) - len(data.lstrip())
+    first = re.split(rb"[\r\n]", data.lstrip(), maxsplit=1)[0]
+    width = first.count(b",") + 1
+    if width not in names:
+        known = " or ".join(str(count) for count in sorted(names))
+        line = 1 + len(data[:blank_lines].splitlines())
+        raise DataError(f"{width} fields, but a {kind} line has {known}", path, line)
+    body, columns = CsvBody(file, data, 1, width, "the first line has").parse()
+    return table_of(body, names[width], columns)
+
+
+def frames_of(table: Table, first: int) -> IntArray:
+    """Return the column `frame` (R,).
+
+    Args:
+        table: the file's table.
+        first: the number of a recording's first frame in this format.
+
+    Raises:
+        DataError: names the first line whose frame number is less than `first`, or is no whole number.
+    """
+    frame = table.whole("frame")
+    if (frame < first).any():
+        row = int(np.argmax(frame < first))
+        raise table.error(row, f"frames count from {first}, got {frame[row]}")
+    return frame
+
+
+def check_sizes(table: Table, boxes: FloatArray) -> None:
+    """Check that widths and heights are positive.
+
+    Args:
+        table: where the boxes are from.
+        boxes: (R, 4) left, top, width, height (px).
+
+    Raises:
+        DataError: names the first line or row with a width or height that is not positive.
+    """
+    bad = ~(boxes[:, 2:] > 0).all(axis=1)
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise table.error(
+            row, f"width and height must be positive, got {boxes[row, 2]:g} x {boxes[row, 3]:g}"
+        )

@@ -1,0 +1,160 @@
+"""Write tables to CSV or Parquet, piece by piece, the same bytes however the rows are cut into pieces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.arrays import FloatArray
+from jeat_graph.errors import DataError
+from jeat_graph.io.atomic import atomic_path
+from jeat_graph.io.tables import PARQUET_SUFFIXES
+
+# Rows kept in memory, and a Parquet row group. Fixed, because the bytes of a Parquet file depend on it.
+_CHUNK_ROWS = 1 << 16
+_MOST_DECIMALS = 22  # 10^22 is the largest power of ten that a float holds exactly
+
+
+class TableWriter:
+    """A context manager that writes rows and makes the file visible only when it is complete.
+
+    NaN, masked entries and empty text become blank fields (CSV) or nulls (Parquet, but for the text). Numbers
+    are written with as few digits as give the same number back.
+
+    Args:
+        path: the file; `.parquet` and `.pq` are Parquet, all else is text.
+        header: whether the first line of a text file names the columns.
+        delimiter: one character between the fields of a text file.
+    """
+
+    def __init__(self, path: str | Path, *, header: bool = True, delimiter: str = ",") -> None:
+        self._path = Path(path)
+        self._header = header
+        self._delimiter = delimiter
+        self._parquet = self._path.suffix.lower() in PARQUET_SUFFIXES
+        self._stack = ExitStack()
+        self._pending: list[Any] = []
+        self._sink: Any = None
+        self._target: Path | None = None
+
+    def __enter__(self) -> Self:
+        self._target = self._stack.enter_context(atomic_path(self._path))
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            if error is None:
+                self._write(everything=True)
+        except BaseException as failure:
+            self._stack.__exit__(type(failure), failure, failure.__traceback__)
+            raise
+        self._stack.__exit__(kind, error, trace)
+
+    def append(self, columns: Mapping[str, npt.NDArray[Any]]) -> None:
+        """Add rows; every call gives the same columns in the same order.
+
+        Args:
+            columns: arrays (R,) of numbers or text by name; masked arrays where whole numbers are missing.
+        """
+        import pyarrow as pa
+
+        if self._target is None:
+            raise RuntimeError("the writer must be entered with `with` before rows are appended")
+        arrays = [_to_arrow(values) for values in columns.values()]
+        self._pending.append(pa.table(arrays, names=list(columns)))
+        if sum(len(part) for part in self._pending) >= _CHUNK_ROWS:
+            self._write(everything=False)
+
+    def _write(self, everything: bool) -> None:
+        import pyarrow as pa
+
+        if not self._pending:
+            return
+        table = pa.concat_tables(self._pending)
+        end = len(table) if everything else len(table) - len(table) % _CHUNK_ROWS
+        if self._sink is None:
+            self._open(table.schema)
+        for start in range(0, end, _CHUNK_ROWS):
+            part = table.slice(start, min(_CHUNK_ROWS, end - start))
+            if self._parquet:
+                self._sink.write_table(part.combine_chunks())
+            else:
+                self._sink.write(_csv_bytes(part, self._delimiter))
+        self._pending = [table.slice(end)]
+
+    def _open(self, schema: Any) -> None:
+        assert self._target is not None
+        if self._parquet:
+            from pyarrow import parquet
+
+            self._sink = self._stack.enter_context(parquet.ParquetWriter(self._target, schema))
+        else:
+            self._sink = self._stack.enter_context(self._target.open("wb"))
+            if self._header:
+                self._sink.write((self._delimiter.join(schema.names) + "\n").encode())
+
+
+def write_columns(
+    columns: Mapping[str, npt.NDArray[Any]], path: str | Path, *, header: bool = True, delimiter: str = ","
+) -> None:
+    """Write one table in one go (see `TableWriter`)."""
+    with TableWriter(path, header=header, delimiter=delimiter) as writer:
+        writer.append(columns)
+
+
+def round_decimals(values: FloatArray, decimals: int) -> FloatArray:
+    """Round to a number of decimals; minus zero becomes zero."""
+    return np.asarray(np.round(values, decimals) + 0.0, dtype=np.float64)
+
+
+def round_significant(values: FloatArray, digits: int) -> FloatArray:
+    """Round to a number of significant decimal digits; zero, NaN and infinity stay."""
+    good = np.isfinite(values) & (values != 0)
+    safe = np.where(good, np.abs(values), 1.0)
+    decimals = np.minimum(digits - 1 - np.floor(np.log10(safe)), _MOST_DECIMALS)
+    # Both factors are exact powers of ten, and one is 1, so the result is the float nearest to its digits.
+    up, down = 10.0 ** np.maximum(decimals, 0), 10.0 ** np.maximum(-decimals, 0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        rounded = np.rint(values * up / down) / up * down
+    return np.asarray(np.where(good & np.isfinite(rounded), rounded, values) + 0.0, dtype=np.float64)
+
+
+def _to_arrow(values: npt.NDArray[Any]) -> Any:
+    import pyarrow as pa
+
+    if values.dtype.kind == "U":
+        distinct, index = np.unique(values, return_inverse=True)
+        coded = pa.DictionaryArray.from_arrays(index.reshape(-1).astype(np.int32), distinct.tolist() or [""])
+        return coded.cast(pa.string())
+    if isinstance(values, np.ma.MaskedArray):
+        return pa.array(values.data, mask=np.ma.getmaskarray(values))
+    return pa.array(values, from_pandas=True)
+
+
+def _csv_bytes(table: Any, delimiter: str) -> bytes:
+    import pyarrow as pa
+    from pyarrow import csv as arrow_csv
+
+    # Arrow quotes either all text or none, and refuses "none" where a text holds a comma or a quote.
+    for style in ("none", "needed"):
+        buffer = pa.BufferOutputStream()
+        options = arrow_csv.WriteOptions(include_header=False, delimiter=delimiter, quoting_style=style)
+        try:
+            arrow_csv.write_csv(table, buffer, options)
+        except pa.ArrowInvalid as error:
+            if style == "needed":
+                raise DataError(f"cannot be written as CSV: {error}") from None
+            continue
+        return bytes(buffer.getvalue())
+    raise AssertionError("one of the two styles returns or raises")

@@ -1,0 +1,177 @@
+"""Ground truth from and to files, whatever the format."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jeat_graph.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.errors import DataError
+from jeat_graph.io import kitti, motchallenge, prophesee
+from jeat_graph.io.formats import recognise
+from jeat_graph.io.frames import check_rate, fill_frames, gap_times
+from jeat_graph.io.plain_text import check_sizes, frames_of
+from jeat_graph.io.table_writer import write_columns
+from jeat_graph.io.tables import Table, read_table
+from jeat_graph.trajectories import GroundTruth
+
+_BOX = ("left", "top", "width", "height")
+_REQUIRED = ("t", "object_id", *_BOX)
+_MOTION = ("x", "y", "vx", "vy", "ax", "ay")
+_OPTIONAL = (*_MOTION, "class", "ignore", "distance")
+_TRUTH_WORDS = {"": False, "0": False, "1": True, "false": False, "true": True}
+
+
+def read_truth(path: str | Path, *, rate_hz: float | None = None, fmt: str | None = None) -> GroundTruth:
+    """Read ground truth from a file of any known format.
+
+    ============  ==========================================================================================
+    csv, parquet  `t, object_id, left, top, width, height`, optional `x, y, vx, vy, ax, ay, class, ignore,
+                  distance`; a row with only `t` is a recorded frame without objects. With any motion column
+                  there is motion: a column that is absent is NaN, except x and y, then the box's centre.
+    motchallenge  column 7 = 0 means ignore. With 9 columns the 8th is the class; with 10, columns 8 to 10 are
+                  world coordinates and are passed over. Rate from `rate_hz` or `seqinfo.ini`.
+    kitti         tracking labels (17 columns); type is the class, `DontCare` is ignored, `distance` is that
+                  of the 3D location. 10 Hz unless `rate_hz` says else.
+    prophesee     structured `.npy` with `t` or `ts` (µs), `x, y, w, h, track_id`, optional `class_id`.
+    ============  ==========================================================================================
+
+    MOTChallenge and KITTI cannot say that a frame is empty: all frames between the first and the last are
+    taken as recorded (every n-th, if only every n-th occurs; to the length in `seqinfo.ini`, if there is
+    one). For `prophesee` that is done only where `rate_hz` is given.
+
+    Raises:
+        DataError: names the file, the line or row, and what is wrong, such as an object twice at one time.
+    """
+    kind = recognise(path, fmt, ("csv", "parquet", "motchallenge", "kitti", "prophesee"))
+    if kind in ("csv", "parquet"):
+        return _read_contract(path)
+    distance: FloatArray | None = None
+    if kind == "motchallenge":
+        table = motchallenge.read_lines(path)
+        rate, length = motchallenge.sequence_rate(path, rate_hz)
+        frame = frames_of(table, motchallenge.FIRST_FRAME) - motchallenge.FIRST_FRAME
+        t, ids, boxes = frame / rate, table.whole("id"), motchallenge.boxes_of(table)
+        classes = motchallenge.class_names(table)
+        ignore = table.number("conf") == 0 if "conf" in table else np.zeros(len(t), dtype=bool)
+        frames = (fill_frames(frame + 1, path, length) - 1) / rate
+        negative = (ids < 0) & ~ignore
+        if negative.any():
+            raise table.error(int(np.argmax(negative)), "truth needs an id, got -1; are these detections?")
+    elif kind == "kitti":
+        table = kitti.read_lines(path)
+        rate = check_rate(kitti.RATE_HZ if rate_hz is None else rate_hz, path)
+        frame = frames_of(table, kitti.FIRST_FRAME)
+        t, ids, boxes, classes = frame / rate, table.whole("id"), kitti.boxes_of(table), table.text("type")
+        ignore = classes == kitti.NO_OBJECT
+        distance = kitti.distances_of(table)
+        frames = fill_frames(frame, path) / rate
+    else:
+        table = prophesee.read_array(path)
+        if "track_id" not in table:
+            raise DataError("field 'track_id' is missing; truth needs ids", path)
+        t, ids, boxes = prophesee.times_of(table), table.whole("track_id"), prophesee.boxes_of(table)
+        classes, ignore, frames = prophesee.class_names(table), np.zeros(len(t), dtype=bool), np.unique(t)
+        if rate_hz is not None:
+            frames = np.union1d(frames, gap_times(t, rate_hz, path))
+    check_sizes(table, boxes)
+    _check_unique(table, t, ids, ignore)
+    return GroundTruth(
+        t=t,
+        object_id=ids,
+        boxes=boxes,
+        motion=None,
+        ignore=np.asarray(ignore, dtype=bool),
+        classes=classes,
+        distance=distance,
+        frames=frames,
+    )
+
+
+def write_truth(truth: GroundTruth, path: str | Path) -> None:
+    """Write truth as CSV, or as Parquet where the name ends so; every number is kept to the last bit.
+
+    Frames without objects become rows with only `t`. Columns that the truth does not have are not written.
+    """
+    bare = np.setdiff1d(truth.frame_times(), truth.t)
+    t = np.concatenate([truth.t, bare])
+    order = np.argsort(t, kind="stable")
+    gap = np.full(len(bare), np.nan)
+
+    def numbers(values: FloatArray) -> FloatArray:
+        return np.concatenate([values, gap])[order]
+
+    def whole(values: IntArray) -> np.ma.MaskedArray[Any, Any]:
+        padded = np.concatenate([values, np.zeros(len(bare), dtype=np.int64)])
+        return np.ma.masked_array(padded[order], mask=order >= len(truth))
+
+    columns: dict[str, Any] = {"t": t[order], "object_id": whole(truth.object_id)}
+    columns |= {name: numbers(truth.boxes[:, k]) for k, name in enumerate(_BOX)}
+    if truth.motion is not None:
+        columns |= {name: numbers(truth.motion[:, k]) for k, name in enumerate(_MOTION)}
+    if truth.classes is not None:
+        columns["class"] = np.concatenate([truth.classes, np.zeros(len(bare), dtype="U1")])[order]
+    columns["ignore"] = whole(truth.ignore.astype(np.int64))
+    if truth.distance is not None:
+        columns["distance"] = numbers(truth.distance)
+    write_columns(columns, path)
+
+
+def _read_contract(path: str | Path) -> GroundTruth:
+    table = read_table(path, _REQUIRED, _OPTIONAL, short=1)
+    all_t = table.number("t")
+    blanks = np.stack([table.blank(name) for name in _REQUIRED[1:]], axis=1)
+    bare: BoolArray = np.asarray(blanks.all(axis=1))
+    torn = blanks.any(axis=1) & ~bare
+    if torn.any():
+        row = int(np.argmax(torn))
+        which = _REQUIRED[1:][int(np.argmax(blanks[row]))]
+        raise table.error(row, f"{which} is missing; a frame without objects has only t")
+    rows = np.flatnonzero(~bare)
+    boxes = np.stack([table.number(name, blank_ok=True) for name in _BOX], axis=1)
+    check_sizes(table, np.where(bare[:, None], 1.0, boxes))
+    ids, ignore = table.whole("object_id", blank_ok=True), _ignore_flags(table)
+    _check_unique(table, all_t, ids, ignore | bare)
+    motion: FloatArray | None = None
+    if any(name in table for name in _MOTION):
+        motion = np.full((len(all_t), 6), np.nan)
+        motion[:, :2] = boxes[:, :2] + boxes[:, 2:] / 2
+        for k, name in enumerate(_MOTION):
+            if name in table:
+                motion[:, k] = table.number(name, blank_ok=True, nan_ok=True)
+    distance = table.number("distance", blank_ok=True, nan_ok=True)[rows] if "distance" in table else None
+    return GroundTruth(
+        t=all_t[rows],
+        object_id=ids[rows],
+        boxes=np.ascontiguousarray(boxes[rows]),
+        motion=None if motion is None else motion[rows],
+        ignore=ignore[rows],
+        classes=table.text("class", blank_ok=True)[rows] if "class" in table else None,
+        distance=distance,
+        frames=np.unique(all_t),
+    )
+
+
+def _ignore_flags(table: Table) -> BoolArray:
+    """Read `ignore` (R,): 1 or true, 0 or false or blank."""
+    if "ignore" not in table:
+        return np.zeros(len(table), dtype=bool)
+    words = np.char.lower(table.text("ignore", blank_ok=True))
+    distinct, index = np.unique(words, return_inverse=True)
+    flags = [_TRUTH_WORDS.get(word.removesuffix(".0")) for word in distinct.tolist()]
+    if None in flags:
+        row = int(np.argmax(index.reshape(-1) == flags.index(None)))
+        raise table.error(row, f"ignore must be 0 or 1, got {words[row]!r}")
+    return np.asarray(flags, dtype=bool)[index.reshape(-1)]
+
+
+def _check_unique(table: Table, t: FloatArray, ids: IntArray, exempt: BoolArray) -> None:
+    """Refuse an object that is there twice at one time, unless it is one that is not judged."""
+    rows = np.flatnonzero(~exempt)
+    order = rows[np.lexsort((rows, ids[rows], t[rows]))]
+    same = (np.diff(t[order]) == 0) & (np.diff(ids[order]) == 0)
+    if same.any():
+        row = int(order[1:][same].min())
+        raise table.error(row, f"object {ids[row]} is there twice at t = {t[row]:g}")
