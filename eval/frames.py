@@ -16,12 +16,13 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+
+from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.errors import DataError
+from jeat_graph.eval.matching import match as match
 from jeat_graph.eval.overlap import pairwise_covered, pairwise_iou
 from jeat_graph.eval.pairing import check_pair, check_truth
 from jeat_graph.eval.resampling import TIME_TOLERANCE_S, Resampled, check_unique, interpolate_to, predict_to
-
-from jeat_graph.detections import FloatArray, IntArray
-from jeat_graph.errors import DataError
 from jeat_graph.trajectories import GroundTruth, Trajectories
 
 Kind = Literal["causal", "smoothed"]
@@ -173,25 +174,3 @@ def tracks_to_judge(
     )
     drop: npt.NDArray[np.bool_] = np.where(matched, ignored[truth_of], on_ignored)
     return ~drop
-
-
-def match(iou: FloatArray, threshold: float) -> IntArray:
-    """One-to-one match of largest total IoU among the pairs that reach `threshold`.
-
-    Args:
-        iou: (G, M).
-        threshold: smallest IoU of a pair.
-
-    Returns:
-        (M,) index of the truth each track is matched to, -1 where to none.
-    """
-    from scipy.optimize import linear_sum_assignment
-
-    truth_of = np.full(iou.shape[1], -1, dtype=np.int64)
-    if iou.size:
-        # A pair below the threshold is worth nothing, so that it never displaces a valid one.
-        value = np.where(iou >= threshold - np.finfo(float).eps, iou, 0.0)
-        rows, cols = linear_sum_assignment(value, maximize=True)
-        good = value[rows, cols] > 0.0
-        truth_of[cols[good]] = rows[good]
-    return truth_of

@@ -13,10 +13,10 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from jeat_graph.eval.frames import Frames, Kind, build_frames
 
-from jeat_graph.detections import FloatArray
+from jeat_graph.arrays import FloatArray
 from jeat_graph.errors import DataError
+from jeat_graph.eval.frames import Frames, Kind, build_frames
 from jeat_graph.trajectories import GroundTruth, Trajectories
 
 # Scores in per cent; the others are counts.

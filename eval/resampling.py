@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jeat_graph.detections import FloatArray, IntArray
+from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.errors import DataError
 from jeat_graph.trajectories import Trajectories
 

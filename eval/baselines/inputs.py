@@ -11,11 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
+from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.detections import Detections
+from jeat_graph.errors import DataError, UnknownSensorError
 from jeat_graph.eval.overlap import pairwise_iou
 from jeat_graph.eval.resampling import TIME_TOLERANCE_S
-
-from jeat_graph.detections import Detections, FloatArray, IntArray
-from jeat_graph.errors import DataError, UnknownSensorError
 
 
 @dataclass(frozen=True, eq=False)

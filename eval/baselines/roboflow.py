@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from jeat_graph.eval.baselines.inputs import baseline_frames, sensor_rate
 
-from jeat_graph.detections import Detections, FloatArray
+from jeat_graph.arrays import FloatArray
+from jeat_graph.detections import Detections
 from jeat_graph.errors import ConfigError
+from jeat_graph.eval.baselines.inputs import baseline_frames, sensor_rate
 from jeat_graph.trajectories import Trajectories
 
 # Name: class in `trackers`, and what is set differently from its defaults.

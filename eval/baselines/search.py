@@ -12,11 +12,11 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from jeat_graph.eval.baselines.roboflow import run_baseline
-from jeat_graph.eval.metrics import Scores, evaluate
 
 from jeat_graph.detections import Detections
 from jeat_graph.errors import DataError
+from jeat_graph.eval.baselines.roboflow import run_baseline
+from jeat_graph.eval.metrics import Scores, evaluate
 from jeat_graph.trajectories import GroundTruth
 
 # lost_track_buffer counts frames at 30 Hz, whatever the frame rate: 15 is half a second.

@@ -1,0 +1,99 @@
+"""Judge runs as a whole: tracking scores and motion errors of their causal and smoothed tables, pooled."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from jeat_graph.eval.breakdown import by_distance, by_motion, confirmation_latency, recovery_times
+from jeat_graph.eval.frames import Frames, Kind, build_frames
+from jeat_graph.eval.kinematics import KinematicErrors, kinematic_errors
+from jeat_graph.eval.load import JudgedRun
+from jeat_graph.eval.metrics import SHARES, Scores, score_frames
+from jeat_graph.eval.tables import Cell, Table
+
+COUNTS = ("FP", "FN", "IDSW", "MT", "PT", "ML", "Frag")
+ERRORS = ("position_rmse", "velocity_rmse", "acceleration_rmse", "nees")
+WAITS = ("mean_s", "median_s", "p90_s")
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """What is known of one kind of table, over all runs.
+
+    Attributes:
+        kind: `causal` or `smoothed`.
+        scores: tracking scores.
+        errors: motion errors, None where no truth has motion.
+        sequences: the runs, frame by frame, for further questions.
+    """
+
+    kind: Kind
+    scores: Scores
+    errors: KinematicErrors | None
+    sequences: tuple[Frames, ...]
+
+    def as_dict(self) -> dict[str, float | int]:
+        """Return scores and errors by name, as `eval --json` writes them."""
+        return self.scores.as_dict() | (self.errors.as_dict() if self.errors else {})
+
+
+def judge_runs(
+    runs: Sequence[JudgedRun],
+    *,
+    iou: float = 0.5,
+    max_age_s: float = 0.15,
+    max_gap_s: float | None = None,
+) -> dict[str, Judgement]:
+    """Judge runs against their truth, pooled.
+
+    A kind of table is judged over the runs that have it.
+
+    Args:
+        runs: the runs with their truth.
+        iou: smallest IoU of a match.
+        max_age_s: how far causal estimates may be predicted (s).
+        max_gap_s: how far apart rows of smoothed tables may be that are joined (s); no bound by default.
+
+    Returns:
+        By kind, `causal` before `smoothed`.
+    """
+    kinds: tuple[Kind, ...] = ("causal", "smoothed")
+    out: dict[str, Judgement] = {}
+    for kind in kinds:
+        sequences = []
+        for run in runs:
+            table = run.causal if kind == "causal" else run.smoothed
+            if table is not None:
+                instants = run.truth.frame_times() if run.by_frame else None
+                frames = build_frames(
+                    run.truth, table, kind=kind, max_age_s=max_age_s, max_gap_s=max_gap_s, instants=instants
+                )
+                sequences.append(frames)
+        if sequences:
+            scores = score_frames(sequences, iou=iou)
+            out[kind] = Judgement(kind, scores, kinematic_errors(sequences, iou=iou), tuple(sequences))
+    return out
+
+
+def summary_table(judged: dict[str, Judgement]) -> Table:
+    """One row for each kind of table."""
+    columns = ["table", *SHARES, *COUNTS]
+    if any(one.errors for one in judged.values()):
+        columns += ERRORS
+    records: list[dict[str, Cell]] = [{"table": kind, **one.as_dict()} for kind, one in judged.items()]
+    return Table.from_records(records, columns)
+
+
+def breakdown_tables(judged: dict[str, Judgement], *, iou: float = 0.5) -> list[Table]:
+    """Tables by kind of object and distance, and of waiting times."""
+    groups: list[dict[str, Cell]] = []
+    waits: list[dict[str, Cell]] = []
+    for kind, one in judged.items():
+        for group in by_motion(one.sequences, iou=iou) + by_distance(one.sequences, iou=iou):
+            groups.append({"table": kind, **group.as_dict()})
+        delays = {"confirmation": confirmation_latency(one.sequences, iou=iou)}
+        delays |= {f"recovery after {k}": d for k, d in recovery_times(one.sequences, iou=iou).items()}
+        waits += [{"table": kind, "wait": name, **delay.as_dict()} for name, delay in delays.items()]
+    tables = [Table.from_records(groups, title="By group of objects")] if groups else []
+    return [*tables, Table.from_records(waits, title="Waiting times", digits=dict.fromkeys(WAITS, 3))]

@@ -1,0 +1,138 @@
+"""Read what `eval` is given: runs, tables, MOTChallenge or KITTI results, and their truth."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from jeat_graph.errors import DataError
+from jeat_graph.eval.pairing import check_pair, check_truth
+from jeat_graph.trajectories import GroundTruth, Trajectories
+
+BY_FRAME = ("motchallenge", "kitti")
+# Where truth and result both count frames, and no rate is known, any rate is as good as another.
+ANY_RATE_HZ = 25.0
+SUFFIXES = (".csv", ".parquet")
+
+
+@dataclass(frozen=True, eq=False)
+class JudgedRun:
+    """One run and its truth.
+
+    Attributes:
+        name: what the user called it.
+        truth: the truth.
+        causal: the causal table, or None.
+        smoothed: the smoothed table, or None.
+        by_frame: the run is a result by frame number; a frame without rows is then a frame without tracks.
+    """
+
+    name: str
+    truth: GroundTruth
+    causal: Trajectories | None
+    smoothed: Trajectories | None
+    by_frame: bool = False
+
+
+def load_run(
+    run: str | Path,
+    truth: str | Path,
+    *,
+    rate_hz: float | None = None,
+    classes: Sequence[str] | None = None,
+) -> JudgedRun:
+    """Read a run and its truth, and check that they belong together.
+
+    Args:
+        run: a run directory, a trajectory table (taken as smoothed if its name has `smoothed` in it, else as
+            causal), or a MOTChallenge or KITTI result.
+        truth: the truth, in any format that `read_truth` knows.
+        rate_hz: frame rate of files that count frames; by default that of the truth.
+        classes: classes of objects to be found; others are ignored. All by default.
+
+    Raises:
+        DataError: a file is missing or not valid, or run and truth do not fit together.
+    """
+    from jeat_graph.io.formats import recognise
+
+    path, truth_path = Path(run), Path(truth)
+    tables = _tables_of(path)
+    form = recognise(next(iter(tables.values())))
+    truth_form = recognise(truth_path)
+    if rate_hz is None and truth_form == "motchallenge":
+        rate_hz = _motchallenge_rate(truth_path, form == "motchallenge")
+    objects = _read_truth(truth_path, rate_hz, classes)
+    if rate_hz is None and form in BY_FRAME:
+        frames = objects.frame_times()
+        rate_hz = 1.0 / float(np.median(np.diff(frames))) if len(frames) > 1 else ANY_RATE_HZ
+    read = {kind: _read_table(file, objects, rate_hz) for kind, file in tables.items()}
+    return JudgedRun(str(run), objects, read.get("causal"), read.get("smoothed"), form in BY_FRAME)
+
+
+def restrict_classes(truth: GroundTruth, classes: Sequence[str]) -> GroundTruth:
+    """Judge some classes only: objects of others are ignored, so that tracks on them are no errors.
+
+    Raises:
+        DataError: the truth has no classes, or none of these.
+    """
+    if truth.classes is None:
+        raise DataError("the truth has no classes to choose from")
+    wanted = np.isin(truth.classes, list(classes))
+    if not wanted.any():
+        there = ", ".join(sorted({str(name) for name in truth.classes}))
+        raise DataError(f"no object is of class {' or '.join(classes)}; the truth has: {there}")
+    return dataclasses.replace(truth, ignore=truth.ignore | ~wanted)
+
+
+def _tables_of(path: Path) -> dict[str, Path]:
+    if not path.exists():
+        raise DataError("there is no such run directory or table", path)
+    if not path.is_dir():
+        return {"smoothed" if "smoothed" in path.stem else "causal": path}
+    found = {}
+    for kind in ("causal", "smoothed"):
+        here = [path / (kind + suffix) for suffix in SUFFIXES if (path / (kind + suffix)).is_file()]
+        if here:
+            found[kind] = here[0]
+    if not found:
+        raise DataError("this directory has neither causal.csv nor smoothed.csv, so it is no run", path)
+    return found
+
+
+def _motchallenge_rate(truth: Path, any_will_do: bool) -> float:
+    from jeat_graph.io.motchallenge import sequence_rate
+
+    try:
+        return sequence_rate(truth, None)[0]
+    except DataError:
+        if any_will_do:
+            return ANY_RATE_HZ
+        raise DataError(
+            "MOTChallenge truth has frame numbers only; give the frame rate with --rate", truth
+        ) from None
+
+
+def _read_truth(path: Path, rate_hz: float | None, classes: Sequence[str] | None) -> GroundTruth:
+    from jeat_graph.io.truth_io import read_truth
+
+    truth = read_truth(path, rate_hz=rate_hz)
+    try:
+        check_truth(truth)
+        return truth if classes is None else restrict_classes(truth, classes)
+    except DataError as error:
+        raise DataError(error.message, path) from error
+
+
+def _read_table(path: Path, truth: GroundTruth, rate_hz: float | None) -> Trajectories:
+    from jeat_graph.io.trajectories_io import read_trajectories
+
+    table = read_trajectories(path, rate_hz=rate_hz)
+    try:
+        check_pair(truth, table)
+    except DataError as error:
+        raise DataError(error.message, path) from error
+    return table

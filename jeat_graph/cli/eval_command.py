@@ -1,0 +1,107 @@
+"""`jeat-graph eval`: judge tracks against truth."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jeat_graph.errors import DataError
+
+if TYPE_CHECKING:
+    from jeat_graph.eval.tables import Table
+    from jeat_graph.trajectories import GroundTruth
+
+HELP = "Judge a run, a trajectory table, or a MOTChallenge or KITTI result against ground truth."
+FORMATS = ("text", "markdown", "csv", "latex")
+_MANY: dict[str, Any] = {"nargs": "+", "action": "extend"}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add = parser.add_argument
+    # Not `run`: that name is taken by the function that the entry point calls.
+    add("runs", nargs="+", metavar="RUN", help="run directory, table or result; several are pooled")
+    add("--gt", **_MANY, required=True, metavar="FILE", help="truth of each RUN, in the same order")
+    add("--json", metavar="FILE", help="write all scores as JSON; - writes them to stdout instead")
+    add("--format", choices=FORMATS, default="text", help="form of the table on stdout")
+    add("--iou", type=_share, default=0.5, help="smallest IoU of a match (0.5)")
+    add("--class", **_MANY, dest="classes", metavar="NAME", help="classes to be found; others are ignored")
+    add("--rate", type=_positive, metavar="HZ", help="frame rate of files that count frames")
+    add("--max-age", type=_positive, default=0.15, metavar="S", help="how far to predict causal rows (0.15)")
+    add("--max-gap", type=_positive, metavar="S", help="join no smoothed rows further apart than this")
+    add("--breakdown", action="store_true", help="also by motion and distance, and waiting times")
+    add("--detections", **_MANY, metavar="FILE", help="also AP of the detections of each RUN")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Judge, and print or write the result."""
+    from jeat_graph.eval.judge import breakdown_tables, judge_runs, summary_table
+    from jeat_graph.eval.load import load_run
+    from jeat_graph.eval.tables import to_json
+
+    if len(args.runs) != len(args.gt):
+        raise DataError(f"{len(args.runs)} RUN and {len(args.gt)} --gt given; give one truth for each run")
+    runs = [
+        load_run(path, truth, rate_hz=args.rate, classes=args.classes)
+        for path, truth in zip(args.runs, args.gt, strict=True)
+    ]
+    judged = judge_runs(runs, iou=args.iou, max_age_s=args.max_age, max_gap_s=args.max_gap)
+    result: dict[str, object] = {kind: one.as_dict() for kind, one in judged.items()}
+    tables = [summary_table(judged)]
+    if args.breakdown:
+        extra = breakdown_tables(judged, iou=args.iou)
+        tables += extra
+        result["breakdown"] = [
+            dict(zip(table.columns, row, strict=True)) for table in extra for row in table.rows
+        ]
+    if args.detections:
+        table, values = _detections(args, [one.truth for one in runs])
+        tables.append(table)
+        result["detections"] = values
+    if args.json is not None:
+        _write(args.json, to_json(result))
+    if args.json != "-":
+        sys.stdout.write("\n".join(table.render(args.format) for table in tables))
+    return 0
+
+
+def _detections(
+    args: argparse.Namespace, truths: list[GroundTruth]
+) -> tuple[Table, dict[str, dict[str, float | int]]]:
+    from jeat_graph.eval.detection_ap import detection_ap
+    from jeat_graph.eval.tables import Cell, Table
+    from jeat_graph.io.detections_io import read_detections
+
+    if len(args.detections) != len(truths):
+        raise DataError(f"{len(truths)} RUN and {len(args.detections)} --detections given; give one for each")
+    detections = [read_detections(path) for path in args.detections]
+    found = detection_ap(list(zip(truths, detections, strict=True)))
+    values = {sensor: one.as_dict() for sensor, one in found.items()}
+    records: list[dict[str, Cell]] = [{"sensor": sensor, **one} for sensor, one in values.items()]
+    return Table.from_records(records, title="Detections"), values
+
+
+def _write(target: str, text: str) -> None:
+    if target == "-":
+        sys.stdout.write(text)
+        return
+    from jeat_graph.io.atomic import open_atomic
+
+    with open_atomic(Path(target)) as file:
+        file.write(text)
+
+
+def _share(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value <= 1.0:
+        raise argparse.ArgumentTypeError("must be more than 0 and at most 1")
+    return value
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError("must be a positive number")
+    return value
