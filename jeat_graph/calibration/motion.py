@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numba import njit
 from scipy.optimize import minimize
@@ -97,6 +99,13 @@ def size_loss(
     return loss
 
 
+def _minimise(loss: Callable[[FloatArray], float], first: FloatArray) -> FloatArray:
+    """Minimise by Nelder-Mead from a simplex of a factor of e a side: parameters are logarithms."""
+    simplex = np.vstack([first, first + np.eye(len(first))])
+    options = {"xatol": 1e-2, "fatol": 1e-2, "initial_simplex": simplex}
+    return np.asarray(minimize(loss, first, method="Nelder-Mead", options=options).x)
+
+
 def fit_motion(
     t: FloatArray, z: FloatArray, R: FloatArray, side: FloatArray, start: IntArray
 ) -> MotionConfig:
@@ -123,10 +132,8 @@ def fit_motion(
         # A weak pull to one keeps a parameter that the data say nothing of from running away.
         return total + 0.02 * float(np.sum(np.asarray(log_parameters) ** 2))
 
-    found = minimize(
-        loss, np.log([2.0, 1.0, 1.0]), method="Nelder-Mead", options={"xatol": 1e-2, "fatol": 1e-2}
-    )
-    jerk, velocity, acceleration = np.exp(np.clip(found.x, -8.0, 8.0))
+    first = np.log([2.0, 1.0, 1.0])
+    jerk, velocity, acceleration = np.exp(np.clip(_minimise(loss, first), -8.0, 8.0))
     return MotionConfig(
         jerk_px=0.0,
         jerk_per_size=float(jerk),
@@ -152,6 +159,5 @@ def fit_size(t: FloatArray, z: FloatArray, R: FloatArray, start: IntArray) -> Si
         total = sum(size_loss(t, z[:, side], R[:, side], start, density, rate) for side in range(2))
         return float(total + 0.02 * np.sum(np.asarray(log_parameters) ** 2))
 
-    found = minimize(loss, np.log([0.3, 0.3]), method="Nelder-Mead", options={"xatol": 1e-2, "fatol": 1e-2})
-    density, rate = np.exp(np.clip(found.x, -8.0, 4.0))
+    density, rate = np.exp(np.clip(_minimise(loss, np.log([0.3, 0.3])), -8.0, 4.0))
     return SizeConfig(rate_density=float(density), rate_std=float(rate))
