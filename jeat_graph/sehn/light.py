@@ -22,7 +22,7 @@ class LightConfig:
         3.0, "lux", "what oncoming headlights add to a vehicle's visibility, at 50 m"
     )
     taillight_lux: float = number(1.2, "lux", "what tail lights and the own beam on the road add, at 50 m")
-    parked_lux: float = number(0.6, "lux", "what a parked vehicle's flashers add, at 50 m")
+    parked_lux: float = number(1.5, "lux", "what a parked vehicle's flashers add, at 50 m")
 
     def __post_init__(self) -> None:
         check(self, "light.")

@@ -38,14 +38,14 @@ class TrafficConfig:
 
     density: str = choice("normal", DENSITIES, "which of the vehicle counts below applies")
     vehicles_sparse: float = number(9.0, "vehicles", "driving vehicles within view_m, sparse traffic")
-    vehicles_normal: float = number(23.0, "vehicles", "driving vehicles within view_m, normal traffic")
-    vehicles_dense: float = number(38.0, "vehicles", "driving vehicles within view_m, dense traffic")
+    vehicles_normal: float = number(20.0, "vehicles", "driving vehicles within view_m, normal traffic")
+    vehicles_dense: float = number(34.0, "vehicles", "driving vehicles within view_m, dense traffic")
     parked: int = number(2, "vehicles", "vehicles parked on the shoulders within view", 0, 12)
     view_m: float = number(150.0, "m", "length of road that the counts refer to", open_low=True)
     ring_m: float = number(420.0, "m", "length of the ring, of which the camera sees a part", 300.0)
     behind_m: float = number(130.0, "m", "how much of the ring lies behind the gantry", 30.0)
     speed_factor: float = number(1.0, "1", "factor on every desired speed", 0.1, 2.0)
-    headway_s: tuple[float, float] = number((0.6, 1.1), "s", "lowest and highest desired time gap", 0.4, 5.0)
+    headway_s: tuple[float, float] = number((0.5, 0.9), "s", "lowest and highest desired time gap", 0.4, 5.0)
     response_s: float = number(
         0.25, "s", "time constant with which acceleration follows the driver", 0.05, 1.0
     )
@@ -214,8 +214,8 @@ def _assign_lanes(rng: np.random.Generator, fleet: Fleet, road: Road) -> IntArra
     order = np.concatenate([np.flatnonzero(truck), np.flatnonzero(~truck)])
     for vehicle in order:
         allowed = rank >= max(n - 2, 0) if truck[vehicle] else rank >= 0
-        # Trucks prefer the outermost lane until it is twice as full as the next.
-        cost = load / (1.0 + rank * truck[vehicle]) + rng.uniform(0.0, 10.0, road.num_lanes)
+        # Trucks prefer the outermost lane until it is far fuller than the next.
+        cost = load / (1.0 + 2.0 * rank * truck[vehicle]) + rng.uniform(0.0, 10.0, road.num_lanes)
         pick = int(np.argmin(np.where(allowed, cost, np.inf)))
         lane[vehicle] = pick
         load[pick] += length[vehicle]

@@ -18,7 +18,7 @@ class VehicleKind:
         name: class name in the files.
         size_m: mean length, width and height (m).
         spread_m: half range of length, width and height (m).
-        speed: lowest and highest desired speed (m/s).
+        speed: lowest and highest desired speed on an empty road (m/s); traffic keeps most below theirs.
         max_acceleration: m/s².
     """
 
@@ -30,10 +30,10 @@ class VehicleKind:
 
 
 KINDS = (
-    VehicleKind("car", (4.4, 1.80, 1.46), (0.4, 0.06, 0.05), (27.0, 38.0), 1.6),
-    VehicleKind("suv", (4.7, 1.90, 1.72), (0.3, 0.06, 0.08), (26.0, 36.0), 1.5),
-    VehicleKind("van", (5.6, 2.02, 2.45), (0.5, 0.05, 0.20), (25.0, 33.0), 1.2),
-    VehicleKind("truck", (12.0, 2.50, 3.75), (3.5, 0.05, 0.25), (21.0, 25.0), 0.7),
+    VehicleKind("car", (4.4, 1.80, 1.46), (0.4, 0.06, 0.05), (29.0, 42.0), 1.6),
+    VehicleKind("suv", (4.7, 1.90, 1.72), (0.3, 0.06, 0.08), (28.0, 40.0), 1.5),
+    VehicleKind("van", (5.6, 2.02, 2.45), (0.5, 0.05, 0.20), (26.0, 35.0), 1.2),
+    VehicleKind("truck", (12.0, 2.50, 3.75), (3.5, 0.05, 0.25), (22.0, 25.0), 0.7),
 )
 KIND_NAMES = np.array([kind.name for kind in KINDS])
 
