@@ -151,7 +151,7 @@ def write_detections(detections: Detections, path: str | Path, decimals: int | N
 
 def _read_contract(path: str | Path, sensor: str | None, score_scale: str) -> Detections:
     required = _COLUMNS if sensor is None else tuple(name for name in _COLUMNS if name != "sensor")
-    table = read_table(path, required, ("class", "sensor"), short=2)
+    table = read_table(path, required, ("class", "sensor"), short=("t", "sensor"))
     t = table.number("t")
     names = table.text("sensor", blank_ok=sensor is not None) if "sensor" in table else np.zeros(len(t), "U1")
     if sensor is not None:

@@ -12,6 +12,8 @@ from jeat_graph.errors import DataError
 
 # More empty scans than this come from a wrong frame number, rate or time unit, not from a camera.
 _MOST_FILLED = 5_000_000
+# So many frames share a step by chance in one case of 2^9 at most.
+_ENOUGH_FOR_A_STEP = 10
 
 
 def check_rate(rate_hz: float, path: str | Path) -> float:
@@ -28,7 +30,8 @@ def check_rate(rate_hz: float, path: str | Path) -> float:
 def fill_frames(frames: IntArray, path: str | Path, last: int | None = None) -> IntArray:
     """Return all frames from the first to the last, also those in which nothing was found.
 
-    Where only every n-th frame occurs (n the greatest common divisor of the steps), every n-th frame counts.
+    Where at least ten frames occur and all of them are n, 2n, 3n, … apart, every n-th frame counts: the
+    recording was looked at in every n-th frame only.
 
     Args:
         frames: (R,) frame numbers that occur, in any order, several times or not.
@@ -44,7 +47,7 @@ def fill_frames(frames: IntArray, path: str | Path, last: int | None = None) -> 
     seen = np.unique(frames)
     first = int(seen[0]) if len(seen) else 1
     end = int(seen[-1]) if len(seen) else 0
-    step = max(int(np.gcd.reduce(np.diff(seen))), 1) if len(seen) > 1 else 1
+    step = int(np.gcd.reduce(np.diff(seen))) if len(seen) >= _ENOUGH_FOR_A_STEP else 1
     if last is not None:
         first, end = min(first, 1), max(end, last)
         step = 1

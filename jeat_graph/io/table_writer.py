@@ -135,8 +135,11 @@ def _to_arrow(values: npt.NDArray[Any]) -> Any:
 
     if values.dtype.kind == "U":
         distinct, index = np.unique(values, return_inverse=True)
-        coded = pa.DictionaryArray.from_arrays(index.reshape(-1).astype(np.int32), distinct.tolist() or [""])
-        return coded.cast(pa.string())
+        try:
+            texts = pa.array(distinct.tolist(), pa.string())
+        except UnicodeEncodeError as error:
+            raise DataError(f"text that UTF-8 cannot hold: {error.object!r}") from None
+        return texts.take(pa.array(index.reshape(-1)))
     if isinstance(values, np.ma.MaskedArray):
         return pa.array(values.data, mask=np.ma.getmaskarray(values))
     return pa.array(values, from_pandas=True)

@@ -185,7 +185,7 @@ def _cast(column: Any) -> Any:
 
 
 def read_table(
-    path: str | Path, required: Sequence[str], optional: Sequence[str] = (), *, short: int = 0
+    path: str | Path, required: Sequence[str], optional: Sequence[str] = (), *, short: Sequence[str] = ()
 ) -> Table:
     """Read a CSV file with a header, or a Parquet file, by its suffix.
 
@@ -196,7 +196,7 @@ def read_table(
         path: the file; `.parquet` and `.pq` are Parquet, all else is CSV.
         required: columns that must be there.
         optional: columns that may be there.
-        short: a CSV line may stop after its first `short` fields (those are then the first required ones).
+        short: a CSV line may stop after these columns, if they are the file's first ones.
 
     Raises:
         DataError: the file cannot be read, or a column is missing, misspelt or there twice.
@@ -207,8 +207,9 @@ def read_table(
     data = read_text(file)
     header, body, line = _split_header(data, file)
     _check_names(header, required, optional, file, line)
-    leading = short if set(header[:short]) == set(required[:short]) else 0
-    parsed, columns = CsvBody(file, body, line + 1, len(header), "the header names", leading).parse()
+    leading = {name for name in short if name in header}
+    stop = len(leading) if set(header[: len(leading)]) == leading else 0
+    parsed, columns = CsvBody(file, body, line + 1, len(header), "the header names", stop).parse()
     return table_of(parsed, header, columns)
 
 

@@ -39,7 +39,7 @@ def read_truth(path: str | Path, *, rate_hz: float | None = None, fmt: str | Non
     ============  ==========================================================================================
 
     MOTChallenge and KITTI cannot say that a frame is empty: all frames between the first and the last are
-    taken as recorded (every n-th, if only every n-th occurs; to the length in `seqinfo.ini`, if there is
+    taken as recorded (every n-th, see `fill_frames`; to the length in `seqinfo.ini`, if there is
     one). For `prophesee` that is done only where `rate_hz` is given.
 
     Raises:
@@ -120,7 +120,7 @@ def write_truth(truth: GroundTruth, path: str | Path) -> None:
 
 
 def _read_contract(path: str | Path) -> GroundTruth:
-    table = read_table(path, _REQUIRED, _OPTIONAL, short=1)
+    table = read_table(path, _REQUIRED, _OPTIONAL, short=("t",))
     all_t = table.number("t")
     blanks = np.stack([table.blank(name) for name in _REQUIRED[1:]], axis=1)
     bare: BoolArray = np.asarray(blanks.all(axis=1))
@@ -163,7 +163,7 @@ def _ignore_flags(table: Table) -> BoolArray:
     flags = [_TRUTH_WORDS.get(word.removesuffix(".0")) for word in distinct.tolist()]
     if None in flags:
         row = int(np.argmax(index.reshape(-1) == flags.index(None)))
-        raise table.error(row, f"ignore must be 0 or 1, got {words[row]!r}")
+        raise table.error(row, f"ignore must be 0 or 1, got {str(words[row])!r}")
     return np.asarray(flags, dtype=bool)[index.reshape(-1)]
 
 

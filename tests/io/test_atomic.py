@@ -1,0 +1,46 @@
+"""A file is whole or not there."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from jeat_graph.io.atomic import atomic_path, open_atomic
+
+
+def test_the_file_appears_with_its_content_and_leaves_nothing_beside(tmp_path):
+    with open_atomic(tmp_path / "a.txt") as file:
+        file.write("één\n")
+        assert not (tmp_path / "a.txt").exists()
+    assert (tmp_path / "a.txt").read_bytes() == "één\n".encode()
+    assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_an_error_leaves_the_old_file_and_nothing_beside(tmp_path):
+    path = tmp_path / "a.txt"
+    path.write_text("old", encoding="utf-8")
+    with pytest.raises(TypeError, match="must be str"), open_atomic(path) as file:
+        file.writelines(["new", b"!"])
+    assert path.read_text(encoding="utf-8") == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_missing_folders_are_made(tmp_path):
+    with open_atomic(tmp_path / "x" / "y" / "a.txt") as file:
+        file.write("!")
+    assert (tmp_path / "x" / "y" / "a.txt").read_text(encoding="utf-8") == "!"
+
+
+def test_the_temporary_file_keeps_the_suffix_that_writers_go_by(tmp_path):
+    with atomic_path(tmp_path / "a.parquet") as temporary:
+        assert temporary.suffix == ".parquet"
+        assert temporary.parent == tmp_path
+
+
+@pytest.mark.skipif(os.name == "nt", reason="permissions of POSIX")
+def test_the_file_has_the_permissions_of_any_new_file(tmp_path):
+    with open_atomic(tmp_path / "a.txt") as file:
+        file.write("!")
+    (tmp_path / "b.txt").write_text("!", encoding="utf-8")
+    assert (tmp_path / "a.txt").stat().st_mode == (tmp_path / "b.txt").stat().st_mode
