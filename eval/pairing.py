@@ -8,8 +8,12 @@ from jeat_graph.arrays import FloatArray
 from jeat_graph.errors import DataError
 from jeat_graph.trajectories import GroundTruth, Trajectories
 
-# Clocks of one scene differ in rate by less than this; seconds and milliseconds, or frames, by more.
+# In other units, step and duration of a clock both differ: by one factor if both record at one rate, else by
+# factors that are at least both large. Frames against seconds is a factor of the frame rate, 10 or more.
 UNIT_RATIO = 8.0
+UNIT_RATIO_OTHER_RATE = 15.0
+SAME_FACTOR = 3.0
+BOTH_LARGE = 5.0
 
 
 def check_truth(truth: GroundTruth) -> None:
@@ -68,14 +72,16 @@ def check_pair(truth: GroundTruth, table: Trajectories, *, max_age_s: float = 0.
 
 
 def _check_units(frames: FloatArray, instants: FloatArray) -> None:
-    """Compare rate and duration of both clocks: in other units both differ by about one factor."""
+    """Refuse clocks whose step and duration both differ by more than rates and lengths of recordings do."""
     if len(frames) < 3 or len(instants) < 3:
         return
     step = np.median(np.diff(instants)) / np.median(np.diff(frames))
     span = (instants[-1] - instants[0]) / (frames[-1] - frames[0])
     ratio = float(np.sqrt(step * span))
-    same = 1.0 / 3.0 < step / span < 3.0
-    if same and not 1.0 / UNIT_RATIO < ratio < UNIT_RATIO:
+    one_factor = 1.0 / SAME_FACTOR < step / span < SAME_FACTOR
+    both_large = min(step, span) > BOTH_LARGE or max(step, span) < 1.0 / BOTH_LARGE
+    limit = UNIT_RATIO if one_factor else UNIT_RATIO_OTHER_RATE if both_large else np.inf
+    if not 1.0 / limit < ratio < limit:
         slow, fast = ("tracks", "truth") if ratio > 1.0 else ("truth", "tracks")
         raise DataError(
             f"different units of time: the tracks' clock runs {ratio:.3g} times the truth's "

@@ -1,0 +1,72 @@
+"""Published scores of a known tracker's output on the two TUD sequences."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from jeat_graph.eval.metrics import evaluate
+
+from .data import make_tracks, make_truth, tud
+
+RATE_HZ = 25.0
+KNOWN = {
+    "TUD-Campus": {"IDF1": 0.557659, "MOTA": 0.526462, "FP": 13, "FN": 150, "IDSW": 7},
+    "TUD-Stadtmitte": {"IDF1": 0.644619, "MOTA": 0.564014, "FP": 45, "FN": 452, "IDSW": 7},
+}
+
+
+def tud_pair(name):
+    truth, result = tud(name, "gt.txt"), tud(name, "test.txt")
+    return (
+        make_truth((truth[:, 0] - 1) / RATE_HZ, truth[:, 1], truth[:, 2:6]),
+        make_tracks((result[:, 0] - 1) / RATE_HZ, result[:, 1], result[:, 2:6]),
+    )
+
+
+@pytest.mark.parametrize("kind", ["causal", "smoothed"])
+@pytest.mark.parametrize("name", sorted(KNOWN))
+def test_scores_of_the_tud_results_are_the_published_ones(name, kind):
+    # The rows stand at the truth's own times, where predicting and interpolating both return them.
+    scores = evaluate([tud_pair(name)], kind=kind)
+    known = KNOWN[name]
+    assert pytest.approx(known["MOTA"], abs=5e-7) == scores.MOTA / 100
+    assert pytest.approx(known["IDF1"], abs=5e-7) == scores.IDF1 / 100
+    assert (known["FP"], known["FN"], known["IDSW"]) == (scores.FP, scores.FN, scores.IDSW)
+
+
+def test_sequences_are_pooled_by_summing_their_counts():
+    scores = evaluate([tud_pair(name) for name in sorted(KNOWN)])
+    errors = sum(known["FP"] + known["FN"] + known["IDSW"] for known in KNOWN.values())
+    assert pytest.approx(100 * (1 - errors / scores.truth_boxes), abs=1e-9) == scores.MOTA
+    assert scores.sequences == 2
+
+
+def test_identities_of_different_sequences_are_different():
+    t, box = [0.0, 0.1], [[0, 0, 10, 10]] * 2
+    first = (make_truth(t, [1, 1], box), make_tracks(t, [7, 7], box))
+    second = (make_truth(t, [1, 1], box), make_tracks(t, [8, 8], box))
+    scores = evaluate([first, second])
+    assert (scores.truth_ids, scores.IDSW, scores.IDF1) == (2, 0, 100.0)
+
+
+def test_nothing_is_printed(capsys):
+    box = [[0, 0, 10, 10]]
+    evaluate([(make_truth([0.0], [1], box), make_tracks([0.0], [1], box))])
+    out = capsys.readouterr()
+    assert (out.out, out.err) == ("", "")
+
+
+def test_a_thousand_frames_of_fifty_objects_take_less_than_two_seconds():
+    rng = np.random.default_rng(0)
+    frames, objects = 1000, 50
+    t, ids = np.repeat(np.arange(frames) * 0.05, objects), np.tile(np.arange(objects), frames)
+    n = len(t)
+    boxes = np.column_stack((rng.uniform(0, 1200, (n, 2)), rng.uniform(30, 60, (n, 2))))
+    pair = (make_truth(t, ids, boxes), make_tracks(t, ids, boxes + rng.normal(0, 3, boxes.shape)))
+    start = time.process_time()  # not the wall clock: other work on the machine is not ours
+    scores = evaluate([pair])
+    assert time.process_time() - start < 2.0
+    assert scores.truth_boxes == n

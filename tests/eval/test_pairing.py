@@ -1,0 +1,76 @@
+"""Files that do not belong together are refused with a sentence that says what is wrong."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from jeat_graph.errors import DataError
+from jeat_graph.eval.load import restrict_classes
+from jeat_graph.eval.metrics import evaluate
+
+from .data import make_tracks, make_truth
+
+T = np.arange(100) * 0.05
+BOX = np.tile([10.0, 10.0, 40.0, 20.0], (100, 1))
+
+
+def judge(truth, tracks):
+    return evaluate([(truth, tracks)])
+
+
+def test_no_common_timestamps():
+    with pytest.raises(DataError, match=r"no common timestamps: the truth covers 0 to 4\.95 s"):
+        judge(make_truth(T, [1] * 100, BOX), make_tracks(T + 1000, [1] * 100, BOX))
+
+
+@pytest.mark.parametrize("factor", [1000.0, 20.0, 1e6, 1e-3])
+def test_different_units_of_time(factor):
+    with pytest.raises(DataError, match="different units of time"):
+        judge(make_truth(T, [1] * 100, BOX), make_tracks(T * factor, [1] * 100, BOX))
+
+
+def test_different_units_of_time_at_different_rates():
+    fast = np.arange(500) * 10.0  # 100 Hz in milliseconds
+    with pytest.raises(DataError, match="tracks seem to be in milliseconds or frames"):
+        judge(make_truth(T, [1] * 100, BOX), make_tracks(fast, [1] * 500, np.tile(BOX[0], (500, 1))))
+
+
+def test_a_faster_tracker_and_one_that_ends_early_are_fine():
+    fast = np.arange(500) * 0.01
+    judge(make_truth(T, [1] * 100, BOX), make_tracks(fast, [1] * 500, np.tile(BOX[0], (500, 1))))
+    judge(make_truth(T, [1] * 100, BOX), make_tracks(T[:10], [1] * 10, BOX[:10]))
+
+
+def test_truth_without_identities():
+    with pytest.raises(DataError, match="no identities: every object_id is -1"):
+        judge(make_truth([0.0, 0.0], [-1, -1], BOX[:2]), make_tracks([0.0], [1], BOX[:1]))
+
+
+def test_an_object_twice_in_one_frame():
+    with pytest.raises(DataError, match="object 3 twice at t = 0 s"):
+        judge(make_truth([0.0, 0.0, 0.0], [3, 3, 4], BOX[:3]), make_tracks([0.0], [1], BOX[:1]))
+
+
+def test_truth_without_frames():
+    with pytest.raises(DataError, match="no frames"):
+        judge(make_truth([], [], []), make_tracks([0.0], [1], BOX[:1]))
+
+
+def test_boxes_relative_to_the_picture():
+    with pytest.raises(DataError, match="relative to the picture's size instead of in pixels"):
+        judge(make_truth(T, [1] * 100, BOX), make_tracks(T, [1] * 100, BOX / 1280))
+
+
+def test_no_sequence_and_a_threshold_out_of_range():
+    with pytest.raises(DataError, match="no sequence"):
+        evaluate([])
+    with pytest.raises(DataError, match="IoU threshold"):
+        evaluate([(make_truth([0.0], [1], BOX[:1]), make_tracks([0.0], [1], BOX[:1]))], iou=0.0)
+
+
+def test_a_class_that_is_not_there_is_named_with_those_that_are():
+    truth = make_truth([0.0, 0.0], [1, 2], BOX[:2], classes=np.array(["Car", "Van"]))
+    assert restrict_classes(truth, ["Van"]).ignore.tolist() == [True, False]
+    with pytest.raises(DataError, match="the truth has: Car, Van"):
+        restrict_classes(truth, ["car"])
