@@ -40,6 +40,7 @@ class TableWriter:
         self._parquet = self._path.suffix.lower() in PARQUET_SUFFIXES
         self._stack = ExitStack()
         self._pending: list[Any] = []
+        self._rows = 0
         self._sink: Any = None
         self._target: Path | None = None
 
@@ -73,7 +74,8 @@ class TableWriter:
             raise RuntimeError("the writer must be entered with `with` before rows are appended")
         arrays = [_to_arrow(values) for values in columns.values()]
         self._pending.append(pa.table(arrays, names=list(columns)))
-        if sum(len(part) for part in self._pending) >= _CHUNK_ROWS:
+        self._rows += len(self._pending[-1])
+        if self._rows >= _CHUNK_ROWS:
             self._write(everything=False)
 
     def _write(self, everything: bool) -> None:
@@ -92,6 +94,7 @@ class TableWriter:
             else:
                 self._sink.write(_csv_bytes(part, self._delimiter))
         self._pending = [table.slice(end)]
+        self._rows = len(table) - end
 
     def _open(self, schema: Any) -> None:
         assert self._target is not None

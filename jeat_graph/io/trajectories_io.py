@@ -32,6 +32,7 @@ _PX_DECIMALS = 3
 _EXISTENCE_DECIMALS = 6
 _VAR_DIGITS = 6
 _JOINT = "|"
+_FLUSH_ROWS = 8192
 _MOST_SENSORS = 63  # bits of `Trajectories.used`
 
 
@@ -47,10 +48,12 @@ class TrajectoryWriter:
 
     def __init__(self, path: str | Path) -> None:
         self._writer = TableWriter(path)
+        self._pending: list[Trajectories] = []
+        self._rows = 0
 
     def __enter__(self) -> Self:
         self._writer.__enter__()
-        self.append(Trajectories.empty())  # so that a run without tracks has a header too
+        self._writer.append(_columns(Trajectories.empty()))  # so that a run without tracks has a header too
         return self
 
     def __exit__(
@@ -59,26 +62,48 @@ class TrajectoryWriter:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        try:
+            if error is None:
+                self._flush()
+        except BaseException as failure:
+            self._writer.__exit__(type(failure), failure, failure.__traceback__)
+            raise
         self._writer.__exit__(kind, error, trace)
 
     def append(self, table: Trajectories) -> None:
-        """Add the rows of a table.
+        """Add the rows of a table, which is copied: the caller may use its arrays again.
 
         Raises:
             DataError: a sensor's name holds `|`, which joins the names in the column `sensors`.
         """
+        if self._pending and self._pending[0].sensors != table.sensors:
+            self._flush()
         joint = next((name for name in table.sensors if _JOINT in name), None)
         if joint is not None:
             raise DataError(f"the name of sensor {joint!r} must not hold {_JOINT!r}")
-        boxes, mean = round_decimals(table.boxes, _PX_DECIMALS), round_decimals(table.mean, _PX_DECIMALS)
-        var = round_significant(table.var, _VAR_DIGITS)
-        columns: dict[str, Any] = {"t": table.t + 0.0, "track_id": table.track_id}
-        columns |= {name: boxes[:, k] for k, name in enumerate(BOX)}
-        columns["existence"] = round_decimals(table.existence, _EXISTENCE_DECIMALS)
-        columns |= {name: mean[:, k] for k, name in enumerate(MEAN)}
-        columns |= {name: var[:, k] for k, name in enumerate(VAR)}
-        columns["sensors"] = np.asarray(table.sensor_text(), dtype=np.str_)
-        self._writer.append(columns)
+        self._pending.append(Trajectories.concatenate([table]))
+        self._rows += len(table)
+        if self._rows >= _FLUSH_ROWS or len(self._pending) >= _FLUSH_ROWS:
+            self._flush()
+
+    def _flush(self) -> None:
+        """Convert what has come together: tables of a few rows each would cost far more one by one."""
+        if self._pending:
+            self._writer.append(_columns(Trajectories.concatenate(self._pending)))
+        self._pending, self._rows = [], 0
+
+
+def _columns(table: Trajectories) -> dict[str, Any]:
+    """Return the columns of the contract, rounded as they are written."""
+    boxes, mean = round_decimals(table.boxes, _PX_DECIMALS), round_decimals(table.mean, _PX_DECIMALS)
+    var = round_significant(table.var, _VAR_DIGITS)
+    columns: dict[str, Any] = {"t": table.t + 0.0, "track_id": table.track_id}
+    columns |= {name: boxes[:, k] for k, name in enumerate(BOX)}
+    columns["existence"] = round_decimals(table.existence, _EXISTENCE_DECIMALS)
+    columns |= {name: mean[:, k] for k, name in enumerate(MEAN)}
+    columns |= {name: var[:, k] for k, name in enumerate(VAR)}
+    columns["sensors"] = np.asarray(table.sensor_text(), dtype=np.str_)
+    return columns
 
 
 def write_trajectories(table: Trajectories, path: str | Path) -> None:

@@ -145,6 +145,14 @@ def test_a_run_that_fails_leaves_no_file(tmp_path, name):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_the_caller_may_use_its_arrays_again(tmp_path):
+    rows = table(10)
+    with TrajectoryWriter(tmp_path / "t.csv") as writer:
+        writer.append(rows)
+        rows.boxes[:] = -1
+    assert np.abs(read_trajectories(tmp_path / "t.csv").boxes - table(10).boxes).max() < 0.001
+
+
 def test_rows_are_on_disk_before_the_end(tmp_path):
     with TrajectoryWriter(tmp_path / "t.csv") as writer:
         for k in range(5):
