@@ -73,6 +73,9 @@ class SensorConfig:
     tempering: float = number(
         1.0, "1", "exponent on evidence, below 1 where false boxes repeat in time", 0.01, 1.0
     )
+    miss_tempering: float = number(
+        1.0, "1", "exponent on the evidence of misses, below 1 where misses come in bursts", 0.01, 1.0
+    )
     blind_speed: float = number(
         0.0, "px/s", "image speed below which the sensor sees nothing (events); 0: it sees what stands still"
     )

@@ -30,9 +30,16 @@ def existence_after_hit(existence: float, evidence: float, tempering: float) -> 
 
 
 @njit(cache=True)
-def existence_after_miss(existence: float, p_detect: float) -> float:
-    """Probability of existence after a scan without a detection: r (1 − P_D) / (1 − r P_D)."""
-    return existence * (1.0 - p_detect) / max(1.0 - existence * p_detect, 1e-12)
+def existence_after_miss(existence: float, p_detect: float, tempering: float) -> float:
+    """Probability of existence after a scan without a detection: r (1 − P_D)^β / (1 − r + r (1 − P_D)^β).
+
+    Args:
+        existence: r before.
+        p_detect: P_D of this look.
+        tempering: β, below 1 where misses come in bursts (occlusion, blur); 1 gives r (1 − P_D) / (1 − r P_D).
+    """
+    missed = existence * math.exp(tempering * math.log(max(1.0 - p_detect, 1e-12)))
+    return missed / max(1.0 - existence + missed, 1e-12)
 
 
 @njit(cache=True)

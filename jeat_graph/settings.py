@@ -31,6 +31,7 @@ class SensorArrays(NamedTuple):
         curve_score: (S, K) knots of the calibrated precision, padded with the last.
         curve_precision: (S, K) its values.
         tempering: (S,) exponent on evidence.
+        miss_tempering: (S,) exponent on the evidence of misses.
         blind_speed: (S,) px/s.
     """
 
@@ -45,6 +46,7 @@ class SensorArrays(NamedTuple):
     curve_score: FloatArray
     curve_precision: FloatArray
     tempering: FloatArray
+    miss_tempering: FloatArray
     blind_speed: FloatArray
 
 
@@ -121,6 +123,7 @@ def sensor_arrays(config: Config) -> SensorArrays:
         curve_score=score,
         curve_precision=np.array([[p[1] for p in c] for c in curves]),
         tempering=np.array([s.tempering for s in sensors]),
+        miss_tempering=np.array([s.miss_tempering for s in sensors]),
         blind_speed=np.array([s.blind_speed for s in sensors]),
     )
 

@@ -79,7 +79,7 @@ def step(
     update_matched(tracks, n, t, batch, noise, match, evidence, taken, sensors, settings)
     if settings.second_pass:
         take_second_views(tracks, n, t, batch, match, taken, sensors, settings)
-    count_misses(tracks, n, match, p_detect, present, settings)
+    count_misses(tracks, n, match, p_detect, present, sensors, settings)
     estimate_clutter(tracks, n, batch, match, taken, present, clutter, sensors, settings)
     confirm(tracks, n, t, settings)
     n = remove_ended(tracks, n, t, settings)
@@ -338,7 +338,13 @@ def take_second_views(
 
 @njit(cache=True)
 def count_misses(
-    tracks: TrackArrays, n: int, match: IntArray, p_detect: FloatArray, present: BoolArray, settings: Settings
+    tracks: TrackArrays,
+    n: int,
+    match: IntArray,
+    p_detect: FloatArray,
+    present: BoolArray,
+    sensors: SensorArrays,
+    settings: Settings,
 ) -> None:
     """Lower existence and P_D of the tracks that a sensor looked for and did not find."""
     if not settings.by_existence:
@@ -347,7 +353,9 @@ def count_misses(
         for s in range(len(present)):
             if not present[s] or match[i, s] >= 0:
                 continue
-            tracks.existence[i] = existence_after_miss(tracks.existence[i], p_detect[i, s])
+            tracks.existence[i] = existence_after_miss(
+                tracks.existence[i], p_detect[i, s], sensors.miss_tempering[s]
+            )
             # Only as far as the miss was to be expected does it say anything about the sensor.
             own = tracks.p_detect[i, s]
             visible = p_detect[i, s] / own
@@ -389,13 +397,12 @@ def estimate_clutter(
 def confirm(tracks: TrackArrays, n: int, t: float, settings: Settings) -> None:
     """Confirm the tracks that have earned it: by existence, or by age and hits (paper, track lifecycle)."""
     for i in range(n):
-        if tracks.confirmed[i]:
-            continue
         if settings.by_existence:
-            tracks.confirmed[i] = tracks.existence[i] >= settings.confirm_existence
+            earned = tracks.existence[i] >= settings.confirm_existence
         else:
             old = t - tracks.t_birth[i] >= settings.confirm_age_s
-            tracks.confirmed[i] = old and tracks.hits[i] >= settings.confirm_hits
+            earned = old and tracks.hits[i] >= settings.confirm_hits
+        tracks.confirmed[i] = tracks.confirmed[i] or earned
 
 
 @njit(cache=True)

@@ -89,6 +89,8 @@ def leaders(ahead: FloatArray, shared: BoolArray) -> tuple[IntArray, FloatArray]
     Returns:
         (V,) index of the leader and (V,) centre distance to it (m), infinite where there is none.
     """
+    if not len(ahead):
+        return np.zeros(0, dtype=np.int64), np.zeros(0)
     masked = np.where(shared, ahead, np.inf)
     leader = np.argmin(masked, axis=1)
     return leader, masked[np.arange(len(leader)), leader]

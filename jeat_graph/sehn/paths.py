@@ -84,10 +84,15 @@ class Paths:
                 -amplitude * omega**3 * np.cos(angle),
             ]
         )
-        for vehicle, start, duration, shift in zip(
-            self.change_vehicle, self.change_start, self.change_duration, self.change_shift, strict=True
-        ):
-            u = np.clip((times - start) / duration, 0.0, 1.0)
+        if not len(times):
+            return out
+        # Only changes under way need their polynomials, so that the cost does not grow with the recording.
+        end = self.change_start + self.change_duration
+        over = end <= times.min()
+        np.add.at(out[0].T, self.change_vehicle[over], self.change_shift[over][:, None])
+        for k in np.flatnonzero(~over & (self.change_start < times.max())):
+            duration, shift = self.change_duration[k], self.change_shift[k]
+            u = np.clip((times - self.change_start[k]) / duration, 0.0, 1.0)
             for order, polynomial in enumerate(_STEPS):
-                out[order, :, vehicle] += shift / duration**order * polynomial(u)
+                out[order, :, self.change_vehicle[k]] += shift / duration**order * polynomial(u)
         return out
