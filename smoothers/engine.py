@@ -1,0 +1,157 @@
+"""One interface for all smoothers, so that the configuration chooses among them."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.arrays import FloatArray
+from jeat_graph.errors import ConfigError
+from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
+from jeat_graph.smoothers.full import smooth_full
+from jeat_graph.smoothers.robust import robust_weights
+from jeat_graph.smoothers.rts import smooth_rts
+from jeat_graph.smoothers.track_data import COINCIDENT_S, SmoothedTrack, TrackData, check_measurements
+
+#: Names of the engines: GTSAM with a lag, our own RTS with a lag, GTSAM and RTS over the whole track.
+ENGINES = ("fixed-lag", "fixed-lag-rts", "full", "rts")
+
+
+class TrackSmoother(Protocol):
+    """The smoother of one track.
+
+    Attributes:
+        rebuilds: how often GTSAM failed and the track was solved anew from our arrays.
+        fallbacks: how often our own RTS pass had to stand in for GTSAM.
+        too_late: measurements refused because the states they belong to were final.
+    """
+
+    rebuilds: int
+    fallbacks: int
+    too_late: int
+
+    def feed(self, t: npt.ArrayLike, z: npt.ArrayLike, r: npt.ArrayLike, q: npt.ArrayLike) -> None:
+        """Take in measurements: times (M,) s, centres (M, 2) px, variances (M, 2) px², densities (M,)."""
+
+    def departed(self) -> SmoothedTrack:
+        """Return the states that have become final since the last call, and forget them."""
+
+    def current(self) -> SmoothedTrack:
+        """Return the states that are not final yet, given all measurements so far."""
+
+    def finish(self) -> SmoothedTrack:
+        """Return all states not yet returned by `departed`, and close."""
+
+    def close(self) -> None:
+        """Free everything; the smoother takes no more measurements."""
+
+
+class WholeTrackSmoother:
+    """Keeps the measurements of a track and solves for all of it when asked; nothing is final before.
+
+    Args:
+        prior_t: time of the prior (s).
+        prior_mean: (2, 3) prior mean of [p, v, a] per axis (px, px/s, px/s²).
+        prior_cov: (2, 3, 3) prior covariance.
+        use_gtsam: whether GTSAM does the solving, or our own RTS pass.
+        robust: kernel that weighs down outliers (`robust.KERNELS`), or "none".
+
+    Attributes:
+        rebuilds: how often GTSAM failed.
+        fallbacks: how often the RTS pass gave the result instead; the same number.
+        too_late: measurements refused because they were older than the prior.
+    """
+
+    def __init__(
+        self,
+        prior_t: float,
+        prior_mean: FloatArray,
+        prior_cov: FloatArray,
+        *,
+        use_gtsam: bool = True,
+        robust: str = "none",
+    ) -> None:
+        self.rebuilds = self.fallbacks = self.too_late = 0
+        self._prior = (prior_t, np.asarray(prior_mean), np.asarray(prior_cov))
+        self._use_gtsam, self._robust = use_gtsam, robust
+        self._parts: list[tuple[FloatArray, FloatArray, FloatArray, FloatArray]] = []
+
+    def feed(self, t: npt.ArrayLike, z: npt.ArrayLike, r: npt.ArrayLike, q: npt.ArrayLike) -> None:
+        """Take in measurements, in any order; see `TrackSmoother.feed`.
+
+        Raises:
+            DataError: wrong shapes, numbers that are not finite, variances or densities <= 0.
+        """
+        rows = check_measurements(t, z, r, q)
+        valid = rows[0] >= self._prior[0] - COINCIDENT_S
+        self.too_late += int(np.count_nonzero(~valid))
+        self._parts.append((rows[0][valid], rows[1][valid], rows[2][valid], rows[3][valid]))
+
+    def data(self) -> TrackData:
+        """Return the prior and all measurements so far."""
+        empty = (np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0))
+        t, z, r, q = (np.concatenate(column) for column in zip(empty, *self._parts, strict=True))
+        return TrackData.from_measurements(*self._prior, t, z, r, q)
+
+    def departed(self) -> SmoothedTrack:
+        """Return nothing: no state is final before the track ends."""
+        return SmoothedTrack.empty()
+
+    def current(self) -> SmoothedTrack:
+        """Return the whole track, smoothed with all measurements so far."""
+        data = self.data()
+        weights = None if self._robust == "none" else robust_weights(data, self._robust)
+        if self._use_gtsam:
+            try:
+                return smooth_full(data, weights)
+            except (RuntimeError, np.linalg.LinAlgError):
+                self.rebuilds += 1
+                self.fallbacks += 1
+        return smooth_rts(data, weights)
+
+    def finish(self) -> SmoothedTrack:
+        """Return the whole track, and close."""
+        result = self.current()
+        self.close()
+        return result
+
+    def close(self) -> None:
+        """Forget the measurements."""
+        self._parts = []
+
+
+def make_smoother(
+    engine: str,
+    prior_t: float,
+    prior_mean: FloatArray,
+    prior_cov: FloatArray,
+    *,
+    lag_s: float = 1.0,
+    chunk: int = 24,
+    robust: str = "none",
+) -> TrackSmoother:
+    """Make the smoother of one track.
+
+    Args:
+        engine: one of `ENGINES`.
+        prior_t: time of the prior (s).
+        prior_mean: (2, 3) prior mean of [p, v, a] per axis (px, px/s, px/s²).
+        prior_cov: (2, 3, 3) prior covariance.
+        lag_s: lag of the engines with a window (s).
+        chunk: measurements per update of these.
+        robust: kernel of the engines over the whole track (`robust.KERNELS`), or "none".
+
+    Returns:
+        The smoother.
+
+    Raises:
+        ConfigError: if there is no such engine.
+    """
+    if engine not in ENGINES:
+        raise ConfigError(f"smoother must be one of {', '.join(ENGINES)}, not {engine!r}")
+    if engine.startswith("fixed-lag"):
+        gtsam = engine == "fixed-lag"
+        return FixedLagSmoother(prior_t, prior_mean, prior_cov, lag_s=lag_s, chunk=chunk, use_gtsam=gtsam)
+    return WholeTrackSmoother(prior_t, prior_mean, prior_cov, use_gtsam=engine == "full", robust=robust)

@@ -1,0 +1,49 @@
+"""Whole-track smoothing with GTSAM: one linear factor graph, eliminated by QR in order of time.
+
+The elimination leaves a chain of conditionals p(x_k | x_{k+1}). Back-substitution over it gives the
+means, and the same recursion the covariances and the covariances between neighbours, exactly and in
+linear time, where `gtsam.Marginals` would ask for each one anew.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from jeat_graph.arrays import FloatArray
+from jeat_graph.smoothers import factors
+from jeat_graph.smoothers.rts import filter_track
+from jeat_graph.smoothers.track_data import SmoothedTrack, TrackData
+
+
+@njit(cache=True)
+def _marginals(cov: FloatArray, gain: FloatArray) -> None:
+    """Turn conditional covariances (K, 2, 3, 3) into marginal ones, in place, from the last key back."""
+    for k in range(len(gain) - 2, -1, -1):
+        for a in range(2):
+            cov[k, a] += gain[k, a] @ cov[k + 1, a] @ gain[k, a].T
+
+
+def smooth_full(track: TrackData, weights: FloatArray | None = None) -> SmoothedTrack:
+    """Smooth one whole track with GTSAM.
+
+    Args:
+        track: the data.
+        weights: (M,) factor on the information of each measurement (`robust.py`), 1 where None.
+
+    Returns:
+        The smoothed states at all keys, with covariances and gains.
+
+    Raises:
+        RuntimeError: GTSAM's, if the system is indeterminate; `engine.py` meets it.
+    """
+    z, info = track.fused(weights)
+    reference, _ = filter_track(track, weights)
+    graph = factors.LinearGraph()
+    prior = factors.prior_rows(track.prior_mean, track.prior_cov, z[0], info[0], reference[0])
+    graph.add_prior(0, *prior)
+    graph.add_steps(0, *factors.step_rows(np.diff(track.t), track.q[1:], z[1:], info[1:], reference))
+    vectors, conditional, gain = graph.solve(len(track))
+    cov, gain = factors.unscale_cov(conditional), factors.unscale_gain(gain)
+    _marginals(cov, gain)
+    return SmoothedTrack(track.t, track.q, factors.unscale_mean(vectors, reference), cov, gain)

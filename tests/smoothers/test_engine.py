@@ -1,0 +1,93 @@
+"""All engines are used in the same way and agree."""
+
+import time
+
+import numpy as np
+import pytest
+
+from jeat_graph.errors import ConfigError
+from jeat_graph.smoothers.engine import ENGINES, make_smoother
+from jeat_graph.smoothers.rts import smooth_rts
+from jeat_graph.smoothers.track_data import SmoothedTrack
+
+
+def life(engine, track, step=10, **options):
+    """Feed a track as a live caller would; return all its states in order."""
+    smoother = make_smoother(engine, float(track.t[0]), track.prior_mean, track.prior_cov, **options)
+    parts = []
+    for i in range(0, len(track.z), step):
+        rows = slice(i, i + step)
+        key = track.key[rows]
+        smoother.feed(track.t[key], track.z[rows], track.r[rows], track.q[key])
+        parts.append(smoother.departed())
+    return SmoothedTrack.concatenate([*parts, smoother.finish()])
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_every_engine_gives_the_whole_life_of_a_track(sampled, engine):
+    track, _ = sampled(0, seconds=5.0, q=3000.0)
+    result, exact = life(engine, track), smooth_rts(track)
+    assert np.array_equal(result.t, exact.t)
+    assert np.abs(result.mean[:, :, 0] - exact.mean[:, :, 0]).max() < 1e-2
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_track_that_ends_at_once_is_its_prior(sampled, engine):
+    track, _ = sampled(0, seconds=1.0)
+    smoother = make_smoother(engine, 3.0, track.prior_mean, track.prior_cov)
+    result = smoother.finish()
+    assert result.t.tolist() == [3.0]
+    assert np.allclose(result.mean[0], track.prior_mean)
+    assert np.allclose(result.cov[0], track.prior_cov)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_same_measurements_give_the_same_bytes(sampled, engine):
+    track, _ = sampled(1, seconds=3.0)
+    a, b = life(engine, track), life(engine, track)
+    assert a.mean.tobytes() == b.mean.tobytes()
+    assert a.cov.tobytes() == b.cov.tobytes()
+
+
+def test_whole_track_engines_take_measurements_in_any_order(sampled):
+    track, _ = sampled(2, seconds=2.0)
+    order = np.random.default_rng(0).permutation(len(track.z))
+    smoother = make_smoother("rts", 0.0, track.prior_mean, track.prior_cov)
+    key = track.key[order]
+    smoother.feed(track.t[key], track.z[order], track.r[order], track.q[key])
+    assert np.allclose(smoother.finish().mean, smooth_rts(track).mean, rtol=1e-12)
+
+
+def test_robust_re_weighting_is_an_option_of_the_whole_track(sampled):
+    track, truth = sampled(3, seconds=3.0)
+    track.z[::9] += 40.0
+    error = {
+        robust: np.sqrt(np.mean((life("full", track, robust=robust).mean - truth)[:, :, 0] ** 2))
+        for robust in ("none", "cauchy")
+    }
+    assert error["cauchy"] < 0.5 * error["none"]
+
+
+def test_the_filters_newest_state_is_the_last_of_the_current_ones(sampled):
+    track, _ = sampled(4, seconds=2.0)
+    for engine in ENGINES:
+        smoother = make_smoother(engine, 0.0, track.prior_mean, track.prior_cov)
+        smoother.feed(track.t[track.key], track.z, track.r, track.q[track.key])
+        assert np.abs(smoother.current().mean[-1] - smooth_rts(track).mean[-1])[:, 0].max() < 1e-6
+
+
+def test_rts_is_at_least_five_times_cheaper_than_fixed_lag(sampled):
+    track, _ = sampled(5, seconds=20.0)
+    cost = {}
+    for engine in ("fixed-lag", "rts"):
+        life(engine, track)
+        began = time.process_time()
+        life(engine, track)
+        cost[engine] = time.process_time() - began
+    assert cost["rts"] * 5 <= cost["fixed-lag"]
+
+
+def test_an_unknown_engine_is_an_error(sampled):
+    track, _ = sampled(0, seconds=1.0)
+    with pytest.raises(ConfigError, match="fixed-lag"):
+        make_smoother("isam", 0.0, track.prior_mean, track.prior_cov)

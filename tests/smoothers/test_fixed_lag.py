@@ -1,0 +1,278 @@
+"""The fixed-lag smoother: exact, bounded, and never at the mercy of GTSAM's exceptions."""
+
+import gc
+import resource
+import time
+import weakref
+
+import numpy as np
+import pytest
+
+from jeat_graph.errors import DataError
+from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
+from jeat_graph.smoothers.rts import filter_track, smooth_rts
+from jeat_graph.smoothers.track_data import SmoothedTrack, TrackData
+
+
+def columns(track, rows=slice(None)):
+    """Arguments of `feed` for measurements of a track."""
+    return track.t[track.key[rows]], track.z[rows], track.r[rows], track.q[track.key[rows]]
+
+
+def start(track, **options):
+    return FixedLagSmoother(float(track.t[0]), track.prior_mean, track.prior_cov, **options)
+
+
+def run(track, smoother, step=5):
+    """Feed a track in small portions; return what departed and what was left at the end."""
+    for i in range(0, len(track.z), step):
+        smoother.feed(*columns(track, slice(i, i + step)))
+    left = smoother.current()
+    return smoother.departed(), left
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_newest_state_equals_the_filter_on_harsh_timing(harsh, scaled, relative, seed):
+    track = harsh(seed, 200)
+    _, left = run(track, start(track, chunk=12))
+    mean, cov = filter_track(track)
+    assert np.abs(left.mean[-1, :, 0] - mean[-1, :, 0]).max() < 1e-6
+    assert scaled(left.mean[-1], mean[-1]) < 1e-6
+    assert relative(left.cov[-1], cov[-1]) < 1e-6
+
+
+@pytest.mark.parametrize("use_gtsam", [True, False])
+@pytest.mark.parametrize("seed", range(4))
+def test_departing_states_are_exact_given_what_was_known_by_then(harsh, scaled, relative, seed, use_gtsam):
+    track = harsh(seed, 200)
+    smoother, count = start(track, lag_s=1.0, chunk=1, use_gtsam=use_gtsam), 0
+    for row in range(len(track.z)):
+        smoother.feed(*columns(track, [row]))
+        left = smoother.departed()
+        n = track.key[row] + 1
+        parts = (track.t[:n], track.q[:n], track.key[: row + 1], track.z[: row + 1], track.r[: row + 1])
+        exact = smooth_rts(TrackData(track.prior_mean, track.prior_cov, *parts))
+        if len(left):
+            exact = exact.select(slice(count, count + len(left)))
+            assert np.all(track.t[n - 1] - left.t >= 1.0)
+            assert scaled(left.mean, exact.mean) < 1e-6
+            assert relative(left.cov, exact.cov) < 1e-6
+        count += len(left)
+    assert count > 50
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_departing_states_equal_rts_of_the_whole_track_on_harsh_timing(harsh, relative, seed):
+    # What comes later than the lag is forgotten by the model only if there was enough before it: where
+    # measurements are half a second apart, a second is not enough.
+    track = harsh(seed, 400, q=4000.0)
+    departed, _ = run(track, start(track, lag_s=4.0, chunk=12))
+    exact = smooth_rts(track).select(slice(0, len(departed)))
+    assert len(departed) > 100
+    assert np.abs(departed.mean[:, :, 0] - exact.mean[:, :, 0]).max() < 1e-2
+    assert relative(departed.cov, exact.cov) < 1e-4
+
+
+@pytest.mark.parametrize("use_gtsam", [True, False])
+def test_departing_states_equal_rts_of_the_whole_track_at_a_lag_of_a_second(sampled, relative, use_gtsam):
+    track, _ = sampled(0, seconds=6.0, q=3000.0)
+    departed, _ = run(track, start(track, lag_s=1.0, chunk=24, use_gtsam=use_gtsam))
+    exact = smooth_rts(track).select(slice(0, len(departed)))
+    assert np.abs(departed.mean[:, :, 0] - exact.mean[:, :, 0]).max() < 1e-2
+    assert relative(departed.cov, exact.cov) < 1e-4
+
+
+def test_states_inside_the_window_equal_rts_of_all_measurements_so_far(sampled, scaled, relative):
+    track, _ = sampled(1, seconds=4.0, q=30.0)
+    _, left = run(track, start(track))
+    exact = smooth_rts(track).select(slice(len(track) - len(left), None))
+    assert scaled(left.mean, exact.mean) < 1e-5
+    assert relative(left.cov, exact.cov) < 1e-9
+
+
+def test_covariances_are_gtsams_marginals(sampled, relative):
+    track, _ = sampled(2, seconds=2.5)
+    smoother = start(track)
+    _, left = run(track, smoother)
+    for i in (0, len(left) // 2, len(left) - 1):
+        assert relative(smoother._gtsam.cov(smoother._first + i), left.cov[i]) < 1e-6
+
+
+def test_finish_returns_the_whole_life_with_its_neighbour_covariances(sampled):
+    track, _ = sampled(3, seconds=4.0)
+    smoother = start(track)
+    smoother.feed(*columns(track))
+    whole, exact = smoother.finish(), smooth_rts(track)
+    assert np.array_equal(whole.t, exact.t)
+    assert np.allclose(whole.gain, exact.gain, rtol=1e-9, atol=1e-12)
+
+
+def test_a_gap_longer_than_the_lag_is_survived(sampled):
+    track, _ = sampled(4, seconds=3.0, q=3000.0)
+    t = track.t[track.key]
+    z, r, q = track.z, track.r, track.q[track.key]
+    twice = TrackData.from_measurements(
+        0.0,
+        track.prior_mean,
+        track.prior_cov,
+        np.append(t, t + 9.0),
+        np.append(z, z, axis=0),
+        np.append(r, r, axis=0),
+        np.append(q, q),
+    )
+    smoother = start(twice, lag_s=2.0)
+    joined, exact = SmoothedTrack.concatenate(run(twice, smoother)), smooth_rts(twice)
+    assert smoother.rebuilds == smoother.fallbacks == 0
+    assert np.abs(joined.mean[:, :, 0] - exact.mean[:, :, 0]).max() < 1e-2
+
+
+def test_a_late_measurement_counts_as_if_it_had_come_in_time(sampled, scaled, relative):
+    track, _ = sampled(5, seconds=2.0, q=300.0)
+    late = np.array([200, 180, 150])
+    smoother = start(track)
+    smoother.feed(*columns(track, np.setdiff1d(np.arange(len(track.z)), late)))
+    smoother.current()
+    for row in late:
+        smoother.feed(*columns(track, [row]))
+    left, exact = smoother.current(), smooth_rts(track)
+    same = np.searchsorted(exact.t, left.t)
+    assert smoother.rebuilds == 0
+    assert not np.isin(track.t[track.key[late]], left.t).any()
+    assert scaled(left.mean, exact.mean[same]) < 1e-5
+    assert relative(left.cov, exact.cov[same]) < 1e-9
+    assert np.allclose(left.gain[-5:], smooth_rts(track).gain[-5:], atol=1e-9)
+
+
+def test_a_late_measurement_at_the_time_of_a_key_is_exact(sampled, scaled, relative):
+    track, _ = sampled(6, seconds=1.5)
+    smoother = start(track)
+    smoother.feed(*columns(track))
+    smoother.current()
+    row = 100
+    t, z, r, q = columns(track, [row])
+    smoother.feed(t, z + 3.0, r, q)
+    left = smoother.current()
+    twice = TrackData.from_measurements(
+        0.0,
+        track.prior_mean,
+        track.prior_cov,
+        np.append(track.t[track.key], t),
+        np.append(track.z, z + 3.0, axis=0),
+        np.append(track.r, r, axis=0),
+        np.append(track.q[track.key], q),
+    )
+    exact = smooth_rts(twice).select(slice(len(twice) - len(left), None))
+    assert scaled(left.mean, exact.mean) < 1e-5
+    assert relative(left.cov, exact.cov) < 1e-9
+
+
+def test_a_measurement_older_than_the_window_is_refused_and_counted(sampled):
+    track, _ = sampled(7, seconds=3.0)
+    smoother = start(track)
+    smoother.feed(*columns(track))
+    before = smoother.current()
+    smoother.feed(*columns(track, [10]))
+    assert smoother.too_late == 1
+    assert np.array_equal(smoother.current().mean, before.mean)
+
+
+def test_an_indeterminate_system_is_met_by_a_rebuild(sampled, scaled, monkeypatch):
+    """Factors that go missing leave a state free, at which GTSAM throws; the track does not notice."""
+    from jeat_graph.smoothers.factors import LinearGraph
+
+    track, _ = sampled(8, seconds=4.0, q=1000.0)
+    smoother = start(track)
+    half = len(track.z) // 2
+    smoother.feed(*columns(track, slice(0, half)))
+    with monkeypatch.context() as broken:
+        whole = LinearGraph.add_steps
+
+        def lossy(self, first, A0, A1, b):
+            broken.undo()
+            keep = np.ones_like(b)
+            keep[:, :6] = 0.0  # the motion is forgotten, the measurements stay
+            whole(self, first, A0 * keep[..., None], A1 * keep[..., None], b * keep)
+
+        broken.setattr(LinearGraph, "add_steps", lossy)
+        smoother.feed(*columns(track, slice(half, half + 30)))
+    assert smoother.rebuilds == 1
+    smoother.feed(*columns(track, slice(half + 30, None)))
+    left, exact = smoother.current(), smooth_rts(track)
+    assert smoother.rebuilds == 1
+    assert smoother.fallbacks == 0
+    assert scaled(left.mean, exact.mean[-len(left) :]) < 1e-4
+
+
+def test_a_rebuild_keeps_late_measurements(sampled, scaled):
+    track, _ = sampled(9, seconds=2.5)
+    late = np.array([250, 270])
+    smoother = start(track)
+    smoother.feed(*columns(track, np.setdiff1d(np.arange(len(track.z)), late)))
+    smoother.current()
+    smoother.feed(*columns(track, late))
+    before = smoother.current()
+    smoother._rebuild()
+    assert scaled(smoother.current().mean, before.mean) < 1e-5
+
+
+def test_absurd_scales_give_finite_states_and_no_exception():
+    n = 100
+    t = np.cumsum(np.full(n, 2e-6))
+    z = np.zeros((n, 2))
+    r = np.where(np.arange(n)[:, None] % 2, 1e-12, 1e12) * np.ones(2)
+    cov = np.tile(np.diag([1e14, 1e14, 1e14]), (2, 1, 1))
+    track = TrackData.from_measurements(0.0, np.zeros((2, 3)), cov, t, z, r, np.full(n, 1e-9))
+    smoother = start(track, chunk=10)
+    result = SmoothedTrack.concatenate([*run(track, smoother)])
+    assert np.isfinite(result.mean).all()
+    assert len(result) == len(track)
+
+
+def test_a_closed_smoother_frees_gtsam_at_once(sampled):
+    track, _ = sampled(10, seconds=1.0)
+    smoother = start(track)
+    smoother.feed(*columns(track))
+    alive = weakref.ref(smoother._gtsam)
+    smoother.close()
+    assert alive() is None
+    with pytest.raises(DataError, match="closed"):
+        smoother.feed(*columns(track))
+
+
+def test_bad_numbers_are_refused(sampled):
+    track, _ = sampled(10, seconds=1.0)
+    smoother = start(track)
+    for z, r, q in (([[np.nan, 0]], [[1, 1]], [1]), ([[0, 0]], [[0, 1]], [1]), ([[0, 0]], [[1, 1]], [0])):
+        with pytest.raises(DataError):
+            smoother.feed([1.0], z, r, q)
+
+
+def test_one_long_track_stays_flat_in_memory_and_time(sampled):
+    track, _ = sampled(11, seconds=100.0, q=1.0)
+    smoother = start(track)
+    seconds, slots = [], []
+    for i in range(0, 12_000 - 1200, 1200):
+        began = time.process_time()
+        for j in range(i, i + 1200, 6):
+            smoother.feed(*columns(track, slice(j, j + 6)))
+            smoother.departed()
+        seconds.append(time.process_time() - began)
+        slots.append(smoother._gtsam.factor_slots())
+    assert max(slots[2:]) <= slots[1] * 1.2
+    assert np.median(seconds[-4:]) < 1.5 * np.median(seconds[1:5])
+    assert smoother.rebuilds == 0
+
+
+def test_many_short_tracks_leave_no_memory_behind(sampled):
+    track, _ = sampled(12, seconds=0.5)
+
+    def lives(count):
+        for _ in range(count):
+            smoother = start(track)
+            smoother.feed(*columns(track))
+            smoother.finish()
+        gc.collect()
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+    warm = lives(100)
+    assert lives(200) - warm < 3000  # kB
