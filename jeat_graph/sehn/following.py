@@ -72,19 +72,12 @@ def distances_ahead(s: FloatArray, ring_m: float) -> FloatArray:
     return ahead
 
 
-def share_lane(occupied: BoolArray) -> BoolArray:
-    """Which vehicles (V, V) occupy a common lane, given the lanes (V, L) that each occupies."""
-    lanes = occupied.astype(np.float64)
-    shared: BoolArray = lanes @ lanes.T > 0.0
-    return shared
-
-
 def leaders(ahead: FloatArray, shared: BoolArray) -> tuple[IntArray, FloatArray]:
-    """Find the next vehicle ahead among those that share a lane.
+    """Find the next vehicle ahead in a lane.
 
     Args:
         ahead: (V, V) distances forward from i to j (m).
-        shared: (V, V) true where i and j occupy a common lane.
+        shared: (V, V) true where j occupies the lane that i asks about.
 
     Returns:
         (V,) index of the leader and (V,) centre distance to it (m), infinite where there is none.
@@ -94,6 +87,21 @@ def leaders(ahead: FloatArray, shared: BoolArray) -> tuple[IntArray, FloatArray]
     masked = np.where(shared, ahead, np.inf)
     leader = np.argmin(masked, axis=1)
     return leader, masked[np.arange(len(leader)), leader]
+
+
+def follow(v: FloatArray, ahead: FloatArray, shared: BoolArray, drivers: Drivers) -> FloatArray:
+    """Acceleration (V,) in m/s² that each driver wants behind the leader in one lane.
+
+    Args:
+        v: (V,) speeds (m/s).
+        ahead: (V, V) distances forward from i to j (m).
+        shared: (V, V) true where j occupies the lane that i asks about.
+        drivers: what the drivers want.
+    """
+    leader, distance = leaders(ahead, shared)
+    gap = distance - (drivers.length + drivers.length[leader]) / 2.0
+    closing = np.where(np.isfinite(gap), v - v[leader], 0.0)
+    return idm_acceleration(v, gap, closing, drivers.speed, drivers.headway, drivers.acceleration)
 
 
 def lane_change_gain(

@@ -18,10 +18,8 @@ from jeat_graph.sehn.following import (
     STANDSTILL_GAP_M,
     Drivers,
     distances_ahead,
-    idm_acceleration,
+    follow,
     lane_change_gain,
-    leaders,
-    share_lane,
 )
 from jeat_graph.sehn.paths import Paths
 from jeat_graph.sehn.road import Road
@@ -114,7 +112,7 @@ def simulate_traffic(
 
     occupied = np.zeros((count, road.num_lanes), dtype=bool)
     occupied[np.arange(count), lane] = True
-    first_lane, last_lane = lane.copy(), lane.copy()
+    from_lane, last_lane = lane.copy(), lane.copy()
     change_end = np.full(count, -np.inf)
     brake_end, brake = np.full(count, -np.inf), np.zeros(count)
     along = np.empty((steps, count, 4))
@@ -126,11 +124,13 @@ def simulate_traffic(
         if done.any():
             occupied[done] = False
             occupied[done, last_lane[done]] = True
+            from_lane[done] = last_lane[done]
         ahead = distances_ahead(s, config.ring_m)
-        leader, distance = leaders(ahead, share_lane(occupied))
-        gap = distance - (drivers.length + drivers.length[leader]) / 2.0
-        closing = np.where(np.isfinite(gap), v - v[leader], 0.0)
-        wish = idm_acceleration(v, gap, closing, drivers.speed, drivers.headway, drivers.acceleration)
+        # While changing, a driver minds the leader of either lane: the nearer one may be the less pressing.
+        wish = np.minimum(
+            follow(v, ahead, occupied[:, from_lane].T, drivers),
+            follow(v, ahead, occupied[:, last_lane].T, drivers),
+        )
         startled = rng.random(count) < config.brake_rate_hz * dt
         brake_end = np.where(startled, now + rng.uniform(0.5, 2.0, count), brake_end)
         brake = np.where(startled, rng.uniform(*config.brake_m_s2, count), brake)
@@ -169,7 +169,7 @@ def simulate_traffic(
         start_s=start + keep * dt,
         step_s=dt,
         along=along[keep:],
-        lane_x=road.lane_x[first_lane],
+        lane_x=road.lane_x[lane],
         change_vehicle=np.array(columns[0], dtype=np.int64),
         change_start=np.array(columns[1], dtype=np.float64),
         change_duration=np.array(columns[2], dtype=np.float64),
