@@ -12,11 +12,11 @@ from jeat_graph.arrays import FloatArray, IntArray
 @njit(cache=True)
 def choose_births(
     boxes: FloatArray,
-    precision: FloatArray,
+    existence: FloatArray,
     sensor: IntArray,
     taken: IntArray,
     track_boxes: FloatArray,
-    min_precision: float,
+    min_existence: float,
     max_overlap: float,
 ) -> tuple[IntArray, IntArray]:
     """Choose the leftover detections that start tracks, the surest first.
@@ -26,24 +26,24 @@ def choose_births(
 
     Args:
         boxes: (M, 4) left, top, width, height (px).
-        precision: (M,) calibrated precision of each detection.
+        existence: (M,) probability that each detection is of a vehicle not tracked yet.
         sensor: (M,) sensor of each detection.
         taken: (M,) not zero where a track took the detection.
         track_boxes: (N, 4) boxes of the living tracks.
-        min_precision: least precision of a birth.
+        min_existence: least existence of a birth.
         max_overlap: IoU above which two boxes coincide; 1 refuses none.
 
     Returns:
         parents (B,) detections that start tracks; partner (M,) the index into `parents` of the birth that a
         detection joins, or -1.
     """
-    num = len(precision)
+    num = len(existence)
     parents = np.empty(num, dtype=np.int64)
     partner = np.full(num, -1, dtype=np.int64)
     count = 0
-    order = np.argsort(-precision, kind="mergesort")
+    order = np.argsort(-existence, kind="mergesort")
     for j in order:
-        if taken[j] or precision[j] < min_precision:
+        if taken[j] or existence[j] < min_existence:
             continue
         refused = False
         if max_overlap < 1.0:

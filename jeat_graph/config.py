@@ -73,9 +73,10 @@ class SensorConfig:
     tempering: float = number(
         1.0, "1", "exponent on evidence, below 1 where false boxes repeat in time", 0.01, 1.0
     )
-    miss_tempering: float = number(
-        1.0, "1", "exponent on the evidence of misses, below 1 where misses come in bursts", 0.01, 1.0
+    repeat: float = number(
+        0.0, "1", "probability that a false box is there again in the sensor's next scan", 0.0, 0.95
     )
+    miss_memory_s: float = number(0.0, "s", "time within which misses of one vehicle are one miss")
     blind_speed: float = number(
         0.0, "px/s", "image speed below which the sensor sees nothing (events); 0: it sees what stands still"
     )
@@ -171,7 +172,7 @@ class LifecycleConfig:
 
     method: str = choice("existence", ("existence", "hits"), "Bernoulli existence, or the paper's hit counts")
     confirm_existence: float = number(0.9, "1", "confirmed at this probability of existence", 0.0, 1.0)
-    delete_existence: float = number(0.02, "1", "deleted below this probability of existence", 0.0, 1.0)
+    delete_existence: float = number(0.001, "1", "deleted below this probability of existence", 0.0, 1.0)
     lifetime_s: float = number(
         20.0, "s", "mean time a vehicle stays in the picture (decay of existence)", open_low=True
     )
@@ -195,8 +196,10 @@ class LifecycleConfig:
 class BirthConfig:
     """When a detection that no track took starts a new one."""
 
-    min_precision: float = number(
-        0.05, "1", "least calibrated precision of a detection that starts a track", 0.0, 1.0
+    arrival_rate_hz: float = number(2.0, "1/s", "rate at which vehicles enter the scene")
+    initial: float = number(10.0, "1", "expected number of vehicles in the scene at the start")
+    min_existence: float = number(
+        0.002, "1", "least probability of existence with which a detection starts a track", 0.0, 1.0
     )
     max_overlap: float = number(
         0.7,

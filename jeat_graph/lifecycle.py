@@ -30,15 +30,21 @@ def existence_after_hit(existence: float, evidence: float, tempering: float) -> 
 
 
 @njit(cache=True)
-def existence_after_miss(existence: float, p_detect: float, tempering: float) -> float:
-    """Probability of existence after a scan without a detection: r (1 − P_D)^β / (1 − r + r (1 − P_D)^β).
+def existence_after_miss(existence: float, p_detect: float, repeat: float, share: float) -> float:
+    """Probability of existence after a scan without a detection.
+
+    r Λ^γ / (1 − r + r Λ^γ) with Λ = (1 − P_D) / (1 − ρ): what is false would have been there again with
+    probability ρ. With ρ = 0 and γ = 1 this is r (1 − P_D) / (1 − r P_D).
 
     Args:
         existence: r before.
         p_detect: P_D of this look.
-        tempering: β, below 1 where misses come in bursts (occlusion, blur); 1 gives r (1 − P_D) / (1 − r P_D).
+        repeat: ρ.
+        share: γ, the part of an independent look that this one is; below 1 where misses come in bursts.
     """
-    missed = existence * math.exp(tempering * math.log(max(1.0 - p_detect, 1e-12)))
+    # Not finding a thing is never evidence for it, however often false boxes repeat.
+    ratio = min((1.0 - p_detect) / (1.0 - repeat), 1.0)
+    missed = existence * math.exp(share * math.log(max(ratio, 1e-12)))
     return missed / max(1.0 - existence + missed, 1e-12)
 
 
@@ -70,6 +76,39 @@ def visible_fraction(box: FloatArray, width: float, height: float) -> float:
     if w <= 0.0 or h <= 0.0:
         return 0.0
     return w * h / (box[2] * box[3])
+
+
+@njit(cache=True)
+def hidden_fraction(boxes: FloatArray, existence: FloatArray) -> FloatArray:
+    """Fraction (N,) of each box that the one track in front which covers most of it hides.
+
+    On a plane road the box that reaches further down stands nearer. A doubtful track hides in proportion to
+    its existence.
+
+    Args:
+        boxes: (N, 4) left, top, width, height (px).
+        existence: (N,) probability of existence.
+    """
+    num = boxes.shape[0]
+    out = np.zeros(num)
+    order = np.argsort(boxes[:, 0], kind="mergesort")
+    for a in range(num):
+        i = order[a]
+        right = boxes[i, 0] + boxes[i, 2]
+        for b in range(a + 1, num):
+            k = order[b]
+            if boxes[k, 0] >= right:
+                break
+            width = min(right, boxes[k, 0] + boxes[k, 2]) - boxes[k, 0]
+            bottom_i = boxes[i, 1] + boxes[i, 3]
+            bottom_k = boxes[k, 1] + boxes[k, 3]
+            height = min(bottom_i, bottom_k) - max(boxes[i, 1], boxes[k, 1])
+            if height <= 0.0:
+                continue
+            behind, front = (i, k) if bottom_i < bottom_k else (k, i)
+            covered = existence[front] * width * height / (boxes[behind, 2] * boxes[behind, 3])
+            out[behind] = max(out[behind], covered)
+    return out
 
 
 @njit(cache=True)

@@ -31,7 +31,8 @@ class SensorArrays(NamedTuple):
         curve_score: (S, K) knots of the calibrated precision, padded with the last.
         curve_precision: (S, K) its values.
         tempering: (S,) exponent on evidence.
-        miss_tempering: (S,) exponent on the evidence of misses.
+        repeat: (S,) probability that a false box repeats.
+        miss_memory: (S,) time within which misses are one miss (s).
         blind_speed: (S,) px/s.
     """
 
@@ -46,7 +47,8 @@ class SensorArrays(NamedTuple):
     curve_score: FloatArray
     curve_precision: FloatArray
     tempering: FloatArray
-    miss_tempering: FloatArray
+    repeat: FloatArray
+    miss_memory: FloatArray
     blind_speed: FloatArray
 
 
@@ -88,7 +90,8 @@ class Settings(NamedTuple):
     max_gap_confirmed_s: float
     max_gap_tentative_s: float
     leave_picture: bool
-    birth_min_precision: float
+    arrival_rate: float
+    birth_min_existence: float
     birth_max_overlap: float
     merge: bool
     merge_min_overlap: float
@@ -123,7 +126,8 @@ def sensor_arrays(config: Config) -> SensorArrays:
         curve_score=score,
         curve_precision=np.array([[p[1] for p in c] for c in curves]),
         tempering=np.array([s.tempering for s in sensors]),
-        miss_tempering=np.array([s.miss_tempering for s in sensors]),
+        repeat=np.array([s.repeat for s in sensors]),
+        miss_memory=np.array([s.miss_memory_s for s in sensors]),
         blind_speed=np.array([s.blind_speed for s in sensors]),
     )
 
@@ -170,7 +174,8 @@ def kernel_settings(config: Config) -> Settings:
         max_gap_confirmed_s=c.lifecycle.max_gap_confirmed_s,
         max_gap_tentative_s=c.lifecycle.max_gap_tentative_s,
         leave_picture=c.lifecycle.leave_picture,
-        birth_min_precision=c.birth.min_precision,
+        arrival_rate=c.birth.arrival_rate_hz,
+        birth_min_existence=c.birth.min_existence,
         birth_max_overlap=c.birth.max_overlap,
         merge=c.merge.enabled,
         merge_min_overlap=c.merge.min_overlap,

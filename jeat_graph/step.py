@@ -25,6 +25,7 @@ from jeat_graph.lifecycle import (
     existence_after_hit,
     existence_after_miss,
     motion_visibility,
+    hidden_fraction,
     track_boxes,
     visible_fraction,
 )
@@ -45,6 +46,7 @@ def step(
     sensor: IntArray,
     present: BoolArray,
     clutter: FloatArray,
+    undetected: FloatArray,
     sensors: SensorArrays,
     settings: Settings,
     priority: IntArray,
@@ -62,6 +64,7 @@ def step(
         sensor: (M,) sensor index of each detection.
         present: (S,) which sensors looked at `t`, including those that found nothing.
         clutter: (S,) running estimate of the false boxes a scan; updated.
+        undetected: (1,) expected number of vehicles in the scene that have no track yet; updated.
         sensors: parameters of the sensors.
         settings: scalars of the configuration.
         priority: (S,) order of the sequential association.
@@ -83,7 +86,13 @@ def step(
     estimate_clutter(tracks, n, batch, match, taken, present, clutter, sensors, settings)
     confirm(tracks, n, t, settings)
     n = remove_ended(tracks, n, t, settings)
-    return give_birth(tracks, n, next_id, t, batch, taken, sensors, settings)
+    undetected[0] += settings.arrival_rate * dt
+    n, next_id = give_birth(tracks, n, next_id, t, batch, taken, clutter, undetected[0], sensors, settings)
+    for s in range(len(present)):
+        if present[s]:
+            undetected[0] *= 1.0 - sensors.p_detect[s]
+    undetected[0] = max(undetected[0], 0.1 * settings.arrival_rate * np.min(sensors.period))
+    return n, next_id
 
 
 @njit(cache=True)
@@ -110,13 +119,14 @@ def current_p_detect(
 ) -> FloatArray:
     """Probability (n, S) that each sensor detects each track now; 0 for sensors that did not look.
 
-    The track's own running P_D times what is known of this moment: the part of the box inside the picture,
-    and for an event camera the image speed.
+    The track's own running P_D times what is known of this moment: the part of the box inside the picture and
+    not hidden by nearer vehicles, and for an event camera the image speed.
     """
     out = np.zeros((n, len(present)))
     boxes = track_boxes(tracks.mean[:n], tracks.size_mean[:n])
+    hidden = hidden_fraction(boxes, tracks.existence[:n])
     for i in range(n):
-        inside = visible_fraction(boxes[i], settings.image_width, settings.image_height)
+        inside = visible_fraction(boxes[i], settings.image_width, settings.image_height) * (1.0 - hidden[i])
         for s in range(len(present)):
             if present[s]:
                 seen = motion_visibility(tracks.mean[i], sensors.blind_speed[s])
@@ -154,7 +164,8 @@ def associate(
     """Associate a batch with the predicted tracks.
 
     Returns:
-        match (n, S): detection that each track takes of each sensor, or -1; evidence (n, S): its ln Λ.
+        match (n, S): detection that each track takes of each sensor, or -1; evidence (n, S): its ln Λ against
+        a false track, whose next box would be clutter or, with probability ρ, the same false box again.
     """
     num_sensors = len(clutter)
     rows, cols, d2, log_density, log_size_density = gated_pairs(
@@ -171,6 +182,7 @@ def associate(
         settings.gate,
         settings.size_gate,
     )
+    log_clutter = np.log(clutter) - settings.log_clutter_volume
     pair_evidence = log_evidence(
         rows,
         cols,
@@ -178,7 +190,7 @@ def associate(
         log_size_density,
         p_detect,
         batch.log_score,
-        np.log(clutter) - settings.log_clutter_volume,
+        log_clutter,
         batch.sensor,
     )
     if settings.likelihood:
@@ -197,8 +209,18 @@ def associate(
     for p in range(len(rows)):
         s = batch.sensor[cols[p]]
         if match[rows[p], s] == cols[p]:
-            evidence[rows[p], s] = pair_evidence[p]
+            over_clutter = log_density[p] + log_size_density[p] - log_clutter[s]
+            evidence[rows[p], s] = pair_evidence[p] - log_one_plus(sensors.repeat[s], over_clutter)
     return match, evidence
+
+
+@njit(cache=True)
+def log_one_plus(factor: float, exponent: float) -> float:
+    """ln(1 + factor · e^exponent) without overflow."""
+    if factor <= 0.0:
+        return 0.0
+    x = math.log(factor) + exponent
+    return x + math.log1p(math.exp(-x)) if x > 0.0 else math.log1p(math.exp(x))
 
 
 @njit(cache=True)
@@ -353,8 +375,9 @@ def count_misses(
         for s in range(len(present)):
             if not present[s] or match[i, s] >= 0:
                 continue
+            share = min(sensors.period[s] / max(sensors.miss_memory[s], 1e-9), 1.0)
             tracks.existence[i] = existence_after_miss(
-                tracks.existence[i], p_detect[i, s], sensors.miss_tempering[s]
+                tracks.existence[i], p_detect[i, s], sensors.repeat[s], share
             )
             # Only as far as the miss was to be expected does it say anything about the sensor.
             own = tracks.p_detect[i, s]
@@ -468,21 +491,25 @@ def give_birth(
     t: float,
     batch: Measurements,
     taken: IntArray,
+    clutter: FloatArray,
+    undetected: float,
     sensors: SensorArrays,
     settings: Settings,
 ) -> tuple[int, int]:
     """Start tracks from leftovers; returns the number of tracks and the next identity."""
+    existence = birth_existence(batch, clutter, undetected, sensors)
     parents, partner = choose_births(
         batch.boxes,
-        batch.precision,
+        existence,
         batch.sensor,
         taken,
         track_boxes(tracks.mean[:n], tracks.size_mean[:n]),
-        settings.birth_min_precision,
+        settings.birth_min_existence,
         settings.birth_max_overlap,
     )
     for b in range(len(parents)):
         start_track(tracks, n + b, next_id + b, t, parents[b], batch, sensors, settings)
+        tracks.existence[n + b] = existence[parents[b]]
     for j in range(len(partner)):
         if partner[j] >= 0:
             i = n + partner[j]
@@ -496,6 +523,23 @@ def give_birth(
             tracks.existence[i] = 1.0 - (1.0 - tracks.existence[i]) * (1.0 - batch.precision[j])
     confirm(tracks, n + len(parents), t, settings)
     return n + len(parents), next_id + len(parents)
+
+
+@njit(cache=True)
+def birth_existence(
+    batch: Measurements, clutter: FloatArray, undetected: float, sensors: SensorArrays
+) -> FloatArray:
+    """Probability (M,) that a detection which no track took is of a vehicle not tracked before.
+
+    u P_D LR(score) / (u P_D LR(score) + λ): of the vehicles that have no track yet, u are expected in the scene, and
+    most leftovers are clutter however high their score (Williams 2015, the Poisson part of the mixture).
+    """
+    out = np.empty(len(batch.precision))
+    for j in range(len(out)):
+        s = batch.sensor[j]
+        true = undetected * sensors.p_detect[s] * math.exp(batch.log_score[j])
+        out[j] = true / (true + clutter[s])
+    return out
 
 
 @njit(cache=True)
@@ -529,7 +573,7 @@ def start_track(
         tracks.size_cov[i, axis, 1, 1] = settings.size_rate_std**2
     tracks.scale[i] = 1.0
     tracks.p_detect[i] = sensors.p_detect
-    tracks.existence[i] = batch.precision[j]
+    tracks.existence[i] = 0.5
     tracks.confirmed[i] = False
     tracks.track_id[i] = track_id
     tracks.hits[i] = 1

@@ -49,6 +49,7 @@ class Tracker:
         self._priority = priority_order(config)
         self._tracks = allocate(_FIRST_CAPACITY, len(self.sensor_names))
         self._clutter = self._sensors.clutter.copy()
+        self._undetected = np.array([config.birth.initial])
         self._num_tracks = 0
         self._next_id = 1
         self._t: float | None = None
@@ -112,6 +113,7 @@ class Tracker:
             sensor,
             present,
             self._clutter,
+            self._undetected,
             self._sensors,
             self._settings,
             self._priority,

@@ -48,7 +48,7 @@ def calibrate_sensor(matches: SensorMatches, rate_hz: float) -> SensorConfig:
         clutter_per_scan=float((false.sum() + 0.5) / matches.scans),
         precision=float(precision),
         score_precision=fit_precision(matches.score, matches.correct),
-        tempering=fit_tempering(matches),
+        repeat=fit_repeat(matches),
         blind_speed=blind,
     )
 
@@ -102,7 +102,11 @@ def fit_precision(score: FloatArray, correct: np.ndarray) -> tuple[tuple[float, 
     order = np.argsort(score, kind="stable")
     s, c = score[order], correct[order].astype(float)
     overall = (c.sum() + 0.5) / (len(c) + 1.0)
-    bins = np.array_split(np.arange(len(s)), min(_MAX_KNOTS, max(len(s) // 25, 1)))
+    # Both kinds weigh the same in the division into bins, so that it is fine where the rarer kind lies.
+    mass = np.cumsum(np.where(c > 0, 0.5 / max(c.sum(), 1.0), 0.5 / max((1.0 - c).sum(), 1.0)))
+    count = min(_MAX_KNOTS, max(len(s) // 25, 1))
+    edges = np.unique(np.searchsorted(mass, np.arange(1, count) / count * mass[-1]))
+    bins = [b for b in np.split(np.arange(len(s)), edges) if len(b)]
     centre = np.array([s[b].mean() for b in bins])
     weight = np.array([float(len(b)) for b in bins])
     # Two pseudo-observations at the overall precision keep a bin from claiming certainty.
@@ -115,16 +119,10 @@ def fit_precision(score: FloatArray, correct: np.ndarray) -> tuple[tuple[float, 
     )
 
 
-def fit_tempering(matches: SensorMatches) -> float:
-    """Exponent on evidence for false boxes that repeat: one over the mean number of repeats of a false box.
-
-    Evidence of false boxes that come n in a row is worth one box, not n. The mean is over false boxes, so long
-    runs weigh as much as they hurt.
-    """
+def fit_repeat(matches: SensorMatches) -> float:
+    """Probability that a false box is there again in the next scan: the share of those that continue a run."""
     run = matches.run[~matches.correct]
-    if len(run) == 0:
-        return 1.0
-    return float(np.clip(1.0 / run.mean(), 0.1, 1.0))
+    return float(np.clip((run > 1).sum() / (len(run) + 1.0), 0.0, 0.95))
 
 
 def fit_detection(seen: np.ndarray, speed: FloatArray) -> tuple[float, float]:  # type: ignore[type-arg]
