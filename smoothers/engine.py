@@ -85,9 +85,12 @@ class WholeTrackSmoother:
             DataError: wrong shapes, numbers that are not finite, variances or densities <= 0.
         """
         rows = check_measurements(t, z, r, q)
-        valid = rows[0] >= self._prior[0] - COINCIDENT_S
-        self.too_late += int(np.count_nonzero(~valid))
-        self._parts.append((rows[0][valid], rows[1][valid], rows[2][valid], rows[3][valid]))
+        earliest = self._prior[0] - COINCIDENT_S
+        if rows[0].min(initial=np.inf) < earliest:
+            valid = rows[0] >= earliest
+            self.too_late += int(np.count_nonzero(~valid))
+            rows = (rows[0][valid], rows[1][valid], rows[2][valid], rows[3][valid])
+        self._parts.append(rows)
 
     def data(self) -> TrackData:
         """Return the prior and all measurements so far."""

@@ -86,8 +86,8 @@ class FixedLagSmoother:
         """
         window = self._live()
         rows = check_measurements(t, z, r, q)
-        late = rows[0] <= window.t[-1] + COINCIDENT_S
-        if late.any():
+        if rows[0].min(initial=np.inf) <= window.t[-1] + COINCIDENT_S:
+            late = rows[0] <= window.t[-1] + COINCIDENT_S
             for i in np.flatnonzero(late):
                 self._take_late(float(rows[0][i]), rows[1][i], rows[2][i])
             rows = (rows[0][~late], rows[1][~late], rows[2][~late], rows[3][~late])

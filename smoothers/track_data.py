@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from numba import njit
 
 from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.errors import DataError
@@ -174,8 +175,8 @@ class SmoothedTrack:
     @staticmethod
     def concatenate(parts: Sequence[SmoothedTrack]) -> SmoothedTrack:
         """Join consecutive pieces of one trajectory."""
-        if not parts:
-            return SmoothedTrack.empty()
+        if len(parts) < 2:
+            return parts[0] if parts else SmoothedTrack.empty()
         return SmoothedTrack(
             np.concatenate([part.t for part in parts]),
             np.concatenate([part.q for part in parts]),
@@ -260,8 +261,18 @@ def check_measurements(
         raise DataError(f"times and densities must have shape ({rows},)")
     if centres.shape != (rows, 2) or variances.shape != (rows, 2):
         raise DataError(f"centres and variances must have shape ({rows}, 2)")
-    if not all(np.isfinite(a).all() for a in (times, centres, variances, density)):
-        raise DataError("measurements must be finite")
-    if np.any(variances <= 0) or np.any(density <= 0):
-        raise DataError("spectral densities and variances must be positive")
+    if not _all_valid(times, centres, variances, density):
+        raise DataError("measurements must be finite, their variances and spectral densities positive")
     return times, centres, variances, density
+
+
+@njit(cache=True)
+def _all_valid(t: FloatArray, z: FloatArray, r: FloatArray, q: FloatArray) -> bool:
+    """Whether all is finite and `r`, `q` positive; compiled, as live callers feed one row at a time."""
+    for i in range(len(t)):
+        if not (np.isfinite(t[i]) and np.isfinite(q[i]) and q[i] > 0.0):
+            return False
+        for axis in range(2):
+            if not (np.isfinite(z[i, axis]) and np.isfinite(r[i, axis]) and r[i, axis] > 0.0):
+                return False
+    return True

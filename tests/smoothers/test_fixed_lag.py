@@ -7,6 +7,8 @@ import weakref
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from jeat_graph.errors import DataError
 from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
@@ -108,20 +110,13 @@ def test_finish_returns_the_whole_life_with_its_neighbour_covariances(sampled):
 
 
 def test_a_gap_longer_than_the_lag_is_survived(sampled):
-    track, _ = sampled(4, seconds=3.0, q=3000.0)
-    t = track.t[track.key]
-    z, r, q = track.z, track.r, track.q[track.key]
-    twice = TrackData.from_measurements(
-        0.0,
-        track.prior_mean,
-        track.prior_cov,
-        np.append(t, t + 9.0),
-        np.append(z, z, axis=0),
-        np.append(r, r, axis=0),
-        np.append(q, q),
-    )
-    smoother = start(twice, lag_s=2.0)
-    joined, exact = SmoothedTrack.concatenate(run(twice, smoother)), smooth_rts(twice)
+    whole, _ = sampled(4, seconds=12.0, q=3000.0)
+    t, z, r, q = columns(whole)
+    seen = (t < 3.0) | (t > 9.0)
+    prior = (whole.prior_mean, whole.prior_cov)
+    track = TrackData.from_measurements(0.0, *prior, t[seen], z[seen], r[seen], q[seen])
+    smoother = start(track)
+    joined, exact = SmoothedTrack.concatenate(run(track, smoother)), smooth_rts(track)
     assert smoother.rebuilds == smoother.fallbacks == 0
     assert np.abs(joined.mean[:, :, 0] - exact.mean[:, :, 0]).max() < 1e-2
 
@@ -245,6 +240,50 @@ def test_bad_numbers_are_refused(sampled):
     for z, r, q in (([[np.nan, 0]], [[1, 1]], [1]), ([[0, 0]], [[0, 1]], [1]), ([[0, 0]], [[1, 1]], [0])):
         with pytest.raises(DataError):
             smoother.feed([1.0], z, r, q)
+
+
+def test_a_measurement_at_the_time_of_the_prior_belongs_to_its_state(sampled, scaled, relative):
+    track, _ = sampled(13, seconds=0.5)
+    t, z, r, q = columns(track)
+    rows = (np.append(t[:1] * 0, t), np.append(z[:1] + 5, z, axis=0), np.append(r[:1], r, axis=0))
+    exact = smooth_rts(
+        TrackData.from_measurements(0.0, track.prior_mean, track.prior_cov, *rows, np.append(q[:1], q))
+    )
+    smoother = start(track)
+    smoother.feed(*rows, np.append(q[:1], q))
+    left = smoother.finish()
+    assert np.array_equal(left.t, track.t)
+    assert scaled(left.mean, exact.mean) < 1e-6
+    assert relative(left.cov, exact.cov) < 1e-6
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    feeds=st.lists(
+        st.tuples(
+            st.one_of(st.just(0.0), st.floats(-0.5, 0.5), st.floats(0.0, 5.0)),
+            st.floats(-2000.0, 2000.0),
+            st.floats(0.5, 500.0),
+            st.floats(1.0, 5000.0),
+        ),
+        min_size=1,
+        max_size=60,
+    ),
+    chunk=st.integers(1, 10),
+)
+def test_any_order_of_arrival_gives_finite_valid_states(feeds, chunk):
+    prior = (np.zeros((2, 3)), np.tile(np.diag([9.0, 2500.0, 900.0]), (2, 1, 1)))
+    smoother, now, parts = FixedLagSmoother(0.0, *prior, chunk=chunk), 0.0, []
+    for step, z, r, q in feeds:
+        smoother.feed([max(now + step, 0.0)], [[z, -z]], [[r, r]], [q])
+        now = max(now, now + step)
+        parts.append(smoother.departed())
+    whole = SmoothedTrack.concatenate([*parts, smoother.finish()])
+    assert np.isfinite(whole.mean).all()
+    assert np.all(np.diff(whole.t) > 0)
+    sigma = np.sqrt(np.einsum("...ii->...i", whole.cov))
+    assert np.linalg.eigvalsh(whole.cov / (sigma[..., :, None] * sigma[..., None, :])).min() > -1e-12
+    assert smoother.fallbacks == 0
 
 
 def test_one_long_track_stays_flat_in_memory_and_time(sampled):
