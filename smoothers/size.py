@@ -11,7 +11,7 @@ from jeat_graph.arrays import FloatArray
 from jeat_graph.errors import DataError
 from jeat_graph.filters.motion import size_process_noise, size_transition
 from jeat_graph.smoothers.rts import backward, forward
-from jeat_graph.smoothers.track_data import fuse, group_times
+from jeat_graph.smoothers.track_data import COINCIDENT_S, fuse, group_times
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +100,7 @@ def smooth_size(
     order = np.argsort(t, kind="stable")
     times = np.asarray(t, dtype=np.float64)[order]
     key, first = group_times(times, prior_t)
-    if len(times) and times[0] < prior_t - 1e-6:
+    if len(times) and times[0] < prior_t - COINCIDENT_S:
         raise DataError(f"a size at {times[0]} s is older than the track's prior at {prior_t} s")
     keys = np.concatenate([[prior_t], times[first]])
     density = np.concatenate([[0.0], np.asarray(q, dtype=np.float64)[order][first]])
