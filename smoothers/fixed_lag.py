@@ -125,6 +125,7 @@ class FixedLagSmoother:
         self._pending, self._departed = [], []
 
     def _live(self) -> Window:
+        """Return the window, or refuse if the smoother is closed."""
         if self._window is None:
             raise DataError("this smoother is closed")
         return self._window
