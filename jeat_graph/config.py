@@ -73,10 +73,7 @@ class SensorConfig:
     tempering: float = number(
         1.0, "1", "exponent on evidence, below 1 where false boxes repeat in time", 0.01, 1.0
     )
-    repeat: float = number(
-        0.0, "1", "probability that a false box is there again in the sensor's next scan", 0.0, 0.95
-    )
-    miss_memory_s: float = number(0.0, "s", "time within which misses of one vehicle are one miss")
+    miss_memory_s: float = number(0.05, "s", "time within which misses of one vehicle are one miss")
     blind_speed: float = number(
         0.0, "px/s", "image speed below which the sensor sees nothing (events); 0: it sees what stands still"
     )
@@ -158,8 +155,8 @@ class AssociationConfig:
         default=True,
         metadata={"doc": "joint and sequential: a matched track takes another sensor's leftover"},
     )
-    clutter_memory_s: float = number(
-        10.0, "s", "memory of the running estimate of each sensor's clutter; 0 keeps the configured one"
+    scene_memory_s: float = number(
+        10.0, "s", "memory of the running estimates of each sensor's clutter and P_D; 0 keeps the configured"
     )
     log_size_range: float = number(
         3.0, "ln px", "range of ln width and of ln height over which false boxes spread", open_low=True

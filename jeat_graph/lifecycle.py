@@ -30,21 +30,16 @@ def existence_after_hit(existence: float, evidence: float, tempering: float) -> 
 
 
 @njit(cache=True)
-def existence_after_miss(existence: float, p_detect: float, repeat: float, share: float) -> float:
-    """Probability of existence after a scan without a detection.
-
-    r Λ^γ / (1 − r + r Λ^γ) with Λ = (1 − P_D) / (1 − ρ): what is false would have been there again with
-    probability ρ. With ρ = 0 and γ = 1 this is r (1 − P_D) / (1 − r P_D).
+def existence_after_miss(existence: float, p_detect: float, share: float) -> float:
+    """Probability of existence after a scan without a detection: r (1 − P_D)^γ / (1 − r + r (1 − P_D)^γ).
 
     Args:
         existence: r before.
         p_detect: P_D of this look.
-        repeat: ρ.
-        share: γ, the part of an independent look that this one is; below 1 where misses come in bursts.
+        share: γ, the part of an independent look that this one is, below 1 where misses come in bursts; 1 gives
+            r (1 − P_D) / (1 − r P_D).
     """
-    # Not finding a thing is never evidence for it, however often false boxes repeat.
-    ratio = min((1.0 - p_detect) / (1.0 - repeat), 1.0)
-    missed = existence * math.exp(share * math.log(max(ratio, 1e-12)))
+    missed = existence * math.exp(share * math.log(max(1.0 - p_detect, 1e-12)))
     return missed / max(1.0 - existence + missed, 1e-12)
 
 

@@ -31,7 +31,6 @@ class SensorArrays(NamedTuple):
         curve_score: (S, K) knots of the calibrated precision, padded with the last.
         curve_precision: (S, K) its values.
         tempering: (S,) exponent on evidence.
-        repeat: (S,) probability that a false box repeats.
         miss_memory: (S,) time within which misses are one miss (s).
         blind_speed: (S,) px/s.
     """
@@ -47,7 +46,6 @@ class SensorArrays(NamedTuple):
     curve_score: FloatArray
     curve_precision: FloatArray
     tempering: FloatArray
-    repeat: FloatArray
     miss_memory: FloatArray
     blind_speed: FloatArray
 
@@ -77,7 +75,7 @@ class Settings(NamedTuple):
     size_gate: float
     unassigned_cost: float
     log_clutter_volume: float
-    clutter_memory_s: float
+    scene_memory_s: float
     by_existence: bool
     confirm_existence: float
     delete_existence: float
@@ -126,7 +124,6 @@ def sensor_arrays(config: Config) -> SensorArrays:
         curve_score=score,
         curve_precision=np.array([[p[1] for p in c] for c in curves]),
         tempering=np.array([s.tempering for s in sensors]),
-        repeat=np.array([s.repeat for s in sensors]),
         miss_memory=np.array([s.miss_memory_s for s in sensors]),
         blind_speed=np.array([s.blind_speed for s in sensors]),
     )
@@ -161,7 +158,7 @@ def kernel_settings(config: Config) -> Settings:
         else float("inf"),
         unassigned_cost=0.0 if likelihood else _TAKE_ALL,
         log_clutter_volume=float(np.log(c.image.width * c.image.height * c.association.log_size_range**2)),
-        clutter_memory_s=c.association.clutter_memory_s,
+        scene_memory_s=c.association.scene_memory_s,
         by_existence=c.lifecycle.method == "existence",
         confirm_existence=c.lifecycle.confirm_existence,
         delete_existence=c.lifecycle.delete_existence,

@@ -44,6 +44,20 @@ class TrackArrays(NamedTuple):
     used: IntArray
 
 
+class SceneArrays(NamedTuple):
+    """What is learnt of the scene as a whole.
+
+    Attributes:
+        clutter: (S,) expected false boxes in a scan of each sensor.
+        p_detect: (S,) each sensor's mean probability of detecting a confirmed track: light and darkness.
+        undetected: (1,) expected number of vehicles in the scene that have no track yet.
+    """
+
+    clutter: FloatArray
+    p_detect: FloatArray
+    undetected: FloatArray
+
+
 def allocate(capacity: int, num_sensors: int) -> TrackArrays:
     """Allocate zeroed arrays for `capacity` tracks and `num_sensors` sensors."""
     return TrackArrays(

@@ -24,14 +24,14 @@ from jeat_graph.filters.noise import adapt_scale, base_variance
 from jeat_graph.lifecycle import (
     existence_after_hit,
     existence_after_miss,
-    motion_visibility,
     hidden_fraction,
+    motion_visibility,
     track_boxes,
     visible_fraction,
 )
 from jeat_graph.measurements import Measurements, prepare
 from jeat_graph.settings import SensorArrays, Settings
-from jeat_graph.state import TrackArrays
+from jeat_graph.state import SceneArrays, TrackArrays
 
 
 @njit(cache=True)
@@ -45,8 +45,7 @@ def step(
     scores: FloatArray,
     sensor: IntArray,
     present: BoolArray,
-    clutter: FloatArray,
-    undetected: FloatArray,
+    scene: SceneArrays,
     sensors: SensorArrays,
     settings: Settings,
     priority: IntArray,
@@ -63,8 +62,7 @@ def step(
         scores: (M,) in [0, 1].
         sensor: (M,) sensor index of each detection.
         present: (S,) which sensors looked at `t`, including those that found nothing.
-        clutter: (S,) running estimate of the false boxes a scan; updated.
-        undetected: (1,) expected number of vehicles in the scene that have no track yet; updated.
+        scene: running estimates of clutter, P_D and undetected vehicles; updated.
         sensors: parameters of the sensors.
         settings: scalars of the configuration.
         priority: (S,) order of the sequential association.
@@ -77,21 +75,20 @@ def step(
     batch = prepare(boxes, scores, sensor, sensors, settings)
     p_detect = current_p_detect(tracks, n, present, sensors, settings)
     noise = track_noise(tracks, n, sensors)
-    match, evidence = associate(tracks, n, batch, noise, p_detect, clutter, sensors, settings, priority)
+    match, evidence = associate(tracks, n, batch, noise, p_detect, scene, sensors, settings, priority)
     taken = np.zeros(len(scores), dtype=np.int64)
     update_matched(tracks, n, t, batch, noise, match, evidence, taken, sensors, settings)
     if settings.second_pass:
         take_second_views(tracks, n, t, batch, match, taken, sensors, settings)
+    learn_scene(tracks, n, dt, batch, match, taken, p_detect, present, scene, sensors, settings)
     count_misses(tracks, n, match, p_detect, present, sensors, settings)
-    estimate_clutter(tracks, n, batch, match, taken, present, clutter, sensors, settings)
     confirm(tracks, n, t, settings)
     n = remove_ended(tracks, n, t, settings)
-    undetected[0] += settings.arrival_rate * dt
-    n, next_id = give_birth(tracks, n, next_id, t, batch, taken, clutter, undetected[0], sensors, settings)
+    n, next_id = give_birth(tracks, n, next_id, t, batch, taken, scene, sensors, settings)
+    # Vehicles that this batch could have shown and did not are rarer from now on.
     for s in range(len(present)):
         if present[s]:
-            undetected[0] *= 1.0 - sensors.p_detect[s]
-    undetected[0] = max(undetected[0], 0.1 * settings.arrival_rate * np.min(sensors.period))
+            scene.undetected[0] *= 1.0 - scene.p_detect[s]
     return n, next_id
 
 
@@ -156,7 +153,7 @@ def associate(
     batch: Measurements,
     noise: FloatArray,
     p_detect: FloatArray,
-    clutter: FloatArray,
+    scene: SceneArrays,
     sensors: SensorArrays,
     settings: Settings,
     priority: IntArray,
@@ -164,10 +161,9 @@ def associate(
     """Associate a batch with the predicted tracks.
 
     Returns:
-        match (n, S): detection that each track takes of each sensor, or -1; evidence (n, S): its ln Λ against
-        a false track, whose next box would be clutter or, with probability ρ, the same false box again.
+        match (n, S): detection that each track takes of each sensor, or -1; evidence (n, S): its ln Λ.
     """
-    num_sensors = len(clutter)
+    num_sensors = len(sensors.sigma_px)
     rows, cols, d2, log_density, log_size_density = gated_pairs(
         tracks.mean[:n, :, 0],
         position_variances(tracks, n),
@@ -182,7 +178,7 @@ def associate(
         settings.gate,
         settings.size_gate,
     )
-    log_clutter = np.log(clutter) - settings.log_clutter_volume
+    log_clutter = np.log(scene.clutter) - settings.log_clutter_volume
     pair_evidence = log_evidence(
         rows,
         cols,
@@ -209,18 +205,8 @@ def associate(
     for p in range(len(rows)):
         s = batch.sensor[cols[p]]
         if match[rows[p], s] == cols[p]:
-            over_clutter = log_density[p] + log_size_density[p] - log_clutter[s]
-            evidence[rows[p], s] = pair_evidence[p] - log_one_plus(sensors.repeat[s], over_clutter)
+            evidence[rows[p], s] = pair_evidence[p]
     return match, evidence
-
-
-@njit(cache=True)
-def log_one_plus(factor: float, exponent: float) -> float:
-    """ln(1 + factor · e^exponent) without overflow."""
-    if factor <= 0.0:
-        return 0.0
-    x = math.log(factor) + exponent
-    return x + math.log1p(math.exp(-x)) if x > 0.0 else math.log1p(math.exp(x))
 
 
 @njit(cache=True)
@@ -376,9 +362,7 @@ def count_misses(
             if not present[s] or match[i, s] >= 0:
                 continue
             share = min(sensors.period[s] / max(sensors.miss_memory[s], 1e-9), 1.0)
-            tracks.existence[i] = existence_after_miss(
-                tracks.existence[i], p_detect[i, s], sensors.repeat[s], share
-            )
+            tracks.existence[i] = existence_after_miss(tracks.existence[i], p_detect[i, s], share)
             # Only as far as the miss was to be expected does it say anything about the sensor.
             own = tracks.p_detect[i, s]
             visible = p_detect[i, s] / own
@@ -386,34 +370,55 @@ def count_misses(
 
 
 @njit(cache=True)
-def estimate_clutter(
+def learn_scene(
     tracks: TrackArrays,
     n: int,
+    dt: float,
     batch: Measurements,
     match: IntArray,
     taken: IntArray,
+    p_detect: FloatArray,
     present: BoolArray,
-    clutter: FloatArray,
+    scene: SceneArrays,
     sensors: SensorArrays,
     settings: Settings,
 ) -> None:
-    """Follow each present sensor's number of false boxes a scan: what probably was no vehicle, low-passed."""
-    if settings.clutter_memory_s <= 0.0:
+    """Follow each present sensor's clutter and P_D, and the vehicles that wait to be detected, in place.
+
+    Clutter is what probably was no vehicle; P_D the share of the looks at confirmed tracks, each weighed by how
+    visible the track was, that found them.
+    """
+    scene.undetected[0] += settings.arrival_rate * dt
+    if settings.scene_memory_s <= 0.0:
         return
     for s in range(len(present)):
         if not present[s]:
             continue
         false = 0.0
+        looks = 0.0
+        hits = 0.0
         for i in range(n):
-            if match[i, s] >= 0:
+            found = match[i, s] >= 0
+            if found:
                 false += 1.0 - tracks.existence[i]
+            if tracks.confirmed[i]:
+                visible = p_detect[i, s] / tracks.p_detect[i, s]
+                looks += visible
+                if found:
+                    hits += visible
         for j in range(len(taken)):
             if not taken[j] and batch.sensor[j] == s:
                 false += 1.0 - batch.precision[j]
-        weight = min(sensors.period[s] / settings.clutter_memory_s, 1.0)
-        clutter[s] += weight * (false - clutter[s])
-        # Were it to reach zero, a single detection would be proof.
-        clutter[s] = max(clutter[s], 0.1 * sensors.clutter[s])
+        weight = min(sensors.period[s] / settings.scene_memory_s, 1.0)
+        # Were the clutter to reach zero, a single detection would be proof.
+        scene.clutter[s] = max(
+            scene.clutter[s] + weight * (false - scene.clutter[s]), 0.1 * sensors.clutter[s]
+        )
+        # A few tracks say less of a sensor than many; ten count in full.
+        share = scene.p_detect[s] + weight * min(0.1 * looks, 1.0) * (
+            hits / max(looks, 1e-9) - scene.p_detect[s]
+        )
+        scene.p_detect[s] = min(max(share, settings.p_detect_min), settings.p_detect_max)
 
 
 @njit(cache=True)
@@ -491,13 +496,12 @@ def give_birth(
     t: float,
     batch: Measurements,
     taken: IntArray,
-    clutter: FloatArray,
-    undetected: float,
+    scene: SceneArrays,
     sensors: SensorArrays,
     settings: Settings,
 ) -> tuple[int, int]:
     """Start tracks from leftovers; returns the number of tracks and the next identity."""
-    existence = birth_existence(batch, clutter, undetected, sensors)
+    existence = birth_existence(batch, scene)
     parents, partner = choose_births(
         batch.boxes,
         existence,
@@ -510,6 +514,7 @@ def give_birth(
     for b in range(len(parents)):
         start_track(tracks, n + b, next_id + b, t, parents[b], batch, sensors, settings)
         tracks.existence[n + b] = existence[parents[b]]
+        tracks.p_detect[n + b] = scene.p_detect
     for j in range(len(partner)):
         if partner[j] >= 0:
             i = n + partner[j]
@@ -526,9 +531,7 @@ def give_birth(
 
 
 @njit(cache=True)
-def birth_existence(
-    batch: Measurements, clutter: FloatArray, undetected: float, sensors: SensorArrays
-) -> FloatArray:
+def birth_existence(batch: Measurements, scene: SceneArrays) -> FloatArray:
     """Probability (M,) that a detection which no track took is of a vehicle not tracked before.
 
     u P_D LR(score) / (u P_D LR(score) + λ): of the vehicles that have no track yet, u are expected in the scene, and
@@ -537,8 +540,8 @@ def birth_existence(
     out = np.empty(len(batch.precision))
     for j in range(len(out)):
         s = batch.sensor[j]
-        true = undetected * sensors.p_detect[s] * math.exp(batch.log_score[j])
-        out[j] = true / (true + clutter[s])
+        true = scene.undetected[0] * scene.p_detect[s] * math.exp(batch.log_score[j])
+        out[j] = true / (true + scene.clutter[s])
     return out
 
 
@@ -572,7 +575,6 @@ def start_track(
         tracks.size_cov[i, axis, 0, 0] = sensors.size_var[s, axis]
         tracks.size_cov[i, axis, 1, 1] = settings.size_rate_std**2
     tracks.scale[i] = 1.0
-    tracks.p_detect[i] = sensors.p_detect
     tracks.existence[i] = 0.5
     tracks.confirmed[i] = False
     tracks.track_id[i] = track_id

@@ -14,7 +14,7 @@ from jeat_graph.detections import Detections, Scan
 from jeat_graph.errors import TimeOrderError, UnknownSensorError
 from jeat_graph.reporting import report
 from jeat_graph.settings import kernel_settings, priority_order, sensor_arrays
-from jeat_graph.state import allocate, grow
+from jeat_graph.state import SceneArrays, allocate, grow
 from jeat_graph.step import step
 from jeat_graph.trajectories import Trajectories
 
@@ -48,8 +48,11 @@ class Tracker:
         self._settings = kernel_settings(config)
         self._priority = priority_order(config)
         self._tracks = allocate(_FIRST_CAPACITY, len(self.sensor_names))
-        self._clutter = self._sensors.clutter.copy()
-        self._undetected = np.array([config.birth.initial])
+        self._scene = SceneArrays(
+            clutter=self._sensors.clutter.copy(),
+            p_detect=self._sensors.p_detect.copy(),
+            undetected=np.array([config.birth.initial]),
+        )
         self._num_tracks = 0
         self._next_id = 1
         self._t: float | None = None
@@ -112,8 +115,7 @@ class Tracker:
             scores,
             sensor,
             present,
-            self._clutter,
-            self._undetected,
+            self._scene,
             self._sensors,
             self._settings,
             self._priority,

@@ -48,7 +48,6 @@ def calibrate_sensor(matches: SensorMatches, rate_hz: float) -> SensorConfig:
         clutter_per_scan=float((false.sum() + 0.5) / matches.scans),
         precision=float(precision),
         score_precision=fit_precision(matches.score, matches.correct),
-        repeat=fit_repeat(matches),
         blind_speed=blind,
     )
 
@@ -117,12 +116,6 @@ def fit_precision(score: FloatArray, correct: np.ndarray) -> tuple[tuple[float, 
         (round(float(a), 6), round(float(np.clip(b, 0.002, 0.998)), 5))
         for a, b in zip(centre[keep], rising[keep], strict=True)
     )
-
-
-def fit_repeat(matches: SensorMatches) -> float:
-    """Probability that a false box is there again in the next scan: the share of those that continue a run."""
-    run = matches.run[~matches.correct]
-    return float(np.clip((run > 1).sum() / (len(run) + 1.0), 0.0, 0.95))
 
 
 def fit_detection(seen: np.ndarray, speed: FloatArray) -> tuple[float, float]:  # type: ignore[type-arg]
