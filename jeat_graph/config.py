@@ -112,6 +112,25 @@ class MotionConfig:
 
 
 @dataclass(frozen=True)
+class StandingConfig:
+    """Tracks that stand still: hard to see for either sensor in the dark, and not to be lost."""
+
+    enabled: bool = field(default=True, metadata={"doc": "look for tracks that stand still"})
+    enter_odds: float = number(5.0, "1", "log odds at which a track counts as standing", -30.0, 30.0)
+    min_age_s: float = number(0.7, "s", "time at one place before a track may count as standing")
+    leave_odds: float = number(-2.0, "1", "log odds at which it no longer does", -30.0, 30.0)
+    memory: float = number(0.95, "1", "part of the log odds kept from one measurement to the next", 0.0, 1.0)
+    drift_per_size: float = number(0.02, "1/√s", "random walk of the point that stays, per px of box size")
+    speed_std_per_size: float = number(
+        0.05, "1/s", "std of the zero-velocity pseudo-measurement per px of box size", open_low=True
+    )
+    jerk_factor: float = number(0.1, "1", "factor on the jerk of a standing track", 0.0, 1.0)
+    max_gap_s: float = number(
+        10.0, "s", "a confirmed standing track is kept, and reported, this long without update"
+    )
+
+
+@dataclass(frozen=True)
 class SizeConfig:
     """Filter of ln width and ln height: a nearly constant rate of change."""
 
@@ -239,6 +258,7 @@ class Config:
     sensors: dict[str, SensorConfig]
     image: ImageConfig = field(default_factory=ImageConfig)
     motion: MotionConfig = field(default_factory=MotionConfig)
+    standing: StandingConfig = field(default_factory=StandingConfig)
     size: SizeConfig = field(default_factory=SizeConfig)
     noise: NoiseConfig = field(default_factory=NoiseConfig)
     association: AssociationConfig = field(default_factory=AssociationConfig)

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from jeat_graph.association.costs import log_score_ratio
 from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.association.costs import log_score_ratio
 from jeat_graph.filters.noise import score_weight
 from jeat_graph.settings import SensorArrays, Settings
 

@@ -32,7 +32,10 @@ def report(
     rows = np.empty(num_tracks, dtype=np.int64)
     count = 0
     for i in range(num_tracks):
-        if not tracks.confirmed[i] or t - tracks.t_update[i] > settings.output_max_gap_s:
+        if not tracks.confirmed[i]:
+            continue
+        gap = t - tracks.t_update[i]
+        if gap > settings.output_max_gap_s and not tracks.standing[i]:
             continue
         if settings.by_existence and tracks.existence[i] < settings.output_min_existence:
             continue

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import chi2
 
+from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.association.joint import JOINT, SEQUENTIAL, SLOTS
 from jeat_graph.config import Config
-from jeat_graph.arrays import FloatArray, IntArray
 
 # Costs of the paper's problem are d² <= gate; leaving a row out must cost more than any sum of them, so that
 # as many pairs as possible are taken. Small enough that sums keep ten digits behind the point.
@@ -61,6 +61,15 @@ class Settings(NamedTuple):
     velocity_std_per_size: float
     acceleration_std_px: float
     acceleration_std_per_size: float
+    standing: bool
+    standing_enter: float
+    standing_leave: float
+    standing_age_s: float
+    standing_memory: float
+    standing_drift: float
+    standing_speed_std: float
+    standing_jerk: float
+    standing_gap_s: float
     size_rate_density: float
     size_rate_std: float
     adaptation_rate: float
@@ -142,6 +151,15 @@ def kernel_settings(config: Config) -> Settings:
         velocity_std_per_size=c.motion.velocity_std_per_size,
         acceleration_std_px=c.motion.acceleration_std_px,
         acceleration_std_per_size=c.motion.acceleration_std_per_size,
+        standing=c.standing.enabled,
+        standing_enter=c.standing.enter_odds,
+        standing_age_s=c.standing.min_age_s,
+        standing_leave=c.standing.leave_odds,
+        standing_memory=c.standing.memory,
+        standing_drift=c.standing.drift_per_size,
+        standing_speed_std=c.standing.speed_std_per_size,
+        standing_jerk=c.standing.jerk_factor,
+        standing_gap_s=c.standing.max_gap_s,
         size_rate_density=c.size.rate_density,
         size_rate_std=c.size.rate_std,
         adaptation_rate=c.noise.adaptation_rate,

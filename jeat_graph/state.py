@@ -18,6 +18,11 @@ class TrackArrays(NamedTuple):
         cov: (C, 2, 3, 3) covariance per axis; the axes are independent.
         size_mean: (C, 2, 2) ln width and ln height, each with its rate (1/s).
         size_cov: (C, 2, 2, 2) covariance of each.
+        anchor: (C, 2) where the track is if it stands still (px).
+        anchor_var: (C, 2) variances of that point (px²).
+        anchor_t: (C,) since when it may have stood there (s).
+        still_odds: (C,) log odds of standing against moving.
+        standing: (C,) whether the track counts as standing.
         scale: (C, S) noise scale s of paper eq. 5.
         p_detect: (C, S) running estimate of each sensor's probability of detecting this track.
         existence: (C,) probability that the track is a vehicle.
@@ -33,6 +38,11 @@ class TrackArrays(NamedTuple):
     cov: FloatArray
     size_mean: FloatArray
     size_cov: FloatArray
+    anchor: FloatArray
+    anchor_var: FloatArray
+    anchor_t: FloatArray
+    still_odds: FloatArray
+    standing: npt.NDArray[np.bool_]
     scale: FloatArray
     p_detect: FloatArray
     existence: FloatArray
@@ -65,6 +75,11 @@ def allocate(capacity: int, num_sensors: int) -> TrackArrays:
         cov=np.zeros((capacity, 2, 3, 3)),
         size_mean=np.zeros((capacity, 2, 2)),
         size_cov=np.zeros((capacity, 2, 2, 2)),
+        anchor=np.zeros((capacity, 2)),
+        anchor_var=np.zeros((capacity, 2)),
+        anchor_t=np.zeros(capacity),
+        still_odds=np.zeros(capacity),
+        standing=np.zeros(capacity, dtype=np.bool_),
         scale=np.zeros((capacity, num_sensors)),
         p_detect=np.zeros((capacity, num_sensors)),
         existence=np.zeros(capacity),

@@ -21,6 +21,13 @@ from jeat_graph.association.joint import (
 from jeat_graph.association.merging import find_duplicates
 from jeat_graph.filters.aekf import predict, predict_size, update, update_block
 from jeat_graph.filters.noise import adapt_scale, base_variance
+from jeat_graph.filters.standing import (
+    moving_evidence,
+    still_evidence,
+    update_anchor,
+    update_odds,
+    zero_velocity_update,
+)
 from jeat_graph.lifecycle import (
     existence_after_hit,
     existence_after_miss,
@@ -102,6 +109,10 @@ def predict_all(tracks: TrackArrays, n: int, dt: float, settings: Settings) -> N
     for i in range(n):
         side = math.exp(0.5 * (tracks.size_mean[i, 0, 0] + tracks.size_mean[i, 1, 0]))
         jerk[i] = settings.jerk_px + settings.jerk_per_size * side
+        if tracks.standing[i]:
+            jerk[i] *= settings.standing_jerk
+        drift = settings.standing_drift * side
+        tracks.anchor_var[i] += drift * drift * dt
     predict(tracks.mean[:n], tracks.cov[:n], jerk, dt)
     predict_size(tracks.size_mean[:n], tracks.size_cov[:n], settings.size_rate_density, dt)
     if settings.by_existence:
@@ -128,7 +139,7 @@ def current_p_detect(
             if present[s]:
                 seen = motion_visibility(tracks.mean[i], sensors.blind_speed[s])
                 # A small rest remains: what should be invisible is still taken if it is detected.
-                out[i, s] = tracks.p_detect[i, s] * max(inside * seen, 0.01)
+                out[i, s] = tracks.p_detect[i, s] * max(inside * seen, 1e-3)
     return out
 
 
@@ -230,6 +241,28 @@ def size_variances(tracks: TrackArrays, n: int) -> FloatArray:
 
 
 @njit(cache=True)
+def judge_standing(
+    tracks: TrackArrays, i: int, t: float, z: FloatArray, R: FloatArray, settings: Settings
+) -> None:
+    """Weigh a measurement z (2,), R (2,) of track `i` under "stands" and "moves", before it is taken in."""
+    still = still_evidence(tracks.anchor[i], tracks.anchor_var[i], z, R)
+    moving = moving_evidence(tracks.mean[i], tracks.cov[i], z, R)
+    odds = update_odds(tracks.still_odds[i], still, moving, settings.standing_memory)
+    tracks.still_odds[i] = odds
+    if odds < settings.standing_leave:
+        # It moves: look for a place to stand from here on.
+        tracks.standing[i] = False
+        tracks.still_odds[i] = settings.standing_leave
+        tracks.anchor[i] = z
+        tracks.anchor_var[i] = R
+        tracks.anchor_t[i] = t
+        return
+    old = t - tracks.anchor_t[i] >= settings.standing_age_s
+    tracks.standing[i] = tracks.standing[i] or (old and odds > settings.standing_enter)
+    update_anchor(tracks.anchor[i], tracks.anchor_var[i], z, R)
+
+
+@njit(cache=True)
 def take(
     tracks: TrackArrays,
     i: int,
@@ -242,10 +275,15 @@ def take(
 ) -> None:
     """Update track `i` with detection `j` whose measurement variances are R (2,): filter, size, noise scale."""
     s = batch.sensor[j]
+    if settings.standing:
+        judge_standing(tracks, i, t, batch.z[j], R, settings)
     nis = update(tracks.mean[i], tracks.cov[i], batch.z[j], R)
     tracks.scale[i, s] = adapt_scale(
         tracks.scale[i, s], nis, settings.adaptation_rate, settings.scale_min, settings.scale_max
     )
+    if tracks.standing[i]:
+        size = math.exp(0.5 * (tracks.size_mean[i, 0, 0] + tracks.size_mean[i, 1, 0]))
+        zero_velocity_update(tracks.mean[i], tracks.cov[i], settings.standing_speed_std * size)
     for side in range(2):
         update_block(
             tracks.size_mean[i, side],
@@ -457,6 +495,8 @@ def remove_ended(tracks: TrackArrays, n: int, t: float, settings: Settings) -> i
     for i in range(n):
         gap = t - tracks.t_update[i]
         most = settings.max_gap_confirmed_s if tracks.confirmed[i] else settings.max_gap_tentative_s
+        if tracks.confirmed[i] and tracks.standing[i]:
+            most = max(most, settings.standing_gap_s)
         x, y = tracks.mean[i, 0, 0], tracks.mean[i, 1, 0]
         outside = x < 0.0 or y < 0.0 or x > settings.image_width or y > settings.image_height
         doubted = settings.by_existence and tracks.existence[i] < settings.delete_existence
@@ -475,6 +515,11 @@ def move(tracks: TrackArrays, source: int, target: int) -> None:
     """Copy row `source` of all arrays to row `target`."""
     tracks.mean[target] = tracks.mean[source]
     tracks.cov[target] = tracks.cov[source]
+    tracks.anchor[target] = tracks.anchor[source]
+    tracks.anchor_var[target] = tracks.anchor_var[source]
+    tracks.anchor_t[target] = tracks.anchor_t[source]
+    tracks.still_odds[target] = tracks.still_odds[source]
+    tracks.standing[target] = tracks.standing[source]
     tracks.size_mean[target] = tracks.size_mean[source]
     tracks.size_cov[target] = tracks.size_cov[source]
     tracks.scale[target] = tracks.scale[source]
@@ -566,6 +611,8 @@ def start_track(
     for axis in range(2):
         base = base_variance(sensors.sigma_px[s], sensors.rho[s, axis], batch.boxes[j, 2 + axis])
         tracks.mean[i, axis, 0] = batch.z[j, axis]
+        tracks.anchor[i, axis] = batch.z[j, axis]
+        tracks.anchor_var[i, axis] = base * batch.weight[j]
         tracks.cov[i, axis, 0, 0] = base * batch.weight[j]
         tracks.cov[i, axis, 1, 1] = (settings.velocity_std_px + settings.velocity_std_per_size * side) ** 2
         tracks.cov[i, axis, 2, 2] = (
@@ -574,6 +621,9 @@ def start_track(
         tracks.size_mean[i, axis, 0] = batch.log_size[j, axis]
         tracks.size_cov[i, axis, 0, 0] = sensors.size_var[s, axis]
         tracks.size_cov[i, axis, 1, 1] = settings.size_rate_std**2
+    tracks.anchor_t[i] = t
+    tracks.still_odds[i] = 0.0
+    tracks.standing[i] = False
     tracks.scale[i] = 1.0
     tracks.existence[i] = 0.5
     tracks.confirmed[i] = False

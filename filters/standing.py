@@ -1,0 +1,94 @@
+"""Is a track standing still? A running comparison of two models, and the zero-velocity update it permits.
+
+Constant acceleration with the jerk that traffic needs cannot tell a parked vehicle, seen now and then in the dark,
+from one that creeps. A second model can: a point that stays where it is. Each measurement is weighed under both, and
+the running log odds decide (Bar-Shalom, Li, Kirubarajan, ch. 11, with the two models not mixed but compared). While a
+track stands, its velocity is measured as zero after each update, as inertial navigation does.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+from jeat_graph.arrays import FloatArray
+from jeat_graph.filters.aekf import log_gaussian
+
+_MOST_ODDS = 30.0
+
+
+@njit(cache=True)
+def still_evidence(anchor: FloatArray, anchor_var: FloatArray, z: FloatArray, R: FloatArray) -> float:
+    """Log density of a measurement under the model of a point that stays.
+
+    Args:
+        anchor: (2,) the point (px).
+        anchor_var: (2,) its variances (px²).
+        z: (2,) measured centre (px).
+        R: (2,) variances of the measurement (px²).
+    """
+    total = 0.0
+    for axis in range(2):
+        total += log_gaussian(z[axis] - anchor[axis], anchor_var[axis] + R[axis])
+    return total
+
+
+@njit(cache=True)
+def moving_evidence(mean: FloatArray, cov: FloatArray, z: FloatArray, R: FloatArray) -> float:
+    """Log density of a measurement under the motion model.
+
+    Args:
+        mean: (2, 3) predicted state per axis [p, v, a].
+        cov: (2, 3, 3) its covariance.
+        z: (2,) measured centre (px).
+        R: (2,) variances of the measurement (px²).
+    """
+    total = 0.0
+    for axis in range(2):
+        total += log_gaussian(z[axis] - mean[axis, 0], cov[axis, 0, 0] + R[axis])
+    return total
+
+
+@njit(cache=True)
+def update_anchor(anchor: FloatArray, anchor_var: FloatArray, z: FloatArray, R: FloatArray) -> None:
+    """Update the point that stays with a measurement, in place (scalar Kalman updates); arguments as above."""
+    for axis in range(2):
+        gain = anchor_var[axis] / (anchor_var[axis] + R[axis])
+        anchor[axis] += gain * (z[axis] - anchor[axis])
+        anchor_var[axis] *= 1.0 - gain
+
+
+@njit(cache=True)
+def update_odds(odds: float, still: float, moving: float, memory: float) -> float:
+    """Forget a part of the log odds of standing and add the new evidence, within bounds.
+
+    Args:
+        odds: log odds before.
+        still: log density under the model that stays.
+        moving: log density under the motion model.
+        memory: factor on the old odds, below 1.
+    """
+    return min(max(memory * odds + still - moving, -_MOST_ODDS), _MOST_ODDS)
+
+
+@njit(cache=True)
+def zero_velocity_update(mean: FloatArray, cov: FloatArray, speed_std: float) -> None:
+    """Take in the pseudo-measurement that the velocity is zero, in place, Joseph form for H = [0, 1, 0].
+
+    Args:
+        mean: (2, 3) per axis [p, v, a].
+        cov: (2, 3, 3).
+        speed_std: standard deviation of the pseudo-measurement (px/s), > 0.
+    """
+    R = speed_std * speed_std
+    for axis in range(2):
+        m = mean[axis]
+        P = cov[axis]
+        S = P[1, 1] + R
+        row = P[1].copy()
+        K = row / S
+        y = -m[1]
+        for i in range(3):
+            m[i] += K[i] * y
+            for j in range(i, 3):
+                P[i, j] = P[i, j] - K[i] * row[j] - K[j] * row[i] + K[i] * K[j] * S
+                P[j, i] = P[i, j]
