@@ -73,7 +73,6 @@ class SensorConfig:
     tempering: float = number(
         1.0, "1", "exponent on evidence, below 1 where false boxes repeat in time", 0.01, 1.0
     )
-    miss_memory_s: float = number(0.05, "s", "time within which misses of one vehicle are one miss")
     blind_speed: float = number(
         0.0, "px/s", "image speed below which the sensor sees nothing (events); 0: it sees what stands still"
     )
@@ -103,7 +102,7 @@ class MotionConfig:
 
     jerk_px: float = number(0.0, "px/s^2.5", "root spectral density of jerk that does not depend on size")
     jerk_per_size: float = number(
-        10.0, "1/s^2.5", "root spectral density of jerk per px of box size sqrt(w h)"
+        1.5, "1/s^2.5", "root spectral density of jerk per px of box size sqrt(w h)"
     )
     velocity_std_px: float = number(20.0, "px/s", "std of a new track's velocity")
     velocity_std_per_size: float = number(3.0, "1/s", "std of a new track's velocity per px of box size")
@@ -143,9 +142,9 @@ class NoiseConfig:
     """Adaptive measurement noise R = s R_base / g (paper eq. 5 and section on adaptive noise)."""
 
     adaptation_rate: float = number(0.1, "1", "η of eq. 5", 0.0, 1.0)
-    scale_min: float = number(0.5, "1", "s_min of eq. 5", open_low=True)
+    scale_min: float = number(1.0, "1", "s_min of eq. 5 (paper .5)", open_low=True)
     scale_max: float = number(5.0, "1", "s_max of eq. 5", open_low=True)
-    score_weighting: bool = field(default=True, metadata={"doc": "divide R by max(score, score_floor)"})
+    score_weighting: bool = field(default=False, metadata={"doc": "divide R by max(score, score_floor)"})
     score_floor: float = number(0.1, "1", "floor of the score in R", 0.001, 1.0)
 
     def __post_init__(self) -> None:
@@ -165,7 +164,13 @@ class AssociationConfig:
         "and a second pass; sequential: sensor after sensor in the order of `priority`",
     )
     cost: str = choice("likelihood", ("likelihood", "mahalanobis"), "cost of a pair")
-    gate_probability: float = number(0.999, "1", "probability mass of the χ² gates", 0.5, 1.0 - 1e-12)
+    gate_probability: float = number(
+        1.0 - 1e-12,
+        "1",
+        "probability mass of the χ² gates; wide, for the likelihood decides",
+        0.5,
+        1.0 - 1e-13,
+    )
     size_gate: bool = field(default=True, metadata={"doc": "gate ln size too"})
     priority: tuple[str, ...] = field(
         default=(), metadata={"doc": "order of sensors for `sequential`; those not named follow by name"}
@@ -173,9 +178,6 @@ class AssociationConfig:
     second_pass: bool = field(
         default=True,
         metadata={"doc": "joint and sequential: a matched track takes another sensor's leftover"},
-    )
-    scene_memory_s: float = number(
-        10.0, "s", "memory of the running estimates of each sensor's clutter and P_D; 0 keeps the configured"
     )
     log_size_range: float = number(
         3.0, "ln px", "range of ln width and of ln height over which false boxes spread", open_low=True
@@ -187,10 +189,23 @@ class LifecycleConfig:
     """When a track is confirmed, reported and given up."""
 
     method: str = choice("existence", ("existence", "hits"), "Bernoulli existence, or the paper's hit counts")
-    confirm_existence: float = number(0.9, "1", "confirmed at this probability of existence", 0.0, 1.0)
+    confirm_existence: float = number(0.95, "1", "confirmed at this probability of existence", 0.0, 1.0)
     delete_existence: float = number(0.001, "1", "deleted below this probability of existence", 0.0, 1.0)
     lifetime_s: float = number(
         20.0, "s", "mean time a vehicle stays in the picture (decay of existence)", open_low=True
+    )
+    hidden_prior: float = number(
+        0.1,
+        "1",
+        "share of the time for which a vehicle is hidden from a sensor, whatever the reason",
+        0.0,
+        0.9,
+    )
+    hidden_memory_s: float = number(
+        0.3, "s", "time after which a hidden vehicle may be visible again", open_low=True
+    )
+    scene_memory_s: float = number(
+        10.0, "s", "memory of the running estimates of each sensor's clutter and P_D; 0 keeps the configured"
     )
     p_detect_weight: float = number(0.05, "1", "weight of one look in a track's own P_D per sensor", 0.0, 1.0)
     p_detect_min: float = number(0.05, "1", "least P_D of a track", 0.001, 0.999)
@@ -218,7 +233,7 @@ class BirthConfig:
         0.002, "1", "least probability of existence with which a detection starts a track", 0.0, 1.0
     )
     max_overlap: float = number(
-        0.7,
+        0.5,
         "1",
         "no birth where the IoU with a track, or with another birth of this batch, is above",
         0.0,
@@ -243,7 +258,7 @@ class OutputConfig:
 
     min_existence: float = number(0.5, "1", "reported only above this probability of existence", 0.0, 1.0)
     max_gap_s: float = number(
-        0.25, "s", "reported only if updated within this time (paper: as long as it lives)"
+        0.15, "s", "reported only if updated within this time (paper: as long as it lives)"
     )
     clip: bool = field(default=True, metadata={"doc": "clip boxes to the picture; drop those outside it"})
     min_visible: float = number(

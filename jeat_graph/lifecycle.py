@@ -30,17 +30,24 @@ def existence_after_hit(existence: float, evidence: float, tempering: float) -> 
 
 
 @njit(cache=True)
-def existence_after_miss(existence: float, p_detect: float, share: float) -> float:
-    """Probability of existence after a scan without a detection: r (1 − P_D)^γ / (1 − r + r (1 − P_D)^γ).
+def existence_after_miss(existence: float, p_detect: float) -> float:
+    """Probability of existence after a scan without a detection: r (1 − P_D) / (1 − r P_D)."""
+    return existence * (1.0 - p_detect) / max(1.0 - existence * p_detect, 1e-12)
+
+
+@njit(cache=True)
+def hidden_after_miss(hidden: float, p_detect: float) -> float:
+    """Probability of being hidden after a scan without a detection: h / (h + (1 − h) (1 − P_D)).
+
+    Misses of one vehicle come in a row: occlusion, blur, standing still before an event camera. With this state, a row
+    of misses soon says "hidden" and no longer "gone" (the two-state visibility of Musicki and Evans, "Joint integrated
+    probabilistic data association", IEEE T-AES 40(3), 2004, per sensor).
 
     Args:
-        existence: r before.
-        p_detect: P_D of this look.
-        share: γ, the part of an independent look that this one is, below 1 where misses come in bursts; 1 gives
-            r (1 − P_D) / (1 − r P_D).
+        hidden: h before.
+        p_detect: P_D of this look if the vehicle is not hidden.
     """
-    missed = existence * math.exp(share * math.log(max(1.0 - p_detect, 1e-12)))
-    return missed / max(1.0 - existence + missed, 1e-12)
+    return hidden / max(hidden + (1.0 - hidden) * (1.0 - p_detect), 1e-12)
 
 
 @njit(cache=True)
@@ -74,7 +81,7 @@ def visible_fraction(box: FloatArray, width: float, height: float) -> float:
 
 
 @njit(cache=True)
-def hidden_fraction(boxes: FloatArray, existence: FloatArray) -> FloatArray:
+def occluded_fraction(boxes: FloatArray, existence: FloatArray) -> FloatArray:
     """Fraction (N,) of each box that the one track in front which covers most of it hides.
 
     On a plane road the box that reaches further down stands nearer. A doubtful track hides in proportion to

@@ -31,7 +31,6 @@ class SensorArrays(NamedTuple):
         curve_score: (S, K) knots of the calibrated precision, padded with the last.
         curve_precision: (S, K) its values.
         tempering: (S,) exponent on evidence.
-        miss_memory: (S,) time within which misses are one miss (s).
         blind_speed: (S,) px/s.
     """
 
@@ -46,7 +45,6 @@ class SensorArrays(NamedTuple):
     curve_score: FloatArray
     curve_precision: FloatArray
     tempering: FloatArray
-    miss_memory: FloatArray
     blind_speed: FloatArray
 
 
@@ -89,6 +87,8 @@ class Settings(NamedTuple):
     confirm_existence: float
     delete_existence: float
     lifetime_s: float
+    hidden_prior: float
+    hidden_memory_s: float
     p_detect_weight: float
     p_detect_min: float
     p_detect_max: float
@@ -133,7 +133,6 @@ def sensor_arrays(config: Config) -> SensorArrays:
         curve_score=score,
         curve_precision=np.array([[p[1] for p in c] for c in curves]),
         tempering=np.array([s.tempering for s in sensors]),
-        miss_memory=np.array([s.miss_memory_s for s in sensors]),
         blind_speed=np.array([s.blind_speed for s in sensors]),
     )
 
@@ -176,11 +175,13 @@ def kernel_settings(config: Config) -> Settings:
         else float("inf"),
         unassigned_cost=0.0 if likelihood else _TAKE_ALL,
         log_clutter_volume=float(np.log(c.image.width * c.image.height * c.association.log_size_range**2)),
-        scene_memory_s=c.association.scene_memory_s,
+        scene_memory_s=c.lifecycle.scene_memory_s,
         by_existence=c.lifecycle.method == "existence",
         confirm_existence=c.lifecycle.confirm_existence,
         delete_existence=c.lifecycle.delete_existence,
         lifetime_s=c.lifecycle.lifetime_s,
+        hidden_prior=c.lifecycle.hidden_prior,
+        hidden_memory_s=c.lifecycle.hidden_memory_s,
         p_detect_weight=c.lifecycle.p_detect_weight,
         p_detect_min=c.lifecycle.p_detect_min,
         p_detect_max=c.lifecycle.p_detect_max,

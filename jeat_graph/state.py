@@ -25,6 +25,7 @@ class TrackArrays(NamedTuple):
         standing: (C,) whether the track counts as standing.
         scale: (C, S) noise scale s of paper eq. 5.
         p_detect: (C, S) running estimate of each sensor's probability of detecting this track.
+        hidden: (C, S) probability that the track, if it exists, is hidden from each sensor for now.
         existence: (C,) probability that the track is a vehicle.
         confirmed: (C,) whether it has been confirmed.
         track_id: (C,) identity, ascending.
@@ -45,6 +46,7 @@ class TrackArrays(NamedTuple):
     standing: npt.NDArray[np.bool_]
     scale: FloatArray
     p_detect: FloatArray
+    hidden: FloatArray
     existence: FloatArray
     confirmed: npt.NDArray[np.bool_]
     track_id: IntArray
@@ -82,6 +84,7 @@ def allocate(capacity: int, num_sensors: int) -> TrackArrays:
         standing=np.zeros(capacity, dtype=np.bool_),
         scale=np.zeros((capacity, num_sensors)),
         p_detect=np.zeros((capacity, num_sensors)),
+        hidden=np.zeros((capacity, num_sensors)),
         existence=np.zeros(capacity),
         confirmed=np.zeros(capacity, dtype=np.bool_),
         track_id=np.zeros(capacity, dtype=np.int64),

@@ -31,8 +31,9 @@ from jeat_graph.filters.standing import (
 from jeat_graph.lifecycle import (
     existence_after_hit,
     existence_after_miss,
-    hidden_fraction,
+    hidden_after_miss,
     motion_visibility,
+    occluded_fraction,
     track_boxes,
     visible_fraction,
 )
@@ -88,7 +89,7 @@ def step(
     if settings.second_pass:
         take_second_views(tracks, n, t, batch, match, taken, sensors, settings)
     learn_scene(tracks, n, dt, batch, match, taken, p_detect, present, scene, sensors, settings)
-    count_misses(tracks, n, match, p_detect, present, sensors, settings)
+    count_misses(tracks, n, match, p_detect, present, settings)
     confirm(tracks, n, t, settings)
     n = remove_ended(tracks, n, t, settings)
     n, next_id = give_birth(tracks, n, next_id, t, batch, taken, scene, sensors, settings)
@@ -117,8 +118,11 @@ def predict_all(tracks: TrackArrays, n: int, dt: float, settings: Settings) -> N
     predict_size(tracks.size_mean[:n], tracks.size_cov[:n], settings.size_rate_density, dt)
     if settings.by_existence:
         survival = math.exp(-dt / settings.lifetime_s)
+        relax = 1.0 - math.exp(-dt / settings.hidden_memory_s)
         for i in range(n):
             tracks.existence[i] *= survival
+            for s in range(tracks.hidden.shape[1]):
+                tracks.hidden[i, s] += relax * (settings.hidden_prior - tracks.hidden[i, s])
 
 
 @njit(cache=True)
@@ -132,14 +136,15 @@ def current_p_detect(
     """
     out = np.zeros((n, len(present)))
     boxes = track_boxes(tracks.mean[:n], tracks.size_mean[:n])
-    hidden = hidden_fraction(boxes, tracks.existence[:n])
+    occluded = occluded_fraction(boxes, tracks.existence[:n])
     for i in range(n):
-        inside = visible_fraction(boxes[i], settings.image_width, settings.image_height) * (1.0 - hidden[i])
+        inside = visible_fraction(boxes[i], settings.image_width, settings.image_height) * (1.0 - occluded[i])
         for s in range(len(present)):
             if present[s]:
                 seen = motion_visibility(tracks.mean[i], sensors.blind_speed[s])
                 # A small rest remains: what should be invisible is still taken if it is detected.
-                out[i, s] = tracks.p_detect[i, s] * max(inside * seen, 1e-3)
+                visible = inside * seen * (1.0 - tracks.hidden[i, s])
+                out[i, s] = tracks.p_detect[i, s] * max(visible, 1e-3)
     return out
 
 
@@ -321,6 +326,7 @@ def update_matched(
                 tracks.existence[i] = existence_after_hit(
                     tracks.existence[i], evidence[i, s], sensors.tempering[s]
                 )
+            tracks.hidden[i, s] = 0.0
             p = tracks.p_detect[i, s] + settings.p_detect_weight * (1.0 - tracks.p_detect[i, s])
             tracks.p_detect[i, s] = min(p, settings.p_detect_max)
 
@@ -389,7 +395,6 @@ def count_misses(
     match: IntArray,
     p_detect: FloatArray,
     present: BoolArray,
-    sensors: SensorArrays,
     settings: Settings,
 ) -> None:
     """Lower existence and P_D of the tracks that a sensor looked for and did not find."""
@@ -399,11 +404,13 @@ def count_misses(
         for s in range(len(present)):
             if not present[s] or match[i, s] >= 0:
                 continue
-            share = min(sensors.period[s] / max(sensors.miss_memory[s], 1e-9), 1.0)
-            tracks.existence[i] = existence_after_miss(tracks.existence[i], p_detect[i, s], share)
+            tracks.existence[i] = existence_after_miss(tracks.existence[i], p_detect[i, s])
             # Only as far as the miss was to be expected does it say anything about the sensor.
             own = tracks.p_detect[i, s]
             visible = p_detect[i, s] / own
+            if tracks.hidden[i, s] < 1.0:
+                awake = min(p_detect[i, s] / (1.0 - tracks.hidden[i, s]), 0.999)
+                tracks.hidden[i, s] = min(hidden_after_miss(tracks.hidden[i, s], awake), 0.999)
             tracks.p_detect[i, s] = max(own - settings.p_detect_weight * visible * own, settings.p_detect_min)
 
 
@@ -468,7 +475,10 @@ def confirm(tracks: TrackArrays, n: int, t: float, settings: Settings) -> None:
         else:
             old = t - tracks.t_birth[i] >= settings.confirm_age_s
             earned = old and tracks.hits[i] >= settings.confirm_hits
+        # Without a branch on purpose: compiled with one, this loop was seen to clear flags that it must not touch.
         tracks.confirmed[i] = tracks.confirmed[i] or earned
+        if not settings.by_existence:
+            tracks.existence[i] = 1.0 if tracks.confirmed[i] else 0.5
 
 
 @njit(cache=True)
@@ -523,6 +533,7 @@ def move(tracks: TrackArrays, source: int, target: int) -> None:
     tracks.size_mean[target] = tracks.size_mean[source]
     tracks.size_cov[target] = tracks.size_cov[source]
     tracks.scale[target] = tracks.scale[source]
+    tracks.hidden[target] = tracks.hidden[source]
     tracks.p_detect[target] = tracks.p_detect[source]
     tracks.existence[target] = tracks.existence[source]
     tracks.confirmed[target] = tracks.confirmed[source]
@@ -546,7 +557,7 @@ def give_birth(
     settings: Settings,
 ) -> tuple[int, int]:
     """Start tracks from leftovers; returns the number of tracks and the next identity."""
-    existence = birth_existence(batch, scene)
+    existence = birth_existence(batch, scene, settings)
     parents, partner = choose_births(
         batch.boxes,
         existence,
@@ -560,6 +571,8 @@ def give_birth(
         start_track(tracks, n + b, next_id + b, t, parents[b], batch, sensors, settings)
         tracks.existence[n + b] = existence[parents[b]]
         tracks.p_detect[n + b] = scene.p_detect
+        tracks.hidden[n + b] = settings.hidden_prior
+        tracks.hidden[n + b, batch.sensor[parents[b]]] = 0.0
     for j in range(len(partner)):
         if partner[j] >= 0:
             i = n + partner[j]
@@ -576,7 +589,7 @@ def give_birth(
 
 
 @njit(cache=True)
-def birth_existence(batch: Measurements, scene: SceneArrays) -> FloatArray:
+def birth_existence(batch: Measurements, scene: SceneArrays, settings: Settings) -> FloatArray:
     """Probability (M,) that a detection which no track took is of a vehicle not tracked before.
 
     u P_D LR(score) / (u P_D LR(score) + λ): of the vehicles that have no track yet, u are expected in the scene, and
@@ -585,6 +598,12 @@ def birth_existence(batch: Measurements, scene: SceneArrays) -> FloatArray:
     out = np.empty(len(batch.precision))
     for j in range(len(out)):
         s = batch.sensor[j]
+        x, y = batch.z[j]
+        if settings.leave_picture and not (
+            0.0 <= x <= settings.image_width and 0.0 <= y <= settings.image_height
+        ):
+            out[j] = -1.0  # it would end in the same step
+            continue
         true = scene.undetected[0] * scene.p_detect[s] * math.exp(batch.log_score[j])
         out[j] = true / (true + scene.clutter[s])
     return out

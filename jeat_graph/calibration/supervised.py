@@ -16,6 +16,9 @@ from jeat_graph.errors import DataError
 from jeat_graph.trajectories import GroundTruth
 
 
+_PERIOD_S = 0.1
+
+
 def calibrate(recordings: Sequence[tuple[Detections, GroundTruth]], base: Config | None = None) -> Config:
     """Estimate sensors and motion from recordings with truth.
 
@@ -47,6 +50,9 @@ def calibrate(recordings: Sequence[tuple[Detections, GroundTruth]], base: Config
         if base is None
         else replace(base, sensors=sensors, association=replace(base.association, priority=()))
     )
+    duration = sum(float(np.ptp(truth.frame_times())) for _, truth in recordings)
+    objects = sum(len(np.unique(truth.object_id[~truth.ignore])) for _, truth in recordings)
+    birth = replace(config.birth, arrival_rate_hz=objects / max(duration, 1.0))
     tracks = measured_tracks(matches, sensors)
     return replace(
         config, motion=fit_motion(*tracks[:5]), size=fit_size(tracks[0], tracks[5], tracks[6], tracks[4])
@@ -62,7 +68,8 @@ def measured_tracks(
         t (K,), z (K, 2), R (K, 2), size (K,), start (T + 1,), ln size (K, 2), its variances (K, 2).
     """
     columns: list[list[np.ndarray]] = [[] for _ in range(7)]  # type: ignore[type-arg]
-    for name, m in matches.items():
+    for name, every in matches.items():
+        m = _one_a_period(every)
         s = sensors[name]
         bias = np.array(s.bias)
         side = m.box[:, 2:]
@@ -80,6 +87,20 @@ def measured_tracks(
     start = np.concatenate(([0], np.flatnonzero(change) + 1, [len(order)])).astype(np.int64)
     c = [np.ascontiguousarray(a[order]) for a in (t, z, R, size, log_size, log_var)]
     return c[0], c[1], c[2], c[3], start, c[4], c[5]
+
+
+def _one_a_period(m: SensorMatches) -> SensorMatches:
+    """Keep one correct detection of each object in each period.
+
+    A detector's errors persist over neighbouring scans; taken at every scan of a fast sensor they would pass for
+    motion.
+    """
+    period = np.floor(m.t / _PERIOD_S + 1e-6).astype(np.int64)
+    first = np.unique(np.column_stack([m.key, period]), axis=0, return_index=True)[1]
+    rows = np.sort(first)
+    return replace(
+        m, key=m.key[rows], t=m.t[rows], box=m.box[rows], residual=m.residual[rows], side=m.side[rows]
+    )
 
 
 def _rate(recordings: Sequence[Detections], sensor: str) -> float:
