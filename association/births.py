@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from jeat_graph.association.boxes import overlap
 from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.association.boxes import overlap
 
 
 @njit(cache=True)
@@ -21,8 +21,9 @@ def choose_births(
 ) -> tuple[IntArray, IntArray]:
     """Choose the leftover detections that start tracks, the surest first.
 
-    A detection that coincides with a living track, or with a birth by the same sensor, is a duplicate and starts
-    none. One that coincides with a birth by another sensor is a second view of the new vehicle and joins it.
+    A detection that coincides with a living track, or with a birth by the same sensor, is a duplicate and
+    starts none. One that coincides with a birth by another sensor is a second view of the new vehicle and
+    joins it.
 
     Args:
         boxes: (M, 4) left, top, width, height (px).

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
@@ -117,7 +119,7 @@ def gated_pairs(
 
 
 @njit(cache=True)
-def _grown(array: np.ndarray, capacity: int) -> np.ndarray:  # type: ignore[type-arg]
+def _grown(array: Any, capacity: int) -> Any:
     out = np.empty(capacity, dtype=array.dtype)
     out[: len(array)] = array
     return out

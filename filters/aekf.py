@@ -81,8 +81,10 @@ def predict_size(mean: FloatArray, cov: FloatArray, density: float, dt: float) -
 def update_block(m: FloatArray, P: FloatArray, z: float, R: float) -> float:
     """Update one block with a scalar measurement of its first component, in place (paper eq. 4).
 
-    Joseph form, P ← (I − KH) P (I − KH)ᵀ + K R Kᵀ, written out for H = [1, 0, …]:
-    P_ij − K_i P_0j − K_j P_0i + K_i K_j (P_00 + R).
+    Joseph form, P ← (I − KH) P (I − KH)ᵀ + K R Kᵀ, written out for H = [1, 0, …] and K = P Hᵀ / S: the
+    measured row is P_0j R / S, a product, and the others are P_ij − P_0i P_0j / S. Expanded term by term, the
+    measured variance would be a difference of numbers as large as P_00, of which after a long gap only the
+    rounding is left.
 
     Args:
         m: (D,) mean.
@@ -98,10 +100,11 @@ def update_block(m: FloatArray, P: FloatArray, z: float, R: float) -> float:
     y = z - m[0]
     p0 = P[0].copy()
     K = p0 / S
+    kept = R / S
     for i in range(n):
         m[i] += K[i] * y
         for j in range(i, n):
-            value = P[i, j] - K[i] * p0[j] - K[j] * p0[i] + K[i] * K[j] * S
+            value = p0[j] * kept if i == 0 else P[i, j] - K[i] * p0[j]
             if abs(value) < _FLUSH:
                 value = 0.0
             P[i, j] = value

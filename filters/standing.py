@@ -1,9 +1,10 @@
 """Is a track standing still? A running comparison of two models, and the zero-velocity update it permits.
 
-Constant acceleration with the jerk that traffic needs cannot tell a parked vehicle, seen now and then in the dark,
-from one that creeps. A second model can: a point that stays where it is. Each measurement is weighed under both, and
-the running log odds decide (Bar-Shalom, Li, Kirubarajan, ch. 11, with the two models not mixed but compared). While a
-track stands, its velocity is measured as zero after each update, as inertial navigation does.
+Constant acceleration with the jerk that traffic needs cannot tell a parked vehicle, seen now and then in
+the dark, from one that creeps. A second model can: a point that stays where it is. Each measurement is weighed
+under both, and the running log odds decide (Bar-Shalom, Li, Kirubarajan, ch. 11, the two models not mixed but
+compared). While a track stands, its velocity is measured as zero after each update, as inertial
+navigation does.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ def moving_evidence(mean: FloatArray, cov: FloatArray, z: FloatArray, R: FloatAr
 
 @njit(cache=True)
 def update_anchor(anchor: FloatArray, anchor_var: FloatArray, z: FloatArray, R: FloatArray) -> None:
-    """Update the point that stays with a measurement, in place (scalar Kalman updates); arguments as above."""
+    """Update the point that stays with a measurement, in place; arguments as in `still_evidence`."""
     for axis in range(2):
         gain = anchor_var[axis] / (anchor_var[axis] + R[axis])
         anchor[axis] += gain * (z[axis] - anchor[axis])
@@ -72,7 +73,9 @@ def update_odds(odds: float, still: float, moving: float, memory: float) -> floa
 
 @njit(cache=True)
 def zero_velocity_update(mean: FloatArray, cov: FloatArray, speed_std: float) -> None:
-    """Take in the pseudo-measurement that the velocity is zero, in place, Joseph form for H = [0, 1, 0].
+    """Take in the pseudo-measurement that the velocity is zero, in place: Joseph form for H = [0, 1, 0].
+
+    Written out as in `aekf.update_block`, so that no variance is a difference of large numbers.
 
     Args:
         mean: (2, 3) per axis [p, v, a].
@@ -86,9 +89,11 @@ def zero_velocity_update(mean: FloatArray, cov: FloatArray, speed_std: float) ->
         S = P[1, 1] + R
         row = P[1].copy()
         K = row / S
+        kept = R / S
         y = -m[1]
         for i in range(3):
             m[i] += K[i] * y
             for j in range(i, 3):
-                P[i, j] = P[i, j] - K[i] * row[j] - K[j] * row[i] + K[i] * K[j] * S
+                measured = i == 1 or j == 1
+                P[i, j] = row[i + j - 1] * kept if measured else P[i, j] - K[i] * row[j]
                 P[j, i] = P[i, j]

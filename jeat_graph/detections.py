@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.errors import DataError
 
 
@@ -52,7 +52,7 @@ def find_bad_row(boxes: FloatArray, scores: FloatArray) -> tuple[int, str] | Non
         boxes: (M, 4) left, top, width, height.
         scores: (M,) confidence.
     """
-    finite = np.isfinite(boxes).all(axis=1)
+    finite: BoolArray = np.all(np.isfinite(boxes), axis=1)
     # NaN compares false everywhere, so each test is written for what is good.
     size = (boxes[:, 2] > 0.0) & (boxes[:, 3] > 0.0)
     score = (scores >= 0.0) & (scores <= 1.0)
@@ -189,7 +189,9 @@ class Detections:
             t=np.repeat([scan.t for scan in items], rows),
             sensor=np.repeat([scan.sensor for scan in items], rows) if items else [],
             boxes=np.concatenate([scan.boxes if len(scan) else blank for scan in items] or [blank[:0]]),
-            scores=np.concatenate([scan.scores if len(scan) else blank[:, 0] for scan in items] or [[]]),
+            scores=np.concatenate(
+                [scan.scores if len(scan) else blank[:, 0] for scan in items] or [blank[:0, 0]]
+            ),
             empty=np.repeat([len(scan) == 0 for scan in items], rows),
         )
 
@@ -202,7 +204,11 @@ class Detections:
         columns = [part.to_rows() for part in parts]
         has_class = any(part.classes is not None for part in parts)
         return Detections.from_rows(
-            *(np.concatenate([column[k] for column in columns]) for k in range(5)),
+            t=np.concatenate([column[0] for column in columns]),
+            sensor=np.concatenate([column[1] for column in columns]),
+            boxes=np.concatenate([column[2] for column in columns]),
+            scores=np.concatenate([column[3] for column in columns]),
+            empty=np.concatenate([column[4] for column in columns]),
             classes=np.concatenate([column[5] for column in columns]) if has_class else None,
         )
 
