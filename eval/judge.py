@@ -65,9 +65,13 @@ def judge_runs(
         for run in runs:
             table = run.causal if kind == "causal" else run.smoothed
             if table is not None:
-                instants = run.truth.frame_times() if run.by_frame else None
                 frames = build_frames(
-                    run.truth, table, kind=kind, max_age_s=max_age_s, max_gap_s=max_gap_s, instants=instants
+                    run.truth,
+                    table,
+                    kind=kind,
+                    max_age_s=max_age_s,
+                    max_gap_s=max_gap_s,
+                    instants=run.instants,
                 )
                 sequences.append(frames)
         if sequences:

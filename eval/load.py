@@ -9,8 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from jeat_graph.arrays import FloatArray
 from jeat_graph.errors import DataError
 from jeat_graph.eval.pairing import check_pair, check_truth
+from jeat_graph.run_directory import read_instants
 from jeat_graph.trajectories import GroundTruth, Trajectories
 
 BY_FRAME = ("motchallenge", "kitti")
@@ -28,14 +30,16 @@ class JudgedRun:
         truth: the truth.
         causal: the causal table, or None.
         smoothed: the smoothed table, or None.
-        by_frame: the run is a result by frame number; a frame without rows is then a frame without tracks.
+        instants: (I,) all times at which the causal tracker ran (s), or None if that is not known: at one of
+            them without rows there was no track. A result by frame number ran at the truth's frames; a run
+            directory says it in `scans.csv`.
     """
 
     name: str
     truth: GroundTruth
     causal: Trajectories | None
     smoothed: Trajectories | None
-    by_frame: bool = False
+    instants: FloatArray | None = None
 
 
 def load_run(
@@ -70,7 +74,8 @@ def load_run(
         frames = objects.frame_times()
         rate_hz = 1.0 / float(np.median(np.diff(frames))) if len(frames) > 1 else ANY_RATE_HZ
     read = {kind: _read_table(file, objects, rate_hz) for kind, file in tables.items()}
-    return JudgedRun(str(run), objects, read.get("causal"), read.get("smoothed"), form in BY_FRAME)
+    instants = objects.frame_times() if form in BY_FRAME else read_instants(path)
+    return JudgedRun(str(run), objects, read.get("causal"), read.get("smoothed"), instants)
 
 
 def restrict_classes(truth: GroundTruth, classes: Sequence[str]) -> GroundTruth:
