@@ -260,9 +260,42 @@ class OutputConfig:
     max_gap_s: float = number(
         0.15, "s", "reported only if updated within this time (paper: as long as it lives)"
     )
+    max_missed: float = number(
+        10.0, "nat", "reported only if the misses since its last detection are this likely: -ln P(all missed)"
+    )
     clip: bool = field(default=True, metadata={"doc": "clip boxes to the picture; drop those outside it"})
     min_visible: float = number(
         0.3, "1", "reported only if this fraction of the box lies in the picture", 0.0, 1.0
+    )
+
+
+@dataclass(frozen=True)
+class SmootherConfig:
+    """How the trajectories of confirmed tracks are smoothed."""
+
+    engine: str = choice(
+        "fixed-lag",
+        ("fixed-lag", "fixed-lag-rts", "full", "rts", "none"),
+        "fixed-lag: GTSAM with a window; full: GTSAM over each whole track once it has ended; fixed-lag-rts "
+        "and rts: the same by our own Rauch-Tung-Striebel pass; none: no smoothing",
+    )
+    lag_s: float = number(
+        1.0, "s", "fixed lag: a state is final once this much time has followed", open_low=True
+    )
+    chunk: int = number(24, "1", "fixed lag: measurements of a track per update", low=1)
+    robust: str = choice(
+        "none",
+        ("none", "cauchy", "student-t"),
+        "full and rts: kernel that weighs down outlying measurements",
+    )
+    output_rate_hz: float = number(0.0, "Hz", "rows per second of the smoothed table; 0: one at each scan")
+    stitch: bool = field(
+        default=True,
+        metadata={"doc": "full and rts: join the fragments of one vehicle when the recording ends"},
+    )
+    stitch_max_gap_s: float = number(3.0, "s", "longest time between two fragments of one vehicle")
+    stitch_gate_probability: float = number(
+        0.99, "1", "probability mass of the χ² gate within which two fragments agree", 0.5, 1.0 - 1e-12
     )
 
 
@@ -281,6 +314,7 @@ class Config:
     birth: BirthConfig = field(default_factory=BirthConfig)
     merge: MergeConfig = field(default_factory=MergeConfig)
     output: OutputConfig = field(default_factory=OutputConfig)
+    smoother: SmootherConfig = field(default_factory=SmootherConfig)
 
     def __post_init__(self) -> None:
         if not self.sensors:

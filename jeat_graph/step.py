@@ -40,6 +40,7 @@ from jeat_graph.lifecycle import (
 from jeat_graph.measurements import Measurements, prepare
 from jeat_graph.settings import SensorArrays, Settings
 from jeat_graph.state import SceneArrays, TrackArrays
+from jeat_graph.update_log import UpdateLog, log_birth, log_update, root_jerk
 
 
 @njit(cache=True)
@@ -57,6 +58,7 @@ def step(
     sensors: SensorArrays,
     settings: Settings,
     priority: IntArray,
+    log: UpdateLog,
 ) -> tuple[int, int]:
     """Advance all tracks to time `t` and take in one batch of scans, in place.
 
@@ -74,25 +76,27 @@ def step(
         sensors: parameters of the sensors.
         settings: scalars of the configuration.
         priority: (S,) order of the sequential association.
+        log: takes down what the tracks take in; of capacity 0 where nobody asks.
 
     Returns:
         The number of living tracks and the next identity.
     """
     n = num_tracks
+    log.count[0] = 0
     predict_all(tracks, n, dt, settings)
     batch = prepare(boxes, scores, sensor, sensors, settings)
     p_detect = current_p_detect(tracks, n, present, sensors, settings)
     noise = track_noise(tracks, n, sensors)
     match, evidence = associate(tracks, n, batch, noise, p_detect, scene, sensors, settings, priority)
     taken = np.zeros(len(scores), dtype=np.int64)
-    update_matched(tracks, n, t, batch, noise, match, evidence, taken, sensors, settings)
+    update_matched(tracks, n, t, batch, noise, match, evidence, taken, sensors, settings, log)
     if settings.second_pass:
-        take_second_views(tracks, n, t, batch, match, taken, sensors, settings)
+        take_second_views(tracks, n, t, batch, match, taken, sensors, settings, log)
     learn_scene(tracks, n, dt, batch, match, taken, p_detect, present, scene, sensors, settings)
     count_misses(tracks, n, match, p_detect, present, settings)
     confirm(tracks, n, t, settings)
     n = remove_ended(tracks, n, t, settings)
-    n, next_id = give_birth(tracks, n, next_id, t, batch, taken, scene, sensors, settings)
+    n, next_id = give_birth(tracks, n, next_id, t, batch, taken, scene, sensors, settings, log)
     # Vehicles that this batch could have shown and did not are rarer from now on.
     for s in range(len(present)):
         if present[s]:
@@ -277,9 +281,14 @@ def take(
     R: FloatArray,
     sensors: SensorArrays,
     settings: Settings,
+    log: UpdateLog,
 ) -> None:
     """Update track `i` with detection `j` whose measurement variances are R (2,): filter, size, noise scale."""
     s = batch.sensor[j]
+    if len(log.rows) > 0:
+        factor = settings.standing_jerk if tracks.standing[i] else 1.0
+        jerk = root_jerk(tracks.size_mean[i], settings.jerk_px, settings.jerk_per_size, factor)
+        log_update(log, tracks.track_id[i], s, batch.z[j], R, jerk, batch.log_size[j], sensors.size_var[s])
     if settings.standing:
         judge_standing(tracks, i, t, batch.z[j], R, settings)
     nis = update(tracks.mean[i], tracks.cov[i], batch.z[j], R)
@@ -297,6 +306,7 @@ def take(
             sensors.size_var[s, side],
         )
     tracks.hits[i] += 1
+    tracks.missed[i] = 0.0
     tracks.t_update[i] = t
     tracks.used[i] |= 1 << s
 
@@ -313,6 +323,7 @@ def update_matched(
     taken: IntArray,
     sensors: SensorArrays,
     settings: Settings,
+    log: UpdateLog,
 ) -> None:
     """Take the matched detections in, sensor after sensor (equal to one stacked update); marks `taken` (M,)."""
     for i in range(n):
@@ -321,7 +332,7 @@ def update_matched(
             if j < 0:
                 continue
             taken[j] = 1
-            take(tracks, i, t, j, batch, noise[i, s] * batch.weight[j], sensors, settings)
+            take(tracks, i, t, j, batch, noise[i, s] * batch.weight[j], sensors, settings, log)
             if settings.by_existence:
                 tracks.existence[i] = existence_after_hit(
                     tracks.existence[i], evidence[i, s], sensors.tempering[s]
@@ -341,6 +352,7 @@ def take_second_views(
     taken: IntArray,
     sensors: SensorArrays,
     settings: Settings,
+    log: UpdateLog,
 ) -> None:
     """Second pass of algorithm 1: each matched track takes the nearest gated leftover of another sensor.
 
@@ -383,7 +395,7 @@ def take_second_views(
                         math.exp(min(tracks.size_mean[i, axis, 0], 12.0)),
                     )
                     R2[axis] = tracks.scale[i, s] * base * batch.weight[chosen]
-                take(tracks, i, t, chosen, batch, R2, sensors, settings)
+                take(tracks, i, t, chosen, batch, R2, sensors, settings, log)
                 match[i, s] = chosen
                 taken[chosen] = 1
 
@@ -411,6 +423,7 @@ def count_misses(
             if tracks.hidden[i, s] < 1.0:
                 awake = min(p_detect[i, s] / (1.0 - tracks.hidden[i, s]), 0.999)
                 tracks.hidden[i, s] = min(hidden_after_miss(tracks.hidden[i, s], awake), 0.999)
+                tracks.missed[i] -= math.log1p(-awake)
             tracks.p_detect[i, s] = max(own - settings.p_detect_weight * visible * own, settings.p_detect_min)
 
 
@@ -533,6 +546,7 @@ def move(tracks: TrackArrays, source: int, target: int) -> None:
     tracks.size_mean[target] = tracks.size_mean[source]
     tracks.size_cov[target] = tracks.size_cov[source]
     tracks.scale[target] = tracks.scale[source]
+    tracks.missed[target] = tracks.missed[source]
     tracks.hidden[target] = tracks.hidden[source]
     tracks.p_detect[target] = tracks.p_detect[source]
     tracks.existence[target] = tracks.existence[source]
@@ -555,6 +569,7 @@ def give_birth(
     scene: SceneArrays,
     sensors: SensorArrays,
     settings: Settings,
+    log: UpdateLog,
 ) -> tuple[int, int]:
     """Start tracks from leftovers; returns the number of tracks and the next identity."""
     existence = birth_existence(batch, scene, settings)
@@ -568,7 +583,7 @@ def give_birth(
         settings.birth_max_overlap,
     )
     for b in range(len(parents)):
-        start_track(tracks, n + b, next_id + b, t, parents[b], batch, sensors, settings)
+        start_track(tracks, n + b, next_id + b, t, parents[b], batch, sensors, settings, log)
         tracks.existence[n + b] = existence[parents[b]]
         tracks.p_detect[n + b] = scene.p_detect
         tracks.hidden[n + b] = settings.hidden_prior
@@ -581,7 +596,7 @@ def give_birth(
             for axis in range(2):
                 base = base_variance(sensors.sigma_px[s], sensors.rho[s, axis], batch.boxes[j, 2 + axis])
                 R[axis] = base * batch.weight[j]
-            take(tracks, i, t, j, batch, R, sensors, settings)
+            take(tracks, i, t, j, batch, R, sensors, settings, log)
             # Two sensors' false boxes seldom coincide: each view's chance to be false remains.
             tracks.existence[i] = 1.0 - (1.0 - tracks.existence[i]) * (1.0 - batch.precision[j])
     confirm(tracks, n + len(parents), t, settings)
@@ -619,6 +634,7 @@ def start_track(
     batch: Measurements,
     sensors: SensorArrays,
     settings: Settings,
+    log: UpdateLog,
 ) -> None:
     """Fill row `i` with a new track at detection `j`."""
     s = batch.sensor[j]
@@ -648,6 +664,12 @@ def start_track(
     tracks.confirmed[i] = False
     tracks.track_id[i] = track_id
     tracks.hits[i] = 1
+    tracks.missed[i] = 0.0
     tracks.t_birth[i] = t
     tracks.t_update[i] = t
     tracks.used[i] = 1 << s
+    if len(log.rows) > 0:
+        R = tracks.anchor_var[i]
+        jerk = root_jerk(tracks.size_mean[i], settings.jerk_px, settings.jerk_per_size, 1.0)
+        log_update(log, track_id, s, batch.z[j], R, jerk, batch.log_size[j], sensors.size_var[s])
+        log_birth(log, tracks.cov[i], tracks.size_cov[i])

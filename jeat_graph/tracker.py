@@ -17,6 +17,7 @@ from jeat_graph.settings import kernel_settings, priority_order, sensor_arrays
 from jeat_graph.state import SceneArrays, allocate, grow
 from jeat_graph.step import step
 from jeat_graph.trajectories import Trajectories
+from jeat_graph.update_log import allocate_log
 
 ScanLike: TypeAlias = Scan | tuple[float, str, npt.ArrayLike, npt.ArrayLike]
 
@@ -56,6 +57,7 @@ class Tracker:
         self._num_tracks = 0
         self._next_id = 1
         self._t: float | None = None
+        self._log = allocate_log(0)
 
     @property
     def num_tracks(self) -> int:
@@ -119,6 +121,7 @@ class Tracker:
             self._sensors,
             self._settings,
             self._priority,
+            self._log,
         )
         self._t = t
         return self.causal()

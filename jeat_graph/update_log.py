@@ -1,0 +1,129 @@
+"""What the filter took in during one step, for whoever wants the measurements of each track: the smoothers.
+
+The log is a preallocated table that compiled kernels fill. One of capacity 0 takes nothing and costs nothing,
+and no kernel ever reads it: the causal estimates are the same with and without it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from jeat_graph.arrays import FloatArray, IntArray
+
+#: Columns of `UpdateLog.rows`. `R_x, R_y` are the variances exactly as the filter used them, scale and weight
+#: included; `jerk` is the root spectral density of the track's jerk at the time of the update; `birth` is 1
+#: where the measurement started the track, and then `var_v_x` … `var_rate` are the other prior variances.
+COLUMNS = (
+    "track_id",
+    "sensor",
+    "z_x",
+    "z_y",
+    "R_x",
+    "R_y",
+    "jerk",
+    "log_width",
+    "log_height",
+    "var_log_width",
+    "var_log_height",
+    "birth",
+    "var_v_x",
+    "var_v_y",
+    "var_a_x",
+    "var_a_y",
+    "var_rate",
+)
+WIDTH = len(COLUMNS)
+
+
+class UpdateLog(NamedTuple):
+    """The measurements that the last step gave to tracks.
+
+    Attributes:
+        rows: (C, `WIDTH`) one measurement a row; C is at least the number of detections of the step, or 0.
+        count: (1,) rows in use.
+    """
+
+    rows: FloatArray
+    count: IntArray
+
+
+def allocate_log(capacity: int) -> UpdateLog:
+    """Allocate a log for steps of at most `capacity` detections; 0 for a log that takes nothing."""
+    return UpdateLog(np.zeros((capacity, WIDTH)), np.zeros(1, dtype=np.int64))
+
+
+@njit(cache=True)
+def log_update(
+    log: UpdateLog,
+    track_id: int,
+    sensor: int,
+    z: FloatArray,
+    R: FloatArray,
+    jerk: float,
+    log_size: FloatArray,
+    size_var: FloatArray,
+) -> None:
+    """Append one measurement, if there is room.
+
+    Args:
+        log: the log.
+        track_id: the track that took it.
+        sensor: index of the sensor.
+        z: (2,) centre (px).
+        R: (2,) its variances (px²).
+        jerk: root spectral density of the track's jerk (px/s^2.5).
+        log_size: (2,) ln width, ln height.
+        size_var: (2,) their variances.
+    """
+    k = log.count[0]
+    if k >= len(log.rows):
+        return
+    row = log.rows[k]
+    row[0] = track_id
+    row[1] = sensor
+    for axis in range(2):
+        row[2 + axis] = z[axis]
+        row[4 + axis] = R[axis]
+        row[7 + axis] = log_size[axis]
+        row[9 + axis] = size_var[axis]
+    row[6] = jerk
+    row[11:] = 0.0
+    log.count[0] = k + 1
+
+
+@njit(cache=True)
+def log_birth(log: UpdateLog, cov: FloatArray, size_cov: FloatArray) -> None:
+    """Mark the last row as a birth and note the prior of the new track.
+
+    Args:
+        log: the log.
+        cov: (2, 3, 3) covariance of the new track.
+        size_cov: (2, 2, 2) covariance of its size.
+    """
+    k = log.count[0] - 1
+    if k < 0:
+        return
+    row = log.rows[k]
+    row[11] = 1.0
+    for axis in range(2):
+        row[12 + axis] = cov[axis, 1, 1]
+        row[14 + axis] = cov[axis, 2, 2]
+    row[16] = size_cov[0, 1, 1]
+
+
+@njit(cache=True)
+def root_jerk(size_mean: FloatArray, jerk_px: float, jerk_per_size: float, factor: float) -> float:
+    """Root spectral density of a track's jerk (px/s^2.5), which grows with its size.
+
+    Args:
+        size_mean: (2, 2) ln width and ln height with their rates.
+        jerk_px: part that does not depend on size (px/s^2.5).
+        jerk_per_size: part per px of sqrt(w h) (1/s^2.5).
+        factor: 1, or less while the track stands.
+    """
+    side = math.exp(0.5 * (size_mean[0, 0] + size_mean[1, 0]))
+    return (jerk_px + jerk_per_size * side) * factor
