@@ -1,9 +1,9 @@
 """Is a track standing still? A running comparison of two models, and the zero-velocity update it permits.
 
 Constant acceleration with the jerk that traffic needs cannot tell a parked vehicle, seen now and then in
-the dark, from one that creeps. A second model can: a point that stays where it is. Each measurement is weighed
-under both, and the running log odds decide (Bar-Shalom, Li, Kirubarajan, ch. 11, the two models not mixed but
-compared). While a track stands, its velocity is measured as zero after each update, as inertial
+the dark, from one that creeps. A second model can: a point that stays where it is. Each measurement is
+weighed under both, and the running log odds decide (Bar-Shalom, Li, Kirubarajan, ch. 11, the two models not
+mixed but compared). While a track stands, its velocity is measured as zero after each update, as inertial
 navigation does.
 """
 
@@ -72,28 +72,49 @@ def update_odds(odds: float, still: float, moving: float, memory: float) -> floa
 
 
 @njit(cache=True)
-def zero_velocity_update(mean: FloatArray, cov: FloatArray, speed_std: float) -> None:
-    """Take in the pseudo-measurement that the velocity is zero, in place: Joseph form for H = [0, 1, 0].
+def zero_update(m: FloatArray, P: FloatArray, k: int, std: float) -> None:
+    """Take in the pseudo-measurement that component `k` of a block is zero, in place (Joseph form).
 
-    Written out as in `aekf.update_block`, so that no variance is a difference of large numbers.
+    With H = e_k: P_ij − K_i P_kj − K_j P_ki + K_i K_j S.
+
+    Args:
+        m: (D,) mean.
+        P: (D, D) covariance, symmetric.
+        k: the component.
+        std: standard deviation of the pseudo-measurement, > 0.
+    """
+    S = P[k, k] + std * std
+    row = P[k].copy()
+    K = row / S
+    y = -m[k]
+    for i in range(len(m)):
+        m[i] += K[i] * y
+        for j in range(i, len(m)):
+            P[i, j] = P[i, j] - K[i] * row[j] - K[j] * row[i] + K[i] * K[j] * S
+            P[j, i] = P[i, j]
+
+
+@njit(cache=True)
+def stand_still(
+    mean: FloatArray,
+    cov: FloatArray,
+    size_mean: FloatArray,
+    size_cov: FloatArray,
+    rate_std: float,
+    size: float,
+) -> None:
+    """Take in that a track neither moves nor grows, in place.
 
     Args:
         mean: (2, 3) per axis [p, v, a].
         cov: (2, 3, 3).
-        speed_std: standard deviation of the pseudo-measurement (px/s), > 0.
+        size_mean: (2, 2) ln width and ln height with their rates.
+        size_cov: (2, 2, 2).
+        rate_std: standard deviation of the velocity in box sizes a second, of the acceleration in box sizes a
+            second squared, and of the rate of growth (1/s).
+        size: box size (px).
     """
-    R = speed_std * speed_std
     for axis in range(2):
-        m = mean[axis]
-        P = cov[axis]
-        S = P[1, 1] + R
-        row = P[1].copy()
-        K = row / S
-        kept = R / S
-        y = -m[1]
-        for i in range(3):
-            m[i] += K[i] * y
-            for j in range(i, 3):
-                measured = i == 1 or j == 1
-                P[i, j] = row[i + j - 1] * kept if measured else P[i, j] - K[i] * row[j]
-                P[j, i] = P[i, j]
+        zero_update(mean[axis], cov[axis], 1, rate_std * size)
+        zero_update(mean[axis], cov[axis], 2, rate_std * size)
+        zero_update(size_mean[axis], size_cov[axis], 1, rate_std)

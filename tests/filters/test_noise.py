@@ -1,0 +1,42 @@
+"""Measurement noise: by size, by score, and adapted by the innovations (paper eq. 5)."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from jeat_graph.filters.noise import adapt_scale, base_variance, score_weight
+
+PAPER = (0.1, 0.5, 5.0)
+
+
+@given(sigma=st.floats(0.0, 50.0), rho=st.floats(0.0, 1.0), side=st.floats(0.0, 2000.0))
+def test_base_variance_grows_with_the_square_of_the_side(sigma, rho, side):
+    assert base_variance(sigma, rho, side) == pytest.approx(sigma**2 + (rho * side) ** 2)
+
+
+@pytest.mark.parametrize(
+    ("score", "weight"), [(1.0, 1.0), (0.5, 2.0), (0.1, 10.0), (0.05, 10.0), (0.0, 10.0)]
+)
+def test_a_doubtful_detection_has_more_noise_down_to_the_floor(score, weight):
+    assert score_weight(score, 0.1) == pytest.approx(weight)
+
+
+@given(scale=st.floats(0.5, 5.0), nis=st.floats(0.0, 1e6))
+def test_adaptation_is_equation_5(scale, nis):
+    expected = max(0.5, min(scale * (1.0 + 0.1 * (nis / 2.0 - 1.0)), 5.0))
+    assert adapt_scale(scale, nis, *PAPER) == pytest.approx(expected, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("scale", "nis", "after"),
+    [
+        (1.0, 2.0, 1.0),  # as expected: no change
+        (1.0, 0.0, 0.9),
+        (1.0, 4.0, 1.1),
+        (0.5, 0.0, 0.5),  # clamped below
+        (5.0, 9.2, 5.0),  # clamped above
+        (0.6, 1e300, 5.0),
+    ],
+)
+def test_adaptation_by_hand(scale, nis, after):
+    assert adapt_scale(scale, nis, *PAPER) == pytest.approx(after)

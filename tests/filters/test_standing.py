@@ -1,0 +1,81 @@
+"""Standing tracks: two models compared, and the zero-velocity update."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import multivariate_normal
+
+from jeat_graph.filters.standing import (
+    moving_evidence,
+    still_evidence,
+    update_anchor,
+    update_odds,
+    zero_velocity_update,
+)
+
+
+def test_zero_velocity_update_is_a_kalman_update_that_measures_the_velocity(dense):
+    rng = np.random.default_rng(1)
+    mean, cov = dense.random_tracks(rng, 30)
+    H = np.kron(np.array([[0.0, 1.0, 0.0]]), np.eye(2))
+    for m, P in zip(mean, cov, strict=True):
+        std = rng.uniform(0.1, 30.0)
+        x, full, _ = dense.update(
+            dense.state_vector(m), dense.full_covariance(P), H, np.zeros(2), std**2 * np.eye(2)
+        )
+        zero_velocity_update(m, P, std)
+        scale = np.sqrt(np.diag(full))
+        assert np.allclose(dense.state_vector(m), x, rtol=1e-8, atol=1e-8)
+        assert np.abs((dense.full_covariance(P) - full) / np.outer(scale, scale)).max() < 1e-8
+
+
+def test_evidence_of_each_model_is_its_gaussian_density():
+    rng = np.random.default_rng(2)
+    anchor, anchor_var = rng.normal(size=2), rng.uniform(0.1, 3.0, 2)
+    mean, cov = rng.normal(size=(2, 3)), np.tile(np.diag([2.0, 5.0, 9.0]), (2, 1, 1))
+    z, R = rng.normal(size=2), rng.uniform(0.5, 4.0, 2)
+    still = multivariate_normal.logpdf(z, anchor, np.diag(anchor_var + R))
+    moving = multivariate_normal.logpdf(z, mean[:, 0], np.diag(cov[:, 0, 0] + R))
+    assert still_evidence(anchor, anchor_var, z, R) == pytest.approx(still)
+    assert moving_evidence(mean, cov, z, R) == pytest.approx(moving)
+
+
+def test_the_anchor_is_the_weighted_mean_of_what_was_measured():
+    rng = np.random.default_rng(3)
+    z, R = rng.normal(size=(20, 2)) * 4.0, rng.uniform(0.5, 9.0, (20, 2))
+    anchor, var = z[0].copy(), R[0].copy()
+    for k in range(1, 20):
+        update_anchor(anchor, var, z[k], R[k])
+    assert np.allclose(anchor, (z / R).sum(axis=0) / (1.0 / R).sum(axis=0))
+    assert np.allclose(var, 1.0 / (1.0 / R).sum(axis=0))
+
+
+@given(
+    odds=st.floats(-30, 30),
+    still=st.floats(-1e4, 1e4),
+    moving=st.floats(-1e4, 1e4),
+    memory=st.floats(0, 1),
+)
+def test_odds_add_the_new_evidence_to_what_is_remembered(odds, still, moving, memory):
+    after = update_odds(odds, still, moving, memory)
+    assert after == pytest.approx(np.clip(memory * odds + still - moving, -30.0, 30.0), abs=1e-9)
+
+
+def test_a_point_at_rest_gains_odds_and_one_that_moves_loses_them():
+    rng = np.random.default_rng(4)
+    R = np.array([1.0, 1.0])
+    odds = {}
+    for speed in (0.0, 40.0):
+        anchor, var, log_odds = np.zeros(2), R.copy(), 0.0
+        mean, cov = np.zeros((2, 3)), np.tile(np.diag([9.0, 50.0**2, 10.0]), (2, 1, 1))
+        for k in range(1, 30):
+            mean[0, 0] = speed * 0.05 * k
+            z = np.array([speed * 0.05 * k, 0.0]) + rng.normal(size=2)
+            log_odds = update_odds(
+                log_odds, still_evidence(anchor, var, z, R), moving_evidence(mean, cov, z, R), 0.95
+            )
+            update_anchor(anchor, var, z, R)
+        odds[speed] = log_odds
+    assert odds[0.0] > 5.0
+    assert odds[40.0] < -5.0
