@@ -1,0 +1,144 @@
+"""`jeat-graph demo`: the whole way on the built-in highway, from detections to scores and a picture."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from jeat_graph.arrays import FloatArray
+    from jeat_graph.config import Config
+    from jeat_graph.detections import Detections
+    from jeat_graph.eval.tables import Table
+    from jeat_graph.sehn.simulate import Recording
+    from jeat_graph.trajectories import Trajectories
+
+HELP = "simulate a highway at night, track it with both sensors and with each alone, and show what comes out"
+COLUMNS = ("sensors", "MOTA", "IDF1", "HOTA", "FP", "FN", "IDSW")
+SCENARIO = "night-nolight"
+DURATION_S = 24.0
+SEED = 7
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    add = parser.add_argument
+    add("--scenario", default=SCENARIO, metavar="NAME", help=f"a scenario of `simulate` (default {SCENARIO})")
+    add("--out", default="demo", metavar="DIR", help="folder to write into (default demo)")
+    add("--duration", type=float, default=DURATION_S, metavar="S", help=f"length (default {DURATION_S:g})")
+    add("--seed", type=int, default=SEED, metavar="N", help=f"seed of the simulation (default {SEED})")
+    add("--config", default="default", metavar="NAME|FILE", help="preset or YAML file (default: default)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Simulate, track, judge, draw, and say where everything is."""
+    from jeat_graph.config_io import load_config
+    from jeat_graph.io.detections_io import write_detections
+    from jeat_graph.io.trajectories_io import read_trajectories
+    from jeat_graph.io.truth_io import write_truth
+    from jeat_graph.run_directory import RunDirectory
+    from jeat_graph.sehn.scenario import load_scenario
+    from jeat_graph.sehn.simulate import record
+    from jeat_graph.tracking_run import RunOptions, RunRecord, describe_inputs, write_run
+
+    config = load_config(args.config)
+    scenario = load_scenario(args.scenario)
+    out = Path(args.out)
+    _say(f"simulating {args.duration:g} s of {args.scenario}")
+    recording = record(scenario, args.seed, args.duration)
+    directory = RunDirectory(out / "run")
+    source = out / "detections.csv"
+    write_detections(recording.detections, source)
+    write_truth(recording.truth, out / "gt.csv")
+
+    _say("tracking with both sensors")
+    details = RunRecord(source={"config_name": args.config, "inputs": describe_inputs([source])})
+    with directory:
+        write_run(recording.detections, config, directory, details, RunOptions(progress=sys.stderr.isatty()))
+    table = read_trajectories(out / "run" / "causal.csv")
+    _say("tracking with each sensor alone, and judging")
+    scores = _compare(recording, config, table)
+    _write_text(scores.render("markdown"), out / "scores.md")
+    _say("drawing")
+    pictures = _draw(recording, table, out / "tracks", args.scenario)
+
+    print(scores.render())
+    print(f"picture   {pictures[0]} (and {pictures[1].name})")
+    print(f"tracks    {out / 'run' / 'causal.csv'}")
+    print(f"input     {source}, truth {out / 'gt.csv'}")
+    print()
+    print(
+        "Next: track your own detections with `jeat-graph track my.csv --out run` (columns t, sensor, left,"
+    )
+    print("top, width, height, score), and judge them with `jeat-graph eval run --gt gt.csv`.")
+    return 0
+
+
+def _compare(recording: Recording, config: Config, both: Trajectories) -> Table:
+    """Scores of all sensors together (tracked already) and of each alone, at the truth's times."""
+    from jeat_graph.eval.tables import Cell, Table
+    from jeat_graph.tracker import track
+
+    detections = recording.detections
+    records: list[dict[str, Cell]] = [_scores(" + ".join(detections.sensors), recording, detections, both)]
+    for name in detections.sensors:
+        alone = detections.select([name])
+        records.append(_scores(f"{name} alone", recording, alone, track(config, alone)))
+    return Table.from_records(records, COLUMNS)
+
+
+def _scores(
+    name: str, recording: Recording, detections: Detections, table: Trajectories
+) -> dict[str, str | float | int | None]:
+    import numpy as np
+
+    from jeat_graph.eval.metrics import evaluate
+
+    scores = evaluate([(recording.truth, table)], instants=[np.unique(detections.scan_t)])
+    return {"sensors": name, **scores.as_dict()}
+
+
+def _draw(recording: Recording, table: Trajectories, stem: Path, scenario: str) -> list[Path]:
+    import numpy as np
+
+    from jeat_graph.pictures import DAY, NIGHT, Backdrop, save_pictures
+    from jeat_graph.sehn.markings import marking_lines
+
+    camera, truth = recording.scene.camera, recording.truth
+    end = float(truth.frame_times()[-1])
+    table = table.take(table.t <= end)
+    vehicles = len(np.unique(table.track_id))
+    backdrop = Backdrop(
+        width=camera.width,
+        height=camera.height,
+        lines=marking_lines(recording.scene),
+        missed=_missed(recording, table, end),
+        title=f"{scenario}: {vehicles} tracks in {end:.0f} s",
+        subtitle=" + ".join(table.sensors) + f" · the picture at t = {end:.1f} s, trails of the last 3 s",
+    )
+    return save_pictures(table, backdrop, stem, DAY if scenario.startswith("day") else NIGHT)
+
+
+def _missed(recording: Recording, table: Trajectories, t: float) -> FloatArray:
+    """True boxes (M, 4) at a time of the truth that no track lies on."""
+    from jeat_graph.eval.matching import match
+    from jeat_graph.eval.overlap import pairwise_iou
+
+    truth = recording.truth
+    wanted = truth.boxes[(truth.t == t) & ~truth.ignore]
+    there = table.boxes[table.t == table.t[-1]] if len(table) else table.boxes
+    found = match(pairwise_iou(wanted, there), 0.5)
+    return wanted[[k for k in range(len(wanted)) if k not in set(found.tolist())]]
+
+
+def _write_text(text: str, path: Path) -> None:
+    from jeat_graph.io.atomic import open_atomic
+
+    with open_atomic(path) as file:
+        file.write(text)
+
+
+def _say(text: str) -> None:
+    print(f"demo: {text} …", file=sys.stderr)
