@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, TypeAlias
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.config import Config
 from jeat_graph.detections import Detections, Scan
-from jeat_graph.errors import TimeOrderError, UnknownSensorError
+from jeat_graph.errors import JeatGraphError, TimeOrderError, UnknownSensorError
 from jeat_graph.reporting import report
 from jeat_graph.settings import kernel_settings, priority_order, sensor_arrays
 from jeat_graph.state import SceneArrays, allocate, grow
 from jeat_graph.step import step
 from jeat_graph.trajectories import Trajectories
 from jeat_graph.update_log import allocate_log
+
+if TYPE_CHECKING:
+    from jeat_graph.smoothing.online import TrackSmoothers
 
 ScanLike: TypeAlias = Scan | tuple[float, str, npt.ArrayLike, npt.ArrayLike]
 
@@ -28,7 +32,7 @@ class Tracker:
     """Joint tracker of all vehicles over any number of asynchronous sensors (paper algorithm 1).
 
     Feed it scans in time order. Each step sees only what has arrived: the table it returns is causal. Memory does
-    not grow with time.
+    not grow with time, but for smoothed rows that are not fetched (see `drain_smoothed`).
 
     Args:
         config: sensors and settings, from `load_config`.
@@ -58,6 +62,12 @@ class Tracker:
         self._next_id = 1
         self._t: float | None = None
         self._log = allocate_log(0)
+        self._finished = False
+        self._smoothers: TrackSmoothers | None = None
+        if config.smoother.engine != "none":
+            from jeat_graph.smoothing.online import TrackSmoothers
+
+            self._smoothers = TrackSmoothers(config)
 
     @property
     def num_tracks(self) -> int:
@@ -88,7 +98,10 @@ class Tracker:
             DataError: boxes or scores that are not valid.
             UnknownSensorError: a sensor that the configuration does not declare.
             TimeOrderError: a time before that of the last step. In all three cases the state is as before.
+            JeatGraphError: after `finish`.
         """
+        if self._finished:
+            raise JeatGraphError("this tracker has been finished; make another one for another recording")
         batch = _as_scans(scans)
         t = batch[0].t
         if any(scan.t != t for scan in batch):
@@ -107,6 +120,9 @@ class Tracker:
         present[codes] = True
 
         self._tracks = grow(self._tracks, self._num_tracks, self._num_tracks + len(scores))
+        if self._smoothers is not None and len(scores) > len(self._log.rows):
+            self._log = allocate_log(2 * len(scores))
+        first_id = self._next_id
         self._num_tracks, self._next_id = step(
             self._tracks,
             self._num_tracks,
@@ -124,13 +140,62 @@ class Tracker:
             self._log,
         )
         self._t = t
-        return self.causal()
+        table = self.causal()
+        if self._smoothers is not None:
+            births = self._next_id - first_id
+            self._smoothers.record(t, self._tracks, self._num_tracks, births, self._log, table.track_id)
+        return table
 
     def causal(self) -> Trajectories:
         """Return the tracks that are reported now, as the last step did."""
         t = 0.0 if self._t is None else self._t
         columns = report(self._tracks, self._num_tracks, t, self._settings)
         return Trajectories(*columns, sensors=self.sensor_names)
+
+    def smoothed(self) -> Trajectories:
+        """Return the smoothed trajectories of the confirmed tracks so far, without what was drained.
+
+        Their whole life: the time before confirmation and gaps included, up to the last detection. With a fixed
+        lag the rows older than that are final; all others may still change. (The call makes the smoothers take in
+        what they had set aside, so that later values may differ in their last digits from a run without it.)
+
+        Raises:
+            JeatGraphError: the configuration asks for no smoother.
+        """
+        return self._wanted_smoothers().smoothed()
+
+    def drain_smoothed(self) -> Trajectories:
+        """Return the smoothed rows that are final and forget them, in order of time over all calls.
+
+        A live caller that keeps a smoother calls this now and then: rows that nobody fetches are kept for
+        `finish`, some 200 bytes each. The engines over whole tracks give a track's rows when it has ended, and
+        all at `finish` if fragments are to be stitched.
+
+        Raises:
+            JeatGraphError: the configuration asks for no smoother.
+        """
+        return self._wanted_smoothers().drain()
+
+    def finish(self) -> Trajectories:
+        """End all tracks and return their smoothed trajectories, without what was drained before.
+
+        The tracker takes no more scans. Called again, or without a smoother, it returns an empty table.
+        """
+        self._finished = True
+        if self._smoothers is None:
+            return Trajectories.empty(self.sensor_names)
+        return self._smoothers.finish()
+
+    @property
+    def smoother_counts(self) -> dict[str, int]:
+        """How the smoothers fared so far: rebuilds, fallbacks, measurements too late, joints; none without one."""
+        names = ("tracks", "rebuilds", "fallbacks", "too_late", "stitched")
+        return {name: getattr(self._smoothers, name) for name in names} if self._smoothers else {}
+
+    def _wanted_smoothers(self) -> TrackSmoothers:
+        if self._smoothers is None:
+            raise JeatGraphError("the configuration asks for no smoother: smoother.engine is none")
+        return self._smoothers
 
     def run(self, detections: Detections) -> Iterator[Trajectories]:
         """Step through a recording and yield the table of each time; scans of one time are taken jointly."""
@@ -153,7 +218,8 @@ def track(config: Config, detections: Detections) -> Trajectories:
         config: sensors and settings.
         detections: the recording.
     """
-    return Trajectories.concatenate(list(Tracker(config).run(detections)) or [Trajectories.empty()])
+    causal_only = replace(config, smoother=replace(config.smoother, engine="none"))
+    return Trajectories.concatenate(list(Tracker(causal_only).run(detections)) or [Trajectories.empty()])
 
 
 def _as_scans(scans: Any) -> list[Scan]:

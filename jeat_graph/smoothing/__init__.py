@@ -1,0 +1,1 @@
+"""Smoothing inside the tracker: what each track took in, its smoother, and the smoothed table."""

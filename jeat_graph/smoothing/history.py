@@ -1,0 +1,164 @@
+"""One track's past: what it took in, its smoother, and the rows not handed out yet."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jeat_graph.arrays import FloatArray
+from jeat_graph.config import Config
+from jeat_graph.smoothers.engine import TrackSmoother, make_smoother
+from jeat_graph.smoothers.track_data import COINCIDENT_S, SmoothedTrack
+from jeat_graph.smoothing.looks import Looks
+from jeat_graph.smoothing.rows import rows_of
+from jeat_graph.smoothing.sizes import SizeWindow
+from jeat_graph.trajectories import Trajectories
+from jeat_graph.update_log import COLUMNS, WIDTH
+
+#: Columns of a measurement here: its time, then those of the update log.
+COLUMN = {name: 1 + k for k, name in enumerate(COLUMNS)} | {"t": 0}
+
+_Z, _R = slice(COLUMN["z_x"], COLUMN["z_y"] + 1), slice(COLUMN["R_x"], COLUMN["R_y"] + 1)
+_SIZE = slice(COLUMN["log_width"], COLUMN["log_height"] + 1)
+_SIZE_VAR = slice(COLUMN["var_log_width"], COLUMN["var_log_height"] + 1)
+
+
+def prior_of(birth: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+    """Prior of a track's motion: time (s), mean (2, 3), covariance (2, 3, 3), from its birth (1 + WIDTH,)."""
+    mean = np.zeros((2, 3))
+    mean[:, 0] = birth[_Z]
+    variances = [birth[COLUMN[name]] for name in ("R_x", "var_v_x", "var_a_x", "R_y", "var_v_y", "var_a_y")]
+    cov = np.stack([np.diag(variances[:3]), np.diag(variances[3:])])
+    return float(birth[0]), mean, cov
+
+
+def size_prior_of(birth: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+    """Prior of a track's size: time (s), mean (2, 2), covariance (2, 2, 2), from its birth (1 + WIDTH,)."""
+    mean = np.zeros((2, 2))
+    mean[:, 0] = birth[_SIZE]
+    cov = np.zeros((2, 2, 2))
+    cov[:, 0, 0] = birth[_SIZE_VAR]
+    cov[:, 1, 1] = birth[COLUMN["var_rate"]]
+    return float(birth[0]), mean, cov
+
+
+class TrackHistory:
+    """What is kept of one track for its smoothed trajectory.
+
+    As long as the track is tentative its measurements only wait. Once it is confirmed a smoother takes them,
+    those of the tentative time first.
+
+    Args:
+        track_id: identity.
+        config: settings of the smoother, the sizes and the output.
+        keep: keep all measurements until the end, which stitching needs.
+
+    Attributes:
+        track_id: identity.
+        confirmed: whether the track has ever been confirmed.
+        measurements: measurements (M, 1 + WIDTH) that wait, or all of them if `keep`, in pieces; the first
+            row of the first piece is the birth.
+        looks: steps of its life that have no row yet.
+        smoother: the smoother, once there is one.
+    """
+
+    def __init__(self, track_id: int, config: Config, keep: bool) -> None:
+        self.track_id = track_id
+        self.confirmed = False
+        self.measurements: list[FloatArray] = []
+        self.looks = Looks.empty()
+        self.smoother: TrackSmoother | None = None
+        self._config = config
+        self._keep = keep
+        self._sizes: SizeWindow | None = None
+        self._fed = 0  # pieces of `measurements` that the smoother has had
+        self._tail = SmoothedTrack.empty()  # the last state handed out: rows may lie between it and the next
+        self._last = -np.inf  # time of the last measurement
+
+    def take(self, rows: FloatArray) -> None:
+        """Add measurements (M, 1 + WIDTH) in order of time."""
+        self.measurements.append(rows)
+        self._last = float(rows[-1, 0])
+
+    def watch(self, looks: Looks, confirmed: bool) -> None:
+        """Add steps that the track has lived through, and whether it was confirmed in one of them."""
+        if len(looks):
+            self.looks = Looks.concatenate([self.looks, looks]) if len(self.looks) else looks
+        self.confirmed = self.confirmed or confirmed
+
+    def feed(self) -> None:
+        """Give the smoother what waits, if the track is confirmed."""
+        if not self.confirmed or self._fed == len(self.measurements):
+            return
+        rows = np.concatenate(self.measurements[self._fed :])
+        if self.smoother is None:
+            settings = self._config.smoother
+            self.smoother = make_smoother(
+                settings.engine,
+                *prior_of(rows[0]),
+                lag_s=settings.lag_s,
+                chunk=settings.chunk,
+                robust=settings.robust,
+            )
+            self._sizes = SizeWindow(*size_prior_of(rows[0]), self._config.size.rate_density)
+            rows = rows[1:]
+        assert self._sizes is not None
+        if self._keep:
+            self._fed = len(self.measurements)
+        else:
+            self.measurements = []
+        if len(rows):
+            # A jerk of zero (a configuration may ask for it) would leave nothing to smooth.
+            jerk = np.maximum(rows[:, COLUMN["jerk"]], 1e-6)
+            self.smoother.feed(rows[:, 0], rows[:, _Z], rows[:, _R], jerk)
+            self._sizes.append(rows[:, 0], rows[:, _SIZE], rows[:, _SIZE_VAR])
+
+    def departed(self) -> Trajectories | None:
+        """Return the rows that have become final since the last call, or None."""
+        if self.smoother is None:
+            return None
+        piece = self.smoother.departed()
+        if not len(piece):
+            return None
+        assert self._sizes is not None
+        end = float(piece.t[-1])
+        rows = self._rows(piece, end)
+        self._sizes.advance(end)
+        self._tail = piece.select(slice(-1, None))
+        self.looks = self.looks.take(slice(int(np.searchsorted(self.looks.t, end, side="right")), None))
+        return rows
+
+    def current(self) -> Trajectories | None:
+        """Return the rows that are not final yet, given all measurements so far; None for a tentative track."""
+        if self.smoother is None:
+            return None
+        return self._rows(self.smoother.current(), np.inf)
+
+    def finish(self) -> Trajectories | None:
+        """Return all rows not returned yet, and free the smoother; None for a tentative track."""
+        if self.smoother is None:
+            return None
+        return self._rows(self.smoother.finish(), np.inf)
+
+    def whole(self) -> FloatArray:
+        """Return all measurements (M, 1 + WIDTH), the birth first; needs `keep`."""
+        return np.concatenate(self.measurements) if self.measurements else np.zeros((0, 1 + WIDTH))
+
+    def close(self) -> None:
+        """Free the smoother and all that waits."""
+        if self.smoother is not None:
+            self.smoother.close()
+        self.measurements = []
+
+    def _rows(self, piece: SmoothedTrack, end: float) -> Trajectories | None:
+        """Rows of the steps up to time `end` (s); after the last measurement only where the track is held."""
+        assert self._sizes is not None
+        path = SmoothedTrack.concatenate([self._tail, piece]) if len(self._tail) else piece
+        chosen = (self.looks.t <= end) & ((self.looks.t <= self._last + COINCIDENT_S) | self.looks.held)
+        # Of two steps at one time the later one counts.
+        chosen &= np.diff(self.looks.t, append=np.inf) > 0.0
+        if not len(path) or not chosen.any():
+            return None
+        existence = self.looks.hindsight()[chosen]
+        return rows_of(
+            self.track_id, path, self._sizes.smooth(), self.looks.take(chosen), existence, self._config
+        )
