@@ -20,6 +20,7 @@ _STILL = 0.35  # a track that never moved further than this part of its box stan
 _STILL_MIN_S = 2.0
 _MOST_ROWS = 160  # of the timeline
 _BINS = 900  # of the timeline, over the length of the run
+_LABEL_PX = 30.0  # boxes less high than this are far away and crowded: no number
 _GOLDEN = 0.61803398875
 
 
@@ -74,6 +75,7 @@ class Backdrop:
         height: height of the picture (px).
         lines: polylines (K, 2) drawn behind the tracks (px), such as the road's markings.
         missed: (M, 4) true boxes that no track lies on at the last instant (px).
+        false: tracks that lie on no true box at the last instant.
         title: one line above the picture.
         subtitle: a smaller line beside it.
     """
@@ -82,6 +84,7 @@ class Backdrop:
     height: float
     lines: Sequence[FloatArray] = ()
     missed: FloatArray | None = None
+    false: frozenset[int] = frozenset()
     title: str = ""
     subtitle: str = ""
 
@@ -180,7 +183,10 @@ def _draw_plane(axes: Any, table: Trajectories, backdrop: Backdrop, theme: Theme
         colour = _track_colour(track_id, theme.lightness)
         _draw_trail(axes, table.t[rows], table.mean[rows, :2], colour, end)
         if end - table.t[rows[-1]] <= _RECENT_S:
-            _draw_box(axes, table.boxes[rows[-1]], track_id, colour, track_id in standing, theme)
+            kind = "false" if track_id in backdrop.false else "parked" if track_id in standing else ""
+            _draw_box(axes, table.boxes[rows[-1]], f"{track_id} {kind}".strip(), colour, theme)
+    note = "dashed: parked" + ("" if backdrop.missed is None else " · red: false · red, dotted: missed")
+    axes.text(0.012, 0.018, note, color=theme.quiet, size=9, transform=axes.transAxes)
     for left, top, width, height in [] if backdrop.missed is None else backdrop.missed:
         _rectangle(
             axes, (left, top, width, height), edgecolor=theme.missed, linestyle=(0, (1, 1.5)), zorder=3
@@ -211,20 +217,14 @@ def _draw_trail(
 
 
 def _draw_box(
-    axes: Any, box: FloatArray, track_id: int, colour: tuple[float, float, float], stands: bool, theme: Theme
+    axes: Any, box: FloatArray, text: str, colour: tuple[float, float, float], theme: Theme
 ) -> None:
     left, top, width, height = (float(v) for v in box)
+    line: Any = (0, (3.5, 1.8)) if text.endswith("parked") else "solid"
+    edge = theme.missed if text.endswith("false") else (*colour, 1.0)
     _rectangle(axes, (left, top, width, height), facecolor=(*colour, 0.13), linewidth=0.0, zorder=3)
-    _rectangle(
-        axes,
-        (left, top, width, height),
-        edgecolor=colour,
-        linestyle=(0, (3.5, 1.8)) if stands else "solid",
-        linewidth=1.6,
-        zorder=4,
-    )
-    if height >= 14.0:
-        text = f"{track_id} parked" if stands else str(track_id)
+    _rectangle(axes, (left, top, width, height), edgecolor=edge, linestyle=line, linewidth=1.6, zorder=4)
+    if height >= _LABEL_PX or text.endswith("parked"):
         place = {"color": theme.ink, "size": 7.5, "zorder": 5, "clip_on": True}
         axes.text(left + 0.5 * width, top - 4.0, text, ha="center", va="bottom", **place)
 
@@ -302,12 +302,3 @@ def _draw_legend(figure: Any, sensors: Sequence[str], theme: Theme, y: float) ->
         figure.text(x, y, "■", color=colour, size=11, va="center")
         figure.text(x + 0.17 / 12, y, name, color=theme.quiet, size=9.5, va="center")
         x += (0.55 + 0.085 * len(name)) / 12
-    figure.text(
-        11.8 / 12,
-        y,
-        "above: solid box, a track now · dashed, parked · dotted, missed",
-        color=theme.quiet,
-        size=9.5,
-        va="center",
-        ha="right",
-    )

@@ -42,6 +42,7 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.sehn.scenario import load_scenario
     from jeat_graph.sehn.simulate import record
     from jeat_graph.tracking_run import RunOptions, RunRecord, describe_inputs, write_run
+    from jeat_graph.warm_up import notice_if_cold
 
     config = load_config(args.config)
     scenario = load_scenario(args.scenario)
@@ -55,6 +56,7 @@ def run(args: argparse.Namespace) -> int:
 
     _say("tracking with both sensors")
     details = RunRecord(source={"config_name": args.config, "inputs": describe_inputs([source])})
+    notice_if_cold()
     with directory:
         write_run(recording.detections, config, directory, details, RunOptions(progress=sys.stderr.isatty()))
     table = read_trajectories(out / "run" / "causal.csv")
@@ -109,28 +111,32 @@ def _draw(recording: Recording, table: Trajectories, stem: Path, scenario: str) 
     camera, truth = recording.scene.camera, recording.truth
     end = float(truth.frame_times()[-1])
     table = table.take(table.t <= end)
-    vehicles = len(np.unique(table.track_id))
+    missed, false = _errors(recording, table, end)
+    count = len(np.unique(table.track_id))
     backdrop = Backdrop(
         width=camera.width,
         height=camera.height,
         lines=marking_lines(recording.scene),
-        missed=_missed(recording, table, end),
-        title=f"{scenario}: {vehicles} tracks in {end:.0f} s",
+        missed=missed,
+        false=false,
+        title=f"{scenario}: {count} tracks in {end:.0f} s",
         subtitle=" + ".join(table.sensors) + f" · the picture at t = {end:.1f} s, trails of the last 3 s",
     )
     return save_pictures(table, backdrop, stem, DAY if scenario.startswith("day") else NIGHT)
 
 
-def _missed(recording: Recording, table: Trajectories, t: float) -> FloatArray:
-    """True boxes (M, 4) at a time of the truth that no track lies on."""
+def _errors(recording: Recording, table: Trajectories, t: float) -> tuple[FloatArray, frozenset[int]]:
+    """True boxes (M, 4) at a time of the truth that no track lies on, and tracks that lie on no true box."""
     from jeat_graph.eval.matching import match
     from jeat_graph.eval.overlap import pairwise_iou
 
     truth = recording.truth
-    wanted = truth.boxes[(truth.t == t) & ~truth.ignore]
-    there = table.boxes[table.t == table.t[-1]] if len(table) else table.boxes
-    found = match(pairwise_iou(wanted, there), 0.5)
-    return wanted[[k for k in range(len(wanted)) if k not in set(found.tolist())]]
+    now = truth.t == t
+    boxes, ignored = truth.boxes[now], truth.ignore[now]
+    tracks = table.take(table.t == table.t[-1] if len(table) else slice(0, 0))
+    found = match(pairwise_iou(boxes, tracks.boxes), 0.5)
+    missed = [k for k in range(len(boxes)) if not ignored[k] and k not in set(found.tolist())]
+    return boxes[missed], frozenset(tracks.track_id[found < 0].tolist())
 
 
 def _write_text(text: str, path: Path) -> None:

@@ -71,6 +71,7 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.io.detections_io import read_many, split_name
     from jeat_graph.run_directory import RunDirectory
     from jeat_graph.tracking_run import RunOptions, RunRecord, describe_inputs, write_run
+    from jeat_graph.warm_up import notice_if_cold
 
     begin = time.perf_counter()
     config = load_config(args.config, args.overrides)
@@ -95,6 +96,7 @@ def run(args: argparse.Namespace) -> int:
     for warning in record.warnings:
         print(f"jeat-graph track: warning: {warning}", file=sys.stderr)
     record.timings["read_s"] = round(time.perf_counter() - begin, 4)
+    notice_if_cold()
     with directory:
         write_run(detections, config, directory, record, options)
     counts = record.counts

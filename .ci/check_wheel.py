@@ -1,0 +1,33 @@
+"""Check that a wheel holds the one package jeat_graph, with its data, and nothing else."""
+
+from __future__ import annotations
+
+import sys
+import zipfile
+from pathlib import Path
+
+NEEDED = ("jeat_graph/py.typed", "jeat_graph/configs/default.yaml", "jeat_graph/configs/paper.yaml")
+
+
+def problems(wheel: Path) -> list[str]:
+    """List what is wrong with a wheel, one line each."""
+    with zipfile.ZipFile(wheel) as archive:
+        names = archive.namelist()
+    found = [
+        f"{name} does not belong in the wheel"
+        for name in names
+        if not (name.startswith("jeat_graph/") or name.split("/")[0].endswith(".dist-info"))
+    ]
+    wanted = set(NEEDED)
+    wanted |= {f"jeat_graph/{path.as_posix()}" for path in Path("configs").rglob("*.yaml")}
+    modules = [*Path("jeat_graph").rglob("*.py")]
+    for folder in ("filters", "association", "smoothers", "eval", "configs"):
+        modules += [Path("jeat_graph") / path for path in Path(folder).rglob("*.py")]
+    wanted |= {path.as_posix() for path in modules}
+    return found + [f"{name} is missing from the wheel" for name in sorted(wanted - set(names))]
+
+
+if __name__ == "__main__":
+    lines = problems(Path(sys.argv[1]))
+    print("\n".join(lines) or f"{Path(sys.argv[1]).name}: one package, complete")
+    sys.exit(1 if lines else 0)

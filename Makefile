@@ -1,0 +1,81 @@
+# Every target does its own set-up in .venv and needs only make and Python 3.11 or later.
+#
+#   make demo    simulate a highway at night, track it, judge the tracks, draw a picture (in demo/)
+#   make test    run all tests
+#   make lint    style, format and docstrings
+#   make types   type-check the built package
+#   make build   build the wheel (in dist/)
+#   make clean   remove what was built and computed, .venv included
+
+PYTHONS := python3 python3.13 python3.12 python3.11
+PYTHON ?= $(firstword $(foreach name,$(PYTHONS),$(shell $(name) -c \
+	'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $(name))))
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+SOURCES := $(shell find jeat_graph filters association smoothers -name '*.py')
+
+.PHONY: demo test lint types build clean
+.DELETE_ON_ERROR:
+
+demo: $(VENV)/.compiled
+	@$(BIN)/jeat-graph demo --out demo
+
+test: $(VENV)/.test $(VENV)/.compiled
+	@echo "make: running the tests"
+	@$(BIN)/python -m pytest -n 2
+
+lint: $(VENV)/.lint
+	@$(BIN)/ruff check
+	@$(BIN)/ruff format --check
+	@$(BIN)/interrogate --quiet jeat_graph filters association smoothers eval configs || \
+		$(BIN)/interrogate -v jeat_graph filters association smoothers eval configs
+
+# The folders at the top of the repository become one package only when it is built, so that is what is checked.
+types: build/.installed
+	@cd build && venv/bin/mypy --config-file ../pyproject.toml --cache-dir ../.mypy_cache -p jeat_graph
+
+build: build/.wheel
+
+clean:
+	rm -rf $(VENV) build dist demo *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(BIN)/python:
+	@test -n "$(PYTHON)" || { echo "make: Python 3.11 or later is needed; set PYTHON=/path/to/python" >&2; exit 1; }
+	@echo "make: creating $(VENV)"
+	@$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.run: pyproject.toml | $(BIN)/python
+	@echo "make: installing jeat-graph and what it needs (a minute or two)"
+	@$(PIP) --editable .
+	@touch $@
+
+$(VENV)/.test: pyproject.toml $(VENV)/.run
+	@echo "make: installing what the tests need"
+	@$(PIP) --editable '.[test]'
+	@touch $@
+
+$(VENV)/.lint: pyproject.toml | $(BIN)/python
+	@echo "make: installing the linters"
+	@$(PIP) ruff interrogate
+	@touch $@
+
+# numba does not notice that a function called from another file has changed: new sources, all code anew.
+$(VENV)/.compiled: $(SOURCES) $(VENV)/.run
+	@find jeat_graph filters association smoothers \( -name '*.nbi' -o -name '*.nbc' \) -delete
+	@$(BIN)/python -m jeat_graph.warm_up
+	@touch $@
+
+build/.wheel: $(SOURCES) $(shell find eval configs -name '*.py' -o -name '*.yaml') pyproject.toml | $(BIN)/python
+	@echo "make: building the wheel"
+	@$(PIP) build
+	@rm -rf build dist
+	@$(BIN)/python -m build --wheel --outdir dist . > /dev/null
+	@mkdir -p build && touch $@
+
+build/.installed: build/.wheel
+	@echo "make: installing the wheel into build/venv"
+	@$(PYTHON) -m venv --clear build/venv
+	@build/venv/bin/python -m pip install --quiet --disable-pip-version-check "$$(ls dist/*.whl)[lint]"
+	@touch $@
