@@ -43,15 +43,19 @@ def choose_births(
     partner = np.full(num, -1, dtype=np.int64)
     count = 0
     order = np.argsort(-existence, kind="mergesort")
+    by_left = np.argsort(track_boxes[:, 0], kind="mergesort")
+    left = track_boxes[by_left, 0]
+    widest = np.max(track_boxes[:, 2]) if len(left) > 0 else 0.0
     for j in order:
         if taken[j] or existence[j] < min_existence:
             continue
         refused = False
         if max_overlap < 1.0:
-            for i in range(track_boxes.shape[0]):
-                if overlap(boxes[j], track_boxes[i]) > max_overlap:
-                    refused = True
-                    break
+            right = boxes[j, 0] + boxes[j, 2]
+            k = np.searchsorted(left, boxes[j, 0] - widest)
+            while k < len(left) and left[k] < right and not refused:
+                refused = overlap(boxes[j], track_boxes[by_left[k]]) > max_overlap
+                k += 1
             if refused:
                 continue
             for b in range(count):

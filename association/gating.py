@@ -62,20 +62,27 @@ def gated_pairs(
         return rows[:0], cols[:0], d2[:0], log_density[:0], log_size_density[:0]
     order = np.argsort(z[:, 0], kind="mergesort")
     x_sorted = z[order, 0]
+    y_sorted = z[order, 1]
     heaviest = np.max(weight)
     log_2pi = np.log(2.0 * np.pi)
     for i in range(num_tracks):
         widest = 0.0
+        highest = 0.0
         for s in range(noise.shape[1]):
             widest = max(widest, noise[i, s, 0])
+            highest = max(highest, noise[i, s, 1])
         half = np.sqrt(gate * (position_var[i, 0] + widest * heaviest))
+        # A hair wider than any gate, so that rounding never decides here.
+        half_y = 1.000001 * np.sqrt(gate * (position_var[i, 1] + highest * heaviest))
         k = np.searchsorted(x_sorted, position[i, 0] - half)
         first = count
         while k < num_dets and x_sorted[k] <= position[i, 0] + half:
-            j = order[k]
+            dy = y_sorted[k] - position[i, 1]
             k += 1
+            if abs(dy) > half_y:
+                continue
+            j = order[k - 1]
             s = sensor[j]
-            dy = z[j, 1] - position[i, 1]
             Sy = position_var[i, 1] + noise[i, s, 1] * weight[j]
             ny = dy * dy / Sy
             if ny > gate:

@@ -38,13 +38,19 @@ def find_duplicates(
     num = boxes.shape[0]
     remove = np.zeros(num, dtype=np.bool_)
     order = np.argsort(boxes[:, 0], kind="mergesort")
+    # In the order of the sweep, so that its inner loop runs through memory and mostly stops at two comparisons.
+    left = boxes[order, 0]
+    top = boxes[order, 1]
+    bottom = top + boxes[order, 3]
     for a in range(num):
         i = order[a]
         right = boxes[i, 0] + boxes[i, 2]
         for b in range(a + 1, num):
-            k = order[b]
-            if boxes[k, 0] >= right:
+            if left[b] >= right:
                 break
+            if top[b] >= bottom[a] or bottom[b] <= top[a]:
+                continue
+            k = order[b]
             if remove[i] or remove[k] or overlap(boxes[i], boxes[k]) < min_overlap:
                 continue
             d2 = 0.0

@@ -78,6 +78,11 @@ def predict_size(mean: FloatArray, cov: FloatArray, density: float, dt: float) -
 
 
 @njit(cache=True)
+def _flush(value: float) -> float:
+    return 0.0 if abs(value) < _FLUSH else value
+
+
+@njit(cache=True)
 def update_block(m: FloatArray, P: FloatArray, z: float, R: float) -> float:
     """Update one block with a scalar measurement of its first component, in place (paper eq. 4).
 
@@ -87,7 +92,7 @@ def update_block(m: FloatArray, P: FloatArray, z: float, R: float) -> float:
     rounding is left.
 
     Args:
-        m: (D,) mean.
+        m: (D,) mean, D = 2 or 3.
         P: (D, D) covariance, symmetric.
         z: measurement of m[0].
         R: variance of the measurement, > 0.
@@ -95,20 +100,24 @@ def update_block(m: FloatArray, P: FloatArray, z: float, R: float) -> float:
     Returns:
         The block's share of the normalised innovation squared, y² / S.
     """
-    n = m.shape[0]
-    S = P[0, 0] + R
+    # Entry by entry: a loop over a copied row allocates, and this is the innermost kernel of the tracker.
+    p0, p1 = P[0, 0], P[0, 1]
+    S = p0 + R
     y = z - m[0]
-    p0 = P[0].copy()
-    K = p0 / S
+    K1 = p1 / S
     kept = R / S
-    for i in range(n):
-        m[i] += K[i] * y
-        for j in range(i, n):
-            value = p0[j] * kept if i == 0 else P[i, j] - K[i] * p0[j]
-            if abs(value) < _FLUSH:
-                value = 0.0
-            P[i, j] = value
-            P[j, i] = value
+    m[0] += p0 / S * y
+    m[1] += K1 * y
+    if m.shape[0] == 3:
+        p2 = P[0, 2]
+        K2 = p2 / S
+        m[2] += K2 * y
+        P[0, 2] = P[2, 0] = _flush(p2 * kept)
+        P[1, 2] = P[2, 1] = _flush(P[1, 2] - K1 * p2)
+        P[2, 2] = _flush(P[2, 2] - K2 * p2)
+    P[0, 0] = _flush(p0 * kept)
+    P[0, 1] = P[1, 0] = _flush(p1 * kept)
+    P[1, 1] = _flush(P[1, 1] - K1 * p1)
     return float(y * y / S)
 
 
