@@ -75,7 +75,7 @@ def update_odds(odds: float, still: float, moving: float, memory: float) -> floa
 def zero_update(m: FloatArray, P: FloatArray, k: int, std: float) -> None:
     """Take in the pseudo-measurement that component `k` of a block is zero, in place (Joseph form).
 
-    With H = e_k: P_ij − K_i P_kj − K_j P_ki + K_i K_j S.
+    Written out for H = e_k as in `aekf.update_block`, so that no variance is a difference of large numbers.
 
     Args:
         m: (D,) mean.
@@ -83,14 +83,19 @@ def zero_update(m: FloatArray, P: FloatArray, k: int, std: float) -> None:
         k: the component.
         std: standard deviation of the pseudo-measurement, > 0.
     """
-    S = P[k, k] + std * std
+    R = std * std
+    S = P[k, k] + R
     row = P[k].copy()
     K = row / S
+    kept = R / S
     y = -m[k]
     for i in range(len(m)):
         m[i] += K[i] * y
         for j in range(i, len(m)):
-            P[i, j] = P[i, j] - K[i] * row[j] - K[j] * row[i] + K[i] * K[j] * S
+            if i == k or j == k:
+                P[i, j] = row[i + j - k] * kept
+            else:
+                P[i, j] -= K[i] * row[j]
             P[j, i] = P[i, j]
 
 

@@ -1,4 +1,4 @@
-"""A textbook Kalman filter with full matrices: the oracle of the filters' tests. It shares no code with them."""
+"""A textbook Kalman filter with full matrices: the oracle of the filters' tests. It shares no code."""
 
 import numpy as np
 

@@ -8,26 +8,68 @@ from scipy.stats import multivariate_normal
 
 from jeat_graph.filters.standing import (
     moving_evidence,
+    stand_still,
     still_evidence,
     update_anchor,
     update_odds,
-    zero_velocity_update,
+    zero_update,
 )
 
 
-def test_zero_velocity_update_is_a_kalman_update_that_measures_the_velocity(dense):
+def is_close_covariance(a, b, tolerance=1e-8):
+    """Compare in units of the standard deviations, so that every entry counts alike."""
+    scale = np.sqrt(np.diag(b))
+    return np.abs((a - b) / np.outer(scale, scale)).max() < tolerance
+
+
+@pytest.mark.parametrize("component", [1, 2])
+def test_a_pseudo_measurement_of_zero_is_a_kalman_update(dense, component):
     rng = np.random.default_rng(1)
     mean, cov = dense.random_tracks(rng, 30)
-    H = np.kron(np.array([[0.0, 1.0, 0.0]]), np.eye(2))
+    H = np.kron(np.eye(3)[component], np.eye(2))
     for m, P in zip(mean, cov, strict=True):
         std = rng.uniform(0.1, 30.0)
         x, full, _ = dense.update(
             dense.state_vector(m), dense.full_covariance(P), H, np.zeros(2), std**2 * np.eye(2)
         )
-        zero_velocity_update(m, P, std)
-        scale = np.sqrt(np.diag(full))
+        for axis in range(2):
+            zero_update(m[axis], P[axis], component, std)
         assert np.allclose(dense.state_vector(m), x, rtol=1e-8, atol=1e-8)
-        assert np.abs((dense.full_covariance(P) - full) / np.outer(scale, scale)).max() < 1e-8
+        assert is_close_covariance(dense.full_covariance(P), full)
+
+
+def test_standing_still_measures_velocity_acceleration_and_growth_as_zero(dense):
+    rng = np.random.default_rng(2)
+    mean, cov = dense.random_tracks(rng, 20)
+    rate_std, size = 0.05, 40.0
+    H = np.hstack([np.zeros((4, 2)), np.eye(4)])
+    for m, P in zip(mean, cov, strict=True):
+        root = rng.normal(size=(2, 2, 2))
+        size_mean, size_cov = rng.normal(size=(2, 2)), root @ np.swapaxes(root, 1, 2) + 0.1 * np.eye(2)
+        sizes = size_mean.copy(), size_cov.copy()
+        x, full, _ = dense.update(
+            dense.state_vector(m),
+            dense.full_covariance(P),
+            H,
+            np.zeros(4),
+            (rate_std * size) ** 2 * np.eye(4),
+        )
+        stand_still(m, P, size_mean, size_cov, rate_std, size)
+        assert np.allclose(dense.state_vector(m), x, rtol=1e-7, atol=1e-7)
+        assert is_close_covariance(dense.full_covariance(P), full, 1e-7)
+        for side in range(2):
+            s, V, _ = dense.update(
+                sizes[0][side], sizes[1][side], np.array([[0.0, 1.0]]), np.zeros(1), np.array([[rate_std**2]])
+            )
+            assert np.allclose(size_mean[side], s)
+            assert np.allclose(size_cov[side], V)
+
+
+def test_a_zero_of_what_is_hardly_known_leaves_the_variance_of_the_measurement():
+    m, P = np.array([3.0, 5.0]), np.array([[1e30, 5e29], [5e29, 1e30]])
+    zero_update(m, P, 1, 0.5)
+    assert P[1, 1] == pytest.approx(0.25)
+    assert np.linalg.det(P) > 0.0
 
 
 def test_evidence_of_each_model_is_its_gaussian_density():

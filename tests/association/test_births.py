@@ -1,0 +1,112 @@
+"""Births: duplicates are refused, two sensors' views of one new vehicle are one birth."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from jeat_graph.association.births import choose_births
+from jeat_graph.association.boxes import overlap
+
+
+def iou(a, b):
+    width = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])
+    height = min(a[1] + a[3], b[1] + b[3]) - max(a[1], b[1])
+    common = max(width, 0.0) * max(height, 0.0)
+    return common / (a[2] * a[3] + b[2] * b[3] - common)
+
+
+def births(boxes, existence, sensor, taken=None, tracks=(), least=0.01, most=0.5):
+    boxes = np.array(boxes, dtype=float).reshape(-1, 4)
+    parents, partner = choose_births(
+        boxes,
+        np.array(existence, dtype=float),
+        np.array(sensor, dtype=np.int64),
+        np.zeros(len(boxes), dtype=np.int64) if taken is None else np.array(taken, dtype=np.int64),
+        np.array(tracks, dtype=float).reshape(-1, 4),
+        least,
+        most,
+    )
+    return parents.tolist(), partner.tolist()
+
+
+def by_definition(boxes, existence, sensor, taken, tracks, least, most):
+    """The rule in plain words: the surest first; refuse, join, or start."""
+    parents, partner = [], [-1] * len(boxes)
+    for j in sorted(range(len(boxes)), key=lambda j: (-existence[j], j)):
+        if taken[j] or existence[j] < least:
+            continue
+        if most < 1.0:
+            if any(iou(boxes[j], track) > most for track in tracks):
+                continue
+            near = [
+                b
+                for b, parent in enumerate(parents)
+                if iou(boxes[j], boxes[parent]) > (most if sensor[parent] == sensor[j] else most / 2)
+            ]
+            if near:
+                if sensor[parents[near[0]]] != sensor[j]:
+                    partner[j] = near[0]
+                continue
+        parents.append(j)
+    return parents, partner
+
+
+@st.composite
+def boxes(draw, most):
+    n = draw(st.integers(0, most))
+    rng = np.random.default_rng(draw(st.integers(0, 10**6)))
+    return np.column_stack([rng.uniform(0, 30, (n, 2)), rng.uniform(10, 30, (n, 2))])
+
+
+@given(a=boxes(6), b=boxes(6))
+def test_overlap_is_intersection_over_union(a, b):
+    for one in a:
+        for two in b:
+            assert np.isclose(overlap(one, two), iou(one, two))
+            assert overlap(one, two) == overlap(two, one)
+        assert np.isclose(overlap(one, one), 1.0)
+
+
+@given(
+    dets=boxes(9),
+    tracks=boxes(4),
+    seed=st.integers(0, 10**6),
+    least=st.sampled_from([0.0, 0.3]),
+    most=st.sampled_from([0.2, 0.5, 0.8, 1.0]),
+)
+@settings(max_examples=200, deadline=None)
+def test_births_are_those_of_the_definition(dets, tracks, seed, least, most):
+    rng = np.random.default_rng(seed)
+    # Few distinct probabilities, so that ties occur: the earlier detection is first.
+    existence = rng.integers(0, 5, len(dets)) / 4
+    sensor, taken = rng.integers(0, 2, len(dets)), rng.integers(0, 2, len(dets))
+    expected = by_definition(dets, existence, sensor, taken, tracks, least, most)
+    assert births(dets, existence, sensor, taken, tracks, least, most) == expected
+
+
+def test_the_surest_detection_is_born_first():
+    far = [[0, 0, 10, 10], [100, 0, 10, 10], [200, 0, 10, 10]]
+    assert births(far, [0.2, 0.9, 0.5], [0, 0, 0]) == ([1, 2, 0], [-1, -1, -1])
+
+
+def test_a_detection_on_a_track_starts_none():
+    assert births([[0, 0, 10, 10]], [0.9], [0], tracks=[[1, 0, 10, 10]]) == ([], [-1])
+
+
+def test_two_sensors_views_of_one_vehicle_are_one_birth():
+    assert births([[0, 0, 10, 10], [1, 0, 10, 10]], [0.4, 0.9], [0, 1]) == ([1], [0, -1])
+
+
+def test_two_boxes_of_one_sensor_on_one_place_are_one_birth_and_no_second_view():
+    assert births([[0, 0, 10, 10], [1, 0, 10, 10]], [0.4, 0.9], [0, 0]) == ([1], [-1, -1])
+
+
+def test_what_a_track_took_and_what_is_too_doubtful_start_none():
+    far = [[0, 0, 10, 10], [100, 0, 10, 10], [200, 0, 10, 10]]
+    assert births(far, [0.9, 0.001, 0.9], [0, 0, 0], taken=[1, 0, 0]) == ([2], [-1, -1, -1])
+
+
+def test_the_paper_refuses_no_birth():
+    same = [[0, 0, 10, 10]] * 3
+    parents, partner = births(same, [0.0, 0.0, 0.0], [0, 1, 0], tracks=same, least=0.0, most=1.0)
+    assert (parents, partner) == ([0, 1, 2], [-1, -1, -1])
