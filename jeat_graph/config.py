@@ -258,10 +258,7 @@ class OutputConfig:
 
     min_existence: float = number(0.5, "1", "reported only above this probability of existence", 0.0, 1.0)
     max_gap_s: float = number(
-        0.15, "s", "reported only if updated within this time (paper: as long as it lives)"
-    )
-    max_missed: float = number(
-        10.0, "nat", "reported only if the misses since its last detection are this likely: -ln P(all missed)"
+        0.12, "s", "reported only if updated within this time (paper: as long as it lives)"
     )
     clip: bool = field(default=True, metadata={"doc": "clip boxes to the picture; drop those outside it"})
     min_visible: float = number(

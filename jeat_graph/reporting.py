@@ -35,8 +35,7 @@ def report(
         if not tracks.confirmed[i]:
             continue
         gap = t - tracks.t_update[i]
-        coasts = gap > settings.output_max_gap_s or tracks.missed[i] > settings.output_max_missed
-        if coasts and not tracks.standing[i]:
+        if gap > settings.output_max_gap_s and not tracks.standing[i]:
             continue
         if settings.by_existence and tracks.existence[i] < settings.output_min_existence:
             continue

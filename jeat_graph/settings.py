@@ -105,7 +105,6 @@ class Settings(NamedTuple):
     merge_velocity_gate: float
     output_min_existence: float
     output_max_gap_s: float
-    output_max_missed: float
     output_clip: bool
     output_min_visible: float
 
@@ -199,7 +198,6 @@ def kernel_settings(config: Config) -> Settings:
         merge_velocity_gate=float(chi2.ppf(c.merge.gate_probability, 2)),
         output_min_existence=c.output.min_existence,
         output_max_gap_s=c.output.max_gap_s,
-        output_max_missed=c.output.max_missed,
         output_clip=c.output.clip,
         output_min_visible=c.output.min_visible,
     )

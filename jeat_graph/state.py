@@ -26,7 +26,6 @@ class TrackArrays(NamedTuple):
         scale: (C, S) noise scale s of paper eq. 5.
         p_detect: (C, S) running estimate of each sensor's probability of detecting this track.
         hidden: (C, S) probability that the track, if it exists, is hidden from each sensor for now.
-        missed: (C,) −ln of the probability that all looks since the last detection missed the track.
         existence: (C,) probability that the track is a vehicle.
         confirmed: (C,) whether it has been confirmed.
         track_id: (C,) identity, ascending.
@@ -48,7 +47,6 @@ class TrackArrays(NamedTuple):
     scale: FloatArray
     p_detect: FloatArray
     hidden: FloatArray
-    missed: FloatArray
     existence: FloatArray
     confirmed: npt.NDArray[np.bool_]
     track_id: IntArray
@@ -87,7 +85,6 @@ def allocate(capacity: int, num_sensors: int) -> TrackArrays:
         scale=np.zeros((capacity, num_sensors)),
         p_detect=np.zeros((capacity, num_sensors)),
         hidden=np.zeros((capacity, num_sensors)),
-        missed=np.zeros(capacity),
         existence=np.zeros(capacity),
         confirmed=np.zeros(capacity, dtype=np.bool_),
         track_id=np.zeros(capacity, dtype=np.int64),

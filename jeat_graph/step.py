@@ -23,10 +23,10 @@ from jeat_graph.filters.aekf import predict, predict_size, update, update_block
 from jeat_graph.filters.noise import adapt_scale, base_variance
 from jeat_graph.filters.standing import (
     moving_evidence,
+    stand_still,
     still_evidence,
     update_anchor,
     update_odds,
-    zero_velocity_update,
 )
 from jeat_graph.lifecycle import (
     existence_after_hit,
@@ -295,9 +295,6 @@ def take(
     tracks.scale[i, s] = adapt_scale(
         tracks.scale[i, s], nis, settings.adaptation_rate, settings.scale_min, settings.scale_max
     )
-    if tracks.standing[i]:
-        size = math.exp(0.5 * (tracks.size_mean[i, 0, 0] + tracks.size_mean[i, 1, 0]))
-        zero_velocity_update(tracks.mean[i], tracks.cov[i], settings.standing_speed_std * size)
     for side in range(2):
         update_block(
             tracks.size_mean[i, side],
@@ -305,8 +302,17 @@ def take(
             batch.log_size[j, side],
             sensors.size_var[s, side],
         )
+    if tracks.standing[i]:
+        size = math.exp(0.5 * (tracks.size_mean[i, 0, 0] + tracks.size_mean[i, 1, 0]))
+        stand_still(
+            tracks.mean[i],
+            tracks.cov[i],
+            tracks.size_mean[i],
+            tracks.size_cov[i],
+            settings.standing_speed_std,
+            size,
+        )
     tracks.hits[i] += 1
-    tracks.missed[i] = 0.0
     tracks.t_update[i] = t
     tracks.used[i] |= 1 << s
 
@@ -423,7 +429,6 @@ def count_misses(
             if tracks.hidden[i, s] < 1.0:
                 awake = min(p_detect[i, s] / (1.0 - tracks.hidden[i, s]), 0.999)
                 tracks.hidden[i, s] = min(hidden_after_miss(tracks.hidden[i, s], awake), 0.999)
-                tracks.missed[i] -= math.log1p(-awake)
             tracks.p_detect[i, s] = max(own - settings.p_detect_weight * visible * own, settings.p_detect_min)
 
 
@@ -546,7 +551,6 @@ def move(tracks: TrackArrays, source: int, target: int) -> None:
     tracks.size_mean[target] = tracks.size_mean[source]
     tracks.size_cov[target] = tracks.size_cov[source]
     tracks.scale[target] = tracks.scale[source]
-    tracks.missed[target] = tracks.missed[source]
     tracks.hidden[target] = tracks.hidden[source]
     tracks.p_detect[target] = tracks.p_detect[source]
     tracks.existence[target] = tracks.existence[source]
@@ -664,7 +668,6 @@ def start_track(
     tracks.confirmed[i] = False
     tracks.track_id[i] = track_id
     tracks.hits[i] = 1
-    tracks.missed[i] = 0.0
     tracks.t_birth[i] = t
     tracks.t_update[i] = t
     tracks.used[i] = 1 << s
