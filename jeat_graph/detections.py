@@ -30,8 +30,11 @@ def check_boxes(boxes: npt.ArrayLike, scores: npt.ArrayLike) -> tuple[FloatArray
         DataError: wrong shape, a value that is not finite, a size that is not positive, or a score
             outside [0, 1]. The message names the first row at fault.
     """
-    b = np.ascontiguousarray(boxes, dtype=np.float64)
-    s = np.ascontiguousarray(scores, dtype=np.float64)
+    try:
+        b = np.ascontiguousarray(boxes, dtype=np.float64)
+        s = np.ascontiguousarray(scores, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise DataError("boxes must have shape (M, 4) and scores shape (M,), all of them numbers") from None
     if b.size == 0:
         b = b.reshape(0, 4)
     if b.ndim != 2 or b.shape[1] != 4:
@@ -260,7 +263,7 @@ class Detections:
     def batches(self) -> Iterator[list[Scan]]:
         """Iterate over groups of scans of different sensors at one and the same time."""
         starts = np.flatnonzero(np.diff(self.scan_t, prepend=-np.inf) != 0)
-        ends = np.append(starts[1:], self.num_scans)
+        ends = np.append(starts, self.num_scans)[1:]
         for start, end in zip(starts, ends, strict=True):
             yield [self.scan(k) for k in range(start, end)]
 

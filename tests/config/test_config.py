@@ -1,0 +1,218 @@
+"""Configurations: read, overridden, refused with a useful sentence, written back."""
+
+import dataclasses
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from jeat_graph.config import Config, MotionConfig, NoiseConfig, SensorConfig, check
+from jeat_graph.config_io import config_from_dict, config_to_dict, load_config, preset_names, save_config
+from jeat_graph.errors import ConfigError
+
+
+def write(tmp_path, text, name="my.yaml"):
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def refusal(*args, **kwargs):
+    with pytest.raises(ConfigError) as info:
+        load_config(*args, **kwargs)
+    assert "\n" not in str(info.value), "a message is one line"
+    return str(info.value)
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_every_preset_loads_and_survives_a_round_trip(name, tmp_path):
+    config = load_config(name)
+    assert config_from_dict(config_to_dict(config)) == config
+    save_config(config, tmp_path / "copy.yaml", comment="two\nlines")
+    assert (tmp_path / "copy.yaml").read_text(encoding="utf-8").startswith("# two\n# lines\n")
+    assert load_config(tmp_path / "copy.yaml") == config
+
+
+def test_the_presets_of_the_contract_exist():
+    assert {"default", "paper"} <= set(preset_names())
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        ("noise.adaptation_rate", 0.1),
+        ("noise.scale_min", 0.5),
+        ("noise.scale_max", 5.0),
+        ("noise.score_weighting", True),
+        ("noise.score_floor", 0.1),
+        ("association.method", "joint"),
+        ("association.cost", "mahalanobis"),
+        ("association.second_pass", True),
+        ("lifecycle.method", "hits"),
+        ("lifecycle.confirm_age_s", 0.5),
+        ("lifecycle.confirm_hits", 5),
+        ("lifecycle.max_gap_confirmed_s", 0.5),
+        ("lifecycle.max_gap_tentative_s", 0.2),
+        ("motion.jerk_per_size", 0.0),
+        ("merge.enabled", False),
+    ],
+)
+def test_the_paper_preset_has_the_papers_constants(path, value):
+    section, name = path.split(".")
+    assert getattr(getattr(load_config("paper"), section), name) == value
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("motion.jerk_per_sise=1", ["motion.jerk_per_sise", "motion.jerk_per_size"]),
+        ("moton.jerk_px=1", ["moton", "motion"]),
+        ("sensors.rgb.rate_hs=1", ["sensors.rgb.rate_hs", "sensors.rgb.rate_hz"]),
+        ("sensors.rbg.rate_hz=1", ["rbg", "rgb"]),
+    ],
+)
+def test_an_unknown_key_names_the_nearest_known_one(override, words):
+    message = refusal("default", [override])
+    assert all(word in message for word in words), message
+
+
+def test_an_unknown_preset_names_the_nearest_one():
+    assert "paper" in refusal("papr")
+    assert "presets:" in refusal("qqqqqqqq")
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("noise.adaptation_rate=2", ["noise.adaptation_rate", "2", "[0.0, 1.0]"]),
+        ("noise.scale_min=0", ["noise.scale_min", "(0.0, inf]"]),
+        ("noise.scale_min=6", ["noise.scale_min", "noise.scale_max"]),
+        ("sensors.evt.p_detect=1.5", ["sensors.evt.p_detect", "1.5", "[0.01, 0.999]"]),
+        ("sensors.evt.sigma_px=.nan", ["sensors.evt.sigma_px", "nan"]),
+        ("sensors.evt.rate_hz=.inf", ["sensors.evt.rate_hz", "inf"]),
+        ("lifecycle.confirm_hits=0", ["lifecycle.confirm_hits", "0"]),
+        ("lifecycle.confirm_hits=2.5", ["lifecycle.confirm_hits", "whole number"]),
+        ("motion.jerk_px=fast", ["motion.jerk_px", "number", "fast"]),
+        ("motion.jerk_px=true", ["motion.jerk_px", "number"]),
+        ("merge.enabled=1", ["merge.enabled", "true or false"]),
+        ("association.method=hungarian", ["association.method", "hungarian", "slots", "joint", "sequential"]),
+        ("association.priority=[radar]", ["association.priority", "radar"]),
+        ("association.priority=rgb", ["association.priority", "list"]),
+        ("sensors.rgb.bias=[0, 0]", ["sensors.rgb.bias", "4 entries"]),
+        ("sensors.rgb.score_precision=[[0.5, 0.9], [0.4, 0.95]]", ["sensors.rgb.score_precision", "rise"]),
+        ("motion=3", ["motion", "key: value"]),
+    ],
+)
+def test_a_bad_value_names_the_field_and_what_would_be_right(override, words):
+    message = refusal("default", [override])
+    assert all(word in message for word in words), message
+
+
+@pytest.mark.parametrize("text", ["motion.jerk_px", "=3", "motion.jerk_px=[1", "noise.scale_min.x=1"])
+def test_an_override_that_cannot_be_read_is_refused(text):
+    assert "--set" in refusal("default", [text])
+
+
+def test_overrides_are_laid_over_the_preset_one_after_the_other():
+    base = load_config("default")
+    config = load_config("default", ["motion.jerk_px=7", "sensors.rgb.rate_hz=30", "motion.jerk_px=8"])
+    assert config.motion == dataclasses.replace(base.motion, jerk_px=8.0)
+    assert config.sensors["rgb"] == dataclasses.replace(base.sensors["rgb"], rate_hz=30.0)
+    assert config.sensors["evt"] == base.sensors["evt"]
+    assert load_config("default") == base, "an override must not reach the next load"
+
+
+def test_a_section_that_the_preset_leaves_out_can_be_overridden(tmp_path):
+    path = write(tmp_path, "sensors: {cam: {}}\n")
+    assert load_config(path, ["output.max_gap_s=3"]).output.max_gap_s == 3.0
+
+
+def test_a_file_lies_over_its_base(tmp_path):
+    path = write(tmp_path, "base: paper\nnoise: {scale_max: 4}\nsensors: {rgb: {sigma_px: 9}}\n")
+    config, paper = load_config(path), load_config("paper")
+    assert config.noise == dataclasses.replace(paper.noise, scale_max=4.0)
+    assert config.sensors["rgb"] == dataclasses.replace(paper.sensors["rgb"], sigma_px=9.0)
+    assert config.sensors["evt"] == paper.sensors["evt"]
+
+
+def test_a_base_of_a_base_is_followed(tmp_path):
+    first = write(tmp_path, "base: paper\nnoise: {scale_max: 4}\n", "first.yaml")
+    second = write(tmp_path, f"base: {first}\nnoise: {{scale_min: 2}}\n", "second.yaml")
+    noise = load_config(second).noise
+    assert (noise.scale_min, noise.scale_max, noise.adaptation_rate) == (2.0, 4.0, 0.1)
+
+
+def test_bases_in_a_circle_are_refused(tmp_path):
+    one, two = tmp_path / "one.yaml", tmp_path / "two.yaml"
+    one.write_text(f"base: {two}\n")
+    two.write_text(f"base: {one}\n")
+    assert "leads back to itself" in refusal(one)
+
+
+def test_yaml_that_cannot_be_read_names_file_and_line(tmp_path):
+    path = write(tmp_path, "sensors:\n  rgb: {rate_hz: 20\nmotion: 3\n")
+    message = refusal(path)
+    assert f"{path}:" in message
+    assert "YAML" in message
+
+
+@pytest.mark.parametrize("text", ["", "- a\n- b\n", "just text\n", "3\n"])
+def test_a_file_without_keys_is_refused(tmp_path, text):
+    assert "key: value" in refusal(write(tmp_path, text))
+
+
+def test_a_file_that_is_no_text_is_refused(tmp_path):
+    path = tmp_path / "binary.yaml"
+    path.write_bytes(b"\xff\xfe\x00\x81")
+    assert str(path) in refusal(path)
+
+
+@pytest.mark.parametrize("text", ["motion: {jerk_px: 3}\n", "sensors: {}\n", "sensors: [rgb]\n"])
+def test_a_configuration_without_sensors_is_refused(tmp_path, text):
+    assert "sensor" in refusal(write(tmp_path, text))
+
+
+@pytest.mark.parametrize("name", ["", "a|b", "a,b", " a", 'a"b'])
+def test_a_sensor_name_that_would_break_a_table_is_refused(name):
+    with pytest.raises(ConfigError, match="sensors"):
+        Config(sensors={name: SensorConfig()})
+
+
+def test_more_sensors_than_a_row_has_bits_are_refused():
+    with pytest.raises(ConfigError, match="at most 63"):
+        Config(sensors={f"s{k}": SensorConfig() for k in range(64)})
+
+
+def test_sensors_stand_in_alphabetical_order_whatever_the_file_says():
+    assert Config(sensors={"z": SensorConfig(), "a": SensorConfig()}).sensor_names == ("a", "z")
+
+
+def test_a_configuration_is_frozen():
+    config = load_config("default")
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        config.motion = MotionConfig()
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        config.motion.jerk_px = 3.0
+
+
+def test_every_field_has_a_meaning_and_every_number_a_unit_and_bounds():
+    sections = [type(getattr(load_config("default"), f.name)) for f in dataclasses.fields(Config)][1:]
+    for section in [SensorConfig, *sections]:
+        for f in dataclasses.fields(section):
+            assert f.metadata.get("doc"), f"{section.__name__}.{f.name}"
+            if isinstance(f.default, float):
+                assert f.metadata.get("unit"), f"{section.__name__}.{f.name}"
+                assert "low" in f.metadata
+
+
+@given(rate=st.floats(), low=st.floats(), high=st.floats())
+@settings(max_examples=200, deadline=None)
+def test_a_section_is_accepted_exactly_if_each_value_is_within_its_bounds(rate, low, high):
+    good = 0.0 <= rate <= 1.0 and 0.0 < low <= high < float("inf")
+    try:
+        noise = NoiseConfig(adaptation_rate=rate, scale_min=low, scale_max=high)
+    except ConfigError:
+        assert not good
+    else:
+        assert good
+        check(noise, "noise.")
