@@ -38,7 +38,7 @@ def find_duplicates(
     num = boxes.shape[0]
     remove = np.zeros(num, dtype=np.bool_)
     order = np.argsort(boxes[:, 0], kind="mergesort")
-    # In the order of the sweep, so that its inner loop runs through memory and mostly stops at two comparisons.
+    # In the order of the sweep, so that its inner loop runs through memory and mostly stops early.
     left = boxes[order, 0]
     top = boxes[order, 1]
     bottom = top + boxes[order, 3]
