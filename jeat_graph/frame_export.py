@@ -1,4 +1,4 @@
-"""Causal tables at the frame times of formats that count frames (MOTChallenge, KITTI)."""
+"""Tables at the frame times of formats that count frames (MOTChallenge, KITTI)."""
 
 from __future__ import annotations
 
@@ -45,3 +45,42 @@ def causal_at_frames(
     boxes[:, :2] += shift
     mean[:, :2] += shift
     return dataclasses.replace(rows, t=t, boxes=boxes, mean=mean)
+
+
+def smoothed_at_frames(table: Trajectories, instants: FloatArray, rate_hz: float) -> Trajectories:
+    """Interpolate a smoothed table at the frame times, as `eval` does.
+
+    Args:
+        table: a smoothed table.
+        instants: (I,) all times at which the tracker ran, ascending (s).
+        rate_hz: frames per second; frame k is at k / rate_hz.
+
+    Returns:
+        Rows at frame times; existence that of the track's latest row, and no sensors.
+    """
+    from jeat_graph.eval.resampling import interpolate_to
+
+    if not len(instants) or not len(table):
+        return table.take(slice(0, 0))
+    frames = np.arange(np.ceil(instants[0] * rate_hz), np.floor((instants[-1] + 0.5 / rate_hz) * rate_hz) + 1)
+    times = frames / rate_hz
+    at = interpolate_to(table, times)
+    order = np.lexsort((table.t, table.track_id))
+    ids, first = np.unique(table.track_id[order], return_index=True)
+    rank = np.searchsorted(ids, at.track_id)
+    existence = np.empty(len(at.frame))
+    for k, start in enumerate(first):
+        rows = order[start : first[k + 1] if k + 1 < len(first) else None]
+        mine = rank == k
+        latest = np.searchsorted(table.t[rows], times[at.frame[mine]] + _TOLERANCE_S, side="right") - 1
+        existence[mine] = table.existence[rows[np.maximum(latest, 0)]]
+    return Trajectories(
+        t=times[at.frame],
+        track_id=at.track_id,
+        boxes=at.boxes,
+        existence=existence,
+        mean=at.mean,
+        var=at.var,
+        used=np.zeros(len(at.frame), dtype=np.int64),
+        sensors=table.sensors,
+    )

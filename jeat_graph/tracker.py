@@ -155,9 +155,10 @@ class Tracker:
     def smoothed(self) -> Trajectories:
         """Return the smoothed trajectories of the confirmed tracks so far, without what was drained.
 
-        Their whole life: the time before confirmation and gaps included, up to the last detection. With a fixed
-        lag the rows older than that are final; all others may still change. (The call makes the smoothers take in
-        what they had set aside, so that later values may differ in their last digits from a run without it.)
+        Their whole life: the time before confirmation and gaps included, up to the last detection. With a
+        fixed lag the rows older than that are final; all others may still change. (The call makes the
+        smoothers take in what they had set aside, so that later values may differ in their last digits from a run
+        without it.)
 
         Raises:
             JeatGraphError: the configuration asks for no smoother.
@@ -168,8 +169,8 @@ class Tracker:
         """Return the smoothed rows that are final and forget them, in order of time over all calls.
 
         A live caller that keeps a smoother calls this now and then: rows that nobody fetches are kept for
-        `finish`, some 200 bytes each. The engines over whole tracks give a track's rows when it has ended, and
-        all at `finish` if fragments are to be stitched.
+        `finish`, some 200 bytes each. The engines over whole tracks give a track's rows when it has ended,
+        and all at `finish` if fragments are to be stitched.
 
         Raises:
             JeatGraphError: the configuration asks for no smoother.
@@ -188,7 +189,7 @@ class Tracker:
 
     @property
     def smoother_counts(self) -> dict[str, int]:
-        """How the smoothers fared so far: rebuilds, fallbacks, measurements too late, joints; none without one."""
+        """How the smoothers fared: tracks, rebuilds, fallbacks, late measurements, joints; {} without one."""
         names = ("tracks", "rebuilds", "fallbacks", "too_late", "stitched")
         return {name: getattr(self._smoothers, name) for name in names} if self._smoothers else {}
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,9 @@ from jeat_graph.errors import ConfigError
 from jeat_graph.run_directory import RUN_JSON, SCANS, SUFFIXES, RunDirectory, write_scans
 from jeat_graph.tracker import Tracker
 from jeat_graph.version import __version__
+
+# So many steps go by before smoothed rows that have become final are written.
+_STEPS_PER_DRAIN = 256
 
 FRAME_FORMATS = ("motchallenge", "kitti")
 EXTRA_FORMATS = ("parquet", *FRAME_FORMATS)
@@ -68,7 +72,8 @@ def write_run(
 ) -> None:
     """Track a recording and write the files of the run, `run.json` last.
 
-    The causal table is written while it is made: memory does not grow with its length.
+    Both tables are written while they are made: memory does not grow with their length (but for the engines
+    that smooth whole tracks).
 
     Args:
         detections: the recording, checked (`input_checks.check_detections`).
@@ -82,14 +87,17 @@ def write_run(
     """
     instants = _track(detections, config, run, record, options.progress)
     write_scans(detections, run.path(SCANS))
-    _write_formats(run, "causal", instants, _frame_rate(detections, config, options), options.formats)
+    rate_hz = _frame_rate(detections, config, options)
+    _write_formats(run, "causal", instants, rate_hz, options.formats)
+    if config.smoother.engine != "none":
+        _write_formats(run, "smoothed", instants, rate_hz, options.formats)
     _write_record(detections, config, run, record)
 
 
 def _track(
     detections: Detections, config: Config, run: RunDirectory, record: RunRecord, progress: bool
 ) -> FloatArray:
-    """Step through the recording, write `causal.csv` and return the times of the steps (I,)."""
+    """Step through the recording, write `causal.csv`, `smoothed.csv`; return the times of the steps (I,)."""
     from tqdm import tqdm
 
     from jeat_graph.io.trajectories_io import TrajectoryWriter
@@ -98,10 +106,12 @@ def _track(
     instants = np.unique(detections.scan_t)
     step_s = np.zeros(len(instants))
     reported: set[int] = set()
-    rows = 0
+    rows = smoothed_rows = 0
+    smooths = config.smoother.engine != "none"
     begin = time.perf_counter()
     with (
         TrajectoryWriter(run.path("causal.csv")) as writer,
+        TrajectoryWriter(run.path("smoothed.csv")) if smooths else nullcontext() as smoothed,
         tqdm(total=detections.num_scans, desc="track", unit="scan", disable=not progress, leave=False) as bar,
     ):
         for k, batch in enumerate(detections.batches()):
@@ -112,10 +122,21 @@ def _track(
             reported.update(table.track_id.tolist())
             rows += len(table)
             bar.update(len(batch))
+            if smoothed is not None and k % _STEPS_PER_DRAIN == 0:
+                final = tracker.drain_smoothed()
+                smoothed.append(final)
+                smoothed_rows += len(final)
+        if smoothed is not None:
+            final = tracker.finish()
+            smoothed.append(final)
+            smoothed_rows += len(final)
     record.timings["track_s"] = round(time.perf_counter() - begin, 4)
     record.timings["step_median_ms"] = round(1e3 * float(np.median(step_s)), 4)
     record.timings["step_p99_ms"] = round(1e3 * float(np.quantile(step_s, 0.99)), 4)
     record.counts |= {"tracks_born": tracker.num_born, "tracks_reported": len(reported), "causal_rows": rows}
+    if smooths:
+        record.counts["smoothed_rows"] = smoothed_rows
+        record.smoother = {"engine": config.smoother.engine, **tracker.smoother_counts}
     return instants
 
 
@@ -125,7 +146,7 @@ def _write_formats(
     """Write a table, which stands as CSV already, in further formats."""
     if not formats:
         return
-    from jeat_graph.frame_export import causal_at_frames
+    from jeat_graph.frame_export import causal_at_frames, smoothed_at_frames
     from jeat_graph.io.trajectories_io import (
         read_trajectories,
         write_kitti,
@@ -140,7 +161,8 @@ def _write_formats(
             write_trajectories(table, path)
             continue
         write = write_motchallenge if name == "motchallenge" else write_kitti
-        write(causal_at_frames(table, instants, rate_hz), path, rate_hz)
+        at_frames = causal_at_frames if table_name == "causal" else smoothed_at_frames
+        write(at_frames(table, instants, rate_hz), path, rate_hz)
 
 
 def _frame_rate(detections: Detections, config: Config, options: RunOptions) -> float:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 HELP = "track the vehicles in files of detections and write a run directory"
 INPUT_FORMATS = ("csv", "parquet", "motchallenge", "kitti", "prophesee", "coco")
+ENGINES = ("fixed-lag", "full", "rts", "fixed-lag-rts", "none")
 OUTPUT_FORMATS = ("csv", "parquet", "motchallenge", "kitti")
 
 
@@ -36,6 +37,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="KEY=VALUE",
         help="change one setting, say image.width=1920; may be given many times",
+    )
+    add(
+        "--smoother",
+        choices=ENGINES,
+        help="engine of smoothed.csv: fixed-lag (live, with a delay), full (whole tracks, fragments "
+        "stitched), rts (the same, fast), fixed-lag-rts, none; default: as the configuration says",
     )
     add(
         "--format",
@@ -74,7 +81,10 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.warm_up import notice_if_cold
 
     begin = time.perf_counter()
-    config = load_config(args.config, args.overrides)
+    overrides = list(args.overrides)
+    if args.smoother is not None:
+        overrides.append(f"smoother.engine={args.smoother}")
+    config = load_config(args.config, overrides)
     files = [str(split_name(item)[1]) for item in args.detections]
     directory = RunDirectory(args.out, inputs=files)
     options = RunOptions(
@@ -82,15 +92,20 @@ def run(args: argparse.Namespace) -> int:
         frame_rate_hz=args.frame_rate if args.frame_rate is not None else args.rate,
         progress=sys.stderr.isatty(),
     )
-    detections = read_many(
-        args.detections,
-        rate_hz=args.rate,
-        fmt=args.input_format,
-        score_scale=args.score_scale,
-        images=args.images,
-    )
+    reading = {
+        "rate_hz": args.rate,
+        "fmt": args.input_format,
+        "score_scale": args.score_scale,
+        "images": args.images,
+    }
+    detections = read_many(args.detections, **reading)
     record = RunRecord(
-        source={"config_name": args.config, "overrides": args.overrides, "inputs": describe_inputs(files)},
+        source={
+            "config_name": args.config,
+            "overrides": overrides,
+            "inputs": describe_inputs(files),
+            "reading": {"detections": [str(item) for item in args.detections], **reading},
+        },
         warnings=check_detections(detections, config, " + ".join(files)),
     )
     for warning in record.warnings:

@@ -57,7 +57,6 @@ class TrackHistory:
         confirmed: whether the track has ever been confirmed.
         measurements: measurements (M, 1 + WIDTH) that wait, or all of them if `keep`, in pieces; the first
             row of the first piece is the birth.
-        looks: steps of its life that have no row yet.
         smoother: the smoother, once there is one.
     """
 
@@ -65,7 +64,7 @@ class TrackHistory:
         self.track_id = track_id
         self.confirmed = False
         self.measurements: list[FloatArray] = []
-        self.looks = Looks.empty()
+        self._looks: list[Looks] = []
         self.smoother: TrackSmoother | None = None
         self._config = config
         self._keep = keep
@@ -73,6 +72,18 @@ class TrackHistory:
         self._fed = 0  # pieces of `measurements` that the smoother has had
         self._tail = SmoothedTrack.empty()  # the last state handed out: rows may lie between it and the next
         self._last = -np.inf  # time of the last measurement
+
+    @property
+    def looks(self) -> Looks:
+        """Steps of its life that have no row yet."""
+        if len(self._looks) != 1:
+            self._looks = [Looks.concatenate(self._looks)]
+        return self._looks[0]
+
+    @property
+    def oldest(self) -> float:
+        """Time of the first step without a row (s), or infinity."""
+        return next((float(looks.t[0]) for looks in self._looks if len(looks)), np.inf)
 
     def take(self, rows: FloatArray) -> None:
         """Add measurements (M, 1 + WIDTH) in order of time."""
@@ -82,7 +93,7 @@ class TrackHistory:
     def watch(self, looks: Looks, confirmed: bool) -> None:
         """Add steps that the track has lived through, and whether it was confirmed in one of them."""
         if len(looks):
-            self.looks = Looks.concatenate([self.looks, looks]) if len(self.looks) else looks
+            self._looks.append(looks)
         self.confirmed = self.confirmed or confirmed
 
     def feed(self) -> None:
@@ -124,11 +135,13 @@ class TrackHistory:
         rows = self._rows(piece, end)
         self._sizes.advance(end)
         self._tail = piece.select(slice(-1, None))
-        self.looks = self.looks.take(slice(int(np.searchsorted(self.looks.t, end, side="right")), None))
+        looks = self.looks
+        self._looks = [looks.take(slice(int(np.searchsorted(looks.t, end, side="right")), None))]
         return rows
 
     def current(self) -> Trajectories | None:
-        """Return the rows that are not final yet, given all measurements so far; None for a tentative track."""
+        """Return the rows that are not final yet, by all measurements so far; None for a tentative track."""
+        self.feed()
         if self.smoother is None:
             return None
         return self._rows(self.smoother.current(), np.inf)
@@ -153,12 +166,11 @@ class TrackHistory:
         """Rows of the steps up to time `end` (s); after the last measurement only where the track is held."""
         assert self._sizes is not None
         path = SmoothedTrack.concatenate([self._tail, piece]) if len(self._tail) else piece
-        chosen = (self.looks.t <= end) & ((self.looks.t <= self._last + COINCIDENT_S) | self.looks.held)
+        looks = self.looks
+        chosen = (looks.t <= end) & ((looks.t <= self._last + COINCIDENT_S) | looks.held)
         # Of two steps at one time the later one counts.
-        chosen &= np.diff(self.looks.t, append=np.inf) > 0.0
+        chosen &= np.diff(looks.t, append=np.inf) > 0.0
         if not len(path) or not chosen.any():
             return None
-        existence = self.looks.hindsight()[chosen]
-        return rows_of(
-            self.track_id, path, self._sizes.smooth(), self.looks.take(chosen), existence, self._config
-        )
+        existence = looks.hindsight()[chosen]
+        return rows_of(self.track_id, path, self._sizes.smooth(), looks.take(chosen), existence, self._config)

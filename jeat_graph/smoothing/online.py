@@ -22,10 +22,9 @@ WHOLE = ("full", "rts")
 class TrackSmoothers:
     """Takes down each step of a tracker, and turns it into smoothed trajectories behind it.
 
-    Steps are gathered and handed to the smoothers in bulk. Tentative tracks only have their measurements kept;
-    confirmed ones have a smoother, which takes the tentative start first. A track that ends frees all it held.
-    Of merged tracks the survivor keeps its own measurements only: the other's are of the same vehicle's boxes,
-    mostly seen twice by detectors whose errors are then the same.
+    Steps are gathered and handed to the smoothers in bulk. Of tentative tracks the measurements are only
+    kept; confirmed ones have a smoother, which takes the tentative start first. A track that ends frees all it
+    held. Of merged tracks the survivor keeps its own measurements only.
 
     The filter measures the velocity of standing tracks as zero; the smoothers do not. What they share is the
     lower jerk of a standing track.
@@ -49,7 +48,8 @@ class TrackSmoothers:
         self.rebuilds = self.fallbacks = self.too_late = self.stitched = self.tracks = 0
         self._config = config
         settings = config.smoother
-        self._stitch = settings.stitch and settings.engine in WHOLE
+        self._whole = settings.engine in WHOLE
+        self._stitch = settings.stitch and self._whole
         self._steps_per_flush = max(settings.chunk, 1)
         self._rate_hz = settings.output_rate_hz
         self._bin = -np.inf
@@ -110,7 +110,7 @@ class TrackSmoothers:
         return wanted
 
     def flush(self) -> None:
-        """Hand what was taken down to the tracks, end those that are over, and collect rows that are final."""
+        """Hand what was taken down to the tracks, end those that are over, collect final rows."""
         for track_id, looks, confirmed in self._split_looks():
             history = self._histories.get(track_id)
             if history is None:
@@ -126,16 +126,15 @@ class TrackSmoothers:
             else:
                 self._end(history)
         self._ended = []
-        for history in self._histories.values():
-            history.feed()
-            self._collect(history.departed())
+        if not self._whole:
+            for history in self._histories.values():
+                history.feed()
+                self._collect(history.departed())
 
     def drain(self) -> Trajectories:
-        """Return the final rows that no later ones can precede, in order of time and identity, and forget them."""
+        """Return, and forget, the final rows that no later ones can precede, by time and identity."""
         self.flush()
-        waiting = [float(h.looks.t[0]) for h in self._histories.values() if len(h.looks)]
-        waiting += [float(h.looks.t[0]) for h in self._done if len(h.looks)]
-        horizon = min(waiting, default=np.inf)
+        horizon = min((h.oldest for h in (*self._histories.values(), *self._done)), default=np.inf)
         table = self._gathered([])
         early = table.t < horizon
         self._ready = [table.take(~early)] if not early.all() else []

@@ -23,9 +23,9 @@ def rows_of(
 ) -> Trajectories:
     """Make the rows of one track, one at each of `looks`.
 
-    Between its states the track follows the motion model's own interpolation; after the last one it is held in
-    place (only standing tracks have rows there). Boxes are clipped to the picture, and rows with too little of
-    the box inside it left out, just as in the causal table.
+    Between its states the track follows the motion model's own interpolation; after the last one it is held
+    in place (only standing tracks have rows there). Boxes are clipped to the picture, and rows with too
+    little of the box inside it left out, just as in the causal table.
 
     Args:
         track_id: identity.
