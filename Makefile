@@ -12,7 +12,7 @@ PYTHON ?= $(firstword $(foreach name,$(PYTHONS),$(shell $(name) -c \
 	'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $(name))))
 VENV := .venv
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
 SOURCES := $(shell find jeat_graph filters association smoothers -name '*.py')
 
 .PHONY: demo test lint types build clean
@@ -77,5 +77,5 @@ build/.wheel: $(SOURCES) $(shell find eval configs -name '*.py' -o -name '*.yaml
 build/.installed: build/.wheel
 	@echo "make: installing the wheel into build/venv"
 	@$(PYTHON) -m venv --clear build/venv
-	@build/venv/bin/python -m pip install --quiet --disable-pip-version-check "$$(ls dist/*.whl)[lint]"
+	@build/venv/bin/python -m pip install -qq --disable-pip-version-check "$$(ls dist/*.whl)[lint]"
 	@touch $@
