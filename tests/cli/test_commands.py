@@ -1,0 +1,93 @@
+"""Every command, as a user runs it: help, exit codes, one line for an error, pipes."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from jeat_graph.cli.main import COMMANDS, main
+
+from .conftest import as_user
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_each_command_explains_itself(command, capsys):
+    with pytest.raises(SystemExit) as end:
+        main([command, "--help"])
+    assert end.value.code == 0
+    assert f"usage: jeat-graph {command}" in capsys.readouterr().out
+
+
+def test_the_overview_lists_every_command(capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["--help"])
+    assert end.value.code == 0
+    out = capsys.readouterr().out
+    assert all(command in out for command in COMMANDS)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["track", "nothing.csv", "--out", "run"],
+        ["track", "rgb=nothing.csv", "--out", "run"],
+        ["simulate", "dawn", "--out", "run"],
+        ["simulate", "night", "--out", "run", "--duration", "-1"],
+        ["eval", "nothing", "--gt", "nothing.csv"],
+        ["demo", "--scenario", "dawn", "--out", "run"],
+        ["demo", "--config", "nothing.yaml", "--out", "run"],
+    ],
+)
+def test_bad_input_is_one_line_and_writes_nothing(arguments, fails, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert fails(*arguments).startswith(f"jeat-graph {arguments[0]}: ")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "arguments", [[], ["trak"], ["track"], ["track", "x.csv", "--out", "y", "--rate", "0"]]
+)
+def test_wrong_usage_exits_with_2(arguments, capsys):
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    assert end.value.code == 2
+    assert "usage" in capsys.readouterr().err
+
+
+def test_a_process_shows_no_progress_bar_and_no_traceback_in_a_pipe(recording, tmp_path):
+    good = as_user("track", recording / "detections.csv", "--out", tmp_path / "run")
+    assert good.returncode == 0
+    assert good.stdout.endswith(f"wrote {tmp_path / 'run'}\n")
+    assert "%|" not in good.stderr
+    bad = as_user("track", tmp_path / "missing.csv", "--out", tmp_path / "other")
+    assert bad.returncode == 2
+    assert bad.stderr.count("\n") == 1
+    assert bad.stderr.endswith("missing.csv: no such file\n")
+
+
+def test_a_reader_that_leaves_early_is_no_error(recording, tmp_path):
+    as_user("track", recording / "detections.csv", "--out", tmp_path / "run")
+    command = [
+        sys.executable,
+        "-m",
+        "jeat_graph.cli.main",
+        "eval",
+        tmp_path / "run",
+        "--gt",
+        recording / "gt.csv",
+    ]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        assert process.stderr.read() == ""
+        assert process.wait() == 0
+
+
+def test_importing_the_package_is_light():
+    heavy = "{'numba', 'gtsam', 'matplotlib', 'pyarrow'}"
+    code = f"import sys, jeat_graph; print(sorted({heavy} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
