@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from jeat_graph.arrays import FloatArray
     from jeat_graph.config import Config
     from jeat_graph.detections import Detections
+    from jeat_graph.eval.metrics import Scores
     from jeat_graph.eval.tables import Table
     from jeat_graph.sehn.simulate import Recording
     from jeat_graph.trajectories import Trajectories
@@ -61,14 +62,14 @@ def run(args: argparse.Namespace) -> int:
         write_run(recording.detections, config, directory, details, RunOptions(progress=sys.stderr.isatty()))
     table = read_trajectories(out / "run" / "causal.csv")
     _say("tracking with each sensor alone, and judging")
-    scores = _compare(recording, config, table)
+    scores = _compare(recording, config, table, out / "run" / "smoothed.csv")
     _write_text(scores.render("markdown"), out / "scores.md")
     _say("drawing")
     pictures = _draw(recording, table, out / "tracks", args.scenario)
 
     print(scores.render())
     print(f"picture   {pictures[0]} (and {pictures[1].name})")
-    print(f"tracks    {out / 'run' / 'causal.csv'}")
+    print(f"tracks    {out / 'run'}: causal.csv and smoothed.csv")
     print(f"input     {source}, truth {out / 'gt.csv'}")
     print()
     print(
@@ -78,28 +79,31 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _compare(recording: Recording, config: Config, both: Trajectories) -> Table:
+def _compare(recording: Recording, config: Config, causal: Trajectories, smoothed: Path) -> Table:
     """Scores of all sensors together (tracked already) and of each alone, at the truth's times."""
+    from jeat_graph.eval.metrics import evaluate
     from jeat_graph.eval.tables import Cell, Table
+    from jeat_graph.io.trajectories_io import read_trajectories
     from jeat_graph.tracker import track
 
-    detections = recording.detections
-    records: list[dict[str, Cell]] = [_scores(" + ".join(detections.sensors), recording, detections, both)]
+    detections, truth = recording.detections, recording.truth
+    names = " + ".join(detections.sensors)
+    rows = {names: _causal_scores(recording, detections, causal)}
+    if smoothed.is_file():
+        rows[f"{names}, smoothed"] = evaluate([(truth, read_trajectories(smoothed))], kind="smoothed")
     for name in detections.sensors:
         alone = detections.select([name])
-        records.append(_scores(f"{name} alone", recording, alone, track(config, alone)))
+        rows[f"{name} alone"] = _causal_scores(recording, alone, track(config, alone))
+    records: list[dict[str, Cell]] = [{"sensors": name, **one.as_dict()} for name, one in rows.items()]
     return Table.from_records(records, COLUMNS)
 
 
-def _scores(
-    name: str, recording: Recording, detections: Detections, table: Trajectories
-) -> dict[str, str | float | int | None]:
+def _causal_scores(recording: Recording, detections: Detections, table: Trajectories) -> Scores:
     import numpy as np
 
     from jeat_graph.eval.metrics import evaluate
 
-    scores = evaluate([(recording.truth, table)], instants=[np.unique(detections.scan_t)])
-    return {"sensors": name, **scores.as_dict()}
+    return evaluate([(recording.truth, table)], instants=[np.unique(detections.scan_t)])
 
 
 def _draw(recording: Recording, table: Trajectories, stem: Path, scenario: str) -> list[Path]:
