@@ -148,7 +148,7 @@ def current_p_detect(
                 seen = motion_visibility(tracks.mean[i], sensors.blind_speed[s])
                 # A small rest remains: what should be invisible is still taken if it is detected.
                 visible = inside * seen * (1.0 - tracks.hidden[i, s])
-                out[i, s] = tracks.p_detect[i, s] * max(visible, 1e-3)
+                out[i, s] = tracks.p_detect[i, s] * max(visible, 1e-5)
     return out
 
 
