@@ -19,6 +19,7 @@ from jeat_graph.association.joint import (
     associate_slots,
 )
 from jeat_graph.association.merging import find_duplicates
+from jeat_graph.compaction import keep_rows
 from jeat_graph.filters.aekf import predict, predict_size, update, update_block
 from jeat_graph.filters.noise import adapt_scale, base_variance
 from jeat_graph.filters.standing import (
@@ -249,7 +250,7 @@ def size_variances(tracks: TrackArrays, n: int) -> FloatArray:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def judge_standing(
     tracks: TrackArrays, i: int, t: float, z: FloatArray, R: FloatArray, settings: Settings
 ) -> None:
@@ -271,7 +272,7 @@ def judge_standing(
     update_anchor(tracks.anchor[i], tracks.anchor_var[i], z, R)
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def take(
     tracks: TrackArrays,
     i: int,
@@ -519,6 +520,7 @@ def remove_ended(tracks: TrackArrays, n: int, t: float, settings: Settings) -> i
             settings.merge_min_overlap,
             settings.merge_velocity_gate,
         )
+    rows = np.empty(n, dtype=np.int64)
     kept = 0
     for i in range(n):
         gap = t - tracks.t_update[i]
@@ -532,34 +534,10 @@ def remove_ended(tracks: TrackArrays, n: int, t: float, settings: Settings) -> i
         broken = not (math.isfinite(x) and math.isfinite(y))
         if remove[i] or gap > most or doubted or broken or (settings.leave_picture and outside):
             continue
-        if kept < i:
-            move(tracks, i, kept)
+        rows[kept] = i
         kept += 1
+    keep_rows(tracks, rows[:kept])
     return kept
-
-
-@njit(cache=True)
-def move(tracks: TrackArrays, source: int, target: int) -> None:
-    """Copy row `source` of all arrays to row `target`."""
-    tracks.mean[target] = tracks.mean[source]
-    tracks.cov[target] = tracks.cov[source]
-    tracks.anchor[target] = tracks.anchor[source]
-    tracks.anchor_var[target] = tracks.anchor_var[source]
-    tracks.anchor_t[target] = tracks.anchor_t[source]
-    tracks.still_odds[target] = tracks.still_odds[source]
-    tracks.standing[target] = tracks.standing[source]
-    tracks.size_mean[target] = tracks.size_mean[source]
-    tracks.size_cov[target] = tracks.size_cov[source]
-    tracks.scale[target] = tracks.scale[source]
-    tracks.hidden[target] = tracks.hidden[source]
-    tracks.p_detect[target] = tracks.p_detect[source]
-    tracks.existence[target] = tracks.existence[source]
-    tracks.confirmed[target] = tracks.confirmed[source]
-    tracks.track_id[target] = tracks.track_id[source]
-    tracks.hits[target] = tracks.hits[source]
-    tracks.t_birth[target] = tracks.t_birth[source]
-    tracks.t_update[target] = tracks.t_update[source]
-    tracks.used[target] = tracks.used[source]
 
 
 @njit(cache=True)
