@@ -292,7 +292,7 @@ class SmootherConfig:
     )
     stitch_max_gap_s: float = number(3.0, "s", "longest time between two fragments of one vehicle")
     stitch_gate_probability: float = number(
-        0.99, "1", "probability mass of the χ² gate within which two fragments agree", 0.5, 1.0 - 1e-12
+        0.9999, "1", "probability mass of the χ² gate within which two fragments agree", 0.5, 1.0 - 1e-12
     )
 
 

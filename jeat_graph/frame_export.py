@@ -28,7 +28,7 @@ def causal_at_frames(
         Rows at frame times, boxes moved by `v Δ + a Δ²/2`, variances those of the row predicted from.
     """
     if not len(instants):
-        return table.take(slice(0, 0))
+        return table.take(np.zeros(0, dtype=np.int64))
     frames = np.arange(np.ceil(instants[0] * rate_hz), np.floor((instants[-1] + 0.5 / rate_hz) * rate_hz) + 1)
     times = frames / rate_hz
     latest = np.searchsorted(instants, times + _TOLERANCE_S, side="right") - 1
@@ -61,7 +61,7 @@ def smoothed_at_frames(table: Trajectories, instants: FloatArray, rate_hz: float
     from jeat_graph.eval.resampling import interpolate_to
 
     if not len(instants) or not len(table):
-        return table.take(slice(0, 0))
+        return table.take(np.zeros(0, dtype=np.int64))
     frames = np.arange(np.ceil(instants[0] * rate_hz), np.floor((instants[-1] + 0.5 / rate_hz) * rate_hz) + 1)
     times = frames / rate_hz
     at = interpolate_to(table, times)

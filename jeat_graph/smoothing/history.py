@@ -7,7 +7,7 @@ import numpy as np
 from jeat_graph.arrays import FloatArray
 from jeat_graph.config import Config
 from jeat_graph.smoothers.engine import TrackSmoother, make_smoother
-from jeat_graph.smoothers.track_data import COINCIDENT_S, SmoothedTrack
+from jeat_graph.smoothers.track_data import COINCIDENT_S, SmoothedTrack, TrackData
 from jeat_graph.smoothing.looks import Looks
 from jeat_graph.smoothing.rows import rows_of
 from jeat_graph.smoothing.sizes import SizeWindow
@@ -20,6 +20,9 @@ COLUMN = {name: 1 + k for k, name in enumerate(COLUMNS)} | {"t": 0}
 _Z, _R = slice(COLUMN["z_x"], COLUMN["z_y"] + 1), slice(COLUMN["R_x"], COLUMN["R_y"] + 1)
 _SIZE = slice(COLUMN["log_width"], COLUMN["log_height"] + 1)
 _SIZE_VAR = slice(COLUMN["var_log_width"], COLUMN["var_log_height"] + 1)
+
+# A configuration may ask for no jerk at all; the smoothers want process noise that can be inverted.
+_LEAST_JERK = 1e-6
 
 
 def prior_of(birth: FloatArray) -> tuple[float, FloatArray, FloatArray]:
@@ -39,6 +42,12 @@ def size_prior_of(birth: FloatArray) -> tuple[float, FloatArray, FloatArray]:
     cov[:, 0, 0] = birth[_SIZE_VAR]
     cov[:, 1, 1] = birth[COLUMN["var_rate"]]
     return float(birth[0]), mean, cov
+
+
+def track_data(rows: FloatArray) -> TrackData:
+    """Prior and measurements of a whole track from its rows (M, 1 + WIDTH), the birth first."""
+    jerk = np.maximum(rows[1:, COLUMN["jerk"]], _LEAST_JERK)
+    return TrackData.from_measurements(*prior_of(rows[0]), rows[1:, 0], rows[1:, _Z], rows[1:, _R], jerk)
 
 
 class TrackHistory:
@@ -118,8 +127,7 @@ class TrackHistory:
         else:
             self.measurements = []
         if len(rows):
-            # A jerk of zero (a configuration may ask for it) would leave nothing to smooth.
-            jerk = np.maximum(rows[:, COLUMN["jerk"]], 1e-6)
+            jerk = np.maximum(rows[:, COLUMN["jerk"]], _LEAST_JERK)
             self.smoother.feed(rows[:, 0], rows[:, _Z], rows[:, _R], jerk)
             self._sizes.append(rows[:, 0], rows[:, _SIZE], rows[:, _SIZE_VAR])
 
@@ -139,12 +147,14 @@ class TrackHistory:
         self._looks = [looks.take(slice(int(np.searchsorted(looks.t, end, side="right")), None))]
         return rows
 
-    def current(self) -> Trajectories | None:
-        """Return the rows that are not final yet, by all measurements so far; None for a tentative track."""
+    def current(self) -> tuple[Trajectories | None, Trajectories | None]:
+        """Take in all that waits; return the rows that are final then, as `departed`, and all others."""
         self.feed()
         if self.smoother is None:
-            return None
-        return self._rows(self.smoother.current(), np.inf)
+            return None, None
+        piece = self.smoother.current()
+        final = self.departed()
+        return final, self._rows(piece, np.inf)
 
     def finish(self) -> Trajectories | None:
         """Return all rows not returned yet, and free the smoother; None for a tentative track."""

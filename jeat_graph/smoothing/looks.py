@@ -41,6 +41,12 @@ class Looks:
         return Looks(none, none, np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.bool_))
 
     @staticmethod
+    def unseen(t: FloatArray) -> Looks:
+        """Return looks at times `t` (K,) between two fragments of one vehicle."""
+        count = len(t)
+        return Looks(t, np.zeros(count), np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.bool_))
+
+    @staticmethod
     def concatenate(parts: Sequence[Looks]) -> Looks:
         """Join consecutive stretches."""
         if len(parts) == 1:

@@ -23,8 +23,8 @@ class TrackSmoothers:
     """Takes down each step of a tracker, and turns it into smoothed trajectories behind it.
 
     Steps are gathered and handed to the smoothers in bulk. Of tentative tracks the measurements are only
-    kept; confirmed ones have a smoother, which takes the tentative start first. A track that ends frees all it
-    held. Of merged tracks the survivor keeps its own measurements only.
+    kept; confirmed ones have a smoother, which takes the tentative start first. A track that ends frees all
+    it held. Of merged tracks the survivor keeps its own measurements only.
 
     The filter measures the velocity of standing tracks as zero; the smoothers do not. What they share is the
     lower jerk of a standing track.
@@ -143,8 +143,13 @@ class TrackSmoothers:
     def smoothed(self) -> Trajectories:
         """Return all rows not drained yet: final ones and, of living tracks, those that may still change."""
         self.flush()
-        now = [h.current() for h in (*self._histories.values(), *self._done) if h.confirmed]
-        return self._gathered([rows for rows in now if rows is not None])
+        now = []
+        for history in (*self._histories.values(), *self._done):
+            if history.confirmed:
+                final, rows = history.current()
+                self._collect(final)
+                now += [rows] if rows is not None else []
+        return self._gathered(now)
 
     def finish(self) -> Trajectories:
         """End all tracks, stitch fragments if that is wanted, and return all rows not drained yet."""
@@ -152,9 +157,8 @@ class TrackSmoothers:
         self._done.extend(self._histories.values())
         self._histories = {}
         histories, self._done = sorted(self._done, key=lambda h: h.track_id), []
-        for history in histories:
-            history.feed()
         if self._stitch:
+            histories = [history for history in histories if history.confirmed]
             histories, joints = stitch_histories(histories, np.asarray(self._scan_t), self._config)
             self.stitched += joints
         for history in histories:
@@ -228,6 +232,8 @@ class TrackSmoothers:
 
 def _groups(owner: IntArray) -> Iterator[tuple[int, slice]]:
     """Runs of equal values in an ascending array (N,), with the value of each."""
+    if not len(owner):
+        return
     start = np.flatnonzero(np.diff(owner, prepend=-1))
     end = np.append(start[1:], len(owner))
     for a, b in zip(start.tolist(), end.tolist(), strict=True):

@@ -4,12 +4,122 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from jeat_graph.arrays import FloatArray
 from jeat_graph.config import Config
-from jeat_graph.smoothing.history import TrackHistory
+from jeat_graph.smoothers.rts import smooth_rts_batch
+from jeat_graph.smoothers.size import SmoothedSize
+from jeat_graph.smoothers.stitching import FREEDOM, FragmentEnds, link
+from jeat_graph.smoothers.track_data import SmoothedTrack
+from jeat_graph.smoothing.history import COLUMN, TrackHistory, size_prior_of, track_data
+from jeat_graph.smoothing.looks import Looks
+from jeat_graph.smoothing.sizes import SizeWindow
 
 
 def stitch_histories(
     histories: Sequence[TrackHistory], scan_t: FloatArray, config: Config
 ) -> tuple[list[TrackHistory], int]:
-    return list(histories), 0
+    """Join histories that are most likely of one vehicle; the earliest identity names the whole.
+
+    Args:
+        histories: confirmed tracks with all their measurements, nothing smoothed or handed out yet.
+        scan_t: (K,) times of all steps that the table has rows at (s), ascending.
+        config: the motion model and the limits of stitching.
+
+    Returns:
+        The histories after joining, in order of identity, and the number of joints.
+    """
+    from scipy.stats import chi2
+
+    if len(histories) < 2:
+        return list(histories), 0
+    before = link(
+        fragment_ends(histories, config),
+        max_gap_s=config.smoother.stitch_max_gap_s,
+        gate=float(chi2.ppf(config.smoother.stitch_gate_probability, FREEDOM)),
+        size_density=config.size.rate_density,
+    )
+    after = {int(a): b for b, a in enumerate(before.tolist()) if a >= 0}
+    joined = []
+    for head in np.flatnonzero(before < 0).tolist():
+        chain = [head]
+        while chain[-1] in after:
+            chain.append(after[chain[-1]])
+        parts = [histories[i] for i in chain]
+        joined.append(parts[0] if len(parts) == 1 else _join(parts, scan_t, config))
+    return sorted(joined, key=lambda h: h.track_id), len(after)
+
+
+def fragment_ends(histories: Sequence[TrackHistory], config: Config) -> FragmentEnds:
+    """Smooth each history by itself and return its first and last state."""
+    wholes = [history.whole() for history in histories]
+    paths = smooth_rts_batch([track_data(rows) for rows in wholes])
+    sizes = [_smooth_sizes(rows, config.size.rate_density) for rows in wholes]
+    start_mean = np.stack([path.mean[0] for path in paths])
+    start_size = np.stack([size.mean[0, :, 0] for size in sizes])
+    return FragmentEnds(
+        start_t=np.array([path.t[0] for path in paths]),
+        start_mean=start_mean,
+        start_cov=np.stack([path.cov[0] for path in paths]),
+        start_size=start_size,
+        start_size_var=np.stack([size.cov[0, :, 0, 0] for size in sizes]),
+        end_t=np.array([path.t[-1] for path in paths]),
+        end_mean=np.stack([path.mean[-1] for path in paths]),
+        end_cov=np.stack([path.cov[-1] for path in paths]),
+        end_size=np.stack([size.mean[-1] for size in sizes]),
+        end_size_cov=np.stack([size.cov[-1] for size in sizes]),
+        jerk=np.array([_typical_jerk(path) for path in paths]),
+        birth_log_density=_birth_log_density(wholes, start_mean, config),
+    )
+
+
+def _typical_jerk(path: SmoothedTrack) -> float:
+    """Root spectral density of the jerk while the track is not seen: that of its last steps."""
+    return float(np.median(path.q[1:][-20:])) if len(path) > 1 else 1.0
+
+
+def _smooth_sizes(rows: FloatArray, density: float) -> SmoothedSize:
+    window = SizeWindow(*size_prior_of(rows[0]), density)
+    window.append(
+        rows[1:, 0],
+        rows[1:, COLUMN["log_width"] : COLUMN["log_height"] + 1],
+        rows[1:, COLUMN["var_log_width"] : COLUMN["var_log_height"] + 1],
+    )
+    return window.smooth()
+
+
+def _birth_log_density(wholes: Sequence[FloatArray], mean: FloatArray, config: Config) -> FloatArray:
+    """Density (N,) with which a new vehicle appears in the states `mean` (N, 2, 3).
+
+    Anywhere in the picture and of any size, with the prior of a new track's velocity and acceleration.
+    """
+    births = np.stack([rows[0] for rows in wholes])
+    volume = config.image.width * config.image.height * config.association.log_size_range**2
+    out = np.full(len(wholes), -np.log(volume))
+    for axis, name in enumerate("xy"):
+        for order, quantity in ((1, "v"), (2, "a")):
+            var = births[:, COLUMN[f"var_{quantity}_{name}"]]
+            out -= 0.5 * (mean[:, axis, order] ** 2 / var + np.log(2.0 * np.pi * var))
+    return out
+
+
+def _join(parts: Sequence[TrackHistory], scan_t: FloatArray, config: Config) -> TrackHistory:
+    """One history of several in order of time, with rows at all steps in between."""
+    whole = TrackHistory(parts[0].track_id, config, keep=True)
+    looks: list[Looks] = []
+    for k, part in enumerate(parts):
+        for rows in part.measurements:
+            whole.take(rows)
+        mine = part.looks
+        if k + 1 < len(parts):
+            # The earlier fragment may still have coasted when the later one was born.
+            start = parts[k + 1].looks.t[0]
+            mine = mine.take(mine.t < start)
+            low = int(np.searchsorted(scan_t, mine.t[-1], side="right"))
+            high = int(np.searchsorted(scan_t, start, side="left"))
+            looks += [mine, Looks.unseen(scan_t[low:high])]
+        else:
+            looks.append(mine)
+    whole.watch(Looks.concatenate(looks), True)
+    return whole

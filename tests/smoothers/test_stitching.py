@@ -1,0 +1,116 @@
+"""Linking of fragments by their smoothed ends, against direct evaluation and exhaustive search."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from jeat_graph.smoothers.stitching import FragmentEnds, candidate_pairs, link, pair_scores
+
+from .conftest import noise, transition
+
+DENSITY = 0.5
+
+
+def fragments(starts, ends, rng, spread=20.0):
+    """Fragments with random states; `starts` and `ends` are their times (N,)."""
+    n = len(starts)
+
+    def cov(size):
+        root = rng.normal(size=(n, 2, size, size))
+        return root @ root.swapaxes(-1, -2) + np.eye(size)
+
+    def state():
+        return rng.normal(0.0, spread, (n, 2, 3)) * np.array([1.0, 0.3, 0.1])
+
+    return FragmentEnds(
+        start_t=np.asarray(starts, dtype=float),
+        start_mean=state(),
+        start_cov=cov(3),
+        start_size=rng.normal(4.0, 0.1, (n, 2)),
+        start_size_var=rng.uniform(0.01, 0.1, (n, 2)),
+        end_t=np.asarray(ends, dtype=float),
+        end_mean=state(),
+        end_cov=cov(3),
+        end_size=np.stack([rng.normal(4.0, 0.1, (n, 2)), rng.normal(0.0, 0.1, (n, 2))], axis=2),
+        end_size_cov=0.1 * cov(2),
+        jerk=rng.uniform(5.0, 20.0, n),
+        birth_log_density=np.full(n, -30.0),
+    )
+
+
+def test_pairs_follow_each_other_within_the_limit():
+    ends = fragments([0.0, 2.0, 5.0, 2.9], [1.0, 3.0, 6.0, 3.5], np.random.default_rng(0))
+    first, second = candidate_pairs(ends, 2.5)
+    assert set(zip(first.tolist(), second.tolist(), strict=True)) == {(0, 1), (0, 3), (1, 2), (3, 2)}
+
+
+def test_scores_are_the_densities_of_the_motion_model():
+    ends = fragments([0.0, 1.7], [1.0, 3.0], np.random.default_rng(1))
+    d2, ratio = pair_scores(ends, np.array([0]), np.array([1]), DENSITY)
+    F, Q, dt = transition(0.7), noise(0.7, ends.jerk[0]), 0.7
+    expected, distance = 30.0, 0.0
+    for axis in range(2):
+        S = F @ ends.end_cov[0, axis] @ F.T + Q + ends.start_cov[1, axis]
+        error = ends.start_mean[1, axis] - F @ ends.end_mean[0, axis]
+        expected += multivariate_normal(np.zeros(3), S).logpdf(error)
+        distance += error @ np.linalg.inv(S) @ error
+        P = ends.end_size_cov[0, axis]
+        var = (
+            P[0, 0]
+            + 2 * dt * P[0, 1]
+            + dt**2 * P[1, 1]
+            + DENSITY**2 * dt**3 / 3
+            + ends.start_size_var[1, axis]
+        )
+        error = ends.start_size[1, axis] - ends.end_size[0, axis] @ [1.0, dt]
+        expected += multivariate_normal(0.0, var).logpdf(error)
+        distance += error**2 / var
+    assert ratio[0] == pytest.approx(expected, rel=1e-9)
+    assert d2[0] == pytest.approx(distance, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_choice_is_the_best_of_all(seed):
+    rng = np.random.default_rng(seed)
+    starts = rng.uniform(0.0, 4.0, 6)
+    ends = fragments(starts, starts + 0.3, rng)
+    before = link(ends, max_gap_s=3.0, gate=60.0, size_density=DENSITY)
+
+    first, second = candidate_pairs(ends, 3.0)
+    d2, ratio = pair_scores(ends, first, second, DENSITY)
+    worth = {
+        (a, b): r
+        for a, b, d, r in zip(first.tolist(), second.tolist(), d2, ratio, strict=True)
+        if d <= 60.0 and r > 0
+    }
+    best = 0.0
+    for count in range(len(worth) + 1):
+        for chosen in itertools.combinations(worth, count):
+            heads, tails = {a for a, _ in chosen}, {b for _, b in chosen}
+            if len(heads) == len(tails) == count:
+                best = max(best, sum(worth[pair] for pair in chosen))
+        if count >= 5:
+            break
+    total = sum(worth[int(a), b] for b, a in enumerate(before) if a >= 0)
+    assert total == pytest.approx(best)
+
+
+def test_a_fragment_is_continued_once_and_continues_one():
+    ends = fragments([0.0, 2.0, 2.1], [1.0, 3.0, 3.1], np.random.default_rng(2), spread=1.0)
+    before = link(ends, max_gap_s=3.0, gate=1e9, size_density=DENSITY)
+    taken = before[before >= 0]
+    assert len(taken) == len(set(taken.tolist())) == 1
+
+
+def test_nothing_is_joined_beyond_the_gate():
+    ends = fragments([0.0, 1.5], [1.0, 3.0], np.random.default_rng(3))
+    assert link(ends, max_gap_s=3.0, gate=1e-6, size_density=DENSITY).tolist() == [-1, -1]
+
+
+def test_no_fragments_no_links():
+    ends = fragments([], [], np.random.default_rng(4))
+    assert len(link(ends, max_gap_s=3.0, gate=20.0, size_density=DENSITY)) == 0
