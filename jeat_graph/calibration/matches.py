@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from jeat_graph.detections import Detections
 from jeat_graph.errors import DataError
 from jeat_graph.eval.frames import IGNORE_COVERED, match
 from jeat_graph.eval.overlap import pairwise_covered, pairwise_iou
+from jeat_graph.lifecycle import occluded_fraction
 from jeat_graph.trajectories import GroundTruth
 
 # A detection is of a vehicle if it overlaps its true box by at least this IoU.
@@ -26,13 +28,15 @@ class SensorMatches:
         score: (D,) score of each judged detection.
         correct: (D,) whether it is of a vehicle.
         run: (D,) for false ones, how many scans in a row, this one included, had a false box at this place.
-        residual: (C, 4) of the correct ones: (x − x_true) / w, (y − y_true) / h, ln(w / w_true), ln(h / h_true).
+        residual: (C, 4) of the correct ones: centre errors over the true width and height, ln of the ratios
+            of width and height.
         side: (C, 2) true width and height (px).
         key: (C, 2) sequence and object of each correct one.
         t: (C,) time (s).
         box: (C, 4) the detected box (px).
         seen: (G,) for each true box in view of a scan, whether it was detected.
         speed: (G,) its image speed (px/s), NaN where not known.
+        visible: (G,) the part of it that no nearer vehicle hides, by the rule of the tracker.
     """
 
     scans: int
@@ -46,6 +50,7 @@ class SensorMatches:
     box: FloatArray
     seen: BoolArray
     speed: FloatArray
+    visible: FloatArray
 
     @staticmethod
     def pool(parts: list[SensorMatches]) -> SensorMatches:
@@ -77,7 +82,7 @@ def match_sensor(detections: Detections, truth: GroundTruth, sensor: str, sequen
     stop = np.searchsorted(truth.t[order], frames + 1e-6)
     code = detections.sensors.index(sensor) if sensor in detections.sensors else -1
     chosen = np.flatnonzero(detections.scan_sensor == code)
-    columns: dict[str, list[FloatArray]] = {f.name: [] for f in fields(SensorMatches)[1:]}
+    columns: dict[str, list[Any]] = {f.name: [] for f in fields(SensorMatches)[1:]}
     previous_false: tuple[FloatArray, IntArray] = (np.zeros((0, 4)), np.zeros(0, dtype=np.int64))
     scans = 0
     for k in chosen:
@@ -116,9 +121,12 @@ def match_sensor(detections: Detections, truth: GroundTruth, sensor: str, sequen
         columns["box"].append(found)
         columns["seen"].append(seen[~ignored])
         columns["speed"].append(speed[~ignored])
+        visible = 1.0 - occluded_fraction(boxes, np.ones(len(boxes)))
+        columns["visible"].append(visible[~ignored])
     if not scans:
         raise DataError(f"no scan of sensor {sensor!r} lies within the time span of the truth")
-    return SensorMatches(scans=scans, **{name: np.concatenate(parts) for name, parts in columns.items()})
+    pooled: dict[str, Any] = {name: np.concatenate(parts) for name, parts in columns.items()}
+    return SensorMatches(scans=scans, **pooled)
 
 
 def _truth_between(

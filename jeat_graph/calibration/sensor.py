@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import isotonic_regression, minimize, minimize_scalar
 
-from jeat_graph.arrays import FloatArray
+from jeat_graph.arrays import BoolArray, FloatArray
 from jeat_graph.calibration.matches import SensorMatches
 from jeat_graph.config import SensorConfig
 from jeat_graph.errors import DataError
 
 _MIN_PAIRS = 20
 _MAX_KNOTS = 12
+# A vehicle of which this part is free counts as in full view.
+_IN_VIEW = 0.9
 
 
 def calibrate_sensor(matches: SensorMatches, rate_hz: float) -> SensorConfig:
@@ -32,7 +34,7 @@ def calibrate_sensor(matches: SensorMatches, rate_hz: float) -> SensorConfig:
     centred = matches.residual - bias
     sigma_x, rho_x = fit_noise(centred[:, 0] * matches.side[:, 0], matches.side[:, 0])
     sigma_y, rho_y = fit_noise(centred[:, 1] * matches.side[:, 1], matches.side[:, 1])
-    p_detect, blind = fit_detection(matches.seen, matches.speed)
+    p_detect, blind = fit_detection(matches.seen, matches.speed, matches.visible)
     precision = np.clip((matches.correct.sum() + 0.5) / (len(matches.correct) + 1.0), 0.001, 0.999)
     false = ~matches.correct
     return SensorConfig(
@@ -88,8 +90,8 @@ def fit_noise(residual: FloatArray, side: FloatArray) -> tuple[float, float]:
     return float(sigma * ratio), float(np.clip(rho * ratio, 0.0, 1.0))
 
 
-def fit_precision(score: FloatArray, correct: np.ndarray) -> tuple[tuple[float, float], ...]:  # type: ignore[type-arg]
-    """Calibrate score → precision: isotonic regression on quantile bins, each shrunk to the overall precision.
+def fit_precision(score: FloatArray, correct: BoolArray) -> tuple[tuple[float, float], ...]:
+    """Calibrate score → precision: isotonic regression on quantile bins, shrunk to the overall precision.
 
     Args:
         score: (D,) in [0, 1].
@@ -118,19 +120,24 @@ def fit_precision(score: FloatArray, correct: np.ndarray) -> tuple[tuple[float, 
     )
 
 
-def fit_detection(seen: np.ndarray, speed: FloatArray) -> tuple[float, float]:  # type: ignore[type-arg]
-    """Fit P_D and, if the data speak for it, the speed below which the sensor is blind.
+def fit_detection(seen: BoolArray, speed: FloatArray, visible: FloatArray) -> tuple[float, float]:
+    """Fit P_D of a vehicle in full view and, if the data speak for it, the speed of blindness.
 
-    P_D(v) = P₀ (1 − exp(−(v / v_blind)²)), accepted over a constant P_D where it raises the log likelihood by more
-    than 10 (a Bayes factor no chance explains).
+    P_D(v) = P₀ (1 − exp(−(v / v_blind)²)). The blind speed is accepted over a constant P_D where it raises
+    the log likelihood by more than 10, a Bayes factor that chance does not explain. Vehicles hidden by more
+    than a tenth are left out: the tracker accounts for occlusion itself.
 
     Args:
         seen: (G,) whether each true box was detected.
         speed: (G,) its image speed (px/s), NaN where not known.
+        visible: (G,) the part of it that no nearer vehicle hides.
 
     Returns:
         P₀ and v_blind (px/s), 0 for a sensor that sees what stands still.
     """
+    free = visible >= _IN_VIEW
+    if free.sum() >= _MIN_PAIRS:
+        seen, speed = seen[free], speed[free]
     flat = float((seen.sum() + 1.0) / (len(seen) + 2.0))
     known = np.isfinite(speed)
     if known.sum() < 100:
@@ -143,8 +150,10 @@ def fit_detection(seen: np.ndarray, speed: FloatArray) -> tuple[float, float]:  
 
     def best_p0(blind: float) -> float:
         factor = 1.0 - np.exp(-((v / blind) ** 2))
+        moving = factor > 0.5
         # The ratio of means is the moment estimate of P₀ and close to the most likely one.
-        return float(np.clip(y[factor > 0.5].mean() if (factor > 0.5).any() else 0.5, 0.05, 0.99))
+        share = float(y[moving].sum() / factor[moving].sum()) if moving.any() else 0.5
+        return float(np.clip(share, 0.05, 0.99))
 
     def loss(log_blind: float) -> float:
         blind = float(np.exp(log_blind))

@@ -2,29 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.calibration.matches import SensorMatches, match_sensor
 from jeat_graph.calibration.motion import fit_motion, fit_size
 from jeat_graph.calibration.sensor import calibrate_sensor
-from jeat_graph.config import Config, SensorConfig
+from jeat_graph.config import BirthConfig, Config, SensorConfig
 from jeat_graph.detections import Detections
 from jeat_graph.errors import DataError
 from jeat_graph.trajectories import GroundTruth
 
+Recording = tuple[Detections, GroundTruth]
 
 _PERIOD_S = 0.1
 
 
-def calibrate(recordings: Sequence[tuple[Detections, GroundTruth]], base: Config | None = None) -> Config:
+def calibrate(recordings: Sequence[Recording], base: Config | None = None) -> Config:
     """Estimate sensors and motion from recordings with truth.
 
     Args:
         recordings: detections and truth of each sequence; all are pooled.
-        base: configuration whose other settings (association, lifecycle, …) are kept; the defaults if not given.
+        base: configuration whose other settings (association, lifecycle, …) are kept; the defaults if not
+            given.
 
     Returns:
         A configuration that declares exactly the sensors that occur.
@@ -50,50 +53,107 @@ def calibrate(recordings: Sequence[tuple[Detections, GroundTruth]], base: Config
         if base is None
         else replace(base, sensors=sensors, association=replace(base.association, priority=()))
     )
-    duration = sum(float(np.ptp(truth.frame_times())) for _, truth in recordings)
-    objects = sum(len(np.unique(truth.object_id[~truth.ignore])) for _, truth in recordings)
-    birth = replace(config.birth, arrival_rate_hz=objects / max(duration, 1.0))
     tracks = measured_tracks(matches, sensors)
     return replace(
-        config, motion=fit_motion(*tracks[:5]), size=fit_size(tracks[0], tracks[5], tracks[6], tracks[4])
+        config,
+        motion=fit_motion(tracks.t, tracks.z, tracks.R, tracks.side, tracks.start),
+        size=fit_size(tracks.t, tracks.log_size, tracks.log_size_var, tracks.start),
+        birth=fit_births(config, matches, recordings),
     )
 
 
-def measured_tracks(
-    matches: dict[str, SensorMatches], sensors: dict[str, SensorConfig]
-) -> tuple[np.ndarray, ...]:  # type: ignore[type-arg]
-    """Join all sensors' correct detections into one track an object.
+def fit_births(
+    config: Config, matches: Mapping[str, SensorMatches], recordings: Sequence[Recording]
+) -> BirthConfig:
+    """Estimate how many vehicles wait for a track at the start, and how many more a second.
 
-    Returns:
-        t (K,), z (K, 2), R (K, 2), size (K,), start (T + 1,), ln size (K, 2), its variances (K, 2).
+    A vehicle that no sensor detects for longer than a confirmed track is kept has to be born again, so it
+    counts again.
+
+    Args:
+        config: says how long a confirmed track is kept.
+        matches: detections beside the truth, of all sensors.
+        recordings: for their duration and the number of vehicles in a picture.
     """
-    columns: list[list[np.ndarray]] = [[] for _ in range(7)]  # type: ignore[type-arg]
-    for name, every in matches.items():
-        m = _one_a_period(every)
-        s = sensors[name]
-        bias = np.array(s.bias)
-        side = m.box[:, 2:]
-        log_size = np.log(side) - bias[2:]
-        columns[0].append(m.key)
-        columns[1].append(m.t)
-        columns[2].append(m.box[:, :2] + (0.5 - bias[:2]) * side)
-        columns[3].append(s.sigma_px**2 + (np.array([s.rho_x, s.rho_y]) * side) ** 2)
-        columns[4].append(np.sqrt(side.prod(axis=1)))
-        columns[5].append(log_size)
-        columns[6].append(np.broadcast_to([s.sigma_log_width**2, s.sigma_log_height**2], log_size.shape))
-    key, t, z, R, size, log_size, log_var = (np.concatenate(c) for c in columns)
+    key = np.concatenate([m.key for m in matches.values()])
+    t = np.concatenate([m.t for m in matches.values()])
+    order = np.lexsort((t, key[:, 1], key[:, 0]))
+    same = np.all(np.diff(key[order], axis=0) == 0, axis=1)
+    lost = np.diff(t[order]) > config.lifecycle.max_gap_confirmed_s
+    births = 1 + int(np.sum(~same | lost))
+    frames = [truth.frame_times() for _, truth in recordings]
+    duration = sum(float(f[-1] - f[0]) for f in frames)
+    boxes = sum(int(np.sum(~truth.ignore)) for _, truth in recordings)
+    initial = boxes / sum(len(f) for f in frames)
+    arrivals = max(births - initial * len(recordings), 1.0)
+    return replace(config.birth, arrival_rate_hz=arrivals / max(duration, 1.0), initial=initial)
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredTracks:
+    """Correct detections of all sensors, object by object.
+
+    Attributes:
+        t: (K,) time (s), ascending within a track.
+        z: (K, 2) centre without the sensor's bias (px).
+        R: (K, 2) its variance (px²).
+        side: (K,) sqrt(w h) (px).
+        start: (T + 1,) track i owns the rows start[i]:start[i + 1].
+        log_size: (K, 2) ln width and ln height without bias.
+        log_size_var: (K, 2) their variances.
+    """
+
+    t: FloatArray
+    z: FloatArray
+    R: FloatArray
+    side: FloatArray
+    start: IntArray
+    log_size: FloatArray
+    log_size_var: FloatArray
+
+
+def measured_tracks(
+    matches: Mapping[str, SensorMatches], sensors: Mapping[str, SensorConfig]
+) -> MeasuredTracks:
+    """Join all sensors' correct detections into one track an object, as the filter would take them in.
+
+    Args:
+        matches: by sensor.
+        sensors: calibrated noise and bias, by sensor.
+    """
+    parts = [(_one_a_period(every), sensors[name]) for name, every in matches.items()]
+    key = np.concatenate([m.key for m, _ in parts])
+    t = np.concatenate([m.t for m, _ in parts])
+    box = np.concatenate([m.box for m, _ in parts])
+    rows = [len(m.t) for m, _ in parts]
+    bias = np.repeat([s.bias for _, s in parts], rows, axis=0)
+    rho = np.repeat([(s.rho_x, s.rho_y) for _, s in parts], rows, axis=0)
+    sigma = np.repeat([s.sigma_px for _, s in parts], rows)
+    log_sigma = np.repeat([(s.sigma_log_width, s.sigma_log_height) for _, s in parts], rows, axis=0)
     order = np.lexsort((t, key[:, 1], key[:, 0]))
     change = np.any(np.diff(key[order], axis=0) != 0, axis=1)
     start = np.concatenate(([0], np.flatnonzero(change) + 1, [len(order)])).astype(np.int64)
-    c = [np.ascontiguousarray(a[order]) for a in (t, z, R, size, log_size, log_var)]
-    return c[0], c[1], c[2], c[3], start, c[4], c[5]
+    side = box[:, 2:]
+
+    def sort(column: FloatArray) -> FloatArray:
+        return np.ascontiguousarray(column[order])
+
+    return MeasuredTracks(
+        t=sort(t),
+        z=sort(box[:, :2] + (0.5 - bias[:, :2]) * side),
+        R=sort(sigma[:, None] ** 2 + (rho * side) ** 2),
+        side=sort(np.sqrt(side.prod(axis=1))),
+        start=start,
+        log_size=sort(np.log(side) - bias[:, 2:]),
+        log_size_var=sort(log_sigma**2),
+    )
 
 
 def _one_a_period(m: SensorMatches) -> SensorMatches:
     """Keep one correct detection of each object in each period.
 
-    A detector's errors persist over neighbouring scans; taken at every scan of a fast sensor they would pass for
-    motion.
+    A detector's errors persist over neighbouring scans; taken at every scan of a fast sensor they would
+    pass for motion.
     """
     period = np.floor(m.t / _PERIOD_S + 1e-6).astype(np.int64)
     first = np.unique(np.column_stack([m.key, period]), axis=0, return_index=True)[1]

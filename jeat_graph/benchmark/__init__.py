@@ -1,0 +1,1 @@
+"""Benchmarks: the tables of accuracy, ablation and speed that the README shows."""

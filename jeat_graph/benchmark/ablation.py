@@ -1,0 +1,89 @@
+"""`jeat-graph benchmark ablation`: from the paper's tracker to the default, one change a row."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jeat_graph.benchmark import common
+from jeat_graph.benchmark.judging import OursJob, in_processes, judge_ours, judge_recordings, summarise
+from jeat_graph.benchmark.provenance import provenance
+from jeat_graph.benchmark.recordings import kitti
+from jeat_graph.benchmark.steps import rows
+from jeat_graph.config import Config
+from jeat_graph.config_io import load_config
+
+if TYPE_CHECKING:
+    from jeat_graph.eval.tables import Table
+
+_METRICS = ("MOTA", "IDF1", "HOTA")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the benchmark's arguments."""
+    common.add_arguments(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure (or read an earlier result), print and write."""
+    result = common.earlier(args.source, "ablation") if args.source else measure(args)
+    common.publish(args, "ablation", result, tables(result))
+    return 0
+
+
+def measure(args: argparse.Namespace) -> dict[str, Any]:
+    """Track everything with every row's configuration."""
+    setup = common.settings(args)
+    paper, default = load_config("paper"), load_config("default")
+    configs = rows(paper, default)
+    jobs = [
+        OursJob(name, config, None, scenario, seed, setup["duration_s"])
+        # The recording is in the outer loops: a process keeps the last few it has simulated.
+        for scenario in setup["scenarios"]
+        for seed in setup["seeds"]
+        for name, config in configs
+    ]
+    records = in_processes(judge_ours, jobs, args.jobs, "ablation, simulated")
+    order = {name: k for k, (name, _) in enumerate(configs)}
+    records.sort(key=lambda r: (order[r["row"]], setup["scenarios"].index(r["scenario"]), r["seed"]))
+    result: dict[str, Any] = {
+        "benchmark": "ablation",
+        **provenance(setup, dict(configs)),
+        "records": records,
+        "summary": summarise(records),
+    }
+    folds = common.kitti_folds(args)
+    if folds is not None:
+        folder, targets = folds
+        by_fold = {name: rows(paper, target) for name, target in targets.items()}
+        real = [
+            (name, [one[k][1] for one in by_fold.values()], folder) for k, (name, _) in enumerate(configs)
+        ]
+        result["kitti"] = in_processes(judge_real, real, args.jobs, "ablation, KITTI")
+        result["kitti_configs"] = provenance({}, targets)["configs"]
+    return result
+
+
+def judge_real(job: tuple[str, list[Config], Path]) -> dict[str, Any]:
+    """Judge one row on the KITTI sequences, each with its own leave-one-out configuration, pooled."""
+    name, configs, folder = job
+    return {"row": name, "scores": judge_recordings(configs, kitti(folder))}
+
+
+def tables(result: Mapping[str, Any]) -> dict[str, Table]:
+    """Tables of a result, by the name of their markers."""
+    count = len(result["settings"]["seeds"])
+    out = {
+        "ablation": common.scenario_table(
+            result["summary"],
+            f"From paper to default, simulated: {' / '.join(_METRICS)}, {common.over_seeds(count)}",
+            _METRICS,
+        )
+    }
+    if "kitti" in result:
+        out["ablation-kitti"] = common.pooled_table(
+            result["kitti"], "From paper to kitti, real data: five sequences, leave-one-out, pooled"
+        )
+    return out

@@ -1,0 +1,168 @@
+"""What the benchmarks of accuracy and ablation share: arguments, tables, files."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jeat_graph.benchmark.judging import METRICS, fold_config, in_processes
+from jeat_graph.benchmark.readme import update_readme
+from jeat_graph.benchmark.recordings import DURATION_S, KITTI_SEQUENCES, SCENARIOS, SEEDS, find_kitti
+from jeat_graph.config import Config
+from jeat_graph.errors import DataError
+
+if TYPE_CHECKING:
+    from jeat_graph.eval.tables import Table
+
+QUICK_SEEDS = (0,)
+QUICK_DURATION_S = 8.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of both benchmarks."""
+    add = parser.add_argument
+    add("--out", metavar="DIR", help="write NAME.json and NAME.md there")
+    add("--data", metavar="DIR", help="folder that holds kitti/ (../shared/data)")
+    add("--seeds", nargs="+", type=_seed, metavar="N", help="of the simulated recordings (0 1 2 3 4)")
+    add("--scenarios", nargs="+", metavar="NAME", help=f"simulated scenarios ({' '.join(SCENARIOS)})")
+    add("--duration", type=_positive, metavar="S", help=f"of a simulated recording ({DURATION_S:g})")
+    add("--quick", action="store_true", help="one seed, 8 s, no real data: to see that it runs")
+    add("--jobs", type=_count, metavar="N", help="processes (as many as there are processors)")
+    add("--readme", metavar="FILE", help="renew the tables between the markers of this Markdown file")
+    add("--from", dest="source", metavar="JSON", help="render the tables of an earlier result; run nothing")
+
+
+def settings(args: argparse.Namespace) -> dict[str, Any]:
+    """Seeds, scenarios and duration, with the defaults filled in.
+
+    Raises:
+        ConfigError: unknown scenario.
+    """
+    from jeat_graph.sehn.scenario import load_scenario
+
+    scenarios = tuple(args.scenarios or SCENARIOS)
+    for name in scenarios:
+        load_scenario(name)
+    return {
+        "scenarios": scenarios,
+        "seeds": tuple(args.seeds or (QUICK_SEEDS if args.quick else SEEDS)),
+        "duration_s": args.duration or (QUICK_DURATION_S if args.quick else DURATION_S),
+    }
+
+
+def kitti_folds(args: argparse.Namespace) -> tuple[Path, dict[str, Config]] | None:
+    """Leave-one-out configurations of KITTI; None, with a line on stderr, where the data are missing."""
+    if args.quick:
+        return None
+    folder = find_kitti(args.data)
+    if folder is None:
+        where = args.data or "../shared/data"
+        print(f"no KITTI sequences in {where}/kitti: the table on real data is left out", file=sys.stderr)
+        return None
+    configs = in_processes(
+        fold_config, [(folder, name) for name in KITTI_SEQUENCES], args.jobs, "calibrating, one left out"
+    )
+    return folder, dict(zip(KITTI_SEQUENCES, configs, strict=True))
+
+
+def scenario_table(
+    entries: Sequence[Mapping[str, Any]], title: str, metrics: Sequence[str] = METRICS
+) -> Table:
+    """One row a tracker, one column a scenario: metrics joined by ` / `, MOTA with its spread over seeds."""
+    from jeat_graph.eval.tables import Cell, Table
+
+    scenarios = list(dict.fromkeys(e["scenario"] for e in entries))
+    cells: dict[str, dict[str, Cell]] = {}
+    for e in entries:
+        texts = [
+            f"{e[m]:.1f}" + (f" ± {e[f'{m}_std']:.1f}" if m == "MOTA" and e["seeds"] > 1 else "")
+            for m in metrics
+        ]
+        cells.setdefault(e["row"], {"": e["row"]})[e["scenario"]] = " / ".join(texts)
+    return Table.from_records(list(cells.values()), ["", *scenarios], title=title)
+
+
+def over_seeds(count: int) -> str:
+    """How the numbers of a simulated table come about."""
+    if count == 1:
+        return "one seed"
+    return f"mean of {count} seeds (± standard deviation of MOTA over them)"
+
+
+def pooled_table(entries: Sequence[Mapping[str, Any]], title: str) -> Table:
+    """One row a tracker, one column a metric, for recordings whose scores are pooled."""
+    from jeat_graph.eval.tables import Cell, Table
+
+    columns = (*METRICS, "FP", "FN", "IDSW")
+    records: list[dict[str, Cell]] = [
+        {"": e["row"]} | {name: e["scores"][name] for name in columns} for e in entries
+    ]
+    return Table.from_records(records, title=title, digits=dict.fromkeys(METRICS, 1))
+
+
+def publish(
+    args: argparse.Namespace, name: str, result: Mapping[str, Any], tables: Mapping[str, Table]
+) -> None:
+    """Print tables, and write JSON, Markdown and the README's tables where asked.
+
+    Args:
+        args: of the command.
+        name: of the benchmark.
+        result: all that was measured.
+        tables: by the name they have in the README's markers.
+    """
+    from jeat_graph.eval.tables import to_json
+    from jeat_graph.io.atomic import open_atomic
+
+    sys.stdout.write("\n".join(table.render("text") for table in tables.values()))
+    markdown = {key: table.render("markdown") for key, table in tables.items()}
+    if args.out and not args.source:
+        folder = Path(args.out)
+        with open_atomic(folder / f"{name}.json") as file:
+            file.write(to_json(result))
+        with open_atomic(folder / f"{name}.md") as file:
+            file.write("\n".join(markdown.values()))
+        print(f"written: {folder / name}.json, {name}.md", file=sys.stderr)
+    if args.readme:
+        found = update_readme(args.readme, markdown)
+        print(f"{args.readme}: renewed {', '.join(found) or 'no table: it has no marker'}", file=sys.stderr)
+
+
+def earlier(path: str, name: str) -> dict[str, Any]:
+    """Read the JSON of an earlier benchmark.
+
+    Raises:
+        DataError: not a result of this benchmark.
+    """
+    try:
+        result = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise DataError(f"{path}: cannot be read: {error}") from None
+    if not isinstance(result, dict) or result.get("benchmark") != name:
+        raise DataError(f"{path}: is not a result of `jeat-graph benchmark {name}`")
+    return result
+
+
+def _seed(text: str) -> int:
+    value = int(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError("must not be negative")
+    return value
+
+
+def _count(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError("must be at least 1")
+    return value
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError("must be a positive number")
+    return value

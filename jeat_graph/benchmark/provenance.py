@@ -1,0 +1,54 @@
+"""What is needed to repeat a benchmark: versions, machine, settings."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from jeat_graph.config import Config
+from jeat_graph.config_io import config_to_dict
+from jeat_graph.version import __version__
+
+_PACKAGES = ("numpy", "scipy", "numba", "trackeval", "gtsam", "trackers", "supervision")
+
+
+def provenance(settings: Mapping[str, Any], configs: Mapping[str, Config]) -> dict[str, Any]:
+    """Collect what stands at the head of a benchmark's JSON.
+
+    Args:
+        settings: arguments of the benchmark.
+        configs: full configurations by name.
+    """
+    return {
+        "jeat_graph": __version__,
+        "packages": {name: _version(name) for name in _PACKAGES},
+        "python": platform.python_version(),
+        "machine": {
+            "system": platform.system(),
+            "processor": _processor(),
+            "cores": os.cpu_count(),
+        },
+        "settings": dict(settings),
+        "configs": {name: config_to_dict(config) for name, config in configs.items()},
+    }
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def _processor() -> str:
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as file:
+            for line in file:
+                if line.startswith("model name"):
+                    return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()

@@ -1,0 +1,124 @@
+"""The way from one configuration to another, one change a row."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from jeat_graph.config import Config, SensorConfig
+from jeat_graph.config_io import config_from_dict, config_to_dict
+
+
+@dataclass(frozen=True)
+class Step:
+    """One row of the ablation.
+
+    Attributes:
+        name: what the row adds.
+        take: keys that get the target's values from here on; `sensors.*` stands for every sensor.
+        hold: keys that get values of their own, until a later step takes them from the target.
+    """
+
+    name: str
+    take: tuple[str, ...]
+    hold: Mapping[str, Any] = field(default_factory=dict)
+
+
+STEPS = (
+    Step(
+        "+ scale-aware noise and motion",
+        (
+            "sensors.*.sigma_px",
+            "sensors.*.rho_x",
+            "sensors.*.rho_y",
+            "sensors.*.bias",
+            "motion",
+            "noise",
+            "size",
+            "sensors.*.sigma_log_width",
+            "sensors.*.sigma_log_height",
+        ),
+    ),
+    Step("+ size in the gate", ("association.size_gate", "association.gate_probability")),
+    Step(
+        "+ likelihood as cost",
+        (
+            "association.cost",
+            "association.log_size_range",
+            "sensors.*.p_detect",
+            "sensors.*.clutter_per_scan",
+            "sensors.*.precision",
+            "sensors.*.score_precision",
+        ),
+        {"lifecycle.hidden_prior": 0.0},
+    ),
+    Step("+ one slot a sensor", ("association.method", "association.second_pass", "association.priority")),
+    Step("+ no duplicate births, merging", ("birth.max_overlap", "merge")),
+    Step(
+        "+ existence probability, births weighed",
+        ("lifecycle", "birth", "sensors.*.tempering"),
+        {"lifecycle.hidden_prior": 0.0, "lifecycle.p_detect_weight": 0.0, "lifecycle.leave_picture": False},
+    ),
+    Step("+ output rules", ("output", "lifecycle.leave_picture")),
+    Step("+ blindness of the event camera", ("sensors.*.blind_speed",)),
+    Step("+ P_D of each track, hidden vehicles", ("lifecycle.hidden_prior", "lifecycle.p_detect_weight")),
+    Step("+ standing tracks", ("standing",)),
+)
+
+
+def start(paper: Config, target: Config) -> Config:
+    """Return the paper's configuration for the sensors and the picture of the target.
+
+    Sensors that the paper's preset does not name get its RGB constants.
+    """
+    generic = paper.sensors.get("rgb", SensorConfig())
+    sensors = {
+        name: replace(paper.sensors.get(name, generic), rate_hz=sensor.rate_hz)
+        for name, sensor in target.sensors.items()
+    }
+    return replace(
+        paper, sensors=sensors, image=target.image, association=replace(paper.association, priority=())
+    )
+
+
+def rows(paper: Config, target: Config, steps: Sequence[Step] = STEPS) -> list[tuple[str, Config]]:
+    """All configurations from `start(paper, target)` to `target`, each with its name.
+
+    The last one takes whatever is left, so it equals the target exactly.
+    """
+    first = start(paper, target)
+    tree, goal = config_to_dict(first), config_to_dict(target)
+    out = [("paper", first)]
+    for k, step in enumerate(steps):
+        tree = deepcopy(tree)
+        for key in step.take:
+            for path in _paths(key, goal):
+                _put(tree, path, _get(goal, path))
+        for key, value in step.hold.items():
+            for path in _paths(key, goal):
+                _put(tree, path, value)
+        last = k == len(steps) - 1
+        out.append((step.name, config_from_dict(goal if last else tree)))
+    return out
+
+
+def _paths(key: str, tree: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    path = tuple(key.split("."))
+    if path[:2] == ("sensors", "*"):
+        return [("sensors", name, *path[2:]) for name in tree["sensors"]]
+    return [path]
+
+
+def _get(tree: Mapping[str, Any], path: tuple[str, ...]) -> Any:
+    value: Any = tree
+    for key in path:
+        value = value[key]
+    return deepcopy(value)
+
+
+def _put(tree: dict[str, Any], path: tuple[str, ...], value: Any) -> None:
+    for key in path[:-1]:
+        tree = tree[key]
+    tree[path[-1]] = value

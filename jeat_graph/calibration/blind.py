@@ -1,0 +1,308 @@
+"""Calibration without truth: confirmed tracks take its place.
+
+The recordings are tracked with a base configuration; what its confirmed tracks took in counts as correct,
+the rest as false. Noise and motion are then those under which the innovations of these tracks are most
+likely, and the tracker runs again with what was found.
+
+What this cannot know: a systematic error of a sensor (its bias is set to zero), vehicles that no track found
+(P_D comes out too high), and false boxes that repeat so often that a track was confirmed on them (precision
+too high).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+
+from jeat_graph.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.calibration.motion import (
+    VELOCITY_RESERVE,
+    fit_size,
+    innovation_loss,
+    size_loss,
+)
+from jeat_graph.calibration.sensor import fit_detection, fit_precision
+from jeat_graph.config import Config, MotionConfig, SensorConfig
+from jeat_graph.detections import Detections
+from jeat_graph.errors import DataError
+from jeat_graph.lifecycle import occluded_fraction
+from jeat_graph.tracker import track
+
+_MIN_ROWS = 50
+_MIN_LENGTH = 5
+# Tracks are followed through gaps as long as this, so that the misses in them are counted.
+_REPORT_GAP_S = 1.0
+# A detector's errors persist over neighbouring scans; one detection a sensor and period is taken as
+# independent.
+_PERIOD_S = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class TrackedDetections:
+    """Detections of one or more recordings with the confirmed tracks that took them.
+
+    Attributes:
+        t: (K,) time of each taken detection (s), ascending within a track.
+        track: (K,) number of its track, ascending.
+        sensor: (K,) index into the configuration's sensor names.
+        box: (K, 4) the detection (px).
+        looks: per sensor (L,), for each confirmed track at each scan in its life, whether it was detected.
+        speed: per sensor (L,), the track's image speed then (px/s).
+        visible: per sensor (L,), the part of the track's box that no nearer track hides.
+        score: per sensor (D,), scores of all detections.
+        taken: per sensor (D,), whether a confirmed track took it.
+        scans: per sensor, the number of scans.
+    """
+
+    t: FloatArray
+    track: IntArray
+    sensor: IntArray
+    box: FloatArray
+    looks: tuple[BoolArray, ...]
+    speed: tuple[FloatArray, ...]
+    visible: tuple[FloatArray, ...]
+    score: tuple[FloatArray, ...]
+    taken: tuple[BoolArray, ...]
+    scans: tuple[int, ...]
+
+
+def calibrate_blind(recordings: Sequence[Detections], base: Config, rounds: int = 2) -> Config:
+    """Estimate sensors and motion from recordings without truth.
+
+    Args:
+        recordings: of the same sensors; all are pooled.
+        base: configuration to begin with; sensors that it does not declare begin with the defaults.
+        rounds: how often the tracker runs.
+
+    Returns:
+        A configuration that declares exactly the sensors that occur; all else is as in `base`.
+
+    Raises:
+        DataError: too little that the tracker could follow.
+    """
+    names = sorted({name for detections in recordings for name in detections.sensors})
+    if not names:
+        raise DataError("the recordings hold no scan")
+    sensors = {
+        name: replace(base.sensors.get(name, SensorConfig()), rate_hz=scan_rate(recordings, name))
+        for name in names
+    }
+    config = replace(base, sensors=sensors, association=replace(base.association, priority=()))
+    for _ in range(rounds):
+        config = _fit(config, follow(recordings, config))
+    return config
+
+
+def scan_rate(recordings: Sequence[Detections], sensor: str) -> float:
+    """Rate of a sensor's scans (Hz), from the median step; 20 where there are less than two scans."""
+    steps = [
+        np.diff(d.scan_t[d.scan_sensor == d.sensors.index(sensor)]) for d in recordings if sensor in d.sensors
+    ]
+    every = np.concatenate(steps)
+    return float(1.0 / np.median(every)) if len(every) else 20.0
+
+
+def follow(recordings: Sequence[Detections], config: Config) -> TrackedDetections:
+    """Track recordings and find out which detection each track took.
+
+    Args:
+        recordings: detections.
+        config: declares all their sensors.
+    """
+    # Reported from birth on; afterwards those are kept that were confirmed at some time.
+    eager = replace(
+        config,
+        lifecycle=replace(config.lifecycle, confirm_existence=0.0),
+        output=replace(config.output, min_existence=0.0, max_gap_s=_REPORT_GAP_S),
+    )
+    names = config.sensor_names
+    cols: dict[str, list[FloatArray]] = {name: [] for name in ("t", "track", "sensor", "box")}
+    looks: list[list[BoolArray]] = [[] for _ in names]
+    speed: list[list[FloatArray]] = [[] for _ in names]
+    visible: list[list[FloatArray]] = [[] for _ in names]
+    score: list[list[FloatArray]] = [[] for _ in names]
+    taken: list[list[BoolArray]] = [[] for _ in names]
+    scans = [0] * len(names)
+    first_track = 0
+    for detections in recordings:
+        table = track(eager, detections)
+        sure = table.existence >= config.lifecycle.confirm_existence
+        kept = np.isin(table.track_id, np.unique(table.track_id[sure]))
+        table = table.take(kept)
+        _, number = np.unique(table.track_id, return_inverse=True)
+        for s, name in enumerate(names):
+            if name not in detections.sensors:
+                continue
+            own = np.flatnonzero(detections.scan_sensor == detections.sensors.index(name))
+            scans[s] += len(own)
+            first = np.searchsorted(table.t, detections.scan_t[own])
+            last = np.searchsorted(table.t, detections.scan_t[own], side="right")
+            bit = (table.used >> s & 1).astype(bool)
+            for k, lo, hi in zip(own, first, last, strict=True):
+                scan = detections.scan(int(k))
+                got = np.zeros(len(scan), dtype=bool)
+                rows = np.arange(lo, hi)
+                looks[s].append(bit[rows])
+                speed[s].append(np.hypot(table.mean[rows, 2], table.mean[rows, 3]))
+                visible[s].append(1.0 - occluded_fraction(table.boxes[rows], table.existence[rows]))
+                rows = rows[bit[rows]]
+                if len(rows) and len(scan):
+                    j = _nearest(table.mean[rows, :2], table.boxes[rows, 2:], scan.boxes)
+                    got[j] = True
+                    cols["t"].append(np.full(len(rows), scan.t))
+                    cols["track"].append(first_track + number[rows])
+                    cols["sensor"].append(np.full(len(rows), s))
+                    cols["box"].append(scan.boxes[j])
+                score[s].append(scan.scores)
+                taken[s].append(got)
+        first_track += int(number.max(initial=-1)) + 1
+    if sum(len(c) for c in cols["t"]) < _MIN_ROWS:
+        raise DataError(
+            "the tracker could follow almost nothing; calibrate with --gt, or from a better --config"
+        )
+    flat = {name: np.concatenate(parts) for name, parts in cols.items()}
+    order = np.lexsort((flat["sensor"], flat["t"], flat["track"]))
+    return TrackedDetections(
+        t=flat["t"][order],
+        track=flat["track"][order].astype(np.int64),
+        sensor=flat["sensor"][order].astype(np.int64),
+        box=flat["box"][order],
+        looks=tuple(np.concatenate(x) if x else np.zeros(0, dtype=bool) for x in looks),
+        speed=tuple(np.concatenate(x) if x else np.zeros(0) for x in speed),
+        visible=tuple(np.concatenate(x) if x else np.zeros(0) for x in visible),
+        score=tuple(np.concatenate(x) if x else np.zeros(0) for x in score),
+        taken=tuple(np.concatenate(x) if x else np.zeros(0, dtype=bool) for x in taken),
+        scans=tuple(scans),
+    )
+
+
+def _nearest(centre: FloatArray, side: FloatArray, boxes: FloatArray) -> IntArray:
+    """Detection (R,) nearest, in centre and size, to each track that was updated with one of them."""
+    found = boxes[:, :2] + 0.5 * boxes[:, 2:]
+    scale = np.sqrt(side.prod(axis=1))[:, None]
+    away = np.sum((found[None] - centre[:, None]) ** 2, axis=2) / scale**2
+    size = np.sum((np.log(boxes[None, :, 2:]) - np.log(side[:, None])) ** 2, axis=2)
+    return np.asarray(np.argmin(away + size, axis=1), dtype=np.int64)
+
+
+def _fit(config: Config, data: TrackedDetections) -> Config:
+    names = config.sensor_names
+    thin = _thinned(data)
+    start = np.concatenate(([0], np.flatnonzero(np.diff(thin.track)) + 1, [len(thin.t)])).astype(np.int64)
+    if np.diff(start).max(initial=0) < _MIN_LENGTH:
+        raise DataError("no track is long enough to estimate motion; the recording is too short or too poor")
+    noise, motion = _fit_noise_and_motion(config, thin, start)
+    log_sigma, log_size = _fit_size_noise(config, thin, start)
+    R = log_sigma[thin.sensor] ** 2
+    size = fit_size(thin.t, log_size, R, start)
+    sensors: dict[str, SensorConfig] = {}
+    for s, name in enumerate(names):
+        old, taken = config.sensors[name], data.taken[s]
+        if taken.sum() < _MIN_LENGTH:
+            raise DataError(f"confirmed tracks took almost nothing of sensor {name!r}; calibrate with --gt")
+        p_detect, blind = fit_detection(data.looks[s], data.speed[s], data.visible[s])
+        sensors[name] = replace(
+            old,
+            sigma_px=float(np.clip(noise[s, 0], 0.1, 100.0)),
+            rho_x=float(noise[s, 1]),
+            rho_y=float(noise[s, 1]),
+            sigma_log_width=float(max(log_sigma[s, 0], 0.005)),
+            sigma_log_height=float(max(log_sigma[s, 1], 0.005)),
+            bias=(0.0, 0.0, 0.0, 0.0),
+            p_detect=float(np.clip(p_detect, 0.05, 0.99)),
+            clutter_per_scan=float((np.sum(~taken) + 0.5) / data.scans[s]),
+            precision=float(np.clip((taken.sum() + 0.5) / (len(taken) + 1.0), 0.001, 0.999)),
+            score_precision=fit_precision(data.score[s], taken),
+            blind_speed=blind,
+        )
+    return replace(config, sensors=sensors, motion=motion, size=size)
+
+
+def _thinned(data: TrackedDetections) -> TrackedDetections:
+    """Keep one detection of each track and sensor in each period."""
+    period = np.floor(data.t / _PERIOD_S + 1e-6).astype(np.int64)
+    first = np.unique(np.column_stack([data.track, data.sensor, period]), axis=0, return_index=True)[1]
+    rows = np.sort(first)
+    return replace(data, t=data.t[rows], track=data.track[rows], sensor=data.sensor[rows], box=data.box[rows])
+
+
+def _fit_noise_and_motion(
+    config: Config, data: TrackedDetections, start: IntArray
+) -> tuple[FloatArray, MotionConfig]:
+    """Maximise the innovation likelihood over σ and ρ (S, 2) of every sensor and the motion model."""
+    side = data.box[:, 2:]
+    z = np.ascontiguousarray((data.box[:, :2] + 0.5 * side).T)
+    size = np.sqrt(side.prod(axis=1))
+    known = [config.sensors[name] for name in config.sensor_names]
+    rho = [max(np.sqrt(s.rho_x * s.rho_y), 0.005) for s in known]
+    m = config.motion
+    typical = float(np.median(size))
+    first = np.log(
+        [
+            *(max(s.sigma_px, 0.3) for s in known),
+            *rho,
+            m.jerk_per_size + m.jerk_px / typical + 1e-3,
+            (m.velocity_std_per_size + m.velocity_std_px / typical + 1e-3) / VELOCITY_RESERVE,
+            m.acceleration_std_per_size + m.acceleration_std_px / typical + 1e-3,
+        ]
+    )
+    n = len(known)
+
+    def loss(log_parameters: FloatArray) -> float:
+        p = np.exp(np.clip(log_parameters, -8.0, 8.0))
+        sigma2, rho2 = p[:n][data.sensor] ** 2, p[n : 2 * n][data.sensor] ** 2
+        total = 0.02 * float(np.sum((log_parameters - first) ** 2))
+        for axis in range(2):
+            R = sigma2 + rho2 * side[:, axis] ** 2
+            total += innovation_loss(data.t, z[axis], R, size, start, p[-3], p[-2], p[-1])
+        return total
+
+    found = _minimise(loss, first, 0.5)
+    p = np.exp(np.clip(found, -8.0, 8.0))
+    motion = replace(
+        config.motion,
+        jerk_px=0.0,
+        jerk_per_size=float(p[-3]),
+        velocity_std_px=0.0,
+        velocity_std_per_size=float(VELOCITY_RESERVE * p[-2]),
+        acceleration_std_px=1e-3,
+        acceleration_std_per_size=float(p[-1]),
+    )
+    return np.column_stack([p[:n], np.minimum(p[n : 2 * n], 1.0)]), motion
+
+
+def _fit_size_noise(
+    config: Config, data: TrackedDetections, start: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Noise (S, 2) of ln width and ln height of every sensor, and the measured logarithms (K, 2)."""
+    log_size = np.log(data.box[:, 2:])
+    known = [config.sensors[name] for name in config.sensor_names]
+    out = np.empty((len(known), 2))
+    for axis in range(2):
+        z = np.ascontiguousarray(log_size[:, axis])
+        noise = [s.sigma_log_width if axis == 0 else s.sigma_log_height for s in known]
+        first = np.log([*noise, config.size.rate_density + 1e-3, config.size.rate_std + 1e-3])
+
+        def loss(log_parameters: FloatArray, z: FloatArray = z, first: FloatArray = first) -> float:
+            p = np.exp(np.clip(log_parameters, -8.0, 4.0))
+            pull = 0.02 * float(np.sum((log_parameters - first) ** 2))
+            return float(size_loss(data.t, z, p[data.sensor] ** 2, start, p[-2], p[-1])) + pull
+
+        out[:, axis] = np.exp(_minimise(loss, first, 0.5))[: len(known)]
+    return out, log_size
+
+
+def _minimise(loss: Callable[[FloatArray], float], first: FloatArray, step: float) -> FloatArray:
+    simplex = np.vstack([first, first + step * np.eye(len(first))])
+    options: Any = {
+        "xatol": 1e-2,
+        "fatol": 1e-1,
+        "maxfev": 250 * len(first),
+        "adaptive": True,
+        "initial_simplex": simplex,
+    }
+    return np.asarray(minimize(loss, first, method="Nelder-Mead", options=options).x)

@@ -1,0 +1,42 @@
+"""Rounding of calibrated numbers to what the data can say, so that configuration files read well."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import Any
+
+from jeat_graph.config import Config
+
+_DIGITS = 4
+
+
+def rounded(config: Config, digits: int = _DIGITS) -> Config:
+    """Round every number of the sensors, motion, size and birth sections to significant digits.
+
+    Args:
+        config: any.
+        digits: significant digits kept.
+    """
+    sensors = {name: _section(s, digits) for name, s in config.sensors.items()}
+    return replace(
+        config,
+        sensors=sensors,
+        motion=_section(config.motion, digits),
+        size=_section(config.size, digits),
+        birth=_section(config.birth, digits),
+    )
+
+
+def _section(section: Any, digits: int) -> Any:
+    values = {f.name: _value(getattr(section, f.name), digits) for f in fields(section)}
+    # Scores may crowd near 1; the knots are rounded where they are made, and stay apart.
+    values.pop("score_precision", None)
+    return replace(section, **values)
+
+
+def _value(value: Any, digits: int) -> Any:
+    if isinstance(value, float):
+        return float(f"{value:.{digits}g}")
+    if isinstance(value, tuple):
+        return tuple(_value(v, digits) for v in value)
+    return value

@@ -1,0 +1,243 @@
+"""Second stage of calibration: what matched detections cannot tell is chosen by tracking.
+
+How far a sensor's evidence may be believed (tempering), when a track is confirmed, how long it is reported
+without an update: these depend on how detections err *together*, over time and between sensors, so no
+statistic of single detections gives them. A coordinate search over short grids maximises (MOTA + IDF1 +
+HOTA) / 3. Each candidate is judged together with its neighbours on the grid, since the middle of a plateau
+holds on other data better than the top of a peak does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from jeat_graph.config import Config
+from jeat_graph.detections import Detections
+from jeat_graph.errors import DataError
+from jeat_graph.eval.metrics import evaluate
+from jeat_graph.tracker import track
+from jeat_graph.trajectories import GroundTruth
+
+Recording = tuple[Detections, GroundTruth]
+
+_TEMPERING = (0.07, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.55, 0.75, 1.0)
+# A neighbour on the grid counts half as much as the candidate itself.
+_NEIGHBOUR_WEIGHT = 0.5
+# What a change must gain (per cent) to be made: less than this is chance.
+_LEAST_GAIN = 0.05
+
+
+@dataclass(frozen=True)
+class Knob:
+    """One setting that is chosen by tracking.
+
+    Attributes:
+        name: what is set.
+        values: candidates, in order.
+        apply: config and value → config.
+        ordered: whether neighbours in `values` are alike, so that their scores support each other.
+    """
+
+    name: str
+    values: tuple[float, ...]
+    apply: Callable[[Config, float], Config]
+    ordered: bool = True
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What the search chose for one setting.
+
+    Attributes:
+        name: the setting.
+        value: chosen.
+        score: (MOTA + IDF1 + HOTA) / 3 with it, at that moment of the search (per cent).
+    """
+
+    name: str
+    value: float
+    score: float
+
+
+def tune(
+    config: Config,
+    recordings: Sequence[Recording],
+    *,
+    passes: int = 2,
+    max_scans: int = 6000,
+    progress: Callable[[str], None] | None = None,
+) -> tuple[Config, tuple[Choice, ...]]:
+    """Choose the settings of `knobs` by tracking recordings with known truth.
+
+    Args:
+        config: calibrated from matched detections; where the search starts.
+        recordings: detections and truth; their metrics are pooled.
+        passes: how often all settings are gone through.
+        max_scans: recordings are cut so that they hold about this many scans in all.
+        progress: called with the name of each setting when it is done.
+
+    Returns:
+        The configuration, and the last choice made for each setting.
+
+    Raises:
+        DataError: no recording.
+    """
+    if not recordings:
+        raise DataError("tuning needs at least one recording with truth")
+    short = shorten(recordings, max_scans)
+    known: dict[str, float] = {}
+
+    def judge(candidate: Config) -> float:
+        key = repr(candidate)
+        if key not in known:
+            known[key] = tracking_score(candidate, short)
+        return known[key]
+
+    chosen: dict[str, Choice] = {}
+    for _ in range(passes):
+        before = config
+        for knob in knobs(config):
+            config, choice = _turn(knob, config, judge)
+            if choice is not None:
+                chosen[knob.name] = choice
+            if progress is not None:
+                progress(knob.name)
+        if config == before:
+            break
+    return config, tuple(chosen.values())
+
+
+def tracking_score(config: Config, recordings: Sequence[Recording]) -> float:
+    """Mean of MOTA, IDF1 and HOTA (per cent), pooled over recordings tracked with `config`."""
+    pairs = [(truth, track(config, detections)) for detections, truth in recordings]
+    instants = [np.unique(detections.scan_t) for detections, _ in recordings]
+    scores = evaluate(pairs, instants=instants)
+    return float(scores.MOTA + scores.IDF1 + scores.HOTA) / 3.0
+
+
+def knobs(config: Config) -> list[Knob]:
+    """List the settings that are tuned, those first on which most depends.
+
+    Args:
+        config: names the sensors and their rates.
+    """
+    period = 1.0 / min(s.rate_hz for s in config.sensors.values())
+    out = [
+        Knob(
+            "output.max_gap_s",
+            # Half a period: only what was updated just now. Units of the slowest sensor's period.
+            tuple(round(f * period, 4) for f in (0.5, 1.5, 3.0)),
+            lambda c, v: replace(c, output=replace(c.output, max_gap_s=v)),
+            ordered=False,
+        ),
+        Knob("tempering", _TEMPERING, _temper_all),
+        Knob(
+            "standing.enabled",
+            (1.0, 0.0),
+            lambda c, v: replace(c, standing=replace(c.standing, enabled=bool(v))),
+            ordered=False,
+        ),
+        Knob(
+            "lifecycle.confirm_existence",
+            (0.3, 0.5, 0.7, 0.85, 0.95),
+            lambda c, v: replace(c, lifecycle=replace(c.lifecycle, confirm_existence=v)),
+        ),
+        Knob(
+            "lifecycle.hidden_prior",
+            (0.0, 0.05, 0.1),
+            lambda c, v: replace(c, lifecycle=replace(c.lifecycle, hidden_prior=v)),
+        ),
+        Knob(
+            "lifecycle.p_detect_weight",
+            (0.02, 0.05, 0.1),
+            lambda c, v: replace(c, lifecycle=replace(c.lifecycle, p_detect_weight=v)),
+        ),
+    ]
+    if len(config.sensors) > 1:
+        out += [Knob(f"sensors.{n}.tempering", _TEMPERING, _temper_one(n)) for n in config.sensor_names]
+    return out
+
+
+def shorten(recordings: Sequence[Recording], max_scans: int) -> list[Recording]:
+    """Keep the first part of each recording, the same share of all, about `max_scans` scans in all."""
+    total = sum(detections.num_scans for detections, _ in recordings)
+    share = max_scans / max(total, 1)
+    if share >= 1.0:
+        return list(recordings)
+    out = []
+    for detections, truth in recordings:
+        scans = max(int(share * detections.num_scans), 1)
+        end = detections.scan_t[scans - 1]
+        rows = int(detections.scan_start[scans])
+        head = replace(
+            detections,
+            scan_t=detections.scan_t[:scans],
+            scan_sensor=detections.scan_sensor[:scans],
+            scan_start=detections.scan_start[: scans + 1],
+            boxes=detections.boxes[:rows],
+            scores=detections.scores[:rows],
+            classes=None if detections.classes is None else detections.classes[:rows],
+        )
+        out.append((head, cut_truth(truth, float(end))))
+    return out
+
+
+def cut_truth(truth: GroundTruth, end: float) -> GroundTruth:
+    """Keep the truth up to the time `end` (s)."""
+    keep = truth.t <= end
+    return GroundTruth(
+        t=truth.t[keep],
+        object_id=truth.object_id[keep],
+        boxes=truth.boxes[keep],
+        motion=None if truth.motion is None else truth.motion[keep],
+        ignore=truth.ignore[keep],
+        classes=None if truth.classes is None else truth.classes[keep],
+        distance=None if truth.distance is None else truth.distance[keep],
+        frames=None if truth.frames is None else truth.frames[truth.frames <= end],
+    )
+
+
+def plateau(scores: Sequence[float]) -> list[float]:
+    """Average each score with its neighbours on the grid, which count half; the ends have one neighbour."""
+    s = np.asarray(scores, dtype=np.float64)
+    total, weight = s.copy(), np.ones(len(s))
+    total[1:] += _NEIGHBOUR_WEIGHT * s[:-1]
+    weight[1:] += _NEIGHBOUR_WEIGHT
+    total[:-1] += _NEIGHBOUR_WEIGHT * s[1:]
+    weight[:-1] += _NEIGHBOUR_WEIGHT
+    return [float(v) for v in total / weight]
+
+
+def _turn(knob: Knob, config: Config, judge: Callable[[Config], float]) -> tuple[Config, Choice | None]:
+    """Choose the best value of one knob; the present setting stays where nothing is clearly better.
+
+    The choice is None where the present setting, kept, is none of the knob's values.
+    """
+    candidates = [knob.apply(config, value) for value in knob.values]
+    scores = [judge(candidate) for candidate in candidates]
+    merit = plateau(scores) if knob.ordered else scores
+    best = int(np.argmax(merit))
+    if config in candidates:
+        here = candidates.index(config)
+        if merit[best] < merit[here] + _LEAST_GAIN:
+            best = here
+    elif merit[best] < judge(config) + _LEAST_GAIN:
+        return config, None
+    return candidates[best], Choice(knob.name, knob.values[best], scores[best])
+
+
+def _temper_all(config: Config, value: float) -> Config:
+    sensors = {name: replace(s, tempering=value) for name, s in config.sensors.items()}
+    return replace(config, sensors=sensors)
+
+
+def _temper_one(name: str) -> Callable[[Config, float], Config]:
+    def apply(config: Config, value: float) -> Config:
+        return replace(
+            config, sensors=config.sensors | {name: replace(config.sensors[name], tempering=value)}
+        )
+
+    return apply

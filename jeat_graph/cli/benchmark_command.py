@@ -1,0 +1,42 @@
+"""`jeat-graph benchmark`: reproduce the tables of accuracy, ablation and speed."""
+
+from __future__ import annotations
+
+import argparse
+from importlib import import_module
+from typing import Any
+
+HELP = "Reproduce the README's tables: accuracy, ablation or speed."
+_KINDS = {
+    "accuracy": "our tracker and others' on simulated and real data",
+    "ablation": "from the paper's tracker to the default, one change a row",
+    "speed": "time per step, against others",
+}
+
+
+class _LateParser(argparse.ArgumentParser):
+    """Imports its benchmark only when it is asked for: the others' libraries need not be there."""
+
+    module_name: str | None = None
+
+    def parse_known_args(self, *args: Any, **kwargs: Any) -> Any:
+        if self.module_name is not None:
+            name, self.module_name = self.module_name, None
+            import_module(name).add_arguments(self)
+        return super().parse_known_args(*args, **kwargs)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the subcommands."""
+    kinds = parser.add_subparsers(
+        dest="kind", metavar="|".join(_KINDS), required=True, parser_class=_LateParser
+    )
+    for name, text in _KINDS.items():
+        sub = kinds.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
+        sub.module_name = f"jeat_graph.benchmark.{name}"
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the benchmark that was asked for."""
+    module = import_module(f"jeat_graph.benchmark.{args.kind}")
+    return int(module.run(args) or 0)

@@ -1,0 +1,197 @@
+"""`jeat-graph calibrate`: estimate a configuration from recordings."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from jeat_graph.errors import ConfigError, DataError
+
+if TYPE_CHECKING:
+    from jeat_graph.calibration.tune import Choice
+    from jeat_graph.config import Config
+    from jeat_graph.detections import Detections
+    from jeat_graph.eval.tables import Cell, Table
+    from jeat_graph.trajectories import GroundTruth
+
+HELP = "Estimate sensors and motion from recordings, with or without truth, and write a configuration."
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add = parser.add_argument
+    add("detections", nargs="+", metavar="DETECTIONS", help="one file a recording; all are pooled")
+    add("--gt", nargs="+", action="extend", metavar="FILE", help="truth of each recording, in the same order")
+    add("--out", required=True, metavar="CONFIG.yaml", help="the configuration to write")
+    add("--config", default="default", metavar="NAME|FILE", help="where all else comes from (default)")
+    add("--image", type=_image_size, metavar="WxH", help="size of the picture in px, say 1280x720")
+    add("--no-tune", action="store_true", help="do not choose the rest by tracking the recordings")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Calibrate, write the configuration, and print what was estimated."""
+    from jeat_graph.config_io import load_config, save_config
+    from jeat_graph.io.detections_io import read_detections
+    from jeat_graph.io.truth_io import read_truth
+
+    if args.gt and len(args.gt) != len(args.detections):
+        raise DataError(
+            f"{len(args.detections)} DETECTIONS and {len(args.gt)} --gt given; give one truth for each"
+        )
+    if Path(args.out).suffix not in (".yaml", ".yml"):
+        raise ConfigError(f"--out {args.out}: the name of a configuration must end in .yaml")
+    base = load_config(args.config)
+    recordings = [read_detections(path) for path in args.detections]
+    base = with_image(base, recordings, args.image)
+    choices: tuple[Choice, ...] = ()
+    if args.gt:
+        truths = [read_truth(path) for path in args.gt]
+        config, choices = _with_truth(list(zip(recordings, truths, strict=True)), base, not args.no_tune)
+    else:
+        config = _without_truth(recordings, base)
+    save_config(config, args.out, comment=describe(args, config, choices))
+    sys.stdout.write("\n".join(table.render("text") for table in summary(config, choices)))
+    print(f"written: {args.out}", file=sys.stderr)
+    return 0
+
+
+def with_image(base: Config, recordings: list[Detections], size: tuple[float, float] | None) -> Config:
+    """Set the size of the picture, or check that the base configuration's fits the boxes.
+
+    Args:
+        base: configuration.
+        recordings: all boxes to be fitted.
+        size: width and height (px), if given.
+
+    Raises:
+        ConfigError: no size is given and boxes lie beyond the base configuration's picture.
+    """
+    from dataclasses import replace
+
+    if size is not None:
+        return replace(base, image=replace(base.image, width=size[0], height=size[1]))
+    right = max((float((d.boxes[:, 0] + d.boxes[:, 2]).max()) for d in recordings if len(d)), default=0.0)
+    bottom = max((float((d.boxes[:, 1] + d.boxes[:, 3]).max()) for d in recordings if len(d)), default=0.0)
+    width, height = base.image.width, base.image.height
+    # Detectors let boxes reach over the edge by a little.
+    if right > 1.1 * width or bottom > 1.1 * height:
+        raise ConfigError(
+            f"boxes reach to {right:g}, {bottom:g} px, beyond the {width:g} x {height:g} px of the base "
+            "configuration's picture; give its size as --image WxH"
+        )
+    print(
+        f"picture of {width:g} x {height:g} px, from the base configuration (--image WxH changes it)",
+        file=sys.stderr,
+    )
+    return base
+
+
+def _with_truth(
+    recordings: list[tuple[Detections, GroundTruth]], base: Config, tuned: bool
+) -> tuple[Config, tuple[Choice, ...]]:
+    from tqdm import tqdm
+
+    from jeat_graph.calibration.rounding import rounded
+    from jeat_graph.calibration.supervised import calibrate
+    from jeat_graph.calibration.tune import knobs, tune
+
+    print("estimating sensors and motion from matched detections", file=sys.stderr)
+    config = calibrate(recordings, base)
+    if not tuned:
+        return rounded(config), ()
+    passes = 2
+    with tqdm(
+        total=passes * len(knobs(config)), desc="tuning", unit="setting", disable=None, file=sys.stderr
+    ) as bar:
+
+        def advance(line: str) -> None:
+            bar.set_postfix_str(line, refresh=False)
+            bar.update()
+
+        config, choices = tune(config, recordings, passes=passes, progress=advance)
+    return rounded(config), choices
+
+
+def _without_truth(recordings: list[Detections], base: Config) -> Config:
+    from jeat_graph.calibration.blind import calibrate_blind
+    from jeat_graph.calibration.rounding import rounded
+
+    print("no --gt: what confirmed tracks take in is believed to be true", file=sys.stderr)
+    return rounded(calibrate_blind(recordings, base))
+
+
+def describe(args: argparse.Namespace, config: Config, choices: tuple[Choice, ...]) -> str:
+    """Comment at the head of the file: where each part comes from."""
+    from jeat_graph.version import __version__
+
+    names = ", ".join(Path(p).parent.name + "/" + Path(p).name for p in args.detections)
+    lines = [f"Made by jeat-graph calibrate {__version__} from {len(args.detections)} recording(s):", names]
+    if args.gt:
+        lines += [
+            "sensors (but tempering), motion, size, births: from detections matched with the truth.",
+            "chosen by tracking these recordings: " + ", ".join(c.name for c in choices) + "."
+            if choices
+            else "tempering, lifecycle and output: not tuned (--no-tune), as in the base configuration.",
+        ]
+    else:
+        lines += [
+            "sensors (but tempering), motion, size: without truth, from innovations of confirmed tracks.",
+            "bias is unknown without truth and set to zero; p_detect and precision are upper bounds.",
+        ]
+    picture = "--image" if args.image else f"the base configuration {Path(args.config).name}"
+    lines += [f"image: from {picture}; all else from the base configuration {Path(args.config).name}."]
+    return "\n".join(lines)
+
+
+def summary(config: Config, choices: tuple[Choice, ...]) -> list[Table]:
+    """Tables of what was estimated: one row a sensor; motion and size; what tuning chose."""
+    from jeat_graph.eval.tables import Table
+
+    sensors: list[dict[str, Cell]] = [
+        {
+            "sensor": name,
+            "rate_hz": s.rate_hz,
+            "sigma_px": s.sigma_px,
+            "rho_x": s.rho_x,
+            "rho_y": s.rho_y,
+            "sigma_ln_w": s.sigma_log_width,
+            "sigma_ln_h": s.sigma_log_height,
+            "p_detect": s.p_detect,
+            "clutter": s.clutter_per_scan,
+            "precision": s.precision,
+            "blind_px_s": s.blind_speed,
+            "tempering": s.tempering,
+        }
+        for name, s in sorted(config.sensors.items())
+    ]
+    digits = dict.fromkeys(("rho_x", "rho_y", "sigma_ln_w", "sigma_ln_h"), 4)
+    m = config.motion
+    motion: dict[str, Cell] = {
+        "jerk_per_size": m.jerk_per_size,
+        "velocity_std_per_size": m.velocity_std_per_size,
+        "acceleration_std_per_size": m.acceleration_std_per_size,
+        "size_rate_density": config.size.rate_density,
+        "arrivals_hz": config.birth.arrival_rate_hz,
+    }
+    tables = [
+        Table.from_records(sensors, title="Sensors", digits=digits),
+        Table.from_records([motion], title="Motion"),
+    ]
+    if choices:
+        rows: list[dict[str, Cell]] = [
+            {"setting": c.name, "value": c.value, "(MOTA+IDF1+HOTA)/3": c.score} for c in choices
+        ]
+        tables.append(Table.from_records(rows, title="Chosen by tracking", digits={"value": 3}))
+    return tables
+
+
+def _image_size(text: str) -> tuple[float, float]:
+    try:
+        width, height = (float(part) for part in text.lower().split("x"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} must read WIDTHxHEIGHT, say 1280x720") from None
+    if not (0.0 < width < 1e6 and 0.0 < height < 1e6):
+        raise argparse.ArgumentTypeError(f"{text!r}: width and height must be positive")
+    return width, height
