@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import chi2
 
 from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.association.joint import JOINT, SEQUENTIAL, SLOTS
@@ -169,8 +169,8 @@ def kernel_settings(config: Config) -> Settings:
         method={"slots": SLOTS, "joint": JOINT, "sequential": SEQUENTIAL}[c.association.method],
         likelihood=likelihood,
         second_pass=c.association.second_pass and c.association.method != "slots",
-        gate=float(chi2.ppf(c.association.gate_probability, 2)),
-        size_gate=float(chi2.ppf(c.association.gate_probability, 2))
+        gate=_chi2_bound(c.association.gate_probability),
+        size_gate=_chi2_bound(c.association.gate_probability)
         if c.association.size_gate
         else float("inf"),
         unassigned_cost=0.0 if likelihood else _TAKE_ALL,
@@ -195,12 +195,17 @@ def kernel_settings(config: Config) -> Settings:
         birth_max_overlap=c.birth.max_overlap,
         merge=c.merge.enabled,
         merge_min_overlap=c.merge.min_overlap,
-        merge_velocity_gate=float(chi2.ppf(c.merge.gate_probability, 2)),
+        merge_velocity_gate=_chi2_bound(c.merge.gate_probability),
         output_min_existence=c.output.min_existence,
         output_max_gap_s=c.output.max_gap_s,
         output_clip=c.output.clip,
         output_min_visible=c.output.min_visible,
     )
+
+
+def _chi2_bound(probability: float) -> float:
+    """Bound below which a χ² variable of 2 degrees of freedom lies with this probability, −2 ln(1 − p)."""
+    return -2.0 * math.log1p(-probability)
 
 
 def priority_order(config: Config) -> IntArray:
