@@ -71,7 +71,7 @@ build/.wheel: $(SOURCES) $(shell find eval configs -name '*.py' -o -name '*.yaml
 	@echo "make: building the wheel"
 	@$(PIP) build
 	@rm -rf build dist
-	@$(BIN)/python -m build --wheel --outdir dist . > /dev/null
+	@$(BIN)/python -m build --wheel --outdir dist . > $(VENV)/build.log 2>&1 || { cat $(VENV)/build.log; exit 1; }
 	@mkdir -p build && touch $@
 
 build/.installed: build/.wheel
