@@ -27,14 +27,16 @@ def notice_if_cold() -> None:
 
 
 def warm_up() -> None:
-    """Step a tracker of each preset once with one box a sensor, which compiles all it needs."""
+    """Track a vehicle for a second with each preset, smoother included, which compiles all they need."""
     from jeat_graph.config_io import load_config
     from jeat_graph.tracker import Tracker
 
     for preset in ("default", "paper"):
         tracker = Tracker(load_config(preset))
-        for t in (0.0, 0.05):
-            tracker.step([(t, name, [[10.0, 10.0, 20.0, 20.0]], [0.9]) for name in tracker.sensor_names])
+        for k in range(20):
+            box = [100.0 + 5.0 * k, 100.0, 40.0, 30.0]
+            tracker.step([(0.05 * k, name, [box], [0.9]) for name in tracker.sensor_names])
+        tracker.finish()
 
 
 if __name__ == "__main__":

@@ -36,6 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Simulate, track, judge, draw, and say where everything is."""
     from jeat_graph.config_io import load_config
+    from jeat_graph.input_checks import check_detections
     from jeat_graph.io.detections_io import write_detections
     from jeat_graph.io.trajectories_io import read_trajectories
     from jeat_graph.io.truth_io import write_truth
@@ -48,15 +49,16 @@ def run(args: argparse.Namespace) -> int:
     config = load_config(args.config)
     scenario = load_scenario(args.scenario)
     out = Path(args.out)
-    _say(f"simulating {args.duration:g} s of {args.scenario}")
     recording = record(scenario, args.seed, args.duration)
     directory = RunDirectory(out / "run")
+    warnings = check_detections(recording.detections, config, args.scenario)
     source = out / "detections.csv"
     write_detections(recording.detections, source)
     write_truth(recording.truth, out / "gt.csv")
 
-    _say("tracking with both sensors")
-    details = RunRecord(source={"config_name": args.config, "inputs": describe_inputs([source])})
+    _say(f"{args.duration:g} s of {args.scenario} simulated; tracking with both sensors")
+    origin = {"config_name": args.config, "inputs": describe_inputs([source])}
+    details = RunRecord(source=origin, warnings=warnings)
     notice_if_cold()
     with directory:
         write_run(recording.detections, config, directory, details, RunOptions(progress=sys.stderr.isatty()))

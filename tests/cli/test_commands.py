@@ -37,6 +37,7 @@ def test_the_overview_lists_every_command(capsys):
         ["simulate", "night", "--out", "run", "--duration", "-1"],
         ["eval", "nothing", "--gt", "nothing.csv"],
         ["demo", "--scenario", "dawn", "--out", "run"],
+        ["demo", "--duration", "0", "--out", "run"],
         ["demo", "--config", "nothing.yaml", "--out", "run"],
     ],
 )

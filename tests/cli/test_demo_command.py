@@ -97,3 +97,11 @@ def test_a_track_too_short_to_tell_does_not_count_as_standing():
 def test_a_run_without_tracks_has_a_picture_too(tmp_path):
     paths = save_pictures(Trajectories.empty(("rgb",)), Backdrop(640, 480, title="none"), tmp_path / "empty")
     assert [path.name for path in paths] == ["empty.png", "empty.svg"]
+
+
+def test_a_configuration_without_its_sensors_is_refused_before_anything_is_written(tmp_path, fails):
+    config = tmp_path / "radar.yaml"
+    config.write_text("sensors: {radar: {rate_hz: 10}}\n")
+    message = fails("demo", "--config", config, "--out", tmp_path / "demo", *SHORT)
+    assert "sensor 'evt' is not declared (declared: radar)" in message
+    assert not (tmp_path / "demo").exists()
