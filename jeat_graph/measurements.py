@@ -39,12 +39,12 @@ class Measurements(NamedTuple):
 def interpolate(x: float, knots: FloatArray, values: FloatArray) -> float:
     """Interpolate linearly between rising knots (K,), constant beyond the first and the last."""
     if x <= knots[0]:
-        return values[0]
+        return float(values[0])
     for k in range(1, len(knots)):
         if x < knots[k]:
             fraction = (x - knots[k - 1]) / (knots[k] - knots[k - 1])
-            return values[k - 1] + fraction * (values[k] - values[k - 1])
-    return values[-1]
+            return float(values[k - 1] + fraction * (values[k] - values[k - 1]))
+    return float(values[-1])
 
 
 @njit(cache=True)

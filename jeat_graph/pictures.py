@@ -108,7 +108,7 @@ def save_pictures(
     from jeat_graph.io.atomic import atomic_path
 
     mpl.use("Agg")
-    settings = {"svg.hashsalt": "jeat-graph", "font.family": "DejaVu Sans", "path.simplify_threshold": 0.5}
+    settings: Any = {"svg.hashsalt": "jeat-graph", "font.family": "DejaVu Sans"}
     out = []
     with mpl.rc_context(settings):
         figure = draw_run(table, backdrop, theme)

@@ -24,8 +24,8 @@ def report(
         settings: scalars of the configuration.
 
     Returns:
-        Columns of `Trajectories`: t (R,), track_id (R,), boxes (R, 4), existence (R,), mean (R, 6), var (R, 6),
-        used (R,).
+        Columns of `Trajectories`: t (R,), track_id (R,), boxes (R, 4), existence (R,), mean (R, 6),
+        var (R, 6), used (R,).
     """
     boxes = track_boxes(tracks.mean[:num_tracks], tracks.size_mean[:num_tracks])
     width, height = settings.image_width, settings.image_height

@@ -31,8 +31,8 @@ _FIRST_CAPACITY = 64
 class Tracker:
     """Joint tracker of all vehicles over any number of asynchronous sensors (paper algorithm 1).
 
-    Feed it scans in time order. Each step sees only what has arrived: the table it returns is causal. Memory does
-    not grow with time, but for smoothed rows that are not fetched (see `drain_smoothed`).
+    Feed it scans in time order. Each step sees only what has arrived: the table it returns is causal. Memory
+    does not grow with time, but for smoothed rows that are not fetched (see `drain_smoothed`).
 
     Args:
         config: sensors and settings, from `load_config`.
@@ -88,8 +88,8 @@ class Tracker:
         """Take in one scan, or several of one and the same time, which are associated jointly.
 
         Args:
-            scans: a `Scan` or a tuple (t, sensor, boxes (M, 4), scores (M,)), or a sequence of these. A scan that
-                found nothing (M = 0) is information too.
+            scans: a `Scan` or a tuple (t, sensor, boxes (M, 4), scores (M,)), or a sequence of these. A scan
+                that found nothing (M = 0) is information too.
 
         Returns:
             The tracks that are reported now, one row each.
@@ -157,8 +157,8 @@ class Tracker:
 
         Their whole life: the time before confirmation and gaps included, up to the last detection. With a
         fixed lag the rows older than that are final; all others may still change. (The call makes the
-        smoothers take in what they had set aside, so that later values may differ in their last digits from a run
-        without it.)
+        smoothers take in what they had set aside, so that later values may differ in their last digits from a
+        run without it.)
 
         Raises:
             JeatGraphError: the configuration asks for no smoother.

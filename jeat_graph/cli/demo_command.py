@@ -133,13 +133,15 @@ def _draw(recording: Recording, table: Trajectories, stem: Path, scenario: str) 
 
 def _errors(recording: Recording, table: Trajectories, t: float) -> tuple[FloatArray, frozenset[int]]:
     """True boxes (M, 4) at a time of the truth that no track lies on, and tracks that lie on no true box."""
+    import numpy as np
+
     from jeat_graph.eval.matching import match
     from jeat_graph.eval.overlap import pairwise_iou
 
     truth = recording.truth
     now = truth.t == t
     boxes, ignored = truth.boxes[now], truth.ignore[now]
-    tracks = table.take(table.t == table.t[-1] if len(table) else slice(0, 0))
+    tracks = table.take(table.t == table.t.max(initial=-np.inf))
     found = match(pairwise_iou(boxes, tracks.boxes), 0.5)
     missed = [k for k in range(len(boxes)) if not ignored[k] and k not in set(found.tolist())]
     return boxes[missed], frozenset(tracks.track_id[found < 0].tolist())
