@@ -13,6 +13,7 @@ from jeat_graph.benchmark.judging import METRICS, fold_config, in_processes
 from jeat_graph.benchmark.readme import update_readme
 from jeat_graph.benchmark.recordings import DURATION_S, KITTI_SEQUENCES, SCENARIOS, SEEDS, find_kitti
 from jeat_graph.config import Config
+from jeat_graph.config_io import config_from_dict
 from jeat_graph.errors import DataError
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--duration", type=_positive, metavar="S", help=f"of a simulated recording ({DURATION_S:g})")
     add("--quick", action="store_true", help="one seed, 8 s, no real data: to see that it runs")
     add("--jobs", type=_count, metavar="N", help="processes (as many as there are processors)")
+    add("--folds", metavar="JSON", help="take the leave-one-out configurations from an earlier result")
     add("--readme", metavar="FILE", help="renew the tables between the markers of this Markdown file")
     add("--from", dest="source", metavar="JSON", help="render the tables of an earlier result; run nothing")
 
@@ -63,6 +65,11 @@ def kitti_folds(args: argparse.Namespace) -> tuple[Path, dict[str, Config]] | No
         where = args.data or "../shared/data"
         print(f"no KITTI sequences in {where}/kitti: the table on real data is left out", file=sys.stderr)
         return None
+    if args.folds:
+        known = earlier(args.folds, None).get("kitti_configs", {})
+        if set(known) != set(KITTI_SEQUENCES):
+            raise DataError(f"{args.folds}: holds no leave-one-out configurations")
+        return folder, {name: config_from_dict(known[name]) for name in KITTI_SEQUENCES}
     configs = in_processes(
         fold_config, [(folder, name) for name in KITTI_SEQUENCES], args.jobs, "calibrating, one left out"
     )
@@ -132,19 +139,20 @@ def publish(
         print(f"{args.readme}: renewed {', '.join(found) or 'no table: it has no marker'}", file=sys.stderr)
 
 
-def earlier(path: str, name: str) -> dict[str, Any]:
+def earlier(path: str, name: str | None) -> dict[str, Any]:
     """Read the JSON of an earlier benchmark.
 
     Raises:
-        DataError: not a result of this benchmark.
+        DataError: not a result of benchmark `name` (of any, if None).
     """
     try:
         result = json.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
         raise DataError(f"{path}: cannot be read: {error}") from None
-    if not isinstance(result, dict) or result.get("benchmark") != name:
-        raise DataError(f"{path}: is not a result of `jeat-graph benchmark {name}`")
-    return result
+    kind = result.get("benchmark") if isinstance(result, dict) else None
+    if kind is None or name not in (None, kind):
+        raise DataError(f"{path}: is not a result of `jeat-graph benchmark {name or 'accuracy'}`")
+    return dict(result)
 
 
 def _seed(text: str) -> int:

@@ -107,6 +107,8 @@ def tune(
                 progress(knob.name)
         if config == before:
             break
+    if len(config.sensors) > 1:
+        chosen.pop("tempering", None)  # each sensor's own has taken its place
     return config, tuple(chosen.values())
 
 

@@ -1,0 +1,78 @@
+"""The command `jeat-graph calibrate`."""
+
+import pytest
+
+from jeat_graph.cli.main import main
+from jeat_graph.config_io import load_config
+from jeat_graph.io.detections_io import write_detections
+from jeat_graph.io.truth_io import write_truth
+
+
+@pytest.fixture(scope="module")
+def files(recordings, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("recordings")
+    out = []
+    for k, (detections, truth) in enumerate(recordings):
+        paths = folder / f"detections{k}.csv", folder / f"gt{k}.csv"
+        write_detections(detections, paths[0])
+        write_truth(truth, paths[1])
+        out.append(tuple(map(str, paths)))
+    return out
+
+
+def test_with_truth_a_configuration_is_written_that_loads(files, tmp_path, capsys, known):
+    out = tmp_path / "config.yaml"
+    (d0, g0), (d1, g1) = files
+    assert main(["calibrate", d0, d1, "--gt", g0, g1, "--out", str(out), "--no-tune"]) == 0
+    found = load_config(out)
+    assert found.sensors["rgb"].p_detect == pytest.approx(known.P_DETECT, abs=0.02)
+    table = capsys.readouterr().out
+    assert "Sensors" in table
+    assert "jerk_per_size" in table
+    assert "not tuned" in out.read_text().split("sensors:")[0]
+
+
+def test_without_truth_the_head_of_the_file_says_so(files, tmp_path):
+    out = tmp_path / "config.yaml"
+    assert main(["calibrate", files[0][0], "--out", str(out)]) == 0
+    assert "without truth" in out.read_text().split("\nsensors:")[0]
+    assert load_config(out).sensor_names == ("rgb",)
+
+
+def test_the_size_of_the_picture_is_taken_over(files, tmp_path):
+    out = tmp_path / "config.yaml"
+    d, g = files[0]
+    assert main(["calibrate", d, "--gt", g, "--image", "1300x730", "--no-tune", "--out", str(out)]) == 0
+    image = load_config(out).image
+    assert (image.width, image.height) == (1300.0, 730.0)
+
+
+def test_boxes_beyond_the_base_picture_need_a_size(files, tmp_path, capsys):
+    small = tmp_path / "small.yaml"
+    small.write_text("base: default\nimage: {width: 640, height: 360}\n")
+    d, g = files[0]
+    args = ["calibrate", d, "--gt", g, "--config", str(small), "--out", str(tmp_path / "out.yaml")]
+    assert main(args) == 2
+    assert "--image" in capsys.readouterr().err
+    assert not (tmp_path / "out.yaml").exists()
+
+
+@pytest.mark.parametrize(
+    ("extra", "message"),
+    [
+        (["--gt", "a.csv", "b.csv"], "one truth for each"),
+        (["--out", "config.txt"], "must end in .yaml"),
+        (["--config", "defualt"], "did you mean default"),
+    ],
+)
+def test_wrong_use_is_one_line_and_exit_2(files, tmp_path, capsys, extra, message):
+    assert main(["calibrate", files[0][0], "--out", str(tmp_path / "x.yaml"), *extra]) == 2
+    err = capsys.readouterr().err.strip()
+    assert message in err
+    assert len(err.splitlines()) == 1
+
+
+def test_size_of_the_picture_must_read_width_x_height(files, tmp_path):
+    with pytest.raises(SystemExit) as stop:
+        main(["calibrate", files[0][0], "--image", "large", "--out", str(tmp_path / "x.yaml")])
+    assert stop.value.code == 2

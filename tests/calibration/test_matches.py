@@ -1,0 +1,67 @@
+"""Detections are matched with the truth at their own time."""
+
+import numpy as np
+import pytest
+
+from jeat_graph.calibration.matches import match_sensor
+from jeat_graph.detections import Detections, Scan
+from jeat_graph.errors import DataError
+from jeat_graph.trajectories import GroundTruth
+
+
+def truth(rows, ignore=()):
+    t, ids, boxes = zip(*rows, strict=True)
+    return GroundTruth(
+        t=np.array(t, dtype=float),
+        object_id=np.array(ids),
+        boxes=np.array(boxes, dtype=float),
+        motion=None,
+        ignore=np.isin(np.arange(len(t)), ignore),
+    )
+
+
+def scans(*items):
+    return Detections.from_scans(
+        Scan(t, "rgb", np.array(boxes, dtype=float).reshape(-1, 4), np.full(len(boxes), 0.5))
+        for t, boxes in items
+    )
+
+
+def test_truth_is_interpolated_to_the_time_of_a_scan_between_frames():
+    g = truth([(0.0, 1, (0, 0, 40, 40)), (0.1, 1, (20, 0, 40, 40))])
+    m = match_sensor(scans((0.05, [(10, 0, 40, 40)])), g, "rgb")
+    np.testing.assert_allclose(m.residual, 0.0, atol=1e-12)
+    np.testing.assert_allclose(m.speed, 200.0)
+
+
+def test_residuals_are_in_units_of_the_true_box():
+    g = truth([(0.0, 1, (0, 0, 40, 20))])
+    m = match_sensor(scans((0.0, [(4, 1, 40, 20)])), g, "rgb")
+    np.testing.assert_allclose(m.residual, [[0.1, 0.05, 0.0, 0.0]], atol=1e-12)
+
+
+def test_a_detection_on_an_ignored_box_counts_neither_way():
+    g = truth([(0.0, 1, (0, 0, 40, 40)), (0.0, 2, (200, 0, 80, 80))], ignore=(1,))
+    m = match_sensor(scans((0.0, [(0, 0, 40, 40), (210, 10, 30, 30)])), g, "rgb")
+    assert m.correct.tolist() == [True]
+    assert m.seen.tolist() == [True]
+
+
+def test_false_boxes_that_repeat_at_one_place_are_counted_as_a_run():
+    g = truth([(k / 10, 1, (0, 0, 40, 40)) for k in range(3)])
+    m = match_sensor(scans(*((k / 10, [(500, 100, 30, 30)]) for k in range(3))), g, "rgb")
+    assert m.run.tolist() == [1, 2, 3]
+    assert m.seen.tolist() == [False, False, False]
+
+
+def test_the_box_behind_another_is_known_to_be_hidden():
+    # The second reaches further down, so it stands nearer; it covers half of the first.
+    g = truth([(0.0, 1, (0, 0, 40, 40)), (0.0, 2, (20, 0, 40, 60))])
+    m = match_sensor(scans((0.0, [])), g, "rgb")
+    np.testing.assert_allclose(np.sort(m.visible), [0.5, 1.0])
+
+
+def test_scans_outside_the_truth_are_not_judged():
+    g = truth([(1.0, 1, (0, 0, 40, 40)), (1.1, 1, (0, 0, 40, 40))])
+    with pytest.raises(DataError, match="'rgb' lies within the time span"):
+        match_sensor(scans((0.0, [(0, 0, 40, 40)]), (5.0, [])), g, "rgb")
