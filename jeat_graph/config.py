@@ -291,6 +291,9 @@ class SmootherConfig:
         metadata={"doc": "full and rts: join the fragments of one vehicle when the recording ends"},
     )
     stitch_max_gap_s: float = number(3.0, "s", "longest time between two fragments of one vehicle")
+    stitch_hidden_s: float = number(
+        0.5, "s", "mean time for which a vehicle is hidden while others are seen", open_low=True
+    )
     stitch_gate_probability: float = number(
         0.9999, "1", "probability mass of the χ² gate within which two fragments agree", 0.5, 1.0 - 1e-12
     )

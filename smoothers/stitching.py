@@ -39,6 +39,9 @@ class FragmentEnds:
         end_size_cov: (N, 2, 2, 2) their covariances.
         jerk: (N,) root spectral density of the jerk at the end (px/s^2.5).
         birth_log_density: (N,) ln of the density with which new vehicles appear in the first state.
+        seen_t: (K,) times at which the sensors saw anything at all (s), ascending, and
+        seen_s: (K,) for how long they had been seeing by then (s). Where the sensors see others, a vehicle
+            is not hidden for long; where they see nothing, its silence says nothing.
     """
 
     start_t: FloatArray
@@ -53,6 +56,21 @@ class FragmentEnds:
     end_size_cov: FloatArray
     jerk: FloatArray
     birth_log_density: FloatArray
+    seen_t: FloatArray
+    seen_s: FloatArray
+
+
+def seeing_time(t: FloatArray, longest_pause_s: float) -> tuple[FloatArray, FloatArray]:
+    """For how long the sensors have been seeing, from the times (M,) of all detections taken, in any order.
+
+    A pause longer than `longest_pause_s` in which nothing at all was detected does not count.
+
+    Returns:
+        (K,) ascending times (s) and (K,) seconds of seeing up to each.
+    """
+    moments = np.unique(t)
+    steps = np.diff(moments, prepend=moments[:1])
+    return moments, np.cumsum(np.where(steps <= longest_pause_s, steps, 0.0))
 
 
 def candidate_pairs(ends: FragmentEnds, max_gap_s: float) -> tuple[IntArray, IntArray]:
@@ -102,7 +120,9 @@ def pair_scores(
     return d2, log_density - ends.birth_log_density[second]
 
 
-def link(ends: FragmentEnds, *, max_gap_s: float, gate: float, size_density: float) -> IntArray:
+def link(
+    ends: FragmentEnds, *, max_gap_s: float, gate: float, size_density: float, hidden_s: float = np.inf
+) -> IntArray:
     """Choose which fragments continue which, by one assignment of greatest total likelihood.
 
     Args:
@@ -110,6 +130,7 @@ def link(ends: FragmentEnds, *, max_gap_s: float, gate: float, size_density: flo
         max_gap_s: longest time between two fragments of one vehicle (s).
         gate: bound on a pair's squared distance.
         size_density: root spectral density of the rate of ln size (1/s^1.5).
+        hidden_s: mean time for which a vehicle is hidden while the sensors see others (s).
 
     Returns:
         (N,) the fragment that each continues, or -1. Each is continued by one at most.
@@ -124,6 +145,8 @@ def link(ends: FragmentEnds, *, max_gap_s: float, gate: float, size_density: flo
     if not len(first):
         return before
     d2, ratio = pair_scores(ends, first, second, size_density)
+    seen = np.interp(ends.start_t[second], ends.seen_t, ends.seen_s)
+    ratio -= (seen - np.interp(ends.end_t[first], ends.seen_t, ends.seen_s)) / hidden_s
     keep = (d2 <= gate) & (ratio > 0.0)
     first, second, ratio = first[keep], second[keep], ratio[keep]
     if not len(first):

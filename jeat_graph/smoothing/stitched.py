@@ -10,11 +10,14 @@ from jeat_graph.arrays import FloatArray
 from jeat_graph.config import Config
 from jeat_graph.smoothers.rts import smooth_rts_batch
 from jeat_graph.smoothers.size import SmoothedSize
-from jeat_graph.smoothers.stitching import FREEDOM, FragmentEnds, link
+from jeat_graph.smoothers.stitching import FREEDOM, FragmentEnds, link, seeing_time
 from jeat_graph.smoothers.track_data import SmoothedTrack
 from jeat_graph.smoothing.history import COLUMN, TrackHistory, size_prior_of, track_data
 from jeat_graph.smoothing.looks import Looks
 from jeat_graph.smoothing.sizes import SizeWindow
+
+# Longer than this without any detection of any track, and the sensors are taken to be blind.
+_LONGEST_PAUSE_S = 0.2
 
 
 def stitch_histories(
@@ -39,6 +42,7 @@ def stitch_histories(
         max_gap_s=config.smoother.stitch_max_gap_s,
         gate=float(chi2.ppf(config.smoother.stitch_gate_probability, FREEDOM)),
         size_density=config.size.rate_density,
+        hidden_s=config.smoother.stitch_hidden_s,
     )
     after = {int(a): b for b, a in enumerate(before.tolist()) if a >= 0}
     joined = []
@@ -56,6 +60,7 @@ def fragment_ends(histories: Sequence[TrackHistory], config: Config) -> Fragment
     wholes = [history.whole() for history in histories]
     paths = smooth_rts_batch([track_data(rows) for rows in wholes])
     sizes = [_smooth_sizes(rows, config.size.rate_density) for rows in wholes]
+    seen_t, seen_s = seeing_time(np.concatenate([rows[:, 0] for rows in wholes]), _LONGEST_PAUSE_S)
     start_mean = np.stack([path.mean[0] for path in paths])
     start_size = np.stack([size.mean[0, :, 0] for size in sizes])
     return FragmentEnds(
@@ -71,6 +76,8 @@ def fragment_ends(histories: Sequence[TrackHistory], config: Config) -> Fragment
         end_size_cov=np.stack([size.cov[-1] for size in sizes]),
         jerk=np.array([_typical_jerk(path) for path in paths]),
         birth_log_density=_birth_log_density(wholes, start_mean, config),
+        seen_t=seen_t,
+        seen_s=seen_s,
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from jeat_graph.smoothers.stitching import FragmentEnds, candidate_pairs, link, pair_scores
+from jeat_graph.smoothers.stitching import FragmentEnds, candidate_pairs, link, pair_scores, seeing_time
 
 from .conftest import noise, transition
 
@@ -39,6 +39,8 @@ def fragments(starts, ends, rng, spread=20.0):
         end_size_cov=0.1 * cov(2),
         jerk=rng.uniform(5.0, 20.0, n),
         birth_log_density=np.full(n, -30.0),
+        seen_t=np.array([0.0, 10.0]),
+        seen_s=np.array([0.0, 10.0]),
     )
 
 
@@ -109,6 +111,22 @@ def test_a_fragment_is_continued_once_and_continues_one():
 def test_nothing_is_joined_beyond_the_gate():
     ends = fragments([0.0, 1.5], [1.0, 3.0], np.random.default_rng(3))
     assert link(ends, max_gap_s=3.0, gate=1e-6, size_density=DENSITY).tolist() == [-1, -1]
+
+
+def test_a_vehicle_is_not_hidden_for_long_while_others_are_seen():
+    ends = fragments([0.0, 2.5], [1.0, 3.0], np.random.default_rng(2), spread=1.0)
+    _, ratio = pair_scores(ends, np.array([0]), np.array([1]), DENSITY)
+    link_with = {
+        hidden: link(ends, max_gap_s=3.0, gate=1e9, size_density=DENSITY, hidden_s=hidden)[1]
+        for hidden in (1.6 / ratio[0], 1.4 / ratio[0])
+    }
+    assert list(link_with.values()) == [0, -1]
+
+
+def test_time_in_which_nothing_is_seen_does_not_count():
+    t, seen = seeing_time(np.array([0.0, 0.1, 0.2, 1.2, 1.3, 0.1]), 0.2)
+    assert t.tolist() == [0.0, 0.1, 0.2, 1.2, 1.3]
+    assert seen == pytest.approx([0.0, 0.1, 0.2, 0.2, 0.3])
 
 
 def test_no_fragments_no_links():
