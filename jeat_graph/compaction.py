@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any
+
+import numpy.typing as npt
 from numba import njit
 
 from jeat_graph.arrays import IntArray
@@ -47,7 +49,7 @@ def keep_rows(tracks: TrackArrays, rows: IntArray) -> None:
 
 
 @njit(cache=True)
-def _shift(array: np.ndarray, rows: IntArray, first: int) -> None:  # type: ignore[type-arg]
+def _shift(array: npt.NDArray[Any], rows: IntArray, first: int) -> None:
     flat = array.reshape(array.shape[0], -1)
     for k in range(first, len(rows)):
         source = rows[k]

@@ -48,7 +48,7 @@ class UpdateLog(NamedTuple):
     """
 
     rows: FloatArray
-    count: IntArray
+    count: IntArray  # type: ignore[assignment]  # hides tuple.count, which nobody calls
 
 
 def allocate_log(capacity: int) -> UpdateLog:
