@@ -1,0 +1,51 @@
+"""The rows of the ablation lead from the paper's tracker to the default."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from jeat_graph.benchmark.steps import STEPS, rows, start
+from jeat_graph.config_io import load_config
+from jeat_graph.sehn.scenario import load_scenario
+from jeat_graph.sehn.simulate import simulate
+from jeat_graph.tracker import track
+
+
+@pytest.mark.parametrize("target", ["default", "kitti"])
+def test_the_last_row_is_the_target_exactly(target):
+    goal = load_config(target)
+    assert rows(load_config("paper"), goal)[-1][1] == goal
+
+
+def test_the_first_row_is_the_paper_preset():
+    paper, default = load_config("paper"), load_config("default")
+    assert rows(paper, default)[0] == ("paper", start(paper, default))
+    assert start(paper, default) == paper
+
+
+def test_sensors_that_the_paper_does_not_know_get_its_rgb_constants():
+    kitti = load_config("kitti")
+    first = start(load_config("paper"), kitti)
+    assert first.image == kitti.image
+    assert first.sensors["lidar"] == replace(load_config("paper").sensors["rgb"], rate_hz=10.0)
+
+
+def test_every_step_changes_something():
+    configs = [config for _, config in rows(load_config("paper"), load_config("default"))]
+    assert len(configs) == len(STEPS) + 1
+    assert all(a != b for a, b in pairwise(configs))
+
+
+def test_before_the_last_step_all_that_it_takes_is_still_to_come():
+    # Nothing is left over for the last row to take silently: its own keys make the whole difference.
+    paper, goal = load_config("paper"), load_config("default")
+    before = rows(paper, goal)[-2][1]
+    assert replace(before, standing=goal.standing) == goal
+
+
+def test_all_rows_track():
+    detections, _ = simulate(load_scenario("day"), seed=0, duration_s=1.0)
+    for _, config in rows(load_config("paper"), load_config("default")):
+        assert np.isfinite(track(config, detections).boxes).all()
