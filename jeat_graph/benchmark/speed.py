@@ -104,23 +104,14 @@ def _start_up(args: argparse.Namespace) -> dict[str, float]:
 def _real_time(args: argparse.Namespace) -> list[dict[str, Any]]:
     duration = 1.0 if args.quick else 5.0
     vehicles = VEHICLES[:1] if args.quick else VEHICLES
-    work = [(num, engine) for num in vehicles for engine in ENGINES]
-    return [
-        {
-            "vehicles": num,
-            "smoother": engine,
-            "times_real_time": ask(
-                {
-                    "job": "real_time",
-                    "objects": num,
-                    "engine": engine,
-                    "duration": duration,
-                    "clock": args.clock,
-                }
-            ),
-        }
-        for num, engine in tqdm(work, desc="real time", disable=not sys.stderr.isatty())
-    ]
+    rows = []
+    for num in tqdm(vehicles, desc="real time", disable=not sys.stderr.isatty()):
+        job = {"objects": num, "engines": list(ENGINES), "duration": duration, "clock": args.clock}
+        rows += [
+            {"vehicles": num, "smoother": engine, "times_real_time": factor}
+            for engine, factor in ask({"job": "real_time", **job}).items()
+        ]
+    return rows
 
 
 def _tables(result: dict[str, Any]) -> str:

@@ -98,12 +98,15 @@ def start_up() -> dict[str, float]:
     }
 
 
-def real_time(objects: int, engine: str, duration: float, clock: str) -> float:
-    """`speed_timing.real_time_factor`, after a run that compiles all."""
+def real_time(objects: int, engines: list[str], duration: float, clock: str) -> dict[str, float]:
+    """`speed_timing.real_time_factor` of each engine, each after a short run that loads what it needs."""
     from jeat_graph.benchmark.speed_timing import real_time_factor
 
-    real_time_factor(3, engine, 1.0)
-    return real_time_factor(objects, engine, duration, clock=clock)
+    out = {}
+    for engine in engines:
+        real_time_factor(3, engine, 1.0)
+        out[engine] = real_time_factor(objects, engine, duration, clock=clock)
+    return out
 
 
 def endurance(scans: int, objects: int) -> dict[str, Any]:
