@@ -452,7 +452,10 @@ def learn_scene(
     Clutter is what probably was no vehicle; P_D the share of the looks at confirmed tracks, each weighed by how
     visible the track was, that found them.
     """
-    scene.undetected[0] += settings.arrival_rate * dt
+    # However long nobody looked, those who arrived have left again after their time in the picture.
+    expected = scene.undetected[0] + settings.arrival_rate * dt
+    most = settings.arrival_rate * settings.lifetime_s
+    scene.undetected[0] = max(scene.undetected[0], min(expected, most))
     if settings.scene_memory_s <= 0.0:
         return
     for s in range(len(present)):
