@@ -145,7 +145,8 @@ def collect_samples(
     """
     frames = build_frames(truth, smoothed, kind="smoothed")
     matched = matched_errors(frames, iou=iou)
-    assert matched is not None and truth.motion is not None
+    assert matched is not None
+    assert truth.motion is not None
     entry, row = matched.track_entry, frames.truth_row[matched.truth_entry]
     whole = ~matched.truncated
     identity, row = frames.tracks.track_id[entry][whole], row[whole]
@@ -348,5 +349,3 @@ def _disagreement(filtered: States, full: States) -> FloatArray:
     ratio = np.where(known, squared / np.where(known, gained, 1.0), np.nan)
     both = known.all(axis=1)
     return np.asarray(np.where(both, np.where(known, ratio, 0.0).mean(axis=1), np.nan))
-
-

@@ -15,7 +15,12 @@ from jeat_graph.smoothers.track_data import COINCIDENT_S, TrackData
 
 @dataclass(frozen=True, eq=False)
 class States:
-    """States of one track at T times: means (T, 2, 3) per axis [p, v, a] in px and s, covariances (T, 2, 3, 3)."""
+    """States of one track at T times.
+
+    Attributes:
+        mean: (T, 2, 3) per axis [p, v, a] (px, px/s, px/s²).
+        cov: (T, 2, 3, 3) covariances.
+    """
 
     mean: FloatArray
     cov: FloatArray

@@ -21,6 +21,7 @@ from jeat_graph.trajectories import Trajectories
 from jeat_graph.update_log import allocate_log
 
 if TYPE_CHECKING:
+    from jeat_graph.smoothing.history import TrackHistory
     from jeat_graph.smoothing.online import TrackSmoothers
 
 ScanLike: TypeAlias = Scan | tuple[float, str, npt.ArrayLike, npt.ArrayLike]
@@ -192,6 +193,14 @@ class Tracker:
         """How the smoothers fared: tracks, rebuilds, fallbacks, late measurements, joints; {} without one."""
         names = ("tracks", "rebuilds", "fallbacks", "too_late", "stitched")
         return {name: getattr(self._smoothers, name) for name in names} if self._smoothers else {}
+
+    def confirmed_histories(self) -> list[TrackHistory]:
+        """Return what the confirmed tracks took in so far; for engines that keep it (full and rts, stitching).
+
+        Raises:
+            JeatGraphError: the configuration asks for no smoother.
+        """
+        return self._wanted_smoothers().confirmed_histories()
 
     def _wanted_smoothers(self) -> TrackSmoothers:
         if self._smoothers is None:

@@ -1,0 +1,68 @@
+"""`jeat-graph compare` from files to files."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from jeat_graph.cli.main import main
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("compare")
+    assert main(["simulate", "day-sparse", "--out", str(path / "sim"), "--duration", "3", "--seed", "1"]) == 0
+    detections = str(path / "sim" / "detections.csv")
+    assert main(["track", detections, "--out", str(path / "run"), "--smoother", "rts"]) == 0
+    return path
+
+
+def test_it_prints_tables_and_writes_json_and_pictures(folder, capsys):
+    truth = str(folder / "sim" / "gt.csv")
+    assert main(["compare", str(folder / "run"), "--gt", truth, "--out", str(folder / "out")]) == 0
+    shown = capsys.readouterr().out
+    assert "lag 0.5 s" in shown
+    assert "innovation autocorrelation" in shown
+    values = json.loads((folder / "out" / "compare.json").read_text())
+    assert values["errors"]["full"]["velocity_rmse"] < values["errors"]["filter"]["velocity_rmse"]
+    for name in ("trajectories", "error-over-time", "rmse-against-lag"):
+        assert (folder / "out" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+        assert b"<svg" in (folder / "out" / f"{name}.svg").read_bytes()
+
+
+def test_without_truth_it_judges_consistency(folder, capsys):
+    assert main(["compare", str(folder / "run"), "--out", str(folder / "plain")]) == 0
+    assert "NIS" in capsys.readouterr().out
+    assert sorted(p.name for p in (folder / "plain").iterdir()) == ["compare.json"]
+
+
+def test_the_same_run_gives_the_same_bytes(folder):
+    truth = str(folder / "sim" / "gt.csv")
+    for out in ("a", "b"):
+        assert main(["compare", str(folder / "run"), "--gt", truth, "--out", str(folder / out)]) == 0
+    for path in sorted((folder / "a").iterdir()):
+        assert path.read_bytes() == (folder / "b" / path.name).read_bytes(), path.name
+
+
+def test_an_input_that_has_changed_is_refused(folder, tmp_path, capsys):
+    moved = tmp_path / "detections.csv"
+    moved.write_bytes((folder / "sim" / "detections.csv").read_bytes() + b"2.9999,rgb,1,1,5,5,0.5\n")
+    out = str(tmp_path / "out")
+    assert main(["compare", str(folder / "run"), "--detections", str(moved), "--out", out]) == 2
+    error = capsys.readouterr().err
+    assert "detections.csv" in error
+    assert "has changed since the run" in error
+    assert len(error.strip().splitlines()) == 1
+
+
+def test_inputs_that_have_moved_can_be_named(folder, tmp_path):
+    moved = tmp_path / "elsewhere.csv"
+    moved.write_bytes((folder / "sim" / "detections.csv").read_bytes())
+    out = str(tmp_path / "out")
+    assert main(["compare", str(folder / "run"), "--detections", str(moved), "--out", out, "--no-plots"]) == 0
+
+
+def test_a_folder_that_holds_no_run_is_refused(tmp_path, capsys):
+    assert main(["compare", str(tmp_path)]) == 2
+    assert "run.json" in capsys.readouterr().err
