@@ -7,6 +7,7 @@ import difflib
 import numpy as np
 
 from jeat_graph.config import Config
+from jeat_graph.config_io import load_config, preset_names
 from jeat_graph.detections import Detections
 from jeat_graph.errors import DataError, UnknownSensorError
 
@@ -47,11 +48,13 @@ def _check_sensors(detections: Detections, config: Config, names: str) -> None:
     name = unknown[0]
     near = difflib.get_close_matches(name, config.sensor_names, 1)
     rate = _rate_hz(detections, detections.sensors.index(name))
+    fitting = [p for p in preset_names() if set(detections.sensors) <= load_config(p).sensors.keys()]
     setting = "rate_hz: 20" if rate is None else f"rate_hz: {rate:.3g}"
     raise UnknownSensorError(
         f"{names}: sensor {name!r} is not declared (declared: {', '.join(config.sensor_names)})"
         + (f"; did you mean {near[0]!r}?" if near else ";")
-        + f" declare it with --set 'sensors.{name}={{{setting}}}', or in a file from `jeat-graph calibrate`,"
+        + (f" use --config {fitting[0]}," if fitting else "")
+        + f" declare it with --set 'sensors.{name}={{{setting}}}' or in a file from `jeat-graph calibrate`,"
         + " or rename it with NAME=path"
     )
 

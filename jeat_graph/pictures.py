@@ -160,8 +160,8 @@ def _rows_by_track(table: Trajectories) -> list[IntArray]:
 
 
 def _track_colour(track_id: int, lightness: float) -> tuple[float, float, float]:
-    """Neighbouring identities get hues far apart (multiples of the golden ratio)."""
-    return colorsys.hls_to_rgb((0.08 + track_id * _GOLDEN) % 1.0, lightness, 0.82)
+    """Neighbouring identities get hues far apart (multiples of the golden ratio); red is kept for errors."""
+    return colorsys.hls_to_rgb(0.07 + 0.84 * (track_id * _GOLDEN % 1.0), lightness, 0.82)
 
 
 def _draw_plane(axes: Any, table: Trajectories, backdrop: Backdrop, theme: Theme) -> None:

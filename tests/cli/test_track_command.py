@@ -139,6 +139,11 @@ def test_an_undeclared_sensor_is_refused_with_the_way_to_declare_it(write, tmp_p
     assert main(["track", write(*lines), "--out", str(tmp_path / "run"), "--set", setting]) == 0
 
 
+def test_a_preset_that_declares_the_sensors_is_named(write, tmp_path, fails):
+    lines = [line.replace("rgb", "lidar") for line in STEADY]
+    assert "use --config kitti" in fails("track", write(*lines), "--out", tmp_path / "run")
+
+
 def test_boxes_of_another_picture_are_refused_with_their_extent(write, tmp_path, fails):
     lines = [f"{k * 0.05:.2f},rgb,{1500 + k},800,40,30,0.9" for k in range(20)]
     message = fails("track", write(*lines), "--out", tmp_path / "run")
