@@ -25,6 +25,7 @@ from jeat_graph.calibration.motion import (
     innovation_loss,
     size_loss,
 )
+from jeat_graph.calibration.rates import scan_rate
 from jeat_graph.calibration.sensor import fit_detection, fit_precision
 from jeat_graph.config import Config, MotionConfig, SensorConfig
 from jeat_graph.detections import Detections
@@ -87,23 +88,15 @@ def calibrate_blind(recordings: Sequence[Detections], base: Config, rounds: int 
     names = sorted({name for detections in recordings for name in detections.sensors})
     if not names:
         raise DataError("the recordings hold no scan")
+    # Nothing is known of a sensor that the base does not declare, so its evidence is taken with most caution.
+    new = SensorConfig(tempering=min(s.tempering for s in base.sensors.values()))
     sensors = {
-        name: replace(base.sensors.get(name, SensorConfig()), rate_hz=scan_rate(recordings, name))
-        for name in names
+        name: replace(base.sensors.get(name, new), rate_hz=scan_rate(recordings, name)) for name in names
     }
     config = replace(base, sensors=sensors, association=replace(base.association, priority=()))
     for _ in range(rounds):
         config = _fit(config, follow(recordings, config))
     return config
-
-
-def scan_rate(recordings: Sequence[Detections], sensor: str) -> float:
-    """Rate of a sensor's scans (Hz), from the median step; 20 where there are less than two scans."""
-    steps = [
-        np.diff(d.scan_t[d.scan_sensor == d.sensors.index(sensor)]) for d in recordings if sensor in d.sensors
-    ]
-    every = np.concatenate(steps)
-    return float(1.0 / np.median(every)) if len(every) else 20.0
 
 
 def follow(recordings: Sequence[Detections], config: Config) -> TrackedDetections:

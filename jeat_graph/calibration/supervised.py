@@ -10,6 +10,7 @@ import numpy as np
 from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.calibration.matches import SensorMatches, match_sensor
 from jeat_graph.calibration.motion import fit_motion, fit_size
+from jeat_graph.calibration.rates import scan_rate
 from jeat_graph.calibration.sensor import calibrate_sensor
 from jeat_graph.config import BirthConfig, Config, SensorConfig
 from jeat_graph.detections import Detections
@@ -47,7 +48,8 @@ def calibrate(recordings: Sequence[Recording], base: Config | None = None) -> Co
             if name in detections.sensors
         ]
         matches[name] = SensorMatches.pool(parts)
-        sensors[name] = calibrate_sensor(matches[name], _rate([d for d, _ in recordings], name))
+        found = calibrate_sensor(matches[name], scan_rate([d for d, _ in recordings], name))
+        sensors[name] = replace(found, tempering=_tempering(base, name))
     config = (
         Config(sensors=sensors)
         if base is None
@@ -149,6 +151,15 @@ def measured_tracks(
     )
 
 
+def _tempering(base: Config | None, name: str) -> float:
+    """Tempering cannot be read off single detections: the base's, for a new sensor its most cautious one."""
+    if base is None:
+        return SensorConfig().tempering
+    if name in base.sensors:
+        return base.sensors[name].tempering
+    return min(s.tempering for s in base.sensors.values())
+
+
 def _one_a_period(m: SensorMatches) -> SensorMatches:
     """Keep one correct detection of each object in each period.
 
@@ -161,15 +172,3 @@ def _one_a_period(m: SensorMatches) -> SensorMatches:
     return replace(
         m, key=m.key[rows], t=m.t[rows], box=m.box[rows], residual=m.residual[rows], side=m.side[rows]
     )
-
-
-def _rate(recordings: Sequence[Detections], sensor: str) -> float:
-    """Median rate (Hz) of a sensor's scans."""
-    steps = []
-    for detections in recordings:
-        if sensor in detections.sensors:
-            steps.append(
-                np.diff(detections.scan_t[detections.scan_sensor == detections.sensors.index(sensor)])
-            )
-    every = np.concatenate(steps)
-    return float(1.0 / np.median(every)) if len(every) else 20.0

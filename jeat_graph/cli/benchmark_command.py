@@ -20,6 +20,7 @@ class _LateParser(argparse.ArgumentParser):
     module_name: str | None = None
 
     def parse_known_args(self, *args: Any, **kwargs: Any) -> Any:
+        """Add the arguments, then parse."""
         if self.module_name is not None:
             name, self.module_name = self.module_name, None
             import_module(name).add_arguments(self)

@@ -56,6 +56,13 @@ def test_all_else_is_the_base_configuration(found):
     assert found.image == base.image
 
 
+def test_tempering_is_the_bases_and_the_most_cautious_one_for_a_new_sensor(recordings, known):
+    base = load_config("default", ["sensors.rgb.tempering=0.3", "sensors.evt.tempering=0.2"])
+    assert calibrate(recordings[:1], base).sensors["rgb"].tempering == 0.3
+    radar = known.recording(3, duration_s=5.0, sensor="radar")
+    assert calibrate([radar], base).sensors["radar"].tempering == 0.2
+
+
 def test_no_recording_and_no_match_are_refused(recordings):
     with pytest.raises(DataError, match="no scan"):
         calibrate([])
