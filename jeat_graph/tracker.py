@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 ScanLike: TypeAlias = Scan | tuple[float, str, npt.ArrayLike, npt.ArrayLike]
 
 _FIRST_CAPACITY = 64
+# Thirty years: whatever lived before is over, and powers of a longer step would overflow.
+_LONGEST_STEP_S = 1e9
 
 
 class Tracker:
@@ -128,7 +130,7 @@ class Tracker:
             self._tracks,
             self._num_tracks,
             self._next_id,
-            0.0 if self._t is None else t - self._t,
+            0.0 if self._t is None else min(t - self._t, _LONGEST_STEP_S),
             t,
             boxes,
             scores,

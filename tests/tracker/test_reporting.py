@@ -1,0 +1,95 @@
+"""Which tracks the causal table reports, and as what."""
+
+import numpy as np
+import pytest
+
+from jeat_graph import Tracker, load_config
+
+STEP = 0.05
+
+
+def follow(overrides=(), steps=30, box=(100.0, 100.0, 40.0, 30.0), velocity=(0.0, 0.0), preset="default"):
+    """Track one vehicle with the RGB camera; returns the tracker, the last table and the last time."""
+    tracker = Tracker(load_config(preset, ["smoother.engine=none", *overrides]))
+    for k in range(steps):
+        t = STEP * k
+        moved = np.array([[box[0] + velocity[0] * t, box[1] + velocity[1] * t, box[2], box[3]]])
+        table = tracker.step((t, "rgb", moved, [0.95]))
+    return tracker, table, t
+
+
+def test_a_vehicle_is_reported_with_its_box_state_and_identity():
+    _, table, t = follow(velocity=(40.0, -20.0))
+    assert len(table) == 1
+    assert table.t[0] == t
+    assert table.track_id[0] == 1
+    assert np.allclose(table.boxes[0], [100 + 40 * t, 100 - 20 * t, 40, 30], atol=1.0)
+    assert np.allclose(table.mean[0, :2], table.boxes[0, :2] + table.boxes[0, 2:] / 2, atol=1e-9)
+    assert np.allclose(table.mean[0, 2:4], [40, -20], atol=2.0)
+
+
+def test_one_look_confirms_nothing():
+    _, table, _ = follow(steps=1, overrides=["lifecycle.confirm_existence=1"])
+    assert len(table) == 0
+
+
+def test_a_track_is_reported_until_the_longest_gap_has_passed():
+    for gap, rows in ((0.19, 1), (0.21, 0)):
+        tracker, _, t = follow(["output.max_gap_s=0.2", "output.min_existence=0", "standing.enabled=false"])
+        assert len(tracker.step((t + gap, "evt", [], []))) == rows
+
+
+def test_a_doubted_track_is_not_reported():
+    tracker, table, t = follow(
+        ["output.max_gap_s=9", "lifecycle.max_gap_confirmed_s=9"], velocity=(60.0, 0.0)
+    )
+    existence = table.existence[0]
+    reported = []
+    for k in range(1, 40):
+        table = tracker.step((t + k * STEP, "rgb", [], []))
+        reported.append(len(table))
+        if len(table):
+            assert 0.5 <= table.existence[0] < existence
+            existence = table.existence[0]
+    assert reported[0] == 1
+    assert reported[-1] == 0
+    assert sorted(reported, reverse=True) == reported
+
+
+@pytest.mark.parametrize(
+    ("box", "clipped"),
+    [
+        ((-10.0, 100.0, 60.0, 30.0), (0.0, 100.0, 50.0, 30.0)),
+        ((1240.0, 100.0, 60.0, 30.0), (1240.0, 100.0, 40.0, 30.0)),
+        ((100.0, 705.0, 40.0, 28.0), (100.0, 705.0, 40.0, 15.0)),
+        ((100.0, -10.0, 40.0, 30.0), (100.0, 0.0, 40.0, 20.0)),
+    ],
+)
+def test_boxes_are_clipped_to_the_picture_and_states_are_not(box, clipped):
+    _, table, _ = follow(box=box)
+    assert np.allclose(table.boxes[0], clipped, atol=0.5)
+    assert np.allclose(table.mean[0, :2], [box[0] + box[2] / 2, box[1] + box[3] / 2], atol=0.5)
+
+
+def test_without_clipping_a_box_keeps_its_part_outside_the_picture():
+    box = (-10.0, 100.0, 60.0, 30.0)
+    _, table, _ = follow(["output.clip=false"], box=box)
+    assert np.allclose(table.boxes[0], box, atol=0.5)
+
+
+def test_a_vehicle_of_which_too_little_is_in_the_picture_is_not_reported():
+    inside = (1255.0, 100.0, 40.0, 30.0)  # 25 of its 40 px
+    keep = ["lifecycle.leave_picture=false"]
+    assert len(follow([*keep, "output.min_visible=0.6"], box=inside)[1]) == 1
+    assert len(follow([*keep, "output.min_visible=0.65"], box=inside)[1]) == 0
+
+
+def test_a_track_whose_centre_leaves_the_picture_ends():
+    for leave, alive in (("true", 0), ("false", 1)):
+        tracker, _, _ = follow(
+            [f"lifecycle.leave_picture={leave}"],
+            box=(1230.0, 100.0, 40.0, 30.0),
+            velocity=(100.0, 0.0),
+            steps=10,
+        )
+        assert tracker.num_tracks == alive
