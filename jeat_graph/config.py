@@ -5,6 +5,7 @@ A configuration is a tree of frozen dataclasses. `config_io` reads it from YAML 
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field, fields
 from typing import Any
@@ -81,7 +82,7 @@ class SensorConfig:
         check(self, "sensor.")
         knots = self.score_precision
         ok = len(knots) >= 1 and all(0 <= s <= 1 and 0 <= p <= 1 for s, p in knots)
-        rising = all(b[0] > a[0] and b[1] >= a[1] for a, b in zip(knots, knots[1:], strict=False))
+        rising = all(b[0] > a[0] and b[1] >= a[1] for a, b in itertools.pairwise(knots))
         if not (ok and rising):
             raise ConfigError(
                 "sensor.score_precision: scores must rise, precisions must not fall, all in [0, 1]"
@@ -279,7 +280,7 @@ class SmootherConfig:
     lag_s: float = number(
         1.0, "s", "fixed lag: a state is final once this much time has followed", open_low=True
     )
-    chunk: int = number(24, "1", "fixed lag: measurements of a track per update", low=1)
+    chunk: int = number(48, "1", "fixed lag: measurements of a track per update", low=1)
     robust: str = choice(
         "none",
         ("none", "cauchy", "student-t"),

@@ -1,0 +1,97 @@
+"""Association of one batch with the predicted tracks."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.association.costs import likelihood_cost, log_evidence
+from jeat_graph.association.gating import gated_pairs
+from jeat_graph.association.joint import JOINT, SLOTS, associate_joint, associate_sequential, associate_slots
+from jeat_graph.measurements import Measurements
+from jeat_graph.settings import SensorArrays, Settings
+from jeat_graph.state import SceneArrays, TrackArrays
+
+
+@njit(cache=True)
+def associate(
+    tracks: TrackArrays,
+    n: int,
+    batch: Measurements,
+    noise: FloatArray,
+    p_detect: FloatArray,
+    scene: SceneArrays,
+    sensors: SensorArrays,
+    settings: Settings,
+    priority: IntArray,
+) -> tuple[IntArray, FloatArray]:
+    """Associate a batch with the predicted tracks.
+
+    Returns:
+        match (n, S): detection that each track takes of each sensor, or -1; evidence (n, S): its ln Λ.
+    """
+    num_sensors = len(sensors.sigma_px)
+    rows, cols, d2, log_density, log_size_density = gated_pairs(
+        tracks.mean[:n, :, 0],
+        position_variances(tracks, n),
+        noise,
+        tracks.size_mean[:n, :, 0],
+        size_variances(tracks, n),
+        sensors.size_var,
+        batch.z,
+        batch.log_size,
+        batch.weight,
+        batch.sensor,
+        settings.gate,
+        settings.size_gate,
+    )
+    log_clutter = np.log(scene.clutter) - settings.log_clutter_volume
+    pair_evidence = log_evidence(
+        rows,
+        cols,
+        log_density,
+        log_size_density,
+        p_detect,
+        batch.log_score,
+        log_clutter,
+        batch.sensor,
+    )
+    if settings.likelihood:
+        costs = likelihood_cost(rows, cols, pair_evidence, tracks.existence, p_detect, batch.sensor)
+    else:
+        costs = d2
+    if settings.method == SLOTS:
+        match = associate_slots(n, num_sensors, rows, cols, costs, batch.sensor, settings.unassigned_cost)
+    elif settings.method == JOINT:
+        match = associate_joint(n, num_sensors, rows, cols, costs, batch.sensor, settings.unassigned_cost)
+    else:
+        match = associate_sequential(
+            n, num_sensors, rows, cols, costs, batch.sensor, settings.unassigned_cost, priority
+        )
+    evidence = np.zeros((n, num_sensors))
+    for p in range(len(rows)):
+        s = batch.sensor[cols[p]]
+        if match[rows[p], s] == cols[p]:
+            evidence[rows[p], s] = pair_evidence[p]
+    return match, evidence
+
+
+@njit(cache=True)
+def position_variances(tracks: TrackArrays, n: int) -> FloatArray:
+    """Variances (n, 2) of the predicted centres (px²)."""
+    out = np.empty((n, 2))
+    for i in range(n):
+        for axis in range(2):
+            out[i, axis] = tracks.cov[i, axis, 0, 0]
+    return out
+
+
+@njit(cache=True)
+def size_variances(tracks: TrackArrays, n: int) -> FloatArray:
+    """Variances (n, 2) of the predicted ln width and ln height."""
+    out = np.empty((n, 2))
+    for i in range(n):
+        for side in range(2):
+            out[i, side] = tracks.size_cov[i, side, 0, 0]
+    return out

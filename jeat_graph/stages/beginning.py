@@ -1,0 +1,135 @@
+"""New tracks from detections that no track took."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.association.births import choose_births
+from jeat_graph.filters.noise import base_variance
+from jeat_graph.lifecycle import track_boxes
+from jeat_graph.measurements import Measurements
+from jeat_graph.settings import SensorArrays, Settings
+from jeat_graph.stages.ending import confirm
+from jeat_graph.stages.updating import take
+from jeat_graph.state import SceneArrays, TrackArrays
+from jeat_graph.update_log import UpdateLog, log_birth, log_update, root_jerk
+
+
+@njit(cache=True)
+def give_birth(
+    tracks: TrackArrays,
+    n: int,
+    next_id: int,
+    t: float,
+    batch: Measurements,
+    taken: IntArray,
+    scene: SceneArrays,
+    sensors: SensorArrays,
+    settings: Settings,
+    log: UpdateLog,
+) -> tuple[int, int]:
+    """Start tracks from leftovers; returns the number of tracks and the next identity."""
+    existence = birth_existence(batch, scene, settings)
+    parents, partner = choose_births(
+        batch.boxes,
+        existence,
+        batch.sensor,
+        taken,
+        track_boxes(tracks.mean[:n], tracks.size_mean[:n]),
+        settings.birth_min_existence,
+        settings.birth_max_overlap,
+    )
+    for b in range(len(parents)):
+        start_track(tracks, n + b, next_id + b, t, parents[b], batch, sensors, settings, log)
+        tracks.existence[n + b] = existence[parents[b]]
+        tracks.p_detect[n + b] = scene.p_detect
+        tracks.hidden[n + b] = settings.hidden_prior
+        tracks.hidden[n + b, batch.sensor[parents[b]]] = 0.0
+    for j in range(len(partner)):
+        if partner[j] >= 0:
+            i = n + partner[j]
+            s = batch.sensor[j]
+            R = np.empty(2)
+            for axis in range(2):
+                base = base_variance(sensors.sigma_px[s], sensors.rho[s, axis], batch.boxes[j, 2 + axis])
+                R[axis] = base * batch.weight[j]
+            take(tracks, i, t, j, batch, R, sensors, settings, log)
+            # Two sensors' false boxes seldom coincide: each view's chance to be false remains.
+            tracks.existence[i] = 1.0 - (1.0 - tracks.existence[i]) * (1.0 - batch.precision[j])
+    confirm(tracks, n + len(parents), t, settings)
+    return n + len(parents), next_id + len(parents)
+
+
+@njit(cache=True)
+def birth_existence(batch: Measurements, scene: SceneArrays, settings: Settings) -> FloatArray:
+    """Probability (M,) that a detection which no track took is of a vehicle not tracked before.
+
+    u P_D LR(score) / (u P_D LR(score) + λ): u vehicles in the scene are expected to have no track yet, and most
+    leftovers are clutter however high their score (Williams 2015, the Poisson part of the mixture).
+    """
+    out = np.empty(len(batch.precision))
+    for j in range(len(out)):
+        s = batch.sensor[j]
+        x, y = batch.z[j]
+        if settings.leave_picture and not (
+            0.0 <= x <= settings.image_width and 0.0 <= y <= settings.image_height
+        ):
+            out[j] = -1.0  # it would end in the same step
+            continue
+        true = scene.undetected[0] * scene.p_detect[s] * math.exp(batch.log_score[j])
+        out[j] = true / (true + scene.clutter[s])
+    return out
+
+
+@njit(cache=True)
+def start_track(
+    tracks: TrackArrays,
+    i: int,
+    track_id: int,
+    t: float,
+    j: int,
+    batch: Measurements,
+    sensors: SensorArrays,
+    settings: Settings,
+    log: UpdateLog,
+) -> None:
+    """Fill row `i` with a new track at detection `j`."""
+    s = batch.sensor[j]
+    side = math.sqrt(batch.boxes[j, 2] * batch.boxes[j, 3])
+    tracks.mean[i] = 0.0
+    tracks.cov[i] = 0.0
+    tracks.size_mean[i] = 0.0
+    tracks.size_cov[i] = 0.0
+    for axis in range(2):
+        base = base_variance(sensors.sigma_px[s], sensors.rho[s, axis], batch.boxes[j, 2 + axis])
+        tracks.mean[i, axis, 0] = batch.z[j, axis]
+        tracks.anchor[i, axis] = batch.z[j, axis]
+        tracks.anchor_var[i, axis] = base * batch.weight[j]
+        tracks.cov[i, axis, 0, 0] = base * batch.weight[j]
+        tracks.cov[i, axis, 1, 1] = (settings.velocity_std_px + settings.velocity_std_per_size * side) ** 2
+        tracks.cov[i, axis, 2, 2] = (
+            settings.acceleration_std_px + settings.acceleration_std_per_size * side
+        ) ** 2
+        tracks.size_mean[i, axis, 0] = batch.log_size[j, axis]
+        tracks.size_cov[i, axis, 0, 0] = sensors.size_var[s, axis]
+        tracks.size_cov[i, axis, 1, 1] = settings.size_rate_std**2
+    tracks.anchor_t[i] = t
+    tracks.still_odds[i] = 0.0
+    tracks.standing[i] = False
+    tracks.scale[i] = 1.0
+    tracks.existence[i] = 0.5
+    tracks.confirmed[i] = False
+    tracks.track_id[i] = track_id
+    tracks.hits[i] = 1
+    tracks.t_birth[i] = t
+    tracks.t_update[i] = t
+    tracks.used[i] = 1 << s
+    if len(log.rows) > 0:
+        R = tracks.anchor_var[i]
+        jerk = root_jerk(tracks.size_mean[i], settings.jerk_px, settings.jerk_per_size, 1.0)
+        log_update(log, track_id, s, batch.z[j], R, jerk, batch.log_size[j], sensors.size_var[s])
+        log_birth(log, tracks.cov[i], tracks.size_cov[i])

@@ -1,0 +1,82 @@
+"""Prediction of all tracks to the time of a batch, and what each sensor may then see of them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from jeat_graph.arrays import BoolArray, FloatArray
+from jeat_graph.filters.aekf import predict, predict_size
+from jeat_graph.filters.noise import base_variance
+from jeat_graph.lifecycle import motion_visibility, occluded_fraction, track_boxes, visible_fraction
+from jeat_graph.settings import SensorArrays, Settings
+from jeat_graph.state import TrackArrays
+from jeat_graph.update_log import root_jerk
+
+
+@njit(cache=True)
+def predict_all(tracks: TrackArrays, n: int, dt: float, settings: Settings) -> None:
+    """Predict motion, size and existence of the first `n` tracks by `dt` seconds, in place."""
+    tracks.used[:n] = 0
+    if dt <= 0.0:
+        return
+    jerk = np.empty(n)
+    for i in range(n):
+        side = math.exp(0.5 * (tracks.size_mean[i, 0, 0] + tracks.size_mean[i, 1, 0]))
+        factor = settings.standing_jerk if tracks.standing[i] else 1.0
+        jerk[i] = root_jerk(tracks.size_mean[i], settings.jerk_px, settings.jerk_per_size, factor)
+        drift = settings.standing_drift * side
+        tracks.anchor_var[i] += drift * drift * dt
+    predict(tracks.mean[:n], tracks.cov[:n], jerk, dt)
+    predict_size(tracks.size_mean[:n], tracks.size_cov[:n], settings.size_rate_density, dt)
+    if settings.by_existence:
+        survival = math.exp(-dt / settings.lifetime_s)
+        relax = 1.0 - math.exp(-dt / settings.hidden_memory_s)
+        for i in range(n):
+            tracks.existence[i] *= survival
+            for s in range(tracks.hidden.shape[1]):
+                tracks.hidden[i, s] += relax * (settings.hidden_prior - tracks.hidden[i, s])
+
+
+@njit(cache=True)
+def current_p_detect(
+    tracks: TrackArrays, n: int, present: BoolArray, sensors: SensorArrays, settings: Settings
+) -> FloatArray:
+    """Probability (n, S) that each sensor detects each track now; 0 for sensors that did not look.
+
+    The track's own running P_D times what is known of this moment: the part of the box inside the picture and
+    not hidden by nearer vehicles, and for an event camera the image speed.
+    """
+    out = np.zeros((n, len(present)))
+    boxes = track_boxes(tracks.mean[:n], tracks.size_mean[:n])
+    occluded = occluded_fraction(boxes, tracks.existence[:n])
+    for i in range(n):
+        inside = visible_fraction(boxes[i], settings.image_width, settings.image_height) * (1.0 - occluded[i])
+        for s in range(len(present)):
+            if present[s]:
+                seen = motion_visibility(tracks.mean[i], sensors.blind_speed[s])
+                # A small rest remains: what should be invisible is still taken if it is detected.
+                visible = inside * seen * (1.0 - tracks.hidden[i, s])
+                out[i, s] = tracks.p_detect[i, s] * max(visible, 1e-5)
+    return out
+
+
+@njit(cache=True)
+def detection_variance(tracks: TrackArrays, i: int, s: int, axis: int, sensors: SensorArrays) -> float:
+    """Variance (px²) of a detection of sensor `s` on track `i`, one axis, at weight 1: s · R_base(size)."""
+    side = math.exp(min(tracks.size_mean[i, axis, 0], 12.0))
+    return tracks.scale[i, s] * base_variance(sensors.sigma_px[s], sensors.rho[s, axis], side)
+
+
+@njit(cache=True)
+def track_noise(tracks: TrackArrays, n: int, sensors: SensorArrays) -> FloatArray:
+    """Measurement variances (n, S, 2) of a detection of each sensor on each track, at weight 1 (px²)."""
+    num_sensors = len(sensors.sigma_px)
+    out = np.empty((n, num_sensors, 2))
+    for i in range(n):
+        for s in range(num_sensors):
+            for axis in range(2):
+                out[i, s, axis] = detection_variance(tracks, i, s, axis, sensors)
+    return out
