@@ -94,7 +94,7 @@ def test_drained_rows_and_the_rest_are_the_whole_table_in_order_of_time():
     drained = make_tracker()
     parts = []
     for k, _ in enumerate(drained.run(detections)):
-        if k % 24 == 23:  # as often as steps are handed to the smoothers anyway
+        if k % 48 == 47:  # as often as steps are handed to the smoothers anyway
             parts.append(drained.drain_smoothed())
     assert sum(len(part) for part in parts) > 100
     parts.append(drained.finish())
