@@ -19,7 +19,7 @@ FILTER, LAGGED, FULL, TRUTH = "#d1662b", "#7a6fb0", "#1f6f8b", "#222222"
 MOST_TRACKS = 3
 BIN_S = 0.5
 LONGEST_LINE_S = 0.25
-_STYLE = {
+_STYLE: Any = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,

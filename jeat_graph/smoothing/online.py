@@ -24,7 +24,7 @@ class TrackSmoothers:
 
     Steps are gathered and handed to the smoothers in bulk. Of tentative tracks the measurements are only
     kept; confirmed ones have a smoother, which takes the tentative start first. A track that ends frees all
-    it held. Of merged tracks the survivor keeps its own measurements only.
+    it held. Of merged tracks the survivor keeps its own measurements only: a confirmed one in fifty ends so.
 
     The filter measures the velocity of standing tracks as zero; the smoothers do not. What they share is the
     lower jerk of a standing track.
