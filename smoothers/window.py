@@ -80,7 +80,8 @@ class Window:
             The row that holds it now.
         """
         row = int(np.argmin(np.abs(self.t - t)))
-        if abs(self.t[row] - t) <= COINCIDENT_S:
+        # At large times a microsecond is a few roundings: what lies outside the rows belongs to the nearest.
+        if abs(self.t[row] - t) <= COINCIDENT_S or not self.t[0] < t < self.t[-1]:
             total = self.info[row] + info
             self.z[row] = (self.info[row] * self.z[row] + info * z) / total
             self.info[row] = total

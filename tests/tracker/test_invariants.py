@@ -11,7 +11,7 @@ from jeat_graph.errors import DataError, TimeOrderError, UnknownSensorError
 from jeat_graph.tracker import track
 
 PRESETS = ("default", "paper")
-# Without smoothers: what they make of such tracks is their own tests' matter.
+# Most of this is about the filter; one test below lets the presets' smoothers run as well.
 CONFIGS = {name: load_config(name, ["smoother.engine=none"]) for name in PRESETS}
 SENSORS = CONFIGS["default"].sensor_names
 
@@ -99,6 +99,33 @@ def test_the_same_input_gives_the_same_bytes(preset, recording):
     first, second = (track(CONFIGS[preset], detections) for _ in range(2))
     for name in ("t", "track_id", "boxes", "existence", "mean", "var", "used"):
         assert getattr(first, name).tobytes() == getattr(second, name).tobytes()
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@given(recording=recordings())
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+def test_the_presets_smoothers_take_any_scans_too(preset, recording):
+    tracker = Tracker(load_config(preset))
+    reported = set()
+    for batch in recording:
+        reported |= set(tracker.step(batch).track_id.tolist())
+    table = tracker.finish()
+    for column in (table.boxes, table.mean, table.var, table.existence):
+        assert np.isfinite(column).all()
+    # A table of a certain rate may pass over a track that lived between two of its rows, but it invents none.
+    assert set(table.track_id.tolist()) <= set(range(1, tracker.num_born + 1))
+    assert reported <= set(range(1, tracker.num_born + 1))
+
+
+@pytest.mark.parametrize("epoch", [0.0, 2001000.46, 1.7e9])
+def test_scans_a_microsecond_apart_reach_the_smoother_at_any_epoch(epoch):
+    tracker, t = Tracker(load_config("default")), epoch
+    for k in range(60):
+        t += 0.01 if k % 3 else 1e-6
+        tracker.step((t, "rgb", [[100, 100, 40, 30]], [0.95]))
+    table = tracker.finish()
+    assert len(table) > 0
+    assert np.allclose(table.mean[:, :2], [120, 115], atol=0.1)
 
 
 @pytest.mark.parametrize("preset", PRESETS)
