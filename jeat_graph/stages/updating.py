@@ -140,6 +140,7 @@ def take_second_views(
 
     The distance is that to the track as the first detection has updated it. Entries of `match` are set.
     """
+    leftover = np.flatnonzero(taken == 0)
     for i in range(n):
         first = -1
         for s in range(match.shape[1]):
@@ -152,7 +153,7 @@ def take_second_views(
                 continue
             best = settings.gate
             chosen = -1
-            for j in range(len(taken)):
+            for j in leftover:
                 if taken[j] or batch.sensor[j] != s:
                     continue
                 d2 = 0.0
