@@ -125,5 +125,6 @@ def root_jerk(size_mean: FloatArray, jerk_px: float, jerk_per_size: float, facto
         jerk_per_size: part per px of sqrt(w h) (1/s^2.5).
         factor: 1, or less while the track stands.
     """
-    side = math.exp(0.5 * (size_mean[0, 0] + size_mean[1, 0]))
+    # A runaway extrapolation of a size must not overflow, as in `lifecycle.track_boxes`.
+    side = math.exp(min(0.5 * (size_mean[0, 0] + size_mean[1, 0]), 12.0))
     return (jerk_px + jerk_per_size * side) * factor

@@ -24,7 +24,7 @@ def predict_all(tracks: TrackArrays, n: int, dt: float, settings: Settings) -> N
         return
     jerk = np.empty(n)
     for i in range(n):
-        side = math.exp(0.5 * (tracks.size_mean[i, 0, 0] + tracks.size_mean[i, 1, 0]))
+        side = math.exp(min(0.5 * (tracks.size_mean[i, 0, 0] + tracks.size_mean[i, 1, 0]), 12.0))
         factor = settings.standing_jerk if tracks.standing[i] else 1.0
         jerk[i] = root_jerk(tracks.size_mean[i], settings.jerk_px, settings.jerk_per_size, factor)
         drift = settings.standing_drift * side
