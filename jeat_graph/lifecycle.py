@@ -39,9 +39,9 @@ def existence_after_miss(existence: float, p_detect: float) -> float:
 def hidden_after_miss(hidden: float, p_detect: float) -> float:
     """Probability of being hidden after a scan without a detection: h / (h + (1 − h) (1 − P_D)).
 
-    Misses of one vehicle come in a row: occlusion, blur, standing still before an event camera. With this state, a row
-    of misses soon says "hidden" and no longer "gone" (the two-state visibility of Musicki and Evans, "Joint integrated
-    probabilistic data association", IEEE T-AES 40(3), 2004, per sensor).
+    Misses of one vehicle come in a row: occlusion, blur, standing still before an event camera. With this
+    state, a row of misses soon says "hidden" and no longer "gone" (the two-state visibility of Musicki and
+    Evans, "Joint integrated probabilistic data association", IEEE T-AES 40(3), 2004, per sensor).
 
     Args:
         hidden: h before.
@@ -77,7 +77,7 @@ def visible_fraction(box: FloatArray, width: float, height: float) -> float:
     h = min(box[1] + box[3], height) - max(box[1], 0.0)
     if w <= 0.0 or h <= 0.0:
         return 0.0
-    return w * h / (box[2] * box[3])
+    return float(w * h / (box[2] * box[3]))
 
 
 @njit(cache=True)

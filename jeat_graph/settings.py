@@ -170,9 +170,7 @@ def kernel_settings(config: Config) -> Settings:
         likelihood=likelihood,
         second_pass=c.association.second_pass and c.association.method != "slots",
         gate=_chi2_bound(c.association.gate_probability),
-        size_gate=_chi2_bound(c.association.gate_probability)
-        if c.association.size_gate
-        else float("inf"),
+        size_gate=_chi2_bound(c.association.gate_probability) if c.association.size_gate else float("inf"),
         unassigned_cost=0.0 if likelihood else _TAKE_ALL,
         log_clutter_volume=float(np.log(c.image.width * c.image.height * c.association.log_size_range**2)),
         scene_memory_s=c.lifecycle.scene_memory_s,

@@ -35,7 +35,7 @@ class Tracker:
     """Joint tracker of all vehicles over any number of asynchronous sensors (paper algorithm 1).
 
     Feed it scans in time order. Each step sees only what has arrived: the table it returns is causal. Memory
-    does not grow with time, but for smoothed rows that are not fetched (see `drain_smoothed`).
+    does not grow with time (smoothed rows that nobody fetches go to a temporary file, see `drain_smoothed`).
 
     Args:
         config: sensors and settings, from `load_config`.
@@ -172,7 +172,7 @@ class Tracker:
         """Return the smoothed rows that are final and forget them, in order of time over all calls.
 
         A live caller that keeps a smoother calls this now and then: rows that nobody fetches are kept for
-        `finish`, some 200 bytes each. The engines over whole tracks give a track's rows when it has ended,
+        `finish`, some 200 bytes each, the first 100,000 in memory and the rest in a temporary file. The engines over whole tracks give a track's rows when it has ended,
         and all at `finish` if fragments are to be stitched.
 
         Raises:
@@ -197,7 +197,7 @@ class Tracker:
         return {name: getattr(self._smoothers, name) for name in names} if self._smoothers else {}
 
     def confirmed_histories(self) -> list[TrackHistory]:
-        """Return what the confirmed tracks took in so far; for engines that keep it (full and rts, stitching).
+        """Return what the confirmed tracks took in so far; only engines that stitch (full, rts) keep it.
 
         Raises:
             JeatGraphError: the configuration asks for no smoother.

@@ -11,6 +11,7 @@ from jeat_graph.config import Config
 from jeat_graph.smoothing.history import TrackHistory
 from jeat_graph.smoothing.looks import Looks
 from jeat_graph.smoothing.stitched import stitch_histories
+from jeat_graph.smoothing.waiting import WaitingRows
 from jeat_graph.state import TrackArrays
 from jeat_graph.trajectories import Trajectories
 from jeat_graph.update_log import UpdateLog
@@ -29,7 +30,7 @@ class TrackSmoothers:
     The filter measures the velocity of standing tracks as zero; the smoothers do not. What they share is the
     lower jerk of a standing track.
 
-    Memory: rows wait here until `drain` takes them. With a fixed lag and regular drains it is bounded; the
+    Memory: rows wait until `drain` takes them, many of them in a file. With a fixed lag it is bounded; the
     engines over whole tracks hold each track's measurements until it ends, and until the recording ends if
     fragments are to be stitched.
 
@@ -55,7 +56,7 @@ class TrackSmoothers:
         self._bin = -np.inf
         self._histories: dict[int, TrackHistory] = {}
         self._done: list[TrackHistory] = []
-        self._ready: list[Trajectories] = []
+        self._ready = WaitingRows(config.sensor_names)
         self._scan_t: list[float] = []
         self._ids: IntArray = np.zeros(0, dtype=np.int64)
         self._confirmed: BoolArray = np.zeros(0, dtype=np.bool_)
@@ -137,7 +138,8 @@ class TrackSmoothers:
         horizon = min((h.oldest for h in (*self._histories.values(), *self._done)), default=np.inf)
         table = self._gathered([])
         early = table.t < horizon
-        self._ready = [table.take(~early)] if not early.all() else []
+        self._ready.take()
+        self._ready.append(table.take(~early))
         return table.take(early)
 
     def smoothed(self) -> Trajectories:
@@ -163,7 +165,8 @@ class TrackSmoothers:
             self.stitched += joints
         for history in histories:
             self._end(history)
-        table, self._ready = self._gathered([]), []
+        table = self._gathered([])
+        self._ready.take()
         return table
 
     def confirmed_histories(self) -> list[TrackHistory]:
@@ -184,12 +187,12 @@ class TrackSmoothers:
         history.close()
 
     def _collect(self, rows: Trajectories | None) -> None:
-        if rows is not None and len(rows):
+        if rows is not None:
             self._ready.append(rows)
 
     def _gathered(self, more: list[Trajectories]) -> Trajectories:
         """All rows that are ready, and more, in order of time and identity."""
-        parts = self._ready + more
+        parts = self._ready.peek() + more
         if not parts:
             return Trajectories.empty(self._config.sensor_names)
         table = Trajectories.concatenate(parts)

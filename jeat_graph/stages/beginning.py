@@ -68,8 +68,8 @@ def give_birth(
 def birth_existence(batch: Measurements, scene: SceneArrays, settings: Settings) -> FloatArray:
     """Probability (M,) that a detection which no track took is of a vehicle not tracked before.
 
-    u P_D LR(score) / (u P_D LR(score) + λ): u vehicles in the scene are expected to have no track yet, and most
-    leftovers are clutter however high their score (Williams 2015, the Poisson part of the mixture).
+    u P_D LR(score) / (u P_D LR(score) + λ): u vehicles in the scene are expected to have no track yet, and
+    most leftovers are clutter however high their score (Williams 2015, the Poisson part of the mixture).
     """
     out = np.empty(len(batch.precision))
     for j in range(len(out)):

@@ -31,7 +31,7 @@ def confirm(tracks: TrackArrays, n: int, t: float, settings: Settings) -> None:
 
 @njit(cache=True)
 def remove_ended(tracks: TrackArrays, n: int, t: float, settings: Settings) -> int:
-    """Remove tracks that are over, out of the picture, or duplicates; keep the order, return the number left."""
+    """Remove tracks that are over, out of the picture, or duplicates; return the number left, in order."""
     boxes = track_boxes(tracks.mean[:n], tracks.size_mean[:n])
     remove = np.zeros(n, dtype=np.bool_)
     if settings.merge and n > 1:

@@ -107,7 +107,7 @@ def update_matched(
     settings: Settings,
     log: UpdateLog,
 ) -> None:
-    """Take the matched detections in, sensor after sensor (equal to one stacked update); mark `taken` (M,)."""
+    """Take the matched detections in, one sensor after another (equal to a stacked update); mark `taken`."""
     for i in range(n):
         for s in range(match.shape[1]):
             j = match[i, s]
