@@ -172,8 +172,9 @@ class Tracker:
         """Return the smoothed rows that are final and forget them, in order of time over all calls.
 
         A live caller that keeps a smoother calls this now and then: rows that nobody fetches are kept for
-        `finish`, some 200 bytes each, the first 100,000 in memory and the rest in a temporary file. The engines over whole tracks give a track's rows when it has ended,
-        and all at `finish` if fragments are to be stitched.
+        `finish`, some 200 bytes each, the first 100,000 in memory and the rest in a temporary file. The
+        engines over whole tracks give a track's rows when it has ended, and all at `finish` if fragments are
+        to be stitched.
 
         Raises:
             JeatGraphError: the configuration asks for no smoother.

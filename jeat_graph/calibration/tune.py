@@ -34,17 +34,22 @@ _LEAST_GAIN = 0.05
 class Knob:
     """One setting that is chosen by tracking.
 
+    A present value that is none of the candidates gives way to the best of them, even if it scores no less:
+    a time that the base configuration brings along was chosen for sensors of other rates.
+
     Attributes:
         name: what is set.
         values: candidates, in order.
         apply: config and value → config.
         ordered: whether neighbours in `values` are alike, so that their scores support each other.
+        optional: whether a present value that is none of the candidates may stay all the same.
     """
 
     name: str
     values: tuple[float, ...]
     apply: Callable[[Config, float], Config]
     ordered: bool = True
+    optional: bool = False
 
 
 @dataclass(frozen=True)
@@ -135,7 +140,7 @@ def knobs(config: Config) -> list[Knob]:
             lambda c, v: replace(c, output=replace(c.output, max_gap_s=v)),
             ordered=False,
         ),
-        Knob("tempering", _TEMPERING, _temper_all),
+        Knob("tempering", _TEMPERING, _temper_all, optional=True),
         Knob(
             "standing.enabled",
             (1.0, 0.0),
@@ -226,7 +231,7 @@ def _turn(knob: Knob, config: Config, judge: Callable[[Config], float]) -> tuple
         here = candidates.index(config)
         if merit[best] < merit[here] + _LEAST_GAIN:
             best = here
-    elif merit[best] < judge(config) + _LEAST_GAIN:
+    elif knob.optional and merit[best] < judge(config) + _LEAST_GAIN:
         return config, None
     return candidates[best], Choice(knob.name, knob.values[best], scores[best])
 

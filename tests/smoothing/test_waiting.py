@@ -27,9 +27,12 @@ def table(first: int, rows: int) -> Trajectories:
 
 def test_rows_beyond_the_bound_come_back_in_order() -> None:
     waiting = WaitingRows(("rgb",), most_in_memory=10)
+    waiting.append(table(0, 4))
+    waiting.append(table(4, 4))
     with pytest.warns(UserWarning, match="drain_smoothed"):
-        for k in range(12):
-            waiting.append(table(4 * k, 4))
+        waiting.append(table(8, 4))
+    for k in range(3, 12):
+        waiting.append(table(4 * k, 4))
     kept = Trajectories.concatenate(waiting.peek())
     taken = Trajectories.concatenate(waiting.take())
     for rows in (kept, taken):
