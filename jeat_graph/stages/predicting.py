@@ -67,7 +67,7 @@ def current_p_detect(
 def detection_variance(tracks: TrackArrays, i: int, s: int, axis: int, sensors: SensorArrays) -> float:
     """Variance (px²) of a detection of sensor `s` on track `i`, one axis, at weight 1: s · R_base(size)."""
     side = math.exp(min(tracks.size_mean[i, axis, 0], 12.0))
-    return tracks.scale[i, s] * base_variance(sensors.sigma_px[s], sensors.rho[s, axis], side)
+    return float(tracks.scale[i, s] * base_variance(sensors.sigma_px[s], sensors.rho[s, axis], side))
 
 
 @njit(cache=True)

@@ -163,7 +163,7 @@ def take_second_views(
                     d2 += y * y / (tracks.cov[i, axis, 0, 0] + R)
                 if d2 <= best:
                     best = d2
-                    chosen = j
+                    chosen = int(j)
             if chosen >= 0:
                 variance = np.empty(2)
                 for axis in range(2):
