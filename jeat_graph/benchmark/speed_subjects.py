@@ -25,6 +25,7 @@ OURS = {
 PEERS = ("bytetrack", "sort", "ocsort")
 REFERENCE = "bytetrack"
 SENSOR = "rgb"
+FETCH_S = 0.5
 
 
 @dataclass(frozen=True)
@@ -60,13 +61,19 @@ def tracker_for(preset: str, engine: str) -> Tracker:
 
 
 def stepper(tracker: Tracker) -> Callable[[Any], Any]:
-    """One call a batch; with a smoother, fetching what is final belongs to it, or its rows would pile up."""
+    """One call a batch; with a smoother, what is final is fetched every half second, or it would pile up."""
     if tracker.config.smoother.engine == "none":
         return tracker.step
 
+    fetched = 0.0
+
     def step(batch: Any) -> Any:
+        nonlocal fetched
         table = tracker.step(batch)
-        tracker.drain_smoothed()
+        now = tracker.time or 0.0
+        if now - fetched >= FETCH_S:
+            tracker.drain_smoothed()
+            fetched = now
         return table
 
     return step

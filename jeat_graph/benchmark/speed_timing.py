@@ -31,19 +31,20 @@ def time_side_by_side(
     """Run the same frames through all trackers, in turns of `block` frames.
 
     Whatever slows the machine down for a while meets all of them; garbage is collected between turns only,
-    so that nobody pays for another's.
+    so that nobody pays for another's. The first frame of a turn meets the caches as the others left them, and
+    is not counted.
 
     Args:
         names: subjects.
         num_objects: in the picture.
-        frames: how many are timed.
+        frames: how many there are after the warm-up.
         warm_up: how many go before, so that all tracks are confirmed.
         seed: of the scene.
         block: frames of one turn.
         clock: `wall`, or `cpu` time of this thread on a machine that others use as well.
 
     Returns:
-        For each name its times (frames,) in s and the mean number of tracks that it reported.
+        For each name its times in s, one a counted frame, and the mean number of tracks that it reported.
     """
     total = warm_up + frames
     scene = make_frames(num_objects, total, RATE_HZ, seed)
@@ -66,8 +67,9 @@ def time_side_by_side(
                 gc.enable()
     finally:
         (gc.enable if enabled else gc.disable)()
+    counted = np.array([k for k in range(warm_up, total) if k % block])
     return {
-        subject.name: (1e-9 * elapsed[row, warm_up:], float(reported[row, warm_up:].mean()))
+        subject.name: (1e-9 * elapsed[row, counted], float(reported[row, warm_up:].mean()))
         for row, subject in enumerate(subjects)
     }
 
