@@ -27,8 +27,9 @@ if TYPE_CHECKING:
 ScanLike: TypeAlias = Scan | tuple[float, str, npt.ArrayLike, npt.ArrayLike]
 
 _FIRST_CAPACITY = 64
-# Thirty years: whatever lived before is over, and powers of a longer step would overflow.
-_LONGEST_STEP_S = 1e9
+# After so long without any scan no vehicle is the one that was there before, and predictions over longer times
+# span more digits than a double has.
+_LONGEST_SILENCE_S = 300.0
 
 
 class Tracker:
@@ -122,6 +123,9 @@ class Tracker:
         present = np.zeros(len(self.sensor_names), dtype=np.bool_)
         present[codes] = True
 
+        dt = 0.0 if self._t is None else min(t - self._t, _LONGEST_SILENCE_S)
+        if dt == _LONGEST_SILENCE_S:
+            self._num_tracks = 0
         self._tracks = grow(self._tracks, self._num_tracks, self._num_tracks + len(scores))
         if self._smoothers is not None and len(scores) > len(self._log.rows):
             self._log = allocate_log(2 * len(scores))
@@ -130,7 +134,7 @@ class Tracker:
             self._tracks,
             self._num_tracks,
             self._next_id,
-            0.0 if self._t is None else min(t - self._t, _LONGEST_STEP_S),
+            dt,
             t,
             boxes,
             scores,

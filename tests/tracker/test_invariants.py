@@ -16,7 +16,7 @@ CONFIGS = {name: load_config(name, ["smoother.engine=none"]) for name in PRESETS
 SENSORS = CONFIGS["default"].sensor_names
 
 # Steps of time from none at all to eleven days, and boxes from a hair to a planet, near each other or far.
-STEP = st.sampled_from([0.0, 0.0, 1e-6, 0.01, 0.01, 0.05, 0.05, 0.3, 5.0, 1e3, 1e6])
+STEP = st.sampled_from([0.0, 0.0, 1e-6, 0.01, 0.01, 0.05, 0.05, 0.3, 5.0, 299.0, 1e6])
 NEAR = st.tuples(st.floats(0, 60), st.floats(0, 60), st.floats(5, 60), st.floats(5, 60))
 WILD = st.tuples(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6), st.floats(1e-6, 1e6), st.floats(1e-6, 1e6))
 BOX = st.one_of(NEAR, NEAR, st.just((10.0, 10.0, 30.0, 20.0)), WILD)
@@ -56,7 +56,6 @@ def positive_definite(cov):
 def test_any_scans_give_finite_tables_and_sane_states(preset, state, recording):
     tracker, config = Tracker(CONFIGS[preset]), CONFIGS[preset]
     seen, confirmed, newest = set(), set(), 0
-    calm, last = True, recording[0][0].t if recording else 0.0
     for batch in recording:
         table = tracker.step(batch)
         for column in (table.boxes, table.mean, table.var, table.existence):
@@ -66,13 +65,9 @@ def test_any_scans_give_finite_tables_and_sane_states(preset, state, recording):
         assert (table.t == batch[0].t).all()
 
         now = state(tracker)
-        # A track that lives through several gaps of days spans more digits than a double has.
-        calm = calm and batch[0].t - last <= 1e4
-        last = batch[0].t
-        if calm:
-            assert (table.var > 0).all()
-            assert positive_definite(now["cov"])
-            assert positive_definite(now["size_cov"])
+        assert (table.var > 0).all()
+        assert positive_definite(now["cov"])
+        assert positive_definite(now["size_cov"])
         for name in ("existence", "p_detect", "hidden"):
             assert ((now[name] >= 0) & (now[name] <= 1)).all(), name
         low, high = config.noise.scale_min, max(config.noise.scale_max, 1.0)
@@ -139,6 +134,17 @@ def test_one_batch_of_the_largest_and_smallest_numbers_does_no_harm(preset, stat
         assert np.isfinite(table.var).all()
         assert np.isfinite(table.boxes).all()
     assert np.isfinite(state(tracker)["existence"]).all()
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_after_minutes_without_any_scan_all_vehicles_are_new_ones(preset):
+    tracker = Tracker(CONFIGS[preset])
+    for k in range(30):
+        before = tracker.step((0.05 * k, "rgb", [[100, 100, 40, 30]], [0.95]))
+    for k in range(30):
+        after = tracker.step((3600.0 + 0.05 * k, "rgb", [[100, 100, 40, 30]], [0.95]))
+    assert len(before) == len(after) == 1
+    assert after.track_id[0] > before.track_id[0]
 
 
 def test_a_pause_does_not_fill_the_scene_with_vehicles_that_wait_to_be_found():
