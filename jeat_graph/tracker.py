@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 ScanLike: TypeAlias = Scan | tuple[float, str, npt.ArrayLike, npt.ArrayLike]
 
 _FIRST_CAPACITY = 64
-# After so long without any scan no vehicle is the one that was there before, and predictions over longer times
+# After so long without any scan no vehicle is the one that was there before, and longer predictions
 # span more digits than a double has.
 _LONGEST_SILENCE_S = 300.0
 
