@@ -216,6 +216,13 @@ class LifecycleConfig:
     max_gap_confirmed_s: float = number(
         1.0, "s", "a confirmed track without update is deleted after this (paper .5)"
     )
+    max_silence_s: float = number(
+        300.0,
+        "s",
+        "after so long without any scan all tracks are over (longer predictions outgrow a double's digits)",
+        high=1000.0,
+        open_low=True,
+    )
     leave_picture: bool = field(
         default=True, metadata={"doc": "a track whose centre leaves the picture ends"}
     )

@@ -27,9 +27,6 @@ if TYPE_CHECKING:
 ScanLike: TypeAlias = Scan | tuple[float, str, npt.ArrayLike, npt.ArrayLike]
 
 _FIRST_CAPACITY = 64
-# After so long without any scan no vehicle is the one that was there before, and longer predictions
-# span more digits than a double has.
-_LONGEST_SILENCE_S = 300.0
 
 
 class Tracker:
@@ -123,8 +120,9 @@ class Tracker:
         present = np.zeros(len(self.sensor_names), dtype=np.bool_)
         present[codes] = True
 
-        dt = 0.0 if self._t is None else min(t - self._t, _LONGEST_SILENCE_S)
-        if dt == _LONGEST_SILENCE_S:
+        longest = self.config.lifecycle.max_silence_s
+        dt = 0.0 if self._t is None else min(t - self._t, longest)
+        if dt == longest:
             self._num_tracks = 0
         self._tracks = grow(self._tracks, self._num_tracks, self._num_tracks + len(scores))
         if self._smoothers is not None and len(scores) > len(self._log.rows):
