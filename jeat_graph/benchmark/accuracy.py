@@ -202,7 +202,7 @@ def tables(result: Mapping[str, Any]) -> dict[str, Table]:
     if "kitti" in result:
         out["accuracy-kitti"] = common.pooled_table(
             result["kitti"],
-            "KITTI, five sequences pooled: ours leave-one-out, peers `tuned` on these very sequences",
+            "KITTI, five sequences pooled: ours leave-one-out, peers as they come (tuned: on these)",
         )
     return out
 
