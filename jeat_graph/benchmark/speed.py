@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from jeat_graph.benchmark.readme import update_readme
 from jeat_graph.benchmark.speed_worker import SCANS_A_MINUTE, ask
 
 OBJECTS = (10, 50, 200, 1000)
@@ -31,6 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--smoothers", action="store_true", help="time the steps with smoothing too")
     add("--no-peers", action="store_true", help="ours alone")
     add("--quick", action="store_true", help="small numbers: to see that it runs")
+    add("--readme", metavar="FILE", help="renew the table between the markers of this Markdown file")
     add("--hour", action="store_true", help="also an hour of input at 100 Hz: is memory flat?")
 
 
@@ -48,6 +50,8 @@ def run(args: argparse.Namespace) -> int:
     if args.hour:
         result["hour"] = ask({"job": "endurance", "scans": _HOUR, "objects": 5})
     sys.stdout.write(_tables(result))
+    if args.readme is not None:
+        update_readme(args.readme, {"speed": f"```text\n{_tables(result)}```"})
     if args.out is not None:
         _write(result, args)
     return 0
