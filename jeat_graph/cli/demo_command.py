@@ -58,6 +58,7 @@ def run(args: argparse.Namespace) -> int:
 
     _say(f"{args.duration:g} s of {args.scenario} simulated; tracking with both sensors")
     origin = {"config_name": args.config, "inputs": describe_inputs([source])}
+    origin["reading"] = {"detections": [str(source)]}  # as `track` has it: `compare` reads the inputs again
     details = RunRecord(source=origin, warnings=warnings)
     notice_if_cold()
     with directory:

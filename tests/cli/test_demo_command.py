@@ -105,3 +105,9 @@ def test_a_configuration_without_its_sensors_is_refused_before_anything_is_writt
     message = fails("demo", "--config", config, "--out", tmp_path / "demo", *SHORT)
     assert "sensor 'evt' is not declared (declared: radar)" in message
     assert not (tmp_path / "demo").exists()
+
+
+def test_its_run_can_be_compared(demo, tmp_path):
+    arguments = [str(demo / "run"), "--gt", str(demo / "gt.csv"), "--out", str(tmp_path / "comparison")]
+    assert main(["compare", *arguments, "--no-plots", "--lags", "0.2"]) == 0
+    assert (tmp_path / "comparison" / "compare.json").is_file()
