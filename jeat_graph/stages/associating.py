@@ -34,10 +34,10 @@ def associate(
     num_sensors = len(sensors.sigma_px)
     rows, cols, d2, log_density, log_size_density = gated_pairs(
         tracks.mean[:n, :, 0],
-        position_variances(tracks, n),
+        tracks.cov[:n, :, 0, 0],
         noise,
         tracks.size_mean[:n, :, 0],
-        size_variances(tracks, n),
+        tracks.size_cov[:n, :, 0, 0],
         sensors.size_var,
         batch.z,
         batch.log_size,
@@ -75,23 +75,3 @@ def associate(
         if match[rows[p], s] == cols[p]:
             evidence[rows[p], s] = pair_evidence[p]
     return match, evidence
-
-
-@njit(cache=True)
-def position_variances(tracks: TrackArrays, n: int) -> FloatArray:
-    """Variances (n, 2) of the predicted centres (px²)."""
-    out = np.empty((n, 2))
-    for i in range(n):
-        for axis in range(2):
-            out[i, axis] = tracks.cov[i, axis, 0, 0]
-    return out
-
-
-@njit(cache=True)
-def size_variances(tracks: TrackArrays, n: int) -> FloatArray:
-    """Variances (n, 2) of the predicted ln width and ln height."""
-    out = np.empty((n, 2))
-    for i in range(n):
-        for side in range(2):
-            out[i, side] = tracks.size_cov[i, side, 0, 0]
-    return out

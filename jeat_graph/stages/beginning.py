@@ -52,16 +52,22 @@ def give_birth(
     for j in range(len(partner)):
         if partner[j] >= 0:
             i = n + partner[j]
-            s = batch.sensor[j]
-            R = np.empty(2)
-            for axis in range(2):
-                base = base_variance(sensors.sigma_px[s], sensors.rho[s, axis], batch.boxes[j, 2 + axis])
-                R[axis] = base * batch.weight[j]
-            take(tracks, i, t, j, batch, R, sensors, settings, log)
+            take(tracks, i, t, j, batch, own_variances(batch, j, sensors), sensors, settings, log)
             # Two sensors' false boxes seldom coincide: each view's chance to be false remains.
             tracks.existence[i] = 1.0 - (1.0 - tracks.existence[i]) * (1.0 - batch.precision[j])
     confirm(tracks, n + len(parents), t, settings)
     return n + len(parents), next_id + len(parents)
+
+
+@njit(cache=True)
+def own_variances(batch: Measurements, j: int, sensors: SensorArrays) -> FloatArray:
+    """Variances (2,) of detection `j` (px²) by its own size, where no track's is known: R_base / g."""
+    s = batch.sensor[j]
+    out = np.empty(2)
+    for axis in range(2):
+        base = base_variance(sensors.sigma_px[s], sensors.rho[s, axis], batch.boxes[j, 2 + axis])
+        out[axis] = base * batch.weight[j]
+    return out
 
 
 @njit(cache=True)
@@ -97,19 +103,19 @@ def start_track(
     settings: Settings,
     log: UpdateLog,
 ) -> None:
-    """Fill row `i` with a new track at detection `j`."""
+    """Fill row `i` with a new track at detection `j`; `give_birth` adds what the scene says of it."""
     s = batch.sensor[j]
     side = math.sqrt(batch.boxes[j, 2] * batch.boxes[j, 3])
     tracks.mean[i] = 0.0
     tracks.cov[i] = 0.0
     tracks.size_mean[i] = 0.0
     tracks.size_cov[i] = 0.0
+    R = own_variances(batch, j, sensors)
     for axis in range(2):
-        base = base_variance(sensors.sigma_px[s], sensors.rho[s, axis], batch.boxes[j, 2 + axis])
         tracks.mean[i, axis, 0] = batch.z[j, axis]
         tracks.anchor[i, axis] = batch.z[j, axis]
-        tracks.anchor_var[i, axis] = base * batch.weight[j]
-        tracks.cov[i, axis, 0, 0] = base * batch.weight[j]
+        tracks.anchor_var[i, axis] = R[axis]
+        tracks.cov[i, axis, 0, 0] = R[axis]
         tracks.cov[i, axis, 1, 1] = (settings.velocity_std_px + settings.velocity_std_per_size * side) ** 2
         tracks.cov[i, axis, 2, 2] = (
             settings.acceleration_std_px + settings.acceleration_std_per_size * side
@@ -121,7 +127,6 @@ def start_track(
     tracks.still_odds[i] = 0.0
     tracks.standing[i] = False
     tracks.scale[i] = 1.0
-    tracks.existence[i] = 0.5
     tracks.confirmed[i] = False
     tracks.track_id[i] = track_id
     tracks.hits[i] = 1
@@ -129,7 +134,6 @@ def start_track(
     tracks.t_update[i] = t
     tracks.used[i] = 1 << s
     if len(log.rows) > 0:
-        R = tracks.anchor_var[i]
         jerk = root_jerk(tracks.size_mean[i], settings.jerk_px, settings.jerk_per_size, 1.0)
         log_update(log, track_id, s, batch.z[j], R, jerk, batch.log_size[j], sensors.size_var[s])
         log_birth(log, tracks.cov[i], tracks.size_cov[i])

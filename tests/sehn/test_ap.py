@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from jeat_graph.detections import Detections, FloatArray
-from jeat_graph.sehn.ap import average_precision
 from jeat_graph.trajectories import GroundTruth
+
+from .ap import average_precision
 
 BOX = np.array([[0.0, 0.0, 10.0, 10.0]])
 SHIFTED = np.array([[5.0, 0.0, 10.0, 10.0]])

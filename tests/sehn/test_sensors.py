@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from jeat_graph.detections import Detections
-from jeat_graph.sehn.ap import iou_matrix
 from jeat_graph.sehn.clutter import ClutterConfig, draw_clutter
 from jeat_graph.sehn.detectability import judge
 from jeat_graph.sehn.noise import NoiseModel, persistent_noise, perturb
@@ -17,6 +16,8 @@ from jeat_graph.sehn.sequences import correlated, sticky_uniform
 from jeat_graph.sehn.simulate import record
 from jeat_graph.sehn.timing import TimingConfig, run_clock
 from jeat_graph.sehn.truth import Views, look
+
+from .ap import iou_matrix
 
 PICTURE = (1280.0, 720.0)
 

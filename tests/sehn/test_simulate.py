@@ -13,10 +13,11 @@ from jeat_graph.detections import Detections
 from jeat_graph.errors import ConfigError
 from jeat_graph.io.detections_io import read_detections
 from jeat_graph.io.truth_io import read_truth
-from jeat_graph.sehn.ap import average_precision
 from jeat_graph.sehn.scenario import load_scenario, scenario_names
 from jeat_graph.sehn.simulate import record, simulate
 from jeat_graph.trajectories import GroundTruth
+
+from .ap import average_precision
 
 
 def fingerprint(detections: Detections, truth: GroundTruth) -> str:
