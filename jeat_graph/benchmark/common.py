@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from jeat_graph.argument_types import counting, natural, positive
 from jeat_graph.benchmark.judging import METRICS, fold_config, in_processes
 from jeat_graph.benchmark.readme import update_readme
 from jeat_graph.benchmark.recordings import DURATION_S, KITTI_SEQUENCES, SCENARIOS, SEEDS, find_kitti
@@ -28,11 +29,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("--out", metavar="DIR", help="write NAME.json and NAME.md there")
     add("--data", metavar="DIR", help="folder that holds kitti/ (../shared/data)")
-    add("--seeds", nargs="+", type=_seed, metavar="N", help="of the simulated recordings (0 1 2 3 4)")
+    add("--seeds", nargs="+", type=natural, metavar="N", help="of the simulated recordings (0 1 2 3 4)")
     add("--scenarios", nargs="+", metavar="NAME", help=f"simulated scenarios ({' '.join(SCENARIOS)})")
-    add("--duration", type=_positive, metavar="S", help=f"of a simulated recording ({DURATION_S:g})")
+    add("--duration", type=positive, metavar="S", help=f"of a simulated recording ({DURATION_S:g})")
     add("--quick", action="store_true", help="one seed, 8 s, no real data: to see that it runs")
-    add("--jobs", type=_count, metavar="N", help="processes (as many as there are processors)")
+    add("--jobs", type=counting, metavar="N", help="processes (as many as there are processors)")
     add("--folds", metavar="JSON", help="take the leave-one-out configurations from an earlier result")
     add("--readme", metavar="FILE", help="renew the tables between the markers of this Markdown file")
     add("--from", dest="source", metavar="JSON", help="render the tables of an earlier result; run nothing")
@@ -153,24 +154,3 @@ def earlier(path: str, name: str | None) -> dict[str, Any]:
     if kind is None or name not in (None, kind):
         raise DataError(f"{path}: is not a result of `jeat-graph benchmark {name or 'accuracy'}`")
     return dict(result)
-
-
-def _seed(text: str) -> int:
-    value = int(text)
-    if value < 0:
-        raise argparse.ArgumentTypeError("must not be negative")
-    return value
-
-
-def _count(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError("must be at least 1")
-    return value
-
-
-def _positive(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError("must be a positive number")
-    return value

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from jeat_graph.argument_types import counting
 from jeat_graph.benchmark.readme import update_readme
 from jeat_graph.benchmark.speed_worker import SCANS_A_MINUTE, ask
 
@@ -24,10 +25,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     add = parser.add_argument
     add("--out", metavar="DIR", help="write speed.json, speed.png and speed.svg there")
-    add("--objects", nargs="+", type=_count, default=list(OBJECTS), metavar="N", help="10 50 200 1000")
-    add("--frames", type=_count, default=100, metavar="N", help="timed frames a repetition (100)")
-    add("--warm-up", type=_count, default=30, metavar="N", help="frames before them (30)")
-    add("--repeats", type=_count, default=3, metavar="N", help="repetitions, each of another scene (3)")
+    add("--objects", nargs="+", type=counting, default=list(OBJECTS), metavar="N", help="10 50 200 1000")
+    add("--frames", type=counting, default=100, metavar="N", help="timed frames a repetition (100)")
+    add("--warm-up", type=counting, default=30, metavar="N", help="frames before them (30)")
+    add("--repeats", type=counting, default=3, metavar="N", help="repetitions, each of another scene (3)")
     add("--clock", choices=("wall", "cpu"), default="wall", help="cpu where others use the machine as well")
     add("--smoothers", action="store_true", help="time the steps with smoothing too")
     add("--no-peers", action="store_true", help="ours alone")
@@ -168,10 +169,3 @@ def _write(result: dict[str, Any], args: argparse.Namespace) -> None:
         file.write("\n")
     for suffix in ("png", "svg"):
         plot_speed(result["steps"], folder / f"speed.{suffix}")
-
-
-def _count(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError("must be at least 1")
-    return value

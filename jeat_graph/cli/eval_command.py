@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from jeat_graph.argument_types import positive, share
 from jeat_graph.errors import DataError
 
 if TYPE_CHECKING:
@@ -26,11 +27,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--gt", **_MANY, required=True, metavar="FILE", help="truth of each RUN, in the same order")
     add("--json", metavar="FILE", help="write all scores as JSON; - writes them to stdout instead")
     add("--format", choices=FORMATS, default="text", help="form of the table on stdout")
-    add("--iou", type=_share, default=0.5, help="smallest IoU of a match (0.5)")
+    add("--iou", type=share, default=0.5, help="smallest IoU of a match (0.5)")
     add("--class", **_MANY, dest="classes", metavar="NAME", help="classes to be found; others are ignored")
-    add("--rate", type=_positive, metavar="HZ", help="frame rate of files that count frames")
-    add("--max-age", type=_positive, default=0.15, metavar="S", help="how far to predict causal rows (0.15)")
-    add("--max-gap", type=_positive, metavar="S", help="join no smoothed rows further apart than this")
+    add("--rate", type=positive, metavar="HZ", help="frame rate of files that count frames")
+    add("--max-age", type=positive, default=0.15, metavar="S", help="how far to predict causal rows (0.15)")
+    add("--max-gap", type=positive, metavar="S", help="join no smoothed rows further apart than this")
     add("--breakdown", action="store_true", help="also by motion and distance, and waiting times")
     add("--detections", **_MANY, metavar="FILE", help="also AP of the detections of each RUN")
 
@@ -91,17 +92,3 @@ def _write(target: str, text: str) -> None:
 
     with open_atomic(Path(target)) as file:
         file.write(text)
-
-
-def _share(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value <= 1.0:
-        raise argparse.ArgumentTypeError("must be more than 0 and at most 1")
-    return value
-
-
-def _positive(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError("must be a positive number")
-    return value

@@ -7,6 +7,8 @@ import sys
 import time
 from pathlib import Path
 
+from jeat_graph.argument_types import positive
+
 HELP = "track the vehicles in files of detections and write a run directory"
 INPUT_FORMATS = ("csv", "parquet", "motchallenge", "kitti", "prophesee", "coco")
 ENGINES = ("fixed-lag", "full", "rts", "fixed-lag-rts", "none")
@@ -56,11 +58,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--frame-rate",
-        type=_positive,
+        type=positive,
         metavar="HZ",
         help="frames per second of such output files",
     )
-    add("--rate", type=_positive, metavar="HZ", help="frames per second of input files that count frames")
+    add("--rate", type=positive, metavar="HZ", help="frames per second of input files that count frames")
     add("--input-format", choices=INPUT_FORMATS, help="format of the input, if it is not recognised")
     add(
         "--score-scale",
@@ -118,10 +120,3 @@ def run(args: argparse.Namespace) -> int:
     print(f"{detections.num_scans} scans, {len(detections)} detections: {counts['tracks_reported']} tracks")
     print(f"wrote {Path(args.out)}")
     return 0
-
-
-def _positive(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError("must be a positive number")
-    return value
