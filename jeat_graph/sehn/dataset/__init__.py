@@ -1,0 +1,1 @@
+"""The SEHN data set: protocol, files and their verification."""

@@ -1,0 +1,1 @@
+"""Pictures of the scene: its radiance, the RGB camera and the event camera."""
