@@ -20,7 +20,7 @@ class FrameTruth:
     Attributes:
         object_id: (K,) identity, unique within the segment, from 1.
         class_name: (K,) text: car, suv, van, truck.
-        boxes: (K, 4) left, top, width, height (px) around the eight projected corners, clipped to the picture.
+        boxes: (K, 4) left, top, width, height (px) of the eight projected corners, clipped to the picture.
         visible: (K,) fraction of the vehicle's projected pixels that nothing nearer covers and that lie
             within the picture, from the depth buffer.
         motion: (K, 6) x, y, vx, vy, ax, ay of the centre of the unclipped box (px, px/s, px/s²).
