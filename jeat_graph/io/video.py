@@ -1,0 +1,355 @@
+"""Frames of a recording: a video file or a folder of pictures, written one by one and read back by number.
+
+============  =========================================  ====================================================
+`mp4`         `frames.mp4`, MPEG-4 part 2                small, lossy
+`lossless`    `frames.avi`, FFV1                         bit for bit what was written
+`png`         folder `frames/` of `000000.png`, …        bit for bit, readable by everything
+============  =========================================  ====================================================
+
+`frames.csv` beside them (`index,t_us`) holds the time of each frame.
+FFV1 stands in AVI because Matroska files carry a random number and no two of them are equal.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections import OrderedDict
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.errors import ConfigError, DataError
+from jeat_graph.io.atomic import atomic_path
+
+RgbImage = npt.NDArray[np.uint8]
+
+VIDEO_FILES = {"mp4": "frames.mp4", "lossless": "frames.avi", "png": "frames"}
+FRAME_TIMES = "frames.csv"
+_CODECS = {"mp4": "mp4v", "lossless": "FFV1"}
+_PICTURES = (".png", ".jpg", ".jpeg")
+_US_PER_S = 1e6
+_KEPT_FRAMES = 32  # decoded frames that a reader keeps, for steps backwards
+
+
+class FrameWriter:
+    """A context manager that writes frames; a video, and `frames.csv`, appear only when it has ended well.
+
+    Args:
+        folder: where the frames and `frames.csv` go.
+        video: `mp4`, `lossless` or `png`.
+        size_px: width and height.
+        rate_hz: frame rate that the video file declares; the true times are in `frames.csv`.
+
+    Raises:
+        ConfigError: no such kind of video.
+    """
+
+    def __init__(self, folder: str | Path, video: str, size_px: tuple[int, int], rate_hz: float) -> None:
+        if video not in VIDEO_FILES:
+            raise ConfigError(f"video must be one of {', '.join(VIDEO_FILES)}, not {video!r}")
+        self._folder, self._video, self._size_px, self._rate_hz = Path(folder), video, size_px, rate_hz
+        self._stack = ExitStack()
+        self._times: list[int] = []
+        self._target = Path()
+        self._sink: Any = None
+
+    def __enter__(self) -> Self:
+        target = self._folder / VIDEO_FILES[self._video]
+        if self._video == "png":
+            target.mkdir(parents=True, exist_ok=True)
+            self._target = target
+        else:
+            self._target = self._stack.enter_context(atomic_path(target))
+            self._sink = _open_sink(self._target, _CODECS[self._video], self._rate_hz, self._size_px)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._sink is not None:
+            self._sink.release()
+        self._stack.__exit__(kind, error, trace)
+        if error is None:
+            from jeat_graph.io.table_writer import write_columns
+
+            t_us = np.array(self._times, dtype=np.int64)
+            write_columns({"index": np.arange(len(t_us)), "t_us": t_us}, self._folder / FRAME_TIMES)
+
+    def append(self, t_us: int, rgb: RgbImage) -> None:
+        """Add a frame.
+
+        Args:
+            t_us: its time (µs), after that of the frame before.
+            rgb: (H, W, 3) in the order red, green, blue.
+
+        Raises:
+            DataError: the time does not go on, or the picture has another size.
+        """
+        import cv2
+
+        width, height = self._size_px
+        if rgb.shape != (height, width, 3) or rgb.dtype != np.uint8:
+            raise DataError(f"frame must be ({height}, {width}, 3) uint8, not {rgb.shape} {rgb.dtype}")
+        if self._times and t_us <= self._times[-1]:
+            raise DataError(f"frame at {t_us} µs does not follow the one at {self._times[-1]} µs")
+        bgr = np.ascontiguousarray(rgb[..., ::-1])
+        if self._video == "png":
+            _write_png(self._target / f"{len(self._times):06d}.png", cv2.imencode(".png", bgr)[1])
+        else:
+            self._sink.write(bgr)
+        self._times.append(t_us)
+
+
+class FrameSource:
+    """Frames of a recording by number; a context manager. Steps forward are fast, the last few are kept.
+
+    Attributes:
+        path: the video file or the folder.
+        times_s: (F,) time of each frame (s), ascending.
+        size_px: width and height.
+    """
+
+    def __init__(self, path: Path, times_s: FloatArray, size_px: tuple[int, int], decode: _Decoder) -> None:
+        self.path = path
+        self.times_s = times_s
+        self.size_px = size_px
+        self._decode = decode
+        self._kept: OrderedDict[int, RgbImage] = OrderedDict()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __len__(self) -> int:
+        return len(self.times_s)
+
+    def __iter__(self) -> Iterator[tuple[float, RgbImage]]:
+        for i in range(len(self)):
+            yield float(self.times_s[i]), self.frame(i)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._decode.close()
+
+    def frame(self, index: int) -> RgbImage:
+        """Return frame `index`: (H, W, 3) in the order red, green, blue; not to be changed.
+
+        Raises:
+            IndexError: there is no such frame.
+            DataError: the frame cannot be decoded, or has another size than the first.
+        """
+        if not 0 <= index < len(self):
+            raise IndexError(f"frame {index} of {len(self)}")
+        if index not in self._kept:
+            bgr = self._decode.bgr(index)
+            if bgr.shape[1::-1] != self.size_px:
+                raise DataError(
+                    f"frame {index} is {bgr.shape[1]} x {bgr.shape[0]} px, not as the first", self.path
+                )
+            self._kept[index] = np.ascontiguousarray(bgr[..., ::-1])
+            while len(self._kept) > _KEPT_FRAMES:
+                self._kept.popitem(last=False)
+        return self._kept[index]
+
+
+def open_frames(path: str | Path, rate_hz: float | None = None) -> FrameSource:
+    """Open a video file, a folder of pictures, or a folder that holds one of them under its name above.
+
+    Times come from `frames.csv`, in the folder or beside it or beside the video; without it they are
+    index / rate, by `rate_hz` or by what the video declares.
+
+    Args:
+        path: the video or folder. Pictures are `.png` or `.jpg`, in natural order (2 before 10).
+        rate_hz: frames per second where there is no `frames.csv`; for a video the default is its own rate.
+
+    Raises:
+        DataError: nothing there, nothing to be read, no rate known, or `frames.csv` of another length.
+    """
+    place = Path(path)
+    if place.is_dir():
+        inner = next((place / name for name in VIDEO_FILES.values() if (place / name).exists()), None)
+        if inner is not None:
+            return open_frames(inner, rate_hz)
+        decode: _Decoder = _Pictures(place)
+        known = [place / FRAME_TIMES, place.parent / FRAME_TIMES]
+    elif place.is_file():
+        decode = _Video(place)
+        known = [place.parent / FRAME_TIMES]
+    else:
+        raise DataError("no such video or folder of pictures", place)
+    try:
+        table = next((file for file in known if file.is_file()), None)
+        count = decode.count()
+        if table is not None and rate_hz is None:
+            times = read_frame_times(table) / _US_PER_S
+            if len(times) != count:
+                raise DataError(f"has {count} frames, but {table} has {len(times)}", place)
+        else:
+            rate = rate_hz or decode.rate_hz()
+            if rate is None or not 0.0 < rate < float("inf"):
+                raise DataError(f"no {FRAME_TIMES} beside it; give the frame rate", place)
+            times = np.arange(count) / rate
+        first = decode.bgr(0)
+        return FrameSource(place, times, (first.shape[1], first.shape[0]), decode)
+    except BaseException:
+        decode.close()
+        raise
+
+
+def read_frame_times(path: str | Path) -> IntArray:
+    """Read the times (F,) of `frames.csv` (µs).
+
+    Raises:
+        DataError: not such a table, or times that do not ascend.
+    """
+    from jeat_graph.io.tables import read_table
+
+    table = read_table(path, ("index", "t_us"))
+    t_us = table.whole("t_us")
+    bad = np.diff(t_us) <= 0
+    if bad.any():
+        raise table.error(1 + int(np.argmax(bad)), "t_us must ascend")
+    return t_us
+
+
+class _Decoder:
+    """Frames by number, as OpenCV gives them: blue, green, red."""
+
+    def count(self) -> int:
+        raise NotImplementedError
+
+    def rate_hz(self) -> float | None:
+        raise NotImplementedError
+
+    def bgr(self, index: int) -> RgbImage:
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Release the file."""
+
+
+class _Pictures(_Decoder):
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._files = sorted(
+            (p for p in folder.iterdir() if p.suffix.lower() in _PICTURES), key=lambda p: _natural(p.name)
+        )
+        if not self._files:
+            raise DataError(f"no pictures ({', '.join(_PICTURES)}) in this folder", folder)
+
+    def count(self) -> int:
+        return len(self._files)
+
+    def rate_hz(self) -> float | None:
+        return None
+
+    def bgr(self, index: int) -> RgbImage:
+        import cv2
+
+        file = self._files[index]
+        try:
+            data = np.frombuffer(file.read_bytes(), dtype=np.uint8)
+        except OSError as error:
+            raise DataError(f"cannot be read: {error.strerror or error}", file) from None
+        picture = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
+        if picture is None:
+            raise DataError("is not a picture that can be read", file)
+        return np.asarray(picture, dtype=np.uint8)
+
+
+class _Video(_Decoder):
+    def __init__(self, path: Path) -> None:
+        import cv2
+
+        self._path = path
+        self._capture = _quietly(lambda: cv2.VideoCapture(str(path), cv2.CAP_FFMPEG))
+        if not self._capture.isOpened():
+            raise DataError("is not a video that can be read", path)
+        self._next = 0
+        self._count: int | None = None
+
+    def count(self) -> int:
+        """Number of frames, by decoding headers only; the container's own count is an estimate at times."""
+        if self._count is None:
+            self._rewind()
+            n = 0
+            while self._capture.grab():
+                n += 1
+            self._count = n
+            self._rewind()
+            if not n:
+                raise DataError("holds no frame that can be read", self._path)
+        return self._count
+
+    def rate_hz(self) -> float | None:
+        import cv2
+
+        return float(self._capture.get(cv2.CAP_PROP_FPS)) or None
+
+    def bgr(self, index: int) -> RgbImage:
+        if index < self._next:
+            self._rewind()
+        while self._next < index:
+            if not self._capture.grab():
+                raise DataError(f"frame {self._next} cannot be decoded", self._path)
+            self._next += 1
+        good, picture = self._capture.read()
+        if not good:
+            raise DataError(f"frame {index} cannot be decoded", self._path)
+        self._next += 1
+        return np.asarray(picture, dtype=np.uint8)
+
+    def close(self) -> None:
+        self._capture.release()
+
+    def _rewind(self) -> None:
+        import cv2
+
+        # Seeking by frame number is not exact in all containers; the beginning always is.
+        self._capture.release()
+        self._capture = cv2.VideoCapture(str(self._path), cv2.CAP_FFMPEG)
+        self._next = 0
+
+
+def _natural(name: str) -> tuple[tuple[int, str], ...]:
+    return tuple((int(part), "") if part.isdigit() else (0, part) for part in re.split(r"(\d+)", name))
+
+
+def _write_png(path: Path, data: npt.NDArray[np.uint8]) -> None:
+    path.write_bytes(data.tobytes())
+
+
+def _quietly(call: Any) -> Any:
+    """Call OpenCV without the lines that it and FFmpeg write to stderr about files they cannot read."""
+    import cv2
+
+    # FFmpeg's own level, which OpenCV takes from here when it first opens a video; -8 is "quiet".
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    level = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        return call()
+    finally:
+        cv2.utils.logging.setLogLevel(level)
+
+
+def _open_sink(path: Path, codec: str, rate_hz: float, size_px: tuple[int, int]) -> Any:
+    import cv2
+
+    code = cv2.VideoWriter.fourcc(*codec)
+    sink = _quietly(lambda: cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, rate_hz, size_px))
+    if not sink.isOpened():
+        raise DataError(f"this build of OpenCV cannot write {codec} video; take --video png", path)
+    return sink
