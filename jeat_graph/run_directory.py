@@ -17,9 +17,11 @@ from jeat_graph.errors import DataError
 
 RUN_JSON = "run.json"
 SCANS = "scans.csv"
+DIAGNOSTICS = "diagnostics.csv"
 TABLES = ("causal", "smoothed")
 SUFFIXES = {"csv": ".csv", "parquet": ".parquet", "motchallenge": ".mot.txt", "kitti": ".kitti.txt"}
-RUN_FILES = (*(kind + suffix for kind in TABLES for suffix in SUFFIXES.values()), SCANS, RUN_JSON)
+_TABLE_FILES = (kind + suffix for kind in TABLES for suffix in SUFFIXES.values())
+RUN_FILES = (*_TABLE_FILES, SCANS, DIAGNOSTICS, RUN_JSON)
 
 
 class RunDirectory:

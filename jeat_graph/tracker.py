@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from jeat_graph.config import Config
 from jeat_graph.detections import Detections, Scan
+from jeat_graph.diagnostics import Diagnostics
 from jeat_graph.errors import JeatGraphError, TimeOrderError, UnknownSensorError
 from jeat_graph.reporting import report
 from jeat_graph.settings import kernel_settings, priority_order, sensor_arrays
@@ -37,6 +38,7 @@ class Tracker:
 
     Args:
         config: sensors and settings, from `load_config`.
+        diagnostics: take down how well each detection fitted its track, for `last_updates`.
 
     Example:
         >>> from jeat_graph import Tracker, load_config
@@ -46,8 +48,9 @@ class Tracker:
         1
     """
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self, config: Config, *, diagnostics: bool = False) -> None:
         self.config = config
+        self._diagnostics = diagnostics
         self.sensor_names = config.sensor_names
         self._index = {name: k for k, name in enumerate(self.sensor_names)}
         self._sensors = sensor_arrays(config)
@@ -125,7 +128,8 @@ class Tracker:
         if dt == longest:
             self._num_tracks = 0
         self._tracks = grow(self._tracks, self._num_tracks, self._num_tracks + len(scores))
-        if self._smoothers is not None and len(scores) > len(self._log.rows):
+        logs = self._diagnostics or self._smoothers is not None
+        if logs and len(scores) > len(self._log.rows):
             self._log = allocate_log(2 * len(scores))
         first_id = self._next_id
         self._num_tracks, self._next_id = step(
@@ -156,6 +160,20 @@ class Tracker:
         t = 0.0 if self._t is None else self._t
         columns = report(self._tracks, self._num_tracks, t, self._settings)
         return Trajectories(*columns, sensors=self.sensor_names)
+
+    def last_updates(self) -> Diagnostics:
+        """Return what the last step gave to the tracks, those too that are not reported.
+
+        Raises:
+            JeatGraphError: the tracker was not made with `diagnostics`.
+        """
+        if not self._diagnostics:
+            raise JeatGraphError("make the tracker with diagnostics=True to be told of its updates")
+        t = 0.0 if self._t is None else self._t
+        rows = self._log.rows[: int(self._log.count[0])]
+        n = self._num_tracks
+        living = (self._tracks.track_id[:n], self._tracks.existence[:n])
+        return Diagnostics.from_log(t, rows, *living, self.sensor_names)
 
     def smoothed(self) -> Trajectories:
         """Return the smoothed trajectories of the confirmed tracks so far, without what was drained.

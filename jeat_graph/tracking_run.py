@@ -16,7 +16,7 @@ from jeat_graph.config import Config
 from jeat_graph.config_io import config_to_dict
 from jeat_graph.detections import Detections
 from jeat_graph.errors import ConfigError
-from jeat_graph.run_directory import RUN_JSON, SCANS, SUFFIXES, RunDirectory, write_scans
+from jeat_graph.run_directory import DIAGNOSTICS, RUN_JSON, SCANS, SUFFIXES, RunDirectory, write_scans
 from jeat_graph.tracker import Tracker
 from jeat_graph.version import __version__
 
@@ -36,11 +36,13 @@ class RunOptions:
         frame_rate_hz: frames per second of formats that count frames; by default the declared rate of the
             slowest sensor that occurs.
         progress: whether to show a progress bar on stderr.
+        diagnostics: whether to write `diagnostics.csv` too.
     """
 
     formats: tuple[str, ...] = ()
     frame_rate_hz: float | None = None
     progress: bool = False
+    diagnostics: bool = False
 
     def __post_init__(self) -> None:
         unknown = [name for name in self.formats if name not in EXTRA_FORMATS]
@@ -85,7 +87,7 @@ def write_run(
     Raises:
         DataError: a time that a format cannot express.
     """
-    instants = _track(detections, config, run, record, options.progress)
+    instants = _track(detections, config, run, record, options)
     write_scans(detections, run.path(SCANS))
     rate_hz = _frame_rate(detections, config, options)
     _write_formats(run, "causal", instants, rate_hz, options.formats)
@@ -95,14 +97,16 @@ def write_run(
 
 
 def _track(
-    detections: Detections, config: Config, run: RunDirectory, record: RunRecord, progress: bool
+    detections: Detections, config: Config, run: RunDirectory, record: RunRecord, options: RunOptions
 ) -> FloatArray:
     """Step through the recording, write `causal.csv`, `smoothed.csv`; return the times of the steps (I,)."""
     from tqdm import tqdm
 
+    from jeat_graph.io.diagnostics_io import DiagnosticsWriter
     from jeat_graph.io.trajectories_io import TrajectoryWriter
 
-    tracker = Tracker(config)
+    tracker = Tracker(config, diagnostics=options.diagnostics)
+    hidden = not options.progress
     instants = np.unique(detections.scan_t)
     step_s = np.zeros(len(instants))
     reported: set[int] = set()
@@ -112,13 +116,16 @@ def _track(
     with (
         TrajectoryWriter(run.path("causal.csv")) as writer,
         TrajectoryWriter(run.path("smoothed.csv")) if smooths else nullcontext() as smoothed,
-        tqdm(total=detections.num_scans, desc="track", unit="scan", disable=not progress, leave=False) as bar,
+        DiagnosticsWriter(run.path(DIAGNOSTICS)) if options.diagnostics else nullcontext() as diagnostics,
+        tqdm(total=detections.num_scans, desc="track", unit="scan", disable=hidden, leave=False) as bar,
     ):
         for k, batch in enumerate(detections.batches()):
             start = time.perf_counter()
             table = tracker.step(batch)
             step_s[k] = time.perf_counter() - start
             writer.append(table)
+            if diagnostics is not None:
+                diagnostics.append(tracker.last_updates())
             reported.update(table.track_id.tolist())
             rows += len(table)
             bar.update(len(batch))

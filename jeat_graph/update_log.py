@@ -16,7 +16,9 @@ from jeat_graph.arrays import FloatArray, IntArray
 
 #: Columns of `UpdateLog.rows`. `R_x, R_y` are the variances exactly as the filter used them, scale and weight
 #: included; `jerk` is the root spectral density of the track's jerk at the time of the update; `birth` is 1
-#: where the measurement started the track, and then `var_v_x` … `var_rate` are the other prior variances.
+#: where the measurement started the track, and then `var_v_x` … `var_rate` are the other prior variances;
+#: `nis` is the normalised innovation squared of the centre (NaN at a birth) and `scale` the noise scale s of
+#: the sensor that went into `R_x, R_y`.
 COLUMNS = (
     "track_id",
     "sensor",
@@ -35,6 +37,8 @@ COLUMNS = (
     "var_a_x",
     "var_a_y",
     "var_rate",
+    "nis",
+    "scale",
 )
 WIDTH = len(COLUMNS)
 
@@ -92,7 +96,25 @@ def log_update(
         row[9 + axis] = size_var[axis]
     row[6] = jerk
     row[11:] = 0.0
+    row[17] = math.nan
+    row[18] = 1.0
     log.count[0] = k + 1
+
+
+@njit(cache=True)
+def log_surprise(log: UpdateLog, nis: float, scale: float) -> None:
+    """Note in the last row how well the measurement fitted the prediction.
+
+    Args:
+        log: the log, of capacity 0 or with a row just appended.
+        nis: normalised innovation squared (χ² with 2 degrees of freedom).
+        scale: the noise scale s with which the measurement was weighed.
+    """
+    k = log.count[0] - 1
+    if k < 0:
+        return
+    log.rows[k, 17] = nis
+    log.rows[k, 18] = scale
 
 
 @njit(cache=True)

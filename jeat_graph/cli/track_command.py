@@ -62,6 +62,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="HZ",
         help="frames per second of such output files",
     )
+    add(
+        "--diagnostics",
+        action="store_true",
+        help="also write diagnostics.csv: NIS and noise scale of every update, for the pages of `report`",
+    )
     add("--rate", type=positive, metavar="HZ", help="frames per second of input files that count frames")
     add("--input-format", choices=INPUT_FORMATS, help="format of the input, if it is not recognised")
     add(
@@ -93,6 +98,7 @@ def run(args: argparse.Namespace) -> int:
         formats=tuple(dict.fromkeys(name for name in args.formats if name != "csv")),
         frame_rate_hz=args.frame_rate if args.frame_rate is not None else args.rate,
         progress=sys.stderr.isatty(),
+        diagnostics=args.diagnostics,
     )
     reading = {
         "rate_hz": args.rate,

@@ -22,7 +22,7 @@ from jeat_graph.measurements import Measurements
 from jeat_graph.settings import SensorArrays, Settings
 from jeat_graph.stages.predicting import detection_variance
 from jeat_graph.state import TrackArrays
-from jeat_graph.update_log import UpdateLog, log_update, root_jerk
+from jeat_graph.update_log import UpdateLog, log_surprise, log_update, root_jerk
 
 
 @njit(cache=True, forceinline=True)
@@ -68,6 +68,7 @@ def take(
     if settings.standing:
         judge_standing(tracks, i, t, batch.z[j], R, settings)
     nis = update(tracks.mean[i], tracks.cov[i], batch.z[j], R)
+    log_surprise(log, nis, tracks.scale[i, s])
     tracks.scale[i, s] = adapt_scale(
         tracks.scale[i, s], nis, settings.adaptation_rate, settings.scale_min, settings.scale_max
     )
