@@ -1,0 +1,113 @@
+"""Segments from our own renderer."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from jeat_graph.arrays import IntArray
+from jeat_graph.errors import ConfigError
+from jeat_graph.events import EventArray
+from jeat_graph.section_tree import plain
+from jeat_graph.sehn.camera import Camera
+from jeat_graph.sehn.imaging.config import ImagingConfig
+from jeat_graph.sehn.imaging.scaling import scaled_camera
+from jeat_graph.sehn.imaging.truth import frame_truth
+from jeat_graph.sehn.scenario import Scenario
+from jeat_graph.sehn.scene import Scene
+from jeat_graph.sehn.segment import SegmentStep
+from jeat_graph.sehn.streams import stream
+
+
+class RenderedSource:
+    """Pictures of a simulated highway; a `SegmentSource`."""
+
+    def __init__(
+        self, scenario: Scenario, imaging: ImagingConfig | None = None, seed: int = 0, frames: int = 100
+    ) -> None:
+        """Prepare; nothing is rendered yet.
+
+        Args:
+            scenario: road, traffic, light and camera; its camera is scaled to the picture's size.
+            imaging: renderer and cameras.
+            seed: of all segments.
+            frames: RGB frames a segment.
+
+        Raises:
+            ConfigError: a negative seed, or no frames.
+        """
+        if seed < 0:
+            raise ConfigError(f"seed: must not be negative, got {seed}")
+        if frames < 1:
+            raise ConfigError(f"frames: must be at least 1, got {frames}")
+        self.scenario = scenario
+        self.imaging = imaging or ImagingConfig()
+        self.seed = seed
+        self.frames = frames
+        render = self.imaging.render
+        self.camera_config = scaled_camera(scenario.camera, render.width, render.height)
+        self.camera = Camera.mounted(self.camera_config)
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height of the pictures."""
+        return self.camera.width, self.camera.height
+
+    def calibration(self) -> dict[str, Any]:
+        """Return the camera's calibration as plain values."""
+        return self.camera.to_dict()
+
+    def settings(self) -> dict[str, Any]:
+        """Return all settings as plain values; with the index they define a segment."""
+        return {
+            "source": "rendered",
+            "seed": self.seed,
+            "frames": self.frames,
+            "scenario": plain(dataclasses.asdict(self.scenario)),
+            "imaging": plain(dataclasses.asdict(self.imaging)),
+        }
+
+    def scene(self, index: int) -> Scene:
+        """Build the scene of segment `index`, with traffic of its own."""
+        s = self.scenario
+        seed = int(stream(self.seed, f"segment.{index}").integers(0, 2**62))
+        duration = (self.frames + 1) / self.imaging.rgb.rate_hz + 1.0
+        return Scene.build(seed, duration, s.road, s.fleet, s.traffic, s.light, self.camera_config)
+
+    def frame_times_us(self, index: int) -> IntArray:
+        """Times of the frames of segment `index` (µs): the nominal ones with jitter, ascending."""
+        config = self.imaging.rgb
+        period = 1.0 / config.rate_hz
+        rng = stream(self.seed, f"segment.{index}.clock")
+        jitter = np.clip(config.jitter_s * rng.standard_normal(self.frames), -0.4 * period, 0.4 * period)
+        return np.round(1e6 * (period * np.arange(1, self.frames + 1) + jitter)).astype(np.int64)
+
+    def segment(self, index: int) -> Iterator[SegmentStep]:
+        """Yield the frames of segment `index`."""
+        scene = self.scene(index)
+        w, h = self.size_px
+        rng = stream(self.seed, f"segment.{index}.evt")
+        previous = 0
+        for t in self.frame_times_us(index):
+            states = scene.states_at(np.array([t * 1e-6]), far_m=self.scenario.truth.horizon_m)
+            truth = frame_truth(states, self.camera, np.ones(len(states)), 5.0)
+            rgb = np.full((h, w, 3), 60, dtype=np.uint8)
+            xs, ys = [], []
+            for left, top, width, height in truth.boxes.astype(int):
+                rgb[top : top + height, left : left + width] = 150
+                xs.append(left + rng.integers(0, width, 200))
+                ys.append(top + rng.integers(0, height, 200))
+            x = np.concatenate(xs) if xs else np.zeros(0)
+            y = np.concatenate(ys) if ys else np.zeros(0)
+            events = EventArray(
+                np.sort(rng.integers(previous, t, len(x))),
+                x.astype(np.uint16),
+                y.astype(np.uint16),
+                rng.integers(0, 2, len(x)).astype(np.uint8),
+                rng.random(len(x)) < 0.8,
+            )
+            previous = int(t)
+            yield SegmentStep(int(t), rgb, events, truth)
