@@ -64,7 +64,7 @@ def load_run(
     from jeat_graph.io.formats import recognise
 
     path, truth_path = Path(run), Path(truth)
-    tables = _tables_of(path)
+    tables = tables_of(path)
     form = recognise(next(iter(tables.values())))
     truth_form = recognise(truth_path)
     if rate_hz is None and truth_form == "motchallenge":
@@ -93,7 +93,12 @@ def restrict_classes(truth: GroundTruth, classes: Sequence[str]) -> GroundTruth:
     return dataclasses.replace(truth, ignore=truth.ignore | ~wanted)
 
 
-def _tables_of(path: Path) -> dict[str, Path]:
+def tables_of(path: Path) -> dict[str, Path]:
+    """Find the tables of a run by kind, `causal` before `smoothed`; a file alone is taken by its name.
+
+    Raises:
+        DataError: there is no such path, or it is a directory without either table.
+    """
     if not path.exists():
         raise DataError("there is no such run directory or table", path)
     if not path.is_dir():

@@ -70,7 +70,8 @@ class Table:
             raise ConfigError(f"unknown table format {form!r}; use one of {', '.join(FORMATS)}")
         return writers[form]()
 
-    def _shown(self, dash: str = "–") -> list[list[str]]:
+    def shown(self, dash: str = "–") -> list[list[str]]:
+        """Return the cells as they are shown to people, row by row."""
         return [
             [self._cell(value, name, dash) for value, name in zip(row, self.columns, strict=True)]
             for row in self.rows
@@ -84,16 +85,17 @@ class Table:
             return text[1:] if text.startswith("-") and not text.strip("-0.") else text
         return str(value)
 
-    def _is_number(self, k: int) -> bool:
+    def is_number(self, k: int) -> bool:
+        """Tell whether column `k` holds numbers, which are aligned to the right."""
         return all(not isinstance(row[k], str) for row in self.rows)
 
     def _text(self) -> str:
-        cells = self._shown()
+        cells = self.shown()
         widths = [max(len(n), *(len(r[k]) for r in cells), 0) for k, n in enumerate(self.columns)]
 
         def line(row: Sequence[str]) -> str:
             parts = [
-                c.rjust(w) if self._is_number(k) else c.ljust(w)
+                c.rjust(w) if self.is_number(k) else c.ljust(w)
                 for k, (c, w) in enumerate(zip(row, widths, strict=True))
             ]
             return "  ".join(parts).rstrip()
@@ -106,9 +108,9 @@ class Table:
         def line(row: Sequence[str]) -> str:
             return "| " + " | ".join(c.replace("|", "\\|") for c in row) + " |"
 
-        marks = ["--:" if self._is_number(k) else "---" for k in range(len(self.columns))]
+        marks = ["--:" if self.is_number(k) else "---" for k in range(len(self.columns))]
         head = [f"**{self.title}**", ""] if self.title else []
-        rows = [line(r) for r in self._shown()]
+        rows = [line(r) for r in self.shown()]
         return "\n".join([*head, line(self.columns), "|" + "|".join(marks) + "|", *rows]) + "\n"
 
     def _csv(self) -> str:
@@ -131,8 +133,8 @@ class Table:
         def line(row: Sequence[str]) -> str:
             return " & ".join(escape(c) for c in row) + r" \\"
 
-        layout = "".join("r" if self._is_number(k) else "l" for k in range(len(self.columns)))
-        rows = [line(r) for r in self._shown("--")]
+        layout = "".join("r" if self.is_number(k) else "l" for k in range(len(self.columns)))
+        rows = [line(r) for r in self.shown("--")]
         head = [f"% {self.title}"] if self.title else []
         begin, end = rf"\begin{{tabular}}{{{layout}}}", r"\end{tabular}"
         return "\n".join(

@@ -101,5 +101,12 @@ class Diagnostics:
     def take(self, rows: npt.ArrayLike) -> Diagnostics:
         """Return the rows chosen by an index or mask array."""
         index = np.asarray(rows)
-        columns = (self.t, self.track_id, self.sensor, self.nis, self.noise_scale, self.existence)
-        return Diagnostics(*(column[index] for column in columns), sensors=self.sensors)
+        return Diagnostics(
+            t=self.t[index],
+            track_id=self.track_id[index],
+            sensor=self.sensor[index],
+            nis=self.nis[index],
+            noise_scale=self.noise_scale[index],
+            existence=self.existence[index],
+            sensors=self.sensors,
+        )
