@@ -29,9 +29,9 @@ def gated_pairs(
     full N x M matrix is never built.
 
     Args:
-        position: (N, 2) predicted centre of each track (px).
-        position_var: (N, 2) its variances (px²).
-        noise: (N, S, 2) measurement variances of a detection of sensor s on track i, at weight 1 (px²).
+        position: (N, S, 2) expected centre of a detection of sensor s on track i (px).
+        position_var: (N, S, 2) its variances, before the detection's white noise (px²).
+        noise: (N, S, 2) variances of that noise, at weight 1 (px²).
         log_size: (N, 2) predicted ln width, ln height.
         log_size_var: (N, 2) their variances.
         size_noise: (S, 2) measurement variances of ln width, ln height.
@@ -114,29 +114,32 @@ def _fill(
     heaviest = np.max(weight)
     log_2pi = np.log(2.0 * np.pi)
     for i in range(num_tracks):
-        widest = 0.0
-        highest = 0.0
+        left, right = np.inf, -np.inf
+        top, bottom = np.inf, -np.inf
         for s in range(noise.shape[1]):
-            widest = max(widest, noise[i, s, 0])
-            highest = max(highest, noise[i, s, 1])
-        half = np.sqrt(gate * (position_var[i, 0] + widest * heaviest))
-        # A hair wider than any gate, so that rounding never decides here.
-        half_y = 1.000001 * np.sqrt(gate * (position_var[i, 1] + highest * heaviest))
-        k = np.searchsorted(x_sorted, position[i, 0] - half)
+            # A hair wider than any gate, so that rounding never decides here.
+            half = 1.000001 * np.sqrt(gate * (position_var[i, s, 0] + noise[i, s, 0] * heaviest))
+            left = min(left, position[i, s, 0] - half)
+            right = max(right, position[i, s, 0] + half)
+            half = 1.000001 * np.sqrt(gate * (position_var[i, s, 1] + noise[i, s, 1] * heaviest))
+            top = min(top, position[i, s, 1] - half)
+            bottom = max(bottom, position[i, s, 1] + half)
+        k = np.searchsorted(x_sorted, left)
         first = count
-        while k < num_dets and x_sorted[k] <= position[i, 0] + half:
-            dy = y_sorted[k] - position[i, 1]
+        while k < num_dets and x_sorted[k] <= right:
+            y = y_sorted[k]
             k += 1
-            if abs(dy) > half_y:
+            if y < top or y > bottom:
                 continue
             j = order[k - 1]
             s = sensor[j]
-            Sy = position_var[i, 1] + noise[i, s, 1] * weight[j]
+            dy = y - position[i, s, 1]
+            Sy = position_var[i, s, 1] + noise[i, s, 1] * weight[j]
             ny = dy * dy / Sy
             if ny > gate:
                 continue
-            dx = z[j, 0] - position[i, 0]
-            Sx = position_var[i, 0] + noise[i, s, 0] * weight[j]
+            dx = z[j, 0] - position[i, s, 0]
+            Sx = position_var[i, s, 0] + noise[i, s, 0] * weight[j]
             distance = dx * dx / Sx + ny
             if not distance <= gate:
                 continue

@@ -78,7 +78,8 @@ def predict_size(mean: FloatArray, cov: FloatArray, density: float, dt: float) -
 
 
 @njit(cache=True)
-def _flush(value: float) -> float:
+def flush(value: float) -> float:
+    """Return the value, or zero where it would sink into subnormals."""
     return 0.0 if abs(value) < _FLUSH else value
 
 
@@ -112,32 +113,13 @@ def update_block(m: FloatArray, P: FloatArray, z: float, R: float) -> float:
         p2 = P[0, 2]
         K2 = p2 / S
         m[2] += K2 * y
-        P[0, 2] = P[2, 0] = _flush(p2 * kept)
-        P[1, 2] = P[2, 1] = _flush(P[1, 2] - K1 * p2)
-        P[2, 2] = _flush(P[2, 2] - K2 * p2)
-    P[0, 0] = _flush(p0 * kept)
-    P[0, 1] = P[1, 0] = _flush(p1 * kept)
-    P[1, 1] = _flush(P[1, 1] - K1 * p1)
+        P[0, 2] = P[2, 0] = flush(p2 * kept)
+        P[1, 2] = P[2, 1] = flush(P[1, 2] - K1 * p2)
+        P[2, 2] = flush(P[2, 2] - K2 * p2)
+    P[0, 0] = flush(p0 * kept)
+    P[0, 1] = P[1, 0] = flush(p1 * kept)
+    P[1, 1] = flush(P[1, 1] - K1 * p1)
     return float(y * y / S)
-
-
-@njit(cache=True)
-def update(mean: FloatArray, cov: FloatArray, z: FloatArray, R: FloatArray) -> float:
-    """Update one track with a measurement of its box centre, in place (paper eq. 4).
-
-    Args:
-        mean: (2, 3) per axis [p, v, a].
-        cov: (2, 3, 3).
-        z: (2,) measured centre (px).
-        R: (2,) variances of the measurement (px²).
-
-    Returns:
-        The normalised innovation squared ε = yᵀ S⁻¹ y, χ² with 2 degrees of freedom for a consistent filter.
-    """
-    nis = 0.0
-    for k in range(2):
-        nis += update_block(mean[k], cov[k], z[k], R[k])
-    return nis
 
 
 @njit(cache=True)

@@ -53,6 +53,10 @@ class SensorConfig:
     sigma_px: float = number(2.0, "px", "noise of the box centre that does not depend on size", open_low=True)
     rho_x: float = number(0.03, "1", "noise of the box centre in x as a fraction of the width (method: rho)")
     rho_y: float = number(0.03, "1", "noise of the box centre in y as a fraction of the height (method: rho)")
+    correlated_share: float = number(
+        0.0, "1", "share of the centre's noise variance that persists from scan to scan", 0.0, 0.99
+    )
+    memory_s: float = number(0.2, "s", "correlation time of that share", 1e-3, 1e4)
     sigma_log_width: float = number(0.08, "ln px", "noise of the logarithm of the width", open_low=True)
     sigma_log_height: float = number(0.08, "ln px", "noise of the logarithm of the height", open_low=True)
     bias: tuple[float, float, float, float] = number(

@@ -22,6 +22,9 @@ class SensorArrays(NamedTuple):
     Attributes:
         sigma_px: (S,) px.
         rho: (S, 2) fraction of width and height.
+        share: (S,) share of the centre's noise variance that has memory.
+        error: (S,) the sensor's error state, counted from 0; -1 where its errors are white.
+        memory: (B,) correlation time of each error state (s).
         size_var: (S, 2) variances of ln width, ln height.
         bias: (S, 4) centre x / width, centre y / height, ln width, ln height.
         p_detect: (S,) prior of a new track.
@@ -36,6 +39,9 @@ class SensorArrays(NamedTuple):
 
     sigma_px: FloatArray
     rho: FloatArray
+    share: FloatArray
+    error: IntArray
+    memory: FloatArray
     size_var: FloatArray
     bias: FloatArray
     p_detect: FloatArray
@@ -121,9 +127,13 @@ def sensor_arrays(config: Config) -> SensorArrays:
             for s, c in zip(sensors, curves, strict=True)
         ]
     )
+    lasting = np.array([s.correlated_share > 0.0 for s in sensors])
     return SensorArrays(
         sigma_px=np.array([s.sigma_px for s in sensors]),
         rho=np.array([[s.rho_x, s.rho_y] for s in sensors]),
+        share=np.array([s.correlated_share for s in sensors]),
+        error=np.where(lasting, np.cumsum(lasting) - 1, -1),
+        memory=np.array([s.memory_s for s in sensors])[lasting],
         size_var=np.array([[s.sigma_log_width**2, s.sigma_log_height**2] for s in sensors]),
         bias=np.array([s.bias for s in sensors]),
         p_detect=np.array([s.p_detect for s in sensors]),

@@ -14,8 +14,9 @@ class TrackArrays(NamedTuple):
     """Arrays of capacity C for tracks and S sensors; rows beyond the number of living tracks are unused.
 
     Attributes:
-        mean: (C, 2, 3) per axis [p, v, a] of the box centre (px, px/s, px/s²).
-        cov: (C, 2, 3, 3) covariance per axis; the axes are independent.
+        mean: (C, 2, 3 + B) per axis [p, v, a] of the box centre (px, px/s, px/s²), and the errors with memory
+            of B sensors (`filters/coloured.py`).
+        cov: (C, 2, 3 + B, 3 + B) covariance per axis; the axes are independent.
         size_mean: (C, 2, 2) ln width and ln height, each with its rate (1/s).
         size_cov: (C, 2, 2, 2) covariance of each.
         anchor: (C, 2) where the track is if it stands still (px).
@@ -70,11 +71,12 @@ class SceneArrays(NamedTuple):
     undetected: FloatArray
 
 
-def allocate(capacity: int, num_sensors: int) -> TrackArrays:
-    """Allocate zeroed arrays for `capacity` tracks and `num_sensors` sensors."""
+def allocate(capacity: int, num_sensors: int, num_errors: int = 0) -> TrackArrays:
+    """Allocate zeroed arrays for `capacity` tracks, `num_sensors` sensors and `num_errors` error states."""
+    dim = 3 + num_errors
     return TrackArrays(
-        mean=np.zeros((capacity, 2, 3)),
-        cov=np.zeros((capacity, 2, 3, 3)),
+        mean=np.zeros((capacity, 2, dim)),
+        cov=np.zeros((capacity, 2, dim, dim)),
         size_mean=np.zeros((capacity, 2, 2)),
         size_cov=np.zeros((capacity, 2, 2, 2)),
         anchor=np.zeros((capacity, 2)),
@@ -103,7 +105,7 @@ def grow(tracks: TrackArrays, num_tracks: int, capacity: int) -> TrackArrays:
     old = len(tracks.existence)
     if capacity <= old:
         return tracks
-    larger = allocate(max(capacity, 2 * old), tracks.scale.shape[1])
+    larger = allocate(max(capacity, 2 * old), tracks.scale.shape[1], tracks.mean.shape[2] - 3)
     for source, target in zip(tracks, larger, strict=True):
         target[:num_tracks] = source[:num_tracks]
     return larger

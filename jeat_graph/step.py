@@ -12,7 +12,7 @@ from jeat_graph.stages.associating import associate
 from jeat_graph.stages.beginning import give_birth
 from jeat_graph.stages.ending import confirm, remove_ended
 from jeat_graph.stages.learning import count_misses, learn_scene
-from jeat_graph.stages.predicting import current_p_detect, predict_all, track_noise
+from jeat_graph.stages.predicting import current_p_detect, expect_detections, predict_all
 from jeat_graph.stages.updating import take_second_views, update_matched
 from jeat_graph.state import SceneArrays, TrackArrays
 from jeat_graph.update_log import UpdateLog
@@ -58,13 +58,13 @@ def step(
     """
     n = num_tracks
     log.count[0] = 0
-    predict_all(tracks, n, dt, settings)
+    predict_all(tracks, n, dt, sensors, settings)
     batch = prepare(boxes, scores, sensor, sensors, settings)
     p_detect = current_p_detect(tracks, n, present, sensors, settings)
-    noise = track_noise(tracks, n, sensors)
-    match, evidence = associate(tracks, n, batch, noise, p_detect, scene, sensors, settings, priority)
+    expectation = expect_detections(tracks, n, sensors)
+    match, evidence = associate(tracks, n, batch, expectation, p_detect, scene, sensors, settings, priority)
     taken = np.zeros(len(scores), dtype=np.int64)
-    update_matched(tracks, n, t, batch, noise, match, evidence, taken, sensors, settings, log)
+    update_matched(tracks, n, t, batch, expectation, match, evidence, taken, sensors, settings, log)
     if settings.second_pass:
         take_second_views(tracks, n, t, batch, match, taken, sensors, settings, log)
     learn_scene(tracks, n, dt, batch, match, taken, p_detect, present, scene, sensors, settings)

@@ -56,7 +56,7 @@ class Tracker:
         self._sensors = sensor_arrays(config)
         self._settings = kernel_settings(config)
         self._priority = priority_order(config)
-        self._tracks = allocate(_FIRST_CAPACITY, len(self.sensor_names))
+        self._tracks = allocate(_FIRST_CAPACITY, len(self.sensor_names), len(self._sensors.memory))
         self._scene = SceneArrays(
             clutter=self._sensors.clutter.copy(),
             p_detect=self._sensors.p_detect.copy(),

@@ -14,11 +14,11 @@ from numba import njit
 
 from jeat_graph.arrays import FloatArray, IntArray
 
-#: Columns of `UpdateLog.rows`. `R_x, R_y` are the variances exactly as the filter used them, scale and weight
-#: included; `jerk` is the root spectral density of the track's jerk at the time of the update; `birth` is 1
-#: where the measurement started the track, and then `var_v_x` … `var_rate` are the other prior variances;
-#: `nis` is the normalised innovation squared of the centre (NaN at a birth) and `scale` the noise scale s of
-#: the sensor that went into `R_x, R_y`.
+#: Columns of `UpdateLog.rows`. `R_x, R_y` are the variances of the white noise exactly as the filter used
+#: them, scale and weight included, `lever_x, lever_y` the levers of the sensor's error state; `jerk` is the
+#: root spectral density of the track's jerk at the time of the update; `birth` is 1 where the measurement
+#: started the track, and then `var_v_x` … `var_rate` are the other prior variances; `nis` is the normalised
+#: innovation squared of the centre (NaN at a birth) and `scale` the noise scale s that went into the noise.
 COLUMNS = (
     "track_id",
     "sensor",
@@ -39,6 +39,8 @@ COLUMNS = (
     "var_rate",
     "nis",
     "scale",
+    "lever_x",
+    "lever_y",
 )
 WIDTH = len(COLUMNS)
 
@@ -67,6 +69,7 @@ def log_update(
     sensor: int,
     z: FloatArray,
     R: FloatArray,
+    lever: FloatArray,
     jerk: float,
     log_size: FloatArray,
     size_var: FloatArray,
@@ -78,7 +81,8 @@ def log_update(
         track_id: the track that took it.
         sensor: index of the sensor.
         z: (2,) centre (px).
-        R: (2,) its variances (px²).
+        R: (2,) variances of its white noise (px²).
+        lever: (2,) levers of the sensor's error state (px), 0 where it has none.
         jerk: root spectral density of the track's jerk (px/s^2.5).
         log_size: (2,) ln width, ln height.
         size_var: (2,) their variances.
@@ -98,6 +102,8 @@ def log_update(
     row[11:] = 0.0
     row[17] = math.nan
     row[18] = 1.0
+    for axis in range(2):
+        row[19 + axis] = lever[axis]
     log.count[0] = k + 1
 
 
@@ -123,7 +129,7 @@ def log_birth(log: UpdateLog, cov: FloatArray, size_cov: FloatArray) -> None:
 
     Args:
         log: the log.
-        cov: (2, 3, 3) covariance of the new track.
+        cov: (2, 3 + B, 3 + B) covariance of the new track.
         size_cov: (2, 2, 2) covariance of its size.
     """
     k = log.count[0] - 1

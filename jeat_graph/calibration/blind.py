@@ -190,8 +190,7 @@ def _fit(config: Config, data: TrackedDetections) -> Config:
         raise DataError("no track is long enough to estimate motion; the recording is too short or too poor")
     noise, motion = _fit_noise_and_motion(config, thin, start)
     log_sigma, log_size = _fit_size_noise(config, thin, start)
-    R = log_sigma[thin.sensor] ** 2
-    size = fit_size(thin.t, log_size, R, start)
+    size = fit_size(thin.t, log_size, log_sigma[thin.sensor] ** 2, start)
     sensors: dict[str, SensorConfig] = {}
     for s, name in enumerate(names):
         old, taken = config.sensors[name], data.taken[s]
@@ -226,9 +225,12 @@ def _thinned(data: TrackedDetections) -> TrackedDetections:
 def _fit_noise_and_motion(
     config: Config, data: TrackedDetections, start: IntArray
 ) -> tuple[FloatArray, MotionConfig]:
-    """Maximise the innovation likelihood over σ and ρ (S, 2) of every sensor and the motion model."""
+    """Maximise the innovation likelihood over σ and ρ (S, 2) of every sensor and the motion model.
+
+    What the configuration says of errors with memory is kept: without truth, a slow error is motion.
+    """
     side = data.box[:, 2:]
-    z = np.ascontiguousarray((data.box[:, :2] + 0.5 * side).T)
+    z = data.box[:, :2] + 0.5 * side
     size = np.sqrt(side.prod(axis=1))
     known = [config.sensors[name] for name in config.sensor_names]
     rho = [max(np.sqrt(s.rho_x * s.rho_y), 0.005) for s in known]
@@ -244,15 +246,19 @@ def _fit_noise_and_motion(
         ]
     )
     n = len(known)
+    share = np.array([s.correlated_share for s in known])[data.sensor][:, None]
+    lasting = np.array([s.correlated_share > 0.0 for s in known])
+    error = np.where(lasting, np.cumsum(lasting) - 1, -1)[data.sensor]
+    memory = np.array([s.memory_s for s in known])[lasting]
 
     def loss(log_parameters: FloatArray) -> float:
         p = np.exp(np.clip(log_parameters, -8.0, 8.0))
         sigma2, rho2 = p[:n][data.sensor] ** 2, p[n : 2 * n][data.sensor] ** 2
-        total = 0.02 * float(np.sum((log_parameters - first) ** 2))
-        for axis in range(2):
-            R = sigma2 + rho2 * side[:, axis] ** 2
-            total += innovation_loss(data.t, z[axis], R, size, start, p[-3], p[-2], p[-1])
-        return total
+        var = sigma2[:, None] + rho2[:, None] * side**2
+        white, lever = (1.0 - share) * var, np.sqrt(share * var)
+        noise = (white, lever, error, memory)
+        pull = 0.02 * float(np.sum((log_parameters - first) ** 2))
+        return pull + float(innovation_loss(data.t, z, *noise, size, start, p[-3], p[-2], p[-1]))
 
     found = _minimise(loss, first, 0.5)
     p = np.exp(np.clip(found, -8.0, 8.0))

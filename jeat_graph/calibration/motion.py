@@ -10,15 +10,12 @@ from numba import njit
 from scipy.optimize import minimize
 
 from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.calibration.measured import MeasuredTracks
 from jeat_graph.config import MotionConfig, SizeConfig
 from jeat_graph.errors import DataError
-from jeat_graph.filters.aekf import update_block
-from jeat_graph.filters.motion import (
-    process_noise,
-    size_process_noise,
-    size_transition,
-    transition,
-)
+from jeat_graph.filters.aekf import predict, update_block
+from jeat_graph.filters.coloured import MOTION, expected, predict_errors, update_with_error
+from jeat_graph.filters.motion import size_process_noise, size_transition
 
 # Innovations beyond this many standard deviations are outliers and count as if they were this large.
 _HUBER = 3.0
@@ -33,45 +30,61 @@ def innovation_loss(
     t: FloatArray,
     z: FloatArray,
     R: FloatArray,
+    lever: FloatArray,
+    error: IntArray,
+    memory: FloatArray,
     side: FloatArray,
     start: IntArray,
     jerk_per_size: float,
     velocity_std_per_size: float,
     acceleration_std_per_size: float,
 ) -> float:
-    """Robust negative log likelihood of the innovations of many tracks, one axis.
+    """Robust negative log likelihood of the innovations of many tracks, both axes.
 
     Args:
         t: (K,) times (s), ascending within a track.
-        z: (K,) measured coordinate (px).
-        R: (K,) its variance (px²).
+        z: (K, 2) measured centres (px).
+        R: (K, 2) variances of their white noise (px²).
+        lever: (K, 2) levers of the errors with memory (px).
+        error: (K,) the sensor's error state, counted from 0, or -1.
+        memory: (B,) correlation times of the errors (s).
         side: (K,) box size sqrt(w h) (px).
         start: (T + 1,) track i owns the rows start[i]:start[i + 1].
         jerk_per_size: root spectral density of jerk per px of size (1/s^2.5).
         velocity_std_per_size: std of a new track's velocity per px of size (1/s).
         acceleration_std_per_size: the same of its acceleration (1/s²).
     """
+    D = MOTION + len(memory)
     loss = 0.0
+    mean, cov, u, jerk = np.zeros((1, 2, D)), np.zeros((1, 2, D, D)), np.empty(D), np.empty(1)
     for i in range(len(start) - 1):
-        m = np.zeros(3)
-        P = np.zeros((3, 3))
         for k in range(start[i], start[i + 1]):
             dt = t[k] - t[k - 1] if k > start[i] else 0.0
             if k == start[i] or dt > _MAX_GAP_S:
-                m[:] = 0.0
-                m[0] = z[k]
-                P[:] = 0.0
-                P[0, 0] = R[k]
-                P[1, 1] = (velocity_std_per_size * side[k]) ** 2
-                P[2, 2] = (acceleration_std_per_size * side[k]) ** 2
+                mean[:] = 0.0
+                cov[:] = 0.0
+                for axis in range(2):
+                    P = cov[0, axis]
+                    mean[0, axis, 0] = z[k, axis]
+                    P[0, 0] = R[k, axis] + lever[k, axis] ** 2
+                    P[1, 1] = (velocity_std_per_size * side[k]) ** 2
+                    P[2, 2] = (acceleration_std_per_size * side[k]) ** 2
+                    for b in range(MOTION, D):
+                        P[b, b] = 1.0
+                    if error[k] >= 0:
+                        P[0, MOTION + error[k]] = P[MOTION + error[k], 0] = -lever[k, axis]
                 continue
-            F = transition(dt)
-            m = F @ m
-            P = F @ P @ F.T + process_noise(dt, jerk_per_size * side[k])
-            S = P[0, 0] + R[k]
-            e = abs(z[k] - m[0]) / np.sqrt(S)
-            loss += 0.5 * np.log(S) + (0.5 * e * e if e < _HUBER else _HUBER * e - 0.5 * _HUBER**2)
-            update_block(m, P, z[k], R[k] if e < _HUBER else R[k] * (e / _HUBER) ** 2)
+            jerk[0] = jerk_per_size * side[k]
+            predict(mean, cov, jerk, dt)
+            predict_errors(mean, cov, memory, dt)
+            for axis in range(2):
+                m, P, r = mean[0, axis], cov[0, axis], R[k, axis]
+                centre, var = expected(m, P, lever[k, axis], error[k])
+                S = var + r
+                e = abs(z[k, axis] - centre) / np.sqrt(S)
+                loss += 0.5 * np.log(S) + (0.5 * e * e if e < _HUBER else _HUBER * e - 0.5 * _HUBER**2)
+                r = r if e < _HUBER else r * (e / _HUBER) ** 2
+                update_with_error(m, P, z[k, axis], r, lever[k, axis], error[k], u)
     return loss
 
 
@@ -79,7 +92,10 @@ def innovation_loss(
 def size_loss(
     t: FloatArray, z: FloatArray, R: FloatArray, start: IntArray, rate_density: float, rate_std: float
 ) -> float:
-    """Robust negative log likelihood of the innovations of ln width or ln height; arguments as above."""
+    """Robust negative log likelihood of the innovations of ln width or ln height.
+
+    Arguments as above, of one side.
+    """
     loss = 0.0
     for i in range(len(start) - 1):
         m = np.zeros(2)
@@ -110,29 +126,33 @@ def _minimise(loss: Callable[[FloatArray], float], first: FloatArray) -> FloatAr
     return np.asarray(minimize(loss, first, method="Nelder-Mead", options=options).x)
 
 
-def fit_motion(
-    t: FloatArray, z: FloatArray, R: FloatArray, side: FloatArray, start: IntArray
-) -> MotionConfig:
+def fit_motion(tracks: MeasuredTracks) -> MotionConfig:
     """Fit the motion model to measured tracks.
 
     Args:
-        t: (K,) times (s), ascending within a track.
-        z: (K, 2) measured centres (px), bias removed.
-        R: (K, 2) variances (px²).
-        side: (K,) box size sqrt(w h) (px).
-        start: (T + 1,) track i owns the rows start[i]:start[i + 1].
+        tracks: correct detections of all sensors, object by object.
 
     Raises:
         DataError: no track has three measurements.
     """
-    if len(start) < 2 or np.diff(start).max(initial=0) < 3:
+    if len(tracks.start) < 2 or np.diff(tracks.start).max(initial=0) < 3:
         raise DataError("no object was detected three times; motion cannot be estimated")
 
     def loss(log_parameters: FloatArray) -> float:
         jerk, velocity, acceleration = np.exp(np.clip(log_parameters, -8.0, 8.0))
-        total = 0.0
-        for axis in range(2):
-            total += innovation_loss(t, z[:, axis], R[:, axis], side, start, jerk, velocity, acceleration)
+        total = innovation_loss(
+            tracks.t,
+            tracks.z,
+            tracks.R,
+            tracks.lever,
+            tracks.error,
+            tracks.memory,
+            tracks.side,
+            tracks.start,
+            jerk,
+            velocity,
+            acceleration,
+        )
         # A weak pull to one keeps a parameter that the data say nothing of from running away.
         return total + 0.02 * float(np.sum(np.asarray(log_parameters) ** 2))
 

@@ -7,6 +7,7 @@ from scipy.optimize import isotonic_regression, minimize, minimize_scalar
 
 from jeat_graph.arrays import BoolArray, FloatArray
 from jeat_graph.calibration.matches import SensorMatches
+from jeat_graph.calibration.memory import fit_memory
 from jeat_graph.config import SensorConfig
 from jeat_graph.errors import DataError
 
@@ -34,15 +35,20 @@ def calibrate_sensor(matches: SensorMatches, rate_hz: float) -> SensorConfig:
     centred = matches.residual - bias
     sigma_x, rho_x = fit_noise(centred[:, 0] * matches.side[:, 0], matches.side[:, 0])
     sigma_y, rho_y = fit_noise(centred[:, 1] * matches.side[:, 1], matches.side[:, 1])
+    # One floor for both axes; each axis' own part goes with its side.
+    sigma = float(max(np.sqrt(0.5 * (sigma_x**2 + sigma_y**2)), 0.1))
+    spread = np.hypot(sigma, np.array([rho_x, rho_y]) * matches.side)
+    share, memory = fit_memory(centred[:, :2] * matches.side / spread, matches.key, matches.t)
     p_detect, blind = fit_detection(matches.seen, matches.speed, matches.visible)
     precision = np.clip((matches.correct.sum() + 0.5) / (len(matches.correct) + 1.0), 0.001, 0.999)
     false = ~matches.correct
     return SensorConfig(
         rate_hz=rate_hz,
-        # One floor for both axes; each axis' own part goes with its side.
-        sigma_px=float(max(np.sqrt(0.5 * (sigma_x**2 + sigma_y**2)), 0.1)),
+        sigma_px=sigma,
         rho_x=rho_x,
         rho_y=rho_y,
+        correlated_share=share,
+        memory_s=memory,
         sigma_log_width=float(max(robust_std(centred[:, 2]), 0.005)),
         sigma_log_height=float(max(robust_std(centred[:, 3]), 0.005)),
         bias=(float(bias[0]), float(bias[1]), float(bias[2]), float(bias[3])),

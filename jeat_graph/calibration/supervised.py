@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.calibration.matches import SensorMatches, match_sensor
+from jeat_graph.calibration.measured import measured_tracks
 from jeat_graph.calibration.motion import fit_motion, fit_size
 from jeat_graph.calibration.rates import scan_rate
 from jeat_graph.calibration.sensor import calibrate_sensor
@@ -18,8 +18,6 @@ from jeat_graph.errors import DataError
 from jeat_graph.trajectories import GroundTruth
 
 Recording = tuple[Detections, GroundTruth]
-
-_PERIOD_S = 0.1
 
 
 def calibrate(recordings: Sequence[Recording], base: Config | None = None) -> Config:
@@ -58,7 +56,7 @@ def calibrate(recordings: Sequence[Recording], base: Config | None = None) -> Co
     tracks = measured_tracks(matches, sensors)
     return replace(
         config,
-        motion=fit_motion(tracks.t, tracks.z, tracks.R, tracks.side, tracks.start),
+        motion=fit_motion(tracks),
         size=fit_size(tracks.t, tracks.log_size, tracks.log_size_var, tracks.start),
         birth=fit_births(config, matches, recordings),
     )
@@ -91,66 +89,6 @@ def fit_births(
     return replace(config.birth, arrival_rate_hz=arrivals / max(duration, 1.0), initial=initial)
 
 
-@dataclass(frozen=True, eq=False)
-class MeasuredTracks:
-    """Correct detections of all sensors, object by object.
-
-    Attributes:
-        t: (K,) time (s), ascending within a track.
-        z: (K, 2) centre without the sensor's bias (px).
-        R: (K, 2) its variance (px²).
-        side: (K,) sqrt(w h) (px).
-        start: (T + 1,) track i owns the rows start[i]:start[i + 1].
-        log_size: (K, 2) ln width and ln height without bias.
-        log_size_var: (K, 2) their variances.
-    """
-
-    t: FloatArray
-    z: FloatArray
-    R: FloatArray
-    side: FloatArray
-    start: IntArray
-    log_size: FloatArray
-    log_size_var: FloatArray
-
-
-def measured_tracks(
-    matches: Mapping[str, SensorMatches], sensors: Mapping[str, SensorConfig]
-) -> MeasuredTracks:
-    """Join all sensors' correct detections into one track an object, as the filter would take them in.
-
-    Args:
-        matches: by sensor.
-        sensors: calibrated noise and bias, by sensor.
-    """
-    parts = [(_one_a_period(every), sensors[name]) for name, every in matches.items()]
-    key = np.concatenate([m.key for m, _ in parts])
-    t = np.concatenate([m.t for m, _ in parts])
-    box = np.concatenate([m.box for m, _ in parts])
-    rows = [len(m.t) for m, _ in parts]
-    bias = np.repeat([s.bias for _, s in parts], rows, axis=0)
-    rho = np.repeat([(s.rho_x, s.rho_y) for _, s in parts], rows, axis=0)
-    sigma = np.repeat([s.sigma_px for _, s in parts], rows)
-    log_sigma = np.repeat([(s.sigma_log_width, s.sigma_log_height) for _, s in parts], rows, axis=0)
-    order = np.lexsort((t, key[:, 1], key[:, 0]))
-    change = np.any(np.diff(key[order], axis=0) != 0, axis=1)
-    start = np.concatenate(([0], np.flatnonzero(change) + 1, [len(order)])).astype(np.int64)
-    side = box[:, 2:]
-
-    def sort(column: FloatArray) -> FloatArray:
-        return np.ascontiguousarray(column[order])
-
-    return MeasuredTracks(
-        t=sort(t),
-        z=sort(box[:, :2] + (0.5 - bias[:, :2]) * side),
-        R=sort(sigma[:, None] ** 2 + (rho * side) ** 2),
-        side=sort(np.sqrt(side.prod(axis=1))),
-        start=start,
-        log_size=sort(np.log(side) - bias[:, 2:]),
-        log_size_var=sort(log_sigma**2),
-    )
-
-
 def _tempering(base: Config | None, name: str) -> float:
     """Tempering cannot be read off single detections: the base's, for a new sensor its most cautious one."""
     if base is None:
@@ -158,17 +96,3 @@ def _tempering(base: Config | None, name: str) -> float:
     if name in base.sensors:
         return base.sensors[name].tempering
     return min(s.tempering for s in base.sensors.values())
-
-
-def _one_a_period(m: SensorMatches) -> SensorMatches:
-    """Keep one correct detection of each object in each period.
-
-    A detector's errors persist over neighbouring scans; taken at every scan of a fast sensor they would
-    pass for motion.
-    """
-    period = np.floor(m.t / _PERIOD_S + 1e-6).astype(np.int64)
-    first = np.unique(np.column_stack([m.key, period]), axis=0, return_index=True)[1]
-    rows = np.sort(first)
-    return replace(
-        m, key=m.key[rows], t=m.t[rows], box=m.box[rows], residual=m.residual[rows], side=m.side[rows]
-    )

@@ -11,6 +11,7 @@ from jeat_graph.association.gating import gated_pairs
 from jeat_graph.association.joint import JOINT, SLOTS, associate_joint, associate_sequential, associate_slots
 from jeat_graph.measurements import Measurements
 from jeat_graph.settings import SensorArrays, Settings
+from jeat_graph.stages.predicting import Expectation
 from jeat_graph.state import SceneArrays, TrackArrays
 
 
@@ -19,7 +20,7 @@ def associate(
     tracks: TrackArrays,
     n: int,
     batch: Measurements,
-    noise: FloatArray,
+    expectation: Expectation,
     p_detect: FloatArray,
     scene: SceneArrays,
     sensors: SensorArrays,
@@ -33,9 +34,9 @@ def associate(
     """
     num_sensors = len(sensors.sigma_px)
     rows, cols, d2, log_density, log_size_density = gated_pairs(
-        tracks.mean[:n, :, 0],
-        tracks.cov[:n, :, 0, 0],
-        noise,
+        expectation.centre,
+        expectation.var,
+        expectation.white,
         tracks.size_mean[:n, :, 0],
         tracks.size_cov[:n, :, 0, 0],
         sensors.size_var,

@@ -9,11 +9,13 @@ from numba import njit
 
 from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.association.births import choose_births
+from jeat_graph.filters.coloured import MOTION
 from jeat_graph.filters.noise import base_variance
 from jeat_graph.lifecycle import track_boxes
 from jeat_graph.measurements import Measurements
 from jeat_graph.settings import SensorArrays, Settings
 from jeat_graph.stages.ending import confirm
+from jeat_graph.stages.predicting import split_noise
 from jeat_graph.stages.updating import take
 from jeat_graph.state import SceneArrays, TrackArrays
 from jeat_graph.update_log import UpdateLog, log_birth, log_update, root_jerk
@@ -52,7 +54,8 @@ def give_birth(
     for j in range(len(partner)):
         if partner[j] >= 0:
             i = n + partner[j]
-            take(tracks, i, t, j, batch, own_variances(batch, j, sensors), sensors, settings, log)
+            R, lever = own_noise(batch, j, sensors)
+            take(tracks, i, t, j, batch, R, lever, sensors, settings, log)
             # Two sensors' false boxes seldom coincide: each view's chance to be false remains.
             tracks.existence[i] = 1.0 - (1.0 - tracks.existence[i]) * (1.0 - batch.precision[j])
     confirm(tracks, n + len(parents), t, settings)
@@ -60,14 +63,19 @@ def give_birth(
 
 
 @njit(cache=True)
-def own_variances(batch: Measurements, j: int, sensors: SensorArrays) -> FloatArray:
-    """Variances (2,) of detection `j` (px²) by its own size, where no track's is known: R_base / g."""
+def own_noise(batch: Measurements, j: int, sensors: SensorArrays) -> tuple[FloatArray, FloatArray]:
+    """Noise of detection `j` by its own size, where no track's is known.
+
+    Returns:
+        (2,) variances of the white part (px²) and (2,) levers of the sensor's error state (px).
+    """
     s = batch.sensor[j]
-    out = np.empty(2)
+    white, lever = np.empty(2), np.empty(2)
     for axis in range(2):
         base = base_variance(sensors.sigma_px[s], sensors.rho[s, axis], batch.boxes[j, 2 + axis])
-        out[axis] = base * batch.weight[j]
-    return out
+        r, h = split_noise(base, s, sensors)
+        white[axis], lever[axis] = r * batch.weight[j], h
+    return white, lever
 
 
 @njit(cache=True)
@@ -110,7 +118,8 @@ def start_track(
     tracks.cov[i] = 0.0
     tracks.size_mean[i] = 0.0
     tracks.size_cov[i] = 0.0
-    R = own_variances(batch, j, sensors)
+    white, lever = own_noise(batch, j, sensors)
+    R = white + lever * lever
     for axis in range(2):
         tracks.mean[i, axis, 0] = batch.z[j, axis]
         tracks.anchor[i, axis] = batch.z[j, axis]
@@ -120,6 +129,12 @@ def start_track(
         tracks.cov[i, axis, 2, 2] = (
             settings.acceleration_std_px + settings.acceleration_std_per_size * side
         ) ** 2
+        for e in range(MOTION, tracks.mean.shape[2]):
+            tracks.cov[i, axis, e, e] = 1.0
+        if sensors.error[s] >= 0:
+            # p = z − h e − w: what the detection is off by, the position is off by the other way.
+            e = MOTION + sensors.error[s]
+            tracks.cov[i, axis, 0, e] = tracks.cov[i, axis, e, 0] = -lever[axis]
         tracks.size_mean[i, axis, 0] = batch.log_size[j, axis]
         tracks.size_cov[i, axis, 0, 0] = sensors.size_var[s, axis]
         tracks.size_cov[i, axis, 1, 1] = settings.size_rate_std**2
@@ -135,5 +150,5 @@ def start_track(
     tracks.used[i] = 1 << s
     if len(log.rows) > 0:
         jerk = root_jerk(tracks.size_mean[i], settings.jerk_px, settings.jerk_per_size, 1.0)
-        log_update(log, track_id, s, batch.z[j], R, jerk, batch.log_size[j], sensors.size_var[s])
+        log_update(log, track_id, s, batch.z[j], white, lever, jerk, batch.log_size[j], sensors.size_var[s])
         log_birth(log, tracks.cov[i], tracks.size_cov[i])

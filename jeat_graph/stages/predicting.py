@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from jeat_graph.arrays import BoolArray, FloatArray
 from jeat_graph.filters.aekf import predict, predict_size
+from jeat_graph.filters.coloured import expected, predict_errors
 from jeat_graph.filters.noise import base_variance
 from jeat_graph.lifecycle import motion_visibility, occluded_fraction, track_boxes, visible_fraction
 from jeat_graph.settings import SensorArrays, Settings
@@ -17,7 +19,7 @@ from jeat_graph.update_log import root_jerk
 
 
 @njit(cache=True)
-def predict_all(tracks: TrackArrays, n: int, dt: float, settings: Settings) -> None:
+def predict_all(tracks: TrackArrays, n: int, dt: float, sensors: SensorArrays, settings: Settings) -> None:
     """Predict motion, size and existence of the first `n` tracks by `dt` seconds, in place."""
     tracks.used[:n] = 0
     if dt <= 0.0:
@@ -30,6 +32,8 @@ def predict_all(tracks: TrackArrays, n: int, dt: float, settings: Settings) -> N
         drift = settings.standing_drift * side
         tracks.anchor_var[i] += drift * drift * dt
     predict(tracks.mean[:n], tracks.cov[:n], jerk, dt)
+    if len(sensors.memory):
+        predict_errors(tracks.mean[:n], tracks.cov[:n], sensors.memory, dt)
     predict_size(tracks.size_mean[:n], tracks.size_cov[:n], settings.size_rate_density, dt)
     if settings.by_existence:
         survival = math.exp(-dt / settings.lifetime_s)
@@ -71,12 +75,37 @@ def detection_variance(tracks: TrackArrays, i: int, s: int, axis: int, sensors: 
 
 
 @njit(cache=True)
-def track_noise(tracks: TrackArrays, n: int, sensors: SensorArrays) -> FloatArray:
-    """Measurement variances (n, S, 2) of a detection of each sensor on each track, at weight 1 (px²)."""
-    num_sensors = len(sensors.sigma_px)
-    out = np.empty((n, num_sensors, 2))
+def split_noise(variance: float, s: int, sensors: SensorArrays) -> tuple[float, float]:
+    """Split the noise of sensor `s` into its white variance (px²) and the lever of its error state (px)."""
+    return (1.0 - sensors.share[s]) * variance, math.sqrt(sensors.share[s] * variance)
+
+
+class Expectation(NamedTuple):
+    """Where the next detection of each sensor on each track is expected.
+
+    Attributes:
+        centre: (N, S, 2) expected centre (px).
+        var: (N, S, 2) its variance before the detection's white noise (px²).
+        white: (N, S, 2) variance of that noise at weight 1 (px²).
+        lever: (N, S, 2) lever of the sensor's error state (px), 0 where there is none.
+    """
+
+    centre: FloatArray
+    var: FloatArray
+    white: FloatArray
+    lever: FloatArray
+
+
+@njit(cache=True)
+def expect_detections(tracks: TrackArrays, n: int, sensors: SensorArrays) -> Expectation:
+    """Say where each sensor would find each of the first `n` tracks, and with what noise."""
+    shape = (n, len(sensors.sigma_px), 2)
+    centre, var, white, lever = np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape)
     for i in range(n):
-        for s in range(num_sensors):
+        for s in range(shape[1]):
             for axis in range(2):
-                out[i, s, axis] = detection_variance(tracks, i, s, axis, sensors)
-    return out
+                r, h = split_noise(detection_variance(tracks, i, s, axis, sensors), s, sensors)
+                white[i, s, axis], lever[i, s, axis] = r, h
+                z, V = expected(tracks.mean[i, axis], tracks.cov[i, axis], h, sensors.error[s])
+                centre[i, s, axis], var[i, s, axis] = z, V
+    return Expectation(centre, var, white, lever)

@@ -8,7 +8,8 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.arrays import FloatArray, IntArray
-from jeat_graph.filters.aekf import update, update_block
+from jeat_graph.filters.aekf import update_block
+from jeat_graph.filters.coloured import update_centre
 from jeat_graph.filters.noise import adapt_scale
 from jeat_graph.filters.standing import (
     moving_evidence,
@@ -20,7 +21,7 @@ from jeat_graph.filters.standing import (
 from jeat_graph.lifecycle import existence_after_hit
 from jeat_graph.measurements import Measurements
 from jeat_graph.settings import SensorArrays, Settings
-from jeat_graph.stages.predicting import detection_variance
+from jeat_graph.stages.predicting import Expectation, expect_detections
 from jeat_graph.state import TrackArrays
 from jeat_graph.update_log import UpdateLog, log_surprise, log_update, root_jerk
 
@@ -55,19 +56,26 @@ def take(
     j: int,
     batch: Measurements,
     R: FloatArray,
+    lever: FloatArray,
     sensors: SensorArrays,
     settings: Settings,
     log: UpdateLog,
 ) -> None:
-    """Update track `i` with detection `j` of variances R (2,) (px²): filter, size, noise scale, standing."""
+    """Update track `i` with detection `j`: filter, size, noise scale, standing.
+
+    Its noise has white variances R (2,) (px²) and the lever (2,) (px) on the sensor's error with memory.
+    """
     s = batch.sensor[j]
     if len(log.rows) > 0:
         factor = settings.standing_jerk if tracks.standing[i] else 1.0
         jerk = root_jerk(tracks.size_mean[i], settings.jerk_px, settings.jerk_per_size, factor)
-        log_update(log, tracks.track_id[i], s, batch.z[j], R, jerk, batch.log_size[j], sensors.size_var[s])
+        log_update(
+            log, tracks.track_id[i], s, batch.z[j], R, lever, jerk, batch.log_size[j], sensors.size_var[s]
+        )
     if settings.standing:
-        judge_standing(tracks, i, t, batch.z[j], R, settings)
-    nis = update(tracks.mean[i], tracks.cov[i], batch.z[j], R)
+        # Both models take the error with memory for white: neither may gain by knowing it.
+        judge_standing(tracks, i, t, batch.z[j], R + lever * lever, settings)
+    nis = update_centre(tracks.mean[i], tracks.cov[i], batch.z[j], R, lever, sensors.error[s])
     log_surprise(log, nis, tracks.scale[i, s])
     tracks.scale[i, s] = adapt_scale(
         tracks.scale[i, s], nis, settings.adaptation_rate, settings.scale_min, settings.scale_max
@@ -100,7 +108,7 @@ def update_matched(
     n: int,
     t: float,
     batch: Measurements,
-    noise: FloatArray,
+    expectation: Expectation,
     match: IntArray,
     evidence: FloatArray,
     taken: IntArray,
@@ -115,7 +123,8 @@ def update_matched(
             if j < 0:
                 continue
             taken[j] = 1
-            take(tracks, i, t, j, batch, noise[i, s] * batch.weight[j], sensors, settings, log)
+            R = expectation.white[i, s] * batch.weight[j]
+            take(tracks, i, t, j, batch, R, expectation.lever[i, s], sensors, settings, log)
             if settings.by_existence:
                 tracks.existence[i] = existence_after_hit(
                     tracks.existence[i], evidence[i, s], sensors.tempering[s]
@@ -142,6 +151,9 @@ def take_second_views(
     The distance is that to the track as the first detection has updated it. Entries of `match` are set.
     """
     leftover = np.flatnonzero(taken == 0)
+    if not len(leftover):
+        return
+    expectation = expect_detections(tracks, n, sensors)
     for i in range(n):
         first = -1
         for s in range(match.shape[1]):
@@ -159,16 +171,14 @@ def take_second_views(
                     continue
                 d2 = 0.0
                 for axis in range(2):
-                    y = batch.z[j, axis] - tracks.mean[i, axis, 0]
-                    R = detection_variance(tracks, i, s, axis, sensors) * batch.weight[j]
-                    d2 += y * y / (tracks.cov[i, axis, 0, 0] + R)
+                    y = batch.z[j, axis] - expectation.centre[i, s, axis]
+                    R = expectation.white[i, s, axis] * batch.weight[j]
+                    d2 += y * y / (expectation.var[i, s, axis] + R)
                 if d2 <= best:
                     best = d2
                     chosen = int(j)
             if chosen >= 0:
-                variance = np.empty(2)
-                for axis in range(2):
-                    variance[axis] = detection_variance(tracks, i, s, axis, sensors) * batch.weight[chosen]
-                take(tracks, i, t, chosen, batch, variance, sensors, settings, log)
+                white = expectation.white[i, s] * batch.weight[chosen]
+                take(tracks, i, t, chosen, batch, white, expectation.lever[i, s], sensors, settings, log)
                 match[i, s] = chosen
                 taken[chosen] = 1

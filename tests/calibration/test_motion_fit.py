@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+from jeat_graph.calibration.measured import MeasuredTracks
 from jeat_graph.calibration.motion import VELOCITY_RESERVE, fit_motion, fit_size, innovation_loss, size_loss
 
 
@@ -19,7 +20,7 @@ def white_jerk(dt, q):
     return F, Q
 
 
-def dense_loss(t, z, R, P0, model):
+def dense_loss(t, z, R, P0, model, lasting=None):
     """-ln N(z[1:] | z[0]) without the constant, from the joint covariance of all measurements."""
     n, d = len(t), len(P0)
     cov = [[None] * n for _ in range(n)]
@@ -37,7 +38,11 @@ def dense_loss(t, z, R, P0, model):
             C = C @ F.T
             cov[k][j] = C
     S = np.array([[cov[min(a, b)][max(a, b)][0, 0] for b in range(n)] for a in range(n)])
+    # Given z[0] = p[0] + e[0]: the prior variance of p[0] is that of e[0], and both move together.
     S = S[1:, 1:] + np.diag(R[1:])
+    if lasting is not None:
+        first, rest = lasting[0, 1:], lasting[1:, 1:]
+        S = S + rest - first[:, None] - first[None, :]
     k = n - 1
     assert d in (2, 3)
     return -multivariate_normal(np.full(k, z[0]), S).logpdf(z[1:]) - 0.5 * k * np.log(2 * np.pi)
@@ -51,8 +56,41 @@ def test_loss_is_the_density_of_a_track_under_the_white_jerk_model():
     side = np.full(8, 50.0)
     P0 = np.diag([R[0], (2.0 * 50.0) ** 2, (1.5 * 50.0) ** 2])
     expected = dense_loss(t, z, R, P0, lambda dt: white_jerk(dt, 3.0 * 50.0))
-    found = innovation_loss(t, z, R, side, np.array([0, 8]), 3.0, 2.0, 1.5)
-    assert found == pytest.approx(expected, rel=1e-9)
+    white = (np.zeros((8, 2)), np.full(8, -1), np.zeros(0))
+    both = np.column_stack([z, z])
+    found = innovation_loss(t, both, np.column_stack([R, R]), *white, side, np.array([0, 8]), 3.0, 2.0, 1.5)
+    assert found == pytest.approx(2.0 * expected, rel=1e-9)
+
+
+def test_loss_with_lasting_errors_is_the_density_with_their_covariance():
+    rng = np.random.default_rng(5)
+    t = np.cumsum(rng.uniform(0.02, 0.3, 8))
+    R, lever, tau = rng.uniform(1.0, 4.0, 8), rng.uniform(1.0, 2.0, 8), 0.3
+    z = 100.0 + 0.3 * rng.normal(size=8)
+    lasting = lever[:, None] * lever * np.exp(-np.abs(t[:, None] - t) / tau)
+    P0 = np.diag([R[0] + lever[0] ** 2, (2.0 * 50.0) ** 2, (1.5 * 50.0) ** 2])
+    expected = dense_loss(t, z, R, P0, lambda dt: white_jerk(dt, 3.0 * 50.0), lasting)
+    both, noise = np.column_stack([z, z]), np.column_stack([R, R])
+    errors = (np.column_stack([lever, lever]), np.zeros(8, dtype=np.int64), np.array([tau]))
+    side, start = np.full(8, 50.0), np.array([0, 8])
+    found = innovation_loss(t, both, noise, *errors, side, start, 3.0, 2.0, 1.5)
+    assert found == pytest.approx(2.0 * expected, rel=1e-9)
+
+
+def tracks_of(t, z, variance, side, start):
+    """Measured tracks with white errors."""
+    return MeasuredTracks(
+        t=t,
+        z=z,
+        R=np.full(z.shape, variance),
+        lever=np.zeros(z.shape),
+        error=np.full(len(t), -1),
+        memory=np.zeros(0),
+        side=np.full(len(t), side),
+        start=start,
+        log_size=np.zeros(z.shape),
+        log_size_var=np.ones(z.shape),
+    )
 
 
 def test_loss_of_sizes_is_the_density_of_an_integrated_random_walk():
@@ -89,7 +127,7 @@ def test_jerk_and_priors_are_found_again_in_tracks_drawn_with_them(jerk):
     tracks, length = 60, 30
     z = sampled(np.random.default_rng(2), tracks, length, jerk, 1.5, 1.0, 60.0, 2.0)
     t = np.tile(np.arange(length) * 0.1, tracks)
-    found = fit_motion(t, z, np.full(z.shape, 4.0), np.full(len(t), 60.0), np.arange(0, len(t) + 1, length))
+    found = fit_motion(tracks_of(t, z, 4.0, 60.0, np.arange(0, len(t) + 1, length)))
     assert found.jerk_per_size == pytest.approx(jerk, rel=0.15)
     assert found.velocity_std_per_size == pytest.approx(VELOCITY_RESERVE * 1.5, rel=0.25)
 
@@ -114,4 +152,4 @@ def test_too_short_tracks_are_refused():
     from jeat_graph.errors import DataError
 
     with pytest.raises(DataError, match="detected three times"):
-        fit_motion(np.zeros(2), np.zeros((2, 2)), np.ones((2, 2)), np.ones(2), np.array([0, 2]))
+        fit_motion(tracks_of(np.zeros(2), np.zeros((2, 2)), 1.0, 1.0, np.array([0, 2])))
