@@ -159,7 +159,12 @@ class EventWriter:
         joined = EventArray.concatenate(self._pending)
         end = len(joined) if everything else len(joined) - len(joined) % CHUNK_ROWS
         group = self._file["events"]
-        columns = {"x": joined.x, "y": joined.y, "p": joined.polarity, "t": joined.t_us}
+        columns: dict[str, npt.NDArray[Any]] = {
+            "x": joined.x,
+            "y": joined.y,
+            "p": joined.polarity,
+            "t": joined.t_us,
+        }
         if self._labelled:
             assert joined.by_motion is not None
             columns[_LABEL] = joined.by_motion
