@@ -17,8 +17,8 @@ def two_sensors(residual, variances, weights=(1.0, 1.0), track_var=4.0):
     """One track, one detection of each of two sensors at the same residual; d² and cost of both pairs."""
     flat, small = np.zeros((1, 2)), np.full((1, 2), 0.01)
     rows, cols, d2, density, size_density = gated_pairs(
-        flat,
-        np.full((1, 2), track_var),
+        np.zeros((1, 2, 2)),
+        np.full((1, 2, 2), track_var),
         np.repeat(np.array(variances), 2).reshape(1, 2, 2),
         flat,
         small,

@@ -12,8 +12,8 @@ from jeat_graph.association.gating import gated_pairs
 def random_scene(rng, tracks, dets, sensors=2, width=300.0):
     """Arguments of `gated_pairs` up to the gates."""
     return (
-        rng.uniform(0.0, width, (tracks, 2)),
-        rng.uniform(1.0, 60.0, (tracks, 2)),
+        rng.uniform(0.0, width, (tracks, 1, 2)) + rng.normal(0.0, 2.0, (tracks, sensors, 2)),
+        rng.uniform(1.0, 60.0, (tracks, sensors, 2)),
         rng.uniform(1.0, 30.0, (tracks, sensors, 2)),
         rng.normal(4.0, 0.3, (tracks, 2)),
         rng.uniform(0.001, 0.05, (tracks, 2)),
@@ -31,12 +31,12 @@ def all_pairs(
     out = []
     for i in range(len(position)):
         for j in range(len(z)):
-            S = var[i] + noise[i, sensor[j]] * weight[j]
-            d2 = ((z[j] - position[i]) ** 2 / S).sum()
+            S = var[i, sensor[j]] + noise[i, sensor[j]] * weight[j]
+            d2 = ((z[j] - position[i, sensor[j]]) ** 2 / S).sum()
             V = size_var[i] + size_noise[sensor[j]]
             size_d2 = ((z_size[j] - log_size[i]) ** 2 / V).sum()
             if d2 <= gate and size_d2 <= size_gate:
-                density = multivariate_normal.logpdf(z[j], position[i], np.diag(S))
+                density = multivariate_normal.logpdf(z[j], position[i, sensor[j]], np.diag(S))
                 size_density = multivariate_normal.logpdf(z_size[j], log_size[i], np.diag(V))
                 out.append((i, j, d2, density, size_density))
     return out
@@ -76,8 +76,8 @@ def test_a_detection_on_the_gate_is_inside():
     one, flat = np.ones((1, 2)), np.zeros((1, 2))
     z = np.array([[6.0, 0.0]])
     arguments = (
-        flat,
-        one,
+        flat[None],
+        one[None],
         np.ones((1, 1, 2)),
         flat,
         one,
