@@ -1,91 +1,227 @@
-"""`jeat-graph simulate`: detections and truth of the built-in highway."""
+"""`jeat-graph simulate`: detections, or pictures and events, of a highway, with truth; and their check."""
 
 from __future__ import annotations
 
 import argparse
-import json
+import re
 import sys
+from argparse import ArgumentTypeError
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-HELP = "simulate a highway seen by an RGB and an event camera: detections and truth"
+from jeat_graph.argument_types import counting
+from jeat_graph.errors import ConfigError
+
+if TYPE_CHECKING:
+    from jeat_graph.sehn.dataset.workers import SourceFactory
+    from jeat_graph.sehn.scenario import Scenario
+
+HELP = "simulate a highway seen by an RGB and an event camera: detections or pictures, and truth"
 _DENSITIES = ("sparse", "normal", "dense")
+_DURATION_S = 30.0
+_SEGMENTS = 1
+_FRAMES = 100
+_SIZE = (640, 384)
+# Arguments that only mean something with pictures, by the name of the attribute.
+_PICTURE_ONLY = ("segments", "frames", "size", "workers", "video", "compression", "split", "imaging")
+_CARLA_ONLY = ("carla_host", "carla_port")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.add_argument(
-        "scenario", metavar="SCENARIO", help="a name (day, night, night-nolight, …) or a YAML file"
+        "scenario",
+        metavar="SCENARIO",
+        nargs="?",
+        help="a name (day, night, night-nolight, …) or a YAML file",
     )
-    parser.add_argument("--out", required=True, metavar="DIR", help="folder to write into")
-    parser.add_argument("--duration", type=float, default=30.0, metavar="S", help="length (default 30)")
+    parser.add_argument("--out", metavar="DIR", help="folder to write into")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed (default 0)")
     parser.add_argument("--density", choices=_DENSITIES, help="traffic density (default: the scenario's)")
     parser.add_argument(
         "--sensors",
-        choices=("detections",),
+        choices=("detections", "pictures", "carla"),
         default="detections",
-        help="what to simulate (default detections)",
+        help="detections (default); pictures: RGB frames and events of the built-in renderer; carla: those "
+        "of a running CARLA server",
     )
+    parser.add_argument(
+        "--verify",
+        metavar="DIR",
+        help="only check a simulated folder: missing, changed and extra files, and whether all fit together; "
+        "exit code 1 if not",
+    )
+    only = parser.add_argument_group("with --sensors detections")
+    only.add_argument("--duration", type=float, metavar="S", help=f"length (default {_DURATION_S:g})")
+    pictures = parser.add_argument_group(
+        "with --sensors pictures or carla",
+        "A run that was stopped goes on where it was when it is called again, and gives the same bytes.",
+    )
+    pictures.add_argument(
+        "--segments", type=counting, metavar="N", help=f"how many (default {_SEGMENTS}; the full set: 500)"
+    )
+    pictures.add_argument(
+        "--frames", type=counting, metavar="N", help=f"RGB frames a segment (default {_FRAMES})"
+    )
+    pictures.add_argument("--size", type=_size, metavar="WxH", help="of the pictures (default 640x384)")
+    pictures.add_argument("--workers", type=counting, metavar="K", help="processes (default: one a core)")
+    pictures.add_argument(
+        "--video", choices=("mp4", "lossless", "png"), help="how frames are stored (default mp4, lossy)"
+    )
+    pictures.add_argument(
+        "--compression",
+        choices=("gzip", "none", "blosc"),
+        help="of events (default gzip; blosc needs the extra `hdf5`)",
+    )
+    pictures.add_argument(
+        "--split", type=_shares, metavar="A:B:C", help="shares of train, val, test (default 70:15:15)"
+    )
+    pictures.add_argument(
+        "--imaging",
+        metavar="FILE",
+        help="YAML with settings of renderer and cameras (sections render, rgb, evt)",
+    )
+    carla = parser.add_argument_group("with --sensors carla")
+    carla.add_argument("--carla-host", metavar="HOST", help="where the server runs (default localhost)")
+    carla.add_argument("--carla-port", type=counting, metavar="PORT", help="its port (default 2000)")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Simulate, write the files and print what was written."""
-    import numpy as np
-    import yaml
-    from tqdm import tqdm
-
-    from jeat_graph.io.atomic import open_atomic
-    from jeat_graph.io.detections_io import write_detections
-    from jeat_graph.io.hashing import sha256_of
-    from jeat_graph.io.truth_io import write_truth
-    from jeat_graph.sehn.scenario import load_scenario, scenario_to_yaml
-    from jeat_graph.sehn.simulate import record
-    from jeat_graph.version import __version__
+    """Simulate or check, and print what was written or found."""
+    if args.verify is not None:
+        if args.scenario is not None or args.out is not None:
+            raise ConfigError("--verify DIR stands alone, without SCENARIO and --out")
+        return _verify(Path(args.verify))
+    if args.scenario is None or args.out is None:
+        raise ConfigError("SCENARIO and --out DIR are needed (or --verify DIR)")
+    unfit = [*(_PICTURE_ONLY if args.sensors == "detections" else ("duration",))]
+    unfit += [] if args.sensors == "carla" else _CARLA_ONLY
+    unfit += ["imaging", "workers"] if args.sensors == "carla" else []
+    for name in unfit:
+        if getattr(args, name) is not None:
+            flag = "--" + name.replace("_", "-")
+            raise ConfigError(f"{flag} does not go with --sensors {args.sensors}")
+    from jeat_graph.sehn.scenario import load_scenario
 
     scenario = load_scenario(args.scenario, args.density)
-    out = Path(args.out)
-    with tqdm(total=3, desc="simulate", disable=not sys.stderr.isatty(), leave=False) as bar:
-        recording = record(scenario, args.seed, args.duration)
-        bar.update()
-        detections, truth = recording.detections, recording.truth
-        write_detections(detections, out / "detections.csv")
-        bar.update()
-        write_truth(truth, out / "gt.csv")
-        bar.update()
-    with open_atomic(out / "scenario.yaml") as file:
-        file.write(scenario_to_yaml(scenario))
-    with open_atomic(out / "camera.yaml") as file:
-        file.write(yaml.safe_dump(recording.scene.camera.to_dict(), sort_keys=False))
+    if args.sensors == "detections":
+        return _detections(args, scenario)
+    return _pictures(args, scenario)
 
-    boxes = np.diff(detections.scan_start)
-    sensors = {
-        name: {
-            "scans": int((detections.scan_sensor == k).sum()),
-            "detections": int(boxes[detections.scan_sensor == k].sum()),
-        }
-        for k, name in enumerate(detections.sensors)
-    }
-    names = ("detections.csv", "gt.csv", "scenario.yaml", "camera.yaml")
-    manifest: dict[str, Any] = {
-        "version": __version__,
-        "scenario": str(args.scenario),
-        "seed": args.seed,
-        "duration_s": args.duration,
-        "density": scenario.traffic.density,
-        "sensors": sensors,
-        "truth": {
-            "frames": len(truth.frame_times()),
-            "boxes": len(truth),
-            "ignored": int(truth.ignore.sum()),
-            "objects": len(np.unique(truth.object_id)),
-        },
-        "sha256": {name: sha256_of(out / name) for name in names},
-    }
-    with open_atomic(out / "manifest.json") as file:
-        file.write(json.dumps(manifest, indent=2) + "\n")
-    for name, count in sensors.items():
+
+def _detections(args: argparse.Namespace, scenario: Scenario) -> int:
+    from tqdm import tqdm
+
+    from jeat_graph.sehn.dataset.detection_set import STEPS, write_detection_set
+
+    duration = _DURATION_S if args.duration is None else args.duration
+    with tqdm(total=STEPS, desc="simulate", disable=not sys.stderr.isatty(), leave=False) as bar:
+        manifest = write_detection_set(
+            scenario, str(args.scenario), Path(args.out), args.seed, duration, bar.update
+        )
+    for name, count in manifest["sensors"].items():
         print(f"{name}: {count['detections']} boxes in {count['scans']} scans")
     print(f"truth: {manifest['truth']['objects']} vehicles in {manifest['truth']['frames']} frames")
-    print(f"wrote {out}")
+    print(f"wrote {args.out}")
     return 0
+
+
+def _pictures(args: argparse.Namespace, scenario: Scenario) -> int:
+    from tqdm import tqdm
+
+    from jeat_graph.sehn.dataset.protocol import Protocol
+    from jeat_graph.sehn.dataset.recording import record_dataset
+    from jeat_graph.sehn.dataset.workers import available_cores
+    from jeat_graph.sehn.scenario import scenario_to_yaml
+
+    given = {
+        "video": args.video,
+        "compression": args.compression,
+        "shares": args.split,
+    }
+    protocol = Protocol(
+        args.segments or _SEGMENTS,
+        args.seed,
+        **{key: value for key, value in given.items() if value is not None},
+    )
+    frames = args.frames or _FRAMES
+    carla = args.sensors == "carla"
+    factory = _carla_source(args, scenario, frames) if carla else _renderer(args, scenario, frames)
+    # One server renders for CARLA, so there is nothing to gain from several processes.
+    workers = 1 if carla else min(args.workers or available_cores(), protocol.segments)
+    total = protocol.segments * frames
+    with tqdm(total=total, desc="frames", disable=not sys.stderr.isatty(), leave=False) as bar:
+        manifest = record_dataset(
+            factory,
+            args.out,
+            protocol,
+            scenario_yaml=scenario_to_yaml(scenario),
+            workers=workers,
+            on_frames=bar.update,
+        )
+    totals = manifest["totals"]
+    splits = ", ".join(f"{len(names)} {name}" for name, names in manifest["splits"].items())
+    print(f"segments: {manifest['segments']} ({splits})")
+    print(f"frames: {totals['frames']}, events: {totals['events']}, {totals['bytes'] / 1e6:.1f} MB")
+    print(f"truth: {totals['boxes']} boxes, {totals['ignored']} of them hidden")
+    print(f"wrote {args.out}")
+    return 0
+
+
+def _renderer(args: argparse.Namespace, scenario: Scenario, frames: int) -> SourceFactory:
+    from jeat_graph.sehn.imaging.config import load_imaging
+    from jeat_graph.sehn.imaging.source import RenderedSource
+
+    tree: dict[str, Any] = {} if args.imaging is None else _read_yaml(Path(args.imaging))
+    if args.size is not None or "width" not in (tree.get("render") or {}):
+        width, height = args.size or _SIZE
+        tree["render"] = {**(tree.get("render") or {}), "width": width, "height": height}
+    return partial(RenderedSource, scenario, load_imaging(tree), args.seed, frames)
+
+
+def _carla_source(args: argparse.Namespace, scenario: Scenario, frames: int) -> SourceFactory:
+    raise ConfigError("--sensors carla is not there yet")
+
+
+def _verify(folder: Path) -> int:
+    from tqdm import tqdm
+
+    from jeat_graph.sehn.dataset.verify import file_count, verify
+
+    problems = 0
+    count = file_count(folder)
+    with tqdm(total=count, desc="verify", disable=not sys.stderr.isatty(), leave=False) as bar:
+        for problem in verify(folder, bar.update):
+            problems += 1
+            with bar.external_write_mode(file=sys.stdout):
+                print(problem)
+    if not problems:
+        print(f"{folder}: {count} files, all as they should be")
+    return 1 if problems else 0
+
+
+def _read_yaml(path: Path) -> dict[str, Any]:
+    from jeat_graph.section_tree import read_tree
+
+    if not path.is_file():
+        raise ConfigError(f"{path}: no such file")
+    return read_tree(str(path), (), str, "imaging file")
+
+
+def _size(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r"(\d+)[x×](\d+)", text.strip())
+    if match is None:
+        raise ArgumentTypeError(f"must read like 640x384, not {text!r}")
+    width, height = int(match[1]), int(match[2])
+    if not (16 <= width <= 8192 and 16 <= height <= 8192 and width % 2 == height % 2 == 0):
+        raise ArgumentTypeError(f"must be even numbers from 16 to 8192, not {text!r}")
+    return width, height
+
+
+def _shares(text: str) -> tuple[float, float, float]:
+    try:
+        train, val, test = (float(part) for part in text.split(":"))
+    except ValueError:
+        raise ArgumentTypeError(f"must read like 70:15:15, not {text!r}") from None
+    return train, val, test

@@ -32,6 +32,7 @@ SEGMENTS = "segments"
 SEGMENT_JSON = "segment.json"
 EVENTS = "events.h5"
 TRUTH = "gt.csv"
+DETECTIONS = "detections.csv"  # of a simulation at the level of detections
 VEHICLES = "vehicles.csv"
 BOXES = "boxes.npy"
 COCO = "coco.json"

@@ -41,7 +41,7 @@ def record_dataset(
     *,
     scenario_yaml: str | None = None,
     workers: int = 1,
-    on_frames: Callable[[int], None] = lambda n: None,
+    on_frames: Callable[[int], object] = lambda n: None,
 ) -> dict[str, Any]:
     """Make a data set, or what is missing of it. The same arguments give the same bytes.
 

@@ -26,7 +26,7 @@ _DEFAULT_RATE_HZ = 20.0  # what a video of a single frame declares
 
 
 def write_segment(
-    source: SegmentSource, index: int, root: Path, protocol: Protocol, on_frame: Callable[[], None]
+    source: SegmentSource, index: int, root: Path, protocol: Protocol, on_frame: Callable[[], object]
 ) -> dict[str, Any]:
     """Write segment `index` into its folder, which appears when it is whole.
 
@@ -60,7 +60,7 @@ def write_segment(
 
 
 def _fill(
-    source: SegmentSource, index: int, folder: Path, protocol: Protocol, on_frame: Callable[[], None]
+    source: SegmentSource, index: int, folder: Path, protocol: Protocol, on_frame: Callable[[], object]
 ) -> dict[str, Any]:
     place = source.calibration().get("position_m")
     truth = SegmentTruth(None if place is None else np.asarray(place, dtype=np.float64), protocol.min_visible)

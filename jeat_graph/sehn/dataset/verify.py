@@ -18,6 +18,7 @@ from jeat_graph.io.video import FRAME_TIMES, VIDEO_FILES, open_frames, read_fram
 from jeat_graph.sehn.dataset.layout import (
     BOXES,
     CAMERA,
+    DETECTIONS,
     EVENTS,
     FORMAT,
     MANIFEST,
@@ -31,10 +32,9 @@ from jeat_graph.sehn.dataset.manifest import read_json
 
 _US_PER_S = 1e6
 _TOLERANCE_PX = 1e-3  # of text and of 32-bit floats
-_DETECTIONS = "detections.csv"
 
 
-def verify(folder: str | Path, on_file: Callable[[], None] = lambda: None) -> Iterator[str]:
+def verify(folder: str | Path, on_file: Callable[[], object] = lambda: None) -> Iterator[str]:
     """Yield each problem as one line; none if all is well.
 
     Checked are, by `manifest.json`: files that are missing, changed (SHA-256) or not listed. In segments of
@@ -85,7 +85,9 @@ def file_count(folder: str | Path) -> int:
         return 0
 
 
-def _check_files(root: Path, sums: dict[str, str], on_file: Callable[[], None]) -> Iterator[tuple[str, str]]:
+def _check_files(
+    root: Path, sums: dict[str, str], on_file: Callable[[], object]
+) -> Iterator[tuple[str, str]]:
     for name in sorted(sums):
         path = root / name
         if not path.is_file():
@@ -196,9 +198,9 @@ def _check_detections(root: Path, manifest: dict[str, Any]) -> Iterator[str]:
     counts = manifest.get("truth", {})
     if (len(truth), len(truth.frame_times())) != (counts.get("boxes"), counts.get("frames")):
         yield f"{root / TRUTH}: {len(truth)} boxes in {len(truth.frame_times())} frames, not as in {MANIFEST}"
-    detections = read_detections(root / _DETECTIONS)
+    detections = read_detections(root / DETECTIONS)
     for k, name in enumerate(detections.sensors):
         mine = detections.scan_sensor == k
         found = {"scans": int(mine.sum()), "detections": int(np.diff(detections.scan_start)[mine].sum())}
         if found != manifest.get("sensors", {}).get(name):
-            yield f"{root / _DETECTIONS}: {found} of {name}, not as in {MANIFEST}"
+            yield f"{root / DETECTIONS}: {found} of {name}, not as in {MANIFEST}"

@@ -46,7 +46,7 @@ def make_segments(
     protocol: Protocol,
     indices: Sequence[int],
     workers: int,
-    on_frames: Callable[[int], None],
+    on_frames: Callable[[int], object],
 ) -> Generator[dict[str, Any], None, None]:
     """Make segments and yield the entry of each as it is done, in any order.
 
@@ -76,7 +76,7 @@ def _in_processes(
     protocol: Protocol,
     indices: Sequence[int],
     workers: int,
-    on_frames: Callable[[int], None],
+    on_frames: Callable[[int], object],
 ) -> Generator[dict[str, Any], None, None]:
     context = multiprocessing.get_context("spawn")  # fork would copy the threads' locks of other libraries
     counter = context.Value("q", 0)
