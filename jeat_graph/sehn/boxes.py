@@ -38,21 +38,30 @@ class ProjectedBoxes:
 
 
 def project_boxes(states: VehicleStates, camera: Camera) -> ProjectedBoxes:
-    """Project vehicles into the picture.
+    """Project vehicles into the picture (see `project_corners`)."""
+    place, velocity, acceleration = states.corners()
+    assert velocity is not None
+    assert acceleration is not None
+    return project_corners(place, velocity, acceleration, camera)
+
+
+def project_corners(
+    place: FloatArray, velocity: FloatArray, acceleration: FloatArray, camera: Camera
+) -> ProjectedBoxes:
+    """Project the corners of 3D boxes into the picture.
 
     The hull's left edge moves as the corner that is leftmost now, and so on, so that velocity and
     acceleration are exact in closed form on either side of the moments when the outermost corner changes.
 
     Args:
-        states: N vehicles.
+        place: (N, 8, 3) corners in the world (m); numbers of corners that share an edge differ in one bit.
+        velocity: (N, 8, 3) m/s.
+        acceleration: (N, 8, 3) m/s².
         camera: the camera.
 
     Returns:
         Boxes of all N rows; those wholly behind the camera have an empty hull (all zero).
     """
-    place, velocity, acceleration = states.corners()
-    assert velocity is not None
-    assert acceleration is not None
     depth = camera.to_camera(place)[..., 2]
     front = depth > NEAR_PLANE_M
     whole: BoolArray = np.all(front, axis=1)
