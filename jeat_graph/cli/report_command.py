@@ -1,0 +1,83 @@
+"""`jeat-graph report`: a run as one HTML page."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from jeat_graph.argument_types import positive
+
+if TYPE_CHECKING:
+    from jeat_graph.report.figures import ComparedRun
+
+HELP = "write a run as one self-contained HTML page: scores, map, and the curves of every track"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    add = parser.add_argument
+    # Not `run`: that name is taken by the function that the entry point calls.
+    add("run_directory", metavar="RUN", help="run directory, or a table or result of tracks")
+    add("--gt", metavar="FILE", help="truth; without it there are no scores")
+    add("--out", required=True, metavar="FILE.html", help="the page")
+    add("--rate", type=positive, metavar="HZ", help="frame rate of files that count frames")
+    add(
+        "--detections",
+        nargs="+",
+        metavar="FILE",
+        help="the run's inputs, in their order, if they have moved since (for filter against smoother)",
+    )
+    add(
+        "--no-compare",
+        action="store_true",
+        help="leave out filter against smoother, for which the run's inputs are tracked again",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Read the run, compare if its inputs are there, write the page."""
+    from jeat_graph.errors import DataError
+    from jeat_graph.io.atomic import open_atomic
+    from jeat_graph.report.page import render_page
+    from jeat_graph.report.run_data import load_run_data
+
+    out = Path(args.out)
+    if out.is_dir():
+        raise DataError("is a folder; --out must name a file, such as report.html", out)
+    data = load_run_data(args.run_directory, args.gt, args.rate)
+    compared, reason = _compare(args)
+    page = render_page(data, compared, reason)
+    with open_atomic(out) as file:
+        file.write(page)
+    for note in (*data.notes, *([] if reason is None else [reason])):
+        print(f"jeat-graph report: {note}", file=sys.stderr)
+    print(f"wrote {out}: {len(data.track_ids())} tracks, {out.stat().st_size / 1e6:.1f} MB")
+    return 0
+
+
+def _compare(args: argparse.Namespace) -> tuple[ComparedRun | None, str | None]:
+    """Filter against smoothers on the run's inputs, or the reason why that is not on the page."""
+    if args.no_compare:
+        return None, "Filter against smoother was left out (--no-compare)."
+    from jeat_graph.cli.compare_command import recorded_inputs
+    from jeat_graph.errors import DataError
+    from jeat_graph.eval.compare import ComparedTrack, compare
+    from jeat_graph.io.truth_io import read_truth
+    from jeat_graph.report.figures import compared_run
+    from jeat_graph.smoothing.records import record_tracks
+
+    folder = Path(args.run_directory)
+    try:
+        config, detections = recorded_inputs(folder, args.detections)
+    except DataError as error:
+        if args.detections is not None:
+            raise
+        return None, f"Filter against smoother is not shown: {error}."
+    truth = None if args.gt is None else read_truth(args.gt, rate_hz=args.rate)
+    records, smoothed = record_tracks(config, detections, progress=sys.stderr.isatty())
+    comparison = compare(
+        [ComparedTrack(*one) for one in records], config.sensor_names, truth=truth, smoothed=smoothed
+    )
+    return compared_run(comparison), None

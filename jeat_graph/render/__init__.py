@@ -1,0 +1,1 @@
+"""Tracks drawn over video, frames or events."""
