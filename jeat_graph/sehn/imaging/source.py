@@ -10,12 +10,15 @@ import numpy as np
 
 from jeat_graph.arrays import IntArray
 from jeat_graph.errors import ConfigError
-from jeat_graph.events import EventArray
 from jeat_graph.section_tree import plain
 from jeat_graph.sehn.camera import Camera
 from jeat_graph.sehn.imaging.config import ImagingConfig
+from jeat_graph.sehn.imaging.event_camera import EventCamera
+from jeat_graph.sehn.imaging.renderer import Renderer
+from jeat_graph.sehn.imaging.rgb_camera import choose_exposure, develop, electrons, expose
 from jeat_graph.sehn.imaging.scaling import scaled_camera
 from jeat_graph.sehn.imaging.truth import frame_truth
+from jeat_graph.sehn.imaging.visibility import buffers
 from jeat_graph.sehn.scenario import Scenario
 from jeat_graph.sehn.scene import Scene
 from jeat_graph.sehn.segment import SegmentStep
@@ -73,9 +76,8 @@ class RenderedSource:
     def scene(self, index: int) -> Scene:
         """Build the scene of segment `index`, with traffic of its own."""
         s = self.scenario
-        seed = int(stream(self.seed, f"segment.{index}").integers(0, 2**62))
         duration = (self.frames + 1) / self.imaging.rgb.rate_hz + 1.0
-        return Scene.build(seed, duration, s.road, s.fleet, s.traffic, s.light, self.camera_config)
+        return Scene.build(self._segment_seed(index), duration, s.road, s.fleet, s.traffic, s.light, self.camera_config)
 
     def frame_times_us(self, index: int) -> IntArray:
         """Times of the frames of segment `index` (µs): the nominal ones with jitter, ascending."""
@@ -88,26 +90,30 @@ class RenderedSource:
     def segment(self, index: int) -> Iterator[SegmentStep]:
         """Yield the frames of segment `index`."""
         scene = self.scene(index)
-        w, h = self.size_px
-        rng = stream(self.seed, f"segment.{index}.evt")
-        previous = 0
-        for t in self.frame_times_us(index):
-            states = scene.states_at(np.array([t * 1e-6]), far_m=self.scenario.truth.horizon_m)
-            truth = frame_truth(states, self.camera, np.ones(len(states)), 5.0)
-            rgb = np.full((h, w, 3), 60, dtype=np.uint8)
-            xs, ys = [], []
-            for left, top, width, height in truth.boxes.astype(int):
-                rgb[top : top + height, left : left + width] = 150
-                xs.append(left + rng.integers(0, width, 200))
-                ys.append(top + rng.integers(0, height, 200))
-            x = np.concatenate(xs) if xs else np.zeros(0)
-            y = np.concatenate(ys) if ys else np.zeros(0)
-            events = EventArray(
-                np.sort(rng.integers(previous, t, len(x))),
-                x.astype(np.uint16),
-                y.astype(np.uint16),
-                rng.integers(0, 2, len(x)).astype(np.uint8),
-                rng.random(len(x)) < 0.8,
+        seed = self._segment_seed(index)
+        config = self.imaging
+        renderer = Renderer(scene, config.render, seed)
+        exposure = choose_exposure(config.rgb, renderer.background.whole)
+        scale = exposure.scale(config.rgb)
+        event_camera = EventCamera(renderer, config, self.seed, seed, scale)
+        noise = stream(seed, "rgb.noise")
+        ground = renderer.background
+        least = self.scenario.truth.min_side_px * self.camera.width / self.scenario.camera.width
+        for t_us in self.frame_times_us(index):
+            time = np.array([1e-6 * t_us])
+            events = event_camera.advance(int(t_us))
+            radiance = expose(renderer, float(time[0]), exposure.time_s, config.rgb.readout_s)
+            charge = electrons(radiance, exposure.time_s, config.rgb, noise)
+            moments, look = renderer.moments(time)
+            _, _, visible = buffers(moments, look, ground.front_depth, ground.front_cover)
+            states = scene.states_at(time, far_m=self.scenario.truth.horizon_m)
+            seen = visible[np.searchsorted(look.number, states.object_id)]
+            yield SegmentStep(
+                t_us=int(t_us),
+                rgb=develop(charge, exposure.gain, config.rgb),
+                events=events,
+                truth=frame_truth(states, self.camera, seen, least),
             )
-            previous = int(t)
-            yield SegmentStep(int(t), rgb, events, truth)
+
+    def _segment_seed(self, index: int) -> int:
+        return int(stream(self.seed, f"segment.{index}").integers(0, 2**62))
