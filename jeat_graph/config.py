@@ -109,6 +109,9 @@ class MotionConfig:
     jerk_per_size: float = number(
         1.5, "1/s^2.5", "root spectral density of jerk per px of box size sqrt(w h)"
     )
+    jerk_per_growth: float = number(
+        0.0, "1", "root spectral density of jerk by perspective, in units of box size · growth rate^2.5"
+    )
     velocity_std_px: float = number(20.0, "px/s", "std of a new track's velocity")
     velocity_std_per_size: float = number(3.0, "1/s", "std of a new track's velocity per px of box size")
     acceleration_std_px: float = number(1.0, "px/s²", "std of a new track's acceleration", open_low=True)

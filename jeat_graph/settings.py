@@ -61,6 +61,7 @@ class Settings(NamedTuple):
     image_height: float
     jerk_px: float
     jerk_per_size: float
+    jerk_per_growth: float
     velocity_std_px: float
     velocity_std_per_size: float
     acceleration_std_px: float
@@ -156,6 +157,7 @@ def kernel_settings(config: Config) -> Settings:
         image_height=c.image.height,
         jerk_px=c.motion.jerk_px,
         jerk_per_size=c.motion.jerk_per_size,
+        jerk_per_growth=c.motion.jerk_per_growth,
         velocity_std_px=c.motion.velocity_std_px,
         velocity_std_per_size=c.motion.velocity_std_per_size,
         acceleration_std_px=c.motion.acceleration_std_px,

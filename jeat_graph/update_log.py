@@ -141,18 +141,3 @@ def log_birth(log: UpdateLog, cov: FloatArray, size_cov: FloatArray) -> None:
         row[12 + axis] = cov[axis, 1, 1]
         row[14 + axis] = cov[axis, 2, 2]
     row[16] = size_cov[0, 1, 1]
-
-
-@njit(cache=True)
-def root_jerk(size_mean: FloatArray, jerk_px: float, jerk_per_size: float, factor: float) -> float:
-    """Root spectral density of a track's jerk (px/s^2.5), which grows with its size.
-
-    Args:
-        size_mean: (2, 2) ln width and ln height with their rates.
-        jerk_px: part that does not depend on size (px/s^2.5).
-        jerk_per_size: part per px of sqrt(w h) (1/s^2.5).
-        factor: 1, or less while the track stands.
-    """
-    # A runaway extrapolation of a size must not overflow, as in `lifecycle.track_boxes`.
-    side = math.exp(min(0.5 * (size_mean[0, 0] + size_mean[1, 0]), 12.0))
-    return (jerk_px + jerk_per_size * side) * factor

@@ -20,8 +20,10 @@ from scipy.optimize import minimize
 
 from jeat_graph.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.calibration.motion import (
+    LEAST_JERK_PER_SIZE,
     VELOCITY_RESERVE,
     fit_size,
+    growth_rates,
     innovation_loss,
     size_loss,
 )
@@ -188,9 +190,11 @@ def _fit(config: Config, data: TrackedDetections) -> Config:
     start = np.concatenate(([0], np.flatnonzero(np.diff(thin.track)) + 1, [len(thin.t)])).astype(np.int64)
     if np.diff(start).max(initial=0) < _MIN_LENGTH:
         raise DataError("no track is long enough to estimate motion; the recording is too short or too poor")
-    noise, motion = _fit_noise_and_motion(config, thin, start)
     log_sigma, log_size = _fit_size_noise(config, thin, start)
-    size = fit_size(thin.t, log_size, log_sigma[thin.sensor] ** 2, start)
+    log_var = log_sigma[thin.sensor] ** 2
+    size = fit_size(thin.t, log_size, log_var, start)
+    growth = growth_rates(thin.t, log_size, log_var, start, size.rate_density, size.rate_std)
+    noise, motion = _fit_noise_and_motion(config, thin, start, growth)
     sensors: dict[str, SensorConfig] = {}
     for s, name in enumerate(names):
         old, taken = config.sensors[name], data.taken[s]
@@ -223,7 +227,7 @@ def _thinned(data: TrackedDetections) -> TrackedDetections:
 
 
 def _fit_noise_and_motion(
-    config: Config, data: TrackedDetections, start: IntArray
+    config: Config, data: TrackedDetections, start: IntArray, growth: FloatArray
 ) -> tuple[FloatArray, MotionConfig]:
     """Maximise the innovation likelihood over σ and ρ (S, 2) of every sensor and the motion model.
 
@@ -241,6 +245,7 @@ def _fit_noise_and_motion(
             *(max(s.sigma_px, 0.3) for s in known),
             *rho,
             m.jerk_per_size + m.jerk_px / typical + 1e-3,
+            max(m.jerk_per_growth, 0.5),
             (m.velocity_std_per_size + m.velocity_std_px / typical + 1e-3) / VELOCITY_RESERVE,
             m.acceleration_std_per_size + m.acceleration_std_px / typical + 1e-3,
         ]
@@ -258,14 +263,15 @@ def _fit_noise_and_motion(
         white, lever = (1.0 - share) * var, np.sqrt(share * var)
         noise = (white, lever, error, memory)
         pull = 0.02 * float(np.sum((log_parameters - first) ** 2))
-        return pull + float(innovation_loss(data.t, z, *noise, size, start, p[-3], p[-2], p[-1]))
+        return pull + float(innovation_loss(data.t, z, *noise, size, growth, start, *p[2 * n :]))
 
     found = _minimise(loss, first, 0.5)
     p = np.exp(np.clip(found, -8.0, 8.0))
     motion = replace(
         config.motion,
         jerk_px=0.0,
-        jerk_per_size=float(p[-3]),
+        jerk_per_size=max(float(p[-4]), LEAST_JERK_PER_SIZE),
+        jerk_per_growth=float(p[-3]),
         velocity_std_px=0.0,
         velocity_std_per_size=float(VELOCITY_RESERVE * p[-2]),
         acceleration_std_px=1e-3,

@@ -13,8 +13,9 @@ from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.calibration.measured import MeasuredTracks
 from jeat_graph.config import MotionConfig, SizeConfig
 from jeat_graph.errors import DataError
-from jeat_graph.filters.aekf import predict, update_block
+from jeat_graph.filters.aekf import predict, predict_size, update_block
 from jeat_graph.filters.coloured import MOTION, expected, predict_errors, update_with_error
+from jeat_graph.filters.jerk import jerk_density
 from jeat_graph.filters.motion import size_process_noise, size_transition
 
 # Innovations beyond this many standard deviations are outliers and count as if they were this large.
@@ -23,6 +24,9 @@ _MAX_GAP_S = 1.0
 # A prior of the velocity that is too narrow loses the fast vehicle on its second scan; one that is too wide
 # costs little. Speeds have heavier tails than the normal prior that is fitted, hence the reserve.
 VELOCITY_RESERVE = 2.0
+# Drivers brake and steer at about 1 m/s³ for about a second, in vehicles of about 2 m: a recording in which
+# nobody does is no reason to lose the one who will.
+LEAST_JERK_PER_SIZE = 0.3
 
 
 @njit(cache=True)
@@ -34,8 +38,10 @@ def innovation_loss(
     error: IntArray,
     memory: FloatArray,
     side: FloatArray,
+    growth: FloatArray,
     start: IntArray,
     jerk_per_size: float,
+    jerk_per_growth: float,
     velocity_std_per_size: float,
     acceleration_std_per_size: float,
 ) -> float:
@@ -49,8 +55,10 @@ def innovation_loss(
         error: (K,) the sensor's error state, counted from 0, or -1.
         memory: (B,) correlation times of the errors (s).
         side: (K,) box size sqrt(w h) (px).
+        growth: (K,) rate of growth of ln size (1/s), from `growth_rates`.
         start: (T + 1,) track i owns the rows start[i]:start[i + 1].
         jerk_per_size: root spectral density of jerk per px of size (1/s^2.5).
+        jerk_per_growth: the same by perspective, in units of size · growth^2.5.
         velocity_std_per_size: std of a new track's velocity per px of size (1/s).
         acceleration_std_per_size: the same of its acceleration (1/s²).
     """
@@ -74,7 +82,7 @@ def innovation_loss(
                     if error[k] >= 0:
                         P[0, MOTION + error[k]] = P[MOTION + error[k], 0] = -lever[k, axis]
                 continue
-            jerk[0] = jerk_per_size * side[k]
+            jerk[0] = jerk_density(side[k], growth[k], 0.0, jerk_per_size, jerk_per_growth)
             predict(mean, cov, jerk, dt)
             predict_errors(mean, cov, memory, dt)
             for axis in range(2):
@@ -119,6 +127,45 @@ def size_loss(
     return loss
 
 
+@njit(cache=True)
+def growth_rates(
+    t: FloatArray,
+    log_size: FloatArray,
+    var: FloatArray,
+    start: IntArray,
+    rate_density: float,
+    rate_std: float,
+) -> FloatArray:
+    """Rate of growth of ln size (K,) (1/s) as the size filter predicts it for each row.
+
+    Args:
+        t: (K,) times (s), ascending within a track.
+        log_size: (K, 2) measured ln width, ln height.
+        var: (K, 2) variances.
+        start: (T + 1,) track i owns the rows start[i]:start[i + 1].
+        rate_density: of the size filter (1/s^1.5).
+        rate_std: of the size filter (1/s).
+    """
+    out = np.zeros(len(t))
+    mean, cov = np.zeros((1, 2, 2)), np.zeros((1, 2, 2, 2))
+    for i in range(len(start) - 1):
+        for k in range(start[i], start[i + 1]):
+            dt = t[k] - t[k - 1] if k > start[i] else 0.0
+            if k == start[i] or dt > _MAX_GAP_S:
+                mean[:] = 0.0
+                cov[:] = 0.0
+                for side in range(2):
+                    mean[0, side, 0] = log_size[k, side]
+                    cov[0, side, 0, 0] = var[k, side]
+                    cov[0, side, 1, 1] = rate_std**2
+                continue
+            predict_size(mean, cov, rate_density, dt)
+            out[k] = 0.5 * (mean[0, 0, 1] + mean[0, 1, 1])
+            for side in range(2):
+                update_block(mean[0, side], cov[0, side], log_size[k, side], var[k, side])
+    return out
+
+
 def _minimise(loss: Callable[[FloatArray], float], first: FloatArray) -> FloatArray:
     """Minimise by Nelder-Mead from a simplex of a factor of e a side: parameters are logarithms."""
     simplex = np.vstack([first, first + np.eye(len(first))])
@@ -126,11 +173,12 @@ def _minimise(loss: Callable[[FloatArray], float], first: FloatArray) -> FloatAr
     return np.asarray(minimize(loss, first, method="Nelder-Mead", options=options).x)
 
 
-def fit_motion(tracks: MeasuredTracks) -> MotionConfig:
+def fit_motion(tracks: MeasuredTracks, size: SizeConfig) -> MotionConfig:
     """Fit the motion model to measured tracks.
 
     Args:
         tracks: correct detections of all sensors, object by object.
+        size: the size filter, which tells how fast a vehicle grows.
 
     Raises:
         DataError: no track has three measurements.
@@ -138,8 +186,12 @@ def fit_motion(tracks: MeasuredTracks) -> MotionConfig:
     if len(tracks.start) < 2 or np.diff(tracks.start).max(initial=0) < 3:
         raise DataError("no object was detected three times; motion cannot be estimated")
 
+    growth = growth_rates(
+        tracks.t, tracks.log_size, tracks.log_size_var, tracks.start, size.rate_density, size.rate_std
+    )
+
     def loss(log_parameters: FloatArray) -> float:
-        jerk, velocity, acceleration = np.exp(np.clip(log_parameters, -8.0, 8.0))
+        jerk, perspective, velocity, acceleration = np.exp(np.clip(log_parameters, -8.0, 8.0))
         total = innovation_loss(
             tracks.t,
             tracks.z,
@@ -148,19 +200,22 @@ def fit_motion(tracks: MeasuredTracks) -> MotionConfig:
             tracks.error,
             tracks.memory,
             tracks.side,
+            growth,
             tracks.start,
             jerk,
+            perspective,
             velocity,
             acceleration,
         )
         # A weak pull to one keeps a parameter that the data say nothing of from running away.
         return total + 0.02 * float(np.sum(np.asarray(log_parameters) ** 2))
 
-    first = np.log([2.0, 1.0, 1.0])
-    jerk, velocity, acceleration = np.exp(np.clip(_minimise(loss, first), -8.0, 8.0))
+    first = np.log([2.0, 2.0, 1.0, 1.0])
+    jerk, perspective, velocity, acceleration = np.exp(np.clip(_minimise(loss, first), -8.0, 8.0))
     return MotionConfig(
         jerk_px=0.0,
-        jerk_per_size=float(jerk),
+        jerk_per_size=max(float(jerk), LEAST_JERK_PER_SIZE),
+        jerk_per_growth=float(perspective),
         velocity_std_px=0.0,
         velocity_std_per_size=float(VELOCITY_RESERVE * velocity),
         acceleration_std_px=1e-3,

@@ -54,10 +54,11 @@ def calibrate(recordings: Sequence[Recording], base: Config | None = None) -> Co
         else replace(base, sensors=sensors, association=replace(base.association, priority=()))
     )
     tracks = measured_tracks(matches, sensors)
+    size = fit_size(tracks.t, tracks.log_size, tracks.log_size_var, tracks.start)
     return replace(
         config,
-        motion=fit_motion(tracks),
-        size=fit_size(tracks.t, tracks.log_size, tracks.log_size_var, tracks.start),
+        motion=fit_motion(tracks, size),
+        size=size,
         birth=fit_births(config, matches, recordings),
     )
 

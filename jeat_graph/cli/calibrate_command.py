@@ -156,6 +156,8 @@ def summary(config: Config, choices: tuple[Choice, ...]) -> list[Table]:
             "sigma_px": s.sigma_px,
             "rho_x": s.rho_x,
             "rho_y": s.rho_y,
+            "share": s.correlated_share,
+            "memory (s)": s.memory_s if s.correlated_share else None,
             "sigma_ln_w": s.sigma_log_width,
             "sigma_ln_h": s.sigma_log_height,
             "p_detect": s.p_detect,
@@ -170,6 +172,7 @@ def summary(config: Config, choices: tuple[Choice, ...]) -> list[Table]:
     m = config.motion
     motion: dict[str, Cell] = {
         "jerk_per_size": m.jerk_per_size,
+        "jerk_per_growth": m.jerk_per_growth,
         "velocity_std_per_size": m.velocity_std_per_size,
         "acceleration_std_per_size": m.acceleration_std_per_size,
         "size_rate_density": config.size.rate_density,

@@ -15,10 +15,10 @@ from jeat_graph.lifecycle import track_boxes
 from jeat_graph.measurements import Measurements
 from jeat_graph.settings import SensorArrays, Settings
 from jeat_graph.stages.ending import confirm
-from jeat_graph.stages.predicting import split_noise
+from jeat_graph.stages.predicting import jerk_of, split_noise
 from jeat_graph.stages.updating import take
 from jeat_graph.state import SceneArrays, TrackArrays
-from jeat_graph.update_log import UpdateLog, log_birth, log_update, root_jerk
+from jeat_graph.update_log import UpdateLog, log_birth, log_update
 
 
 @njit(cache=True)
@@ -149,6 +149,6 @@ def start_track(
     tracks.t_update[i] = t
     tracks.used[i] = 1 << s
     if len(log.rows) > 0:
-        jerk = root_jerk(tracks.size_mean[i], settings.jerk_px, settings.jerk_per_size, 1.0)
+        jerk = jerk_of(tracks, i, settings)
         log_update(log, track_id, s, batch.z[j], white, lever, jerk, batch.log_size[j], sensors.size_var[s])
         log_birth(log, tracks.cov[i], tracks.size_cov[i])

@@ -11,11 +11,24 @@ from numba import njit
 from jeat_graph.arrays import BoolArray, FloatArray
 from jeat_graph.filters.aekf import predict, predict_size
 from jeat_graph.filters.coloured import expected, predict_errors
+from jeat_graph.filters.jerk import track_jerk
 from jeat_graph.filters.noise import base_variance
 from jeat_graph.lifecycle import motion_visibility, occluded_fraction, track_boxes, visible_fraction
 from jeat_graph.settings import SensorArrays, Settings
 from jeat_graph.state import TrackArrays
-from jeat_graph.update_log import root_jerk
+
+
+@njit(cache=True, forceinline=True)
+def jerk_of(tracks: TrackArrays, i: int, settings: Settings) -> float:
+    """Root spectral density of the jerk of track `i` now (px/s^2.5)."""
+    factor = settings.standing_jerk if tracks.standing[i] else 1.0
+    return track_jerk(
+        tracks.size_mean[i],
+        settings.jerk_px,
+        settings.jerk_per_size,
+        settings.jerk_per_growth,
+        factor,
+    )
 
 
 @njit(cache=True)
@@ -27,8 +40,7 @@ def predict_all(tracks: TrackArrays, n: int, dt: float, sensors: SensorArrays, s
     jerk = np.empty(n)
     for i in range(n):
         side = math.exp(min(0.5 * (tracks.size_mean[i, 0, 0] + tracks.size_mean[i, 1, 0]), 12.0))
-        factor = settings.standing_jerk if tracks.standing[i] else 1.0
-        jerk[i] = root_jerk(tracks.size_mean[i], settings.jerk_px, settings.jerk_per_size, factor)
+        jerk[i] = jerk_of(tracks, i, settings)
         drift = settings.standing_drift * side
         tracks.anchor_var[i] += drift * drift * dt
     predict(tracks.mean[:n], tracks.cov[:n], jerk, dt)

@@ -21,9 +21,9 @@ from jeat_graph.filters.standing import (
 from jeat_graph.lifecycle import existence_after_hit
 from jeat_graph.measurements import Measurements
 from jeat_graph.settings import SensorArrays, Settings
-from jeat_graph.stages.predicting import Expectation, expect_detections
+from jeat_graph.stages.predicting import Expectation, expect_detections, jerk_of
 from jeat_graph.state import TrackArrays
-from jeat_graph.update_log import UpdateLog, log_surprise, log_update, root_jerk
+from jeat_graph.update_log import UpdateLog, log_surprise, log_update
 
 
 @njit(cache=True, forceinline=True)
@@ -67,8 +67,7 @@ def take(
     """
     s = batch.sensor[j]
     if len(log.rows) > 0:
-        factor = settings.standing_jerk if tracks.standing[i] else 1.0
-        jerk = root_jerk(tracks.size_mean[i], settings.jerk_px, settings.jerk_per_size, factor)
+        jerk = jerk_of(tracks, i, settings)
         log_update(
             log, tracks.track_id[i], s, batch.z[j], R, lever, jerk, batch.log_size[j], sensors.size_var[s]
         )

@@ -6,6 +6,7 @@ from scipy.stats import multivariate_normal
 
 from jeat_graph.calibration.measured import MeasuredTracks
 from jeat_graph.calibration.motion import VELOCITY_RESERVE, fit_motion, fit_size, innovation_loss, size_loss
+from jeat_graph.config import SizeConfig
 
 
 def white_jerk(dt, q):
@@ -58,7 +59,9 @@ def test_loss_is_the_density_of_a_track_under_the_white_jerk_model():
     expected = dense_loss(t, z, R, P0, lambda dt: white_jerk(dt, 3.0 * 50.0))
     white = (np.zeros((8, 2)), np.full(8, -1), np.zeros(0))
     both = np.column_stack([z, z])
-    found = innovation_loss(t, both, np.column_stack([R, R]), *white, side, np.array([0, 8]), 3.0, 2.0, 1.5)
+    still, start = np.zeros(8), np.array([0, 8])
+    noise = np.column_stack([R, R])
+    found = innovation_loss(t, both, noise, *white, side, still, start, 3.0, 0.0, 2.0, 1.5)
     assert found == pytest.approx(2.0 * expected, rel=1e-9)
 
 
@@ -72,8 +75,8 @@ def test_loss_with_lasting_errors_is_the_density_with_their_covariance():
     expected = dense_loss(t, z, R, P0, lambda dt: white_jerk(dt, 3.0 * 50.0), lasting)
     both, noise = np.column_stack([z, z]), np.column_stack([R, R])
     errors = (np.column_stack([lever, lever]), np.zeros(8, dtype=np.int64), np.array([tau]))
-    side, start = np.full(8, 50.0), np.array([0, 8])
-    found = innovation_loss(t, both, noise, *errors, side, start, 3.0, 2.0, 1.5)
+    side, still, start = np.full(8, 50.0), np.zeros(8), np.array([0, 8])
+    found = innovation_loss(t, both, noise, *errors, side, still, start, 3.0, 7.0, 2.0, 1.5)
     assert found == pytest.approx(2.0 * expected, rel=1e-9)
 
 
@@ -127,7 +130,7 @@ def test_jerk_and_priors_are_found_again_in_tracks_drawn_with_them(jerk):
     tracks, length = 60, 30
     z = sampled(np.random.default_rng(2), tracks, length, jerk, 1.5, 1.0, 60.0, 2.0)
     t = np.tile(np.arange(length) * 0.1, tracks)
-    found = fit_motion(tracks_of(t, z, 4.0, 60.0, np.arange(0, len(t) + 1, length)))
+    found = fit_motion(tracks_of(t, z, 4.0, 60.0, np.arange(0, len(t) + 1, length)), SizeConfig())
     assert found.jerk_per_size == pytest.approx(jerk, rel=0.15)
     assert found.velocity_std_per_size == pytest.approx(VELOCITY_RESERVE * 1.5, rel=0.25)
 
@@ -152,4 +155,4 @@ def test_too_short_tracks_are_refused():
     from jeat_graph.errors import DataError
 
     with pytest.raises(DataError, match="detected three times"):
-        fit_motion(tracks_of(np.zeros(2), np.zeros((2, 2)), 1.0, 1.0, np.array([0, 2])))
+        fit_motion(tracks_of(np.zeros(2), np.zeros((2, 2)), 1.0, 1.0, np.array([0, 2])), SizeConfig())

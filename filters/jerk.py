@@ -1,0 +1,59 @@
+"""How strongly a track's motion in the picture may change: the density of its white jerk."""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from jeat_graph.arrays import FloatArray
+
+# Beyond these a size is no vehicle's, and a growth none that a picture shows for longer than a moment.
+_MOST_LOG_SIZE = 12.0
+_MOST_GROWTH = 4.0  # 1/s
+
+
+@njit(cache=True)
+def jerk_density(
+    side: float, growth: float, jerk_px: float, jerk_per_size: float, jerk_per_growth: float
+) -> float:
+    """Root spectral density of the jerk (px/s^2.5).
+
+    Drivers brake and steer in metres, so their share grows with the size of the box. The rest is
+    perspective: of a vehicle that passes at constant speed, at a growth g = d ln(size) / dt, all distances in
+    the picture go with 1 / (t₀ − t) and g = 1 / (t₀ − t), so its jerk is proportional to size · g³ and lasts
+    for about 1 / g; as the density of a white process that is size · g^2.5. The constant-acceleration model
+    has no other way to know that a vehicle about to pass below the camera will not go on as it did.
+
+    Args:
+        side: box size sqrt(w h) (px).
+        growth: rate of growth of ln size (1/s), of either sign.
+        jerk_px: part that depends on nothing (px/s^2.5).
+        jerk_per_size: part of drivers, per px of size (1/s^2.5).
+        jerk_per_growth: part of perspective, in units of size · |growth|^2.5.
+    """
+    g = min(abs(growth), _MOST_GROWTH)
+    drivers = jerk_px + jerk_per_size * side
+    perspective = jerk_per_growth * side * g * g * math.sqrt(g)
+    if perspective == 0.0:
+        return float(drivers)
+    return math.sqrt(drivers * drivers + perspective * perspective)
+
+
+@njit(cache=True)
+def track_jerk(
+    size_mean: FloatArray, jerk_px: float, jerk_per_size: float, jerk_per_growth: float, factor: float
+) -> float:
+    """Root spectral density of a track's jerk (px/s^2.5), see `jerk_density`.
+
+    Args:
+        size_mean: (2, 2) ln width and ln height with their rates.
+        jerk_px: as there.
+        jerk_per_size: as there.
+        jerk_per_growth: as there.
+        factor: 1, or less while the track stands.
+    """
+    # A runaway extrapolation of a size must not overflow, as in `lifecycle.track_boxes`.
+    side = math.exp(min(0.5 * (size_mean[0, 0] + size_mean[1, 0]), _MOST_LOG_SIZE))
+    growth = 0.5 * (size_mean[0, 1] + size_mean[1, 1])
+    return factor * jerk_density(side, growth, jerk_px, jerk_per_size, jerk_per_growth)

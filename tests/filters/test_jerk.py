@@ -1,0 +1,39 @@
+"""The density of a track's jerk."""
+
+import numpy as np
+import pytest
+
+from jeat_graph.filters.jerk import jerk_density, track_jerk
+
+
+def test_without_growth_it_is_the_drivers_alone():
+    assert jerk_density(40.0, 0.0, 3.0, 0.5, 7.0) == pytest.approx(3.0 + 0.5 * 40.0)
+
+
+def test_the_parts_add_as_independent_noises_do():
+    drivers, perspective = 3.0 + 0.5 * 40.0, 7.0 * 40.0 * 1.5**2.5
+    for growth in (1.5, -1.5):
+        assert jerk_density(40.0, growth, 3.0, 0.5, 7.0) == pytest.approx(np.hypot(drivers, perspective))
+
+
+def test_perspective_has_the_scale_of_a_vehicle_that_passes():
+    """Size and place go with 1 / (t0 - t): the true third derivative over the density's scale is constant."""
+    t0 = 3.0
+    t = np.array([0.0, 1.0, 2.0, 2.5])
+    size, growth = 50.0 / (t0 - t), 1.0 / (t0 - t)
+    third = 6.0 * 50.0 / (t0 - t) ** 4
+    # A jerk of this size for about 1 / growth is a white process of density jerk · growth^-1/2.
+    density = [jerk_density(s, g, 0.0, 0.0, 1.0) for s, g in zip(size, growth, strict=True)]
+    assert third / np.sqrt(growth) / density == pytest.approx(np.full(4, 6.0))
+
+
+def test_a_runaway_size_or_growth_stays_finite():
+    wild = np.array([[1e6, 1e9], [1e6, -1e3]])
+    assert np.isfinite(track_jerk(wild, 1.0, 1.0, 1.0, 1.0))
+
+
+def test_a_standing_track_has_a_part_of_it():
+    size = np.array([[4.0, 0.3], [3.0, 0.1]])
+    full = track_jerk(size, 1.0, 0.5, 2.0, 1.0)
+    assert full == pytest.approx(jerk_density(np.exp(3.5), 0.2, 1.0, 0.5, 2.0))
+    assert track_jerk(size, 1.0, 0.5, 2.0, 0.1) == pytest.approx(0.1 * full)
