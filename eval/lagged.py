@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 
 from jeat_graph.arrays import FloatArray, IntArray
-from jeat_graph.smoothers.rts import filter_track, motion_matrices, smooth_rts
-from jeat_graph.smoothers.track_data import COINCIDENT_S, TrackData
+from jeat_graph.smoothers.passes import backward_between
+from jeat_graph.smoothers.rts import Filtered, run_filter, smooth_rts, steps_of
+from jeat_graph.smoothers.track_data import COINCIDENT_S, MOTION, TrackData
 
 
 @dataclass(frozen=True, eq=False)
 class States:
-    """States of one track at T times.
+    """Motion of one track at T times, without the error states of its sensors.
 
     Attributes:
         mean: (T, 2, 3) per axis [p, v, a] (px, px/s, px/s²).
@@ -33,7 +33,7 @@ class Innovations:
     Attributes:
         t: (K,) times of keys with a measurement (s); coincident measurements are one.
         error: (K, 2) innovation (px).
-        var: (K, 2) its variance S (px²).
+        var: (M, 2) its variance S (px²).
     """
 
     t: FloatArray
@@ -41,11 +41,11 @@ class Innovations:
     var: FloatArray
 
     def normalised(self) -> FloatArray:
-        """Innovations in units of their standard deviations (K, 2)."""
+        """Innovations in units of their standard deviations (M, 2)."""
         return np.asarray(self.error / np.sqrt(self.var))
 
     def nis(self) -> FloatArray:
-        """Normalised innovation squared (K,), χ² with two degrees of freedom if the filter is consistent."""
+        """Normalised innovation squared (M,), χ² with two degrees of freedom if the filter is consistent."""
         return np.asarray((self.error**2 / self.var).sum(axis=1))
 
 
@@ -73,7 +73,7 @@ def with_times(track: TrackData, t: FloatArray) -> tuple[TrackData, IntArray]:
     q = track.q[np.minimum(np.searchsorted(track.t, keys), len(track) - 1)]
     q = np.where(q > 0.0, q, 1.0)
     old_to_new = np.searchsorted(keys, track.t)
-    longer = TrackData(track.prior_mean, track.prior_cov, keys, q, old_to_new[track.key], track.z, track.r)
+    longer = replace(track, t=keys, q=q, key=old_to_new[track.key])
     at = np.searchsorted(keys, times - COINCIDENT_S)
     at = np.where(here, old_to_new[near], np.minimum(at, len(keys) - 1))
     return longer, at.astype(np.int64)
@@ -93,56 +93,33 @@ def states_at(
         The filter's states, those at each lag, those of the whole track, and the filter's innovations.
     """
     longer, at = with_times(track, t)
-    mean, cov = filter_track(longer)
-    whole = smooth_rts(longer)
-    F, Q = motion_matrices(np.diff(longer.t, prepend=longer.t[0]), longer.q)
+    filtered, whole = run_filter(longer), smooth_rts(longer)
     lagged = []
     for lag in lags_s:
         until = np.searchsorted(longer.t, longer.t[at] + lag + COINCIDENT_S, side="right") - 1
-        lagged.append(States(*_smooth_back(F, Q, mean, cov, whole.gain, at, until)))
+        lagged.append(_motion(*_smoothed_until(longer, filtered, at, until)))
     return (
-        States(mean[at], cov[at]),
+        _motion(filtered.mean[at], filtered.cov[at]),
         lagged,
-        States(whole.mean[at], whole.cov[at]),
-        _innovations(longer, F, Q, mean, cov),
+        _motion(whole.mean[at], whole.cov[at]),
+        _innovations(longer, filtered),
     )
 
 
-@njit(cache=True)
-def _smooth_back(
-    F: FloatArray,
-    Q: FloatArray,
-    mean: FloatArray,
-    cov: FloatArray,
-    gain: FloatArray,
-    at: IntArray,
-    until: IntArray,
+def _motion(mean: FloatArray, cov: FloatArray) -> States:
+    """Leave the error states (T, 2, 3 + B), (T, 2, 3 + B, 3 + B) out."""
+    return States(mean[:, :, :MOTION], cov[:, :, :MOTION, :MOTION])
+
+
+def _smoothed_until(
+    track: TrackData, filtered: Filtered, at: IntArray, until: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Smooth the states `at` (T,) with all up to keys `until` (T,): gains do not depend on what follows."""
-    out_mean = np.empty((len(at), 2, 3))
-    out_cov = np.empty((len(at), 2, 3, 3))
-    for i in range(len(at)):
-        for a in range(2):
-            m = mean[until[i], a].copy()
-            P = cov[until[i], a].copy()
-            for k in range(until[i] - 1, at[i] - 1, -1):
-                G = np.ascontiguousarray(gain[k, a])
-                step = F[k + 1]
-                filtered = np.ascontiguousarray(cov[k, a])
-                predicted = step @ filtered @ step.T + Q[k + 1]
-                m = mean[k, a] + G @ (m - step @ np.ascontiguousarray(mean[k, a]))
-                P = filtered + G @ (P - predicted) @ G.T
-            out_mean[i, a] = m
-            out_cov[i, a] = P
-    return out_mean, out_cov
+    """Smooth the states `at` (T,) with all up to the keys `until` (T,)."""
+    model = (steps_of(track), track.memory, track.key, track.lever, track.error)
+    return backward_between((0,) * track.size, *model, *filtered.passes(), at, until)
 
 
-def _innovations(
-    track: TrackData, F: FloatArray, Q: FloatArray, mean: FloatArray, cov: FloatArray
-) -> Innovations:
-    z, info = track.fused()
-    k = np.flatnonzero((info[:, 0] > 0.0) & (np.arange(len(track)) > 0))
-    step = F[k][:, None]
-    predicted = (step @ mean[k - 1][..., None])[..., 0]
-    P = step @ cov[k - 1] @ step.swapaxes(-1, -2) + Q[k][:, None]
-    return Innovations(track.t[k], z[k] - predicted[:, :, 0], P[:, :, 0, 0] + 1.0 / info[k])
+def _innovations(track: TrackData, filtered: Filtered) -> Innovations:
+    """Innovations of all measurements after the prior's own time."""
+    later = track.key > 0
+    return Innovations(track.t[track.key[later]], filtered.innovation[later], filtered.variance[later])

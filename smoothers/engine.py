@@ -11,9 +11,10 @@ from jeat_graph.arrays import FloatArray
 from jeat_graph.errors import ConfigError
 from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
 from jeat_graph.smoothers.full import smooth_full
+from jeat_graph.smoothers.measurements import COINCIDENT_S, Measurements, check_measurements
 from jeat_graph.smoothers.robust import robust_weights
 from jeat_graph.smoothers.rts import smooth_rts
-from jeat_graph.smoothers.track_data import COINCIDENT_S, SmoothedTrack, TrackData, check_measurements
+from jeat_graph.smoothers.track_data import SmoothedTrack, TrackData
 
 #: Names of the engines: GTSAM with a lag, our own RTS with a lag, GTSAM and RTS over the whole track.
 ENGINES = ("fixed-lag", "fixed-lag-rts", "full", "rts")
@@ -32,8 +33,25 @@ class TrackSmoother(Protocol):
     fallbacks: int
     too_late: int
 
-    def feed(self, t: npt.ArrayLike, z: npt.ArrayLike, r: npt.ArrayLike, q: npt.ArrayLike) -> None:
-        """Take in measurements: times (M,) s, centres (M, 2) px, variances (M, 2) px², densities (M,)."""
+    def feed(
+        self,
+        t: npt.ArrayLike,
+        z: npt.ArrayLike,
+        r: npt.ArrayLike,
+        q: npt.ArrayLike,
+        lever: npt.ArrayLike | None = None,
+        error: npt.ArrayLike | None = None,
+    ) -> None:
+        """Take in measurements z = p + lever · e + w.
+
+        Args:
+            t: (M,) times (s).
+            z: (M, 2) centres (px).
+            r: (M, 2) variances of the white part w (px²).
+            q: (M,) root spectral densities of the jerk (px/s^2.5).
+            lever: (M, 2) standard deviations of the part with a memory (px); None for none.
+            error: (M,) index of the error state e of each, or -1; None for -1.
+        """
 
     def departed(self) -> SmoothedTrack:
         """Return the states that have become final since the last call, and forget them."""
@@ -53,10 +71,11 @@ class WholeTrackSmoother:
 
     Args:
         prior_t: time of the prior (s).
-        prior_mean: (2, 3) prior mean of [p, v, a] per axis (px, px/s, px/s²).
-        prior_cov: (2, 3, 3) prior covariance.
+        prior_mean: (2, 3 + B) prior mean of [p, v, a, e_1, …, e_B] per axis (px, px/s, px/s², 1).
+        prior_cov: (2, 3 + B, 3 + B) prior covariance.
         use_gtsam: whether GTSAM does the solving, or our own RTS pass.
         robust: kernel that weighs down outliers (`robust.KERNELS`), or "none".
+        memory: (B,) memory of the error states (s).
 
     Attributes:
         rebuilds: how often GTSAM failed.
@@ -72,31 +91,42 @@ class WholeTrackSmoother:
         *,
         use_gtsam: bool = True,
         robust: str = "none",
+        memory: npt.ArrayLike = (),
     ) -> None:
         self.rebuilds = self.fallbacks = self.too_late = 0
         self._prior = (prior_t, np.asarray(prior_mean), np.asarray(prior_cov))
         self._use_gtsam, self._robust = use_gtsam, robust
-        self._parts: list[tuple[FloatArray, FloatArray, FloatArray, FloatArray]] = []
+        self._memory = np.asarray(memory, dtype=np.float64)
+        self._parts: list[Measurements] = []
 
-    def feed(self, t: npt.ArrayLike, z: npt.ArrayLike, r: npt.ArrayLike, q: npt.ArrayLike) -> None:
+    def feed(
+        self,
+        t: npt.ArrayLike,
+        z: npt.ArrayLike,
+        r: npt.ArrayLike,
+        q: npt.ArrayLike,
+        lever: npt.ArrayLike | None = None,
+        error: npt.ArrayLike | None = None,
+    ) -> None:
         """Take in measurements, in any order; see `TrackSmoother.feed`.
 
         Raises:
-            DataError: wrong shapes, numbers that are not finite, variances or densities <= 0.
+            DataError: wrong shapes, numbers that are not finite, variances or densities <= 0, error states
+                that do not exist.
         """
-        rows = check_measurements(t, z, r, q)
+        taken = check_measurements(t, z, r, q, lever, error, len(self._memory))
         earliest = self._prior[0] - COINCIDENT_S
-        if rows[0].min(initial=np.inf) < earliest:
-            valid = rows[0] >= earliest
+        if taken.t.min(initial=np.inf) < earliest:
+            valid = taken.t >= earliest
             self.too_late += int(np.count_nonzero(~valid))
-            rows = (rows[0][valid], rows[1][valid], rows[2][valid], rows[3][valid])
-        self._parts.append(rows)
+            taken = taken.take(valid)
+        self._parts.append(taken)
 
     def data(self) -> TrackData:
         """Return the prior and all measurements so far."""
-        empty = (np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0))
-        t, z, r, q = (np.concatenate(column) for column in zip(empty, *self._parts, strict=True))
-        return TrackData.from_measurements(*self._prior, t, z, r, q)
+        empty = check_measurements([], np.zeros((0, 2)), np.zeros((0, 2)), [])
+        taken = Measurements.concatenate([empty, *self._parts])
+        return TrackData.from_measurements(*self._prior, *taken, memory=self._memory)
 
     def departed(self) -> SmoothedTrack:
         """Return nothing: no state is final before the track ends."""
@@ -134,17 +164,19 @@ def make_smoother(
     lag_s: float = 1.0,
     chunk: int = 24,
     robust: str = "none",
+    memory: npt.ArrayLike = (),
 ) -> TrackSmoother:
     """Make the smoother of one track.
 
     Args:
         engine: one of `ENGINES`.
         prior_t: time of the prior (s).
-        prior_mean: (2, 3) prior mean of [p, v, a] per axis (px, px/s, px/s²).
-        prior_cov: (2, 3, 3) prior covariance.
+        prior_mean: (2, 3 + B) prior mean of [p, v, a, e_1, …, e_B] per axis (px, px/s, px/s², 1).
+        prior_cov: (2, 3 + B, 3 + B) prior covariance.
         lag_s: lag of the engines with a window (s).
         chunk: measurements per update of these.
         robust: kernel of the engines over the whole track (`robust.KERNELS`), or "none".
+        memory: (B,) memory of the error states (s): those of sensors whose errors are coloured.
 
     Returns:
         The smoother.
@@ -154,7 +186,8 @@ def make_smoother(
     """
     if engine not in ENGINES:
         raise ConfigError(f"smoother must be one of {', '.join(ENGINES)}, not {engine!r}")
+    prior = (prior_t, prior_mean, prior_cov)
     if engine.startswith("fixed-lag"):
         gtsam = engine == "fixed-lag"
-        return FixedLagSmoother(prior_t, prior_mean, prior_cov, lag_s=lag_s, chunk=chunk, use_gtsam=gtsam)
-    return WholeTrackSmoother(prior_t, prior_mean, prior_cov, use_gtsam=engine == "full", robust=robust)
+        return FixedLagSmoother(*prior, lag_s=lag_s, chunk=chunk, use_gtsam=gtsam, memory=memory)
+    return WholeTrackSmoother(*prior, use_gtsam=engine == "full", robust=robust, memory=memory)

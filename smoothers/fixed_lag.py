@@ -1,10 +1,11 @@
 """Fixed-lag smoothing of one live track: each state is final once a lag's worth of data has followed.
 
 The values come from GTSAM's incremental fixed-lag smoother (or, with `use_gtsam=False`, from our own
-Rauch-Tung-Striebel pass over the window). The covariances do not depend on the measured values, and come
-from the pass over our own arrays in both cases: the same numbers as GTSAM's marginals (tested), at a
-twentieth of the cost (about 1 ms for one marginal at the far end of a window of a second at 120 Hz,
-0.1 ms for all of the window's).
+pass over the window). GTSAM solves for every `STRIDE`-th state, its *anchors*; those in between are
+eliminated before (`factors.py`) and follow from the anchor after them, exactly. The covariances do not
+depend on the measured values, and come from the pass over our own arrays in both cases: the same numbers
+as GTSAM's marginals (tested), at a twentieth of the cost (about 1 ms for one marginal at the far end of a
+window of a second at 120 Hz).
 """
 
 from __future__ import annotations
@@ -16,9 +17,13 @@ from jeat_graph.arrays import FloatArray
 from jeat_graph.errors import DataError
 from jeat_graph.smoothers import factors
 from jeat_graph.smoothers.gtsam_window import GtsamWindow
-from jeat_graph.smoothers.interpolation import bridge
-from jeat_graph.smoothers.track_data import COINCIDENT_S, SmoothedTrack, check_measurements, fuse, group_times
+from jeat_graph.smoothers.measurements import COINCIDENT_S, Measurements, check_measurements, group_times
+from jeat_graph.smoothers.passes import fill_back
+from jeat_graph.smoothers.track_data import SmoothedTrack
 from jeat_graph.smoothers.window import Window
+
+#: GTSAM solves for one state in so many.
+STRIDE = 4
 
 #: What GTSAM's C++ exceptions become in Python.
 _GTSAM_ERRORS = (RuntimeError, IndexError, ValueError)
@@ -32,16 +37,17 @@ class FixedLagSmoother:
 
     Args:
         prior_t: time of the prior (s).
-        prior_mean: (2, 3) prior mean of [p, v, a] per axis (px, px/s, px/s²).
-        prior_cov: (2, 3, 3) prior covariance.
+        prior_mean: (2, 3 + B) prior mean of [p, v, a, e_1, …, e_B] per axis (px, px/s, px/s², 1).
+        prior_cov: (2, 3 + B, 3 + B) prior covariance.
         lag_s: how far a state lies behind the newest when it leaves, at least (s).
         chunk: measurements per update. More make an update cheaper per measurement, and a state leave
             later.
-        use_gtsam: whether GTSAM does the solving, or our own RTS pass.
+        use_gtsam: whether GTSAM does the solving, or our own pass.
+        memory: (B,) memory of the error states (s).
 
     Attributes:
         rebuilds: how often GTSAM failed and the window was built anew from our arrays.
-        fallbacks: how often that failed as well, and the RTS pass gave the values.
+        fallbacks: how often that failed as well, and our own pass gave the values.
         too_late: measurements refused because they were older than the window.
     """
 
@@ -54,46 +60,57 @@ class FixedLagSmoother:
         lag_s: float = 1.0,
         chunk: int = 24,
         use_gtsam: bool = True,
+        memory: npt.ArrayLike = (),
     ) -> None:
         self.lag_s, self.chunk = lag_s, chunk
         self.rebuilds = self.fallbacks = self.too_late = 0
+        self._memory = np.asarray(memory, dtype=np.float64)
+        prior = (np.asarray(prior_mean, dtype=np.float64), np.asarray(prior_cov, dtype=np.float64))
+        self._window: Window | None = Window(prior_t, *prior, self._memory)
         self._use_gtsam = use_gtsam
-        self._window: Window | None = Window(prior_t, np.asarray(prior_mean), np.asarray(prior_cov))
         self._gtsam: GtsamWindow | None = None
-        self._first = 0  # number, inside GTSAM, of the window's first key
-        self._leaving = range(0)  # keys that have left our window but not yet GTSAM's
-        self._pending: list[tuple[FloatArray, FloatArray, FloatArray, FloatArray]] = []
+        self._outdated = use_gtsam  # whether GTSAM's window has to be built from ours
+        self._oldest = self._next = 0  # number of the oldest state inside GTSAM, and of the next one
+        self._pending: list[Measurements] = []
         self._waiting = 0
         self._departed: list[SmoothedTrack] = []
-        if use_gtsam:
-            self._rebuild()
 
-    def feed(self, t: npt.ArrayLike, z: npt.ArrayLike, r: npt.ArrayLike, q: npt.ArrayLike) -> None:
+    def feed(
+        self,
+        t: npt.ArrayLike,
+        z: npt.ArrayLike,
+        r: npt.ArrayLike,
+        q: npt.ArrayLike,
+        lever: npt.ArrayLike | None = None,
+        error: npt.ArrayLike | None = None,
+    ) -> None:
         """Take in accepted measurements, in any order.
 
-        One that is older than the newest key, but inside the window, becomes one more linear factor on
-        the two neighbouring states. (Two late ones between the same two keys are taken for independent
-        given these; the process noise that they share is negligible beside their own.)
+        One that is older than the newest key, but inside the window, gets no key of its own; apart from
+        that it counts as if it had come in time.
 
         Args:
             t: (M,) times (s).
             z: (M, 2) centres (px).
-            r: (M, 2) variances (px²), as the filter used them.
+            r: (M, 2) variances of the white part (px²), as the filter used them.
             q: (M,) root spectral density of the jerk since the measurement before (px/s^2.5).
+            lever: (M, 2) standard deviation of the part with a memory (px); None for none.
+            error: (M,) index of its error state, or -1; None for -1.
 
         Raises:
-            DataError: wrong shapes, numbers that are not finite, variances or densities <= 0.
+            DataError: wrong shapes, numbers that are not finite, variances or densities <= 0, error states
+                that do not exist.
         """
         window = self._live()
-        rows = check_measurements(t, z, r, q)
-        if rows[0].min(initial=np.inf) <= window.t[-1] + COINCIDENT_S:
-            late = rows[0] <= window.t[-1] + COINCIDENT_S
-            for i in np.flatnonzero(late):
-                self._take_late(float(rows[0][i]), rows[1][i], rows[2][i])
-            rows = (rows[0][~late], rows[1][~late], rows[2][~late], rows[3][~late])
-        if len(rows[0]):
-            self._pending.append(rows)
-            self._waiting += len(rows[0])
+        taken = check_measurements(t, z, r, q, lever, error, len(self._memory))
+        newest = window.t[-1] + COINCIDENT_S
+        if taken.t.min(initial=np.inf) <= newest:
+            late = taken.t <= newest
+            self._take_late(taken.take(late))
+            taken = taken.take(~late)
+        if len(taken.t):
+            self._pending.append(taken)
+            self._waiting += len(taken.t)
         if self._waiting >= self.chunk:
             self._absorb()
 
@@ -105,12 +122,7 @@ class FixedLagSmoother:
     def current(self) -> SmoothedTrack:
         """Return the states inside the window, given all measurements so far; the last is the filter's."""
         self._absorb()
-        window = self._live()
-        rows = window.key_rows()
-        means, cov, gain = window.smooth()
-        if self._use_gtsam:
-            means = self._gtsam_means(len(rows), means)
-        return SmoothedTrack(window.t[rows], window.q[rows], means, cov, gain)
+        return self._smoothed(len(self._live().key_rows()))
 
     def finish(self) -> SmoothedTrack:
         """Return all states not yet returned by `departed`, and close."""
@@ -135,56 +147,48 @@ class FixedLagSmoother:
         window = self._live()
         if not self._pending:
             return
-        t, z, r, q = (np.concatenate(column) for column in zip(*self._pending, strict=True))
+        taken = Measurements.concatenate(self._pending).by_time()
         self._pending, self._waiting = [], 0
-        order = np.argsort(t, kind="stable")
-        t, z, r, q = t[order], z[order], r[order], q[order]
-        key, first = group_times(t, float(window.t[-1]))
-        fused_z, info = fuse(key - 1, z, r, len(first))
+        key, first = group_times(taken.t, float(window.t[-1]))
         old = len(window.t)
-        number = self._first + int(np.count_nonzero(window.is_key))
-        window.append(t[first], q[first], fused_z, info)
+        window.append(taken.t[first], key - 1, taken)
         if self._gtsam is not None:
-            graph = factors.LinearGraph()
-            dt, reference = np.diff(window.t[old - 1 :]), window.reference[old - 1 :]
-            graph.add_steps(number - 1, *factors.step_rows(dt, q[first], fused_z, info, reference))
-            self._update(graph, number, len(first))
+            # The newest row is an anchor always, so that GTSAM knows all measurements.
+            last = len(window.t) - 1
+            self._extend(self._gtsam, np.append(np.arange(old - 1, last, STRIDE), last))
         elif self._use_gtsam:
             self._rebuild()
         self._depart()
 
-    def _take_late(self, t: float, z: FloatArray, r: FloatArray) -> None:
-        """Add a late measurement (2,), (2,) to the window and, as a linear factor, to GTSAM."""
+    def _take_late(self, late: Measurements) -> None:
+        """Add late measurements to the window; GTSAM's is to be built anew."""
         window = self._live()
-        if t < window.t[0] - COINCIDENT_S:
-            self.too_late += 1
-            return
-        row = window.insert(t, z, 1.0 / r)
-        if self._gtsam is not None:
-            graph = factors.LinearGraph()
-            self._add_between(graph, row, z, r)
-            self._update(graph, 0, 0)
+        for t, z, r, _, lever, error in zip(*late, strict=True):
+            if t < window.t[0] - COINCIDENT_S:
+                self.too_late += 1
+                continue
+            window.insert(float(t), z, r, lever, int(error))
+            self._gtsam, self._outdated = None, self._use_gtsam
 
-    def _add_between(self, graph: factors.LinearGraph, row: int, z: FloatArray, r: FloatArray) -> None:
-        """Add a measurement at the window's row `row` to a graph: on its key, or between its neighbours."""
-        window = self._live()
-        t = float(window.t[row])
-        before = int(np.count_nonzero(window.is_key[: row + 1])) - 1
-        if window.is_key[row]:
-            graph.add_measurement(self._first + before, z, 1.0 / r, window.reference[row])
-            return
-        pair = window.key_rows()[before : before + 2]
-        start, end = window.t[pair]
-        L, S, noise = bridge(np.array([t - start]), np.array([end - start]), window.q[pair[1:]])
-        late = factors.late_rows(L[0, 0], S[0, 0], float(noise[0, 0, 0]), z, r, window.reference[pair])
-        graph.add_late(self._first + before, *late)
+    def _segments(self, graph: factors.LinearGraph, ends: npt.NDArray[np.int64]) -> None:
+        """Add all steps and measurements after the row `ends`[0], an anchor, and make the others anchors."""
+        w = self._live()
+        count = len(ends) - 1
+        steps = (ends, w.steps(), w.q, w.memory)
+        rows = factors.segment_rows(*steps, w.row, w.z, w.info, w.lever, w.error, w.reference)
+        graph.add_segments(int(w.anchor[ends[0]]), *rows)
+        w.anchor[ends[1:]] = np.arange(self._next, self._next + count)
+        self._next += count
 
-    def _update(self, graph: factors.LinearGraph, first: int, count: int) -> None:
-        """Hand a graph with new states to GTSAM; if that fails, build its window anew."""
-        assert self._gtsam is not None
-        leaving, self._leaving = self._leaving, range(0)
+    def _extend(self, gtsam: GtsamWindow, ends: npt.NDArray[np.int64]) -> None:
+        """Tell GTSAM of the rows after its newest anchor; if that fails, build its window anew."""
+        window, first = self._live(), self._next
+        graph = factors.LinearGraph(window.size)
+        self._segments(graph, ends)
+        oldest = int(window.anchor[window.anchor >= 0][0])
         try:
-            self._gtsam.update(graph, first, count, leaving)
+            gtsam.update(graph, first, self._next - first, range(self._oldest, oldest))
+            self._oldest = oldest
         except _GTSAM_ERRORS:
             self.rebuilds += 1
             self._rebuild()
@@ -192,37 +196,71 @@ class FixedLagSmoother:
     def _rebuild(self) -> None:
         """Build GTSAM's window from our arrays; without GTSAM until the next chunk if that fails."""
         window = self._live()
-        rows = window.key_rows()
-        t, z, info, reference = (a[rows] for a in (window.t, window.z, window.info, window.reference))
-        graph = factors.LinearGraph()
-        self._leaving = range(0)
-        self._gtsam = None
+        self._gtsam, self._outdated = None, False
+        window.anchor[:] = -1
+        window.anchor[0] = self._oldest = self._next
+        self._next += 1
+        graph = factors.LinearGraph(window.size)
         try:
-            prior = factors.prior_rows(window.base_mean, window.base_cov, z[0], info[0], reference[0])
-            graph.add_prior(self._first, *prior)
-            steps = factors.step_rows(np.diff(t), window.q[rows[1:]], z[1:], info[1:], reference)
-            graph.add_steps(self._first, *steps)
-            for row in np.flatnonzero(~window.is_key):
-                self._add_between(graph, int(row), window.z[row], 1.0 / window.info[row])
-            gtsam = GtsamWindow()
-            gtsam.update(graph, self._first, len(rows), range(0))
+            first = int(np.searchsorted(window.row, 0, side="right"))
+            prior = factors.prior_rows(
+                window.base_mean,
+                window.base_cov,
+                window.reference[0],
+                window.z[:first],
+                window.info[:first],
+                window.lever[:first],
+                window.error[:first],
+            )
+            graph.add_prior(self._oldest, *prior)
+            rows = window.key_rows()
+            if len(rows) > 1:
+                self._segments(graph, np.append(rows[:-1:STRIDE], rows[-1]))
+            gtsam = GtsamWindow(window.size)
+            gtsam.update(graph, self._oldest, self._next - self._oldest, range(0))
             self._gtsam = gtsam
         except (*_GTSAM_ERRORS, np.linalg.LinAlgError):
             self.fallbacks += 1
 
-    def _gtsam_means(self, count: int, fallback: FloatArray) -> FloatArray:
-        """Return GTSAM's means (count, 2, 3) of the first keys, or the first of `fallback`."""
+    def _smoothed(self, count: int) -> SmoothedTrack:
+        """Return the first `count` keys, smoothed with all measurements that the window holds."""
         window = self._live()
-        reference = window.reference[window.key_rows()[:count]]
+        keys = window.key_rows()
+        rows = int(keys[count]) if count < len(keys) else len(window.t)
+        if self._outdated:
+            self._rebuild()
+        if self._gtsam is None:
+            means, cov, gain = window.smooth(rows)
+        else:
+            anchors = np.flatnonzero(window.anchor >= 0)
+            anchors = anchors[: int(np.searchsorted(anchors, rows - 1)) + 1]
+            means, cov, gain = window.smooth(int(anchors[-1]) + 1)
+            means = self._gtsam_means(anchors, means, gain)[:rows]
+        # States are a Markov chain, so the gain over several steps is the product of theirs.
+        for row in np.flatnonzero(~window.is_key[:rows])[::-1]:
+            gain[row - 1] = gain[row - 1] @ gain[row]
+        chosen = keys[:count]
+        return SmoothedTrack(window.t[chosen], window.q[chosen], means[chosen], cov[chosen], gain[chosen])
+
+    def _gtsam_means(self, anchors: npt.NDArray[np.int64], own: FloatArray, gain: FloatArray) -> FloatArray:
+        """Return GTSAM's means (N, 2, n) of the rows up to the last of `anchors`, or `own` if it fails."""
+        window = self._live()
         for _ in range(2):
             if self._gtsam is None:
                 break
             try:
-                return self._gtsam.means(range(self._first, self._first + count), reference)
+                numbers = window.anchor[anchors].tolist()
+                known = self._gtsam.means(numbers, window.reference[anchors])
             except _GTSAM_ERRORS:
                 self.rebuilds += 1
                 self._rebuild()
-        return fallback[:count]
+                continue
+            out = np.empty_like(own)
+            out[anchors] = known
+            dims = (0,) * window.size
+            fill_back(dims, window.steps(), window.memory, anchors, window.mean, gain, out)
+            return out
+        return own
 
     def _depart(self) -> None:
         """Emit the states that are final by now, and drop them from the window."""
@@ -232,19 +270,5 @@ class FixedLagSmoother:
         count = min(old, len(rows) - self.chunk)
         if count <= 0:
             return
-        means, cov, gain = window.smooth()
-        if self._use_gtsam:
-            means = self._gtsam_means(count, means)
-        leaving = rows[:count]
-        self._departed.append(
-            SmoothedTrack(
-                window.t[leaving],
-                window.q[leaving],
-                means[:count].copy(),
-                cov[:count].copy(),
-                gain[:count].copy(),
-            )
-        )
+        self._departed.append(self._smoothed(count))
         window.drop_before(int(rows[count]))
-        self._leaving = range(self._leaving.start if self._leaving else self._first, self._first + count)
-        self._first += count

@@ -12,13 +12,13 @@ from numba import njit
 
 from jeat_graph.arrays import FloatArray
 from jeat_graph.smoothers import factors
-from jeat_graph.smoothers.rts import filter_track
+from jeat_graph.smoothers.rts import filter_track, information, steps_of
 from jeat_graph.smoothers.track_data import SmoothedTrack, TrackData
 
 
 @njit(cache=True)
 def _marginals(cov: FloatArray, gain: FloatArray) -> None:
-    """Turn conditional covariances (K, 2, 3, 3) into marginal ones, in place, from the last key back."""
+    """Turn conditional covariances (K, 2, n, n) into marginal ones, in place, from the last key back."""
     for k in range(len(gain) - 2, -1, -1):
         for a in range(2):
             cov[k, a] += gain[k, a] @ cov[k + 1, a] @ gain[k, a].T
@@ -29,7 +29,7 @@ def smooth_full(track: TrackData, weights: FloatArray | None = None) -> Smoothed
 
     Args:
         track: the data.
-        weights: (M,) factor on the information of each measurement (`robust.py`), 1 where None.
+        weights: (M,) factor on the information of each measurement's white part (`robust.py`), 1 where None.
 
     Returns:
         The smoothed states at all keys, with covariances and gains.
@@ -37,12 +37,33 @@ def smooth_full(track: TrackData, weights: FloatArray | None = None) -> Smoothed
     Raises:
         RuntimeError: GTSAM's, if the system is indeterminate; `engine.py` meets it.
     """
-    z, info = track.fused(weights)
+    info = information(track, weights)
     reference, _ = filter_track(track, weights)
-    graph = factors.LinearGraph()
-    prior = factors.prior_rows(track.prior_mean, track.prior_cov, z[0], info[0], reference[0])
+    graph = factors.LinearGraph(track.size)
+    first = int(np.searchsorted(track.key, 0, side="right"))
+    prior = factors.prior_rows(
+        track.prior_mean,
+        track.prior_cov,
+        reference[0],
+        track.z[:first],
+        info[:first],
+        track.lever[:first],
+        track.error[:first],
+    )
     graph.add_prior(0, *prior)
-    graph.add_steps(0, *factors.step_rows(np.diff(track.t), track.q[1:], z[1:], info[1:], reference))
+    segments = factors.segment_rows(
+        np.arange(len(track)),
+        steps_of(track),
+        track.q,
+        track.memory,
+        track.key,
+        track.z,
+        info,
+        track.lever,
+        track.error,
+        reference,
+    )
+    graph.add_segments(0, *segments)
     vectors, conditional, gain = graph.solve(len(track))
     cov, gain = factors.unscale_cov(conditional), factors.unscale_gain(gain)
     _marginals(cov, gain)

@@ -7,6 +7,7 @@ all that the last chunk of measurements said about it, also where a gap is longe
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,10 +23,15 @@ class GtsamWindow:
     """The window of one track inside GTSAM, in px and s at its interface.
 
     Every method may raise GTSAM's RuntimeError; after that the object is not to be used again.
+
+    Args:
+        size: components of a state per axis, n.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, size: int) -> None:
         import gtsam
+
+        self._size = size
 
         gauss_newton = gtsam.ISAM2GaussNewtonParams()
         # At the default, changes below 1e-3 px are not propagated back through the window.
@@ -38,15 +44,15 @@ class GtsamWindow:
         params.enableRelinearization = False
         self._smoother: Any = gtsam.IncrementalFixedLagSmoother(_LAG, params)
 
-    def update(self, graph: factors.LinearGraph, first: int, count: int, leaving: range) -> None:
+    def update(self, graph: factors.LinearGraph, first: int, count: int, leaving: Iterable[int]) -> None:
         """Add factors and the states `first`, …, `first` + `count` - 1, and marginalise those leaving."""
         stamps = dict.fromkeys(range(first, first + count), _STAYS)
         stamps.update(dict.fromkeys(leaving, _LEAVES))
-        values = factors.zero_values(range(first, first + count))
+        values = factors.zero_values(range(first, first + count), self._size)
         self._smoother.update(graph.as_nonlinear(), values, stamps)
 
-    def means(self, keys: range, reference: FloatArray) -> FloatArray:
-        """Return the means (N, 2, 3) of states of the window, given their references (N, 2, 3).
+    def means(self, keys: Sequence[int], reference: FloatArray) -> FloatArray:
+        """Return the means (N, 2, n) of states of the window, given their references (N, 2, n).
 
         Raises:
             RuntimeError: also if a mean is not finite.
@@ -57,7 +63,7 @@ class GtsamWindow:
         return factors.unscale_mean(vectors, reference)
 
     def cov(self, key: int) -> FloatArray:
-        """Return the marginal covariance (2, 3, 3) of one state of the window."""
+        """Return the marginal covariance (2, n, n) of one state of the window."""
         blocks = factors.axis_blocks(self._smoother.marginalCovariance(key))
         if not np.isfinite(blocks).all():
             raise RuntimeError("GTSAM gave a covariance that is not finite")

@@ -2,7 +2,8 @@
 
 White-jerk motion is a Gaussian process with the Markov property: given its two neighbouring states, a
 state in between is normal, with a mean linear in both. So interpolation is exact, covariance included,
-given the covariance *between* the neighbours, which the smoother's gains carry.
+given the covariance *between* the neighbours, which the smoother's gains carry. Given the motion at the
+neighbours, neither the errors of the sensors nor the measurements say more about the motion in between.
 
 Source: Barfoot, State Estimation for Robotics, ch. 3.4 and 11.
 """
@@ -12,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 
 from jeat_graph.arrays import FloatArray
-from jeat_graph.smoothers.rts import motion_matrices
-from jeat_graph.smoothers.track_data import SmoothedTrack
+from jeat_graph.smoothers.track_data import MOTION, SmoothedTrack
+from jeat_graph.smoothers.transitions import motion_matrices
 
 
 def bridge(since: FloatArray, span: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -45,9 +46,9 @@ def bridge(since: FloatArray, span: FloatArray, q: FloatArray) -> tuple[FloatArr
 
 
 def interpolate(track: SmoothedTrack, t: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return means and covariances at any times; beyond the ends by prediction, forth or back.
+    """Return the motion at any times, with covariances; beyond the ends by prediction, forth or back.
 
-    At a key the result is the key's own state.
+    At a key the result is the key's own position, velocity and acceleration.
 
     Args:
         track: the smoothed states, at least one.
@@ -60,8 +61,9 @@ def interpolate(track: SmoothedTrack, t: FloatArray) -> tuple[FloatArray, FloatA
     mean = np.empty((len(query), 2, 3))
     cov = np.empty((len(query), 2, 3, 3))
     right = np.searchsorted(track.t, query)
+    means, covs = track.motion()
     exact = (right < len(track)) & (track.t[np.minimum(right, len(track) - 1)] == query)
-    mean[exact], cov[exact] = track.mean[right[exact]], track.cov[right[exact]]
+    mean[exact], cov[exact] = means[right[exact]], covs[right[exact]]
 
     late = right == len(track)
     if late.any():
@@ -77,11 +79,12 @@ def interpolate(track: SmoothedTrack, t: FloatArray) -> tuple[FloatArray, FloatA
         start = track.t[k0]
         L, S, noise = bridge(query[inside] - start, track.t[k1] - start, track.q[k1])
         L, S = L[:, None], S[:, None]
-        mean[inside] = (L @ track.mean[k0, :, :, None] + S @ track.mean[k1, :, :, None])[..., 0]
-        crossed = L @ (track.gain[k0] @ track.cov[k1]) @ S.swapaxes(-1, -2)
+        mean[inside] = (L @ means[k0, :, :, None] + S @ means[k1, :, :, None])[..., 0]
+        between = track.gain[k0, :, :MOTION] @ track.cov[k1, :, :, :MOTION]
+        crossed = L @ between @ S.swapaxes(-1, -2)
         cov[inside] = (
-            L @ track.cov[k0] @ L.swapaxes(-1, -2)
-            + S @ track.cov[k1] @ S.swapaxes(-1, -2)
+            L @ covs[k0] @ L.swapaxes(-1, -2)
+            + S @ covs[k1] @ S.swapaxes(-1, -2)
             + crossed
             + crossed.swapaxes(-1, -2)
             + noise[:, None]
@@ -93,11 +96,12 @@ def _extrapolate(track: SmoothedTrack, key: int, ahead: FloatArray) -> tuple[Flo
     """Predict from one end by `ahead` (N,) seconds, all > 0 after the last key or < 0 before the first."""
     neighbour = min(max(key, 1), len(track) - 1)
     F, Q = motion_matrices(np.abs(ahead), np.full(len(ahead), track.q[neighbour]))
-    cov = track.cov[key][None]
+    means, covs = track.motion()
+    cov = covs[key][None]
     if ahead[0] < 0:
         # x₀ = F⁻¹ (x₁ - w), and F(Δ)⁻¹ = F(-Δ).
         F, _ = motion_matrices(ahead, np.zeros(len(ahead)))
         cov, Q = cov + Q[:, None], np.zeros_like(Q)
     F = F[:, None]
-    mean = (F @ track.mean[key][None, :, :, None])[..., 0]
+    mean = (F @ means[key][None, :, :, None])[..., 0]
     return mean, F @ cov @ F.swapaxes(-1, -2) + Q[:, None]

@@ -17,7 +17,7 @@ import numpy as np
 from jeat_graph.arrays import FloatArray
 from jeat_graph.errors import ConfigError
 from jeat_graph.smoothers.rts import smooth_rts
-from jeat_graph.smoothers.track_data import SmoothedTrack, TrackData
+from jeat_graph.smoothers.track_data import MOTION, SmoothedTrack, TrackData
 
 #: Names of the kernels.
 KERNELS = ("cauchy", "student-t")
@@ -35,7 +35,7 @@ _CONVERGED = 1e-3
 
 
 def robust_weights(track: TrackData, kernel: str = "cauchy") -> FloatArray:
-    """Return a factor on the information of each measurement, in (0, 1] for "cauchy".
+    """Return a factor on the information of each measurement's white part, in (0, 1] for "cauchy".
 
     - "cauchy": 1 up to `INLIER_LIMIT`, and Cauchy's 1 / (1 + (d² - limit) / s²) beyond, s² annealed to 1.
     - "student-t": (ν + 2) / (ν + d²) (d² annealed), with ν chosen by likelihood, ν = ∞ unless the track
@@ -84,13 +84,18 @@ def left_out_distances(track: TrackData, smoothed: SmoothedTrack, weights: Float
     Args:
         track: the data.
         smoothed: its smoothed states, solved with `weights`.
-        weights: (M,) factor on the information of each measurement.
+        weights: (M,) factor on the information of each measurement's white part.
 
     Returns:
         (M,) distances d², χ² with two degrees of freedom if the model holds.
     """
-    P = smoothed.cov[track.key, :, 0, 0]
-    residual = track.z - smoothed.mean[track.key, :, 0]
+    # With a coloured error the measurement is of p + h e: H = [1, 0, 0, …, h, …].
+    H = np.zeros((len(track.z), 2, track.size))
+    H[:, :, 0] = 1.0
+    coloured = np.flatnonzero(track.error >= 0)
+    H[coloured, :, MOTION + track.error[coloured]] = track.lever[coloured]
+    P = np.einsum("mai,maij,maj->ma", H, smoothed.cov[track.key], H)
+    residual = track.z - np.einsum("mai,mai->ma", H, smoothed.mean[track.key])
     # A measurement that alone determines its state has leverage 1 and says nothing about itself.
     rest = np.maximum(1.0 - weights[:, None] * P / track.r, 1e-9)
     return np.asarray(((residual / rest) ** 2 / (track.r + P / rest)).sum(axis=1))

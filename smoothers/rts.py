@@ -1,209 +1,74 @@
-"""Rauch-Tung-Striebel smoothing, compiled: the exact oracle of the others, and the cheap engine.
+"""Our own smoother of whole tracks: the exact oracle of the others, and the cheap engine.
 
-Forward a Kalman filter, back the smoother; both covariance updates are sums of congruences (Joseph
-form), so that no rounding makes a covariance indefinite. All tracks of a batch run in one call.
+It is the Rauch-Tung-Striebel smoother (AIAA Journal 3(8), 1965), computed as `passes.py` says. All tracks
+of a batch run in one compiled call.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numba import njit
 
 from jeat_graph.arrays import FloatArray, IntArray
-from jeat_graph.filters.motion import process_noise, transition
+from jeat_graph.errors import DataError
+from jeat_graph.smoothers.passes import backward, forward
 from jeat_graph.smoothers.track_data import SmoothedTrack, TrackData
 
 
-@njit(cache=True)
-def motion_matrices(dt: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Transition matrices and process noise of white-jerk motion (paper eq. 2) for many steps.
+@dataclass(frozen=True, eq=False)
+class Filtered:
+    """What the filter leaves for the way back, of one track or of several in a row.
 
-    Args:
-        dt: (N,) time steps (s), >= 0; a step of 0 gives identity and zero.
-        q: (N,) root spectral densities of the jerk (px/s^2.5).
-
-    Returns:
-        (N, 3, 3) transition matrices and (N, 3, 3) covariances.
+    Attributes:
+        mean: (N, 2, n) filtered means at all keys.
+        cov: (N, 2, n, n) filtered covariances.
+        gain: (M, 2, n) gain of each measurement.
+        innovation: (M, 2) its innovation (px).
+        variance: (M, 2) the variance of that (px²).
     """
-    F = np.empty((len(dt), 3, 3))
-    Q = np.empty((len(dt), 3, 3))
-    for i in range(len(dt)):
-        F[i] = transition(dt[i])
-        Q[i] = process_noise(dt[i], q[i])
-    return F, Q
+
+    mean: FloatArray
+    cov: FloatArray
+    gain: FloatArray
+    innovation: FloatArray
+    variance: FloatArray
+
+    def passes(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return all of it in the order in which `passes` wants it."""
+        return self.mean, self.cov, self.gain, self.innovation, self.variance
 
 
-@njit(cache=True)
-def _update(m: FloatArray, P: FloatArray, z: float, info: float) -> None:
-    """Joseph update of one axis, in place, by a position `z` of information `info` (1/variance)."""
-    n = len(m)
-    r = 1.0 / info
-    K = P[:, 0] / (P[0, 0] + r)
-    innovation = z - m[0]
-    row = P[0].copy()
-    corner = row[0] + r
-    for i in range(n):
-        m[i] += K[i] * innovation
-        for j in range(n):
-            # (I - K H) P (I - K H)ᵀ + K r Kᵀ written out for H = [1, 0, ...].
-            P[i, j] += -K[i] * row[j] - row[i] * K[j] + K[i] * corner * K[j]
+def steps_of(track: TrackData) -> FloatArray:
+    """Return the steps (K,) between keys (s), 0 for the first."""
+    return np.diff(track.t, prepend=track.t[0])
 
 
-@njit(cache=True)
-def _solve_positive(A: FloatArray, B: FloatArray) -> None:
-    """Overwrite B (n, n) with A⁻¹ B for a symmetric positive definite A (n, n), by LDLᵀ without pivots."""
-    n = len(A)
-    L = np.eye(n)
-    d = np.empty(n)
-    for j in range(n):
-        d[j] = A[j, j]
-        for k in range(j):
-            d[j] -= L[j, k] * L[j, k] * d[k]
-        for i in range(j + 1, n):
-            s = A[i, j]
-            for k in range(j):
-                s -= L[i, k] * L[j, k] * d[k]
-            L[i, j] = s / d[j]
-    for c in range(n):
-        for i in range(n):
-            for k in range(i):
-                B[i, c] -= L[i, k] * B[k, c]
-        for i in range(n - 1, -1, -1):
-            B[i, c] /= d[i]
-            for k in range(i + 1, n):
-                B[i, c] -= L[k, i] * B[k, c]
+def information(track: TrackData, weights: FloatArray | None = None) -> FloatArray:
+    """Return the information (M, 2) of the white part of each measurement (1/px²), weighted by (M,)."""
+    return 1.0 / track.r if weights is None else weights[:, None] / track.r
 
 
-@njit(cache=True)
-def _congruence(A: FloatArray, P: FloatArray, out: FloatArray) -> None:
-    """Write A P Aᵀ, symmetric, into `out` (n, n)."""
-    n = len(A)
-    for i in range(n):
-        for j in range(i + 1):
-            s = 0.0
-            for k in range(n):
-                for m in range(n):
-                    s += A[i, k] * P[k, m] * A[j, m]
-            out[i, j] = s
-            out[j, i] = s
-
-
-@njit(cache=True)
-def forward(
-    F: FloatArray,
-    Q: FloatArray,
-    z: FloatArray,
-    info: FloatArray,
-    start: IntArray,
-    prior_mean: FloatArray,
-    prior_cov: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Kalman filter of many tracks whose keys lie one after the other (paper eq. 2 to 4).
-
-    Args:
-        F: (N, n, n) transition from the key before; not used at the first key of a track.
-        Q: (N, n, n) process noise of that step.
-        z: (N, A) measurement of the first component, per axis.
-        info: (N, A) its information (1/variance); 0 where there is no measurement.
-        start: (T + 1,) first key of each track, and N.
-        prior_mean: (T, A, n) prior at the first key of each track.
-        prior_cov: (T, A, n, n) its covariance.
-
-    Returns:
-        (N, A, n) filtered means and (N, A, n, n) filtered covariances.
-    """
-    N, axes = z.shape
-    n = F.shape[1]
-    mean = np.empty((N, axes, n))
-    cov = np.empty((N, axes, n, n))
-    for track in range(len(start) - 1):
-        for k in range(start[track], start[track + 1]):
-            for a in range(axes):
-                m, P = mean[k, a], cov[k, a]
-                if k == start[track]:
-                    m[:] = prior_mean[track, a]
-                    P[:] = prior_cov[track, a]
-                else:
-                    for i in range(n):
-                        m[i] = 0.0
-                        for j in range(n):
-                            m[i] += F[k, i, j] * mean[k - 1, a, j]
-                    _congruence(F[k], cov[k - 1, a], P)
-                    P += Q[k]
-                if info[k, a] > 0.0:
-                    _update(m, P, z[k, a], info[k, a])
-    return mean, cov
-
-
-@njit(cache=True)
-def backward(
-    F: FloatArray, Q: FloatArray, start: IntArray, filtered_mean: FloatArray, filtered_cov: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Rauch-Tung-Striebel pass (AIAA Journal 3(8), 1965), covariance in Joseph form.
-
-    G = P Fᵀ (F P Fᵀ + Q)⁻¹;  P_s = (I - G F) P (I - G F)ᵀ + G (P_s⁺ + Q) Gᵀ.
-
-    Args:
-        F: (N, n, n) transition from the key before.
-        Q: (N, n, n) process noise of that step.
-        start: (T + 1,) first key of each track, and N.
-        filtered_mean: (N, A, n) filtered means.
-        filtered_cov: (N, A, n, n) filtered covariances.
-
-    Returns:
-        (N, A, n) smoothed means, (N, A, n, n) covariances, and (N, A, n, n) gains; the gain in row k
-        is of the step from k to k + 1, and zero at the last key of a track.
-    """
-    N, axes, n = filtered_mean.shape
-    mean = filtered_mean.copy()
-    cov = filtered_cov.copy()
-    gain = np.zeros((N, axes, n, n))
-    predicted = np.empty((n, n))
-    B = np.empty((n, n))
-    left = np.empty((n, n))
-    part = np.empty((n, n))
-    residual = np.empty(n)
-    for track in range(len(start) - 1):
-        for k in range(start[track + 1] - 2, start[track] - 1, -1):
-            step = F[k + 1]
-            for a in range(axes):
-                P, G = filtered_cov[k, a], gain[k, a]
-                _congruence(step, P, predicted)
-                predicted += Q[k + 1]
-                for i in range(n):
-                    for j in range(n):
-                        s = 0.0
-                        for m in range(n):
-                            s += step[i, m] * P[m, j]
-                        B[i, j] = s
-                _solve_positive(predicted, B)  # B = (F P Fᵀ + Q)⁻¹ F P = Gᵀ
-                for i in range(n):
-                    residual[i] = mean[k + 1, a, i]
-                    for j in range(n):
-                        G[i, j] = B[j, i]
-                        residual[i] -= step[i, j] * filtered_mean[k, a, j]
-                for i in range(n):
-                    for j in range(n):
-                        mean[k, a, i] += G[i, j] * residual[j]
-                        left[i, j] = 1.0 if i == j else 0.0
-                        for m in range(n):
-                            left[i, j] -= G[i, m] * step[m, j]
-                _congruence(left, P, cov[k, a])
-                _congruence(G, cov[k + 1, a] + Q[k + 1], part)
-                cov[k, a] += part
-    return mean, cov, gain
-
-
-def _stack(tracks: Sequence[TrackData]) -> tuple[FloatArray, FloatArray, IntArray]:
-    """Return F (N, 3, 3), Q (N, 3, 3) of all keys of all tracks, and where each track starts (T + 1,)."""
-    start = np.concatenate([[0], np.cumsum([len(track) for track in tracks])]).astype(np.int64)
-    t = np.concatenate([track.t for track in tracks])
-    dt = np.diff(t, prepend=t[0])
-    dt[start[:-1]] = 0.0
-    F, Q = motion_matrices(dt, np.concatenate([track.q for track in tracks]))
-    return F, Q, start
+def run_filter(track: TrackData, weights: FloatArray | None = None) -> Filtered:
+    """Filter one track; see `filter_track`."""
+    return Filtered(
+        *forward(
+            (0,) * track.size,
+            steps_of(track),
+            track.q,
+            track.memory,
+            track.key,
+            track.z,
+            information(track, weights),
+            track.lever,
+            track.error,
+            np.array([0, len(track)]),
+            track.prior_mean[None],
+            track.prior_cov[None],
+        )
+    )
 
 
 def filter_track(track: TrackData, weights: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
@@ -211,14 +76,13 @@ def filter_track(track: TrackData, weights: FloatArray | None = None) -> tuple[F
 
     Args:
         track: the data.
-        weights: (M,) factor on the information of each measurement, 1 where None.
+        weights: (M,) factor on the information of each measurement's white part, 1 where None.
 
     Returns:
-        (K, 2, 3) filtered means and (K, 2, 3, 3) covariances.
+        (K, 2, 3 + B) filtered means and (K, 2, 3 + B, 3 + B) covariances.
     """
-    F, Q, start = _stack([track])
-    z, info = track.fused(weights)
-    return forward(F, Q, z, info, start, track.prior_mean[None], track.prior_cov[None])
+    filtered = run_filter(track, weights)
+    return filtered.mean, filtered.cov
 
 
 def smooth_rts(track: TrackData, weights: FloatArray | None = None) -> SmoothedTrack:
@@ -226,7 +90,7 @@ def smooth_rts(track: TrackData, weights: FloatArray | None = None) -> SmoothedT
 
     Args:
         track: the data.
-        weights: (M,) factor on the information of each measurement, 1 where None.
+        weights: (M,) factor on the information of each measurement's white part, 1 where None.
 
     Returns:
         The smoothed states at all keys, with covariances and gains.
@@ -240,27 +104,51 @@ def smooth_rts_batch(
     """Smooth many whole tracks in one compiled call.
 
     Args:
-        tracks: the data, T tracks.
+        tracks: the data, T tracks with the same error states.
         weights: for each track (M,) factors on the information of its measurements, 1 where None.
 
     Returns:
         T smoothed tracks, in the order given.
+
+    Raises:
+        DataError: if the tracks' error states are not the same.
     """
     if not tracks:
         return []
-    F, Q, start = _stack(tracks)
-    fused = [track.fused(None if weights is None else weights[i]) for i, track in enumerate(tracks)]
-    filtered_mean, filtered_cov = forward(
-        F,
-        Q,
-        np.concatenate([z for z, _ in fused]),
-        np.concatenate([info for _, info in fused]),
+    memory = tracks[0].memory
+    if any(not np.array_equal(track.memory, memory) for track in tracks):
+        raise DataError("the tracks of a batch must have the same error states")
+    start = _starts(tracks)
+    dims, key = (0,) * tracks[0].size, _join([track.key + a for track, a in zip(tracks, start, strict=False)])
+    dt, q = _join([steps_of(track) for track in tracks]), _join([track.q for track in tracks])
+    lever, error = _join([track.lever for track in tracks]), _join([track.error for track in tracks])
+    filtered = forward(
+        dims,
+        dt,
+        q,
+        memory,
+        key,
+        _join([track.z for track in tracks]),
+        _join(
+            [information(track, None if weights is None else weights[i]) for i, track in enumerate(tracks)]
+        ),
+        lever,
+        error,
         start,
         np.stack([track.prior_mean for track in tracks]),
         np.stack([track.prior_cov for track in tracks]),
     )
-    mean, cov, gain = backward(F, Q, start, filtered_mean, filtered_cov)
+    mean, cov, gain = backward(dims, dt, q, memory, key, lever, error, start, np.diff(start), *filtered)
     return [
         SmoothedTrack(track.t, track.q, mean[a:b], cov[a:b], gain[a:b])
         for track, a, b in zip(tracks, start[:-1], start[1:], strict=True)
     ]
+
+
+def _starts(tracks: Sequence[TrackData]) -> IntArray:
+    """First key of each track and the number of all keys (T + 1,), if they lie one after the other."""
+    return np.concatenate([[0], np.cumsum([len(track) for track in tracks])]).astype(np.int64)
+
+
+def _join(parts: Sequence[Any]) -> Any:
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from jeat_graph.arrays import FloatArray
+from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.errors import DataError
-from jeat_graph.filters.motion import size_process_noise, size_transition
-from jeat_graph.smoothers.rts import backward, forward
-from jeat_graph.smoothers.track_data import COINCIDENT_S, fuse, group_times
+from jeat_graph.smoothers.measurements import COINCIDENT_S, group_times
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,14 +21,12 @@ class SmoothedSize:
         q: (K,) root spectral density of the rate over the interval that ends there (1/s^1.5).
         mean: (K, 2, 2) for width and height, [ln size, rate] (ln px, 1/s).
         cov: (K, 2, 2, 2) covariances.
-        gain: (K, 2, 2, 2) smoother gains, see `SmoothedTrack`.
     """
 
     t: FloatArray
     q: FloatArray
     mean: FloatArray
     cov: FloatArray
-    gain: FloatArray
 
     def at(self, t: FloatArray) -> FloatArray:
         """Sizes (T, 2), width and height (px), at times `t` (T,) (s).
@@ -59,14 +55,64 @@ class SmoothedSize:
 
 
 @njit(cache=True)
-def _size_matrices(dt: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Transition (N, 2, 2) and process noise (N, 2, 2) of [ln size, rate] for steps `dt` (N,) (s)."""
-    F = np.empty((len(dt), 2, 2))
-    Q = np.empty((len(dt), 2, 2))
-    for i in range(len(dt)):
-        F[i] = size_transition(dt[i])
-        Q[i] = size_process_noise(dt[i], q[i])
-    return F, Q
+def _smooth(
+    dt: FloatArray,
+    q: FloatArray,
+    key: IntArray,
+    z: FloatArray,
+    r: FloatArray,
+    prior_mean: FloatArray,
+    prior_cov: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Filter and smooth [ln size, rate] at keys `dt` (K,) apart; see `smooth_size`."""
+    keys = len(dt)
+    mean, cov = np.empty((keys, 2, 2)), np.empty((keys, 2, 2, 2))
+    ahead = np.empty((keys, 2, 3))  # predicted covariances: of the size, with the rate, of the rate
+    for axis in range(2):
+        i = 0
+        for k in range(keys):
+            if k == 0:
+                m, v = prior_mean[axis, 0], prior_mean[axis, 1]
+                a, b, c = prior_cov[axis, 0, 0], prior_cov[axis, 0, 1], prior_cov[axis, 1, 1]
+            else:
+                d, s = dt[k], q[k] * q[k]
+                m += d * v
+                a += d * (2.0 * b + d * c) + s * d * d * d / 3.0
+                b += d * c + 0.5 * s * d * d
+                c += s * d
+            ahead[k, axis, 0], ahead[k, axis, 1], ahead[k, axis, 2] = a, b, c
+            while i < len(key) and key[i] == k:
+                S = a + r[i, axis]
+                K0, K1 = a / S, b / S
+                y = z[i, axis] - m
+                m, v = m + K0 * y, v + K1 * y
+                # Joseph form, which no rounding makes indefinite.
+                c += K1 * (K1 * S - 2.0 * b)
+                b = (1.0 - K0) * (b - K1 * a) + K0 * K1 * r[i, axis]
+                a = (1.0 - K0) * (1.0 - K0) * a + K0 * K0 * r[i, axis]
+                i += 1
+            mean[k, axis, 0], mean[k, axis, 1] = m, v
+            cov[k, axis, 0, 0], cov[k, axis, 0, 1], cov[k, axis, 1, 0], cov[k, axis, 1, 1] = a, b, b, c
+        for k in range(keys - 2, -1, -1):
+            d = dt[k + 1]
+            P, A = cov[k, axis], ahead[k + 1, axis]
+            det = A[0] * A[2] - A[1] * A[1]
+            # G = P Fᵀ A⁻¹
+            f00, f01, f10, f11 = P[0, 0] + d * P[0, 1], P[0, 1], P[0, 1] + d * P[1, 1], P[1, 1]
+            g00, g01 = (f00 * A[2] - f01 * A[1]) / det, (f01 * A[0] - f00 * A[1]) / det
+            g10, g11 = (f10 * A[2] - f11 * A[1]) / det, (f11 * A[0] - f10 * A[1]) / det
+            e0 = mean[k + 1, axis, 0] - mean[k, axis, 0] - d * mean[k, axis, 1]
+            e1 = mean[k + 1, axis, 1] - mean[k, axis, 1]
+            mean[k, axis, 0] += g00 * e0 + g01 * e1
+            mean[k, axis, 1] += g10 * e0 + g11 * e1
+            D0 = cov[k + 1, axis, 0, 0] - A[0]
+            D1 = cov[k + 1, axis, 0, 1] - A[1]
+            D2 = cov[k + 1, axis, 1, 1] - A[2]
+            P[0, 0] += g00 * (g00 * D0 + g01 * D1) + g01 * (g00 * D1 + g01 * D2)
+            P[0, 1] += g10 * (g00 * D0 + g01 * D1) + g11 * (g00 * D1 + g01 * D2)
+            P[1, 0] = P[0, 1]
+            P[1, 1] += g10 * (g10 * D0 + g11 * D1) + g11 * (g10 * D1 + g11 * D2)
+    return mean, cov
 
 
 def smooth_size(
@@ -104,9 +150,7 @@ def smooth_size(
         raise DataError(f"a size at {times[0]} s is older than the track's prior at {prior_t} s")
     keys = np.concatenate([[prior_t], times[first]])
     density = np.concatenate([[0.0], np.asarray(q, dtype=np.float64)[order][first]])
-    z, info = fuse(key, np.asarray(log_size)[order], np.asarray(r)[order], len(keys))
-    F, Q = _size_matrices(np.diff(keys, prepend=prior_t), density)
-    start = np.array([0, len(keys)])
-    filtered = forward(F, Q, z, info, start, np.asarray(prior_mean)[None], np.asarray(prior_cov)[None])
-    mean, cov, gain = backward(F, Q, start, *filtered)
-    return SmoothedSize(keys, density, mean, cov, gain)
+    z, var = np.asarray(log_size)[order], np.asarray(r)[order]
+    prior = (np.asarray(prior_mean), np.asarray(prior_cov))
+    mean, cov = _smooth(np.diff(keys, prepend=prior_t), density, key, z, var, *prior)
+    return SmoothedSize(keys, density, mean, cov)

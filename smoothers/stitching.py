@@ -16,7 +16,7 @@ import numpy as np
 
 from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.filters.motion import size_process_noise, size_transition
-from jeat_graph.smoothers.rts import motion_matrices
+from jeat_graph.smoothers.transitions import motion_matrices
 
 #: Degrees of freedom of a pair's squared distance: position, velocity, acceleration and size, in x and y.
 FREEDOM = 8
@@ -28,7 +28,7 @@ class FragmentEnds:
 
     Attributes:
         start_t: (N,) time of the first state (s).
-        start_mean: (N, 2, 3) per axis [p, v, a] (px, px/s, px/s²).
+        start_mean: (N, 2, 3) per axis [p, v, a] (px, px/s, px/s²): the motion alone, no error states.
         start_cov: (N, 2, 3, 3) its covariance.
         start_size: (N, 2) ln width and ln height then.
         start_size_var: (N, 2) their variances.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -114,9 +116,7 @@ def many(count=30, seed=4):
         centre = np.stack([x[:, 0, 0] + 40.0 * identity * 100, x[:, 1, 0]], axis=1)
         moved = np.zeros((2, 3))
         moved[0, 0] = 4000.0 * identity
-        shifted = TrackData(
-            data.prior_mean + moved, data.prior_cov, data.t, data.q, data.key, data.z + moved[:, 0], data.r
-        )
+        shifted = replace(data, prior_mean=data.prior_mean + moved, z=data.z + moved[:, 0])
         tracks[-1] = ComparedTrack(identity, shifted, tracks[-1].sensor, 1)
         motion = x.transpose(0, 2, 1).reshape(-1, 6).copy()
         motion[:, :2] = centre
@@ -175,7 +175,7 @@ def test_measurements_noisier_than_claimed_show_in_nis_and_nees():
     tracks, truth, table = many(count=6)
     for k, one in enumerate(tracks):
         d = one.data
-        shy = TrackData(d.prior_mean, d.prior_cov, d.t, d.q, d.key, d.z, d.r / 9.0)
+        shy = replace(d, r=d.r / 9.0)
         tracks[k] = ComparedTrack(one.track_id, shy, one.sensor, one.birth_sensor)
     values = compare(tracks, ("a", "b"), truth=truth, smoothed=table, lags_s=(0.0,)).values
     assert values["consistency"]["nis"] > 2.0

@@ -10,51 +10,57 @@ from jeat_graph.smoothers.engine import ENGINES, make_smoother
 from jeat_graph.smoothers.rts import smooth_rts
 from jeat_graph.smoothers.track_data import SmoothedTrack
 
+#: White errors, and two sensors with a memory (s).
+COLOURS = [(), (0.3, 0.08)]
+
 
 def life(engine, track, step=10, **options):
     """Feed a track as a live caller would; return all its states in order."""
-    smoother = make_smoother(engine, float(track.t[0]), track.prior_mean, track.prior_cov, **options)
+    prior = (float(track.t[0]), track.prior_mean, track.prior_cov)
+    smoother = make_smoother(engine, *prior, memory=track.memory, **options)
     parts = []
     for i in range(0, len(track.z), step):
-        rows = slice(i, i + step)
-        key = track.key[rows]
-        smoother.feed(track.t[key], track.z[rows], track.r[rows], track.q[key])
+        smoother.feed(*track.measurements().take(slice(i, i + step)))
         parts.append(smoother.departed())
     return SmoothedTrack.concatenate([*parts, smoother.finish()])
 
 
+@pytest.mark.parametrize("memory", COLOURS)
 @pytest.mark.parametrize("engine", ENGINES)
-def test_every_engine_gives_the_whole_life_of_a_track(sampled, engine):
-    track, _ = sampled(0, seconds=5.0, q=3000.0)
-    result, exact = life(engine, track), smooth_rts(track)
+def test_every_engine_gives_the_whole_life_of_a_track(sampled, engine, memory):
+    track, _ = sampled(0, seconds=5.0, q=3000.0, memory=memory)
+    # Errors with a memory are told from motion by a longer look only.
+    result, exact = life(engine, track, lag_s=2.0 if memory else 1.0), smooth_rts(track)
     assert np.array_equal(result.t, exact.t)
     assert np.abs(result.mean[:, :, 0] - exact.mean[:, :, 0]).max() < 1e-2
 
 
+@pytest.mark.parametrize("memory", COLOURS)
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_track_that_ends_at_once_is_its_prior(sampled, engine):
-    track, _ = sampled(0, seconds=1.0)
-    smoother = make_smoother(engine, 3.0, track.prior_mean, track.prior_cov)
+def test_a_track_that_ends_at_once_is_its_prior(sampled, engine, memory):
+    track, _ = sampled(0, seconds=1.0, memory=memory)
+    smoother = make_smoother(engine, 3.0, track.prior_mean, track.prior_cov, memory=track.memory)
     result = smoother.finish()
     assert result.t.tolist() == [3.0]
     assert np.allclose(result.mean[0], track.prior_mean)
     assert np.allclose(result.cov[0], track.prior_cov)
 
 
+@pytest.mark.parametrize("memory", COLOURS)
 @pytest.mark.parametrize("engine", ENGINES)
-def test_the_same_measurements_give_the_same_bytes(sampled, engine):
-    track, _ = sampled(1, seconds=3.0)
+def test_the_same_measurements_give_the_same_bytes(sampled, engine, memory):
+    track, _ = sampled(1, seconds=3.0, memory=memory)
     a, b = life(engine, track), life(engine, track)
     assert a.mean.tobytes() == b.mean.tobytes()
     assert a.cov.tobytes() == b.cov.tobytes()
 
 
-def test_whole_track_engines_take_measurements_in_any_order(sampled):
-    track, _ = sampled(2, seconds=2.0)
+@pytest.mark.parametrize("memory", COLOURS)
+def test_whole_track_engines_take_measurements_in_any_order(sampled, memory):
+    track, _ = sampled(2, seconds=2.0, memory=memory)
     order = np.random.default_rng(0).permutation(len(track.z))
-    smoother = make_smoother("rts", 0.0, track.prior_mean, track.prior_cov)
-    key = track.key[order]
-    smoother.feed(track.t[key], track.z[order], track.r[order], track.q[key])
+    smoother = make_smoother("rts", 0.0, track.prior_mean, track.prior_cov, memory=track.memory)
+    smoother.feed(*track.measurements().take(order))
     assert np.allclose(smoother.finish().mean, smooth_rts(track).mean, rtol=1e-12)
 
 
@@ -68,11 +74,12 @@ def test_robust_re_weighting_is_an_option_of_the_whole_track(sampled):
     assert error["cauchy"] < 0.5 * error["none"]
 
 
-def test_the_filters_newest_state_is_the_last_of_the_current_ones(sampled):
-    track, _ = sampled(4, seconds=2.0)
+@pytest.mark.parametrize("memory", COLOURS)
+def test_the_filters_newest_state_is_the_last_of_the_current_ones(sampled, memory):
+    track, _ = sampled(4, seconds=2.0, memory=memory)
     for engine in ENGINES:
-        smoother = make_smoother(engine, 0.0, track.prior_mean, track.prior_cov)
-        smoother.feed(track.t[track.key], track.z, track.r, track.q[track.key])
+        smoother = make_smoother(engine, 0.0, track.prior_mean, track.prior_cov, memory=track.memory)
+        smoother.feed(*track.measurements())
         assert np.abs(smoother.current().mean[-1] - smooth_rts(track).mean[-1])[:, 0].max() < 1e-6
 
 

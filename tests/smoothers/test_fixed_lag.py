@@ -12,17 +12,28 @@ from hypothesis import strategies as st
 
 from jeat_graph.errors import DataError
 from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
+from jeat_graph.smoothers.measurements import Measurements
 from jeat_graph.smoothers.rts import filter_track, smooth_rts
 from jeat_graph.smoothers.track_data import SmoothedTrack, TrackData
+
+#: White errors, and two sensors with a memory (s).
+COLOURS = [(), (0.3, 0.08)]
 
 
 def columns(track, rows=slice(None)):
     """Arguments of `feed` for measurements of a track."""
-    return track.t[track.key[rows]], track.z[rows], track.r[rows], track.q[track.key[rows]]
+    return tuple(track.measurements().take(rows))
 
 
 def start(track, **options):
-    return FixedLagSmoother(float(track.t[0]), track.prior_mean, track.prior_cov, **options)
+    prior = (float(track.t[0]), track.prior_mean, track.prior_cov)
+    return FixedLagSmoother(*prior, memory=track.memory, **options)
+
+
+def until(track, rows):
+    """The same track with its first measurements only."""
+    prior = (float(track.t[0]), track.prior_mean, track.prior_cov)
+    return TrackData.from_measurements(*prior, *columns(track, slice(0, rows)), track.memory)
 
 
 def run(track, smoother, step=5):
@@ -33,9 +44,10 @@ def run(track, smoother, step=5):
     return smoother.departed(), left
 
 
+@pytest.mark.parametrize("memory", COLOURS)
 @pytest.mark.parametrize("seed", range(4))
-def test_newest_state_equals_the_filter_on_harsh_timing(harsh, scaled, relative, seed):
-    track = harsh(seed, 200)
+def test_newest_state_equals_the_filter_on_harsh_timing(harsh, scaled, relative, seed, memory):
+    track = harsh(seed, 200, memory=memory)
     _, left = run(track, start(track, chunk=12))
     mean, cov = filter_track(track)
     assert np.abs(left.mean[-1, :, 0] - mean[-1, :, 0]).max() < 1e-6
@@ -43,31 +55,33 @@ def test_newest_state_equals_the_filter_on_harsh_timing(harsh, scaled, relative,
     assert relative(left.cov[-1], cov[-1]) < 1e-6
 
 
+@pytest.mark.parametrize("memory", COLOURS)
 @pytest.mark.parametrize("use_gtsam", [True, False])
 @pytest.mark.parametrize("seed", range(4))
-def test_departing_states_are_exact_given_what_was_known_by_then(harsh, scaled, relative, seed, use_gtsam):
-    track = harsh(seed, 200)
+def test_departing_states_are_exact_given_what_was_known_by_then(
+    harsh, scaled, relative, seed, use_gtsam, memory
+):
+    track = harsh(seed, 200, memory=memory)
     smoother, count = start(track, lag_s=1.0, chunk=1, use_gtsam=use_gtsam), 0
     for row in range(len(track.z)):
         smoother.feed(*columns(track, [row]))
         left = smoother.departed()
-        n = track.key[row] + 1
-        parts = (track.t[:n], track.q[:n], track.key[: row + 1], track.z[: row + 1], track.r[: row + 1])
-        exact = smooth_rts(TrackData(track.prior_mean, track.prior_cov, *parts))
+        exact = smooth_rts(until(track, row + 1))
         if len(left):
             exact = exact.select(slice(count, count + len(left)))
-            assert np.all(track.t[n - 1] - left.t >= 1.0)
+            assert np.all(track.t[track.key[row]] - left.t >= 1.0)
             assert scaled(left.mean, exact.mean) < 1e-6
             assert relative(left.cov, exact.cov) < 1e-6
         count += len(left)
     assert count > 50
 
 
+@pytest.mark.parametrize("memory", COLOURS)
 @pytest.mark.parametrize("seed", range(4))
-def test_departing_states_equal_rts_of_the_whole_track_on_harsh_timing(harsh, relative, seed):
+def test_departing_states_equal_rts_of_the_whole_track_on_harsh_timing(harsh, relative, seed, memory):
     # What comes later than the lag is forgotten by the model only if there was enough before it: where
     # measurements are half a second apart, a second is not enough.
-    track = harsh(seed, 400, q=4000.0)
+    track = harsh(seed, 400, q=4000.0, memory=memory)
     departed, _ = run(track, start(track, lag_s=4.0, chunk=12))
     exact = smooth_rts(track).select(slice(0, len(departed)))
     assert len(departed) > 100
@@ -75,33 +89,43 @@ def test_departing_states_equal_rts_of_the_whole_track_on_harsh_timing(harsh, re
     assert relative(departed.cov, exact.cov) < 1e-4
 
 
+@pytest.mark.parametrize("memory", COLOURS)
 @pytest.mark.parametrize("use_gtsam", [True, False])
-def test_departing_states_equal_rts_of_the_whole_track_at_a_lag_of_a_second(sampled, relative, use_gtsam):
-    track, _ = sampled(0, seconds=6.0, q=3000.0)
-    departed, _ = run(track, start(track, lag_s=1.0, chunk=24, use_gtsam=use_gtsam))
+def test_departing_states_equal_rts_of_the_whole_track_at_a_lag_of_a_second(
+    sampled, relative, use_gtsam, memory
+):
+    track, _ = sampled(0, seconds=6.0, q=3000.0, memory=memory)
+    # Errors with a memory are told from motion by a longer look only.
+    lag = 2.5 if memory else 1.0
+    departed, _ = run(track, start(track, lag_s=lag, chunk=24, use_gtsam=use_gtsam))
     exact = smooth_rts(track).select(slice(0, len(departed)))
     assert np.abs(departed.mean[:, :, 0] - exact.mean[:, :, 0]).max() < 1e-2
     assert relative(departed.cov, exact.cov) < 1e-4
 
 
-def test_states_inside_the_window_equal_rts_of_all_measurements_so_far(sampled, scaled, relative):
-    track, _ = sampled(1, seconds=4.0, q=30.0)
+@pytest.mark.parametrize("memory", COLOURS)
+def test_states_inside_the_window_equal_rts_of_all_measurements_so_far(sampled, scaled, relative, memory):
+    track, _ = sampled(1, seconds=4.0, q=30.0, memory=memory)
     _, left = run(track, start(track))
     exact = smooth_rts(track).select(slice(len(track) - len(left), None))
     assert scaled(left.mean, exact.mean) < 1e-5
     assert relative(left.cov, exact.cov) < 1e-9
 
 
-def test_covariances_are_gtsams_marginals(sampled, relative):
-    track, _ = sampled(2, seconds=2.5)
+@pytest.mark.parametrize("memory", COLOURS)
+def test_covariances_are_gtsams_marginals(sampled, relative, memory):
+    track, _ = sampled(2, seconds=2.5, memory=memory)
     smoother = start(track)
     _, left = run(track, smoother)
-    for i in (0, len(left) // 2, len(left) - 1):
-        assert relative(smoother._gtsam.cov(smoother._first + i), left.cov[i]) < 1e-6
+    anchors = np.flatnonzero(smoother._window.anchor >= 0)
+    for i in (anchors[0], anchors[len(anchors) // 2], len(left) - 1):
+        number = int(smoother._window.anchor[i])
+        assert relative(smoother._gtsam.cov(number), left.cov[i]) < 1e-6
 
 
-def test_finish_returns_the_whole_life_with_its_neighbour_covariances(sampled):
-    track, _ = sampled(3, seconds=4.0)
+@pytest.mark.parametrize("memory", COLOURS)
+def test_finish_returns_the_whole_life_with_its_neighbour_covariances(sampled, memory):
+    track, _ = sampled(3, seconds=4.0, memory=memory)
     smoother = start(track)
     smoother.feed(*columns(track))
     whole, exact = smoother.finish(), smooth_rts(track)
@@ -111,18 +135,18 @@ def test_finish_returns_the_whole_life_with_its_neighbour_covariances(sampled):
 
 def test_a_gap_longer_than_the_lag_is_survived(sampled):
     whole, _ = sampled(4, seconds=12.0, q=3000.0)
-    t, z, r, q = columns(whole)
-    seen = (t < 3.0) | (t > 9.0)
-    prior = (whole.prior_mean, whole.prior_cov)
-    track = TrackData.from_measurements(0.0, *prior, t[seen], z[seen], r[seen], q[seen])
+    t = whole.t[whole.key]
+    seen = columns(whole, (t < 3.0) | (t > 9.0))
+    track = TrackData.from_measurements(0.0, whole.prior_mean, whole.prior_cov, *seen, whole.memory)
     smoother = start(track)
     joined, exact = SmoothedTrack.concatenate(run(track, smoother)), smooth_rts(track)
     assert smoother.rebuilds == smoother.fallbacks == 0
     assert np.abs(joined.mean[:, :, 0] - exact.mean[:, :, 0]).max() < 1e-2
 
 
-def test_a_late_measurement_counts_as_if_it_had_come_in_time(sampled, scaled, relative):
-    track, _ = sampled(5, seconds=2.0, q=300.0)
+@pytest.mark.parametrize("memory", COLOURS)
+def test_a_late_measurement_counts_as_if_it_had_come_in_time(sampled, scaled, relative, memory):
+    track, _ = sampled(5, seconds=2.0, q=300.0, memory=memory)
     late = np.array([200, 180, 150])
     smoother = start(track)
     smoother.feed(*columns(track, np.setdiff1d(np.arange(len(track.z)), late)))
@@ -138,24 +162,19 @@ def test_a_late_measurement_counts_as_if_it_had_come_in_time(sampled, scaled, re
     assert np.allclose(left.gain[-5:], smooth_rts(track).gain[-5:], atol=1e-9)
 
 
-def test_a_late_measurement_at_the_time_of_a_key_is_exact(sampled, scaled, relative):
-    track, _ = sampled(6, seconds=1.5)
+@pytest.mark.parametrize("memory", COLOURS)
+def test_a_late_measurement_at_the_time_of_a_key_is_exact(sampled, scaled, relative, memory):
+    track, _ = sampled(6, seconds=1.5, memory=memory)
     smoother = start(track)
     smoother.feed(*columns(track))
     smoother.current()
     row = 100
-    t, z, r, q = columns(track, [row])
-    smoother.feed(t, z + 3.0, r, q)
+    again = track.measurements().take([row])
+    again = again._replace(z=again.z + 3.0)
+    smoother.feed(*again)
     left = smoother.current()
-    twice = TrackData.from_measurements(
-        0.0,
-        track.prior_mean,
-        track.prior_cov,
-        np.append(track.t[track.key], t),
-        np.append(track.z, z + 3.0, axis=0),
-        np.append(track.r, r, axis=0),
-        np.append(track.q[track.key], q),
-    )
+    both = Measurements.concatenate([track.measurements(), again])
+    twice = TrackData.from_measurements(0.0, track.prior_mean, track.prior_cov, *both, track.memory)
     exact = smooth_rts(twice).select(slice(len(twice) - len(left), None))
     assert scaled(left.mean, exact.mean) < 1e-5
     assert relative(left.cov, exact.cov) < 1e-9
@@ -171,24 +190,23 @@ def test_a_measurement_older_than_the_window_is_refused_and_counted(sampled):
     assert np.array_equal(smoother.current().mean, before.mean)
 
 
-def test_an_indeterminate_system_is_met_by_a_rebuild(sampled, scaled, monkeypatch):
+@pytest.mark.parametrize("memory", COLOURS)
+def test_an_indeterminate_system_is_met_by_a_rebuild(sampled, scaled, monkeypatch, memory):
     """Factors that go missing leave a state free, at which GTSAM throws; the track does not notice."""
     from jeat_graph.smoothers.factors import LinearGraph
 
-    track, _ = sampled(8, seconds=4.0, q=1000.0)
+    track, _ = sampled(8, seconds=4.0, q=1000.0, memory=memory)
     smoother = start(track)
     half = len(track.z) // 2
     smoother.feed(*columns(track, slice(0, half)))
     with monkeypatch.context() as broken:
-        whole = LinearGraph.add_steps
+        whole = LinearGraph.add_segments
 
-        def lossy(self, first, A0, A1, b):
+        def lossy(self, first, A0, A1, b, counts):
             broken.undo()
-            keep = np.ones_like(b)
-            keep[:, :6] = 0.0  # the motion is forgotten, the measurements stay
-            whole(self, first, A0 * keep[..., None], A1 * keep[..., None], b * keep)
+            whole(self, first, A0, A1, b, np.full_like(counts, 2))  # of the motion, and nothing measured
 
-        broken.setattr(LinearGraph, "add_steps", lossy)
+        broken.setattr(LinearGraph, "add_segments", lossy)
         smoother.feed(*columns(track, slice(half, half + 30)))
     assert smoother.rebuilds == 1
     smoother.feed(*columns(track, slice(half + 30, None)))
@@ -198,8 +216,9 @@ def test_an_indeterminate_system_is_met_by_a_rebuild(sampled, scaled, monkeypatc
     assert scaled(left.mean, exact.mean[-len(left) :]) < 1e-4
 
 
-def test_a_rebuild_keeps_late_measurements(sampled, scaled):
-    track, _ = sampled(9, seconds=2.5)
+@pytest.mark.parametrize("memory", COLOURS)
+def test_a_rebuild_keeps_late_measurements(sampled, scaled, memory):
+    track, _ = sampled(9, seconds=2.5, memory=memory)
     late = np.array([250, 270])
     smoother = start(track)
     smoother.feed(*columns(track, np.setdiff1d(np.arange(len(track.z)), late)))
@@ -242,15 +261,16 @@ def test_bad_numbers_are_refused(sampled):
             smoother.feed([1.0], z, r, q)
 
 
-def test_a_measurement_at_the_time_of_the_prior_belongs_to_its_state(sampled, scaled, relative):
-    track, _ = sampled(13, seconds=0.5)
-    t, z, r, q = columns(track)
-    rows = (np.append(t[:1] * 0, t), np.append(z[:1] + 5, z, axis=0), np.append(r[:1], r, axis=0))
-    exact = smooth_rts(
-        TrackData.from_measurements(0.0, track.prior_mean, track.prior_cov, *rows, np.append(q[:1], q))
-    )
+@pytest.mark.parametrize("memory", COLOURS)
+def test_a_measurement_at_the_time_of_the_prior_belongs_to_its_state(sampled, scaled, relative, memory):
+    track, _ = sampled(13, seconds=0.5, memory=memory)
+    first = track.measurements().take([0])
+    first = first._replace(t=np.zeros(1), z=first.z + 5)
+    rows = Measurements.concatenate([first, track.measurements()])
+    prior = (track.prior_mean, track.prior_cov)
+    exact = smooth_rts(TrackData.from_measurements(0.0, *prior, *rows, track.memory))
     smoother = start(track)
-    smoother.feed(*rows, np.append(q[:1], q))
+    smoother.feed(*rows)
     left = smoother.finish()
     assert np.array_equal(left.t, track.t)
     assert scaled(left.mean, exact.mean) < 1e-6

@@ -54,8 +54,9 @@ def test_cauchy_weighs_down_gross_outliers_and_only_those(sampled):
     assert weights[~bad].mean() > 0.99
 
 
-def test_left_out_distance_equals_leaving_the_measurement_out(harsh):
-    track = harsh(0, 30)
+@pytest.mark.parametrize("memory", [(), (0.3, 0.08)])
+def test_left_out_distance_equals_leaving_the_measurement_out(harsh, memory):
+    track = harsh(0, 30, memory=memory)
     ones = np.ones(len(track.z))
     closed = left_out_distances(track, smooth_rts(track), ones)
     for i in range(0, len(track.z), 4):
@@ -63,7 +64,12 @@ def test_left_out_distance_equals_leaving_the_measurement_out(harsh):
         without[i] = 1e-12
         rest = smooth_rts(track, without)
         k = track.key[i]
-        e, P = track.z[i] - rest.mean[k, :, 0], rest.cov[k, :, 0, 0]
+        H = np.zeros((2, track.size))
+        H[:, 0] = 1.0
+        if track.error[i] >= 0:
+            H[:, 3 + track.error[i]] = track.lever[i]
+        e = track.z[i] - (H * rest.mean[k]).sum(axis=1)
+        P = np.einsum("ai,aij,aj->a", H, rest.cov[k], H)
         assert closed[i] == pytest.approx(np.sum(e**2 / (track.r[i] + P)), rel=1e-4)
 
 

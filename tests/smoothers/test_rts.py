@@ -1,5 +1,7 @@
 """The Rauch-Tung-Striebel smoother is exact."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,19 +11,24 @@ from jeat_graph.errors import DataError
 from jeat_graph.smoothers.rts import filter_track, smooth_rts, smooth_rts_batch
 from jeat_graph.smoothers.track_data import TrackData
 
+#: White errors, and two sensors with a memory (s).
+COLOURS = [(), (0.3, 0.08)]
 
+
+@pytest.mark.parametrize("memory", COLOURS)
 @pytest.mark.parametrize("seed", range(4))
-def test_equals_the_dense_solution_on_harsh_timing(harsh, dense, blocks, scaled, relative, seed):
-    track = harsh(seed)
+def test_equals_the_dense_solution_on_harsh_timing(harsh, dense, blocks, scaled, relative, seed, memory):
+    track = harsh(seed, memory=memory)
     smoothed = smooth_rts(track)
     mean, joint = dense(track)
     assert scaled(smoothed.mean, mean) < 1e-7
-    assert relative(smoothed.cov, blocks(joint)) < 1e-7
+    assert relative(smoothed.cov, blocks(joint, size=track.size)) < 1e-7
 
 
-def test_carries_the_covariance_between_neighbours(harsh, dense, blocks):
-    track = harsh(1)
-    cross, exact = smooth_rts(track).cross(), blocks(dense(track)[1], lag=1)
+@pytest.mark.parametrize("memory", COLOURS)
+def test_carries_the_covariance_between_neighbours(harsh, dense, blocks, memory):
+    track = harsh(1, memory=memory)
+    cross, exact = smooth_rts(track).cross(), blocks(dense(track)[1], lag=1, size=track.size)
     assert np.allclose(cross, exact, rtol=1e-6, atol=1e-6)
 
 
@@ -60,9 +67,7 @@ def test_a_batch_gives_each_track_what_it_gets_alone(harsh):
 def test_weights_scale_the_information_of_measurements(harsh):
     track = harsh(0)
     weights = np.linspace(0.1, 1.0, len(track.z))
-    stretched = TrackData(
-        track.prior_mean, track.prior_cov, track.t, track.q, track.key, track.z, track.r / weights[:, None]
-    )
+    stretched = replace(track, r=track.r / weights[:, None])
     assert np.allclose(smooth_rts(track, weights).mean, smooth_rts(stretched).mean, rtol=1e-12)
 
 

@@ -1,0 +1,507 @@
+"""The two compiled passes over a track: the Kalman filter forward, the smoother back.
+
+The way back is in the Bryson-Frazier form, which needs no inverse: with the innovation y of variance S and
+gain K of a measurement with row H, and C = I - K H, an adjoint λ with its matrix Λ goes
+
+    back over a measurement:  λ ← Cᵀ λ - Hᵀ y / S,   Λ ← Cᵀ Λ C + Hᵀ H / S
+    back over a step:         λ ← Fᵀ λ,              Λ ← Fᵀ Λ F
+
+and a smoothed state is x - P λ with covariance P - P Λ P, given the filtered x and P. It is the
+Rauch-Tung-Striebel smoother in other variables, and where only few of many states are wanted it is much
+cheaper: H and F have few entries, so λ and Λ cost O(n²) a key.
+
+Source: Bierman, Fixed interval smoothing with discrete measurements, Int. J. Control 18(1), 1973.
+
+States are [p, v, a, e_1, …, e_B] per axis (`transitions.py`), n = 3 + B. `dims`, a tuple of n elements,
+tells n to the compiler, which then unrolls the loops over a state. Numba does not notice changes in
+another file, so all compiled functions that call each other stand here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.filters.motion import process_noise
+
+# Process noise of white jerk is q² Δ u_i u_j times this, with u = (Δ², Δ, 1) (paper eq. 2).
+_UNIT_NOISE = process_noise.py_func(1.0, 1.0)
+
+
+@njit(cache=True)
+def _error_steps(dt: float, memory: FloatArray, phi: FloatArray, var: FloatArray) -> None:
+    """Fill transition factors `phi` (B,) and noise variances `var` (B,) of the error states."""
+    for b in range(len(memory)):
+        phi[b] = np.exp(-dt / memory[b])
+        var[b] = -np.expm1(-2.0 * dt / memory[b])
+
+
+@njit(cache=True)
+def _step_mean(dims: tuple[int, ...], dt: float, phi: FloatArray, old: FloatArray, new: FloatArray) -> None:
+    """Write F m (n,) of a filtered mean `old` into `new`."""
+    half = 0.5 * dt * dt
+    new[0] = old[0] + dt * old[1] + half * old[2]
+    new[1] = old[1] + dt * old[2]
+    new[2] = old[2]
+    for i in range(3, len(dims)):
+        new[i] = phi[i - 3] * old[i]
+
+
+@njit(cache=True)
+def _step_cov(
+    dims: tuple[int, ...],
+    dt: float,
+    q: float,
+    phi: FloatArray,
+    var: FloatArray,
+    old: FloatArray,
+    moved: FloatArray,
+    new: FloatArray,
+) -> None:
+    """Write F P (n, n) of a filtered covariance `old` into `moved`, and F P Fᵀ + Q into `new`."""
+    n = len(dims)
+    half = 0.5 * dt * dt
+    for j in range(n):
+        moved[0, j] = old[0, j] + dt * old[1, j] + half * old[2, j]
+        moved[1, j] = old[1, j] + dt * old[2, j]
+        moved[2, j] = old[2, j]
+        for i in range(3, n):
+            moved[i, j] = phi[i - 3] * old[i, j]
+    unit = q * q * dt
+    d2 = dt * dt
+    new[0, 0] = moved[0, 0] + dt * moved[0, 1] + half * moved[0, 2] + unit * d2 * d2 * _UNIT_NOISE[0, 0]
+    new[1, 0] = moved[1, 0] + dt * moved[1, 1] + half * moved[1, 2] + unit * d2 * dt * _UNIT_NOISE[1, 0]
+    new[2, 0] = moved[2, 0] + dt * moved[2, 1] + half * moved[2, 2] + unit * d2 * _UNIT_NOISE[2, 0]
+    new[1, 1] = moved[1, 1] + dt * moved[1, 2] + unit * d2 * _UNIT_NOISE[1, 1]
+    new[2, 1] = moved[2, 1] + dt * moved[2, 2] + unit * dt * _UNIT_NOISE[2, 1]
+    new[2, 2] = moved[2, 2] + unit * _UNIT_NOISE[2, 2]
+    for i in range(3, n):
+        new[i, 0] = moved[i, 0] + dt * moved[i, 1] + half * moved[i, 2]
+        new[i, 1] = moved[i, 1] + dt * moved[i, 2]
+        new[i, 2] = moved[i, 2]
+        for j in range(3, i + 1):
+            new[i, j] = moved[i, j] * phi[j - 3]
+        new[i, i] += var[i - 3]
+    for i in range(n):
+        for j in range(i):
+            new[j, i] = new[i, j]
+
+
+@njit(cache=True)
+def forward(
+    dims: tuple[int, ...],
+    dt: FloatArray,
+    q: FloatArray,
+    memory: FloatArray,
+    row: IntArray,
+    z: FloatArray,
+    info: FloatArray,
+    lever: FloatArray,
+    error: IntArray,
+    start: IntArray,
+    prior_mean: FloatArray,
+    prior_cov: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Kalman filter of many tracks whose keys lie one after the other (paper eq. 2 to 4).
+
+    The update is in Joseph form, so that no rounding makes a covariance indefinite; coincident
+    measurements are taken in one after the other.
+
+    Args:
+        dims: any tuple of n elements.
+        dt: (N,) step from the key before (s); not used at the first key of a track.
+        q: (N,) root spectral density of the jerk over that step (px/s^2.5).
+        memory: (B,) memory of the error states (s).
+        row: (M,) key of each measurement, ascending.
+        z: (M, 2) measurements (px).
+        info: (M, 2) their information (1/px²), > 0: of the white part alone.
+        lever: (M, 2) factor of the error state in each (px).
+        error: (M,) its index, or -1.
+        start: (T + 1,) first key of each track, and N.
+        prior_mean: (T, 2, n) prior at the first key of each track.
+        prior_cov: (T, 2, n, n) its covariance.
+
+    Returns:
+        (N, 2, n) filtered means, (N, 2, n, n) filtered covariances; and for the way back, by measurement,
+        (M, 2, n) gains, (M, 2) innovations (px) and (M, 2) their variances (px²).
+    """
+    n = len(dims)
+    mean = np.empty((len(dt), 2, n))
+    cov = np.empty((len(dt), 2, n, n))
+    gain = np.empty((len(row), 2, n))
+    innovation = np.empty((len(row), 2))
+    variance = np.empty((len(row), 2))
+    phi, var = np.empty(n - 3), np.empty(n - 3)
+    moved = np.empty((n, n))
+    seen = np.empty(n)
+    i = 0
+    for track in range(len(start) - 1):
+        for k in range(start[track], start[track + 1]):
+            if k == start[track]:
+                mean[k] = prior_mean[track]
+                cov[k] = prior_cov[track]
+            else:
+                _error_steps(dt[k], memory, phi, var)
+                for a in range(2):
+                    _step_mean(dims, dt[k], phi, mean[k - 1, a], mean[k, a])
+                    _step_cov(dims, dt[k], q[k], phi, var, cov[k - 1, a], moved, cov[k, a])
+            while i < len(row) and row[i] == k:
+                e = error[i] + 3
+                for a in range(2):
+                    m, P = mean[k, a], cov[k, a]
+                    h = lever[i, a] if e >= 3 else 0.0
+                    y = z[i, a] - m[0]
+                    for j in range(n):
+                        seen[j] = P[0, j]
+                    if e >= 3:
+                        y -= h * m[e]
+                        for j in range(n):
+                            seen[j] += h * P[e, j]
+                        S = seen[0] + h * seen[e] + 1.0 / info[i, a]
+                    else:
+                        S = seen[0] + 1.0 / info[i, a]
+                    K = gain[i, a]
+                    for j in range(n):
+                        K[j] = seen[j] / S
+                        m[j] += K[j] * y
+                    for j in range(n):
+                        for c in range(j + 1):
+                            # (I - K H) P (I - K H)ᵀ + K r Kᵀ written out.
+                            new = P[j, c] + (K[j] * S * K[c] - K[j] * seen[c] - seen[j] * K[c])
+                            P[j, c] = new
+                            P[c, j] = new
+                    innovation[i, a] = y
+                    variance[i, a] = S
+                i += 1
+    return mean, cov, gain, innovation, variance
+
+
+@njit(cache=True)
+def _back_over_measurement(
+    dims: tuple[int, ...],
+    h: float,
+    e: int,
+    K: FloatArray,
+    y: float,
+    S: float,
+    lam: FloatArray,
+    Lam: FloatArray,
+    u: FloatArray,
+) -> None:
+    """Take λ (n,) and Λ (n, n) back over a measurement p + h x_e, in place; e < 3 for white errors."""
+    n = len(dims)
+    s = y / S
+    c = 1.0 / S
+    for i in range(n):
+        s += K[i] * lam[i]
+        t = 0.0
+        for j in range(n):
+            t += Lam[i, j] * K[j]
+        u[i] = t
+        c += K[i] * t
+    lam[0] -= s
+    # Cᵀ Λ C + Hᵀ H / S = Λ - Hᵀ uᵀ - u H + c Hᵀ H with u = Λ K.
+    for j in range(n):
+        Lam[0, j] -= u[j]
+        Lam[j, 0] -= u[j]
+    Lam[0, 0] += c
+    if e >= 3:
+        lam[e] -= h * s
+        for j in range(n):
+            Lam[e, j] -= h * u[j]
+            Lam[j, e] -= h * u[j]
+        Lam[0, e] += h * c
+        Lam[e, 0] += h * c
+        Lam[e, e] += h * h * c
+
+
+@njit(cache=True)
+def _back_over_step(
+    dims: tuple[int, ...], dt: float, phi: FloatArray, lam: FloatArray, Lam: FloatArray
+) -> None:
+    """Take λ (n,) to Fᵀ λ and Λ (n, n) to Fᵀ Λ F, in place."""
+    n = len(dims)
+    half = 0.5 * dt * dt
+    lam[2] += dt * lam[1] + half * lam[0]
+    lam[1] += dt * lam[0]
+    for i in range(3, n):
+        lam[i] *= phi[i - 3]
+    for j in range(n):
+        Lam[2, j] += dt * Lam[1, j] + half * Lam[0, j]
+        Lam[1, j] += dt * Lam[0, j]
+        for i in range(3, n):
+            Lam[i, j] *= phi[i - 3]
+    for i in range(n):
+        Lam[i, 2] += dt * Lam[i, 1] + half * Lam[i, 0]
+        Lam[i, 1] += dt * Lam[i, 0]
+        for j in range(3, n):
+            Lam[i, j] *= phi[j - 3]
+    for i in range(n):
+        for j in range(i):
+            # Rounding must not make it grow apart from its transpose.
+            Lam[j, i] = Lam[i, j]
+
+
+@njit(cache=True)
+def _smoothed(
+    dims: tuple[int, ...],
+    m: FloatArray,
+    P: FloatArray,
+    lam: FloatArray,
+    Lam: FloatArray,
+    part: FloatArray,
+    out_mean: FloatArray,
+    out_cov: FloatArray,
+) -> None:
+    """Write m - P λ and P - P Λ P."""
+    n = len(dims)
+    for i in range(n):
+        s = m[i]
+        for j in range(n):
+            s -= P[i, j] * lam[j]
+            t = 0.0
+            for k in range(n):
+                t += P[i, k] * Lam[k, j]
+            part[i, j] = t
+        out_mean[i] = s
+    for i in range(n):
+        for j in range(i + 1):
+            t = P[i, j]
+            for k in range(n):
+                t -= part[i, k] * P[k, j]
+            out_cov[i, j] = t
+            out_cov[j, i] = t
+
+
+@njit(cache=True)
+def _gain(
+    dims: tuple[int, ...],
+    predicted: FloatArray,
+    moved: FloatArray,
+    L: FloatArray,
+    d: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Write G = (F P)ᵀ (F P Fᵀ + Q)⁻¹ (n, n), by LDLᵀ; `moved` = F P is overwritten."""
+    n = len(dims)
+    for j in range(n):
+        s = predicted[j, j]
+        for k in range(j):
+            s -= L[j, k] * L[j, k] * d[k]
+        d[j] = s
+        for i in range(j + 1, n):
+            s = predicted[i, j]
+            for k in range(j):
+                s -= L[i, k] * L[j, k] * d[k]
+            L[i, j] = s / d[j]
+    for i in range(n):
+        for k in range(i):
+            for c in range(n):
+                moved[i, c] -= L[i, k] * moved[k, c]
+    for i in range(n - 1, -1, -1):
+        for c in range(n):
+            moved[i, c] /= d[i]
+        for k in range(i + 1, n):
+            for c in range(n):
+                moved[i, c] -= L[k, i] * moved[k, c]
+    for i in range(n):
+        for c in range(n):
+            out[c, i] = moved[i, c]
+
+
+@njit(cache=True)
+def backward(
+    dims: tuple[int, ...],
+    dt: FloatArray,
+    q: FloatArray,
+    memory: FloatArray,
+    row: IntArray,
+    lever: FloatArray,
+    error: IntArray,
+    start: IntArray,
+    wanted: IntArray,
+    mean: FloatArray,
+    cov: FloatArray,
+    gain: FloatArray,
+    innovation: FloatArray,
+    variance: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Smooth many tracks, given what `forward` returned.
+
+    Args:
+        dims: any tuple of n elements.
+        dt: (N,) as for `forward`.
+        q: (N,) as for `forward`.
+        memory: (B,) as for `forward`.
+        row: (M,) as for `forward`.
+        lever: (M, 2) as for `forward`.
+        error: (M,) as for `forward`.
+        start: (T + 1,) as for `forward`.
+        wanted: (T,) how many of the first keys of each track are wanted, or more.
+        mean: (N, 2, n) filtered means.
+        cov: (N, 2, n, n) filtered covariances.
+        gain: (M, 2, n) gains.
+        innovation: (M, 2) innovations (px).
+        variance: (M, 2) their variances (px²).
+
+    Returns:
+        (N, 2, n) smoothed means, (N, 2, n, n) covariances, and (N, 2, n, n) smoother gains; the gain in row
+        k is of the step from k to k + 1, and zero at the last key of a track. Only those wanted are filled.
+    """
+    n = len(dims)
+    out_mean, out_cov = np.empty_like(mean), np.empty_like(cov)
+    out_gain = np.empty_like(cov)
+    phi, var = np.empty(n - 3), np.empty(n - 3)
+    lam, Lam = np.empty((2, n)), np.empty((2, n, n))
+    u, d = np.empty(n), np.empty(n)
+    predicted, part, L = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+    i = len(row) - 1
+    for track in range(len(start) - 2, -1, -1):
+        first, last = start[track], start[track + 1] - 1
+        lam[:] = 0.0
+        Lam[:] = 0.0
+        for k in range(last, first - 1, -1):
+            if k < last:
+                # phi and var are those of the step from k to k + 1.
+                for a in range(2):
+                    _back_over_step(dims, dt[k + 1], phi, lam[a], Lam[a])
+            if k - first < wanted[track]:
+                for a in range(2):
+                    if k < last:
+                        P = cov[k, a]
+                        _smoothed(dims, mean[k, a], P, lam[a], Lam[a], part, out_mean[k, a], out_cov[k, a])
+                        _step_cov(dims, dt[k + 1], q[k + 1], phi, var, P, part, predicted)
+                        _gain(dims, predicted, part, L, d, out_gain[k, a])
+                    else:
+                        out_mean[k, a] = mean[k, a]
+                        out_cov[k, a] = cov[k, a]
+                        out_gain[k, a] = 0.0
+            while i >= 0 and row[i] == k:
+                e = error[i] + 3
+                for a in range(2):
+                    _back_over_measurement(
+                        dims,
+                        lever[i, a],
+                        e,
+                        gain[i, a],
+                        innovation[i, a],
+                        variance[i, a],
+                        lam[a],
+                        Lam[a],
+                        u,
+                    )
+                i -= 1
+            if k > first:
+                _error_steps(dt[k], memory, phi, var)
+    return out_mean, out_cov, out_gain
+
+
+@njit(cache=True)
+def backward_between(
+    dims: tuple[int, ...],
+    dt: FloatArray,
+    memory: FloatArray,
+    row: IntArray,
+    lever: FloatArray,
+    error: IntArray,
+    mean: FloatArray,
+    cov: FloatArray,
+    gain: FloatArray,
+    innovation: FloatArray,
+    variance: FloatArray,
+    at: IntArray,
+    until: IntArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Smooth some keys of one track, each with the measurements up to a key of its own.
+
+    Args:
+        dims: any tuple of n elements.
+        dt: (N,) as for `forward`.
+        memory: (B,) as for `forward`.
+        row: (M,) as for `forward`.
+        lever: (M, 2) as for `forward`.
+        error: (M,) as for `forward`.
+        mean: (N, 2, n) filtered means.
+        cov: (N, 2, n, n) filtered covariances.
+        gain: (M, 2, n) gains.
+        innovation: (M, 2) innovations (px).
+        variance: (M, 2) their variances (px²).
+        at: (T,) keys wanted.
+        until: (T,) the last key whose measurements count, >= `at`.
+
+    Returns:
+        (T, 2, n) means and (T, 2, n, n) covariances.
+    """
+    n = len(dims)
+    out_mean, out_cov = np.empty((len(at), 2, n)), np.empty((len(at), 2, n, n))
+    phi, var = np.empty(n - 3), np.empty(n - 3)
+    lam, Lam = np.empty((2, n)), np.empty((2, n, n))
+    u, part = np.empty(n), np.empty((n, n))
+    for t in range(len(at)):
+        lam[:] = 0.0
+        Lam[:] = 0.0
+        i = np.searchsorted(row, until[t], side="right") - 1
+        for k in range(until[t], at[t], -1):
+            while i >= 0 and row[i] == k:
+                for a in range(2):
+                    _back_over_measurement(
+                        dims,
+                        lever[i, a],
+                        error[i] + 3,
+                        gain[i, a],
+                        innovation[i, a],
+                        variance[i, a],
+                        lam[a],
+                        Lam[a],
+                        u,
+                    )
+                i -= 1
+            _error_steps(dt[k], memory, phi, var)
+            for a in range(2):
+                _back_over_step(dims, dt[k], phi, lam[a], Lam[a])
+        k = at[t]
+        for a in range(2):
+            _smoothed(dims, mean[k, a], cov[k, a], lam[a], Lam[a], part, out_mean[t, a], out_cov[t, a])
+    return out_mean, out_cov
+
+
+@njit(cache=True)
+def fill_back(
+    dims: tuple[int, ...],
+    dt: FloatArray,
+    memory: FloatArray,
+    known: IntArray,
+    filtered: FloatArray,
+    gain: FloatArray,
+    mean: FloatArray,
+) -> None:
+    """Complete smoothed means of which some are known, in place: x_k = m_k + G_k (x_{k+1} - F m_k).
+
+    Args:
+        dims: any tuple of n elements.
+        dt: (N,) steps (s).
+        memory: (B,) memory of the error states (s).
+        known: (A,) keys whose means are known, ascending; the last is the last of all, N - 1.
+        filtered: (N, 2, n) filtered means.
+        gain: (N, 2, n, n) smoother gains.
+        mean: (N, 2, n) the means.
+    """
+    n = len(dims)
+    phi, var = np.empty(n - 3), np.empty(n - 3)
+    jump = np.empty(n)
+    i = len(known) - 1
+    for k in range(len(mean) - 1, -1, -1):
+        if i >= 0 and known[i] == k:
+            i -= 1
+            continue
+        _error_steps(dt[k + 1], memory, phi, var)
+        for a in range(2):
+            _step_mean(dims, dt[k + 1], phi, filtered[k, a], jump)
+            for j in range(n):
+                jump[j] = mean[k + 1, a, j] - jump[j]
+            for j in range(n):
+                s = filtered[k, a, j]
+                for c in range(n):
+                    s += gain[k, a, j, c] * jump[c]
+                mean[k, a, j] = s
