@@ -181,7 +181,15 @@ def _renderer(args: argparse.Namespace, scenario: Scenario, frames: int) -> Sour
 
 
 def _carla_source(args: argparse.Namespace, scenario: Scenario, frames: int) -> SourceFactory:
-    raise ConfigError("--sensors carla is not there yet")
+    from jeat_graph.sehn.carla.config import CarlaConfig
+    from jeat_graph.sehn.carla.session import client_api
+    from jeat_graph.sehn.carla.source import CarlaSource
+
+    client_api()  # says so now if it is not installed
+    width, height = args.size or _SIZE
+    config = CarlaConfig(width=width, height=height)
+    host, port = args.carla_host or "localhost", args.carla_port or 2000
+    return partial(CarlaSource, scenario, config, args.seed, frames, host, port)
 
 
 def _verify(folder: Path) -> int:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from collections.abc import Callable, Generator, Iterator
+from contextlib import ExitStack, closing
 from itertools import chain, islice
 from pathlib import Path
 from typing import Any
@@ -66,8 +66,12 @@ def _fill(
     truth = SegmentTruth(None if place is None else np.asarray(place, dtype=np.float64), protocol.min_visible)
     counts = {"frames": 0, "events": 0, "positive": 0}
     by_motion: int | None = 0
-    steps, rate_hz = _rate_of(iter(source.segment(index)))
+    given = iter(source.segment(index))
     with ExitStack() as stack:
+        if isinstance(given, Generator):
+            # What a source holds, a server's actors say, is let go at once if writing fails.
+            stack.enter_context(closing(given))
+        steps, rate_hz = _rate_of(given)
         frames = stack.enter_context(FrameWriter(folder, protocol.video, source.size_px, rate_hz))
         events = stack.enter_context(EventWriter(folder / EVENTS, source.size_px, protocol.compression))
         for step in steps:
