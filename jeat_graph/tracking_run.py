@@ -20,8 +20,8 @@ from jeat_graph.run_directory import DIAGNOSTICS, RUN_JSON, SCANS, SUFFIXES, Run
 from jeat_graph.tracker import Tracker
 from jeat_graph.version import __version__
 
-# So many steps go by before smoothed rows that have become final are written.
-_STEPS_PER_DRAIN = 256
+#: So many steps go by before smoothed rows that have become final are written.
+STEPS_PER_DRAIN = 256
 
 FRAME_FORMATS = ("motchallenge", "kitti")
 EXTRA_FORMATS = ("parquet", *FRAME_FORMATS)
@@ -129,7 +129,7 @@ def _track(
             reported.update(table.track_id.tolist())
             rows += len(table)
             bar.update(len(batch))
-            if smoothed is not None and k % _STEPS_PER_DRAIN == 0:
+            if smoothed is not None and k % STEPS_PER_DRAIN == 0:
                 final = tracker.drain_smoothed()
                 smoothed.append(final)
                 smoothed_rows += len(final)

@@ -116,6 +116,14 @@ def write_columns(
         writer.append(columns)
 
 
+def csv_lines(columns: Mapping[str, npt.NDArray[Any]], delimiter: str = ",") -> str:
+    """Return the lines of a text file with these rows, without its header, just as they would be written."""
+    import pyarrow as pa
+
+    table = pa.table([_to_arrow(values) for values in columns.values()], names=list(columns))
+    return _csv_bytes(table, delimiter).decode("utf-8")
+
+
 def round_decimals(values: FloatArray, decimals: int) -> FloatArray:
     """Round to a number of decimals; minus zero becomes zero."""
     return np.asarray(np.round(values, decimals) + 0.0, dtype=np.float64)

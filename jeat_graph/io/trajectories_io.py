@@ -53,7 +53,9 @@ class TrajectoryWriter:
 
     def __enter__(self) -> Self:
         self._writer.__enter__()
-        self._writer.append(_columns(Trajectories.empty()))  # so that a run without tracks has a header too
+        self._writer.append(
+            table_columns(Trajectories.empty())
+        )  # so that a run without tracks has a header too
         return self
 
     def __exit__(
@@ -89,12 +91,12 @@ class TrajectoryWriter:
     def _flush(self) -> None:
         """Convert what has come together: tables of a few rows each would cost far more one by one."""
         if self._pending:
-            self._writer.append(_columns(Trajectories.concatenate(self._pending)))
+            self._writer.append(table_columns(Trajectories.concatenate(self._pending)))
         self._pending, self._rows = [], 0
 
 
-def _columns(table: Trajectories) -> dict[str, Any]:
-    """Return the columns of the contract, rounded as they are written."""
+def table_columns(table: Trajectories) -> dict[str, Any]:
+    """Return the columns of the contract (N,) by name, rounded as they are written."""
     boxes, mean = round_decimals(table.boxes, _PX_DECIMALS), round_decimals(table.mean, _PX_DECIMALS)
     var = round_significant(table.var, _VAR_DIGITS)
     columns: dict[str, Any] = {"t": table.t + 0.0, "track_id": table.track_id}

@@ -1,0 +1,222 @@
+"""Scans from a stream of lines, one after another as they come: JSON, or rows of CSV."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterable, Iterator
+from typing import Any, NamedTuple
+
+from jeat_graph.detections import Scan
+from jeat_graph.errors import DataError
+
+_KEYS = ("t", "sensor", "boxes", "scores")
+_COLUMNS = ("t", "sensor", "left", "top", "width", "height", "score")
+
+
+class Batch(NamedTuple):
+    """Scans of one time, to be taken jointly.
+
+    Attributes:
+        scans: at least one.
+        lines: number of the line, from 1, that each scan began on.
+    """
+
+    scans: list[Scan]
+    lines: list[int]
+
+    @property
+    def t(self) -> float:
+        """Time of the scans (s)."""
+        return self.scans[0].t
+
+
+def read_batches(
+    lines: Iterable[bytes], name: str, *, joint: bool = False, ordered: bool = True
+) -> Iterator[Batch]:
+    """Read scans as their lines arrive.
+
+    A line of JSON is one scan, `{"t": 0.05, "sensor": "rgb", "boxes": [[l, t, w, h], …], "scores": [s, …]}`,
+    or a list of scans of one time. It is given out at once; with `joint` only when a later time is seen, so
+    that scans of one time that came in lines of their own are given out together.
+
+    CSV begins with a header and has one row a detection; a row with only `t` and `sensor` is a scan that
+    found nothing. Rows of one time are given out together, when a row of another time or an empty line
+    arrives, or at the end.
+
+    Args:
+        lines: lines with their ends.
+        name: name of the stream, for messages.
+        joint: wait for a later time.
+        ordered: refuse a scan that is older than the one held back; otherwise it is given out before that
+            one is.
+
+    Raises:
+        DataError: names the stream, the line, and what is wrong.
+    """
+    numbered = enumerate(lines, start=1)
+    for number, line in numbered:
+        text = _decode(line, name, number)
+        if not text:
+            continue
+        if text.startswith(("{", "[")):
+            parts = _json_batches(text, number, numbered, name)
+            yield from _joined(parts, name, ordered) if joint else parts
+        else:
+            yield from _joined(_csv_batches(text, number, numbered, name), name, ordered)
+        return
+
+
+def _decode(line: bytes, name: str, number: int) -> str:
+    try:
+        return line.decode("utf-8-sig" if number == 1 else "utf-8").strip()
+    except UnicodeDecodeError:
+        raise DataError("is not UTF-8", name, number) from None
+
+
+def _json_batches(
+    text: str, number: int, numbered: Iterator[tuple[int, bytes]], name: str
+) -> Iterator[Batch]:
+    yield _json_batch(text, name, number)
+    for after, line in numbered:
+        text = _decode(line, name, after)
+        if text:
+            yield _json_batch(text, name, after)
+
+
+def _json_batch(text: str, name: str, number: int) -> Batch:
+    try:
+        content = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        what = error.msg if isinstance(error, json.JSONDecodeError) else str(error)
+        raise DataError(f"is not JSON: {what}", name, number) from None
+    items = content if isinstance(content, list) else [content]
+    if not items:
+        raise DataError("a list of scans must hold at least one", name, number)
+    scans = [_scan_of(item, name, number) for item in items]
+    if any(scan.t != scans[0].t for scan in scans):
+        raise DataError("the scans of one line must have one and the same t", name, number)
+    return _in_order(Batch(scans, [number] * len(scans)))
+
+
+def _scan_of(item: Any, name: str, number: int) -> Scan:
+    example = '{"t": 0.05, "sensor": "rgb", "boxes": [[10, 20, 30, 40]], "scores": [0.9]}'
+    if not isinstance(item, dict):
+        raise DataError(f"a scan is an object such as {example}", name, number)
+    strange = next((key for key in item if key not in _KEYS), None)
+    if strange is not None:
+        raise DataError(f"unknown key {strange!r}; a scan has {', '.join(_KEYS)}", name, number)
+    missing = next((key for key in _KEYS if key not in item), None)
+    if missing is not None:
+        raise DataError(f"{missing} is missing; a scan has {', '.join(_KEYS)}", name, number)
+    t, sensor = item["t"], item["sensor"]
+    if isinstance(t, bool) or not isinstance(t, int | float):
+        raise DataError(f"t must be a number of seconds, got {t!r}", name, number)
+    if not isinstance(sensor, str) or not sensor:
+        raise DataError(f"sensor must be a name, got {sensor!r}", name, number)
+    try:
+        return Scan(t, sensor, item["boxes"], item["scores"])
+    except DataError as error:
+        raise DataError(error.message, name, number) from None
+    except OverflowError:
+        raise DataError("t is too large", name, number) from None
+
+
+class _Row(NamedTuple):
+    t: float
+    sensor: str
+    box: list[float] | None
+    score: float
+
+
+def _csv_batches(
+    header: str, at: int, numbered: Iterator[tuple[int, bytes]], name: str
+) -> Iterator[Batch | None]:
+    """Yield a batch of one scan for each run of rows of one sensor and time, None where a line is empty."""
+    columns = _fields(header, name, at)
+    missing = [column for column in _COLUMNS if column not in columns]
+    if missing:
+        raise DataError(
+            f"the first line must be a scan as JSON or a header of CSV; column {missing[0]} is missing",
+            name,
+            at,
+        )
+    place = {column: columns.index(column) for column in _COLUMNS}
+    rows: list[_Row] = []
+    first = 0
+    for number, line in numbered:
+        text = _decode(line, name, number)
+        row = _csv_row(text, place, name, number) if text else None
+        if rows and (row is None or (row.t, row.sensor) != (rows[0].t, rows[0].sensor)):
+            yield _scan_of_rows(rows, first)
+            rows = []
+        if row is None:
+            yield None
+            continue
+        first = first if rows else number
+        rows.append(row)
+    if rows:
+        yield _scan_of_rows(rows, first)
+
+
+def _fields(text: str, name: str, number: int) -> list[str]:
+    try:
+        return [field.strip() for field in next(csv.reader([text]))]
+    except csv.Error as error:
+        raise DataError(f"cannot be read as CSV: {error}", name, number) from None
+
+
+def _csv_row(text: str, place: dict[str, int], name: str, number: int) -> _Row:
+    fields = _fields(text, name, number)
+    value = {column: fields[k] if k < len(fields) else "" for column, k in place.items()}
+    if not value["sensor"]:
+        raise DataError("sensor is missing", name, number)
+    numbers = [column for column in _COLUMNS if column != "sensor"]
+    empty = not any(value[column] for column in numbers[1:])
+    found: dict[str, float] = {}
+    for column in numbers[:1] if empty else numbers:
+        try:
+            found[column] = float(value[column])
+        except ValueError:
+            what = f"must be a number, got {value[column]!r}" if value[column] else "is missing"
+            raise DataError(f"{column} {what}", name, number) from None
+    box = None if empty else [found[column] for column in ("left", "top", "width", "height")]
+    row = _Row(found["t"], value["sensor"], box, found.get("score", 0.0))
+    try:
+        _scan_of_rows([row], number)
+    except DataError as error:
+        raise DataError(error.message.removeprefix("box 0: "), name, number) from None
+    return row
+
+
+def _scan_of_rows(rows: list[_Row], line: int) -> Batch:
+    found = [row for row in rows if row.box is not None]
+    boxes, scores = [row.box for row in found], [row.score for row in found]
+    return Batch([Scan(rows[0].t, rows[0].sensor, boxes, scores)], [line])  # type: ignore[arg-type]
+
+
+def _joined(parts: Iterable[Batch | None], name: str, ordered: bool) -> Iterator[Batch]:
+    """Hold scans back until a later time is seen, or an empty line of CSV; sensors in alphabetical order."""
+    held: Batch | None = None
+    for part in parts:
+        if held is None or part is None:
+            if held is not None:
+                yield _in_order(held)
+            held = part
+        elif part.t == held.t:
+            held = Batch(held.scans + part.scans, held.lines + part.lines)
+        elif part.t > held.t:
+            yield _in_order(held)
+            held = part
+        elif ordered:
+            what = f"scan at t = {part.t} s is older than the last one at {held.t} s"
+            raise DataError(what, name, part.lines[0])
+        else:
+            yield part
+    if held is not None:
+        yield _in_order(held)
+
+
+def _in_order(batch: Batch) -> Batch:
+    order = sorted(range(len(batch.scans)), key=lambda k: batch.scans[k].sensor)
+    return Batch([batch.scans[k] for k in order], [batch.lines[k] for k in order])

@@ -1,0 +1,286 @@
+"""`jeat-graph stream`: tracks appear while scans arrive, and are those of `track`."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import re
+import selectors
+import signal
+import subprocess
+import sys
+import time
+from contextlib import contextmanager, suppress
+
+import numpy as np
+import pytest
+
+from jeat_graph.cli.main import main
+from jeat_graph.io.detections_io import read_detections
+from jeat_graph.io.trajectories_io import MEAN, VAR, read_trajectories
+
+COMMAND = [sys.executable, "-m", "jeat_graph.cli.main", "stream"]
+PATIENCE_S = 120.0  # the first run on a machine compiles
+
+
+@contextmanager
+def live(*arguments):
+    """The command as a process, its stdin and stdout in our hands; killed if it does not end by itself."""
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    pipe = subprocess.PIPE
+    process = subprocess.Popen(
+        [*COMMAND, *map(str, arguments)], stdin=pipe, stdout=pipe, stderr=pipe, env=environment
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+        for pipe_end in (process.stdin, process.stdout, process.stderr):
+            with suppress(BrokenPipeError):
+                pipe_end.close()
+
+
+def answer(process) -> bytes:
+    """The next line of output, or a failure if there is none in time."""
+    with selectors.DefaultSelector() as selector:
+        selector.register(process.stdout, selectors.EVENT_READ)
+        assert selector.select(PATIENCE_S), "no output while the input is still open"
+    return process.stdout.readline()
+
+
+def scan_line(scan) -> str:
+    return json.dumps(as_object(scan)) + "\n"
+
+
+def as_object(scan):
+    return {"t": scan.t, "sensor": scan.sensor, "boxes": scan.boxes.tolist(), "scores": scan.scores.tolist()}
+
+
+def stream(text, monkeypatch, capsys, *arguments):
+    """Run the command in this process; exit code, stdout, stderr."""
+    raw = text if isinstance(text, bytes) else text.encode()
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(raw)))
+    capsys.readouterr()
+    code = main(["stream", *map(str, arguments)])
+    caught = capsys.readouterr()
+    return code, caught.out, caught.err
+
+
+@pytest.fixture(scope="module")
+def detections(recording):
+    return read_detections(recording / "detections.csv")
+
+
+@pytest.fixture(scope="module")
+def tracked(recording, tmp_path_factory):
+    out = tmp_path_factory.mktemp("tracked")
+    assert main(["track", str(recording / "detections.csv"), "--out", str(out)]) == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def joint_lines(detections):
+    """One line a time, with all scans of it."""
+    return "".join(json.dumps([as_object(scan) for scan in batch]) + "\n" for batch in detections.batches())
+
+
+BOX = {"boxes": [[100, 100, 40, 30]], "scores": [0.99]}
+
+
+def line(t, sensor="rgb", **other):
+    return json.dumps({"t": t, "sensor": sensor, **BOX, **other}) + "\n"
+
+
+def test_each_line_is_answered_while_the_input_is_open():
+    with live() as process:
+        for k in range(10):
+            process.stdin.write(line(0.05 * k).encode())
+            process.stdin.flush()
+            said = json.loads(answer(process))
+            assert said["t"] == 0.05 * k
+        assert [track["track_id"] for track in said["tracks"]] == [1]
+        assert said["tracks"][0]["sensors"] == ["rgb"]
+        process.stdin.close()
+        assert process.wait(PATIENCE_S) == 0
+
+
+def test_an_empty_line_of_csv_completes_a_scan_at_once():
+    with live("--format", "csv") as process:
+        assert answer(process).startswith(b"t,track_id,left,")
+        process.stdin.write(b"t,sensor,left,top,width,height,score\n")
+        for k in range(6):
+            process.stdin.write(f"{0.05 * k},rgb,100,100,40,30,0.99\n\n".encode())
+            process.stdin.flush()
+        assert answer(process).split(b",")[1] == b"1"
+
+
+def test_csv_out_is_byte_for_byte_the_causal_table_of_track(joint_lines, tracked, monkeypatch, capsys):
+    code, out, _ = stream(joint_lines, monkeypatch, capsys, "--format", "csv")
+    assert code == 0
+    assert out == (tracked / "causal.csv").read_text()
+
+
+def test_csv_in_and_out_is_the_causal_table_too(
+    recording, detections, tracked, monkeypatch, capsys, tmp_path
+):
+    from jeat_graph.io.detections_io import write_detections
+
+    write_detections(detections, tmp_path / "ordered.csv")
+    text = (tmp_path / "ordered.csv").read_bytes()
+    code, out, _ = stream(text, monkeypatch, capsys, "--format", "csv")
+    assert code == 0
+    assert out == (tracked / "causal.csv").read_text()
+
+
+def test_joint_takes_scans_of_one_time_together_as_track_does(detections, tracked, monkeypatch, capsys):
+    lines = "".join(scan_line(scan) for scan in reversed_within_times(detections))
+    code, out, _ = stream(lines, monkeypatch, capsys, "--joint", "--format", "csv")
+    assert code == 0
+    assert out == (tracked / "causal.csv").read_text()
+
+
+def reversed_within_times(detections):
+    """Scans in time order, those of one time in the other order of sensors."""
+    return [scan for batch in detections.batches() for scan in reversed(batch)]
+
+
+def test_json_out_holds_the_numbers_of_the_causal_table(joint_lines, tracked, monkeypatch, capsys):
+    _, out, _ = stream(joint_lines, monkeypatch, capsys)
+    table = read_trajectories(tracked / "causal.csv")
+    steps = [json.loads(text) for text in out.splitlines()]
+    rows = [(step["t"], track) for step in steps for track in step["tracks"]]
+    np.testing.assert_array_equal([t for t, _ in rows], table.t)
+    np.testing.assert_array_equal([track["track_id"] for _, track in rows], table.track_id)
+    np.testing.assert_array_equal([track["box"] for _, track in rows], table.boxes)
+    np.testing.assert_array_equal([track["mean"] for _, track in rows], table.mean)
+    np.testing.assert_array_equal([track["var"] for _, track in rows], table.var)
+    np.testing.assert_array_equal([track["existence"] for _, track in rows], table.existence)
+    assert ["|".join(track["sensors"]) for _, track in rows] == table.sensor_text()
+    assert len(rows[0][1]["mean"]) == len(MEAN)
+    assert len(rows[0][1]["var"]) == len(VAR)
+
+
+def test_smoothed_is_the_smoothed_table_of_track(joint_lines, tracked, monkeypatch, capsys, tmp_path):
+    path = tmp_path / "s.csv"
+    code, _, _ = stream(joint_lines, monkeypatch, capsys, "--smoothed", path)
+    assert code == 0
+    assert path.read_bytes() == (tracked / "smoothed.csv").read_bytes()
+
+
+def test_a_scan_that_found_nothing_is_answered_too(monkeypatch, capsys):
+    code, out, _ = stream(line(1.5, boxes=[], scores=[]), monkeypatch, capsys)
+    assert (code, json.loads(out)) == (0, {"t": 1.5, "tracks": []})
+
+
+def test_no_input_is_no_error(monkeypatch, capsys):
+    assert stream("", monkeypatch, capsys) == (0, "", "")
+    assert stream("\n\n", monkeypatch, capsys) == (0, "", "")
+
+
+@pytest.mark.parametrize(
+    ("bad", "message"),
+    [
+        ("{", "is not JSON"),
+        ("[]", "at least one"),
+        ("3", "is not JSON|an object such as|is missing"),
+        ('["a"]', "an object such as"),
+        ('{"t": 1, "sensor": "rgb", "boxes": []}', "scores is missing"),
+        ('{"t": 1, "sensor": "rgb", "boxes": [], "score": []}', "unknown key 'score'"),
+        ('{"t": "1", "sensor": "rgb", "boxes": [], "scores": []}', "t must be a number"),
+        ('{"t": NaN, "sensor": "rgb", "boxes": [], "scores": []}', "must be finite"),
+        ('{"t": 1, "sensor": 5, "boxes": [], "scores": []}', "sensor must be a name"),
+        ('{"t": 1, "sensor": "rgd", "boxes": [], "scores": []}', "did you mean 'rgb'"),
+        ('{"t": 1, "sensor": "rgb", "boxes": [[1, 2, -3, 4]], "scores": [1]}', "must be positive"),
+        ('{"t": 1, "sensor": "rgb", "boxes": [[1, 2, 3, 4]], "scores": [1.5]}', r"\[0, 1\]"),
+        ('{"t": 1, "sensor": "rgb", "boxes": [[1, 2, 3, 4]], "scores": []}', "shape"),
+        ('{"t": 1, "sensor": "rgb", "boxes": "x", "scores": []}', "shape"),
+        ('{"t": -1, "sensor": "rgb", "boxes": [], "scores": []}', "older than the last one"),
+        (
+            '[{"t": 1, "sensor": "rgb", "boxes": [], "scores": []},'
+            ' {"t": 2, "sensor": "evt", "boxes": [], "scores": []}]',
+            "one and the same t",
+        ),
+        ("\xff".encode("latin-1"), "is not UTF-8"),
+        ("[" * 100_000, "is not JSON"),
+    ],
+)
+def test_a_bad_line_ends_it_with_one_line_that_names_it(bad, message, monkeypatch, capsys):
+    raw = bad if isinstance(bad, bytes) else bad.encode()
+    code, out, err = stream(line(0.0).encode() + b"\n" + raw + b"\n", monkeypatch, capsys)
+    assert code == 2
+    assert len(out.splitlines()) == 1
+    assert err.count("\n") == 1
+    assert re.search(rf"^jeat-graph stream: <stdin>:3: .*({message})", err), err
+
+
+@pytest.mark.parametrize(
+    ("rows", "number", "message"),
+    [
+        ("t,sensor,left\n", 1, "column top is missing"),
+        ("0,rgb,1,2,3,4,x\n", 2, "score must be a number"),
+        ("0,rgb,1,2,3,4\n", 2, "score is missing"),
+        ("0,,1,2,3,4,1\n", 2, "sensor is missing"),
+        ("0,rgb,1,2,0,4,1\n", 2, "must be positive"),
+        ("0.1,rgb\n0,rgb\n", 3, "older than the last one"),
+    ],
+)
+def test_a_bad_row_of_csv_is_named_too(rows, number, message, monkeypatch, capsys):
+    head = "" if number == 1 else "t,sensor,left,top,width,height,score\n"
+    code, _, err = stream(head + rows, monkeypatch, capsys)
+    assert code == 2
+    assert err.startswith(f"jeat-graph stream: <stdin>:{number}: ")
+    assert message in err
+
+
+def test_a_bad_line_leaves_no_smoothed_file(monkeypatch, capsys, tmp_path):
+    code, _, _ = stream(line(0.0) + "{\n", monkeypatch, capsys, "--smoothed", tmp_path / "s.csv")
+    assert code == 2
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_late_scans_are_passed_over_if_asked(monkeypatch, capsys):
+    code, out, err = stream(line(1.0) + line(0.5) + line(1.1), monkeypatch, capsys, "--late", "skip")
+    assert code == 0
+    assert [json.loads(text)["t"] for text in out.splitlines()] == [1.0, 1.1]
+    assert "<stdin>:2" in err
+
+
+def test_smoothed_without_a_smoother_is_refused(monkeypatch, capsys, tmp_path):
+    options = ("--smoothed", tmp_path / "s.csv", "--set", "smoother.engine=none")
+    code, _, err = stream("", monkeypatch, capsys, *options)
+    assert code == 2
+    assert "smoother" in err
+
+
+def test_ctrl_c_ends_it_cleanly_and_keeps_the_smoothed_trajectories(tmp_path):
+    path = tmp_path / "s.csv"
+    with live("--smoothed", path) as process:
+        for k in range(30):
+            process.stdin.write(line(0.05 * k).encode())
+            process.stdin.flush()
+            answer(process)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE_S) == 130
+        err = process.stderr.read().decode()
+    assert "Traceback" not in err
+    assert err.splitlines()[-1] == "jeat-graph stream: interrupted"
+    assert len(read_trajectories(path)) == 30
+
+
+def test_a_reader_that_goes_away_ends_it_cleanly():
+    with live() as process:
+        process.stdin.write(line(0.0).encode())
+        process.stdin.flush()
+        answer(process)
+        process.stdout.close()
+        try:
+            for k in range(1, 2000):
+                process.stdin.write(line(0.05 * k).encode())
+                process.stdin.flush()
+                time.sleep(0.0005)
+        except BrokenPipeError:
+            pass
+        assert process.wait(PATIENCE_S) == 0
+        assert b"Traceback" not in process.stderr.read()
