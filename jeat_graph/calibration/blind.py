@@ -21,6 +21,7 @@ from scipy.optimize import minimize
 from jeat_graph.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.calibration.motion import (
     LEAST_JERK_PER_SIZE,
+    PERSPECTIVE_RESERVE,
     VELOCITY_RESERVE,
     fit_size,
     growth_rates,
@@ -245,7 +246,7 @@ def _fit_noise_and_motion(
             *(max(s.sigma_px, 0.3) for s in known),
             *rho,
             m.jerk_per_size + m.jerk_px / typical + 1e-3,
-            max(m.jerk_per_growth, 0.5),
+            max(m.jerk_per_growth / PERSPECTIVE_RESERVE, 0.5),
             (m.velocity_std_per_size + m.velocity_std_px / typical + 1e-3) / VELOCITY_RESERVE,
             m.acceleration_std_per_size + m.acceleration_std_px / typical + 1e-3,
         ]
@@ -271,7 +272,7 @@ def _fit_noise_and_motion(
         config.motion,
         jerk_px=0.0,
         jerk_per_size=max(float(p[-4]), LEAST_JERK_PER_SIZE),
-        jerk_per_growth=float(p[-3]),
+        jerk_per_growth=float(PERSPECTIVE_RESERVE * p[-3]),
         velocity_std_px=0.0,
         velocity_std_per_size=float(VELOCITY_RESERVE * p[-2]),
         acceleration_std_px=1e-3,

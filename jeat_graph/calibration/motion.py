@@ -24,6 +24,9 @@ _MAX_GAP_S = 1.0
 # A prior of the velocity that is too narrow loses the fast vehicle on its second scan; one that is too wide
 # costs little. Speeds have heavier tails than the normal prior that is fitted, hence the reserve.
 VELOCITY_RESERVE = 2.0
+# The measured growth lags behind the true one where it matters most, just before a vehicle passes. With this
+# reserve the covariances of velocity and acceleration hold there too; positions lose nothing by it.
+PERSPECTIVE_RESERVE = 1.7
 # Drivers brake and steer at about 1 m/s³ for about a second, in vehicles of about 2 m: a recording in which
 # nobody does is no reason to lose the one who will.
 LEAST_JERK_PER_SIZE = 0.3
@@ -215,7 +218,7 @@ def fit_motion(tracks: MeasuredTracks, size: SizeConfig) -> MotionConfig:
     return MotionConfig(
         jerk_px=0.0,
         jerk_per_size=max(float(jerk), LEAST_JERK_PER_SIZE),
-        jerk_per_growth=float(perspective),
+        jerk_per_growth=float(PERSPECTIVE_RESERVE * perspective),
         velocity_std_px=0.0,
         velocity_std_per_size=float(VELOCITY_RESERVE * velocity),
         acceleration_std_px=1e-3,
