@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from jeat_graph.arrays import FloatArray
+from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.sehn.imaging.config import CarlaEventConfig
 from jeat_graph.sehn.imaging.event_sink import Sink, put
 from jeat_graph.sehn.imaging.pixel_random import normal, seeds
@@ -79,9 +79,7 @@ def make_carla_state(model: CarlaModel, luminance: FloatArray, rng: np.random.Ge
     """Start all pixels at a picture (N,), which is the first that the sensor sees."""
     random = seeds(rng, len(luminance))
     clean, noisy = _first_look(luminance, model, random)
-    return CarlaState(
-        noisy, noisy.copy(), np.full(len(luminance), -1.0), clean, clean.copy(), random
-    )
+    return CarlaState(noisy, noisy.copy(), np.full(len(luminance), -1.0), clean, clean.copy(), random)
 
 
 @njit(cache=True)
@@ -106,36 +104,44 @@ def look_at(
 
 
 @njit(cache=True)
-def carla_step(
-    i: int, start: float, end: float, luminance: float, model: CarlaModel, state: CarlaState, sink: Sink
-) -> None:
-    """Take pixel `i` from the tick at `start` to that at `end` (µs), when it sees `luminance` (cd/m²)."""
-    clean, now = look_at(i, luminance, model, state.random)
-    before = state.previous[i]
-    state.previous[i] = now
-    clean_before = state.clean[i]
-    state.clean[i] = clean
-    if abs(now - before) <= _TOLERANCE:
-        return
-    brighter = now >= before
-    sign = 1.0 if brighter else -1.0
-    nominal = model.positive if brighter else model.negative
-    threshold = nominal
-    if model.sigma > 0.0:
-        threshold = max(_LEAST_THRESHOLD, nominal + model.sigma * normal(state.random, i))
-    level = state.reference[i]
-    while True:
-        level += sign * threshold
+def carla_advance(
+    pixels: IntArray, luminance: FloatArray, start: float, end: float, model: CarlaModel, state: CarlaState,
+    sink: Sink,
+) -> None:  # fmt: skip
+    """Take pixels from the tick at `start` to that at `end`, and put their events.
+
+    Args:
+        pixels: (P,) which.
+        luminance: (P,) what they see at `end` (cd/m²).
+        start: µs.
+        end: µs.
+        model: constants of all pixels.
+        state: of all pixels; changed.
+        sink: where events go; it must have room.
+    """
+    for n in range(len(pixels)):
+        i = pixels[n]
+        clean, now = look_at(i, luminance[n], model, state.random)
+        before, clean_before = state.previous[i], state.clean[i]
+        state.previous[i], state.clean[i] = now, clean
+        if abs(now - before) <= _TOLERANCE:
+            continue
+        brighter = now >= before
+        sign = 1.0 if brighter else -1.0
+        nominal = model.positive if brighter else model.negative
+        threshold = nominal
+        if model.sigma > 0.0:
+            threshold = max(_LEAST_THRESHOLD, nominal + model.sigma * normal(state.random, i))
+        level = state.reference[i] + sign * threshold
         # As in CARLA, a level that the signal has already passed before this tick ends the search.
-        inside = before < level <= now if brighter else now <= level < before
-        if not inside:
-            return
-        share = (level - before) / (now - before)
-        t = start + share * (end - start)
-        if state.stamp[i] < 0.0 or t - state.stamp[i] >= model.refractory_us:
-            true = clean_before + share * (clean - clean_before)
-            by_motion = sign * (true - state.at_event[i]) >= 0.5 * nominal
-            put(sink, t, i, brighter, by_motion)
-            state.stamp[i] = t
-            state.at_event[i] = true
-        state.reference[i] = level
+        while (before < level <= now) if brighter else (now <= level < before):
+            share = (level - before) / (now - before)
+            t = start + share * (end - start)
+            if state.stamp[i] < 0.0 or t - state.stamp[i] >= model.refractory_us:
+                true = clean_before + share * (clean - clean_before)
+                by_motion = sign * (true - state.at_event[i]) >= 0.5 * nominal
+                put(sink, t, i, brighter, by_motion)
+                state.stamp[i] = t
+                state.at_event[i] = true
+            state.reference[i] = level
+            level += sign * threshold

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from jeat_graph.arrays import FloatArray
+from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.sehn.imaging.config import EventCameraConfig
 from jeat_graph.sehn.imaging.event_sink import Sink, put
 from jeat_graph.sehn.imaging.pixel_random import exponential, seeds, uniform
@@ -148,66 +148,92 @@ def photoreceptor(
 
 
 @njit(cache=True)
-def step(
-    i: int, start: float, end: float, luminance: float, model: PixelModel, state: PixelState, sink: Sink
-) -> None:
-    """Take pixel `i` from time `start` to `end` (µs), when it sees `luminance` (cd/m²); put its events."""
-    after = math.log(luminance + model.dark)
+def advance(
+    pixels: IntArray, luminance: FloatArray, start: float, end: float, settled: bool, model: PixelModel,
+    state: PixelState, sink: Sink,
+) -> None:  # fmt: skip
+    """Take pixels from time `start` to `end`, and put their events.
+
+    Args:
+        pixels: (P,) which.
+        luminance: (P,) what they see at `end` (cd/m²).
+        start: µs.
+        end: µs.
+        settled: the caller knows that neither luminance nor the photoreceptors' outputs change.
+        model: constants of all pixels.
+        state: of all pixels; changed.
+        sink: where events go; it must have room.
+    """
     duration = end - start
-    first = state.output[i]
-    last = photoreceptor(first, state.signal[i], after, duration, luminance, model)
-    state.signal[i] = after
-    state.output[i] = last
-    # The leak of the reference is taken as a rise of the signal, and given back to the reference at the end.
-    leak = model.leak[i]
-    true_slope = (last - first) / duration
-    slope = true_slope + leak
-    reference = state.reference[i]
-    on, off = model.on[i], model.off[i]
-    top = first + slope * duration - reference
-    if state.next_shot[i] > end and -off < top < on and state.blind_until[i] <= start:
-        state.reference[i] = reference - leak * duration
-        return
-    now = start
-    blind = state.blind_until[i]
-    while True:
-        if blind > now:
-            # Within the dead time the pixel's amplifier is held at its input; shot noise is lost.
-            while state.next_shot[i] < blind:
-                state.next_shot[i] += exponential(state.random, i, model.shot[i])
-            if blind >= end:
+    for n in range(len(pixels)):
+        i = pixels[n]
+        first = state.output[i]
+        last = first
+        if not settled:
+            after = math.log(luminance[n] + model.dark)
+            last = photoreceptor(first, state.signal[i], after, duration, luminance[n], model)
+            state.signal[i] = after
+            state.output[i] = last
+        # The leak of the reference is taken as a rise of the signal, and given back at the end.
+        leak = model.leak[i]
+        true_slope = (last - first) / duration
+        slope = true_slope + leak
+        reference = state.reference[i]
+        on, off = model.on[i], model.off[i]
+        blind = state.blind_until[i]
+        top = first + slope * duration - reference
+        if state.next_shot[i] > end and -off < top < on and blind <= start:
+            state.reference[i] = reference - leak * duration
+            continue
+        now = start
+        while True:
+            if blind > now:
+                # In the dead time the pixel's amplifier is held at its input; shot noise is lost.
+                while state.next_shot[i] < blind:
+                    state.next_shot[i] += exponential(state.random, i, model.shot[i])
+                if blind >= end:
+                    break
+                now = blind
+                reference = first + slope * (now - start)
+            crossing = math.inf
+            if slope > 0.0:
+                crossing = start + (reference + on - first) / slope
+            elif slope < 0.0:
+                crossing = start + (reference - off - first) / slope
+            crossing = max(crossing, now)
+            shot = state.next_shot[i]
+            if crossing <= end and crossing <= shot:
+                now = crossing
+                brighter = slope > 0.0
+                reference += on if brighter else -off
+                true = first + true_slope * (now - start)
+                change = true - state.at_event[i]
+                by_motion = change >= 0.5 * on if brighter else -change >= 0.5 * off
+            elif shot <= end:
+                now = max(shot, now)
+                state.next_shot[i] = shot + exponential(state.random, i, model.shot[i])
+                dimming = luminance[n] / (luminance[n] + model.shot_half)
+                if uniform(state.random, i) >= 1.0 - (1.0 - model.shot_bright) * dimming:
+                    continue
+                brighter = uniform(state.random, i) < 0.5
+                true = first + true_slope * (now - start)
+                reference = first + slope * (now - start)
+                by_motion = False
+            else:
                 break
-            now = blind
-            reference = first + slope * (now - start)
-        crossing = math.inf
-        if slope > 0.0:
-            crossing = start + (reference + on - first) / slope
-        elif slope < 0.0:
-            crossing = start + (reference - off - first) / slope
-        crossing = max(crossing, now)
-        shot = state.next_shot[i]
-        if crossing <= end and crossing <= shot:
-            now = crossing
-            brighter = slope > 0.0
-            reference += on if brighter else -off
-            true = first + true_slope * (now - start)
-            change = true - state.at_event[i]
-            by_motion = change >= 0.5 * on if brighter else -change >= 0.5 * off
-        elif shot <= end:
-            now = max(shot, now)
-            state.next_shot[i] = shot + exponential(state.random, i, model.shot[i])
-            dimming = luminance / (luminance + model.shot_half)
-            if uniform(state.random, i) >= 1.0 - (1.0 - model.shot_bright) * dimming:
-                continue
-            brighter = uniform(state.random, i) < 0.5
-            true = first + true_slope * (now - start)
-            reference = first + slope * (now - start)
-            by_motion = False
-        else:
-            break
-        put(sink, now, i, brighter, by_motion)
-        state.at_event[i] = true
-        if model.refractory > 0.0:
-            blind = now + model.refractory
-    state.blind_until[i] = blind
-    state.reference[i] = reference - leak * duration
+            put(sink, now, i, brighter, by_motion)
+            state.at_event[i] = true
+            if model.refractory > 0.0:
+                blind = now + model.refractory
+        state.blind_until[i] = blind
+        state.reference[i] = reference - leak * duration
+
+
+@njit(cache=True)
+def unsettled(pixels: IntArray, luminance: FloatArray, model: PixelModel, state: PixelState) -> float:
+    """Greatest distance (ln) of the pixels' outputs from what they see."""
+    most = 0.0
+    for n in range(len(pixels)):
+        i = pixels[n]
+        most = max(most, abs(math.log(luminance[n] + model.dark) - state.output[i]))
+    return most

@@ -23,6 +23,9 @@ _FADE_M = 25.0
 _LAMP_SIGMA_M = 0.07
 _BODIES = body_table(tuple(kind.name for kind in KINDS))
 _LAMPS = 4
+# A face is lit evenly; beams light it as they would at most this high, for most light falls on its lower part.
+_LIT_HEIGHT_M = 0.9
+_BACK_LUX = 0.3  # what the road before a vehicle gives back of its own beams to its front
 
 
 class Look(NamedTuple):
@@ -93,27 +96,37 @@ class Moments(NamedTuple):
     touch: FloatArray
 
 
-def line_up(states: VehicleStates, count: int, far_m: float) -> tuple[IntArray, FloatArray, FloatArray]:
+def line_up(
+    states: VehicleStates, number: IntArray, count: int, far_m: float
+) -> tuple[FloatArray, FloatArray]:
     """Sort states of `count` times into a table of times by vehicles.
 
+    Args:
+        states: at the times.
+        number: (V,) identities of the vehicles, ascending; others are left out.
+        count: number of times J.
+        far_m: m.
+
     Returns:
-        Row of `states` in which each vehicle is first seen (V,), by ascending identity; poses (count, V, 4)
-        with x, y, sine and cosine of the front's direction; and how visible it is and how hard it brakes,
-        (count, V, 2).
+        Poses (J, V, 4) with x, y, sine and cosine of the front's direction; and how visible each vehicle is,
+        0 where it is not there, and how hard it brakes, (J, V, 2).
     """
-    number, first, column = np.unique(states.object_id, return_index=True, return_inverse=True)
+    column = np.minimum(np.searchsorted(number, states.object_id), max(len(number) - 1, 0))
     pose = np.zeros((count, len(number), 4))
     more = np.zeros((count, len(number), 2))
+    if not len(number):
+        return pose, more
+    known = number[column] == states.object_id
     front = np.where(states.direction < 0, np.pi, 0.0)
     heading = states.pose[:, 2] + front
     sin, cos = np.sin(heading), np.cos(heading)
-    at = (states.frame, column)
-    pose[at] = np.column_stack([states.pose[:, :2], sin, cos])
+    at = (states.frame[known], column[known])
+    pose[at] = np.column_stack([states.pose[:, :2], sin, cos])[known]
     ahead = states.acceleration[:, 0] * sin + states.acceleration[:, 1] * cos
     # Vehicles come out of the distance gradually: one that appeared at once would be a burst of events.
     fade = np.clip((far_m - states.pose[:, 1]) / _FADE_M, 0.0, 1.0)
-    more[at] = np.column_stack([fade, np.clip((-ahead - 0.6) / 0.8, 0.0, 1.0)])
-    return first.astype(np.int64), pose, more
+    more[at] = np.column_stack([fade, np.clip((-ahead - 0.6) / 0.8, 0.0, 1.0)])[known]
+    return pose, more
 
 
 def project_moments(
@@ -125,8 +138,22 @@ def project_moments(
     lights: Lights,
     optics: Optics,
     config: RenderConfig,
+    every: IntArray,
 ) -> Moments:
-    """Project vehicles at J times; `pose` and `more` as `line_up` returns them."""
+    """Project vehicles at J times.
+
+    Args:
+        times: (J,) s.
+        pose: as `line_up` returns it.
+        more: as `line_up` returns it.
+        look: what the vehicles look like.
+        camera: the camera.
+        lights: of the scene.
+        optics: of the lens.
+        config: settings.
+        every: (V,) a vehicle is projected at each so-many-th time only, the last one included; where it is
+            not, only its pose stands.
+    """
     count, vehicles = pose.shape[:2]
     p = (count, vehicles, PARTS)
     out = Moments(
@@ -153,6 +180,7 @@ def project_moments(
     _project(
         out, np.ascontiguousarray(more[..., 1]), look, lens, camera.position,
         np.ascontiguousarray(camera.rotation), lights, optics, candela, _BODIES,
+        every,
     )  # fmt: skip
     return out
 
@@ -161,8 +189,9 @@ def project_moments(
 def _project(
     out: Moments, brake: FloatArray, look: Look, lens: FloatArray, eye: FloatArray, rotation: FloatArray,
     lights: Lights, optics: Optics, candela: FloatArray, bodies: FloatArray,
+    every: IntArray,
 ) -> None:  # fmt: skip
-    fx, fy, cx, cy, width, height = lens
+    fx, fy, cx, cy = lens[0], lens[1], lens[2], lens[3]
     local = np.empty((8, 3))
     corner = np.empty((8, 3))
     pixel = np.empty((8, 3))
@@ -171,7 +200,7 @@ def _project(
     forward = rotation[2]
     for j in range(len(out.times)):
         for v in range(len(look.kind)):
-            if out.fade[j, v] <= 0.0:
+            if out.fade[j, v] <= 0.0 or (j + 1) % every[v] != 0:
                 continue
             x, y, sin, cos = out.pose[j, v]
             length, wide, high = look.size[v]
@@ -214,16 +243,13 @@ def _project(
                     mid_v += pixel[k, 1] / 8.0
                 left, up = pixel[:, 0].min() - 1.0, pixel[:, 1].min() - 1.0
                 right, low = pixel[:, 0].max() + 1.0, pixel[:, 1].max() + 1.0
-                if right <= 0.0 or low <= 0.0 or left >= width or up >= height:
-                    # Out of the picture; its outline is still needed to tell how much of it is.
-                    pass
                 out.part_box[j, v, part] = np.array([left, up, right, low])
                 out.depth[j, v, part, 0] = pixel[:, 2].min()
                 out.depth[j, v, part, 1] = pixel[:, 2].max()
                 faces = 0
                 for f in range(6):
-                    a, b, c = corner[FACE_CORNERS[f, 0]], corner[FACE_CORNERS[f, 1]], corner[FACE_CORNERS[f, 2]]
-                    d = corner[FACE_CORNERS[f, 3]]
+                    a, b = corner[FACE_CORNERS[f, 0]], corner[FACE_CORNERS[f, 1]]
+                    c, d = corner[FACE_CORNERS[f, 2]], corner[FACE_CORNERS[f, 3]]
                     e1, e2 = c - a, d - b
                     nx = e1[1] * e2[2] - e1[2] * e2[1]
                     ny = e1[2] * e2[0] - e1[0] * e2[2]
@@ -259,7 +285,8 @@ def _project(
                             out.face_side[j, v, part, faces, k],
                         )
                     centre = (a + c) / 2.0
-                    _light_face(out, j, v, look, lights, centre, nx, ny, nz, out.face_light[j, v, part, faces])
+                    light = out.face_light[j, v, part, faces]
+                    _light_face(out, j, v, look, lights, centre, nx, ny, nz, light)
                     faces += 1
                 out.face_count[j, v, part] = faces
                 sides = 0
@@ -275,7 +302,7 @@ def _project(
             if lights.on:
                 _light_lamps(out, j, v, brake[j, v], look, lens, eye, rotation, lights, candela)
         if lights.on:
-            _hide_lamps(out, j, look, eye, optics)
+            _hide_lamps(out, j, look, eye, optics, every)
 
 
 @njit(cache=True)
@@ -311,13 +338,11 @@ def _light_face(
             if w == v or look.parked[w] or out.fade[j, w] <= 0.0:
                 continue
             ox, oy, sin, cos = out.pose[j, w]
-            front = 0.5 * look.size[w, 0]
-            beams += beam_lux(
-                at[0], at[1], min(at[2], 0.9), nx, ny, nz, ox + front * sin, oy + front * cos, sin, cos, lights
-            )
+            lamp_x, lamp_y = ox + 0.5 * look.size[w, 0] * sin, oy + 0.5 * look.size[w, 0] * cos
+            height = min(at[2], _LIT_HEIGHT_M)
+            beams += beam_lux(at[0], at[1], height, nx, ny, nz, lamp_x, lamp_y, sin, cos, lights)
         if ny * out.pose[j, v, 3] + nx * out.pose[j, v, 2] > 0.5 and not look.parked[v]:
-            # What the own beams' road gives back to the own front.
-            beams += 0.3
+            beams += _BACK_LUX
     for c in range(3):
         light[c] = (
             sun * lights.sun_tint[c]
@@ -355,8 +380,9 @@ def _touch(
     box[0], box[1], box[2], box[3] = 1e9, 1e9, -1e9, -1e9
     for part in range(PARTS):
         if out.hull_count[j, v, part]:
-            box[0], box[1] = min(box[0], out.part_box[j, v, part, 0]), min(box[1], out.part_box[j, v, part, 1])
-            box[2], box[3] = max(box[2], out.part_box[j, v, part, 2]), max(box[3], out.part_box[j, v, part, 3])
+            body = out.part_box[j, v, part]
+            box[0], box[1] = min(box[0], body[0]), min(box[1], body[1])
+            box[2], box[3] = max(box[2], body[2]), max(box[3], body[3])
     shift_x = shift_y = 0.0
     if lights.sun_lux > 0.0:
         shift_x = -lights.sun[0] / lights.sun[2] * high
@@ -395,14 +421,15 @@ def _light_lamps(
 ) -> None:  # fmt: skip
     """Place the lamps of a vehicle in the picture: two in front, two behind."""
     x, y, sin, cos = out.pose[j, v]
-    length, wide, high = look.size[v]
+    length, wide = look.size[v, 0], look.size[v, 1]
     fx, fy, cx, cy = lens[0], lens[1], lens[2], lens[3]
     for k in range(_LAMPS):
         ahead = 1.0 if k < 2 else -1.0
         across = 0.39 * wide * (1.0 if k & 1 else -1.0)
         along = 0.5 * length * ahead
         z = LAMP_HEIGHT_M + (0.0 if k < 2 else 0.2)
-        dx, dy, dz = x + along * sin + across * cos - eye[0], y + along * cos - across * sin - eye[1], z - eye[2]
+        dx, dy = x + along * sin + across * cos - eye[0], y + along * cos - across * sin - eye[1]
+        dz = z - eye[2]
         Z = rotation[2, 0] * dx + rotation[2, 1] * dy + rotation[2, 2] * dz
         # From the lamp to the eye, along the vehicle's axes.
         forward = -(dx * sin + dy * cos) * ahead
@@ -428,9 +455,11 @@ def _light_lamps(
 
 
 @njit(cache=True)
-def _hide_lamps(out: Moments, j: int, look: Look, eye: FloatArray, optics: Optics) -> None:
+def _hide_lamps(out: Moments, j: int, look: Look, eye: FloatArray, optics: Optics, every: IntArray) -> None:
     """Dim the lamps that stand behind other vehicles, and say how far their glow reaches."""
     for v in range(len(look.kind)):
+        if (j + 1) % every[v] != 0:
+            continue
         box = out.touch[j, v, 1]
         box[0], box[1], box[2], box[3] = 1e9, 1e9, -1e9, -1e9
         for k in range(_LAMPS):
@@ -468,11 +497,12 @@ def chord(
     low, high = 0.0, 1.0
     for axis in range(3):
         if axis == 0:
-            start, step, least, most = ox * sin + oy * cos, dx * sin + dy * cos, -0.48 * size[0], 0.48 * size[0]
+            start, step, most = ox * sin + oy * cos, dx * sin + dy * cos, 0.48 * size[0]
         elif axis == 1:
-            start, step, least, most = ox * cos - oy * sin, dx * cos - dy * sin, -0.46 * size[1], 0.46 * size[1]
+            start, step, most = ox * cos - oy * sin, dx * cos - dy * sin, 0.46 * size[1]
         else:
-            start, step, least, most = az, dz, 0.0, 0.92 * size[2]
+            start, step, most = az, dz, 0.92 * size[2]
+        least = -most if axis < 2 else 0.0
         if abs(step) < 1e-12:
             if start < least or start > most:
                 return 0.0

@@ -69,7 +69,7 @@ def paint(
         if face in (LEFT, RIGHT):
             radius = 0.34 if kind != TRUCK else 0.5
             ends = 0.30 * length if kind != TRUCK else 0.42 * length
-            wheel = max(disc(along - ends, z - radius, radius, wide), disc(along + ends, z - radius, radius, wide))
+            wheel = disc(abs(along) - ends, z - radius, radius, wide)
             dark = max(dark, 0.95 * wheel)
             if part == 1:
                 dark = max(dark, 0.5 * band(y, 0.02, 0.02 + 0.03 / length, max(wide, 0.03) / length))

@@ -15,8 +15,12 @@ from numba import njit
 from jeat_graph.arrays import FloatArray
 from jeat_graph.sehn.imaging.config import RGBConfig
 from jeat_graph.sehn.imaging.lighting import LUMINANCE
-from jeat_graph.sehn.imaging.painter import TILE_H, TILE_W, make_layers, paint_tile
-from jeat_graph.sehn.imaging.renderer import Renderer, steps_for, tile_steps, who_touches
+from jeat_graph.sehn.imaging.painter import paint_tile
+from jeat_graph.sehn.imaging.plan import who_touches
+from jeat_graph.sehn.imaging.renderer import Renderer
+from jeat_graph.sehn.imaging.tiles import TILE, TILE_H, TILE_W
+
+_EASE = 2.0  # a mean over time needs half the samples that events do
 
 
 @dataclass(frozen=True)
@@ -47,33 +51,28 @@ def choose_exposure(config: RGBConfig, static: FloatArray) -> Exposure:
 
 def expose(renderer: Renderer, time_s: float, exposure_s: float, readout_s: float) -> FloatArray:
     """Mean radiance (H, W, 3) of each pixel over its exposure (cd/m²)."""
-    begin, span = time_s - 0.5 * (exposure_s + readout_s), exposure_s + readout_s
-    steps = renderer.steps(time_s - 0.5 * exposure_s, time_s + 0.5 * exposure_s)
-    count = int(steps[:, 1:].max(initial=1))
-    # Samples in the middle of `count` equal parts of the exposure, on one raster for all rows.
-    part = exposure_s / count
-    times = begin + part * (np.arange(count + int(np.ceil((span - exposure_s) / part - 1e-9))) + 0.5)
-    moments, look = renderer.moments(times)
-    every = steps_for(steps, look.number, count)
-    # A beam's light is smooth: for a mean over time it takes fewer samples than for events.
-    every[:, 1] = np.maximum(every[:, 1] // 4, 1)
+    begin, end = time_s - 0.5 * (exposure_s + readout_s), time_s + 0.5 * (exposure_s + readout_s)
+    step_px = _EASE * renderer.config.max_step_px
+    plan = renderer.plan(begin, end, duration_s=exposure_s, step_px=step_px)
+    # Samples in the middle of equal parts of the exposure, on one raster for all rows.
+    part = exposure_s / plan.count
+    extra = int(np.ceil(readout_s / part - 1e-9))
+    moments = renderer.moments(begin + part * (np.arange(plan.count + extra) + 0.5), plan.look)
     height = renderer.background.lux.shape[0]
     middle = np.minimum(renderer.tiles[:, 0] + TILE_H / 2.0, height)
-    first = np.round((len(times) - count) * middle / height).astype(np.int64)
+    first = np.round(extra * middle / height).astype(np.int64)
     out = renderer.background.whole.copy()
     _expose(
-        out, renderer.tiles, renderer.touched(moments), every, first, count, renderer.background, moments, look,
-        renderer.lights, renderer.optics, renderer.view, make_layers(),
+        out, renderer.tiles, plan.boxes, plan.steps, first, plan.count, renderer.background, moments, plan.look,
+        renderer.lights, renderer.optics, renderer.view, renderer.layers,
     )  # fmt: skip
     return out
 
 
-def electrons(
-    radiance: FloatArray, time_s: float, config: RGBConfig, rng: np.random.Generator
-) -> FloatArray:
+def electrons(radiance: FloatArray, time_s: float, config: RGBConfig, rng: np.random.Generator) -> FloatArray:
     """Charge that is read from each pixel (e-): Poisson photoelectrons up to full well, plus read noise."""
     mean = np.maximum(radiance, 0.0) * (config.responsivity * time_s)
-    # Far above full well the noise does not matter, and a Poisson of millions costs more than one of thousands.
+    # Far above full well the noise does not matter, and large means cost more.
     charge = rng.poisson(np.minimum(mean, 2.0 * config.full_well_e)).astype(np.float64)
     out: FloatArray = np.minimum(charge, config.full_well_e)
     out += config.read_noise_e * rng.standard_normal(out.shape)
@@ -88,25 +87,27 @@ def develop(charge: FloatArray, gain: float, config: RGBConfig) -> npt.NDArray[n
 
 @njit(cache=True)
 def _expose(
-    out, tiles, boxes, every, first, available, ground, moments, look, lights, optics, view, layers
+    out, tiles, boxes, steps, first, available, ground, moments, look, lights, optics, view, layers
 ):  # type: ignore[no-untyped-def]  # fmt: skip
     height, width = ground.lux.shape
     who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)
     counts = np.zeros(3, dtype=np.int64)
-    patch = np.zeros((TILE_H * TILE_W, 3))
+    patch = np.zeros((TILE, 3))
     for n in range(len(tiles)):
+        count = steps[n]
+        if count == 0:
+            continue
         row0, column0 = tiles[n]
         who_touches(row0, column0, boxes, who, counts)
-        if counts.sum() == 0:
-            continue
-        count = tile_steps(who, counts, every, available)
         stride = available // count
         rows, columns = min(TILE_H, height - row0), min(TILE_W, width - column0)
         out[row0 : row0 + rows, column0 : column0 + columns] = 0.0
         for k in range(count):
-            # The sample nearest to the middle of its part; the raster's own middles where the part is one.
-            j = first[n] + k * stride + (stride - 1) // 2
-            paint_tile(row0, column0, j, who, counts, ground, moments, look, lights, optics, view, layers, patch)
+            # The sample next to the middle of its part, which is the middle itself where the part is one.
+            j = first[n] + k * stride + stride // 2
+            paint_tile(
+                row0, column0, j, who, counts, ground, moments, look, lights, optics, view, layers, patch
+            )
             for r in range(rows):
                 for c in range(columns):
                     for channel in range(3):

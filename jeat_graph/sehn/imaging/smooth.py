@@ -38,7 +38,7 @@ def hash01(i: int, j: int, salt: int) -> float:
 @njit(cache=True)
 def value_noise(x: float, y: float, salt: int) -> float:
     """Smooth random field in [-1, 1] with cells of size 1."""
-    i, j = int(math.floor(x)), int(math.floor(y))
+    i, j = math.floor(x), math.floor(y)
     fx, fy = x - i, y - j
     fx, fy = fx * fx * (3.0 - 2.0 * fx), fy * fy * (3.0 - 2.0 * fy)
     low = hash01(i, j, salt) * (1.0 - fx) + hash01(i + 1, j, salt) * fx

@@ -77,7 +77,9 @@ class RenderedSource:
         """Build the scene of segment `index`, with traffic of its own."""
         s = self.scenario
         duration = (self.frames + 1) / self.imaging.rgb.rate_hz + 1.0
-        return Scene.build(self._segment_seed(index), duration, s.road, s.fleet, s.traffic, s.light, self.camera_config)
+        return Scene.build(
+            self._segment_seed(index), duration, s.road, s.fleet, s.traffic, s.light, self.camera_config
+        )
 
     def frame_times_us(self, index: int) -> IntArray:
         """Times of the frames of segment `index` (µs): the nominal ones with jitter, ascending."""
@@ -104,7 +106,8 @@ class RenderedSource:
             events = event_camera.advance(int(t_us))
             radiance = expose(renderer, float(time[0]), exposure.time_s, config.rgb.readout_s)
             charge = electrons(radiance, exposure.time_s, config.rgb, noise)
-            moments, look = renderer.moments(time)
+            look = renderer.plan(float(time[0]), float(time[0])).look
+            moments = renderer.moments(time, look)
             _, _, visible = buffers(moments, look, ground.front_depth, ground.front_cover)
             states = scene.states_at(time, far_m=self.scenario.truth.horizon_m)
             seen = visible[np.searchsorted(look.number, states.object_id)]
