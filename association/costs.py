@@ -7,6 +7,8 @@ likelihood ratio has the term ln det S and so does not have this fault.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 
@@ -23,7 +25,7 @@ def log_score_ratio(calibrated: float, overall: float) -> float:
         calibrated: precision of a box of this score, in (0, 1).
         overall: precision of all boxes of the sensor, in (0, 1).
     """
-    return float(np.log(calibrated / (1.0 - calibrated)) - np.log(overall / (1.0 - overall)))
+    return float(math.log(calibrated / (1.0 - calibrated)) - math.log(overall / (1.0 - overall)))
 
 
 @njit(cache=True)
@@ -59,7 +61,7 @@ def log_evidence(
         j = cols[p]
         s = sensor[j]
         out[p] = (
-            np.log(max(p_detect[rows[p], s], 1e-12))
+            math.log(max(p_detect[rows[p], s], 1e-12))
             + log_density[p]
             + log_size_density[p]
             + log_score[j]
@@ -97,5 +99,5 @@ def likelihood_cost(
     for p in range(len(rows)):
         r = existence[rows[p]]
         missed = 1.0 - r * p_detect[rows[p], sensor[cols[p]]]
-        out[p] = -(evidence[p] + np.log(max(r, 1e-12)) - np.log(max(missed, 1e-12)))
+        out[p] = -(evidence[p] + math.log(max(r, 1e-12)) - math.log(max(missed, 1e-12)))
     return out

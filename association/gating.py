@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 
@@ -112,16 +114,16 @@ def _fill(
     x_sorted = z[order, 0]
     y_sorted = z[order, 1]
     heaviest = np.max(weight)
-    log_2pi = np.log(2.0 * np.pi)
+    log_2pi = math.log(2.0 * math.pi)
     for i in range(num_tracks):
         left, right = np.inf, -np.inf
         top, bottom = np.inf, -np.inf
         for s in range(noise.shape[1]):
             # A hair wider than any gate, so that rounding never decides here.
-            half = 1.000001 * np.sqrt(gate * (position_var[i, s, 0] + noise[i, s, 0] * heaviest))
+            half = 1.000001 * math.sqrt(gate * (position_var[i, s, 0] + noise[i, s, 0] * heaviest))
             left = min(left, position[i, s, 0] - half)
             right = max(right, position[i, s, 0] + half)
-            half = 1.000001 * np.sqrt(gate * (position_var[i, s, 1] + noise[i, s, 1] * heaviest))
+            half = 1.000001 * math.sqrt(gate * (position_var[i, s, 1] + noise[i, s, 1] * heaviest))
             top = min(top, position[i, s, 1] - half)
             bottom = max(bottom, position[i, s, 1] + half)
         k = np.searchsorted(x_sorted, left)
@@ -165,7 +167,7 @@ def _fill(
             rows[count] = i
             cols[at] = j
             d2[at] = distance
-            log_density[at] = -0.5 * (distance + np.log(Sx * Sy)) - log_2pi
-            log_size_density[at] = -0.5 * (size_distance + np.log(size_det)) - log_2pi
+            log_density[at] = -0.5 * (distance + math.log(Sx * Sy)) - log_2pi
+            log_size_density[at] = -0.5 * (size_distance + math.log(size_det)) - log_2pi
             count += 1
     return count

@@ -7,7 +7,8 @@ position of each axis and every update is two scalar updates.
 
 from __future__ import annotations
 
-import numpy as np
+import math
+
 from numba import njit
 
 from jeat_graph.arrays import FloatArray
@@ -125,4 +126,4 @@ def update_block(m: FloatArray, P: FloatArray, z: float, R: float) -> float:
 @njit(cache=True)
 def log_gaussian(y: float, S: float) -> float:
     """Logarithm of the density of N(0, S) at `y`."""
-    return float(-0.5 * (y * y / S + np.log(2.0 * np.pi * S)))
+    return float(-0.5 * (y * y / S + math.log(2.0 * math.pi * S)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -71,9 +72,9 @@ def prepare(
         s = sensor[j]
         for axis in range(2):
             side = boxes[j, 2 + axis]
-            log_size[j, axis] = np.log(side) - sensors.bias[s, 2 + axis]
+            log_size[j, axis] = math.log(side) - sensors.bias[s, 2 + axis]
             z[j, axis] = boxes[j, axis] + (0.5 - sensors.bias[s, axis]) * side
-            true_side = np.exp(log_size[j, axis])
+            true_side = math.exp(log_size[j, axis])
             corrected[j, 2 + axis] = true_side
             corrected[j, axis] = z[j, axis] - 0.5 * true_side
         precision[j] = min(

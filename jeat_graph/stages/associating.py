@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 
@@ -47,7 +49,9 @@ def associate(
         settings.gate,
         settings.size_gate,
     )
-    log_clutter = np.log(scene.clutter) - settings.log_clutter_volume
+    log_clutter = np.empty(num_sensors)
+    for s in range(num_sensors):
+        log_clutter[s] = math.log(scene.clutter[s]) - settings.log_clutter_volume
     pair_evidence = log_evidence(
         rows,
         cols,
