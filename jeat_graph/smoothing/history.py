@@ -7,47 +7,13 @@ import numpy as np
 from jeat_graph.arrays import FloatArray
 from jeat_graph.config import Config
 from jeat_graph.smoothers.engine import TrackSmoother, make_smoother
-from jeat_graph.smoothers.track_data import COINCIDENT_S, SmoothedTrack, TrackData
+from jeat_graph.smoothers.track_data import COINCIDENT_S, SmoothedTrack
 from jeat_graph.smoothing.looks import Looks
+from jeat_graph.smoothing.priors import ErrorStates, measurements_of, prior_of, size_prior_of, sizes_of
 from jeat_graph.smoothing.rows import rows_of
 from jeat_graph.smoothing.sizes import SizeWindow
 from jeat_graph.trajectories import Trajectories
-from jeat_graph.update_log import COLUMNS, WIDTH
-
-#: Columns of a measurement here: its time, then those of the update log.
-COLUMN = {name: 1 + k for k, name in enumerate(COLUMNS)} | {"t": 0}
-
-_Z, _R = slice(COLUMN["z_x"], COLUMN["z_y"] + 1), slice(COLUMN["R_x"], COLUMN["R_y"] + 1)
-_SIZE = slice(COLUMN["log_width"], COLUMN["log_height"] + 1)
-_SIZE_VAR = slice(COLUMN["var_log_width"], COLUMN["var_log_height"] + 1)
-
-# A configuration may ask for no jerk at all; the smoothers want process noise that can be inverted.
-_LEAST_JERK = 1e-6
-
-
-def prior_of(birth: FloatArray) -> tuple[float, FloatArray, FloatArray]:
-    """Prior of a track's motion: time (s), mean (2, 3), covariance (2, 3, 3), from its birth (1 + WIDTH,)."""
-    mean = np.zeros((2, 3))
-    mean[:, 0] = birth[_Z]
-    variances = [birth[COLUMN[name]] for name in ("R_x", "var_v_x", "var_a_x", "R_y", "var_v_y", "var_a_y")]
-    cov = np.stack([np.diag(variances[:3]), np.diag(variances[3:])])
-    return float(birth[0]), mean, cov
-
-
-def size_prior_of(birth: FloatArray) -> tuple[float, FloatArray, FloatArray]:
-    """Prior of a track's size: time (s), mean (2, 2), covariance (2, 2, 2), from its birth (1 + WIDTH,)."""
-    mean = np.zeros((2, 2))
-    mean[:, 0] = birth[_SIZE]
-    cov = np.zeros((2, 2, 2))
-    cov[:, 0, 0] = birth[_SIZE_VAR]
-    cov[:, 1, 1] = birth[COLUMN["var_rate"]]
-    return float(birth[0]), mean, cov
-
-
-def track_data(rows: FloatArray) -> TrackData:
-    """Prior and measurements of a whole track from its rows (M, 1 + WIDTH), the birth first."""
-    jerk = np.maximum(rows[1:, COLUMN["jerk"]], _LEAST_JERK)
-    return TrackData.from_measurements(*prior_of(rows[0]), rows[1:, 0], rows[1:, _Z], rows[1:, _R], jerk)
+from jeat_graph.update_log import WIDTH
 
 
 class TrackHistory:
@@ -59,6 +25,7 @@ class TrackHistory:
     Args:
         track_id: identity.
         config: settings of the smoother, the sizes and the output.
+        errors: the sensors' errors with memory.
         keep: keep all measurements until the end, which stitching needs.
 
     Attributes:
@@ -69,13 +36,14 @@ class TrackHistory:
         smoother: the smoother, once there is one.
     """
 
-    def __init__(self, track_id: int, config: Config, keep: bool) -> None:
+    def __init__(self, track_id: int, config: Config, errors: ErrorStates, keep: bool) -> None:
         self.track_id = track_id
         self.confirmed = False
         self.measurements: list[FloatArray] = []
         self._looks: list[Looks] = []
         self.smoother: TrackSmoother | None = None
         self._config = config
+        self._errors = errors
         self._keep = keep
         self._sizes: SizeWindow | None = None
         self._fed = 0  # pieces of `measurements` that the smoother has had
@@ -114,10 +82,11 @@ class TrackHistory:
             settings = self._config.smoother
             self.smoother = make_smoother(
                 settings.engine,
-                *prior_of(rows[0]),
+                *prior_of(rows[0], self._errors),
                 lag_s=settings.lag_s,
                 chunk=settings.chunk,
                 robust=settings.robust,
+                memory=self._errors.memory,
             )
             self._sizes = SizeWindow(*size_prior_of(rows[0]), self._config.size.rate_density)
             rows = rows[1:]
@@ -127,9 +96,8 @@ class TrackHistory:
         else:
             self.measurements = []
         if len(rows):
-            jerk = np.maximum(rows[:, COLUMN["jerk"]], _LEAST_JERK)
-            self.smoother.feed(rows[:, 0], rows[:, _Z], rows[:, _R], jerk)
-            self._sizes.append(rows[:, 0], rows[:, _SIZE], rows[:, _SIZE_VAR])
+            self.smoother.feed(*measurements_of(rows, self._errors))
+            self._sizes.append(*sizes_of(rows))
 
     def departed(self) -> Trajectories | None:
         """Return the rows that have become final since the last call, or None."""

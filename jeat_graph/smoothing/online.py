@@ -10,6 +10,7 @@ from jeat_graph.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.config import Config
 from jeat_graph.smoothing.history import TrackHistory
 from jeat_graph.smoothing.looks import Looks
+from jeat_graph.smoothing.priors import ErrorStates
 from jeat_graph.smoothing.stitched import stitch_histories
 from jeat_graph.smoothing.waiting import WaitingRows
 from jeat_graph.state import TrackArrays
@@ -48,6 +49,7 @@ class TrackSmoothers:
     def __init__(self, config: Config) -> None:
         self.rebuilds = self.fallbacks = self.too_late = self.stitched = self.tracks = 0
         self._config = config
+        self._errors = ErrorStates.of(config)
         settings = config.smoother
         self._whole = settings.engine in WHOLE
         self._stitch = settings.stitch and self._whole
@@ -115,7 +117,7 @@ class TrackSmoothers:
         for track_id, looks, confirmed in self._split_looks():
             history = self._histories.get(track_id)
             if history is None:
-                history = TrackHistory(track_id, self._config, keep=self._stitch)
+                history = TrackHistory(track_id, self._config, self._errors, keep=self._stitch)
                 self._histories[track_id] = history
             history.watch(looks, confirmed)
         for track_id, rows in self._split_updates():

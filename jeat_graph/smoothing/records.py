@@ -11,7 +11,7 @@ from jeat_graph.arrays import IntArray
 from jeat_graph.config import Config
 from jeat_graph.detections import Detections
 from jeat_graph.smoothers.track_data import TrackData
-from jeat_graph.smoothing.history import COLUMN, track_data
+from jeat_graph.smoothing.priors import COLUMN, ErrorStates, track_data
 from jeat_graph.tracker import Tracker
 from jeat_graph.trajectories import Trajectories
 
@@ -57,9 +57,10 @@ def record_tracks(
         for batch in detections.batches():
             tracker.step(batch)
             bar.update(len(batch))
+    errors = ErrorStates.of(config)
     records = []
     for history in tracker.confirmed_histories():
         rows = history.whole()
         sensor = rows[:, COLUMN["sensor"]].astype(np.int64)
-        records.append(TrackRecord(history.track_id, track_data(rows), sensor[1:], int(sensor[0])))
+        records.append(TrackRecord(history.track_id, track_data(rows, errors), sensor[1:], int(sensor[0])))
     return records, tracker.finish()

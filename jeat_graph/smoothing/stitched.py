@@ -12,8 +12,9 @@ from jeat_graph.smoothers.rts import smooth_rts_batch
 from jeat_graph.smoothers.size import SmoothedSize
 from jeat_graph.smoothers.stitching import FREEDOM, FragmentEnds, link, seeing_time
 from jeat_graph.smoothers.track_data import SmoothedTrack
-from jeat_graph.smoothing.history import COLUMN, TrackHistory, size_prior_of, track_data
+from jeat_graph.smoothing.history import TrackHistory
 from jeat_graph.smoothing.looks import Looks
+from jeat_graph.smoothing.priors import COLUMN, ErrorStates, size_prior_of, sizes_of, track_data
 from jeat_graph.smoothing.sizes import SizeWindow
 
 # Longer than this without any detection of any track, and the sensors are taken to be blind.
@@ -58,20 +59,21 @@ def stitch_histories(
 def fragment_ends(histories: Sequence[TrackHistory], config: Config) -> FragmentEnds:
     """Smooth each history by itself and return its first and last state."""
     wholes = [history.whole() for history in histories]
-    paths = smooth_rts_batch([track_data(rows) for rows in wholes])
+    errors = ErrorStates.of(config)
+    paths = smooth_rts_batch([track_data(rows, errors) for rows in wholes])
     sizes = [_smooth_sizes(rows, config.size.rate_density) for rows in wholes]
     seen_t, seen_s = seeing_time(np.concatenate([rows[:, 0] for rows in wholes]), _LONGEST_PAUSE_S)
-    start_mean = np.stack([path.mean[0] for path in paths])
+    start_mean = np.stack([path.mean[0, :, :3] for path in paths])
     start_size = np.stack([size.mean[0, :, 0] for size in sizes])
     return FragmentEnds(
         start_t=np.array([path.t[0] for path in paths]),
         start_mean=start_mean,
-        start_cov=np.stack([path.cov[0] for path in paths]),
+        start_cov=np.stack([path.cov[0, :, :3, :3] for path in paths]),
         start_size=start_size,
         start_size_var=np.stack([size.cov[0, :, 0, 0] for size in sizes]),
         end_t=np.array([path.t[-1] for path in paths]),
-        end_mean=np.stack([path.mean[-1] for path in paths]),
-        end_cov=np.stack([path.cov[-1] for path in paths]),
+        end_mean=np.stack([path.mean[-1, :, :3] for path in paths]),
+        end_cov=np.stack([path.cov[-1, :, :3, :3] for path in paths]),
         end_size=np.stack([size.mean[-1] for size in sizes]),
         end_size_cov=np.stack([size.cov[-1] for size in sizes]),
         jerk=np.array([_typical_jerk(path) for path in paths]),
@@ -88,11 +90,7 @@ def _typical_jerk(path: SmoothedTrack) -> float:
 
 def _smooth_sizes(rows: FloatArray, density: float) -> SmoothedSize:
     window = SizeWindow(*size_prior_of(rows[0]), density)
-    window.append(
-        rows[1:, 0],
-        rows[1:, COLUMN["log_width"] : COLUMN["log_height"] + 1],
-        rows[1:, COLUMN["var_log_width"] : COLUMN["var_log_height"] + 1],
-    )
+    window.append(*sizes_of(rows[1:]))
     return window.smooth()
 
 
@@ -113,7 +111,7 @@ def _birth_log_density(wholes: Sequence[FloatArray], mean: FloatArray, config: C
 
 def _join(parts: Sequence[TrackHistory], scan_t: FloatArray, config: Config) -> TrackHistory:
     """One history of several in order of time, with rows at all steps in between."""
-    whole = TrackHistory(parts[0].track_id, config, keep=True)
+    whole = TrackHistory(parts[0].track_id, config, ErrorStates.of(config), keep=True)
     looks: list[Looks] = []
     for k, part in enumerate(parts):
         for rows in part.measurements:

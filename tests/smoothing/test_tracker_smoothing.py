@@ -9,7 +9,7 @@ import pytest
 
 from jeat_graph.errors import JeatGraphError
 from jeat_graph.smoothers.rts import filter_track
-from jeat_graph.smoothing.history import track_data
+from jeat_graph.smoothing.priors import ErrorStates, track_data
 from jeat_graph.smoothing.online import TrackSmoothers
 from jeat_graph.trajectories import Trajectories
 
@@ -81,8 +81,10 @@ def test_engines_with_a_lag_agree_with_those_without():
         tables[engine] = tracker.finish()
     for engine in ENGINES[:3]:
         assert np.array_equal(tables[engine].t, tables["rts"].t)
-        tolerance = 1e-6 if engine == "full" else 0.02
-        assert np.abs(tables[engine].mean[:, :2] - tables["rts"].mean[:, :2]).max() < tolerance
+        # What comes after the lag could still move an estimate, by little of its own uncertainty.
+        std = np.sqrt(tables["rts"].var)
+        tolerance = 1e-5 if engine == "full" else 0.1
+        assert (np.abs(tables[engine].mean - tables["rts"].mean) / std).max() < tolerance
         assert np.allclose(tables[engine].boxes, tables["rts"].boxes, atol=0.5)
 
 
@@ -103,7 +105,8 @@ def test_drained_rows_and_the_rest_are_the_whole_table_in_order_of_time():
     table = whole.finish()
     assert np.array_equal(joined.t, table.t)
     assert np.array_equal(joined.track_id, table.track_id)
-    assert np.abs(joined.mean - table.mean).max() < 0.5
+    # States leave at other moments, and have then seen a little more or less of what follows.
+    assert (np.abs(joined.mean - table.mean) / np.sqrt(table.var)).max() < 0.25
 
 
 def test_what_was_drained_stays_what_it_was():
@@ -247,7 +250,7 @@ def test_the_log_holds_the_measurements_just_as_the_filter_used_them(one_car):
     tracker = make_tracker(*overrides)
     causal = run(tracker, one_car)
     [history] = tracker._smoothers.confirmed_histories()
-    mean, cov = filter_track(track_data(history.whole()))
-    assert np.allclose(mean[-1].T.reshape(-1)[:2], causal.mean[-1, :2], atol=0.01)
-    var = np.diagonal(cov[-1], axis1=1, axis2=2).T.reshape(-1)
+    mean, cov = filter_track(track_data(history.whole(), ErrorStates.of(tracker.config)))
+    assert np.allclose(mean[-1, :, 0], causal.mean[-1, :2], atol=0.01)
+    var = np.diagonal(cov[-1, :, :3, :3], axis1=1, axis2=2).T.reshape(-1)
     assert np.allclose(var, causal.var[-1], rtol=0.02)
