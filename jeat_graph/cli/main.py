@@ -13,7 +13,18 @@ from jeat_graph.version import __version__
 
 # Each module has HELP (one line), add_arguments(parser) and run(args). Modules are imported only when their
 # command is asked for, so that one command does not pay for another's libraries.
-COMMANDS = ("demo", "simulate", "track", "stream", "eval", "compare", "report", "calibrate", "benchmark")
+COMMANDS = (
+    "demo",
+    "simulate",
+    "track",
+    "stream",
+    "eval",
+    "compare",
+    "render",
+    "report",
+    "calibrate",
+    "benchmark",
+)
 
 
 def build_parser(command: str | None = None) -> argparse.ArgumentParser:

@@ -1,1 +1,1 @@
-"""Tracks drawn over video, frames or events."""
+"""Tracks drawn over video, frames, events, or a plain background."""

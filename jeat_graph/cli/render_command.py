@@ -1,0 +1,118 @@
+"""`jeat-graph render`: a run, or a simulated segment, as a video or a picture."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from jeat_graph.argument_types import positive
+from jeat_graph.errors import DataError
+
+if TYPE_CHECKING:
+    from jeat_graph.render.show import Show
+
+HELP = "draw a run over video, frames or events, or a simulated segment, as an MP4 video or one PNG picture"
+_LARGEST_PX = 8192
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    add = parser.add_argument
+    # Not `run`: that name is taken by the function that the entry point calls.
+    add(
+        "run_directory",
+        metavar="RUN",
+        help="run directory or table of tracks; or a simulated segment, which brings its own frames, events "
+        "and truth",
+    )
+    add("--frames", metavar="VIDEO|DIR", help="video or folder of pictures to draw on")
+    add("--events", metavar="FILE.h5", help="events (DSEC layout) to draw on; beside the frames if both")
+    add("--gt", metavar="FILE", help="truth, drawn as thin outlines")
+    add("--out", required=True, metavar="FILE", help="FILE.mp4, or FILE.png with --at")
+    add("--at", type=float, metavar="T", help="draw only this time (s), as PNG")
+    add("--start", type=float, metavar="S", help="first time (s)")
+    add("--end", type=float, metavar="S", help="last time (s)")
+    add("--only", choices=("causal", "smoothed"), help="draw only these tracks")
+    add("--rate", type=positive, metavar="HZ", help="pictures per second (default: each frame; else 25)")
+    add("--size", type=size, metavar="WxH", help="size of each picture (default: that of the recording)")
+    add(
+        "--frame-rate",
+        type=positive,
+        metavar="HZ",
+        help="frames per second of pictures without times, and of results that count frames",
+    )
+    add("--window", type=positive, metavar="S", help="how long events are shown (default: 1 / rate)")
+
+
+def size(text: str) -> tuple[int, int]:
+    """Read a size such as 1280x720."""
+    width, _, height = text.lower().partition("x")
+    if not (width.isdigit() and height.isdigit()) or not (
+        16 <= int(width) <= _LARGEST_PX and 16 <= int(height) <= _LARGEST_PX
+    ):
+        raise argparse.ArgumentTypeError(f"must be WIDTHxHEIGHT, each from 16 to {_LARGEST_PX}")
+    return int(width), int(height)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Open what is to be drawn, and draw it."""
+    from jeat_graph.render.movie import write_png
+    from jeat_graph.render.sources import Wanted, open_show
+
+    out = Path(args.out)
+    _check_out(out, args.at is not None)
+    wanted = Wanted(
+        run=Path(args.run_directory),
+        frames=_path(args.frames),
+        events=_path(args.events),
+        truth=_path(args.gt),
+        only=args.only,
+        rate_hz=args.rate,
+        size_px=args.size,
+        start_s=args.start,
+        end_s=args.end,
+        at_s=args.at,
+        frame_rate_hz=args.frame_rate,
+        window_s=args.window,
+    )
+    inputs = [path for path in (wanted.frames, wanted.events, wanted.truth) if path is not None]
+    if any(path.resolve() == out.resolve() for path in inputs):
+        raise DataError("would be replaced by the result; choose another --out", out)
+    with ExitStack() as stack:
+        show, rate_hz, warnings = open_show(wanted, stack)
+        for warning in warnings:
+            print(f"jeat-graph render: warning: {warning}", file=sys.stderr)
+        if args.at is not None:
+            write_png(out, show.picture(0))
+        else:
+            _write_movie(show, rate_hz, out)
+    count, (width, height) = len(show.times), show.size_px
+    print(f"wrote {out}: {count} picture{'s' * (count != 1)} of {width} x {height} px")
+    return 0
+
+
+def _write_movie(show: Show, rate_hz: float, out: Path) -> None:
+    from tqdm import tqdm
+
+    from jeat_graph.render.movie import MovieWriter
+
+    hidden = not sys.stderr.isatty()
+    with MovieWriter(out, show.size_px, rate_hz) as movie:
+        for k in tqdm(range(len(show.times)), desc="render", unit="frame", disable=hidden, leave=False):
+            movie.append(show.picture(k))
+
+
+def _check_out(out: Path, one: bool) -> None:
+    if out.is_dir():
+        raise DataError("is a folder; --out must name a file", out)
+    suffix = ".png" if one else ".mp4"
+    if out.suffix.lower() != suffix:
+        hint = "--at writes a PNG picture" if one else "a video is written as MP4 (one picture: --at T)"
+        raise DataError(f"must end in {suffix}: {hint}", out)
+
+
+def _path(text: str | None) -> Path | None:
+    return None if text is None else Path(text)
