@@ -11,7 +11,7 @@ from jeat_graph.errors import DataError
 # Bytes per pixel and frame that a segment takes at most as a rule: noise is what compresses worst.
 _VIDEO_BYTES = {"mp4": 0.3, "lossless": 2.5, "png": 2.5}
 _EVENT_BYTES = {"gzip": 3.5, "blosc": 3.5, "none": 10.0}
-_EVENTS_PER_PIXEL = 0.5  # and frame
+_EVENTS_PER_PIXEL = 1.0  # and frame
 _MARGIN = 1.2  # over the largest segment so far
 _RESERVE = 50_000_000  # left for manifest, annotations and others
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -20,6 +21,7 @@ class MovingRectangles:
     """Vehicles of 10 x 6 px at 40 px/s, one a row of the picture.
 
     `fail_at` is the segment in which the source breaks down after two frames; with `dies`, its whole process.
+    `pause_s` is the time that a frame takes.
     """
 
     seed: int = 0
@@ -29,6 +31,7 @@ class MovingRectangles:
     with_labels: bool = True
     fail_at: int | None = None
     dies: bool = False
+    pause_s: float = 0.0
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -44,6 +47,7 @@ class MovingRectangles:
         rng = np.random.default_rng([self.seed, index])
         start = rng.uniform(0.0, 30.0, self.vehicles)
         for k in range(self.frames):
+            time.sleep(self.pause_s)
             if index == self.fail_at and k == 2:
                 if self.dies:
                     os._exit(9)
@@ -84,3 +88,14 @@ class MovingRectangles:
             rng.integers(0, 2, n).astype(np.uint8),
             rng.random(n) < 0.9 if self.with_labels else None,
         )
+
+
+if __name__ == "__main__":
+    import sys
+    from functools import partial
+
+    from jeat_graph.sehn.dataset.protocol import Protocol
+    from jeat_graph.sehn.dataset.recording import record_dataset
+
+    factory = partial(MovingRectangles, pause_s=0.05)
+    record_dataset(factory, sys.argv[1], Protocol(int(sys.argv[2]), video="png"))

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -110,19 +108,3 @@ def test_carla_without_its_client_package_is_one_line(tmp_path: Path, monkeypatc
     assert main(["simulate", "night", "--out", str(tmp_path / "set"), "--sensors", "carla"]) == 2
     assert "pip install 'jeat-graph[carla]'" in capsys.readouterr().err
     assert not (tmp_path / "set").exists()
-
-
-def test_a_killed_run_goes_on_to_the_same_bytes(tmp_path: Path, fingerprints) -> None:
-    arguments = ["night", "--segments", "4", "--sensors", "pictures", "--size", "64x48", "--frames", "12"]
-    command = [sys.executable, "-m", "jeat_graph.cli.main", "simulate", *arguments, "--workers", "1", "--out"]
-    process = subprocess.Popen([*command, str(tmp_path / "killed")], stdout=subprocess.DEVNULL)
-    first = tmp_path / "killed" / "segments" / "000000"
-    deadline = time.monotonic() + 120.0
-    while not first.exists() and process.poll() is None and time.monotonic() < deadline:
-        time.sleep(0.01)
-    process.kill()
-    process.wait()
-    assert not (tmp_path / "killed" / "manifest.json").exists(), "it was done before it could be killed"
-    for name in ("killed", "whole"):
-        assert main(["simulate", *arguments, "--workers", "2", "--out", str(tmp_path / name)]) == 0
-    assert fingerprints(tmp_path / "killed") == fingerprints(tmp_path / "whole")
