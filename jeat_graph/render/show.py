@@ -74,10 +74,10 @@ class Show:
             for boxes, colour in ((ignored, IGNORED), (wanted, TRUTH)):
                 for box in boxes:
                     canvas.thin_box(box, colour)
-        if self.smoothed is not None:
-            draw_smoothed(canvas, self.smoothed.at(k), names=self.causal is None)
         if self.causal is not None:
             draw_causal(canvas, self.causal.at(k), trails=self.smoothed is None)
+        if self.smoothed is not None:
+            draw_smoothed(canvas, self.smoothed.at(k), names=self.causal is None)
         used = [
             text
             for shown, text in (
