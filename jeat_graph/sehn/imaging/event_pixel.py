@@ -191,7 +191,7 @@ def advance(
                 # In the dead time the pixel's amplifier is held at its input; shot noise is lost.
                 while state.next_shot[i] < blind:
                     state.next_shot[i] += exponential(state.random, i, model.shot[i])
-                if blind >= end:
+                if blind > end:
                     break
                 now = blind
                 reference = first + slope * (now - start)
