@@ -40,7 +40,7 @@ class Canvas:
     def __init__(self, image: RgbImage, scale: tuple[float, float]) -> None:
         self.image = image
         self._scale = np.array(scale)
-        self.unit = max(image.shape[0] / 720.0, 0.75)  # thickness of lines and size of text go with it
+        self.unit = max(float(image.shape[0]) / 720.0, 0.75)  # thickness of lines and size of text go with it
 
     def solid_box(self, box: FloatArray, colour: Colour, thickness: float) -> None:
         """Draw a box (4,) with an unbroken line on a dark rim."""

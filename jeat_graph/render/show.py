@@ -69,15 +69,15 @@ class Show:
         return image
 
     def _draw(self, canvas: Canvas, k: int, t: float) -> None:
+        if self.causal is not None:
+            draw_causal(canvas, self.causal.at(k), trails=self.smoothed is None)
+        if self.smoothed is not None:
+            draw_smoothed(canvas, self.smoothed.at(k), names=self.causal is None)
         if self.truth is not None:
             wanted, ignored = self.truth.at(t)
             for boxes, colour in ((ignored, IGNORED), (wanted, TRUTH)):
                 for box in boxes:
                     canvas.thin_box(box, colour)
-        if self.causal is not None:
-            draw_causal(canvas, self.causal.at(k), trails=self.smoothed is None)
-        if self.smoothed is not None:
-            draw_smoothed(canvas, self.smoothed.at(k), names=self.causal is None)
         used = [
             text
             for shown, text in (
