@@ -151,7 +151,8 @@ def _pictures(args: argparse.Namespace, scenario: Scenario) -> int:
     # One server renders for CARLA, so there is nothing to gain from several processes.
     workers = 1 if carla else min(args.workers or available_cores(), protocol.segments)
     total = protocol.segments * frames
-    with tqdm(total=total, desc="frames", disable=not sys.stderr.isatty(), leave=False) as bar:
+    quiet = not sys.stderr.isatty()
+    with tqdm(total=total, desc="simulate", unit=" frames", disable=quiet, leave=False) as bar:
         manifest = record_dataset(
             factory,
             args.out,
@@ -199,7 +200,8 @@ def _verify(folder: Path) -> int:
 
     problems = 0
     count = file_count(folder)
-    with tqdm(total=count, desc="verify", disable=not sys.stderr.isatty(), leave=False) as bar:
+    quiet = not sys.stderr.isatty()
+    with tqdm(total=count, desc="verify", unit=" files", disable=quiet, leave=False) as bar:
         for problem in verify(folder, bar.update):
             problems += 1
             with bar.external_write_mode(file=sys.stdout):

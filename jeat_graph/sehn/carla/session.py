@@ -11,6 +11,7 @@ from jeat_graph.sehn.carla.config import TOWN, CarlaConfig
 from jeat_graph.sehn.scenario import Scenario
 
 _TM_PORT = 8000
+_ANSWER_S = 5.0  # a server that runs answers within this
 
 
 def client_api() -> Any:
@@ -38,9 +39,10 @@ def connect(api: Any, host: str, port: int, timeout_s: float) -> Any:
         DataError: no server answers there.
     """
     client = api.Client(host, port)
-    client.set_timeout(timeout_s)
+    client.set_timeout(min(_ANSWER_S, timeout_s))
     try:
         client.get_server_version()
+        client.set_timeout(timeout_s)  # to load a town takes longer than to say hello
         if client.get_world().get_map().name.rsplit("/", 1)[-1] != TOWN:
             client.load_world(TOWN)
     except RuntimeError as error:

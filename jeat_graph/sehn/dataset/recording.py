@@ -66,7 +66,7 @@ def record_dataset(
     """
     root = Path(out)
     source = factory()
-    settings = _settings(source, protocol)
+    settings, calibration = _settings(source, protocol), source.calibration()
     _check_folder(root, settings, protocol.segments)
     done = {index: read_entry(root, index) for index in finished_segments(root)}
     missing = [index for index in range(protocol.segments) if index not in done]
@@ -77,7 +77,7 @@ def record_dataset(
     root.mkdir(parents=True, exist_ok=True)
     (root / MANIFEST).unlink(missing_ok=True)  # without it the folder holds no complete set
     _write_text(root / SETTINGS, _yaml(settings))
-    _write_text(root / CAMERA, _yaml(source.calibration()))
+    _write_text(root / CAMERA, _yaml(calibration))
     if scenario_yaml is not None:
         _write_text(root / SCENARIO, scenario_yaml)
     _remove_partial(root)

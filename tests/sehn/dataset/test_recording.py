@@ -190,3 +190,13 @@ def test_a_source_that_breaks_the_order_of_time_is_refused(tmp_path: Path, recta
     with pytest.raises(DataError, match="segment 000000: "):
         record_dataset(Backwards, tmp_path / "set", Protocol(1))
     assert list((tmp_path / "set" / "segments").iterdir()) == []
+
+
+def test_a_source_that_cannot_begin_leaves_no_folder(tmp_path: Path, rectangles) -> None:
+    class Absent(rectangles):
+        def calibration(self):
+            raise DataError("no server")
+
+    with pytest.raises(DataError, match="no server"):
+        record_dataset(Absent, tmp_path / "set", Protocol(1))
+    assert not (tmp_path / "set").exists()
