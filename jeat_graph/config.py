@@ -301,6 +301,10 @@ class SmootherConfig:
         "full and rts: kernel that weighs down outlying measurements",
     )
     output_rate_hz: float = number(0.0, "Hz", "rows per second of the smoothed table; 0: one at each scan")
+    worker: bool = field(
+        default=False,
+        metadata={"doc": "smooth in a process of its own, so that no step of the tracker waits for it"},
+    )
     stitch: bool = field(
         default=True,
         metadata={"doc": "full and rts: join the fragments of one vehicle when the recording ends"},

@@ -22,8 +22,8 @@ from jeat_graph.trajectories import Trajectories
 from jeat_graph.update_log import allocate_log
 
 if TYPE_CHECKING:
+    from jeat_graph.smoothing.behind import Smoothing
     from jeat_graph.smoothing.history import TrackHistory
-    from jeat_graph.smoothing.online import TrackSmoothers
 
 ScanLike: TypeAlias = Scan | tuple[float, str, npt.ArrayLike, npt.ArrayLike]
 
@@ -67,11 +67,9 @@ class Tracker:
         self._t: float | None = None
         self._log = allocate_log(0)
         self._finished = False
-        self._smoothers: TrackSmoothers | None = None
+        self._smoothers: Smoothing | None = None
         if config.smoother.engine != "none":
-            from jeat_graph.smoothing.online import TrackSmoothers
-
-            self._smoothers = TrackSmoothers(config)
+            self._smoothers = _smoothing(config)
 
     @property
     def num_tracks(self) -> int:
@@ -214,8 +212,7 @@ class Tracker:
     @property
     def smoother_counts(self) -> dict[str, int]:
         """How the smoothers fared: tracks, rebuilds, fallbacks, late measurements, joints; {} without one."""
-        names = ("tracks", "rebuilds", "fallbacks", "too_late", "stitched")
-        return {name: getattr(self._smoothers, name) for name in names} if self._smoothers else {}
+        return self._smoothers.counts() if self._smoothers is not None else {}
 
     def confirmed_histories(self) -> list[TrackHistory]:
         """Return what the confirmed tracks took in so far; only engines that stitch (full, rts) keep it.
@@ -225,7 +222,7 @@ class Tracker:
         """
         return self._wanted_smoothers().confirmed_histories()
 
-    def _wanted_smoothers(self) -> TrackSmoothers:
+    def _wanted_smoothers(self) -> Smoothing:
         if self._smoothers is None:
             raise JeatGraphError("the configuration asks for no smoother: smoother.engine is none")
         return self._smoothers
@@ -265,3 +262,14 @@ def _as_scans(scans: Any) -> list[Scan]:
         if out:
             return out
     raise TypeError("step takes a Scan, a tuple (t, sensor, boxes, scores), or a sequence of these")
+
+
+def _smoothing(config: Config) -> Smoothing:
+    """Smoothing here, or in a process of its own; imported only where it is wanted."""
+    if config.smoother.worker:
+        from jeat_graph.smoothing.worker import SmoothingWorker
+
+        return SmoothingWorker(config)
+    from jeat_graph.smoothing.behind import SmoothingHere
+
+    return SmoothingHere(config)
