@@ -8,9 +8,8 @@ factors take diagonal noise only, so each row is divided by its standard deviati
 the factor carries unit noise.
 
 GTSAM need not know every state. What several steps and their measurements say about the states at the
-two ends is a linear factor as well: the states in between are eliminated here, by orthogonal
-transformations, as GTSAM would do it, at a fraction of the cost of a variable there. Nothing is lost: they
-follow from the state after them by the filter's gains.
+two ends is a linear factor as well: the states in between are eliminated here, at a fraction of the cost
+of a variable there. Nothing is lost: they follow from the state after them by the filter's gains.
 """
 
 from __future__ import annotations
@@ -21,14 +20,10 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.arrays import FloatArray, IntArray
-from jeat_graph.filters.motion import process_noise
+from jeat_graph.smoothers.passes import error_steps, step_cov
 
 #: Time scale τ of the scaled state (s): about the interval between measurements.
 TAU_S = 0.05
-
-#: Process noise is q² Δ E M E with E = diag(Δ², Δ, 1) and this M (paper eq. 2), so that whitening it
-#: takes M's inverse Cholesky factor and no factorisation per step, exactly and for any Δ.
-_M_WHITE = np.linalg.inv(np.linalg.cholesky(process_noise.py_func(1.0, 1.0)))
 
 
 def scale(size: int) -> FloatArray:
@@ -62,83 +57,8 @@ def unscale_gain(gain: FloatArray) -> FloatArray:
 
 
 @njit(cache=True)
-def whitened_motion(dt: float, q: float, A0: FloatArray, A1: FloatArray) -> None:
-    """Whitened rows of the motion of scaled states: A0 y0 + A1 y1 = white noise (paper eq. 2).
-
-    Args:
-        dt: step (s), > 0.
-        q: root spectral density of the jerk (px/s^2.5), > 0.
-        A0: its upper left block (3, 3) becomes -W F.
-        A1: its upper left block (3, 3) becomes W, with Wᵀ W the inverse of the process noise.
-    """
-    step = dt / TAU_S
-    unit = 1.0 / (q * np.sqrt(dt) * TAU_S * TAU_S)
-    inverse_e = (unit / (step * step), unit / step, unit)
-    for i in range(3):
-        for j in range(i + 1):
-            A1[i, j] = _M_WHITE[i, j] * inverse_e[j]
-        A0[i, 0] = -A1[i, 0]
-        A0[i, 1] = -A1[i, 0] * step - A1[i, 1]
-        A0[i, 2] = -A1[i, 0] * 0.5 * step * step - A1[i, 1] * step - A1[i, 2]
-
-
-@njit(cache=True)
-def _add_step(
-    dt: float,
-    q: float,
-    memory: FloatArray,
-    old: FloatArray,
-    new: FloatArray,
-    A0: FloatArray,
-    A1: FloatArray,
-    b: FloatArray,
-) -> None:
-    """Write the rows of a step: A0 (n, n), A1 (n, n), b (n,), all zero before; see `segment_rows`."""
-    whitened_motion(dt, q, A0, A1)
-    jump = (
-        new[0] - old[0] - dt * (old[1] + 0.5 * dt * old[2]),
-        TAU_S * (new[1] - old[1] - dt * old[2]),
-        TAU_S * TAU_S * (new[2] - old[2]),
-    )
-    for i in range(3):
-        for j in range(i + 1):
-            b[i] -= A1[i, j] * jump[j]
-    for k in range(len(memory)):
-        i = 3 + k
-        phi = np.exp(-dt / memory[k])
-        A1[i, i] = 1.0 / np.sqrt(-np.expm1(-2.0 * dt / memory[k]))
-        A0[i, i] = -phi * A1[i, i]
-        b[i] = -A1[i, i] * (new[i] - phi * old[i])
-
-
-@njit(cache=True)
-def _eliminate(W: FloatArray, rows: int, columns: int, pivots: int) -> None:
-    """Make the first `pivots` columns of W[:rows, :columns] upper triangular, by Householder reflections."""
-    for p in range(min(pivots, rows - 1)):
-        norm = 0.0
-        for i in range(p, rows):
-            norm += W[i, p] * W[i, p]
-        if norm == 0.0:
-            continue
-        alpha = -np.copysign(np.sqrt(norm), W[p, p])
-        first = W[p, p] - alpha
-        # The reflector v is (first, W[p + 1:, p]), with vᵀ v = -2 alpha first.
-        beta = -1.0 / (alpha * first)
-        W[p, p] = alpha
-        for j in range(p + 1, columns):
-            s = first * W[p, j]
-            for i in range(p + 1, rows):
-                s += W[i, p] * W[i, j]
-            s *= beta
-            W[p, j] -= s * first
-            for i in range(p + 1, rows):
-                W[i, j] -= s * W[i, p]
-        for i in range(p + 1, rows):
-            W[i, p] = 0.0
-
-
-@njit(cache=True)
 def segment_rows(
+    dims: tuple[int, ...],
     ends: IntArray,
     dt: FloatArray,
     q: FloatArray,
@@ -152,8 +72,14 @@ def segment_rows(
 ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
     """Rows of the steps between some states, and of the measurements after each up to the next.
 
+    Let the state at the beginning of a segment be known. Then a Kalman filter gives each measurement's
+    innovation, d - B x0 of variance S, and in the end x1 - A x0 - c of covariance P; all of these are
+    independent of each other. Divided by their standard deviations they are the rows. The measurements at
+    the end itself need no filter: they are rows on x1.
+
     Args:
-        ends: (S + 1,) the states that GTSAM knows, ascending; all others are eliminated.
+        dims: any tuple of n elements (`passes.py`).
+        ends: (S + 1,) the states that GTSAM knows, ascending; those in between are eliminated.
         dt: (N,) step that ends at each state (s), > 0 after the first.
         q: (N,) root spectral density of the jerk over it (px/s^2.5), > 0.
         memory: (B,) memory of the error states (s).
@@ -166,62 +92,128 @@ def segment_rows(
 
     Returns:
         A0 (S, R, 2 n), A1 (S, R, 2 n), b (S, R) and counts (S,): the first `counts` rows of each are used,
-        and A0 y0 + A1 y1 - b is white for the states y at the ends of a segment.
+        and A0 y0 + A1 y1 - b is white for the scaled states y at the ends of a segment.
     """
-    n = reference.shape[2]
+    n = len(dims)
     segments = len(ends) - 1
     first = np.searchsorted(row, ends + 1)
     most = 0
     for s in range(segments):
         most = max(most, first[s + 1] - first[s])
-    capacity = n + min(most, 2 * n)
-    A0 = np.zeros((segments, 2 * capacity, 2 * n))
-    A1 = np.zeros((segments, 2 * capacity, 2 * n))
-    b = np.zeros((segments, 2 * capacity))
-    counts = np.empty(segments, dtype=np.int64)
-    # Columns: the newest state so far, the segment's first one, the next one, b. Above the rows at hand
-    # there is room for those of a step: the heaviest rows have to come first, or digits are lost.
-    W = np.zeros((4 * n, 3 * n + 1))
-    newest, opening, coming, rhs = slice(0, n), slice(n, 2 * n), slice(2 * n, 3 * n), 3 * n
+    A0 = np.zeros((segments, 2 * (n + most), 2 * n))
+    A1 = np.zeros((segments, 2 * (n + most), 2 * n))
+    b = np.zeros((segments, 2 * (n + most)))
+    counts = 2 * (n + first[1:] - first[:-1])
+    scales = np.ones(n)
+    scales[1], scales[2] = 1.0 / TAU_S, 1.0 / (TAU_S * TAU_S)
+    phi, var = np.empty(n - 3), np.empty(n - 3)
+    P, old, moved, L = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+    A, c, seen, B = np.empty((n, n)), np.empty(n), np.empty(n), np.empty(n)
     for s in range(segments):
         for a in range(2):
-            count, i = 0, first[s]
-            for k in range(ends[s] + 1, ends[s + 1] + 1):
-                old, new = reference[k - 1, a], reference[k, a]
-                if count == 0:
-                    rows, count = W[n : 2 * n], n
-                    rows[:] = 0.0
-                    _add_step(dt[k], q[k], memory, old, new, rows[:, opening], rows[:, coming], rows[:, rhs])
-                else:
-                    rows = W[:n]
-                    rows[:] = 0.0
-                    _add_step(dt[k], q[k], memory, old, new, rows[:, newest], rows[:, coming], rows[:, rhs])
-                    _eliminate(W, n + count, 3 * n + 1, n)
-                for j in range(n, n + count):
-                    for c in range(n):
-                        W[j, c] = W[j, 2 * n + c]
-                        W[j, 2 * n + c] = 0.0
+            i, last, place = first[s], ends[s + 1], 2 * n + a
+            A[:] = 0.0
+            for j in range(n):
+                A[j, j] = 1.0
+            old[:] = 0.0
+            c[:] = 0.0
+            for k in range(ends[s] + 1, last + 1):
+                error_steps(dt[k], memory, phi, var)
+                step_cov(dims, dt[k], q[k], phi, var, old, moved, P)
+                _step_rows(dims, dt[k], phi, reference[k - 1, a], reference[k, a], A, c)
                 while i < len(row) and row[i] == k:
-                    if count == 3 * n:
-                        # Two states have no more than 2 n rows to say about them; the rest is a residual.
-                        _eliminate(W[n:], count, 3 * n + 1, 2 * n)
-                        count = 2 * n
-                    root, line = np.sqrt(info[i, a]), W[n + count]
-                    line[:] = 0.0
-                    line[0] = root
-                    line[rhs] = root * (z[i, a] - new[0])
-                    if error[i] >= 0:
-                        line[3 + error[i]] = root * lever[i, a]
-                        line[rhs] -= root * lever[i, a] * new[3 + error[i]]
-                    count += 1
+                    e = error[i] + 3
+                    h = lever[i, a] if e >= 3 else 0.0
+                    e = max(e, 3) if n > 3 else 0
+                    d = z[i, a] - reference[k, a, 0] - h * reference[k, a, e]
+                    if k == last:
+                        root = np.sqrt(info[i, a])
+                        A1[s, place, a * n] = root
+                        A1[s, place, a * n + e] += root * h
+                        b[s, place] = root * d
+                    else:
+                        d -= c[0] + h * c[e]
+                        for j in range(n):
+                            seen[j] = P[0, j] + h * P[e, j]
+                            B[j] = A[0, j] + h * A[e, j]
+                        S = seen[0] + h * seen[e] + 1.0 / info[i, a]
+                        root = 1.0 / np.sqrt(S)
+                        for j in range(n):
+                            A0[s, place, a * n + j] = root * scales[j] * B[j]
+                        b[s, place] = root * d
+                        for j in range(n):
+                            K = seen[j] / S
+                            c[j] += K * d
+                            for x in range(n):
+                                A[j, x] -= K * B[x]
+                                P[j, x] -= K * seen[x]
+                    place += 2
                     i += 1
-            # Both axes' motion before all measurements, for the same reason.
-            rows, place = W[n : n + count], slice(a, 2 * count, 2)
-            A0[s, place, a * n : (a + 1) * n] = rows[:, opening]
-            A1[s, place, a * n : (a + 1) * n] = rows[:, newest]
-            b[s, place] = rows[:, rhs]
-            counts[s] = 2 * count
+                for j in range(n):
+                    for x in range(n):
+                        old[j, x] = P[j, x]
+            _whiten(dims, P, A, c, L)
+            for j in range(n):
+                # Both axes' motion comes before all measurements: the heaviest rows have to be the first,
+                # or orthogonal elimination loses digits.
+                place = 2 * j + a
+                b[s, place] = c[j]
+                for x in range(n):
+                    A0[s, place, a * n + x] = -scales[x] * A[j, x]
+                    A1[s, place, a * n + x] = scales[x] * L[j, x]
     return A0, A1, b, counts
+
+
+@njit(cache=True)
+def _step_rows(
+    dims: tuple[int, ...],
+    dt: float,
+    phi: FloatArray,
+    before: FloatArray,
+    after: FloatArray,
+    A: FloatArray,
+    c: FloatArray,
+) -> None:
+    """Take A (n, n) to F A, and c (n,), relative to the reference `before`, to F c relative to `after`."""
+    n = len(dims)
+    half = 0.5 * dt * dt
+    for j in range(n):
+        A[0, j] += dt * A[1, j] + half * A[2, j]
+        A[1, j] += dt * A[2, j]
+        for i in range(3, n):
+            A[i, j] *= phi[i - 3]
+    c[0] += dt * c[1] + half * c[2] - (after[0] - before[0] - dt * (before[1] + 0.5 * dt * before[2]))
+    c[1] += dt * c[2] - (after[1] - before[1] - dt * before[2])
+    c[2] -= after[2] - before[2]
+    for i in range(3, n):
+        c[i] = phi[i - 3] * (c[i] + before[i]) - after[i]
+
+
+@njit(cache=True)
+def _whiten(dims: tuple[int, ...], P: FloatArray, A: FloatArray, c: FloatArray, W: FloatArray) -> None:
+    """Write W with Wᵀ W = P⁻¹, lower triangular, and take A (n, n) to W A and c (n,) to W c; P is lost."""
+    n = len(dims)
+    for j in range(n):
+        for k in range(j):
+            P[j, j] -= P[j, k] * P[j, k]
+        P[j, j] = np.sqrt(P[j, j])
+        for i in range(j + 1, n):
+            for k in range(j):
+                P[i, j] -= P[i, k] * P[j, k]
+            P[i, j] /= P[j, j]
+    for i in range(n):
+        inverse = 1.0 / P[i, i]
+        for j in range(n):
+            W[i, j] = 1.0 if i == j else 0.0
+        for k in range(i):
+            c[i] -= P[i, k] * c[k]
+            for j in range(n):
+                A[i, j] -= P[i, k] * A[k, j]
+                W[i, j] -= P[i, k] * W[k, j]
+        c[i] *= inverse
+        for j in range(n):
+            A[i, j] *= inverse
+            W[i, j] *= inverse
 
 
 def prior_rows(

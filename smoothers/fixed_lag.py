@@ -22,8 +22,8 @@ from jeat_graph.smoothers.passes import fill_back
 from jeat_graph.smoothers.track_data import SmoothedTrack
 from jeat_graph.smoothers.window import Window
 
-#: GTSAM solves for one state in so many.
-STRIDE = 4
+#: GTSAM solves for one state in so many. More would hardly be faster: what is left is the cost of a chunk.
+STRIDE = 8
 
 #: What GTSAM's C++ exceptions become in Python.
 _GTSAM_ERRORS = (RuntimeError, IndexError, ValueError)
@@ -174,7 +174,7 @@ class FixedLagSmoother:
         """Add all steps and measurements after the row `ends`[0], an anchor, and make the others anchors."""
         w = self._live()
         count = len(ends) - 1
-        steps = (ends, w.steps(), w.q, w.memory)
+        steps = ((0,) * w.size, ends, w.steps(), w.q, w.memory)
         rows = factors.segment_rows(*steps, w.row, w.z, w.info, w.lever, w.error, w.reference)
         graph.add_segments(int(w.anchor[ends[0]]), *rows)
         w.anchor[ends[1:]] = np.arange(self._next, self._next + count)

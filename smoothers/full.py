@@ -52,6 +52,7 @@ def smooth_full(track: TrackData, weights: FloatArray | None = None) -> Smoothed
     )
     graph.add_prior(0, *prior)
     segments = factors.segment_rows(
+        (0,) * track.size,
         np.arange(len(track)),
         steps_of(track),
         track.q,

@@ -11,38 +11,58 @@ Source: Barfoot, State Estimation for Robotics, ch. 3.4 and 11.
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 from jeat_graph.arrays import FloatArray
-from jeat_graph.smoothers.track_data import MOTION, SmoothedTrack
+from jeat_graph.filters.motion import process_noise, transition
+from jeat_graph.smoothers.track_data import SmoothedTrack
 from jeat_graph.smoothers.transitions import motion_matrices
 
+# Transition over a unit of time, and the inverse of its process noise, which is one of integers.
+_WHOLE = transition.py_func(1.0)
+_WHOLE_INVERSE = np.array([[720.0, -360.0, 60.0], [-360.0, 192.0, -36.0], [60.0, -36.0, 9.0]])
 
-def bridge(since: FloatArray, span: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+
+@njit(cache=True)
+def bridge(since: float, span: float, q: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Conditional distribution of a state given the states before and after it.
 
     With Ψ = Q(τ) F(T - τ)ᵀ Q(T)⁻¹ and Λ = F(τ) - Ψ F(T), the state is Λ x₀ + Ψ x₁ plus noise of
     covariance Σ = Q(τ) - Ψ F(T - τ) Q(τ). Computed in units of T, where nothing is badly conditioned.
 
     Args:
-        since: (N,) time τ since the state before (s).
-        span: (N,) time T between the two states (s), >= τ, > 0.
-        q: (N,) root spectral density of the jerk in that interval (px/s^2.5).
+        since: time τ since the state before (s).
+        span: time T between the two states (s), >= τ, > 0.
+        q: root spectral density of the jerk in that interval (px/s^2.5).
 
     Returns:
-        Λ (N, 3, 3), Ψ (N, 3, 3) and Σ (N, 3, 3), for states [p, v, a] of one axis in px and s.
+        Λ (3, 3), Ψ (3, 3) and Σ (3, 3), for states [p, v, a] of one axis in px and s.
     """
-    ones = np.ones_like(span)
-    F_before, Q_before = motion_matrices(since / span, ones)
-    F_after, _ = motion_matrices(1.0 - since / span, ones)
-    F_whole, Q_whole = motion_matrices(ones, ones)
-    across = Q_before @ F_after.transpose(0, 2, 1)
-    Psi = np.linalg.solve(Q_whole, across.transpose(0, 2, 1)).transpose(0, 2, 1)
-    Lambda = F_before - Psi @ F_whole
-    Sigma = Q_before - Psi @ across.transpose(0, 2, 1)
-    units = np.stack([ones, 1.0 / span, 1.0 / span**2], axis=1)
-    convert = units[:, :, None] / units[:, None, :]
-    density = (q**2 * span**5)[:, None, None] * units[:, :, None] * units[:, None, :]
-    return Lambda * convert, Psi * convert, Sigma * density
+    s = since / span
+    Q = process_noise(s, 1.0)
+    across = _product(Q, transition(1.0 - s).T)
+    Psi = _product(across, _WHOLE_INVERSE)
+    Lambda = transition(s) - _product(Psi, _WHOLE)
+    Sigma = Q - _product(Psi, across.T)
+    units = (1.0, 1.0 / span, 1.0 / (span * span))
+    density = q * q * span**5
+    for i in range(3):
+        for j in range(3):
+            Lambda[i, j] *= units[i] / units[j]
+            Psi[i, j] *= units[i] / units[j]
+            Sigma[i, j] *= density * units[i] * units[j]
+    return Lambda, Psi, Sigma
+
+
+@njit(cache=True)
+def _product(A: FloatArray, B: FloatArray) -> FloatArray:
+    """A B for matrices (3, n), (n, 3) too small for a library call."""
+    out = np.zeros((3, 3))
+    for i in range(3):
+        for k in range(B.shape[0]):
+            for j in range(3):
+                out[i, j] += A[i, k] * B[k, j]
+    return out
 
 
 def interpolate(track: SmoothedTrack, t: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -58,38 +78,47 @@ def interpolate(track: SmoothedTrack, t: FloatArray) -> tuple[FloatArray, FloatA
         (N, 2, 3) means (px, px/s, px/s²) and (N, 2, 3, 3) covariances.
     """
     query = np.asarray(t, dtype=np.float64).reshape(-1)
-    mean = np.empty((len(query), 2, 3))
-    cov = np.empty((len(query), 2, 3, 3))
-    right = np.searchsorted(track.t, query)
-    means, covs = track.motion()
-    exact = (right < len(track)) & (track.t[np.minimum(right, len(track) - 1)] == query)
-    mean[exact], cov[exact] = means[right[exact]], covs[right[exact]]
-
-    late = right == len(track)
+    mean, cov = _between(track.t, track.q, track.mean, track.cov, track.gain, query)
+    late = query > track.t[-1]
     if late.any():
         mean[late], cov[late] = _extrapolate(track, len(track) - 1, query[late] - track.t[-1])
-    early = (right == 0) & ~exact
+    early = query < track.t[0]
     if early.any():
         mean[early], cov[early] = _extrapolate(track, 0, query[early] - track.t[0])
-
-    inside = ~(exact | late | early)
-    if inside.any():
-        k1 = right[inside]
-        k0 = k1 - 1
-        start = track.t[k0]
-        L, S, noise = bridge(query[inside] - start, track.t[k1] - start, track.q[k1])
-        L, S = L[:, None], S[:, None]
-        mean[inside] = (L @ means[k0, :, :, None] + S @ means[k1, :, :, None])[..., 0]
-        between = track.gain[k0, :, :MOTION] @ track.cov[k1, :, :, :MOTION]
-        crossed = L @ between @ S.swapaxes(-1, -2)
-        cov[inside] = (
-            L @ covs[k0] @ L.swapaxes(-1, -2)
-            + S @ covs[k1] @ S.swapaxes(-1, -2)
-            + crossed
-            + crossed.swapaxes(-1, -2)
-            + noise[:, None]
-        )
     return mean, cov
+
+
+@njit(cache=True)
+def _between(
+    t: FloatArray, q: FloatArray, mean: FloatArray, cov: FloatArray, gain: FloatArray, query: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Fill in `interpolate`'s result (N, 2, 3), (N, 2, 3, 3) where a time is not beyond the ends."""
+    out_mean, out_cov = np.empty((len(query), 2, 3)), np.empty((len(query), 2, 3, 3))
+    keys, k1 = len(t), 0
+    for i in range(len(query)):
+        if k1 == keys or t[k1] < query[i] or (k1 > 0 and t[k1 - 1] >= query[i]):
+            k1 = np.searchsorted(t, query[i])
+        if k1 == keys or query[i] < t[0]:
+            continue
+        if t[k1] == query[i]:
+            out_mean[i] = mean[k1, :, :3]
+            out_cov[i] = cov[k1, :, :3, :3]
+            continue
+        k0 = k1 - 1
+        L, S, noise = bridge(query[i] - t[k0], t[k1] - t[k0], q[k1])
+        for a in range(2):
+            # [Λ Ψ] times the joint covariance of both ends, whose mixed block is the gain's.
+            cross = _product(gain[k0, a, :3], cov[k1, a, :, :3])
+            left = _product(L, cov[k0, a, :3, :3]) + _product(S, cross.T)
+            right = _product(L, cross) + _product(S, cov[k1, a, :3, :3])
+            whole = _product(left, L.T) + _product(right, S.T) + noise
+            for r in range(3):
+                m = 0.0
+                for c in range(3):
+                    m += L[r, c] * mean[k0, a, c] + S[r, c] * mean[k1, a, c]
+                    out_cov[i, a, r, c] = 0.5 * (whole[r, c] + whole[c, r])
+                out_mean[i, a, r] = m
+    return out_mean, out_cov
 
 
 def _extrapolate(track: SmoothedTrack, key: int, ahead: FloatArray) -> tuple[FloatArray, FloatArray]:

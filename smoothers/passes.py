@@ -13,8 +13,7 @@ cheaper: H and F have few entries, so λ and Λ cost O(n²) a key.
 Source: Bierman, Fixed interval smoothing with discrete measurements, Int. J. Control 18(1), 1973.
 
 States are [p, v, a, e_1, …, e_B] per axis (`transitions.py`), n = 3 + B. `dims`, a tuple of n elements,
-tells n to the compiler, which then unrolls the loops over a state. Numba does not notice changes in
-another file, so all compiled functions that call each other stand here.
+tells n to the compiler, which then unrolls the loops over a state.
 """
 
 from __future__ import annotations
@@ -30,11 +29,12 @@ _UNIT_NOISE = process_noise.py_func(1.0, 1.0)
 
 
 @njit(cache=True)
-def _error_steps(dt: float, memory: FloatArray, phi: FloatArray, var: FloatArray) -> None:
+def error_steps(dt: float, memory: FloatArray, phi: FloatArray, var: FloatArray) -> None:
     """Fill transition factors `phi` (B,) and noise variances `var` (B,) of the error states."""
     for b in range(len(memory)):
-        phi[b] = np.exp(-dt / memory[b])
-        var[b] = -np.expm1(-2.0 * dt / memory[b])
+        less = np.expm1(-dt / memory[b])
+        phi[b] = 1.0 + less
+        var[b] = -less * (2.0 + less)
 
 
 @njit(cache=True)
@@ -49,7 +49,7 @@ def _step_mean(dims: tuple[int, ...], dt: float, phi: FloatArray, old: FloatArra
 
 
 @njit(cache=True)
-def _step_cov(
+def step_cov(
     dims: tuple[int, ...],
     dt: float,
     q: float,
@@ -142,10 +142,10 @@ def forward(
                 mean[k] = prior_mean[track]
                 cov[k] = prior_cov[track]
             else:
-                _error_steps(dt[k], memory, phi, var)
+                error_steps(dt[k], memory, phi, var)
                 for a in range(2):
                     _step_mean(dims, dt[k], phi, mean[k - 1, a], mean[k, a])
-                    _step_cov(dims, dt[k], q[k], phi, var, cov[k - 1, a], moved, cov[k, a])
+                    step_cov(dims, dt[k], q[k], phi, var, cov[k - 1, a], moved, cov[k, a])
             while i < len(row) and row[i] == k:
                 e = error[i] + 3
                 for a in range(2):
@@ -260,18 +260,21 @@ def _smoothed(
         s = m[i]
         for j in range(n):
             s -= P[i, j] * lam[j]
-            t = 0.0
-            for k in range(n):
-                t += P[i, k] * Lam[k, j]
-            part[i, j] = t
+            part[i, j] = P[i, 0] * Lam[0, j]
         out_mean[i] = s
+        # The inner loops run along rows, so that the compiler can do several steps at once.
+        for k in range(1, n):
+            for j in range(n):
+                part[i, j] += P[i, k] * Lam[k, j]
     for i in range(n):
-        for j in range(i + 1):
-            t = P[i, j]
-            for k in range(n):
-                t -= part[i, k] * P[k, j]
-            out_cov[i, j] = t
-            out_cov[j, i] = t
+        for j in range(n):
+            out_cov[i, j] = P[i, j] - part[i, 0] * P[0, j]
+        for k in range(1, n):
+            for j in range(n):
+                out_cov[i, j] -= part[i, k] * P[k, j]
+    for i in range(n):
+        for j in range(i):
+            out_cov[j, i] = out_cov[i, j]
 
 
 @njit(cache=True)
@@ -290,18 +293,20 @@ def _gain(
         for k in range(j):
             s -= L[j, k] * L[j, k] * d[k]
         d[j] = s
+        inverse = 1.0 / s
         for i in range(j + 1, n):
             s = predicted[i, j]
             for k in range(j):
                 s -= L[i, k] * L[j, k] * d[k]
-            L[i, j] = s / d[j]
+            L[i, j] = s * inverse
     for i in range(n):
         for k in range(i):
             for c in range(n):
                 moved[i, c] -= L[i, k] * moved[k, c]
     for i in range(n - 1, -1, -1):
+        inverse = 1.0 / d[i]
         for c in range(n):
-            moved[i, c] /= d[i]
+            moved[i, c] *= inverse
         for k in range(i + 1, n):
             for c in range(n):
                 moved[i, c] -= L[k, i] * moved[k, c]
@@ -371,7 +376,7 @@ def backward(
                     if k < last:
                         P = cov[k, a]
                         _smoothed(dims, mean[k, a], P, lam[a], Lam[a], part, out_mean[k, a], out_cov[k, a])
-                        _step_cov(dims, dt[k + 1], q[k + 1], phi, var, P, part, predicted)
+                        step_cov(dims, dt[k + 1], q[k + 1], phi, var, P, part, predicted)
                         _gain(dims, predicted, part, L, d, out_gain[k, a])
                     else:
                         out_mean[k, a] = mean[k, a]
@@ -393,7 +398,7 @@ def backward(
                     )
                 i -= 1
             if k > first:
-                _error_steps(dt[k], memory, phi, var)
+                error_steps(dt[k], memory, phi, var)
     return out_mean, out_cov, out_gain
 
 
@@ -457,7 +462,7 @@ def backward_between(
                         u,
                     )
                 i -= 1
-            _error_steps(dt[k], memory, phi, var)
+            error_steps(dt[k], memory, phi, var)
             for a in range(2):
                 _back_over_step(dims, dt[k], phi, lam[a], Lam[a])
         k = at[t]
@@ -495,7 +500,7 @@ def fill_back(
         if i >= 0 and known[i] == k:
             i -= 1
             continue
-        _error_steps(dt[k + 1], memory, phi, var)
+        error_steps(dt[k + 1], memory, phi, var)
         for a in range(2):
             _step_mean(dims, dt[k + 1], phi, filtered[k, a], jump)
             for j in range(n):

@@ -33,30 +33,40 @@ class SmoothedSize:
 
         Between two keys by the cubic that the model's prior implies, beyond the ends at constant rate.
         """
-        query = np.asarray(t, dtype=np.float64)
-        right = np.clip(np.searchsorted(self.t, query), 1, max(len(self.t) - 1, 1))
-        left = right - 1
-        right = np.minimum(right, len(self.t) - 1)
-        edge = np.where(query <= self.t[0], 0, len(self.t) - 1)
-        outside = (query <= self.t[0]) | (query >= self.t[-1])
-        span = np.where(outside, 1.0, self.t[right] - self.t[left])[:, None]
-        s = np.where(outside, 0.0, (query - self.t[left]) / span[:, 0])[:, None]
-        a, b = self.mean[left], self.mean[right]
-        # The conditional mean of a constant-velocity (white-acceleration) prior is the cubic Hermite
-        # polynomial of its two ends (Barfoot, State Estimation for Robotics, ch. 3.4).
-        inside = (
-            (1 + 2 * s) * (1 - s) ** 2 * a[:, :, 0]
-            + s * (1 - s) ** 2 * span * a[:, :, 1]
-            + s**2 * (3 - 2 * s) * b[:, :, 0]
-            + s**2 * (s - 1) * span * b[:, :, 1]
-        )
-        beyond = self.mean[edge, :, 0] + (query - self.t[edge])[:, None] * self.mean[edge, :, 1]
-        return np.asarray(np.exp(np.where(outside[:, None], beyond, inside)))
+        return _sizes_at(self.t, self.mean, np.asarray(t, dtype=np.float64))
+
+
+@njit(cache=True)
+def _sizes_at(t: FloatArray, mean: FloatArray, query: FloatArray) -> FloatArray:
+    """`SmoothedSize.at`."""
+    out = np.empty((len(query), 2))
+    last, right = len(t) - 1, 0
+    for i in range(len(query)):
+        if right > last or t[right] < query[i] or (right > 0 and t[right - 1] >= query[i]):
+            right = np.searchsorted(t, query[i])
+        if query[i] <= t[0] or query[i] >= t[last]:
+            edge = 0 if query[i] <= t[0] else last
+            for axis in range(2):
+                out[i, axis] = np.exp(mean[edge, axis, 0] + (query[i] - t[edge]) * mean[edge, axis, 1])
+            continue
+        span = t[right] - t[right - 1]
+        s = (query[i] - t[right - 1]) / span
+        for axis in range(2):
+            a, b = mean[right - 1, axis], mean[right, axis]
+            # The conditional mean of a constant-velocity (white-acceleration) prior is the cubic Hermite
+            # polynomial of its two ends (Barfoot, State Estimation for Robotics, ch. 3.4).
+            out[i, axis] = np.exp(
+                (1 + 2 * s) * (1 - s) ** 2 * a[0]
+                + s * (1 - s) ** 2 * span * a[1]
+                + s**2 * (3 - 2 * s) * b[0]
+                + s**2 * (s - 1) * span * b[1]
+            )
+    return out
 
 
 @njit(cache=True)
 def _smooth(
-    dt: FloatArray,
+    t: FloatArray,
     q: FloatArray,
     key: IntArray,
     z: FloatArray,
@@ -64,8 +74,8 @@ def _smooth(
     prior_mean: FloatArray,
     prior_cov: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Filter and smooth [ln size, rate] at keys `dt` (K,) apart; see `smooth_size`."""
-    keys = len(dt)
+    """Filter and smooth [ln size, rate] at keys `t` (K,); see `smooth_size`."""
+    keys = len(t)
     mean, cov = np.empty((keys, 2, 2)), np.empty((keys, 2, 2, 2))
     ahead = np.empty((keys, 2, 3))  # predicted covariances: of the size, with the rate, of the rate
     for axis in range(2):
@@ -75,7 +85,7 @@ def _smooth(
                 m, v = prior_mean[axis, 0], prior_mean[axis, 1]
                 a, b, c = prior_cov[axis, 0, 0], prior_cov[axis, 0, 1], prior_cov[axis, 1, 1]
             else:
-                d, s = dt[k], q[k] * q[k]
+                d, s = t[k] - t[k - 1], q[k] * q[k]
                 m += d * v
                 a += d * (2.0 * b + d * c) + s * d * d * d / 3.0
                 b += d * c + 0.5 * s * d * d
@@ -94,7 +104,7 @@ def _smooth(
             mean[k, axis, 0], mean[k, axis, 1] = m, v
             cov[k, axis, 0, 0], cov[k, axis, 0, 1], cov[k, axis, 1, 0], cov[k, axis, 1, 1] = a, b, b, c
         for k in range(keys - 2, -1, -1):
-            d = dt[k + 1]
+            d = t[k + 1] - t[k]
             P, A = cov[k, axis], ahead[k + 1, axis]
             det = A[0] * A[2] - A[1] * A[1]
             # G = P Fᵀ A⁻¹
@@ -143,14 +153,15 @@ def smooth_size(
     Raises:
         DataError: if a measurement is older than the prior.
     """
-    order = np.argsort(t, kind="stable")
-    times = np.asarray(t, dtype=np.float64)[order]
+    times = np.asarray(t, dtype=np.float64)
+    z, var, drift = np.asarray(log_size), np.asarray(r), np.asarray(q, dtype=np.float64)
+    if np.any(times[1:] < times[:-1]):
+        order = np.argsort(times, kind="stable")
+        times, z, var, drift = times[order], z[order], var[order], drift[order]
     key, first = group_times(times, prior_t)
     if len(times) and times[0] < prior_t - COINCIDENT_S:
         raise DataError(f"a size at {times[0]} s is older than the track's prior at {prior_t} s")
     keys = np.concatenate([[prior_t], times[first]])
-    density = np.concatenate([[0.0], np.asarray(q, dtype=np.float64)[order][first]])
-    z, var = np.asarray(log_size)[order], np.asarray(r)[order]
-    prior = (np.asarray(prior_mean), np.asarray(prior_cov))
-    mean, cov = _smooth(np.diff(keys, prepend=prior_t), density, key, z, var, *prior)
+    density = np.concatenate([[0.0], drift[first]])
+    mean, cov = _smooth(keys, density, key, z, var, np.asarray(prior_mean), np.asarray(prior_cov))
     return SmoothedSize(keys, density, mean, cov)

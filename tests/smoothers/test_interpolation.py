@@ -70,6 +70,6 @@ def test_a_cubic_path_is_reproduced_exactly():
     def state(t):
         return np.array([1 + 2 * t + 3 * t**2 / 2 + 4 * t**3 / 6, 2 + 3 * t + 2 * t**2, 3 + 4 * t])
 
-    L, S, noise = bridge(np.array([0.3]), np.array([0.8]), np.array([5.0]))
-    assert np.allclose(L[0] @ state(0.0) + S[0] @ state(0.8), state(0.3))
-    assert np.all(np.linalg.eigvalsh(noise[0]) > 0)
+    L, S, noise = bridge(0.3, 0.8, 5.0)
+    assert np.allclose(L @ state(0.0) + S @ state(0.8), state(0.3))
+    assert np.all(np.linalg.eigvalsh(noise) > 0)
