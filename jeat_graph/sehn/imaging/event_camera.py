@@ -8,14 +8,27 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from jeat_graph.arrays import FloatArray
+from jeat_graph.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.events import EventArray
-from jeat_graph.sehn.imaging.carla_pixel import carla_advance, make_carla_model, make_carla_state
+from jeat_graph.sehn.imaging.carla_pixel import (
+    CarlaModel,
+    CarlaState,
+    carla_advance,
+    make_carla_model,
+    make_carla_state,
+)
 from jeat_graph.sehn.imaging.config import ImagingConfig
-from jeat_graph.sehn.imaging.event_pixel import advance, make_model, make_state, unsettled
-from jeat_graph.sehn.imaging.event_sink import make_sink, to_events, with_room
+from jeat_graph.sehn.imaging.event_pixel import (
+    PixelModel,
+    PixelState,
+    advance,
+    make_model,
+    make_state,
+    unsettled,
+)
+from jeat_graph.sehn.imaging.event_sink import Sink, make_sink, to_events, with_room
 from jeat_graph.sehn.imaging.lighting import LUMINANCE
-from jeat_graph.sehn.imaging.painter import paint_tile
+from jeat_graph.sehn.imaging.painter import Stage, paint_tile
 from jeat_graph.sehn.imaging.plan import Plan, who_touches
 from jeat_graph.sehn.imaging.renderer import Renderer
 from jeat_graph.sehn.imaging.tiles import TILE, TILE_H, TILE_W
@@ -76,11 +89,12 @@ class EventCamera:
             last = int(until_us / period + 1e-9)
             if last <= self._ticks:
                 return EventArray.empty(labelled=True)
-            times_us = period * np.arange(self._ticks, last + 1)
+            times_us = period * np.arange(self._ticks, last + 1, dtype=np.float64)
             self._ticks = last
             return self._run(self.renderer.plan(1e-6 * times_us[0], 1e-6 * times_us[-1]), times_us)
         plan = self.renderer.plan(1e-6 * self._now_us, 1e-6 * until_us)
-        times_us = self._now_us + (until_us - self._now_us) * np.arange(plan.count + 1) / plan.count
+        share = np.arange(plan.most + 1, dtype=np.float64) / plan.most
+        times_us = self._now_us + (until_us - self._now_us) * share
         self._now_us = until_us
         return self._run(plan, times_us)
 
@@ -91,16 +105,15 @@ class EventCamera:
         steps = np.where(plan.steps > 0, len(times_us) - 1, 0) if self._carla else plan.steps
         run = _run_carla if self._carla else _run_physical
         sink, rendered = run(
-            r.tiles, plan.boxes, steps, times_us, self._static, self._quiet, r.background, moments, plan.look,
-            r.lights, r.optics, r.view, r.layers, self._model, self._state,
-            make_sink(max(1 << 18, 2 * self._room)), self._room,
+            r.tiles, plan.boxes, steps, times_us, self._static, self._quiet, r.stage(moments, plan.look),
+            self._model, self._state, make_sink(max(1 << 18, 2 * self._room)), self._room,
         )  # fmt: skip
         self.rendered += rendered
         return to_events(sink, self._width)
 
 
 @njit(cache=True)
-def _fill(row0, column0, static, pixels, luminance):  # type: ignore[no-untyped-def]
+def _fill(row0: int, column0: int, static: FloatArray, pixels: IntArray, luminance: FloatArray) -> int:
     """Pixels of a tile and what they see while nothing moves; returns how many there are."""
     height, width = static.shape
     count = 0
@@ -113,7 +126,7 @@ def _fill(row0, column0, static, pixels, luminance):  # type: ignore[no-untyped-
 
 
 @njit(cache=True)
-def _take(patch, columns, count, luminance):  # type: ignore[no-untyped-def]
+def _take(patch: FloatArray, columns: int, count: int, luminance: FloatArray) -> None:
     """Luminance of a rendered tile, in the order of `_fill`."""
     for n in range(count):
         p = n // columns * TILE_W + n % columns
@@ -122,9 +135,13 @@ def _take(patch, columns, count, luminance):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _run_physical(
-    tiles, boxes, steps, times_us, static, quiet, ground, moments, look, lights, optics, view, layers, model,
-    state, sink, room,
-):  # type: ignore[no-untyped-def]  # fmt: skip
+    tiles: IntArray, boxes: FloatArray, steps: IntArray, times_us: FloatArray, static: FloatArray,
+    quiet: BoolArray, stage: Stage, model: PixelModel, state: PixelState, sink: Sink, room: int,
+) -> tuple[Sink, int]:  # fmt: skip
+    """Take all pixels through an interval, tile by tile; returns the sink and how many tiles were painted.
+
+    A tile is `quiet` when its pixels see the static picture and have settled.
+    """
     who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)
     counts = np.zeros(3, dtype=np.int64)
     patch = np.zeros((TILE, 3))
@@ -152,9 +169,7 @@ def _run_physical(
         stride = available // steps[n]
         for k in range(steps[n]):
             j = (k + 1) * stride - 1
-            paint_tile(
-                row0, column0, j, who, counts, ground, moments, look, lights, optics, view, layers, patch
-            )
+            paint_tile(row0, column0, j, who, counts, stage, patch)
             _take(patch, columns, count, luminance)
             sink = with_room(sink, room)
             a, b = times_us[k * stride], times_us[(k + 1) * stride]
@@ -165,9 +180,10 @@ def _run_physical(
 
 @njit(cache=True)
 def _run_carla(
-    tiles, boxes, steps, times_us, static, quiet, ground, moments, look, lights, optics, view, layers, model,
-    state, sink, room,
-):  # type: ignore[no-untyped-def]  # fmt: skip
+    tiles: IntArray, boxes: FloatArray, steps: IntArray, times_us: FloatArray, static: FloatArray,
+    quiet: BoolArray, stage: Stage, model: CarlaModel, state: CarlaState, sink: Sink, room: int,
+) -> tuple[Sink, int]:  # fmt: skip
+    """Take all pixels from tick to tick, tile by tile; as `_run_physical`."""
     who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)
     counts = np.zeros(3, dtype=np.int64)
     patch = np.zeros((TILE, 3))
@@ -181,9 +197,7 @@ def _run_carla(
         for j in range(len(times_us) - 1):
             sink = with_room(sink, room)
             if steps[n] > 0:
-                paint_tile(
-                    row0, column0, j, who, counts, ground, moments, look, lights, optics, view, layers, patch
-                )
+                paint_tile(row0, column0, j, who, counts, stage, patch)
                 _take(patch, columns, count, luminance)
                 rendered += 1
             carla_advance(pixels[:count], luminance[:count], times_us[j], times_us[j + 1], model, state, sink)

@@ -13,17 +13,17 @@ from jeat_graph.events import EventArray
 
 
 class Sink(NamedTuple):
-    """Room for events; `count` (1,) of it is used.
+    """Room for events; `used` (1,) of it is taken.
 
     Attributes:
-        count: (1,) events so far.
+        used: (1,) events so far.
         t_us: (C,) µs.
         pixel: (C,) row · width + column.
         polarity: (C,) 1 brighter, 0 darker.
         by_motion: (C,) cause.
     """
 
-    count: IntArray
+    used: IntArray
     t_us: IntArray
     pixel: IntArray
     polarity: npt.NDArray[np.uint8]
@@ -45,11 +45,11 @@ def make_sink(capacity: int) -> Sink:
 @njit(cache=True)
 def with_room(sink: Sink, more: int) -> Sink:
     """Return the sink, or a larger copy if it has no room for `more` events."""
-    used = sink.count[0]
+    used = sink.used[0]
     if used + more <= len(sink.t_us):
         return sink
     out = make_sink(2 * (used + more))
-    out.count[0] = used
+    out.used[0] = used
     out.t_us[:used] = sink.t_us[:used]
     out.pixel[:used] = sink.pixel[:used]
     out.polarity[:used] = sink.polarity[:used]
@@ -60,18 +60,18 @@ def with_room(sink: Sink, more: int) -> Sink:
 @njit(cache=True)
 def put(sink: Sink, t_us: float, pixel: int, brighter: bool, by_motion: bool) -> None:
     """Add an event at the nearest microsecond; whoever calls has made room."""
-    n = sink.count[0]
+    n = sink.used[0]
     if n < len(sink.t_us):
         sink.t_us[n] = int(np.floor(t_us + 0.5))
         sink.pixel[n] = pixel
         sink.polarity[n] = 1 if brighter else 0
         sink.by_motion[n] = by_motion
-        sink.count[0] = n + 1
+        sink.used[0] = n + 1
 
 
 def to_events(sink: Sink, width: int) -> EventArray:
     """Sort the events by time; those of one time keep the order of their pixels' tiles."""
-    used = int(sink.count[0])
+    used = int(sink.used[0])
     order = np.argsort(sink.t_us[:used], kind="stable")
     pixel = sink.pixel[:used][order]
     return EventArray(

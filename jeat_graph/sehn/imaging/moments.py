@@ -23,7 +23,7 @@ _FADE_M = 25.0
 _LAMP_SIGMA_M = 0.07
 _BODIES = body_table(tuple(kind.name for kind in KINDS))
 _LAMPS = 4
-# A face is lit evenly; beams light it as they would at most this high, for most light falls on its lower part.
+# A face is lit evenly; beams light it as at most this high, for most of their light falls on its lower part.
 _LIT_HEIGHT_M = 0.9
 _BACK_LUX = 0.3  # what the road before a vehicle gives back of its own beams to its front
 

@@ -41,7 +41,8 @@ def glow_at(r2: float, optics: Optics) -> float:
     if r2 >= limit:
         return 0.0
     window = 1.0 - r2 / limit
-    return optics.scale * (1.0 + r2 / (optics.core_px * optics.core_px)) ** -1.25 * window * window
+    part: float = optics.scale * (1.0 + r2 / (optics.core_px * optics.core_px)) ** -_POWER
+    return part * window * window
 
 
 @njit(cache=True)

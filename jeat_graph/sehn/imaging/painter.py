@@ -33,16 +33,28 @@ class Layers(NamedTuple):
     """Room to work in, for the P pixels of a tile.
 
     Attributes:
-        count: (P,) bodies and lights over each pixel.
+        filled: (P,) bodies and lights over each pixel.
         value: (P, _LAYERS, 5) their depth, cover and colour times cover, the farthest first.
         shade: (P, 2) part of the sky's and of the sun's light that vehicles leave the ground.
         beams: (P, 2) illuminance of the ground and of the barriers by headlights (lux).
     """
 
-    count: IntArray
+    filled: IntArray
     value: FloatArray
     shade: FloatArray
     beams: FloatArray
+
+
+class Stage(NamedTuple):
+    """All that a tile is painted from: static picture, vehicles, lights, lens, camera, room to work."""
+
+    ground: Background
+    moments: Moments
+    look: Look
+    lights: Lights
+    optics: Optics
+    camera: View
+    layers: Layers
 
 
 def make_layers() -> Layers:
@@ -54,10 +66,9 @@ def make_layers() -> Layers:
 
 @njit(cache=True)
 def paint_tile(
-    row0: int, column0: int, j: int, who: IntArray, counts: IntArray, ground: Background, moments: Moments,
-    look: Look, lights: Lights, optics: Optics, view: View, layers: Layers, out: FloatArray,
-) -> None:  # fmt: skip
-    """Render the tile whose upper left pixel is (row0, column0) at time `j` of `moments`.
+    row0: int, column0: int, j: int, who: IntArray, counts: IntArray, stage: Stage, out: FloatArray
+) -> None:
+    """Render the tile whose upper left pixel is (row0, column0) at time `j` of the stage's moments.
 
     Args:
         row0: first row.
@@ -65,18 +76,14 @@ def paint_tile(
         j: index of the time.
         who: (3, V) vehicles whose bodies and shadows, glow and beams may touch the tile.
         counts: (3,) how many of each.
-        ground: the static picture.
-        moments: the vehicles.
-        look: what they look like.
-        lights: of the scene.
-        optics: of the lens.
-        view: the camera.
-        layers: room to work in.
+        stage: what there is to paint.
         out: (TILE, 3) radiance (cd/m²), TILE_W pixels a row; those beyond the picture are left as they are.
     """
+    ground, moments, look, layers = stage.ground, stage.moments, stage.look, stage.layers
+    lights, optics, view = stage.lights, stage.optics, stage.camera
     height, width = ground.lux.shape
     rows, columns = min(TILE_H, height - row0), min(TILE_W, width - column0)
-    layers.count[:] = 0
+    layers.filled[:] = 0
     layers.shade[:] = 1.0
     layers.beams[:] = 0.0
     for n in range(counts[0]):
@@ -127,8 +134,8 @@ def _compose(
             blue = shade * ground.back[row, column, 2] + ground.albedo[row, column, 2] * lit * tint[2]
             cover = ground.front_cover[row, column]
             depth = ground.front_depth[row, column] if cover > 0.0 else -1.0
-            for n in range(layers.count[p] + 1):
-                last = n == layers.count[p]
+            for n in range(layers.filled[p] + 1):
+                last = n == layers.filled[p]
                 if depth > 0.0 and (last or layers.value[p, n, 0] < depth):
                     red, green, blue = red * (1.0 - cover), green * (1.0 - cover), blue * (1.0 - cover)
                     red += ground.front[row, column, 0] + ground.front_albedo[row, column, 0] * wall * tint[0]
@@ -152,7 +159,7 @@ def _compose(
 @njit(cache=True)
 def _insert(layers: Layers, p: int, depth: float, cover: float, r: float, g: float, b: float) -> None:
     """Put a layer over a pixel in its place by depth, the farthest first."""
-    n = layers.count[p]
+    n = layers.filled[p]
     if n == _LAYERS:
         return
     value = layers.value
@@ -163,7 +170,7 @@ def _insert(layers: Layers, p: int, depth: float, cover: float, r: float, g: flo
         at -= 1
     value[p, at, 0], value[p, at, 1] = depth, cover
     value[p, at, 2], value[p, at, 3], value[p, at, 4] = r, g, b
-    layers.count[p] = n + 1
+    layers.filled[p] = n + 1
 
 
 @njit(cache=True)

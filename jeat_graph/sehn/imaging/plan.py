@@ -25,14 +25,14 @@ class Plan(NamedTuple):
         look: the V vehicles there are in it.
         boxes: (V, 3, 4) what each changes in the picture (px): body and shadow, glow, beams' light.
         steps: (T,) how often each tile is rendered, a power of two; 0 where nothing changes.
-        count: the greatest of them, at least 1.
-        every: (V,) stride at which a vehicle is needed among `count` times.
+        most: the greatest of them, at least 1.
+        every: (V,) stride at which a vehicle is needed among `most` times.
     """
 
     look: Look
     boxes: FloatArray
     steps: IntArray
-    count: int
+    most: int
     every: IntArray
 
 
@@ -96,7 +96,7 @@ def who_touches(row0: int, column0: int, boxes: FloatArray, who: IntArray, count
             if not apart and box[2] > box[0]:
                 who[kind, counts[kind]] = v
                 counts[kind] += 1
-    return counts[0] + counts[1] + counts[2]
+    return int(counts[0] + counts[1] + counts[2])
 
 
 @njit(cache=True)

@@ -12,7 +12,7 @@ from jeat_graph.sehn.imaging.lighting import lights_of
 from jeat_graph.sehn.imaging.moments import Look, Moments, line_up, project_moments
 from jeat_graph.sehn.imaging.optics import optics_of
 from jeat_graph.sehn.imaging.paint import PALETTE
-from jeat_graph.sehn.imaging.painter import make_layers, paint_tile
+from jeat_graph.sehn.imaging.painter import Stage, make_layers, paint_tile
 from jeat_graph.sehn.imaging.plan import Plan, make_plan, who_touches
 from jeat_graph.sehn.imaging.tiles import TILE, TILE_H, TILE_W, tile_raster, view_of
 from jeat_graph.sehn.scene import Scene, VehicleStates
@@ -40,7 +40,7 @@ class Renderer:
         self.view = view_of(scene.camera)
         self.background: Background = make_background(scene, self.lights, self.optics, config)
         self.tiles = tile_raster(scene.camera.width, scene.camera.height)
-        self.layers = make_layers()
+        self._layers = make_layers()
         rng = stream(seed, "paint")
         total = max(1, len(scene.fleet) + len(scene.parked_fleet))
         palette = np.array(PALETTE)
@@ -75,14 +75,16 @@ class Renderer:
         stride = np.ones(len(look.number), dtype=np.int64) if every is None else every
         return self._project(states, times, look, stride)
 
+    def stage(self, moments: Moments, look: Look) -> Stage:
+        """Put together what tiles are painted from."""
+        return Stage(self.background, moments, look, self.lights, self.optics, self.view, self._layers)
+
     def picture(self, time_s: float) -> FloatArray:
         """Render the whole picture at one time: radiance (H, W, 3) in cd/m²."""
         plan = self.plan(time_s, time_s)
         out = self.background.whole.copy()
-        _paint_all(
-            out, self.tiles, plan.boxes, self.background, self.moments(np.array([time_s]), plan.look), plan.look,
-            self.lights, self.optics, self.view, self.layers,
-        )  # fmt: skip
+        stage = self.stage(self.moments(np.array([time_s]), plan.look), plan.look)
+        _paint_all(out, self.tiles, plan.boxes, stage)
         return out
 
     def _look(self, states: VehicleStates) -> tuple[Look, IntArray]:
@@ -106,10 +108,9 @@ class Renderer:
 
 
 @njit(cache=True)
-def _paint_all(
-    out, tiles, boxes, ground, moments, look, lights, optics, view, layers
-):  # type: ignore[no-untyped-def]  # fmt: skip
-    height, width = ground.lux.shape
+def _paint_all(out: FloatArray, tiles: IntArray, boxes: FloatArray, stage: Stage) -> None:
+    """Paint the tiles that vehicles touch, at the first of the moments, into a picture (H, W, 3)."""
+    height, width = out.shape[:2]
     who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)
     counts = np.zeros(3, dtype=np.int64)
     patch = np.zeros((TILE, 3))
@@ -117,7 +118,7 @@ def _paint_all(
         row0, column0 = tiles[n]
         if who_touches(row0, column0, boxes, who, counts) == 0:
             continue
-        paint_tile(row0, column0, 0, who, counts, ground, moments, look, lights, optics, view, layers, patch)
+        paint_tile(row0, column0, 0, who, counts, stage, patch)
         for r in range(min(TILE_H, height - row0)):
             for c in range(min(TILE_W, width - column0)):
                 for k in range(3):

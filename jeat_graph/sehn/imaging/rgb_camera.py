@@ -12,10 +12,10 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from jeat_graph.arrays import FloatArray
+from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.sehn.imaging.config import RGBConfig
 from jeat_graph.sehn.imaging.lighting import LUMINANCE
-from jeat_graph.sehn.imaging.painter import paint_tile
+from jeat_graph.sehn.imaging.painter import Stage, paint_tile
 from jeat_graph.sehn.imaging.plan import who_touches
 from jeat_graph.sehn.imaging.renderer import Renderer
 from jeat_graph.sehn.imaging.tiles import TILE, TILE_H, TILE_W
@@ -55,17 +55,15 @@ def expose(renderer: Renderer, time_s: float, exposure_s: float, readout_s: floa
     step_px = _EASE * renderer.config.max_step_px
     plan = renderer.plan(begin, end, duration_s=exposure_s, step_px=step_px)
     # Samples in the middle of equal parts of the exposure, on one raster for all rows.
-    part = exposure_s / plan.count
+    part = exposure_s / plan.most
     extra = int(np.ceil(readout_s / part - 1e-9))
-    moments = renderer.moments(begin + part * (np.arange(plan.count + extra) + 0.5), plan.look)
+    times: FloatArray = begin + part * (np.arange(plan.most + extra, dtype=np.float64) + 0.5)
+    moments = renderer.moments(times, plan.look)
     height = renderer.background.lux.shape[0]
     middle = np.minimum(renderer.tiles[:, 0] + TILE_H / 2.0, height)
     first = np.round(extra * middle / height).astype(np.int64)
     out = renderer.background.whole.copy()
-    _expose(
-        out, renderer.tiles, plan.boxes, plan.steps, first, plan.count, renderer.background, moments, plan.look,
-        renderer.lights, renderer.optics, renderer.view, renderer.layers,
-    )  # fmt: skip
+    _expose(out, renderer.tiles, plan.boxes, plan.steps, first, plan.most, renderer.stage(moments, plan.look))
     return out
 
 
@@ -87,9 +85,11 @@ def develop(charge: FloatArray, gain: float, config: RGBConfig) -> npt.NDArray[n
 
 @njit(cache=True)
 def _expose(
-    out, tiles, boxes, steps, first, available, ground, moments, look, lights, optics, view, layers
-):  # type: ignore[no-untyped-def]  # fmt: skip
-    height, width = ground.lux.shape
+    out: FloatArray, tiles: IntArray, boxes: FloatArray, steps: IntArray, first: IntArray, available: int,
+    stage: Stage,
+) -> None:  # fmt: skip
+    """Replace the tiles that vehicles touch by the mean of their samples, from each tile's first on."""
+    height, width = out.shape[:2]
     who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)
     counts = np.zeros(3, dtype=np.int64)
     patch = np.zeros((TILE, 3))
@@ -105,9 +105,7 @@ def _expose(
         for k in range(count):
             # The sample next to the middle of its part, which is the middle itself where the part is one.
             j = first[n] + k * stride + stride // 2
-            paint_tile(
-                row0, column0, j, who, counts, ground, moments, look, lights, optics, view, layers, patch
-            )
+            paint_tile(row0, column0, j, who, counts, stage, patch)
             for r in range(rows):
                 for c in range(columns):
                     for channel in range(3):

@@ -74,7 +74,9 @@ def test_flicker_of_a_dark_picture_is_noise_and_a_larger_epsilon_quenches_it() -
     assert small.by_motion is not None
     assert not small.by_motion.any()
     # One step, from 1 to 2, changes ln(ε + I/255) by 0.59, or by 0.25: above the threshold, or below it.
-    assert math.log((0.001 + 2 / 255) / (0.001 + 1 / 255)) > 0.3 > math.log((0.01 + 2 / 255) / (0.01 + 1 / 255))
+    assert (
+        math.log((0.001 + 2 / 255) / (0.001 + 1 / 255)) > 0.3 > math.log((0.01 + 2 / 255) / (0.01 + 1 / 255))
+    )
     assert len(small) > 5000
     assert len(large) < 0.05 * len(small)
 

@@ -16,7 +16,11 @@ from .scenes import IDEAL, QUIET
 
 
 def run(
-    times_us: np.ndarray, luminance: np.ndarray, seed: int = 0, order: np.ndarray | None = None, **config: float
+    times_us: np.ndarray,
+    luminance: np.ndarray,
+    seed: int = 0,
+    order: np.ndarray | None = None,
+    **config: float,
 ) -> EventArray:
     """Events of N pixels that see `luminance` (T, N) at `times_us` (T,)."""
     rng = np.random.default_rng(seed)

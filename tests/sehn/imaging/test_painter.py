@@ -27,7 +27,8 @@ def test_radiance_is_finite_and_not_negative(light: LightConfig) -> None:
 
 def test_what_is_dark_is_dark() -> None:
     road = [
-        float(np.median(renderer_of(OTHERS, light).picture(0.0)[60:] @ LUMINANCE)) for light in (DAY, LAMPS, DARK)
+        float(np.median(renderer_of(OTHERS, light).picture(0.0)[60:] @ LUMINANCE))
+        for light in (DAY, LAMPS, DARK)
     ]
     assert road[0] > 100.0 * road[1] > 1000.0 * road[2]
 
@@ -55,7 +56,8 @@ def test_radiance_changes_continuously_with_motion(light: LightConfig) -> None:
     renderer = renderer_of(OTHERS, light)
     start = np.log(renderer.picture(0.5) @ LUMINANCE + 0.005)
     change = [
-        float(np.abs(np.log(renderer.picture(0.5 + dt) @ LUMINANCE + 0.005) - start).max()) for dt in (4e-4, 1e-4)
+        float(np.abs(np.log(renderer.picture(0.5 + dt) @ LUMINANCE + 0.005) - start).max())
+        for dt in (4e-4, 1e-4)
     ]
     # A jump would stay when the step is made smaller.
     assert change[1] < 0.4 * change[0]

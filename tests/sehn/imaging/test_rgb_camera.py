@@ -73,9 +73,7 @@ def test_motion_blur_is_as_long_as_speed_times_exposure() -> None:
         rows, columns = np.mgrid[0 : image.shape[0], 0 : image.shape[1]] + 0.5
         near = (np.abs(columns - u) < abs(other - u) / 2.0) & (np.abs(rows - v) < 40)
         weight = np.where(near, image, 0.0) / image[near].sum()
-        variance = sum(
-            float((weight * (a - (weight * a).sum()) ** 2).sum()) for a in (rows, columns)
-        )
+        variance = sum(float((weight * (a - (weight * a).sum()) ** 2).sum()) for a in (rows, columns))
         lengths.append(variance)
     assert expected > 8.0
     assert math.sqrt(12.0 * (lengths[1] - lengths[0])) == pytest.approx(expected, rel=0.06)

@@ -139,9 +139,9 @@ def test_a_scaled_camera_sees_the_same_directions() -> None:
 
 
 def test_settings_that_are_not_valid_are_refused() -> None:
-    with pytest.raises(ConfigError, match="render.width"):
+    with pytest.raises(ConfigError, match=r"render\.width"):
         small({"render": {"width": 3}})
-    with pytest.raises(ConfigError, match="did you mean imaging.evt.threshold_on"):
+    with pytest.raises(ConfigError, match=r"did you mean imaging\.evt\.threshold_on"):
         small({"evt": {"treshold_on": 0.2}})
     with pytest.raises(ConfigError, match="frames"):
         RenderedSource(load_scenario("day"), small(), frames=0)
