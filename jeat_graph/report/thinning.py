@@ -39,6 +39,25 @@ def extremes(t: FloatArray, y: FloatArray, bins: int) -> IntArray:
     return np.unique(np.concatenate([[0], order[first], order[last], [len(t) - 1]]))
 
 
+def sample(t: FloatArray, y: FloatArray, most: int) -> IntArray:
+    """Choose an even sample of single points, and beside it the greatest value in each stretch of time.
+
+    Extremes alone would show a cloud of points as two bands.
+
+    Args:
+        t: (N,) ascending (s).
+        y: (N,) values, without NaN.
+        most: about how many to choose.
+    """
+    if len(t) <= most:
+        return np.arange(len(t), dtype=np.int64)
+    edges = spread(len(t), most // 6)
+    part = np.searchsorted(edges, np.arange(len(t)), side="right")
+    order = np.lexsort((-y, part))
+    peaks = order[np.flatnonzero(np.diff(part[order], prepend=-1))]
+    return np.union1d(spread(len(t), most - len(peaks)), peaks)
+
+
 def occupied(t: FloatArray, start: float, width: float) -> list[int]:
     """Numbers of the bins of `width` (s) from `start` on that hold any of the times (N,), ascending."""
     if not len(t):

@@ -10,11 +10,11 @@ from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.diagnostics import Diagnostics
 from jeat_graph.eval.resampling import interpolate_to
 from jeat_graph.report.run_data import RunData, rows_of_tracks
-from jeat_graph.report.thinning import extremes, milliseconds, occupied, short, spread
+from jeat_graph.report.thinning import extremes, milliseconds, occupied, sample, short, spread
 from jeat_graph.trajectories import Trajectories
 
 # Points of a curve: all tracks share a budget, so that the page stays small however many there are.
-_BUDGET = 12_000
+_BUDGET = 16_000
 _MOST_POINTS, _LEAST_POINTS = 240, 30
 #: So many tracks get timelines, those that live longest; all are on the map and in the list.
 MOST_TRACKS = 600
@@ -114,7 +114,7 @@ def _curve(noted: Diagnostics, name: str, column: str, start: float, points: int
     if name in noted.sensors:
         here = (noted.sensor == noted.sensors.index(name)) & np.isfinite(values)
     t, values = noted.t[here], values[here]
-    keep = extremes(t, values, points // 2)
+    keep = extremes(t, values, points // 2) if column != "nis" else sample(t, values, points)
     return {"t": milliseconds(t[keep], start), "v": short(values[keep])}
 
 

@@ -67,3 +67,38 @@ def test_without_a_choice_the_longest_track_is_drawn_and_none_is_dimmed(full_run
     assert console == []
     assert f'aria-label="Curves of track {full_run.html.data["first"]} ' in dom
     assert '<svg id="map" class="map"' in dom
+
+
+def acting(full_run, tmp_path, script: str) -> tuple[str, list[str]]:
+    """The page after a script of ours has done what a user would do."""
+    page = tmp_path / "acting.html"
+    text = full_run.page.read_text(encoding="utf-8")
+    page.write_text(text.replace("</body>", f"<script>{script}</script></body>"), encoding="utf-8")
+    return dump(page.as_uri(), tmp_path / "profile")
+
+
+def test_a_click_in_the_list_a_key_and_the_pointer_do_what_they_say(full_run, tmp_path):
+    chosen = full_run.html.data["tracks"][5]
+    script = f"""
+      document.querySelector('tr[data-id="{chosen["id"]}"] button').click();
+      const svg = document.querySelector('#chart svg');
+      svg.dispatchEvent(new KeyboardEvent('keydown', {{key: 'End', bubbles: true}}));
+    """
+    dom, console = acting(full_run, tmp_path, script)
+    assert console == []
+    assert f'aria-label="Curves of track {chosen["id"]} ' in dom
+    last = (chosen["to"] + full_run.html.data["start_ms"]) / 1000
+    assert f"t = {last:.2f} s" in re.search(r'id="read".*?</p>', dom, re.DOTALL).group(0)
+
+
+def test_next_goes_on_to_the_following_track_and_round(full_run, tmp_path):
+    ids = [one["id"] for one in full_run.html.data["tracks"]]
+    script = f"""
+      const pick = document.getElementById('pick');
+      pick.value = '{ids[-1]}';
+      pick.dispatchEvent(new Event('change'));
+      document.getElementById('after').click();
+    """
+    dom, console = acting(full_run, tmp_path, script)
+    assert console == []
+    assert f'aria-label="Curves of track {ids[0]} ' in dom

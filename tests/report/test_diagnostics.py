@@ -37,7 +37,9 @@ def collect(config, detections):
 
 
 def test_nis_is_that_of_an_independent_filter_over_the_same_measurements(recording):
-    config = load_config("default", ["standing.enabled=false", "motion.jerk_per_size=0"])
+    config = load_config(
+        "default", ["standing.enabled=false", "motion.jerk_per_size=0", "motion.jerk_per_growth=0"]
+    )
     one_sensor = recording.select(["rgb"])
     table = collect(config, one_sensor)
     records, _ = record_tracks(config, one_sensor)
