@@ -16,98 +16,22 @@ import os
 import re
 from collections import OrderedDict
 from collections.abc import Iterator
-from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.arrays import FloatArray, IntArray
-from jeat_graph.errors import ConfigError, DataError
-from jeat_graph.io.atomic import atomic_path
+from jeat_graph.errors import DataError
 
 RgbImage = npt.NDArray[np.uint8]
 
 VIDEO_FILES = {"mp4": "frames.mp4", "lossless": "frames.avi", "png": "frames"}
 FRAME_TIMES = "frames.csv"
-_CODECS = {"mp4": "mp4v", "lossless": "FFV1"}
 _PICTURES = (".png", ".jpg", ".jpeg")
 _US_PER_S = 1e6
 _KEPT_FRAMES = 32  # decoded frames that a reader keeps, for steps backwards
-
-
-class FrameWriter:
-    """A context manager that writes frames; a video, and `frames.csv`, appear only when it has ended well.
-
-    Args:
-        folder: where the frames and `frames.csv` go.
-        video: `mp4`, `lossless` or `png`.
-        size_px: width and height.
-        rate_hz: frame rate that the video file declares; the true times are in `frames.csv`.
-
-    Raises:
-        ConfigError: no such kind of video.
-    """
-
-    def __init__(self, folder: str | Path, video: str, size_px: tuple[int, int], rate_hz: float) -> None:
-        if video not in VIDEO_FILES:
-            raise ConfigError(f"video must be one of {', '.join(VIDEO_FILES)}, not {video!r}")
-        self._folder, self._video, self._size_px, self._rate_hz = Path(folder), video, size_px, rate_hz
-        self._stack = ExitStack()
-        self._times: list[int] = []
-        self._target = Path()
-        self._sink: Any = None
-
-    def __enter__(self) -> Self:
-        target = self._folder / VIDEO_FILES[self._video]
-        if self._video == "png":
-            target.mkdir(parents=True, exist_ok=True)
-            self._target = target
-        else:
-            self._target = self._stack.enter_context(atomic_path(target))
-            self._sink = _open_sink(self._target, _CODECS[self._video], self._rate_hz, self._size_px)
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        if self._sink is not None:
-            self._sink.release()
-        self._stack.__exit__(kind, error, trace)
-        if error is None:
-            from jeat_graph.io.table_writer import write_columns
-
-            t_us = np.array(self._times, dtype=np.int64)
-            write_columns({"index": np.arange(len(t_us)), "t_us": t_us}, self._folder / FRAME_TIMES)
-
-    def append(self, t_us: int, rgb: RgbImage) -> None:
-        """Add a frame.
-
-        Args:
-            t_us: its time (µs), after that of the frame before.
-            rgb: (H, W, 3) in the order red, green, blue.
-
-        Raises:
-            DataError: the time does not go on, or the picture has another size.
-        """
-        import cv2
-
-        width, height = self._size_px
-        if rgb.shape != (height, width, 3) or rgb.dtype != np.uint8:
-            raise DataError(f"frame must be ({height}, {width}, 3) uint8, not {rgb.shape} {rgb.dtype}")
-        if self._times and t_us <= self._times[-1]:
-            raise DataError(f"frame at {t_us} µs does not follow the one at {self._times[-1]} µs")
-        bgr = np.ascontiguousarray(rgb[..., ::-1])
-        if self._video == "png":
-            _write_png(self._target / f"{len(self._times):06d}.png", cv2.imencode(".png", bgr)[1])
-        else:
-            self._sink.write(bgr)
-        self._times.append(t_us)
 
 
 class FrameSource:
@@ -274,7 +198,7 @@ class _Video(_Decoder):
         import cv2
 
         self._path = path
-        self._capture = _quietly(lambda: cv2.VideoCapture(str(path), cv2.CAP_FFMPEG))
+        self._capture = quietly(lambda: cv2.VideoCapture(str(path), cv2.CAP_FFMPEG))
         if not self._capture.isOpened():
             raise DataError("is not a video that can be read", path)
         self._next = 0
@@ -327,11 +251,7 @@ def _natural(name: str) -> tuple[tuple[int, str], ...]:
     return tuple((int(part), "") if part.isdigit() else (0, part) for part in re.split(r"(\d+)", name))
 
 
-def _write_png(path: Path, data: npt.NDArray[np.uint8]) -> None:
-    path.write_bytes(data.tobytes())
-
-
-def _quietly(call: Any) -> Any:
+def quietly(call: Any) -> Any:
     """Call OpenCV without the lines that it and FFmpeg write to stderr about files they cannot read."""
     import cv2
 
@@ -343,13 +263,3 @@ def _quietly(call: Any) -> Any:
         return call()
     finally:
         cv2.utils.logging.setLogLevel(level)
-
-
-def _open_sink(path: Path, codec: str, rate_hz: float, size_px: tuple[int, int]) -> Any:
-    import cv2
-
-    code = cv2.VideoWriter.fourcc(*codec)
-    sink = _quietly(lambda: cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, rate_hz, size_px))
-    if not sink.isOpened():
-        raise DataError(f"this build of OpenCV cannot write {codec} video; take --video png", path)
-    return sink

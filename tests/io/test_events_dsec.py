@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 
 from jeat_graph.errors import ConfigError, DataError
 from jeat_graph.events import EventArray
-from jeat_graph.io import events_dsec
-from jeat_graph.io.events_dsec import COMPRESSIONS, EventFile, EventWriter
+from jeat_graph.io import events_dsec_writer
+from jeat_graph.io.events_dsec import EventFile
+from jeat_graph.io.events_dsec_writer import COMPRESSIONS, EventWriter
 
 SIZE = (64, 48)
 
@@ -103,7 +104,7 @@ def test_the_layout_is_that_of_dsec(tmp_path: Path) -> None:
 
 
 def test_the_bytes_do_not_depend_on_how_the_events_are_cut(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(events_dsec, "CHUNK_ROWS", 256)
+    monkeypatch.setattr(events_dsec_writer, "CHUNK_ROWS", 256)
     events = random_events(2000, 50_000)
     whole = write(tmp_path / "a.h5", events).read_bytes()
     pieces = [events.take(slice(k, k + 77)) for k in range(0, 2000, 77)]

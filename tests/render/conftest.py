@@ -8,10 +8,10 @@ import pytest
 
 from jeat_graph.cli.main import main
 from jeat_graph.events import EventArray
-from jeat_graph.io.events_dsec import EventWriter
+from jeat_graph.io.events_dsec_writer import EventWriter
 from jeat_graph.io.trajectories_io import write_trajectories
 from jeat_graph.io.truth_io import write_truth
-from jeat_graph.io.video import FrameWriter
+from jeat_graph.io.video_writer import FrameWriter
 from jeat_graph.trajectories import GroundTruth, Trajectories
 
 WIDTH, HEIGHT = 160, 96

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from jeat_graph.errors import ConfigError
-from jeat_graph.io.events_dsec import compression_filter
+from jeat_graph.io.events_dsec_writer import compression_filter
 from jeat_graph.io.video import VIDEO_FILES
 
 SPLITS = ("train", "val", "test")

@@ -14,9 +14,9 @@ import numpy as np
 
 from jeat_graph.errors import DataError
 from jeat_graph.io.atomic import open_atomic
-from jeat_graph.io.events_dsec import EventWriter
+from jeat_graph.io.events_dsec_writer import EventWriter
 from jeat_graph.io.hashing import sha256_of
-from jeat_graph.io.video import FrameWriter
+from jeat_graph.io.video_writer import FrameWriter
 from jeat_graph.sehn.dataset.layout import EVENTS, SEGMENT_JSON, partial_folder, segment_folder, segment_name
 from jeat_graph.sehn.dataset.protocol import Protocol
 from jeat_graph.sehn.dataset.truth_files import SegmentTruth
