@@ -40,6 +40,8 @@ STEPS = (
             "sensors.*.sigma_log_width",
             "sensors.*.sigma_log_height",
         ),
+        # What the likelihood of the innovations finds best as long as nothing is known of perspective.
+        {"motion.jerk_per_size": 2.0, "motion.jerk_per_growth": 0.0},
     ),
     Step("+ size in the gate", ("association.size_gate", "association.gate_probability")),
     Step(
@@ -65,6 +67,8 @@ STEPS = (
     Step("+ blindness of the event camera", ("sensors.*.blind_speed",)),
     Step("+ P_D of each track, hidden vehicles", ("lifecycle.hidden_prior", "lifecycle.p_detect_weight")),
     Step("+ standing tracks", ("standing",)),
+    Step("+ errors with memory", ("sensors.*.correlated_share", "sensors.*.memory_s")),
+    Step("+ jerk by perspective", ("motion",)),
 )
 
 
