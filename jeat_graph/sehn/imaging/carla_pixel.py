@@ -7,7 +7,7 @@ tick to tick and mixes the results over time, it adds film grain, and it rounds.
 noise added before the rounding.
 
 An event is *by motion* if the same logarithm of the picture before noise and rounding has itself gone at
-least half of the nominal threshold in the event's direction since the pixel's event before.
+least half of the nominal threshold in the event's direction since the sensor last moved the pixel's reference.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class CarlaState(NamedTuple):
         reference: level of the last crossing.
         stamp: time of the last event (µs); below 0 for none.
         clean: logarithm of the picture before noise and rounding, at the last tick.
-        at_event: the same at the last event.
+        at_reference: the same when the reference was last moved.
         random: states of the pixels' random numbers.
     """
 
@@ -57,7 +57,7 @@ class CarlaState(NamedTuple):
     reference: FloatArray
     stamp: FloatArray
     clean: FloatArray
-    at_event: FloatArray
+    at_reference: FloatArray
     random: npt.NDArray[np.uint64]
 
 
@@ -137,11 +137,11 @@ def carla_advance(
         while (before < level <= now) if brighter else (now <= level < before):
             share = (level - before) / (now - before)
             t = start + share * (end - start)
+            true = clean_before + share * (clean - clean_before)
             if state.stamp[i] < 0.0 or t - state.stamp[i] >= model.refractory_us:
-                true = clean_before + share * (clean - clean_before)
-                by_motion = sign * (true - state.at_event[i]) >= 0.5 * nominal
+                by_motion = sign * (true - state.at_reference[i]) >= 0.5 * nominal
                 put(sink, t, i, brighter, by_motion)
                 state.stamp[i] = t
-                state.at_event[i] = true
             state.reference[i] = level
+            state.at_reference[i] = true
             level += sign * threshold

@@ -6,8 +6,8 @@ adds, after v2e: a photoreceptor whose bandwidth falls with light, thresholds th
 dead time, leak, and shot noise.
 
 An event is *by motion* if the noise-free signal (the photoreceptor's output, without leak and noise) has
-itself gone at least half a threshold in the event's direction since the pixel's event before; else noise
-had the larger share in it.
+itself gone at least half a threshold in the event's direction since the pixel's last reset, which is the end
+of its last event's dead time; else noise had the larger share in it.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class PixelState(NamedTuple):
         signal: logarithm of the photocurrent at the last sample.
         output: the photoreceptor's output at the last sample.
         reference: output at the last event, less what has leaked since.
-        at_event: output, noise-free, at the last event.
+        at_reset: output, noise-free, when the pixel was last reset.
         blind_until: end of the dead time (µs).
         next_shot: next candidate of shot noise (µs).
         random: states of the pixels' random numbers.
@@ -73,7 +73,7 @@ class PixelState(NamedTuple):
     signal: FloatArray
     output: FloatArray
     reference: FloatArray
-    at_event: FloatArray
+    at_reset: FloatArray
     blind_until: FloatArray
     next_shot: FloatArray
     random: npt.NDArray[np.uint64]
@@ -114,7 +114,7 @@ def make_state(model: PixelModel, luminance: FloatArray, rng: np.random.Generato
         signal=signal,
         output=signal.copy(),
         reference=signal - phase * model.on,
-        at_event=signal.copy(),
+        at_reset=signal.copy(),
         blind_until=np.full(count, -np.inf),
         next_shot=_first_shots(random, model.shot),
         random=random,
@@ -195,6 +195,7 @@ def advance(
                     break
                 now = blind
                 reference = first + slope * (now - start)
+                state.at_reset[i] = first + true_slope * (now - start)
             crossing = math.inf
             if slope > 0.0:
                 crossing = start + (reference + on - first) / slope
@@ -207,7 +208,7 @@ def advance(
                 brighter = slope > 0.0
                 reference += on if brighter else -off
                 true = first + true_slope * (now - start)
-                change = true - state.at_event[i]
+                change = true - state.at_reset[i]
                 by_motion = change >= 0.5 * on if brighter else -change >= 0.5 * off
             elif shot <= end:
                 now = max(shot, now)
@@ -222,7 +223,7 @@ def advance(
             else:
                 break
             put(sink, now, i, brighter, by_motion)
-            state.at_event[i] = true
+            state.at_reset[i] = true
             if model.refractory > 0.0:
                 blind = now + model.refractory
         state.blind_until[i] = blind
