@@ -60,7 +60,7 @@ def unscale_gain(gain: FloatArray) -> FloatArray:
 def segment_rows(
     dims: tuple[int, ...],
     ends: IntArray,
-    dt: FloatArray,
+    t: FloatArray,
     q: FloatArray,
     memory: FloatArray,
     row: IntArray,
@@ -80,8 +80,8 @@ def segment_rows(
     Args:
         dims: any tuple of n elements (`passes.py`).
         ends: (S + 1,) the states that GTSAM knows, ascending; those in between are eliminated.
-        dt: (N,) step that ends at each state (s), > 0 after the first.
-        q: (N,) root spectral density of the jerk over it (px/s^2.5), > 0.
+        t: (N,) times of all states (s), ascending.
+        q: (N,) root spectral density of the jerk over the step that ends at each (px/s^2.5), > 0.
         memory: (B,) memory of the error states (s).
         row: (M,) state of each measurement, ascending.
         z: (M, 2) measurements (px).
@@ -118,9 +118,10 @@ def segment_rows(
             old[:] = 0.0
             c[:] = 0.0
             for k in range(ends[s] + 1, last + 1):
-                error_steps(dt[k], memory, phi, var)
-                step_cov(dims, dt[k], q[k], phi, var, old, moved, P)
-                _step_rows(dims, dt[k], phi, reference[k - 1, a], reference[k, a], A, c)
+                dt = t[k] - t[k - 1]
+                error_steps(dt, memory, phi, var)
+                step_cov(dims, dt, q[k], phi, var, old, moved, P)
+                _step_rows(dims, dt, phi, reference[k - 1, a], reference[k, a], A, c)
                 while i < len(row) and row[i] == k:
                     e = error[i] + 3
                     h = lever[i, a] if e >= 3 else 0.0

@@ -47,7 +47,7 @@ class FixedLagSmoother:
 
     Attributes:
         rebuilds: how often GTSAM failed and the window was built anew from our arrays.
-        fallbacks: how often that failed as well, and our own pass gave the values.
+        fallbacks: how often our own pass gave the values, because that failed as well or came too late.
         too_late: measurements refused because they were older than the window.
     """
 
@@ -103,7 +103,7 @@ class FixedLagSmoother:
         """
         window = self._live()
         taken = check_measurements(t, z, r, q, lever, error, len(self._memory))
-        newest = window.t[-1] + COINCIDENT_S
+        newest = window.newest + COINCIDENT_S
         if taken.t.min(initial=np.inf) <= newest:
             late = taken.t <= newest
             self._take_late(taken.take(late))
@@ -122,7 +122,8 @@ class FixedLagSmoother:
     def current(self) -> SmoothedTrack:
         """Return the states inside the window, given all measurements so far; the last is the filter's."""
         self._absorb()
-        return self._smoothed(len(self._live().key_rows()))
+        keys = self._live().key_rows()
+        return self._smoothed(keys, len(keys))
 
     def finish(self) -> SmoothedTrack:
         """Return all states not yet returned by `departed`, and close."""
@@ -149,13 +150,12 @@ class FixedLagSmoother:
             return
         taken = Measurements.concatenate(self._pending).by_time()
         self._pending, self._waiting = [], 0
-        key, first = group_times(taken.t, float(window.t[-1]))
-        old = len(window.t)
-        window.append(taken.t[first], key - 1, taken)
+        key, opens = group_times(taken.t, window.newest)
+        window.append(taken.t[opens], key - 1, taken, opens)
         if self._gtsam is not None:
             # The newest row is an anchor always, so that GTSAM knows all measurements.
-            last = len(window.t) - 1
-            self._extend(self._gtsam, np.append(np.arange(old - 1, last, STRIDE), last))
+            last = window.end - 1
+            self._extend(self._gtsam, np.append(np.arange(last - len(opens), last, STRIDE), last))
         elif self._use_gtsam:
             self._rebuild()
         self._depart()
@@ -164,7 +164,7 @@ class FixedLagSmoother:
         """Add late measurements to the window; GTSAM's is to be built anew."""
         window = self._live()
         for t, z, r, _, lever, error in zip(*late, strict=True):
-            if t < window.t[0] - COINCIDENT_S:
+            if t < window.t[window.first] - COINCIDENT_S:
                 self.too_late += 1
                 continue
             window.insert(float(t), z, r, lever, int(error))
@@ -174,8 +174,10 @@ class FixedLagSmoother:
         """Add all steps and measurements after the row `ends`[0], an anchor, and make the others anchors."""
         w = self._live()
         count = len(ends) - 1
-        steps = ((0,) * w.size, ends, w.steps(), w.q, w.memory)
-        rows = factors.segment_rows(*steps, w.row, w.z, w.info, w.lever, w.error, w.reference)
+        steps = ((0,) * w.size, ends, w.t, w.q, w.memory)
+        taken = slice(w.taken, w.taken_end)
+        measured = (w.z[taken], w.info[taken], w.lever[taken], w.error[taken])
+        rows = factors.segment_rows(*steps, w.row[taken], *measured, w.reference)
         graph.add_segments(int(w.anchor[ends[0]]), *rows)
         w.anchor[ends[1:]] = np.arange(self._next, self._next + count)
         self._next += count
@@ -185,7 +187,8 @@ class FixedLagSmoother:
         window, first = self._live(), self._next
         graph = factors.LinearGraph(window.size)
         self._segments(graph, ends)
-        oldest = int(window.anchor[window.anchor >= 0][0])
+        anchors = window.anchor[window.first : window.end]
+        oldest = int(anchors[np.argmax(anchors >= 0)])
         try:
             gtsam.update(graph, first, self._next - first, range(self._oldest, oldest))
             self._oldest = oldest
@@ -197,20 +200,21 @@ class FixedLagSmoother:
         """Build GTSAM's window from our arrays; without GTSAM until the next chunk if that fails."""
         window = self._live()
         self._gtsam, self._outdated = None, False
-        window.anchor[:] = -1
-        window.anchor[0] = self._oldest = self._next
+        window.anchor[window.first : window.end] = -1
+        window.anchor[window.first] = self._oldest = self._next
         self._next += 1
         graph = factors.LinearGraph(window.size)
         try:
-            first = int(np.searchsorted(window.row, 0, side="right"))
+            held = window.row[window.taken : window.taken_end]
+            here = slice(window.taken, window.taken + int(np.searchsorted(held, window.first, side="right")))
             prior = factors.prior_rows(
                 window.base_mean,
                 window.base_cov,
-                window.reference[0],
-                window.z[:first],
-                window.info[:first],
-                window.lever[:first],
-                window.error[:first],
+                window.reference[window.first],
+                window.z[here],
+                window.info[here],
+                window.lever[here],
+                window.error[here],
             )
             graph.add_prior(self._oldest, *prior)
             rows = window.key_rows()
@@ -222,53 +226,56 @@ class FixedLagSmoother:
         except (*_GTSAM_ERRORS, np.linalg.LinAlgError):
             self.fallbacks += 1
 
-    def _smoothed(self, count: int) -> SmoothedTrack:
-        """Return the first `count` keys, smoothed with all measurements that the window holds."""
+    def _smoothed(self, keys: npt.NDArray[np.int64], count: int) -> SmoothedTrack:
+        """Return the first `count` of the window's keys (K,), smoothed with all its measurements."""
         window = self._live()
-        keys = window.key_rows()
-        rows = int(keys[count]) if count < len(keys) else len(window.t)
+        end = int(keys[count]) if count < len(keys) else window.end
         if self._outdated:
             self._rebuild()
         if self._gtsam is None:
-            means, cov, gain = window.smooth(rows)
+            means, cov, gain = window.smooth(end - window.first)
         else:
-            anchors = np.flatnonzero(window.anchor >= 0)
-            anchors = anchors[: int(np.searchsorted(anchors, rows - 1)) + 1]
-            means, cov, gain = window.smooth(int(anchors[-1]) + 1)
-            means = self._gtsam_means(anchors, means, gain)[:rows]
-        # States are a Markov chain, so the gain over several steps is the product of theirs.
-        for row in np.flatnonzero(~window.is_key[:rows])[::-1]:
-            gain[row - 1] = gain[row - 1] @ gain[row]
+            anchors = window.first + np.flatnonzero(window.anchor[window.first : window.end] >= 0)
+            anchors = anchors[: int(np.searchsorted(anchors, end - 1)) + 1]
+            means, cov, gain = window.smooth(int(anchors[-1]) + 1 - window.first)
+            means = self._gtsam_means(self._gtsam, anchors, means, gain)
         chosen = keys[:count]
-        return SmoothedTrack(window.t[chosen], window.q[chosen], means[chosen], cov[chosen], gain[chosen])
+        t, q = window.t[chosen], window.q[chosen]
+        if not window.late:
+            return SmoothedTrack(t, q, means[:count], cov[:count], gain[:count])
+        # States are a Markov chain, so the gain over several steps is the product of theirs.
+        for row in np.flatnonzero(~window.is_key[window.first : end])[::-1]:
+            gain[row - 1] = gain[row - 1] @ gain[row]
+        chosen = chosen - window.first
+        return SmoothedTrack(t, q, means[chosen], cov[chosen], gain[chosen])
 
-    def _gtsam_means(self, anchors: npt.NDArray[np.int64], own: FloatArray, gain: FloatArray) -> FloatArray:
+    def _gtsam_means(
+        self, gtsam: GtsamWindow, anchors: npt.NDArray[np.int64], own: FloatArray, gain: FloatArray
+    ) -> FloatArray:
         """Return GTSAM's means (N, 2, n) of the rows up to the last of `anchors`, or `own` if it fails."""
         window = self._live()
-        for _ in range(2):
-            if self._gtsam is None:
-                break
-            try:
-                numbers = window.anchor[anchors].tolist()
-                known = self._gtsam.means(numbers, window.reference[anchors])
-            except _GTSAM_ERRORS:
-                self.rebuilds += 1
-                self._rebuild()
-                continue
-            out = np.empty_like(own)
-            out[anchors] = known
-            dims = (0,) * window.size
-            fill_back(dims, window.steps(), window.memory, anchors, window.mean, gain, out)
-            return out
-        return own
+        try:
+            known = gtsam.means(window.anchor[anchors].tolist(), window.reference[anchors])
+        except _GTSAM_ERRORS:
+            self.rebuilds += 1
+            self.fallbacks += 1
+            self._rebuild()
+            return own
+        out, rows, here = np.empty_like(own), anchors - window.first, slice(window.first, window.end)
+        out[rows] = known
+        model = ((0,) * window.size, window.t[here], window.memory)
+        fill_back(*model, rows, window.mean[here], gain, out)
+        return out
 
     def _depart(self) -> None:
         """Emit the states that are final by now, and drop them from the window."""
         window = self._live()
-        rows = window.key_rows()
-        old = int(np.searchsorted(window.t[rows], window.t[-1] - self.lag_s, side="right"))
-        count = min(old, len(rows) - self.chunk)
+        keys = window.key_rows()
+        if len(keys) <= self.chunk:
+            return
+        old = int(np.searchsorted(window.t[keys], window.newest - self.lag_s, side="right"))
+        count = min(old, len(keys) - self.chunk)
         if count <= 0:
             return
-        self._departed.append(self._smoothed(count))
-        window.drop_before(int(rows[count]))
+        self._departed.append(self._smoothed(keys, count))
+        window.drop_before(int(keys[count]))

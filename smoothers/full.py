@@ -12,7 +12,7 @@ from numba import njit
 
 from jeat_graph.arrays import FloatArray
 from jeat_graph.smoothers import factors
-from jeat_graph.smoothers.rts import filter_track, information, steps_of
+from jeat_graph.smoothers.rts import filter_track, information
 from jeat_graph.smoothers.track_data import SmoothedTrack, TrackData
 
 
@@ -54,7 +54,7 @@ def smooth_full(track: TrackData, weights: FloatArray | None = None) -> Smoothed
     segments = factors.segment_rows(
         (0,) * track.size,
         np.arange(len(track)),
-        steps_of(track),
+        track.t,
         track.q,
         track.memory,
         track.key,

@@ -89,9 +89,98 @@ def step_cov(
 
 
 @njit(cache=True)
+def filter_rows(
+    dims: tuple[int, ...],
+    first: int,
+    end: int,
+    taken: int,
+    given: bool,
+    t: FloatArray,
+    q: FloatArray,
+    memory: FloatArray,
+    row: IntArray,
+    z: FloatArray,
+    info: FloatArray,
+    lever: FloatArray,
+    error: IntArray,
+    mean: FloatArray,
+    cov: FloatArray,
+    gain: FloatArray,
+    innovation: FloatArray,
+    variance: FloatArray,
+) -> None:
+    """Kalman filter over some keys of one track (paper eq. 2 to 4), in place.
+
+    The update is in Joseph form, so that no rounding makes a covariance indefinite; coincident
+    measurements are taken in one after the other.
+
+    Args:
+        dims: any tuple of n elements.
+        first: the first key to filter.
+        end: the key after the last.
+        taken: the first measurement of these keys.
+        given: whether the first key's state is there already, but for its measurements; otherwise it is
+            predicted from the key before.
+        t: (N,) times of all keys (s).
+        q: (N,) root spectral density of the jerk over the step that ends at each (px/s^2.5).
+        memory: (B,) memory of the error states (s).
+        row: (M,) key of each measurement, ascending.
+        z: (M, 2) measurements (px).
+        info: (M, 2) their information (1/px²), > 0: of the white part alone.
+        lever: (M, 2) factor of the error state in each (px).
+        error: (M,) its index, or -1.
+        mean: (N, 2, n) filtered means.
+        cov: (N, 2, n, n) filtered covariances.
+        gain: (M, 2, n) gain of each measurement.
+        innovation: (M, 2) its innovation (px).
+        variance: (M, 2) the variance of that (px²).
+    """
+    n = len(dims)
+    phi, var = np.empty(n - 3), np.empty(n - 3)
+    moved = np.empty((n, n))
+    seen = np.empty(n)
+    i = taken
+    for k in range(first, end):
+        if k > first or not given:
+            dt = t[k] - t[k - 1]
+            error_steps(dt, memory, phi, var)
+            for a in range(2):
+                _step_mean(dims, dt, phi, mean[k - 1, a], mean[k, a])
+                step_cov(dims, dt, q[k], phi, var, cov[k - 1, a], moved, cov[k, a])
+        while i < len(row) and row[i] == k:
+            e = error[i] + 3
+            for a in range(2):
+                m, P = mean[k, a], cov[k, a]
+                h = lever[i, a] if e >= 3 else 0.0
+                y = z[i, a] - m[0]
+                for j in range(n):
+                    seen[j] = P[0, j]
+                if e >= 3:
+                    y -= h * m[e]
+                    for j in range(n):
+                        seen[j] += h * P[e, j]
+                    S = seen[0] + h * seen[e] + 1.0 / info[i, a]
+                else:
+                    S = seen[0] + 1.0 / info[i, a]
+                K = gain[i, a]
+                for j in range(n):
+                    K[j] = seen[j] / S
+                    m[j] += K[j] * y
+                for j in range(n):
+                    for c in range(j + 1):
+                        # (I - K H) P (I - K H)ᵀ + K r Kᵀ written out.
+                        new = P[j, c] + (K[j] * S * K[c] - K[j] * seen[c] - seen[j] * K[c])
+                        P[j, c] = new
+                        P[c, j] = new
+                innovation[i, a] = y
+                variance[i, a] = S
+            i += 1
+
+
+@njit(cache=True)
 def forward(
     dims: tuple[int, ...],
-    dt: FloatArray,
+    t: FloatArray,
     q: FloatArray,
     memory: FloatArray,
     row: IntArray,
@@ -103,77 +192,37 @@ def forward(
     prior_mean: FloatArray,
     prior_cov: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Kalman filter of many tracks whose keys lie one after the other (paper eq. 2 to 4).
-
-    The update is in Joseph form, so that no rounding makes a covariance indefinite; coincident
-    measurements are taken in one after the other.
+    """Filter many tracks whose keys lie one after the other.
 
     Args:
         dims: any tuple of n elements.
-        dt: (N,) step from the key before (s); not used at the first key of a track.
-        q: (N,) root spectral density of the jerk over that step (px/s^2.5).
-        memory: (B,) memory of the error states (s).
-        row: (M,) key of each measurement, ascending.
-        z: (M, 2) measurements (px).
-        info: (M, 2) their information (1/px²), > 0: of the white part alone.
-        lever: (M, 2) factor of the error state in each (px).
-        error: (M,) its index, or -1.
+        t: (N,) as for `filter_rows`, ascending within each track.
+        q: (N,) as for `filter_rows`.
+        memory: (B,) as for `filter_rows`.
+        row: (M,) as for `filter_rows`.
+        z: (M, 2) as for `filter_rows`.
+        info: (M, 2) as for `filter_rows`.
+        lever: (M, 2) as for `filter_rows`.
+        error: (M,) as for `filter_rows`.
         start: (T + 1,) first key of each track, and N.
         prior_mean: (T, 2, n) prior at the first key of each track.
         prior_cov: (T, 2, n, n) its covariance.
 
     Returns:
-        (N, 2, n) filtered means, (N, 2, n, n) filtered covariances; and for the way back, by measurement,
+        (N, 2, n) filtered means and (N, 2, n, n) filtered covariances; and for the way back, by measurement,
         (M, 2, n) gains, (M, 2) innovations (px) and (M, 2) their variances (px²).
     """
     n = len(dims)
-    mean = np.empty((len(dt), 2, n))
-    cov = np.empty((len(dt), 2, n, n))
+    mean, cov = np.empty((len(t), 2, n)), np.empty((len(t), 2, n, n))
     gain = np.empty((len(row), 2, n))
-    innovation = np.empty((len(row), 2))
-    variance = np.empty((len(row), 2))
-    phi, var = np.empty(n - 3), np.empty(n - 3)
-    moved = np.empty((n, n))
-    seen = np.empty(n)
-    i = 0
+    innovation, variance = np.empty((len(row), 2)), np.empty((len(row), 2))
     for track in range(len(start) - 1):
-        for k in range(start[track], start[track + 1]):
-            if k == start[track]:
-                mean[k] = prior_mean[track]
-                cov[k] = prior_cov[track]
-            else:
-                error_steps(dt[k], memory, phi, var)
-                for a in range(2):
-                    _step_mean(dims, dt[k], phi, mean[k - 1, a], mean[k, a])
-                    step_cov(dims, dt[k], q[k], phi, var, cov[k - 1, a], moved, cov[k, a])
-            while i < len(row) and row[i] == k:
-                e = error[i] + 3
-                for a in range(2):
-                    m, P = mean[k, a], cov[k, a]
-                    h = lever[i, a] if e >= 3 else 0.0
-                    y = z[i, a] - m[0]
-                    for j in range(n):
-                        seen[j] = P[0, j]
-                    if e >= 3:
-                        y -= h * m[e]
-                        for j in range(n):
-                            seen[j] += h * P[e, j]
-                        S = seen[0] + h * seen[e] + 1.0 / info[i, a]
-                    else:
-                        S = seen[0] + 1.0 / info[i, a]
-                    K = gain[i, a]
-                    for j in range(n):
-                        K[j] = seen[j] / S
-                        m[j] += K[j] * y
-                    for j in range(n):
-                        for c in range(j + 1):
-                            # (I - K H) P (I - K H)ᵀ + K r Kᵀ written out.
-                            new = P[j, c] + (K[j] * S * K[c] - K[j] * seen[c] - seen[j] * K[c])
-                            P[j, c] = new
-                            P[c, j] = new
-                    innovation[i, a] = y
-                    variance[i, a] = S
-                i += 1
+        k, end = start[track], start[track + 1]
+        mean[k] = prior_mean[track]
+        cov[k] = prior_cov[track]
+        taken = np.searchsorted(row, k)
+        model = (t, q, memory, row, z, info, lever, error)
+        filter_rows(dims, k, end, taken, True, *model, mean, cov, gain, innovation, variance)
     return mean, cov, gain, innovation, variance
 
 
@@ -316,16 +365,93 @@ def _gain(
 
 
 @njit(cache=True)
+def smooth_rows(
+    dims: tuple[int, ...],
+    first: int,
+    end: int,
+    taken: int,
+    wanted: int,
+    t: FloatArray,
+    q: FloatArray,
+    memory: FloatArray,
+    row: IntArray,
+    lever: FloatArray,
+    error: IntArray,
+    mean: FloatArray,
+    cov: FloatArray,
+    gain: FloatArray,
+    innovation: FloatArray,
+    variance: FloatArray,
+    out_mean: FloatArray,
+    out_cov: FloatArray,
+    out_gain: FloatArray,
+) -> None:
+    """Smooth some keys of one track, given what `filter_rows` has made of them.
+
+    Args:
+        dims: any tuple of n elements.
+        first: the first key.
+        end: the key after the last.
+        taken: the measurement after the last of these keys.
+        wanted: how many states are wanted, from the first on.
+        t: (N,) as for `filter_rows`.
+        q: (N,) as for `filter_rows`.
+        memory: (B,) as for `filter_rows`.
+        row: (M,) as for `filter_rows`.
+        lever: (M, 2) as for `filter_rows`.
+        error: (M,) as for `filter_rows`.
+        mean: (N, 2, n) filtered means.
+        cov: (N, 2, n, n) filtered covariances.
+        gain: (M, 2, n) gains.
+        innovation: (M, 2) innovations (px).
+        variance: (M, 2) their variances (px²).
+        out_mean: (wanted, 2, n) becomes the smoothed means.
+        out_cov: (wanted, 2, n, n) becomes their covariances.
+        out_gain: (wanted, 2, n, n) becomes the smoother gains from each key to the next, zero at the last.
+    """
+    n = len(dims)
+    phi, var = np.empty(n - 3), np.empty(n - 3)
+    lam, Lam = np.zeros((2, n)), np.zeros((2, n, n))
+    u, d = np.empty(n), np.empty(n)
+    predicted, part, L = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+    i, dt = taken - 1, 0.0
+    for k in range(end - 1, first - 1, -1):
+        if k < end - 1:
+            # dt, phi and var are those of the step from k to k + 1.
+            for a in range(2):
+                _back_over_step(dims, dt, phi, lam[a], Lam[a])
+        if k - first < wanted:
+            o = k - first
+            for a in range(2):
+                if k < end - 1:
+                    P = cov[k, a]
+                    _smoothed(dims, mean[k, a], P, lam[a], Lam[a], part, out_mean[o, a], out_cov[o, a])
+                    step_cov(dims, dt, q[k + 1], phi, var, P, part, predicted)
+                    _gain(dims, predicted, part, L, d, out_gain[o, a])
+                else:
+                    out_mean[o, a] = mean[k, a]
+                    out_cov[o, a] = cov[k, a]
+                    out_gain[o, a] = 0.0
+        while i >= 0 and row[i] == k:
+            for a in range(2):
+                h, y, S = lever[i, a], innovation[i, a], variance[i, a]
+                _back_over_measurement(dims, h, error[i] + 3, gain[i, a], y, S, lam[a], Lam[a], u)
+            i -= 1
+        if k > first:
+            dt = t[k] - t[k - 1]
+            error_steps(dt, memory, phi, var)
+
+
+@njit(cache=True)
 def backward(
     dims: tuple[int, ...],
-    dt: FloatArray,
+    t: FloatArray,
     q: FloatArray,
     memory: FloatArray,
     row: IntArray,
     lever: FloatArray,
     error: IntArray,
     start: IntArray,
-    wanted: IntArray,
     mean: FloatArray,
     cov: FloatArray,
     gain: FloatArray,
@@ -336,14 +462,13 @@ def backward(
 
     Args:
         dims: any tuple of n elements.
-        dt: (N,) as for `forward`.
+        t: (N,) as for `forward`.
         q: (N,) as for `forward`.
         memory: (B,) as for `forward`.
         row: (M,) as for `forward`.
         lever: (M, 2) as for `forward`.
         error: (M,) as for `forward`.
         start: (T + 1,) as for `forward`.
-        wanted: (T,) how many of the first keys of each track are wanted, or more.
         mean: (N, 2, n) filtered means.
         cov: (N, 2, n, n) filtered covariances.
         gain: (M, 2, n) gains.
@@ -352,60 +477,22 @@ def backward(
 
     Returns:
         (N, 2, n) smoothed means, (N, 2, n, n) covariances, and (N, 2, n, n) smoother gains; the gain in row
-        k is of the step from k to k + 1, and zero at the last key of a track. Only those wanted are filled.
+        k is of the step from k to k + 1, and zero at the last key of a track.
     """
-    n = len(dims)
-    out_mean, out_cov = np.empty_like(mean), np.empty_like(cov)
-    out_gain = np.empty_like(cov)
-    phi, var = np.empty(n - 3), np.empty(n - 3)
-    lam, Lam = np.empty((2, n)), np.empty((2, n, n))
-    u, d = np.empty(n), np.empty(n)
-    predicted, part, L = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
-    i = len(row) - 1
-    for track in range(len(start) - 2, -1, -1):
-        first, last = start[track], start[track + 1] - 1
-        lam[:] = 0.0
-        Lam[:] = 0.0
-        for k in range(last, first - 1, -1):
-            if k < last:
-                # phi and var are those of the step from k to k + 1.
-                for a in range(2):
-                    _back_over_step(dims, dt[k + 1], phi, lam[a], Lam[a])
-            if k - first < wanted[track]:
-                for a in range(2):
-                    if k < last:
-                        P = cov[k, a]
-                        _smoothed(dims, mean[k, a], P, lam[a], Lam[a], part, out_mean[k, a], out_cov[k, a])
-                        step_cov(dims, dt[k + 1], q[k + 1], phi, var, P, part, predicted)
-                        _gain(dims, predicted, part, L, d, out_gain[k, a])
-                    else:
-                        out_mean[k, a] = mean[k, a]
-                        out_cov[k, a] = cov[k, a]
-                        out_gain[k, a] = 0.0
-            while i >= 0 and row[i] == k:
-                e = error[i] + 3
-                for a in range(2):
-                    _back_over_measurement(
-                        dims,
-                        lever[i, a],
-                        e,
-                        gain[i, a],
-                        innovation[i, a],
-                        variance[i, a],
-                        lam[a],
-                        Lam[a],
-                        u,
-                    )
-                i -= 1
-            if k > first:
-                error_steps(dt[k], memory, phi, var)
+    out_mean, out_cov, out_gain = np.empty_like(mean), np.empty_like(cov), np.empty_like(cov)
+    model = (t, q, memory, row, lever, error)
+    filtered = (mean, cov, gain, innovation, variance)
+    for track in range(len(start) - 1):
+        k, end = start[track], start[track + 1]
+        out = (out_mean[k:end], out_cov[k:end], out_gain[k:end])
+        smooth_rows(dims, k, end, np.searchsorted(row, end), end - k, *model, *filtered, *out)
     return out_mean, out_cov, out_gain
 
 
 @njit(cache=True)
 def backward_between(
     dims: tuple[int, ...],
-    dt: FloatArray,
+    t: FloatArray,
     memory: FloatArray,
     row: IntArray,
     lever: FloatArray,
@@ -422,7 +509,7 @@ def backward_between(
 
     Args:
         dims: any tuple of n elements.
-        dt: (N,) as for `forward`.
+        t: (N,) as for `forward`.
         memory: (B,) as for `forward`.
         row: (M,) as for `forward`.
         lever: (M, 2) as for `forward`.
@@ -443,38 +530,30 @@ def backward_between(
     phi, var = np.empty(n - 3), np.empty(n - 3)
     lam, Lam = np.empty((2, n)), np.empty((2, n, n))
     u, part = np.empty(n), np.empty((n, n))
-    for t in range(len(at)):
+    for o in range(len(at)):
         lam[:] = 0.0
         Lam[:] = 0.0
-        i = np.searchsorted(row, until[t], side="right") - 1
-        for k in range(until[t], at[t], -1):
+        i = np.searchsorted(row, until[o], side="right") - 1
+        for k in range(until[o], at[o], -1):
             while i >= 0 and row[i] == k:
                 for a in range(2):
-                    _back_over_measurement(
-                        dims,
-                        lever[i, a],
-                        error[i] + 3,
-                        gain[i, a],
-                        innovation[i, a],
-                        variance[i, a],
-                        lam[a],
-                        Lam[a],
-                        u,
-                    )
+                    h, y, S = lever[i, a], innovation[i, a], variance[i, a]
+                    _back_over_measurement(dims, h, error[i] + 3, gain[i, a], y, S, lam[a], Lam[a], u)
                 i -= 1
-            error_steps(dt[k], memory, phi, var)
+            dt = t[k] - t[k - 1]
+            error_steps(dt, memory, phi, var)
             for a in range(2):
-                _back_over_step(dims, dt[k], phi, lam[a], Lam[a])
-        k = at[t]
+                _back_over_step(dims, dt, phi, lam[a], Lam[a])
+        k = at[o]
         for a in range(2):
-            _smoothed(dims, mean[k, a], cov[k, a], lam[a], Lam[a], part, out_mean[t, a], out_cov[t, a])
+            _smoothed(dims, mean[k, a], cov[k, a], lam[a], Lam[a], part, out_mean[o, a], out_cov[o, a])
     return out_mean, out_cov
 
 
 @njit(cache=True)
 def fill_back(
     dims: tuple[int, ...],
-    dt: FloatArray,
+    t: FloatArray,
     memory: FloatArray,
     known: IntArray,
     filtered: FloatArray,
@@ -485,7 +564,7 @@ def fill_back(
 
     Args:
         dims: any tuple of n elements.
-        dt: (N,) steps (s).
+        t: (N,) times of the keys (s).
         memory: (B,) memory of the error states (s).
         known: (A,) keys whose means are known, ascending; the last is the last of all, N - 1.
         filtered: (N, 2, n) filtered means.
@@ -500,9 +579,10 @@ def fill_back(
         if i >= 0 and known[i] == k:
             i -= 1
             continue
-        error_steps(dt[k + 1], memory, phi, var)
+        dt = t[k + 1] - t[k]
+        error_steps(dt, memory, phi, var)
         for a in range(2):
-            _step_mean(dims, dt[k + 1], phi, filtered[k, a], jump)
+            _step_mean(dims, dt, phi, filtered[k, a], jump)
             for j in range(n):
                 jump[j] = mean[k + 1, a, j] - jump[j]
             for j in range(n):

@@ -41,11 +41,6 @@ class Filtered:
         return self.mean, self.cov, self.gain, self.innovation, self.variance
 
 
-def steps_of(track: TrackData) -> FloatArray:
-    """Return the steps (K,) between keys (s), 0 for the first."""
-    return np.diff(track.t, prepend=track.t[0])
-
-
 def information(track: TrackData, weights: FloatArray | None = None) -> FloatArray:
     """Return the information (M, 2) of the white part of each measurement (1/px²), weighted by (M,)."""
     return 1.0 / track.r if weights is None else weights[:, None] / track.r
@@ -56,7 +51,7 @@ def run_filter(track: TrackData, weights: FloatArray | None = None) -> Filtered:
     return Filtered(
         *forward(
             (0,) * track.size,
-            steps_of(track),
+            track.t,
             track.q,
             track.memory,
             track.key,
@@ -120,11 +115,11 @@ def smooth_rts_batch(
         raise DataError("the tracks of a batch must have the same error states")
     start = _starts(tracks)
     dims, key = (0,) * tracks[0].size, _join([track.key + a for track, a in zip(tracks, start, strict=False)])
-    dt, q = _join([steps_of(track) for track in tracks]), _join([track.q for track in tracks])
+    t, q = _join([track.t for track in tracks]), _join([track.q for track in tracks])
     lever, error = _join([track.lever for track in tracks]), _join([track.error for track in tracks])
     filtered = forward(
         dims,
-        dt,
+        t,
         q,
         memory,
         key,
@@ -138,7 +133,7 @@ def smooth_rts_batch(
         np.stack([track.prior_mean for track in tracks]),
         np.stack([track.prior_cov for track in tracks]),
     )
-    mean, cov, gain = backward(dims, dt, q, memory, key, lever, error, start, np.diff(start), *filtered)
+    mean, cov, gain = backward(dims, t, q, memory, key, lever, error, start, *filtered)
     return [
         SmoothedTrack(track.t, track.q, mean[a:b], cov[a:b], gain[a:b])
         for track, a, b in zip(tracks, start[:-1], start[1:], strict=True)

@@ -3,6 +3,9 @@
 A window is a sequence of *rows* in order of time. Most rows are keys, states that the smoother
 estimates; a row that is none is a measurement that came late, between two keys. What lies before the
 window is summed up in its *base*, the filtered state at the first row.
+
+The arrays are longer than what they hold: new rows are written behind the last one, old ones are left
+behind, and only when the end of an array is reached everything moves, so that a chunk costs no copies.
 """
 
 from __future__ import annotations
@@ -11,10 +14,11 @@ import numpy as np
 
 from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.smoothers.measurements import COINCIDENT_S, Measurements
-from jeat_graph.smoothers.passes import backward, forward
+from jeat_graph.smoothers.passes import filter_rows, smooth_rows
 
 _ROWS = ("t", "q", "is_key", "anchor", "mean", "cov", "reference")
 _TAKEN = ("row", "z", "info", "lever", "error", "gain", "innovation", "variance")
+_ROOM = 64
 
 
 class Window:
@@ -27,6 +31,11 @@ class Window:
         memory: (n - 3,) memory of the error states (s).
 
     Attributes:
+        first: the first row of the window, as an index into all arrays of rows.
+        end: the row after the last.
+        taken: the first measurement of the window, as an index into all arrays of measurements.
+        taken_end: the measurement after the last.
+        late: how many rows are no keys.
         base_mean: (2, n) state at the first row given all before it, and given the row's own measurements
             only once they are no longer kept.
         base_cov: (2, n, n) its covariance.
@@ -44,54 +53,64 @@ class Window:
         info: (M, 2) information of their white parts (1/px²).
         lever: (M, 2) factor of their error states (px).
         error: (M,) index of these, or -1.
-        gain: (M, 2, n), innovation: (M, 2) and variance: (M, 2): what the filter made of them.
+        gain: (M, 2, n) gain with which the filter took it in.
+        innovation: (M, 2) its innovation (px).
+        variance: (M, 2) the variance of that (px²).
     """
 
     def __init__(self, t: float, mean: FloatArray, cov: FloatArray, memory: FloatArray) -> None:
-        size = mean.shape[1]
+        n = int(mean.shape[1])
+        self.size = n
+        self.first, self.end, self.taken, self.taken_end, self.late = 0, 1, 0, 0, 0
         self.base_mean, self.base_cov, self.memory = mean, cov, memory
-        self.t = np.array([t])
-        self.q = np.zeros(1)
-        self.is_key = np.ones(1, dtype=np.bool_)
-        self.anchor = np.full(1, -1, dtype=np.int64)
-        self.mean, self.cov = mean[None].copy(), cov[None].copy()
-        self.reference = self.mean
-        self.row, self.error = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-        self.z, self.info, self.lever = np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2))
-        self.gain, self.innovation, self.variance = np.zeros((0, 2, size)), np.zeros((0, 2)), np.zeros((0, 2))
+        self.t, self.q = np.empty(_ROOM), np.zeros(_ROOM)
+        self.is_key = np.ones(_ROOM, dtype=np.bool_)
+        self.anchor = np.full(_ROOM, -1, dtype=np.int64)
+        self.mean, self.cov = np.empty((_ROOM, 2, n)), np.empty((_ROOM, 2, n, n))
+        self.reference = np.empty((_ROOM, 2, n))
+        # What lies behind the last measurement has no row, so that the passes stop there.
+        self.row, self.error = np.full(_ROOM, -1, dtype=np.int64), np.empty(_ROOM, dtype=np.int64)
+        self.z, self.info, self.lever = np.empty((_ROOM, 2)), np.empty((_ROOM, 2)), np.empty((_ROOM, 2))
+        self.gain = np.empty((_ROOM, 2, n))
+        self.innovation, self.variance = np.empty((_ROOM, 2)), np.empty((_ROOM, 2))
+        self.t[0], self.mean[0], self.cov[0], self.reference[0] = t, mean, cov, mean
+        self._dims = (0,) * n
 
     @property
-    def size(self) -> int:
-        """Components of a state per axis, n."""
-        return int(self.base_mean.shape[1])
+    def newest(self) -> float:
+        """Time of the last row (s)."""
+        return float(self.t[self.end - 1])
 
     def key_rows(self) -> IntArray:
         """Return the rows that are keys (K,)."""
-        return np.flatnonzero(self.is_key)
+        if not self.late:
+            return np.arange(self.first, self.end)
+        return self.first + np.flatnonzero(self.is_key[self.first : self.end])
 
-    def append(self, t: FloatArray, key: IntArray, taken: Measurements) -> None:
+    def append(self, t: FloatArray, key: IntArray, taken: Measurements, opens: IntArray) -> None:
         """Append keys, all later than the last row, and filter them.
 
         Args:
             t: (J,) times of the keys (s), ascending.
             key: (M,) key of each measurement, counted from 0, ascending.
             taken: the measurements.
+            opens: (J,) the first measurement of each key.
         """
-        old, seen, new = len(self.t), len(self.row), len(t)
-        first = np.searchsorted(key, np.arange(new))
-        self.t = np.concatenate([self.t, t])
-        self.q = np.concatenate([self.q, taken.q[first]])
-        self.is_key = np.concatenate([self.is_key, np.ones(new, dtype=np.bool_)])
-        self.anchor = np.concatenate([self.anchor, np.full(new, -1, dtype=np.int64)])
-        self.row = np.concatenate([self.row, key + old])
-        self.z = np.concatenate([self.z, taken.z])
-        self.info = np.concatenate([self.info, 1.0 / taken.r])
-        self.lever = np.concatenate([self.lever, taken.lever])
-        self.error = np.concatenate([self.error, taken.error])
-        self._filter_after(old - 1, seen)
-        self.reference = np.concatenate([self.reference, self.mean[old:]])
+        self._make_room(len(t), len(key))
+        old, seen = self.end, self.taken_end
+        rows = slice(old, old + len(t))
+        self.t[rows], self.q[rows] = t, taken.q[opens]
+        self.is_key[rows], self.anchor[rows] = True, -1
+        self.end = rows.stop
+        places = slice(seen, seen + len(key))
+        self.row[places] = key + old
+        self.z[places], self.lever[places], self.error[places] = taken.z, taken.lever, taken.error
+        np.divide(1.0, taken.r, out=self.info[places])
+        self.taken_end = places.stop
+        self._filter(old, seen)
+        self.reference[rows] = self.mean[rows]
 
-    def insert(self, t: float, z: FloatArray, r: FloatArray, lever: FloatArray, error: int) -> int:
+    def insert(self, t: float, z: FloatArray, r: FloatArray, lever: FloatArray, error: int) -> None:
         """Take in a measurement that came late: into a row at its time, or into one of its own.
 
         Args:
@@ -100,43 +119,40 @@ class Window:
             r: (2,) variance of its white part (px²).
             lever: (2,) factor of its error state (px).
             error: index of that, or -1.
-
-        Returns:
-            The row that holds it now.
         """
-        row = int(np.argmin(np.abs(self.t - t)))
+        self._make_room(1, 1)
+        times = self.t[self.first : self.end]
+        row = self.first + int(np.argmin(np.abs(times - t)))
         # At large times a microsecond is a few roundings: what lies outside the rows belongs to the nearest.
-        if abs(self.t[row] - t) > COINCIDENT_S and self.t[0] < t < self.t[-1]:
-            row = int(np.searchsorted(self.t, t))
-            self.t = np.insert(self.t, row, t)
-            self.q = np.insert(self.q, row, self.q[row])
-            self.is_key = np.insert(self.is_key, row, False)
-            self.anchor = np.insert(self.anchor, row, -1)
-            self.reference = np.insert(self.reference, row, np.nan, axis=0)
-            self.mean = np.insert(self.mean, row, 0.0, axis=0)
-            self.cov = np.insert(self.cov, row, 0.0, axis=0)
-            self.row = np.where(self.row >= row, self.row + 1, self.row)
-        place = int(np.searchsorted(self.row, row, side="right"))
-        self.row = np.insert(self.row, place, row)
-        self.z = np.insert(self.z, place, z, axis=0)
-        self.info = np.insert(self.info, place, 1.0 / r, axis=0)
-        self.lever = np.insert(self.lever, place, lever, axis=0)
-        self.error = np.insert(self.error, place, error)
-        first = int(np.searchsorted(self.row, row))
-        self._filter_after(row - 1, first)
-        if np.isnan(self.reference[row, 0, 0]):
+        alone = abs(self.t[row] - t) > COINCIDENT_S and times[0] < t < times[-1]
+        if alone:
+            row = self.first + int(np.searchsorted(times, t))
+            for name in _ROWS:
+                column = getattr(self, name)
+                column[row + 1 : self.end + 1] = column[row : self.end].copy()
+            self.end += 1
+            self.late += 1
+            self.t[row], self.is_key[row], self.anchor[row] = t, False, -1
+            self.row[self.taken : self.taken_end] += self.row[self.taken : self.taken_end] >= row
+        held = self.row[self.taken : self.taken_end]
+        place = self.taken + int(np.searchsorted(held, row, side="right"))
+        for name in _TAKEN:
+            column = getattr(self, name)
+            column[place + 1 : self.taken_end + 1] = column[place : self.taken_end].copy()
+        self.taken_end += 1
+        self.row[place], self.z[place], self.info[place] = row, z, 1.0 / r
+        self.lever[place], self.error[place] = lever, error
+        self._filter(row, self.taken + int(np.searchsorted(held, row)))
+        if alone:
             self.reference[row] = self.mean[row]
-        return row
 
     def drop_before(self, row: int) -> None:
         """Forget the rows before a key; its filtered state becomes the base."""
         self.base_mean, self.base_cov = self.mean[row].copy(), self.cov[row].copy()
-        first = int(np.searchsorted(self.row, row, side="right"))
-        for name in _ROWS:
-            setattr(self, name, getattr(self, name)[row:].copy())
-        for name in _TAKEN:
-            setattr(self, name, getattr(self, name)[first:].copy())
-        self.row -= row
+        if self.late:
+            self.late -= int(np.count_nonzero(~self.is_key[self.first : row]))
+        self.taken += int(np.searchsorted(self.row[self.taken : self.taken_end], row, side="right"))
+        self.first = row
 
     def smooth(self, wanted: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Smooth the first rows, given all measurements of the window.
@@ -144,48 +160,71 @@ class Window:
         Returns:
             (wanted, 2, n) means, (wanted, 2, n, n) covariances, and (wanted, 2, n, n) gains to the next row.
         """
-        mean, cov, gain = backward(
-            (0,) * self.size,
-            self.steps(),
+        n = self.size
+        out = (np.empty((wanted, 2, n)), np.empty((wanted, 2, n, n)), np.empty((wanted, 2, n, n)))
+        smooth_rows(
+            self._dims,
+            self.first,
+            self.end,
+            self.taken_end,
+            wanted,
+            self.t,
             self.q,
             self.memory,
             self.row,
             self.lever,
             self.error,
-            np.array([0, len(self.t)]),
-            np.array([wanted]),
+            self.mean,
+            self.cov,
+            self.gain,
+            self.innovation,
+            self.variance,
+            *out,
+        )
+        return out
+
+    def _filter(self, row: int, taken: int) -> None:
+        """Filter the rows from `row` on; `taken` is the first measurement of these."""
+        if row == self.first:
+            self.mean[row], self.cov[row] = self.base_mean, self.base_cov
+        filter_rows(
+            self._dims,
+            row,
+            self.end,
+            taken,
+            row == self.first,
+            self.t,
+            self.q,
+            self.memory,
+            self.row,
+            self.z,
+            self.info,
+            self.lever,
+            self.error,
             self.mean,
             self.cov,
             self.gain,
             self.innovation,
             self.variance,
         )
-        return mean[:wanted], cov[:wanted], gain[:wanted]
 
-    def steps(self) -> FloatArray:
-        """Return the steps between the rows (N,) (s), 0 for the first."""
-        return np.diff(self.t, prepend=self.t[0])
+    def _make_room(self, rows: int, taken: int) -> None:
+        """See to it that so many more rows and measurements fit, and that what lies behind them is no row."""
+        if self.end + rows >= len(self.t):
+            self._move(_ROWS, self.first, self.end, rows)
+            self.row[self.taken : self.taken_end] -= self.first
+            self.first, self.end = 0, self.end - self.first
+        if self.taken_end + taken >= len(self.row):
+            self._move(_TAKEN, self.taken, self.taken_end, taken)
+            self.taken, self.taken_end = 0, self.taken_end - self.taken
+            self.row[self.taken_end :] = -1
 
-    def _filter_after(self, row: int, seen: int) -> None:
-        """Filter all after the state at `row`, which is that of `seen` measurements; row -1 is the base."""
-        first = max(row, 0)
-        prior = (self.base_mean, self.base_cov) if row < 0 else (self.mean[row], self.cov[row])
-        taken = slice(seen, None)
-        mean, cov, *of_measurements = forward(
-            (0,) * self.size,
-            np.diff(self.t[first:], prepend=self.t[first]),
-            self.q[first:],
-            self.memory,
-            self.row[taken] - first,
-            self.z[taken],
-            self.info[taken],
-            self.lever[taken],
-            self.error[taken],
-            np.array([0, len(self.t) - first]),
-            prior[0][None],
-            prior[1][None],
-        )
-        self.mean = np.concatenate([self.mean[:first], mean])
-        self.cov = np.concatenate([self.cov[:first], cov])
-        for name, new in zip(("gain", "innovation", "variance"), of_measurements, strict=True):
-            setattr(self, name, np.concatenate([getattr(self, name)[:seen], new]))
+    def _move(self, names: tuple[str, ...], begin: int, end: int, more: int) -> None:
+        """Move what some arrays hold to their beginning, and into larger ones if there is little room."""
+        held = end - begin
+        needed = held + more + (held + more) // 2 + 1
+        for name in names:
+            old = getattr(self, name)
+            new = old if len(old) >= needed else np.empty((needed, *old.shape[1:]), dtype=old.dtype)
+            new[:held] = old[begin:end].copy()
+            setattr(self, name, new)
