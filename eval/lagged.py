@@ -9,7 +9,7 @@ import numpy as np
 
 from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.smoothers.passes import backward_between
-from jeat_graph.smoothers.rts import Filtered, run_filter, smooth_rts, steps_of
+from jeat_graph.smoothers.rts import Filtered, run_filter, smooth_rts
 from jeat_graph.smoothers.track_data import COINCIDENT_S, MOTION, TrackData
 
 
@@ -115,7 +115,7 @@ def _smoothed_until(
     track: TrackData, filtered: Filtered, at: IntArray, until: IntArray
 ) -> tuple[FloatArray, FloatArray]:
     """Smooth the states `at` (T,) with all up to the keys `until` (T,)."""
-    model = (steps_of(track), track.memory, track.key, track.lever, track.error)
+    model = (track.t, track.memory, track.key, track.lever, track.error)
     return backward_between((0,) * track.size, *model, *filtered.passes(), at, until)
 
 
