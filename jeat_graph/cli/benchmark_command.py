@@ -1,4 +1,4 @@
-"""`jeat-graph benchmark`: reproduce the tables of accuracy, ablation, speed and events."""
+"""`jeat-graph benchmark`: reproduce the tables of accuracy, ablation, smoothing, speed and events."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ import argparse
 from importlib import import_module
 from typing import Any
 
-HELP = "Reproduce the README's tables: accuracy, ablation, speed or events."
+HELP = "Reproduce the README's tables: accuracy, ablation, smoothing, speed or events."
 _KINDS = {
     "accuracy": "our tracker and others' on simulated and real data",
     "ablation": "from the paper's tracker to the default, one change a row",
+    "smoothing": "what smoothing gains over the causal estimates",
     "speed": "time per step, against others",
     "events": "noise of the event cameras, what tames it, and what vehicles give",
 }

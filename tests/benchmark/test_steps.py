@@ -42,7 +42,7 @@ def test_before_the_last_step_all_that_it_takes_is_still_to_come():
     # Nothing is left over for the last row to take silently: its own keys make the whole difference.
     paper, goal = load_config("paper"), load_config("default")
     before = rows(paper, goal)[-2][1]
-    assert replace(before, standing=goal.standing) == goal
+    assert replace(before, motion=goal.motion) == goal
 
 
 def test_all_rows_track():
