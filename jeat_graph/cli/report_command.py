@@ -69,6 +69,8 @@ def _compare(args: argparse.Namespace) -> tuple[ComparedRun | None, str | None]:
     from jeat_graph.smoothing.records import record_tracks
 
     folder = Path(args.run_directory)
+    if not folder.is_dir():
+        return None, "Filter against smoother is not shown: that needs a run directory with its inputs."
     try:
         config, detections = recorded_inputs(folder, args.detections)
     except DataError as error:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 HELP = "track scans that arrive on stdin, as JSON lines or CSV, and write the tracks of each moment to stdout"
 STDIN = "<stdin>"
+_WARM_STEPS = 20  # enough for a track to be confirmed and smoothed
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -98,13 +99,15 @@ def _config(args: argparse.Namespace) -> Config:
 
 def _warm_up(config: Config) -> None:
     """Load the compiled code before the first scan arrives, which should not wait for it."""
+    from dataclasses import replace
+
     from jeat_graph.tracker import Tracker
     from jeat_graph.warm_up import notice_if_cold
 
     notice_if_cold()
-    spare = Tracker(config)
+    spare = Tracker(replace(config, smoother=replace(config.smoother, worker=False)))
     box = [0.4 * config.image.width, 0.4 * config.image.height, 40.0, 30.0]
-    for k in range(3):
+    for k in range(_WARM_STEPS):
         spare.step([(0.05 * k, name, [box], [0.9]) for name in spare.sensor_names])
     spare.finish()
 

@@ -32,7 +32,7 @@ def json_line(t: float, table: Trajectories) -> str:
                     "existence": columns["existence"][k],
                     "mean": [columns[name][k] for name in MEAN],
                     "var": [None if value != value else value for value in var],
-                    "sensors": [name for name in columns["sensors"][k].split("|") if name],
+                    "sensors": [name for s, name in enumerate(table.sensors) if table.used[k] >> s & 1],
                 }
             )
     return json.dumps({"t": t, "tracks": tracks}, ensure_ascii=False, separators=(",", ":")) + "\n"

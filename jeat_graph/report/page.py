@@ -143,7 +143,7 @@ def _tracks(data: RunData) -> str:
 <button type="button" id="all">Show all on the map</button></div>
 <div class="legend">{legend}</div>{limit}
 <p class="quiet">Long curves are drawn with fewer points than the tables have; their peaks are kept.</p>
-<p id="read" role="status" aria-live="off"></p><div id="chart"></div>
+<p id="read" aria-live="off"></p><div id="chart"></div>
 <noscript><p>The curves need JavaScript; the list of tracks below has each track's figures.</p></noscript>
 <script type="application/json" id="data">{_json(data, tracks)}</script></section>"""
 

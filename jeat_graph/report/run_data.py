@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -107,7 +108,17 @@ def load_run_data(run: str | Path, truth: str | Path | None = None, rate_hz: flo
         judged=judged,
         truth_name=None if truth is None else str(truth),
     )
-    return RunData(**{**vars(data), "notes": tuple(_missing(data))})
+    notes = _missing(data) if folder.is_dir() else [_SINGLE]
+    if truth is None:
+        notes.append(_NO_TRUTH)
+    return dataclasses.replace(data, notes=tuple(notes))
+
+
+_SINGLE = (
+    "This is a single table, not a run directory: version, configuration, inputs, noise scales and NIS, and "
+    "the other kind of table are not known."
+)
+_NO_TRUTH = "No truth was given (--gt FILE): there are no scores."
 
 
 def _read_record(path: Path) -> dict[str, Any]:
@@ -151,8 +162,6 @@ def _missing(data: RunData) -> list[str]:
             "There is no diagnostics.csv: noise scales and NIS of single updates are not shown. Track again "
             "with jeat-graph track --diagnostics to have them."
         )
-    if data.truth_name is None:
-        notes.append("No truth was given (--gt FILE): there are no scores.")
     return notes
 
 

@@ -208,6 +208,7 @@ const draw = track => {
   if (old) chart.replaceChild(svg, old); else chart.appendChild(svg);
   drawn = {track, list, x, line, svg, width};
   const point = event => {
+    read.setAttribute('aria-live', 'off');  // a voice could not keep up with a pointer
     const box = svg.getBoundingClientRect();
     const px = (event.clientX - box.left) * width / box.width;
     moveTo(track.from + span * (px - left) / (right - left));
@@ -218,6 +219,7 @@ const draw = track => {
     const step = {ArrowLeft: -1, ArrowRight: 1, Home: -1e9, End: 1e9}[event.key];
     if (step === undefined) return;
     event.preventDefault();
+    read.setAttribute('aria-live', 'polite');
     moveTo((cursor === null ? track.from : cursor) + step * span / 100);
   });
 };

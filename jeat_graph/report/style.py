@@ -16,6 +16,10 @@ CSS = """
     --now: #ff9d66; --late: #5fd3a0;
   }
 }
+@media (prefers-color-scheme: dark) {
+  /* The pictures of `compare` are drawn on white: lightness turned over, hues kept. */
+  figure img { filter: invert(.92) hue-rotate(180deg); }
+}
 * { box-sizing: border-box; }
 body {
   margin: 0 auto; padding: 1.2rem clamp(.7rem, 3vw, 2rem) 3rem; max-width: 75rem;
@@ -76,7 +80,7 @@ tr.on td { background: color-mix(in srgb, var(--accent) 16%, transparent); }
 .track .now { stroke-width: 1.1px; }
 .track { cursor: pointer; }
 .track:hover .now { stroke-width: 2.2px; }
-.map.some .track { opacity: .16; }
+.map.some .track { opacity: .22; }
 .map.some .track.on { opacity: 1; }
 .map.some .track.on .now { stroke-width: 2px; }
 .dot { fill: var(--ink); stroke: var(--plane); stroke-width: 2px; vector-effect: non-scaling-stroke; }

@@ -225,6 +225,12 @@ def test_inputs_that_are_gone_leave_out_the_comparison_with_the_reason(copy_of, 
     assert "--detections" in text
 
 
+def test_a_single_table_is_shown_and_named_as_one(full_run, report):
+    html = report(full_run.run / "smoothed.csv")
+    assert "This is a single table, not a run directory" in html.said
+    assert [row["table"] for row in html.tables["Tracks"]] == ["smoothed"]
+
+
 def test_an_empty_run_is_a_page_without_script(tmp_path, report):
     run = tmp_path / "run"
     run.mkdir()
