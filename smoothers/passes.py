@@ -300,6 +300,7 @@ def _smoothed(
     lam: FloatArray,
     Lam: FloatArray,
     part: FloatArray,
+    sum_: FloatArray,
     out_mean: FloatArray,
     out_cov: FloatArray,
 ) -> None:
@@ -317,13 +318,13 @@ def _smoothed(
                 part[i, j] += P[i, k] * Lam[k, j]
     for i in range(n):
         for j in range(n):
-            out_cov[i, j] = P[i, j] - part[i, 0] * P[0, j]
-        for k in range(1, n):
+            sum_[j] = P[i, j]
+        for k in range(n):
             for j in range(n):
-                out_cov[i, j] -= part[i, k] * P[k, j]
-    for i in range(n):
-        for j in range(i):
-            out_cov[j, i] = out_cov[i, j]
+                sum_[j] -= part[i, k] * P[k, j]
+        for j in range(i + 1):
+            out_cov[i, j] = sum_[j]
+            out_cov[j, i] = sum_[j]
 
 
 @njit(cache=True)
@@ -425,7 +426,7 @@ def smooth_rows(
             for a in range(2):
                 if k < end - 1:
                     P = cov[k, a]
-                    _smoothed(dims, mean[k, a], P, lam[a], Lam[a], part, out_mean[o, a], out_cov[o, a])
+                    _smoothed(dims, mean[k, a], P, lam[a], Lam[a], part, u, out_mean[o, a], out_cov[o, a])
                     step_cov(dims, dt, q[k + 1], phi, var, P, part, predicted)
                     _gain(dims, predicted, part, L, d, out_gain[o, a])
                 else:
@@ -546,7 +547,7 @@ def backward_between(
                 _back_over_step(dims, dt, phi, lam[a], Lam[a])
         k = at[o]
         for a in range(2):
-            _smoothed(dims, mean[k, a], cov[k, a], lam[a], Lam[a], part, out_mean[o, a], out_cov[o, a])
+            _smoothed(dims, mean[k, a], cov[k, a], lam[a], Lam[a], part, u, out_mean[o, a], out_cov[o, a])
     return out_mean, out_cov
 
 

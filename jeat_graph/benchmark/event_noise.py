@@ -21,6 +21,7 @@ from jeat_graph.sehn.streams import stream
 
 BASELINE = "baseline"
 ALL = "all three"
+_IDEAL = "ideal"
 _MEASURES: dict[str, dict[str, Any]] = {
     "σ_C = 0": {"sigma_threshold": 0.0},
     "refractory 10 µs": {"refractory_period_ns": 10_000},
@@ -43,14 +44,16 @@ def measure_noise(job: tuple[str, int, int, ImagingConfig]) -> list[dict[str, An
         job: scenario, seed, number of ticks, settings.
 
     Returns:
-        One record a row: rates of noise and motion events a pixel (Hz), and the share of the baseline's
-        motion events that are kept, by count and one by one (see `matched`).
+        One record a row: rates of noise and motion events a pixel (Hz); the share of the baseline's motion
+        events that are kept, by count and one by one (see `matched`); and the share that is found of those
+        of an ideal sensor, which is the baseline without flicker and with steady thresholds.
     """
     name, seed, ticks, imaging = job
     made = RenderedSource(load_scenario(name), imaging, seed=seed, frames=max(1, round(ticks / 5)))
     renderer = Renderer(made.scene(0), imaging.render, seed)
     scale = choose_exposure(imaging.rgb, renderer.background.whole).scale(imaging.rgb)
     rows = measures(imaging.carla)
+    rows[_IDEAL] = replace(imaging.carla, sigma_threshold=0.0, render_noise_dn=0.0)
     models = {row: make_carla_model(config, scale, imaging.rgb.gamma) for row, config in rows.items()}
     period = 1e6 / imaging.carla.tick_hz
     parts: dict[str, list[EventArray]] = {row: [] for row in rows}
@@ -65,9 +68,10 @@ def measure_noise(job: tuple[str, int, int, ImagingConfig]) -> list[dict[str, An
             parts[row].append(to_events(sink, made.size_px[0]))
     events = {row: EventArray.concatenate(part) for row, part in parts.items()}
     span = len(first) * ticks * period * 1e-6
+    ideal = events.pop(_IDEAL)
     return [
-        {"scenario": name, "seed": seed, "row": row, **_judge(events[row], events[BASELINE], span, period)}
-        for row in rows
+        {"scenario": name, "seed": seed, "row": row, **_judge(found, events[BASELINE], ideal, span, period)}
+        for row, found in events.items()
     ]
 
 
@@ -76,7 +80,9 @@ def _luminance(renderer: Renderer, time_s: float) -> FloatArray:
     return out
 
 
-def _judge(events: EventArray, baseline: EventArray, span: float, period_us: float) -> dict[str, float]:
+def _judge(
+    events: EventArray, baseline: EventArray, ideal: EventArray, span: float, period_us: float
+) -> dict[str, float]:
     assert events.by_motion is not None
     assert baseline.by_motion is not None
     motion, before = events.take(events.by_motion), baseline.take(baseline.by_motion)
@@ -85,6 +91,7 @@ def _judge(events: EventArray, baseline: EventArray, span: float, period_us: flo
         "motion_hz": len(motion) / span,
         "kept": len(motion) / max(len(before), 1),
         "matched": matched(motion, before, period_us),
+        "ideal": matched(motion, ideal, period_us),
     }
 
 

@@ -21,7 +21,7 @@ def residuals(track, sensor):
 
 @pytest.mark.parametrize(("sensor", "model"), [(0, EVT), (1, RGB)])
 def test_drawn_noise_has_the_variance_and_the_memory_of_its_model(sensor, model):
-    rate, std, share, memory = model
+    _, std, share, memory = model
     lag, product, square = [], [], []
     for seed in range(30):
         error, t = residuals(from_model(seed, True), sensor)
