@@ -12,7 +12,7 @@ from jeat_graph.sehn.imaging.moments import Look, Moments
 from jeat_graph.sehn.imaging.tiles import TILE_H, TILE_W, View
 
 MAX_STEPS = 256
-_BEAM_STEP_M = 0.3  # a beam's light on the road may move this far from one rendering to the next
+_BEAM_STEP_M = 0.5  # a beam's light on the road may move this far from one rendering to the next
 _GLOW_EASE = 4.0  # glow and beams are smooth: their motion asks for fewer renderings than an edge's
 _BEAM_EASE = 0.33
 _MARGIN_PX = 3.0
