@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.arrays import FloatArray
 from jeat_graph.errors import DataError
-from jeat_graph.smoothers.measurements import COINCIDENT_S, group_times
+from jeat_graph.smoothers.measurements import COINCIDENT_S
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,16 +66,23 @@ def _sizes_at(t: FloatArray, mean: FloatArray, query: FloatArray) -> FloatArray:
 
 @njit(cache=True)
 def _smooth(
-    t: FloatArray,
-    q: FloatArray,
-    key: IntArray,
-    z: FloatArray,
-    r: FloatArray,
+    prior_t: float,
     prior_mean: FloatArray,
     prior_cov: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Filter and smooth [ln size, rate] at keys `t` (K,); see `smooth_size`."""
-    keys = len(t)
+    times: FloatArray,
+    z: FloatArray,
+    r: FloatArray,
+    drift: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Filter and smooth [ln size, rate]; see `smooth_size`, whose measurements are in order of time here."""
+    t, q = np.empty(len(times) + 1), np.empty(len(times) + 1)
+    key = np.empty(len(times), dtype=np.int64)
+    t[0], q[0], keys = prior_t, 0.0, 1
+    for i in range(len(times)):
+        if times[i] - t[keys - 1] > COINCIDENT_S:
+            t[keys], q[keys] = times[i], drift[i]
+            keys += 1
+        key[i] = keys - 1
     mean, cov = np.empty((keys, 2, 2)), np.empty((keys, 2, 2, 2))
     ahead = np.empty((keys, 2, 3))  # predicted covariances: of the size, with the rate, of the rate
     for axis in range(2):
@@ -122,7 +129,7 @@ def _smooth(
             P[0, 1] += g10 * (g00 * D0 + g01 * D1) + g11 * (g00 * D1 + g01 * D2)
             P[1, 0] = P[0, 1]
             P[1, 1] += g10 * (g10 * D0 + g11 * D1) + g11 * (g10 * D1 + g11 * D2)
-    return mean, cov
+    return t[:keys], q[:keys], mean, cov
 
 
 def smooth_size(
@@ -153,15 +160,10 @@ def smooth_size(
     Raises:
         DataError: if a measurement is older than the prior.
     """
-    times = np.asarray(t, dtype=np.float64)
-    z, var, drift = np.asarray(log_size), np.asarray(r), np.asarray(q, dtype=np.float64)
+    times, z, var, drift = t, log_size, r, q
     if np.any(times[1:] < times[:-1]):
         order = np.argsort(times, kind="stable")
         times, z, var, drift = times[order], z[order], var[order], drift[order]
-    key, first = group_times(times, prior_t)
     if len(times) and times[0] < prior_t - COINCIDENT_S:
         raise DataError(f"a size at {times[0]} s is older than the track's prior at {prior_t} s")
-    keys = np.concatenate([[prior_t], times[first]])
-    density = np.concatenate([[0.0], drift[first]])
-    mean, cov = _smooth(keys, density, key, z, var, np.asarray(prior_mean), np.asarray(prior_cov))
-    return SmoothedSize(keys, density, mean, cov)
+    return SmoothedSize(*_smooth(float(prior_t), prior_mean, prior_cov, times, z, var, drift))
