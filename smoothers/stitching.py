@@ -14,12 +14,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.filters.motion import size_process_noise, size_transition
 from jeat_graph.smoothers.transitions import motion_matrices
 
 #: Degrees of freedom of a pair's squared distance: position, velocity, acceleration and size, in x and y.
 FREEDOM = 8
+
+
+# Standard deviation, in sizes of the vehicle, up to which a fragment's place over the gap counts as known.
+_FORESEEN_SIZES = 1.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +124,22 @@ def pair_scores(
     return d2, log_density - ends.birth_log_density[second]
 
 
+def foreseeable(ends: FragmentEnds, first: IntArray, second: IntArray) -> BoolArray:
+    """Mark the pairs (P,) whose places over the gap are known to within about the size of the vehicle.
+
+    A fragment of one or two detections has no velocity to speak of: it agrees with any vehicle that turns up
+    near by, and where vehicles enter the picture one after the other, the likelihood of a new one is greater
+    than that of one anywhere. The condition is on what is known of the states, not on how far they may have
+    changed in between, forward from the end and backward from the start.
+    """
+    gap = ends.start_t[second] - ends.end_t[first]
+    size = np.exp(0.5 * ends.end_size[first, :, 0].sum(axis=1))
+    F, _ = motion_matrices(np.concatenate([gap, -gap]), np.ones(2 * len(gap)))
+    P = np.concatenate([ends.end_cov[first], ends.start_cov[second]])
+    spread = (F[:, None] @ P @ F[:, None].swapaxes(-1, -2))[..., 0, 0].max(axis=1).reshape(2, -1)
+    return np.asarray((spread <= (_FORESEEN_SIZES * size) ** 2).all(axis=0))
+
+
 def link(
     ends: FragmentEnds, *, max_gap_s: float, gate: float, size_density: float, hidden_s: float = np.inf
 ) -> IntArray:
@@ -147,7 +167,7 @@ def link(
     d2, ratio = pair_scores(ends, first, second, size_density)
     seen = np.interp(ends.start_t[second], ends.seen_t, ends.seen_s)
     ratio -= (seen - np.interp(ends.end_t[first], ends.seen_t, ends.seen_s)) / hidden_s
-    keep = (d2 <= gate) & (ratio > 0.0)
+    keep = (d2 <= gate) & (ratio > 0.0) & foreseeable(ends, first, second)
     first, second, ratio = first[keep], second[keep], ratio[keep]
     if not len(first):
         return before

@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from jeat_graph.smoothers.stitching import FragmentEnds, candidate_pairs, link, pair_scores, seeing_time
+from jeat_graph.smoothers.stitching import (
+    FragmentEnds,
+    candidate_pairs,
+    foreseeable,
+    link,
+    pair_scores,
+    seeing_time,
+)
 
 from .conftest import noise, transition
 
@@ -132,3 +139,21 @@ def test_time_in_which_nothing_is_seen_does_not_count():
 def test_no_fragments_no_links():
     ends = fragments([], [], np.random.default_rng(4))
     assert len(link(ends, max_gap_s=3.0, gate=20.0, size_density=DENSITY)) == 0
+
+
+def test_a_fragment_without_a_velocity_of_its_own_continues_nothing():
+    """Two fragments that agree are one vehicle; not if either's place over the gap is anybody's guess."""
+    ends = fragments([0.0, 1.5], [1.0, 3.0], np.random.default_rng(7))
+    ends.end_mean[0] = ends.start_mean[1] = 0.0
+    ends.end_size[0, :, 0], ends.end_size[0, :, 1] = 4.0, 0.0
+    ends.start_size[1] = 4.0
+    ends.end_cov[0] = ends.start_cov[1] = np.diag([1.0, 4.0, 4.0])
+    known = link(ends, max_gap_s=3.0, gate=30.0, size_density=DENSITY)
+    assert known.tolist() == [-1, 0]
+    # exp(4) px are 55 px: a velocity known to 160 px/s spreads over 80 px in the gap, to 100 px/s over 50.
+    for side in (ends.end_cov[0], ends.start_cov[1]):
+        for std, expected in ((100.0, True), (160.0, False)):
+            side[:, 1, 1] = std**2
+            assert foreseeable(ends, np.array([0]), np.array([1])).tolist() == [expected]
+        assert link(ends, max_gap_s=3.0, gate=30.0, size_density=DENSITY).tolist() == [-1, -1]
+        side[:, 1, 1] = 4.0
