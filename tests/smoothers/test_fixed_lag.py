@@ -55,14 +55,15 @@ def test_newest_state_equals_the_filter_on_harsh_timing(harsh, scaled, relative,
     assert relative(left.cov[-1], cov[-1]) < 1e-6
 
 
+@pytest.mark.parametrize("chunk", [1, 20])
 @pytest.mark.parametrize("memory", COLOURS)
 @pytest.mark.parametrize("use_gtsam", [True, False])
 @pytest.mark.parametrize("seed", range(4))
 def test_departing_states_are_exact_given_what_was_known_by_then(
-    harsh, scaled, relative, seed, use_gtsam, memory
+    harsh, scaled, relative, seed, use_gtsam, memory, chunk
 ):
     track = harsh(seed, 200, memory=memory)
-    smoother, count = start(track, lag_s=1.0, chunk=1, use_gtsam=use_gtsam), 0
+    smoother, count = start(track, lag_s=1.0, chunk=chunk, use_gtsam=use_gtsam), 0
     for row in range(len(track.z)):
         smoother.feed(*columns(track, [row]))
         left = smoother.departed()
@@ -286,6 +287,8 @@ def test_a_measurement_at_the_time_of_the_prior_belongs_to_its_state(sampled, sc
             st.floats(-2000.0, 2000.0),
             st.floats(0.5, 500.0),
             st.floats(1.0, 5000.0),
+            st.floats(-30.0, 30.0),
+            st.integers(-1, 1),
         ),
         min_size=1,
         max_size=60,
@@ -293,17 +296,17 @@ def test_a_measurement_at_the_time_of_the_prior_belongs_to_its_state(sampled, sc
     chunk=st.integers(1, 10),
 )
 def test_any_order_of_arrival_gives_finite_valid_states(feeds, chunk):
-    prior = (np.zeros((2, 3)), np.tile(np.diag([9.0, 2500.0, 900.0]), (2, 1, 1)))
-    smoother, now, parts = FixedLagSmoother(0.0, *prior, chunk=chunk), 0.0, []
-    for step, z, r, q in feeds:
-        smoother.feed([max(now + step, 0.0)], [[z, -z]], [[r, r]], [q])
+    prior = (np.zeros((2, 5)), np.tile(np.diag([9.0, 2500.0, 900.0, 1.0, 1.0]), (2, 1, 1)))
+    smoother, now, parts = FixedLagSmoother(0.0, *prior, chunk=chunk, memory=(0.3, 0.08)), 0.0, []
+    for step, z, r, q, lever, error in feeds:
+        smoother.feed([max(now + step, 0.0)], [[z, -z]], [[r, r]], [q], [[lever, lever]], [error])
         now = max(now, now + step)
         parts.append(smoother.departed())
     whole = SmoothedTrack.concatenate([*parts, smoother.finish()])
     assert np.isfinite(whole.mean).all()
     assert np.all(np.diff(whole.t) > 0)
     sigma = np.sqrt(np.einsum("...ii->...i", whole.cov))
-    assert np.linalg.eigvalsh(whole.cov / (sigma[..., :, None] * sigma[..., None, :])).min() > -1e-12
+    assert np.linalg.eigvalsh(whole.cov / (sigma[..., :, None] * sigma[..., None, :])).min() > -1e-11
     assert smoother.fallbacks == 0
 
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from jeat_graph.errors import DataError
-from jeat_graph.smoothers.rts import filter_track, smooth_rts, smooth_rts_batch
+from jeat_graph.smoothers.rts import filter_track, smooth_ends, smooth_rts, smooth_rts_batch
 from jeat_graph.smoothers.track_data import TrackData
 
 #: White errors, and two sensors with a memory (s).
@@ -62,6 +62,18 @@ def test_a_batch_gives_each_track_what_it_gets_alone(harsh):
         alone = smooth_rts(track)
         assert np.array_equal(together.mean, alone.mean)
         assert np.array_equal(together.cov, alone.cov)
+
+
+@pytest.mark.parametrize("memory", COLOURS)
+def test_both_ends_alone_are_those_of_the_whole(harsh, memory):
+    tracks = [harsh(seed, 20 + seed, memory=memory) for seed in range(3)]
+    ends = smooth_ends(tracks)
+    for i, track in enumerate(tracks):
+        whole = smooth_rts(track)
+        assert np.array_equal(ends.start_mean[i], whole.mean[0])
+        assert np.array_equal(ends.start_cov[i], whole.cov[0])
+        assert np.array_equal(ends.end_mean[i], whole.mean[-1])
+        assert np.array_equal(ends.end_cov[i], whole.cov[-1])
 
 
 def test_weights_scale_the_information_of_measurements(harsh):
