@@ -7,7 +7,8 @@ tick to tick and mixes the results over time, it adds film grain, and it rounds.
 noise added before the rounding.
 
 An event is *by motion* if the same logarithm of the picture before noise and rounding has itself gone at
-least half of the nominal threshold in the event's direction since the sensor last moved the pixel's reference.
+least half of the nominal threshold in the event's direction since the sensor last moved the pixel's
+reference.
 """
 
 from __future__ import annotations

@@ -8,12 +8,14 @@ from numba import njit
 from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.sehn.imaging.background import Background, make_background
 from jeat_graph.sehn.imaging.config import RenderConfig
+from jeat_graph.sehn.imaging.layers import make_layers
 from jeat_graph.sehn.imaging.lighting import lights_of
-from jeat_graph.sehn.imaging.moments import Look, Moments, line_up, project_moments
+from jeat_graph.sehn.imaging.moments import Look, Moments, line_up
 from jeat_graph.sehn.imaging.optics import optics_of
 from jeat_graph.sehn.imaging.paint import PALETTE
-from jeat_graph.sehn.imaging.painter import Stage, make_layers, paint_tile
+from jeat_graph.sehn.imaging.painter import Stage, paint_tile
 from jeat_graph.sehn.imaging.plan import Plan, make_plan, who_touches
+from jeat_graph.sehn.imaging.projection import project_moments
 from jeat_graph.sehn.imaging.tiles import TILE, TILE_H, TILE_W, tile_raster, view_of
 from jeat_graph.sehn.scene import Scene, VehicleStates
 from jeat_graph.sehn.streams import stream
