@@ -25,6 +25,7 @@ from jeat_graph.sehn.imaging.event_sink import Sink, put
 from jeat_graph.sehn.imaging.pixel_random import exponential, seeds, uniform
 
 _LEAST_THRESHOLD = 0.01
+_ARRIVED = 1e-6  # a photoreceptor this near to its input (ln) is taken to be there
 
 
 class PixelModel(NamedTuple):
@@ -61,7 +62,8 @@ class PixelState(NamedTuple):
     """What all pixels remember, each (N,).
 
     Attributes:
-        signal: logarithm of the photocurrent at the last sample.
+        luminance: what was seen at the last sample (cd/m²).
+        signal: logarithm of the photocurrent then.
         output: the photoreceptor's output at the last sample.
         reference: output at the last event, less what has leaked since.
         at_reset: output, noise-free, when the pixel was last reset.
@@ -70,6 +72,7 @@ class PixelState(NamedTuple):
         random: states of the pixels' random numbers.
     """
 
+    luminance: FloatArray
     signal: FloatArray
     output: FloatArray
     reference: FloatArray
@@ -111,6 +114,7 @@ def make_state(model: PixelModel, luminance: FloatArray, rng: np.random.Generato
     phase = np.where(model.leak > 0.0, rng.random(count), 0.0)
     random = seeds(rng, count)
     return PixelState(
+        luminance=np.array(luminance, dtype=np.float64),
         signal=signal,
         output=signal.copy(),
         reference=signal - phase * model.on,
@@ -170,10 +174,18 @@ def advance(
         first = state.output[i]
         last = first
         if not settled:
-            after = math.log(luminance[n] + model.dark)
-            last = photoreceptor(first, state.signal[i], after, duration, luminance[n], model)
-            state.signal[i] = after
-            state.output[i] = last
+            before = state.signal[i]
+            after = before
+            # Most pixels of a tile see nothing new, and logarithms and exponentials are what costs.
+            if luminance[n] != state.luminance[i]:
+                after = math.log(luminance[n] + model.dark)
+                state.luminance[i] = luminance[n]
+                state.signal[i] = after
+            if after != before or first != after:
+                last = photoreceptor(first, before, after, duration, luminance[n], model)
+                if after == before and abs(last - after) < _ARRIVED:
+                    last = after
+                state.output[i] = last
         # The leak of the reference is taken as a rise of the signal, and given back at the end.
         leak = model.leak[i]
         true_slope = (last - first) / duration
