@@ -20,7 +20,7 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.arrays import FloatArray, IntArray
-from jeat_graph.smoothers.passes import error_steps, step_cov
+from jeat_graph.smoothers.transitions import error_steps, step_cov
 
 #: Time scale τ of the scaled state (s): about the interval between measurements.
 TAU_S = 0.05
@@ -78,7 +78,7 @@ def segment_rows(
     the end itself need no filter: they are rows on x1.
 
     Args:
-        dims: any tuple of n elements (`passes.py`).
+        dims: any tuple of n elements (`transitions.py`).
         ends: (S + 1,) the states that GTSAM knows, ascending; those in between are eliminated.
         t: (N,) times of all states (s), ascending.
         q: (N,) root spectral density of the jerk over the step that ends at each (px/s^2.5), > 0.

@@ -13,12 +13,12 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.arrays import FloatArray
+from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.errors import DataError
 from jeat_graph.smoothers import factors
+from jeat_graph.smoothers.backward import fill_back
 from jeat_graph.smoothers.gtsam_window import GtsamWindow
 from jeat_graph.smoothers.measurements import COINCIDENT_S, Measurements, check_measurements, group_times
-from jeat_graph.smoothers.passes import fill_back
 from jeat_graph.smoothers.track_data import SmoothedTrack
 from jeat_graph.smoothers.window import Window
 
@@ -170,7 +170,7 @@ class FixedLagSmoother:
             window.insert(float(t), z, r, lever, int(error))
             self._gtsam, self._outdated = None, self._use_gtsam
 
-    def _segments(self, graph: factors.LinearGraph, ends: npt.NDArray[np.int64]) -> None:
+    def _segments(self, graph: factors.LinearGraph, ends: IntArray) -> None:
         """Add all steps and measurements after the row `ends`[0], an anchor, and make the others anchors."""
         w = self._live()
         count = len(ends) - 1
@@ -182,7 +182,7 @@ class FixedLagSmoother:
         w.anchor[ends[1:]] = np.arange(self._next, self._next + count)
         self._next += count
 
-    def _extend(self, gtsam: GtsamWindow, ends: npt.NDArray[np.int64]) -> None:
+    def _extend(self, gtsam: GtsamWindow, ends: IntArray) -> None:
         """Tell GTSAM of the rows after its newest anchor; if that fails, build its window anew."""
         window, first = self._live(), self._next
         graph = factors.LinearGraph(window.size)
@@ -226,7 +226,7 @@ class FixedLagSmoother:
         except (*_GTSAM_ERRORS, np.linalg.LinAlgError):
             self.fallbacks += 1
 
-    def _smoothed(self, keys: npt.NDArray[np.int64], count: int) -> SmoothedTrack:
+    def _smoothed(self, keys: IntArray, count: int) -> SmoothedTrack:
         """Return the first `count` of the window's keys (K,), smoothed with all its measurements."""
         window = self._live()
         end = int(keys[count]) if count < len(keys) else window.end
@@ -250,7 +250,7 @@ class FixedLagSmoother:
         return SmoothedTrack(t, q, means[chosen], cov[chosen], gain[chosen])
 
     def _gtsam_means(
-        self, gtsam: GtsamWindow, anchors: npt.NDArray[np.int64], own: FloatArray, gain: FloatArray
+        self, gtsam: GtsamWindow, anchors: IntArray, own: FloatArray, gain: FloatArray
     ) -> FloatArray:
         """Return GTSAM's means (N, 2, n) of the rows up to the last of `anchors`, or `own` if it fails."""
         window = self._live()

@@ -1,6 +1,6 @@
 """Our own smoother of whole tracks: the exact oracle of the others, and the cheap engine.
 
-It is the Rauch-Tung-Striebel smoother (AIAA Journal 3(8), 1965), computed as `passes.py` says. All tracks
+It is the Rauch-Tung-Striebel smoother (AIAA Journal 3(8), 1965), computed as `backward.py` says. All tracks
 of a batch run in one compiled call.
 """
 
@@ -14,7 +14,8 @@ import numpy as np
 
 from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.errors import DataError
-from jeat_graph.smoothers.passes import backward, forward, smooth_rows
+from jeat_graph.smoothers.backward import backward, smooth_rows
+from jeat_graph.smoothers.forward import forward
 from jeat_graph.smoothers.track_data import SmoothedTrack, TrackData
 
 
@@ -37,7 +38,7 @@ class Filtered:
     variance: FloatArray
 
     def passes(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Return all of it in the order in which `passes` wants it."""
+        """Return all of it in the order in which `backward.py` wants it."""
         return self.mean, self.cov, self.gain, self.innovation, self.variance
 
 

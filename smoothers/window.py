@@ -13,8 +13,9 @@ from __future__ import annotations
 import numpy as np
 
 from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.smoothers.backward import smooth_rows
+from jeat_graph.smoothers.forward import filter_rows
 from jeat_graph.smoothers.measurements import COINCIDENT_S, Measurements
-from jeat_graph.smoothers.passes import filter_rows, smooth_rows
 
 _ROWS = ("t", "q", "is_key", "anchor", "mean", "cov", "reference")
 _TAKEN = ("row", "z", "info", "lever", "error", "gain", "innovation", "variance")

@@ -1,19 +1,16 @@
-"""The two compiled passes over a track: the Kalman filter forward, the smoother back.
+"""The compiled smoother: back over what the filter has made of a track (`forward.py`).
 
-The way back is in the Bryson-Frazier form, which needs no inverse: with the innovation y of variance S and
-gain K of a measurement with row H, and C = I - K H, an adjoint λ with its matrix Λ goes
+It is the Rauch-Tung-Striebel smoother in the form of Bryson and Frazier, which needs no inverse: with the
+innovation y of variance S and gain K of a measurement with row H, and C = I - K H, an adjoint λ with its
+matrix Λ goes
 
     back over a measurement:  λ ← Cᵀ λ - Hᵀ y / S,   Λ ← Cᵀ Λ C + Hᵀ H / S
     back over a step:         λ ← Fᵀ λ,              Λ ← Fᵀ Λ F
 
-and a smoothed state is x - P λ with covariance P - P Λ P, given the filtered x and P. It is the
-Rauch-Tung-Striebel smoother in other variables, and where only few of many states are wanted it is much
-cheaper: H and F have few entries, so λ and Λ cost O(n²) a key.
+and a smoothed state is x - P λ with covariance P - P Λ P, given the filtered x and P. Where only few of many
+states are wanted it is much cheaper: H and F have few entries, so λ and Λ cost O(n²) a key.
 
 Source: Bierman, Fixed interval smoothing with discrete measurements, Int. J. Control 18(1), 1973.
-
-States are [p, v, a, e_1, …, e_B] per axis (`transitions.py`), n = 3 + B. `dims`, a tuple of n elements,
-tells n to the compiler, which then unrolls the loops over a state.
 """
 
 from __future__ import annotations
@@ -22,208 +19,7 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.arrays import FloatArray, IntArray
-from jeat_graph.filters.motion import process_noise
-
-# Process noise of white jerk is q² Δ u_i u_j times this, with u = (Δ², Δ, 1) (paper eq. 2).
-_UNIT_NOISE = process_noise.py_func(1.0, 1.0)
-
-
-@njit(cache=True)
-def error_steps(dt: float, memory: FloatArray, phi: FloatArray, var: FloatArray) -> None:
-    """Fill transition factors `phi` (B,) and noise variances `var` (B,) of the error states."""
-    for b in range(len(memory)):
-        less = np.expm1(-dt / memory[b])
-        phi[b] = 1.0 + less
-        var[b] = -less * (2.0 + less)
-
-
-@njit(cache=True)
-def _step_mean(dims: tuple[int, ...], dt: float, phi: FloatArray, old: FloatArray, new: FloatArray) -> None:
-    """Write F m (n,) of a filtered mean `old` into `new`."""
-    half = 0.5 * dt * dt
-    new[0] = old[0] + dt * old[1] + half * old[2]
-    new[1] = old[1] + dt * old[2]
-    new[2] = old[2]
-    for i in range(3, len(dims)):
-        new[i] = phi[i - 3] * old[i]
-
-
-@njit(cache=True)
-def step_cov(
-    dims: tuple[int, ...],
-    dt: float,
-    q: float,
-    phi: FloatArray,
-    var: FloatArray,
-    old: FloatArray,
-    moved: FloatArray,
-    new: FloatArray,
-) -> None:
-    """Write F P (n, n) of a filtered covariance `old` into `moved`, and F P Fᵀ + Q into `new`."""
-    n = len(dims)
-    half = 0.5 * dt * dt
-    for j in range(n):
-        moved[0, j] = old[0, j] + dt * old[1, j] + half * old[2, j]
-        moved[1, j] = old[1, j] + dt * old[2, j]
-        moved[2, j] = old[2, j]
-        for i in range(3, n):
-            moved[i, j] = phi[i - 3] * old[i, j]
-    unit = q * q * dt
-    d2 = dt * dt
-    new[0, 0] = moved[0, 0] + dt * moved[0, 1] + half * moved[0, 2] + unit * d2 * d2 * _UNIT_NOISE[0, 0]
-    new[1, 0] = moved[1, 0] + dt * moved[1, 1] + half * moved[1, 2] + unit * d2 * dt * _UNIT_NOISE[1, 0]
-    new[2, 0] = moved[2, 0] + dt * moved[2, 1] + half * moved[2, 2] + unit * d2 * _UNIT_NOISE[2, 0]
-    new[1, 1] = moved[1, 1] + dt * moved[1, 2] + unit * d2 * _UNIT_NOISE[1, 1]
-    new[2, 1] = moved[2, 1] + dt * moved[2, 2] + unit * dt * _UNIT_NOISE[2, 1]
-    new[2, 2] = moved[2, 2] + unit * _UNIT_NOISE[2, 2]
-    for i in range(3, n):
-        new[i, 0] = moved[i, 0] + dt * moved[i, 1] + half * moved[i, 2]
-        new[i, 1] = moved[i, 1] + dt * moved[i, 2]
-        new[i, 2] = moved[i, 2]
-        for j in range(3, i + 1):
-            new[i, j] = moved[i, j] * phi[j - 3]
-        new[i, i] += var[i - 3]
-    for i in range(n):
-        for j in range(i):
-            new[j, i] = new[i, j]
-
-
-@njit(cache=True)
-def filter_rows(
-    dims: tuple[int, ...],
-    first: int,
-    end: int,
-    taken: int,
-    given: bool,
-    t: FloatArray,
-    q: FloatArray,
-    memory: FloatArray,
-    row: IntArray,
-    z: FloatArray,
-    info: FloatArray,
-    lever: FloatArray,
-    error: IntArray,
-    mean: FloatArray,
-    cov: FloatArray,
-    gain: FloatArray,
-    innovation: FloatArray,
-    variance: FloatArray,
-) -> None:
-    """Kalman filter over some keys of one track (paper eq. 2 to 4), in place.
-
-    The update is in Joseph form, so that no rounding makes a covariance indefinite; coincident
-    measurements are taken in one after the other.
-
-    Args:
-        dims: any tuple of n elements.
-        first: the first key to filter.
-        end: the key after the last.
-        taken: the first measurement of these keys.
-        given: whether the first key's state is there already, but for its measurements; otherwise it is
-            predicted from the key before.
-        t: (N,) times of all keys (s).
-        q: (N,) root spectral density of the jerk over the step that ends at each (px/s^2.5).
-        memory: (B,) memory of the error states (s).
-        row: (M,) key of each measurement, ascending.
-        z: (M, 2) measurements (px).
-        info: (M, 2) their information (1/px²), > 0: of the white part alone.
-        lever: (M, 2) factor of the error state in each (px).
-        error: (M,) its index, or -1.
-        mean: (N, 2, n) filtered means.
-        cov: (N, 2, n, n) filtered covariances.
-        gain: (M, 2, n) gain of each measurement.
-        innovation: (M, 2) its innovation (px).
-        variance: (M, 2) the variance of that (px²).
-    """
-    n = len(dims)
-    phi, var = np.empty(n - 3), np.empty(n - 3)
-    moved = np.empty((n, n))
-    seen = np.empty(n)
-    i = taken
-    for k in range(first, end):
-        if k > first or not given:
-            dt = t[k] - t[k - 1]
-            error_steps(dt, memory, phi, var)
-            for a in range(2):
-                _step_mean(dims, dt, phi, mean[k - 1, a], mean[k, a])
-                step_cov(dims, dt, q[k], phi, var, cov[k - 1, a], moved, cov[k, a])
-        while i < len(row) and row[i] == k:
-            e = error[i] + 3
-            for a in range(2):
-                m, P = mean[k, a], cov[k, a]
-                h = lever[i, a] if e >= 3 else 0.0
-                y = z[i, a] - m[0]
-                for j in range(n):
-                    seen[j] = P[0, j]
-                if e >= 3:
-                    y -= h * m[e]
-                    for j in range(n):
-                        seen[j] += h * P[e, j]
-                    S = seen[0] + h * seen[e] + 1.0 / info[i, a]
-                else:
-                    S = seen[0] + 1.0 / info[i, a]
-                K = gain[i, a]
-                for j in range(n):
-                    K[j] = seen[j] / S
-                    m[j] += K[j] * y
-                for j in range(n):
-                    for c in range(j + 1):
-                        # (I - K H) P (I - K H)ᵀ + K r Kᵀ written out.
-                        new = P[j, c] + (K[j] * S * K[c] - K[j] * seen[c] - seen[j] * K[c])
-                        P[j, c] = new
-                        P[c, j] = new
-                innovation[i, a] = y
-                variance[i, a] = S
-            i += 1
-
-
-@njit(cache=True)
-def forward(
-    dims: tuple[int, ...],
-    t: FloatArray,
-    q: FloatArray,
-    memory: FloatArray,
-    row: IntArray,
-    z: FloatArray,
-    info: FloatArray,
-    lever: FloatArray,
-    error: IntArray,
-    start: IntArray,
-    prior_mean: FloatArray,
-    prior_cov: FloatArray,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Filter many tracks whose keys lie one after the other.
-
-    Args:
-        dims: any tuple of n elements.
-        t: (N,) as for `filter_rows`, ascending within each track.
-        q: (N,) as for `filter_rows`.
-        memory: (B,) as for `filter_rows`.
-        row: (M,) as for `filter_rows`.
-        z: (M, 2) as for `filter_rows`.
-        info: (M, 2) as for `filter_rows`.
-        lever: (M, 2) as for `filter_rows`.
-        error: (M,) as for `filter_rows`.
-        start: (T + 1,) first key of each track, and N.
-        prior_mean: (T, 2, n) prior at the first key of each track.
-        prior_cov: (T, 2, n, n) its covariance.
-
-    Returns:
-        (N, 2, n) filtered means and (N, 2, n, n) filtered covariances; and for the way back, by measurement,
-        (M, 2, n) gains, (M, 2) innovations (px) and (M, 2) their variances (px²).
-    """
-    n = len(dims)
-    mean, cov = np.empty((len(t), 2, n)), np.empty((len(t), 2, n, n))
-    gain = np.empty((len(row), 2, n))
-    innovation, variance = np.empty((len(row), 2)), np.empty((len(row), 2))
-    for track in range(len(start) - 1):
-        k, end = start[track], start[track + 1]
-        mean[k] = prior_mean[track]
-        cov[k] = prior_cov[track]
-        taken = np.searchsorted(row, k)
-        model = (t, q, memory, row, z, info, lever, error)
-        filter_rows(dims, k, end, taken, True, *model, mean, cov, gain, innovation, variance)
-    return mean, cov, gain, innovation, variance
+from jeat_graph.smoothers.transitions import error_steps, step_cov, step_mean
 
 
 @njit(cache=True)
@@ -583,7 +379,7 @@ def fill_back(
         dt = t[k + 1] - t[k]
         error_steps(dt, memory, phi, var)
         for a in range(2):
-            _step_mean(dims, dt, phi, filtered[k, a], jump)
+            step_mean(dims, dt, phi, filtered[k, a], jump)
             for j in range(n):
                 jump[j] = mean[k + 1, a, j] - jump[j]
             for j in range(n):
