@@ -223,9 +223,9 @@ class Window:
     def _move(self, names: tuple[str, ...], begin: int, end: int, more: int) -> None:
         """Move what some arrays hold to their beginning, and into larger ones if there is little room."""
         held = end - begin
-        needed = held + more + (held + more) // 2 + 1
+        needed = 2 * (held + more)
         for name in names:
             old = getattr(self, name)
             new = old if len(old) >= needed else np.empty((needed, *old.shape[1:]), dtype=old.dtype)
-            new[:held] = old[begin:end].copy()
+            new[:held] = old[begin:end]
             setattr(self, name, new)
