@@ -17,7 +17,7 @@ from jeat_graph.benchmark.speed_worker import SCANS_A_MINUTE, ask
 
 OBJECTS = (10, 50, 200, 1000)
 VEHICLES = (30, 100, 300)
-ENGINES = ("none", "fixed-lag", "fixed-lag-rts")
+ENGINES = ("none", "fixed-lag", "fixed-lag-rts", "rts")
 _HOUR = 60 * SCANS_A_MINUTE
 
 
