@@ -1,13 +1,14 @@
 """Other people's trackers, run on our detections and judged by our evaluator.
 
-The trackers come from the package `trackers` (extra `baselines`); nothing of it is imported before a
-baseline is run.
+The trackers come from the packages `trackers` (extra `baselines`) and `norfair`; nothing of them is imported
+before a baseline is run.
 """
 
 from __future__ import annotations
 
-from jeat_graph.eval.baselines.inputs import BaselineFrame, baseline_frames
-from jeat_graph.eval.baselines.roboflow import BASELINES, run_baseline
+from jeat_graph.eval.baselines.frames import BaselineFrame
+from jeat_graph.eval.baselines.inputs import baseline_frames
+from jeat_graph.eval.baselines.running import BASELINES, missing_packages, run_baseline
 from jeat_graph.eval.baselines.search import SEARCH_GRIDS, BaselineResult, best_baseline, judge_baseline
 
 __all__ = [
@@ -18,5 +19,6 @@ __all__ = [
     "baseline_frames",
     "best_baseline",
     "judge_baseline",
+    "missing_packages",
     "run_baseline",
 ]

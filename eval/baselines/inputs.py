@@ -8,32 +8,15 @@ of every other sensor since the frame before, and non-maximum suppression merges
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.detections import Detections
 from jeat_graph.errors import DataError, UnknownSensorError
+from jeat_graph.eval.baselines.frames import BaselineFrame
 from jeat_graph.eval.overlap import pairwise_iou
 from jeat_graph.eval.resampling import TIME_TOLERANCE_S
-
-
-@dataclass(frozen=True, eq=False)
-class BaselineFrame:
-    """Boxes of one frame.
-
-    Attributes:
-        t: time (s).
-        boxes: (M, 4) left, top, width, height (px).
-        scores: (M,) confidence.
-        sensor: (M,) index into the sensors asked for.
-    """
-
-    t: float
-    boxes: FloatArray
-    scores: FloatArray
-    sensor: IntArray
 
 
 def suppress_overlapping(boxes: FloatArray, scores: FloatArray, iou: float) -> IntArray:

@@ -3,24 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Mapping, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jeat_graph.benchmark import common
-from jeat_graph.benchmark.contenders import (
-    KITTI_BEST,
-    NAMES,
-    SEARCH_DURATION_S,
-    SEARCH_SEED,
-    SIMULATED_BEST,
-    Peer,
-    key,
-    ours,
-    peers,
-)
+from jeat_graph.benchmark.association_table import association_names, association_table, judge_synchronous
+from jeat_graph.benchmark.contenders import KITTI_BEST, SIMULATED_BEST, Peer, ours, peers
 from jeat_graph.benchmark.judging import (
     BaselineJob,
     OursJob,
@@ -30,8 +19,9 @@ from jeat_graph.benchmark.judging import (
     judge_recordings,
     summarise,
 )
+from jeat_graph.benchmark.peer_search import peers_here, search_parameters, search_table
 from jeat_graph.benchmark.provenance import provenance
-from jeat_graph.benchmark.recordings import SCENARIOS, Recording, kitti, simulated
+from jeat_graph.benchmark.recordings import Recording, find_kitti, kitti, simulated
 from jeat_graph.benchmark.steps import start
 from jeat_graph.config import Config
 from jeat_graph.config_io import load_config
@@ -52,28 +42,40 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--search", action="store_true", help="search the other trackers' parameters anew (slow)"
     )
+    parser.add_argument(
+        "--search-only", action="store_true", help="only search their parameters, and say what they gain"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure (or read an earlier result), print and write."""
+    if args.search_only and not args.source:
+        found = search(args, peers_here())
+        shown = {name: search_table(one, f"Parameters searched: {name}") for name, one in found.items()}
+        result = {"benchmark": "peer-search", **provenance({}, {}), "search": found}
+        common.publish(args, "peer-search", result, shown)
+        return 0
     result = common.earlier(args.source, "accuracy") if args.source else measure(args)
     common.publish(args, "accuracy", result, tables(result))
     return 0
 
 
+def search(args: argparse.Namespace, names: Sequence[str]) -> dict[str, dict[str, dict[str, Any]]]:
+    """Search the peers' parameters on simulated recordings and, where they are there, on the real ones."""
+    found = {"simulated": search_parameters(names, _SIMULATED, None, args.jobs)}
+    folder = None if args.quick else find_kitti(args.data)
+    if folder is not None:
+        found["kitti"] = search_parameters(names, _REAL, folder, args.jobs)
+    return found
+
+
 def measure(args: argparse.Namespace) -> dict[str, Any]:
     """Track and judge everything."""
     setup = common.settings(args)
-    with_peers = not args.no_peers
-    if with_peers and (find_spec("trackers") is None or find_spec("supervision") is None):
-        print(
-            "the package `trackers` is not installed: peers are left out (extra `baselines`)", file=sys.stderr
-        )
-        with_peers = False
+    names = [] if args.no_peers else peers_here()
     default, paper = load_config("default"), load_config("paper")
-    best: dict[str, dict[str, Any]] = dict(SIMULATED_BEST)
-    if with_peers and args.search:
-        best = search_simulated(args.jobs)
+    found = search(args, names) if args.search and names else {}
+    best = _parameters(found["simulated"]) if "simulated" in found else SIMULATED_BEST
     rows = ours(default, start(paper, default), "default", _SIMULATED)
     records: list[dict[str, Any]] = []
     duration = setup["duration_s"]
@@ -84,7 +86,7 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
         for r in rows
     ]
     records += in_processes(judge_ours, jobs, args.jobs, "accuracy, ours")
-    others: list[Peer] = peers(_SIMULATED, best) if with_peers else []
+    others = peers(_SIMULATED, best, names)
     peer_jobs = [
         BaselineJob(p.row, p.name, p.sensors, p.parameters, scenario, seed, duration)
         for scenario in setup["scenarios"]
@@ -98,18 +100,27 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
         "benchmark": "accuracy",
         **provenance(setup, {r.row: r.config for r in rows}),
         "peer_parameters": best,
+        "search": found,
         "records": records,
         "summary": summarise(records),
+        "association": {
+            "names": association_names(rows),
+            "records": judge_synchronous(rows, setup["seeds"], duration, args.jobs),
+        },
         "detectors": detectors(setup["scenarios"], setup["seeds"], duration),
     }
     folds = common.kitti_folds(args)
     if folds is not None:
-        result |= measure_kitti(args, *folds, with_peers)
+        best = _parameters(found["kitti"]) if "kitti" in found else KITTI_BEST
+        real = ours(default, paper, "calibrated", _REAL)
+        result["association"]["names"] |= association_names(real)
+        result |= measure_kitti(args, *folds, peers(_REAL, best, names))
+        result["kitti_peer_parameters"] = best
     return result
 
 
 def measure_kitti(
-    args: argparse.Namespace, folder: Path, targets: Mapping[str, Config], with_peers: bool
+    args: argparse.Namespace, folder: Path, targets: Mapping[str, Config], others: Sequence[Peer]
 ) -> dict[str, Any]:
     """Judge everything on the KITTI sequences, pooled; ours each with its leave-one-out configuration."""
     paper = load_config("paper")
@@ -119,18 +130,9 @@ def measure_kitti(
         for fold in zip(*by_fold, strict=True)
     ]
     records = in_processes(judge_kitti_ours, jobs, args.jobs, "KITTI, ours")
-    best: dict[str, dict[str, Any]] = dict(KITTI_BEST)
-    if with_peers:
-        if args.search:
-            best = search_kitti(folder, args.jobs)
-        records += in_processes(
-            judge_kitti_peer, [(p, folder) for p in peers(_REAL, best)], args.jobs, "KITTI, peers"
-        )
-    return {
-        "kitti": records,
-        "kitti_configs": provenance({}, targets)["configs"],
-        "kitti_peer_parameters": best,
-    }
+    if others:
+        records += in_processes(judge_kitti_peer, [(p, folder) for p in others], args.jobs, "KITTI, peers")
+    return {"kitti": records, "kitti_configs": provenance({}, targets)["configs"]}
 
 
 def judge_kitti_ours(job: tuple[str, list[Config], tuple[str, ...] | None, Path]) -> dict[str, Any]:
@@ -161,34 +163,6 @@ def detectors(scenarios: Sequence[str], seeds: Sequence[int], duration_s: float)
     return out
 
 
-def search_simulated(workers: int | None) -> dict[str, dict[str, Any]]:
-    """Best parameters of each baseline on each stream, on recordings that are not judged."""
-    streams = [*((name,) for name in _SIMULATED), _SIMULATED]
-    jobs = [(name, stream, None) for stream in streams for name in NAMES]
-    found = in_processes(search_one, jobs, workers, "searching parameters, simulated")
-    return {key(name, stream): p for (name, stream, _), p in zip(jobs, found, strict=True)}
-
-
-def search_kitti(folder: Path, workers: int | None) -> dict[str, dict[str, Any]]:
-    """Best parameters of each baseline on each stream, on the KITTI sequences themselves."""
-    streams = [*((name,) for name in _REAL), _REAL]
-    jobs = [(name, stream, folder) for stream in streams for name in NAMES]
-    found = in_processes(search_one, jobs, workers, "searching parameters, KITTI")
-    return {key(name, stream): p for (name, stream, _), p in zip(jobs, found, strict=True)}
-
-
-def search_one(job: tuple[str, tuple[str, ...], Path | None]) -> dict[str, Any]:
-    """Best parameters, by MOTA, of one baseline on one stream: (name, sensors, KITTI folder or None)."""
-    from jeat_graph.eval.baselines import best_baseline
-
-    name, sensors, folder = job
-    if folder is None:
-        recordings: Sequence[Recording] = [simulated(s, SEARCH_SEED, SEARCH_DURATION_S) for s in SCENARIOS]
-    else:
-        recordings = kitti(folder)
-    return dict(best_baseline(name, _pairs(recordings), sensors).parameters)
-
-
 def tables(result: Mapping[str, Any]) -> dict[str, Table]:
     """Tables of a result, by the name of their markers."""
     count = len(result["settings"]["seeds"])
@@ -199,6 +173,9 @@ def tables(result: Mapping[str, Any]) -> dict[str, Table]:
         ),
         "detectors": detector_table(result["detectors"]),
     }
+    association = association_table(result)
+    if association is not None:
+        out["association"] = association
     if "kitti" in result:
         out["accuracy-kitti"] = common.pooled_table(
             result["kitti"],
@@ -225,6 +202,10 @@ def detector_table(found: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Ta
         title="Detections that the trackers are given: AP at IoU 0.5 (%)",
         digits=dict.fromkeys(columns, 1),
     )
+
+
+def _parameters(found: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    return {name: dict(one["parameters"]) for name, one in found.items()}
 
 
 def _pairs(recordings: Sequence[Recording]) -> list[tuple[Any, Any]]:

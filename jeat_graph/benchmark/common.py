@@ -80,25 +80,30 @@ def kitti_folds(args: argparse.Namespace) -> tuple[Path, dict[str, Config]] | No
 def scenario_table(
     entries: Sequence[Mapping[str, Any]], title: str, metrics: Sequence[str] = METRICS
 ) -> Table:
-    """One row a tracker, one column a scenario: metrics joined by ` / `, MOTA with its spread over seeds."""
+    """One row a tracker, one column a scenario; see `scenario_cell`."""
     from jeat_graph.eval.tables import Cell, Table
 
     scenarios = list(dict.fromkeys(e["scenario"] for e in entries))
     cells: dict[str, dict[str, Cell]] = {}
     for e in entries:
-        texts = [
-            f"{e[m]:.1f}" + (f" ± {e[f'{m}_std']:.1f}" if m == "MOTA" and e["seeds"] > 1 else "")
-            for m in metrics
-        ]
-        cells.setdefault(e["row"], {"": e["row"]})[e["scenario"]] = " / ".join(texts)
+        cells.setdefault(e["row"], {"": e["row"]})[e["scenario"]] = scenario_cell(e, metrics)
     return Table.from_records(list(cells.values()), ["", *scenarios], title=title)
+
+
+def scenario_cell(entry: Mapping[str, Any], metrics: Sequence[str]) -> str:
+    """Metrics joined by ` / `, each with its spread if there are several seeds.
+
+    No spaces about ±, so that a narrow page breaks the cell between metrics, not within one.
+    """
+    several = entry["seeds"] > 1
+    return " / ".join(f"{entry[m]:.1f}" + (f"±{entry[f'{m}_std']:.1f}" if several else "") for m in metrics)
 
 
 def over_seeds(count: int) -> str:
     """How the numbers of a simulated table come about."""
     if count == 1:
         return "one seed"
-    return f"mean of {count} seeds (± standard deviation of MOTA over them)"
+    return f"mean of {count} seeds (± standard deviation over them)"
 
 
 def pooled_table(entries: Sequence[Mapping[str, Any]], title: str) -> Table:

@@ -8,7 +8,13 @@ from typing import Any
 
 from jeat_graph.config import Config
 
-NAMES = {"sort": "SORT", "bytetrack": "ByteTrack", "ocsort": "OC-SORT", "botsort": "BoT-SORT"}
+NAMES = {
+    "sort": "SORT",
+    "bytetrack": "ByteTrack",
+    "ocsort": "OC-SORT",
+    "botsort": "BoT-SORT",
+    "norfair": "Norfair",
+}
 
 # Best MOTA of the grids in `eval.baselines.search`, found by `benchmark accuracy --search` on other
 # recordings than those that are judged: the first 8 s of seed 100 of all three scenarios, one set of
@@ -30,11 +36,13 @@ class Ours:
         row: its name.
         config: of the tracker.
         sensors: which it is given; None: all.
+        association: its name where ways of association are compared; None: it is not compared there.
     """
 
     row: str
     config: Config
     sensors: tuple[str, ...] | None = None
+    association: str | None = None
 
 
 @dataclass(frozen=True)
@@ -71,29 +79,47 @@ def ours(default: Config, paper: Config, label: str, sensors: Sequence[str]) -> 
             config, association=replace(config.association, method=method, priority=order, second_pass=True)
         )
 
+    joint, sequential = "joint", f"sequential, {order[0]} first"
     return [
-        Ours(f"{label}, {both}", default),
+        Ours(f"{label}, {both}", default, association="default, one slot a sensor"),
         *(Ours(f"{label}, {name}", default, (name,)) for name in sensors),
-        Ours(f"{label}, {both}, joint as in the paper", associated(default, "joint")),
-        Ours(f"{label}, {both}, sequential", associated(default, "sequential")),
-        Ours(f"paper, {both}", paper),
-        Ours(f"paper, {both}, sequential", associated(paper, "sequential")),
+        Ours(
+            f"{label}, {both}, joint as in the paper",
+            associated(default, "joint"),
+            association=f"default, {joint}",
+        ),
+        Ours(
+            f"{label}, {both}, sequential",
+            associated(default, "sequential"),
+            association=f"default, {sequential}",
+        ),
+        Ours(f"paper, {both}", paper, association=f"paper, {joint}"),
+        Ours(
+            f"paper, {both}, sequential", associated(paper, "sequential"), association=f"paper, {sequential}"
+        ),
         *(Ours(f"paper, {name}", paper, (name,)) for name in sensors),
     ]
 
 
-def peers(sensors: Sequence[str], best: Mapping[str, Mapping[str, Any]]) -> list[Peer]:
+def streams(sensors: Sequence[str]) -> list[tuple[str, ...]]:
+    """What a baseline is run on: each sensor alone, and all merged."""
+    return [*((name,) for name in sensors), tuple(sensors)]
+
+
+def peers(
+    sensors: Sequence[str], best: Mapping[str, Mapping[str, Any]], names: Sequence[str] = tuple(NAMES)
+) -> list[Peer]:
     """Rows of the baselines: on each sensor and on both, with their defaults and the best of their grids.
 
     Args:
         sensors: the slower one first: it sets the frames where both are merged.
         best: parameters by `key(name, sensors)`.
+        names: the baselines wanted.
     """
-    streams = [*((name,) for name in sensors), tuple(sensors)]
     out = []
-    for stream in streams:
-        for name, shown in NAMES.items():
-            text = f"{shown}, {' + '.join(stream)}"
+    for stream in streams(sensors):
+        for name in names:
+            text = f"{NAMES[name]}, {' + '.join(stream)}"
             out.append(Peer(text, name, stream, {}))
             found = best.get(key(name, stream))
             if found:

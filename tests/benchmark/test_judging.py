@@ -2,12 +2,25 @@
 
 import operator
 
+import numpy as np
 import pytest
 
-from jeat_graph.benchmark.contenders import key, ours, peers
+from jeat_graph.benchmark.association_table import SYNCHRONOUS, association_table
+from jeat_graph.benchmark.common import scenario_table
+from jeat_graph.benchmark.contenders import (
+    KITTI_BEST,
+    NAMES,
+    SIMULATED_BEST,
+    key,
+    ours,
+    peers,
+    streams,
+)
 from jeat_graph.benchmark.judging import in_processes, spread, summarise
+from jeat_graph.benchmark.peer_search import peers_here
 from jeat_graph.benchmark.recordings import find_kitti, kitti, simulated
 from jeat_graph.config_io import load_config
+from jeat_graph.eval.baselines.search import grid
 
 
 def entry(row, scenario, mota):
@@ -46,9 +59,65 @@ def test_sequential_association_serves_the_slower_sensor_first():
 def test_peers_run_on_each_sensor_and_on_both_with_defaults_and_with_what_was_found():
     found = {key("sort", ("rgb",)): {"min_score": 0.5}}
     rows = peers(("rgb", "evt"), found)
-    assert len(rows) == 4 * 3 + 1
+    assert len(rows) == 5 * 3 + 1
     assert {r.sensors for r in rows} == {("rgb",), ("evt",), ("rgb", "evt")}
     assert [dict(r.parameters) for r in rows if r.row.endswith("tuned")] == [{"min_score": 0.5}]
+
+
+def test_peers_that_are_not_installed_have_no_rows():
+    rows = peers(("rgb", "evt"), {key("sort", ("rgb",)): {"min_score": 0.5}}, ["norfair"])
+    assert [r.row for r in rows] == ["Norfair, rgb", "Norfair, evt", "Norfair, rgb + evt"]
+
+
+def test_a_missing_package_is_said_and_its_trackers_are_left_out(monkeypatch, capsys):
+    missing = {"norfair": ["norfair"]}
+    monkeypatch.setattr("jeat_graph.eval.baselines.missing_packages", lambda name: missing.get(name, []))
+    assert peers_here() == ["sort", "bytetrack", "ocsort", "botsort"]
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "Norfair left out (pip install rich filterpy && pip install --no-deps norfair)" in said
+
+
+def test_every_parameter_that_was_found_belongs_to_a_grid():
+    for best, sensors in ((SIMULATED_BEST, ("rgb", "evt")), (KITTI_BEST, ("rgb", "lidar"))):
+        assert set(best) <= {key(name, stream) for name in NAMES for stream in streams(sensors)}
+        for where, parameters in best.items():
+            assert not parameters or parameters in list(grid(where.partition("/")[0]))
+
+
+def test_each_metric_has_its_spread_where_there_are_several_seeds():
+    several = summarise([entry("a", "day", 90.0), entry("a", "day", 94.0)])
+    assert scenario_table(several, "").rows == (("a", "92.0±2.8 / 1.0±0.0 / 2.0±0.0 / 3.0±0.0"),)
+    assert scenario_table(summarise([entry("a", "day", 90.0)]), "").rows[0][1] == "90.0 / 1.0 / 2.0 / 3.0"
+
+
+def test_ways_of_association_are_taken_from_the_rows_that_stand_for_them():
+    names = {"d, both": "one slot", "c, both": "one slot", "d, both, sequential": "in turn"}
+    result = {
+        "settings": {"seeds": [0]},
+        "summary": summarise(
+            [entry(row, "day", 90.0) for row in ("d, both", "d, rgb", "d, both, sequential")]
+        ),
+        "association": {"names": names, "records": [entry("d, both", "synchronous", 80.0)]},
+        "kitti": [entry("c, both", "", 70.0), entry("c, rgb", "", 60.0)],
+    }
+    table = association_table(result)
+    assert table.columns == ("", "day", "synchronous", "KITTI")
+    assert table.rows == (
+        ("one slot", "90.0 / 2.0 / 3.0", "80.0 / 2.0 / 3.0", "70.0 / 2.0 / 3.0"),
+        ("in turn", "90.0 / 2.0 / 3.0", None, None),
+    )
+    del result["association"]
+    assert association_table(result) is None
+
+
+def test_where_both_sensors_run_by_one_clock_every_rgb_scan_shares_its_time_with_an_event_scan():
+    found = simulated(SYNCHRONOUS, 0, 2.0).detections
+    rgb, evt = (found.scan_t[found.scan_sensor == found.sensors.index(name)] for name in ("rgb", "evt"))
+    assert len(rgb) == 40
+    assert np.isin(rgb, evt).mean() > 0.9
+    jittered = simulated("night", 0, 2.0).detections
+    assert len(np.unique(jittered.scan_t)) == len(jittered.scan_t)
 
 
 def test_a_tracker_of_one_sensor_is_judged_at_the_times_of_that_sensor():
