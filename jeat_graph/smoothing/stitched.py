@@ -8,10 +8,11 @@ import numpy as np
 
 from jeat_graph.arrays import FloatArray
 from jeat_graph.config import Config
-from jeat_graph.smoothers.rts import smooth_rts_batch
+from jeat_graph.filters.coloured import MOTION
+from jeat_graph.smoothers.rts import smooth_ends
 from jeat_graph.smoothers.size import SmoothedSize
 from jeat_graph.smoothers.stitching import FREEDOM, FragmentEnds, link, seeing_time
-from jeat_graph.smoothers.track_data import SmoothedTrack
+from jeat_graph.smoothers.track_data import TrackData
 from jeat_graph.smoothing.history import TrackHistory
 from jeat_graph.smoothing.looks import Looks
 from jeat_graph.smoothing.priors import COLUMN, ErrorStates, size_prior_of, sizes_of, track_data
@@ -60,32 +61,33 @@ def fragment_ends(histories: Sequence[TrackHistory], config: Config) -> Fragment
     """Smooth each history by itself and return its first and last state."""
     wholes = [history.whole() for history in histories]
     errors = ErrorStates.of(config)
-    paths = smooth_rts_batch([track_data(rows, errors) for rows in wholes])
+    tracks = [track_data(rows, errors) for rows in wholes]
+    states = smooth_ends(tracks)
     sizes = [_smooth_sizes(rows, config.size.rate_density) for rows in wholes]
     seen_t, seen_s = seeing_time(np.concatenate([rows[:, 0] for rows in wholes]), _LONGEST_PAUSE_S)
-    start_mean = np.stack([path.mean[0, :, :3] for path in paths])
+    start_mean = states.start_mean[..., :MOTION]
     start_size = np.stack([size.mean[0, :, 0] for size in sizes])
     return FragmentEnds(
-        start_t=np.array([path.t[0] for path in paths]),
+        start_t=np.array([track.t[0] for track in tracks]),
         start_mean=start_mean,
-        start_cov=np.stack([path.cov[0, :, :3, :3] for path in paths]),
+        start_cov=states.start_cov[..., :MOTION, :MOTION],
         start_size=start_size,
         start_size_var=np.stack([size.cov[0, :, 0, 0] for size in sizes]),
-        end_t=np.array([path.t[-1] for path in paths]),
-        end_mean=np.stack([path.mean[-1, :, :3] for path in paths]),
-        end_cov=np.stack([path.cov[-1, :, :3, :3] for path in paths]),
+        end_t=np.array([track.t[-1] for track in tracks]),
+        end_mean=states.end_mean[..., :MOTION],
+        end_cov=states.end_cov[..., :MOTION, :MOTION],
         end_size=np.stack([size.mean[-1] for size in sizes]),
         end_size_cov=np.stack([size.cov[-1] for size in sizes]),
-        jerk=np.array([_typical_jerk(path) for path in paths]),
+        jerk=np.array([_typical_jerk(track) for track in tracks]),
         birth_log_density=_birth_log_density(wholes, start_mean, config),
         seen_t=seen_t,
         seen_s=seen_s,
     )
 
 
-def _typical_jerk(path: SmoothedTrack) -> float:
+def _typical_jerk(track: TrackData) -> float:
     """Root spectral density of the jerk while the track is not seen: that of its last steps."""
-    return float(np.median(path.q[1:][-20:])) if len(path) > 1 else 1.0
+    return float(np.median(track.q[1:][-20:])) if len(track) > 1 else 1.0
 
 
 def _smooth_sizes(rows: FloatArray, density: float) -> SmoothedSize:
