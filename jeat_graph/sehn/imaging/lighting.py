@@ -118,17 +118,18 @@ def beam_candela(forward: float, right: float, up: float, lights: Lights) -> flo
     """
     if forward <= 0.05:
         return 0.0
-    side = right / forward
-    down = -up / forward
+    inverse = 1.0 / forward
+    side, down = right * inverse, -up * inverse
     edge = clamp01((down - 0.0017) / 0.009)
     edge = edge * edge * (3.0 - 2.0 * edge)
-    steep = 1.0 / (1.0 + (down / 0.06) ** 2)
-    # Powers of a rational bell: as good as exponentials here, and much cheaper.
-    bell = 1.0 / (1.0 + (side / 0.27) ** 2)
-    wide = 1.0 / (1.0 + (side / 0.8) ** 2)
-    across = 0.75 * bell * bell * bell + 0.25 * wide * wide * wide
-    stray = lights.beam_stray * wide
-    return lights.beam_candela * (stray + (1.0 - lights.beam_stray) * edge * steep * across)
+    # Powers of rational bells, over one division: this is what a dark scene's rendering time goes into.
+    narrow, wide, steep = 1.0 + (side / 0.27) ** 2, 1.0 + (side / 0.8) ** 2, 1.0 + (down / 0.06) ** 2
+    share = 1.0 / (narrow * wide * steep)
+    narrow, wide, steep = share * wide * steep, share * narrow * steep, share * narrow * wide
+    across = 0.75 * narrow * narrow * narrow + 0.25 * wide * wide * wide
+    return lights.beam_candela * (
+        lights.beam_stray * wide + (1.0 - lights.beam_stray) * edge * steep * across
+    )
 
 
 @njit(cache=True)

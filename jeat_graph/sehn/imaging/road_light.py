@@ -17,6 +17,8 @@ from jeat_graph.sehn.imaging.tiles import TILE_W, View
 _SHADOW_DEPTH = 0.75
 _SUN_EDGE_M = 0.3
 _WALL_HEIGHT_M = 0.5
+_NEGLIGIBLE = 0.003  # of the light there is: a fiftieth of what it takes to make an event
+_FAR_TILES = 1.5
 
 
 @njit(cache=True)
@@ -71,10 +73,11 @@ def cast_beam(
     limit = lights.beam_range_m
     R, eye = view.rotation, view.eye
     fx, fy, cx, cy = view.lens[0], view.lens[1], view.lens[2], view.lens[3]
+    reaches = _reaches(row0, column0, rows, columns, x, y, sin, cos, fade, ground, lights)
     for r in range(rows):
         for c in range(columns):
             row, column, p = row0 + r, column0 + c, r * TILE_W + c
-            if ground.albedo[row, column, 1] > 0.0:
+            if reaches and ground.albedo[row, column, 1] > 0.0:
                 dx, dy = ground.place[row, column, 0] - x, ground.place[row, column, 1] - y
                 forward = dx * sin + dy * cos
                 r2 = dx * dx + dy * dy + LAMP_HEIGHT_M * LAMP_HEIGHT_M
@@ -100,3 +103,31 @@ def cast_beam(
                     rise = _WALL_HEIGHT_M - LAMP_HEIGHT_M
                     candela = beam_candela(forward, dx * cos - dy * sin, rise, lights) * fade
                     layers.beams[p, 1] += candela * facing / (r2 * math.sqrt(r2)) * window * window
+
+
+@njit(cache=True)
+def _reaches(
+    row0: int, column0: int, rows: int, columns: int, x: float, y: float, sin: float, cos: float, fade: float,
+    ground: Background, lights: Lights,
+) -> bool:  # fmt: skip
+    """Say whether beams from (x, y) matter on a tile's ground, by its corners; if in doubt, yes."""
+    most, least_lux = 0.0, math.inf
+    nearest, ahead = math.inf, -math.inf
+    for k in range(4):
+        row, column = row0 + (rows - 1) * (k >> 1), column0 + (columns - 1) * (k & 1)
+        lux = ground.lux[row, column]
+        if lux <= 0.0:
+            return True
+        dx, dy = ground.place[row, column, 0] - x, ground.place[row, column, 1] - y
+        forward, right = dx * sin + dy * cos, dx * cos - dy * sin
+        r2 = dx * dx + dy * dy + LAMP_HEIGHT_M * LAMP_HEIGHT_M
+        candela = beam_candela(forward, right, -LAMP_HEIGHT_M, lights)
+        most = max(most, fade * candela * LAMP_HEIGHT_M / (r2 * math.sqrt(r2)))
+        nearest, ahead = min(nearest, r2), max(ahead, forward)
+        least_lux = min(least_lux, lux)
+    if ahead <= 0.0:
+        return False
+    first, last = ground.place[row0, column0], ground.place[row0 + rows - 1, column0 + columns - 1]
+    across = (first[0] - last[0]) ** 2 + (first[1] - last[1]) ** 2
+    # Near the lamps the corners do not tell what is between them.
+    return nearest < _FAR_TILES * _FAR_TILES * across or most > _NEGLIGIBLE * least_lux
