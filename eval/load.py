@@ -11,7 +11,7 @@ import numpy as np
 
 from jeat_graph.arrays import FloatArray
 from jeat_graph.errors import DataError
-from jeat_graph.eval.pairing import check_pair, check_truth
+from jeat_graph.eval.pairing import check_lives, check_pair, check_truth
 from jeat_graph.run_directory import read_instants
 from jeat_graph.trajectories import GroundTruth, Trajectories
 
@@ -73,8 +73,8 @@ def load_run(
     if rate_hz is None and form in BY_FRAME:
         frames = objects.frame_times()
         rate_hz = 1.0 / float(np.median(np.diff(frames))) if len(frames) > 1 else ANY_RATE_HZ
-    read = {kind: _read_table(file, objects, rate_hz) for kind, file in tables.items()}
     instants = objects.frame_times() if form in BY_FRAME else read_instants(path)
+    read = {kind: _read_table(file, objects, rate_hz, instants is None) for kind, file in tables.items()}
     return JudgedRun(str(run), objects, read.get("causal"), read.get("smoothed"), instants)
 
 
@@ -137,12 +137,14 @@ def _read_truth(path: Path, rate_hz: float | None, classes: Sequence[str] | None
         raise DataError(error.message, path) from error
 
 
-def _read_table(path: Path, truth: GroundTruth, rate_hz: float | None) -> Trajectories:
+def _read_table(path: Path, truth: GroundTruth, rate_hz: float | None, alone: bool) -> Trajectories:
     from jeat_graph.io.trajectories_io import read_trajectories
 
     table = read_trajectories(path, rate_hz=rate_hz)
     try:
         check_pair(truth, table)
+        if alone:
+            check_lives(truth, table)
     except DataError as error:
         raise DataError(error.message, path) from error
     return table

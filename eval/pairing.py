@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray
+from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.errors import DataError
 from jeat_graph.trajectories import GroundTruth, Trajectories
 
@@ -14,13 +14,19 @@ UNIT_RATIO = 8.0
 UNIT_RATIO_OTHER_RATE = 15.0
 SAME_FACTOR = 3.0
 BOTH_LARGE = 5.0
+# Boxes in units of the picture's size have no corner beyond about this; a vehicle in pixels is larger.
+RELATIVE_BOX = 2.0
+# So many boxes in so many frames, and no identity twice: these are numbers of rows.
+ROWS_OF_THEIR_OWN = 10
+FRAMES_OF_THEIR_OWN = 3
 
 
 def check_truth(truth: GroundTruth) -> None:
     """Refuse truth without frames, or without identities.
 
     Raises:
-        DataError: no frame at all; or one identity twice in a frame (as when all are -1).
+        DataError: no frame at all; one identity twice in a frame (as when all are -1); or no identity twice
+            in all frames (as when rows are numbered).
     """
     if not len(truth.frame_times()):
         raise DataError("the truth has no frames, so there is nothing to judge by")
@@ -28,6 +34,7 @@ def check_truth(truth: GroundTruth) -> None:
     order = rows[np.lexsort((truth.t[rows], truth.object_id[rows]))]
     twice = (np.diff(truth.object_id[order]) == 0) & (np.diff(truth.t[order]) == 0)
     if not twice.any():
+        _check_numbering(truth.object_id[rows], truth.t[rows])
         return
     row = order[int(np.argmax(twice))]
     if len(np.unique(truth.object_id[rows])) == 1:
@@ -58,17 +65,60 @@ def check_pair(truth: GroundTruth, table: Trajectories, *, max_age_s: float = 0.
     _check_units(frames, instants)
     if instants[0] > frames[-1] + max_age_s or instants[-1] < frames[0] - max_age_s:
         raise DataError(
-            f"no common timestamps: the truth covers {frames[0]:g} to {frames[-1]:g} s, "
-            f"the tracks {instants[0]:g} to {instants[-1]:g} s; are they of the same recording?"
+            f"no common timestamps: the truth covers {frames[0]:.10g} to {frames[-1]:.10g} s, "
+            f"the tracks {instants[0]:.10g} to {instants[-1]:.10g} s; are they of the same recording?"
         )
     if len(truth):
-        largest = float(np.abs(table.boxes).max())
-        typical = float(np.median(truth.boxes[:, 2:]))
-        if largest <= 2.0 < typical / 2.0:
-            raise DataError(
-                f"the tracks' boxes lie within {largest:g} px, the truth's are about {typical:.0f} px large: "
-                "are the tracks' boxes relative to the picture's size instead of in pixels?"
-            )
+        _check_pixels("tracks", table.boxes, "truth", truth.boxes)
+        _check_pixels("truth", truth.boxes, "tracks", table.boxes)
+
+
+def check_lives(truth: GroundTruth, table: Trajectories, *, max_age_s: float = 0.15) -> None:
+    """Refuse a table without a track at any frame of the truth, where it is not known when the tracker ran.
+
+    Tracks and truth may cover the same hour and still have no moment in common. Where it is known that the
+    tracker looked at those frames, finding nothing there is a result, and this must not be asked.
+
+    Args:
+        truth: the truth, already checked.
+        table: the tracks.
+        max_age_s: how long after its last row a causal table still says something (s).
+
+    Raises:
+        DataError: no track lives at any frame of the truth.
+    """
+    if not len(table):
+        return
+    frames = truth.frame_times()
+    order = np.lexsort((table.t, table.track_id))
+    t, new = table.t[order], np.diff(table.track_id[order]) != 0
+    first = t[np.concatenate(([True], new))]
+    last = t[np.concatenate((new, [True]))] + max_age_s
+    if not (np.searchsorted(frames, last, side="right") > np.searchsorted(frames, first)).any():
+        raise DataError(f"no common timestamps: no track is there at any of the truth's {len(frames)} frames")
+
+
+def _check_numbering(ids: IntArray, t: FloatArray) -> None:
+    """Refuse identities of which none is there twice."""
+    frames = len(np.unique(t))
+    if len(ids) < ROWS_OF_THEIR_OWN or frames < FRAMES_OF_THEIR_OWN or len(np.unique(ids)) < len(ids):
+        return
+    raise DataError(
+        f"the truth has no identities: each of its {len(ids)} boxes in {frames} frames has an object_id of "
+        "its own; tracks can only be judged by boxes that carry the identity of their object"
+    )
+
+
+def _check_pixels(small: str, boxes: FloatArray, large: str, others: FloatArray) -> None:
+    """Refuse boxes in units of the picture's size beside others in pixels."""
+    largest = float(np.abs(boxes).max())
+    typical = float(np.median(others[:, 2:]))
+    if largest <= RELATIVE_BOX < typical / 2.0:
+        raise DataError(
+            f"different units: the boxes of the {small} lie within {largest:.3g} of the picture's corner, "
+            f"those of the {large} are about {typical:.0f} px large; "
+            f"are the former relative to the picture's size instead of in pixels?"
+        )
 
 
 def _check_units(frames: FloatArray, instants: FloatArray) -> None:
@@ -84,7 +134,7 @@ def _check_units(frames: FloatArray, instants: FloatArray) -> None:
     if not 1.0 / limit < ratio < limit:
         slow, fast = ("tracks", "truth") if ratio > 1.0 else ("truth", "tracks")
         raise DataError(
-            f"different units of time: the tracks' clock runs {ratio:.3g} times the truth's "
-            f"(tracks {instants[0]:g} to {instants[-1]:g}, truth {frames[0]:g} to {frames[-1]:g}); "
-            f"the {slow} seem to be in milliseconds or frames where the {fast} are in seconds"
+            f"different units of time: the tracks last {span:.3g} times as long as the truth "
+            f"({instants[0]:.10g} to {instants[-1]:.10g} against {frames[0]:.10g} to {frames[-1]:.10g}); "
+            f"the times of the {slow} seem to be milliseconds or frames, those of the {fast} seconds"
         )

@@ -7,6 +7,7 @@ detections for a frame at which nobody looked.
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -46,15 +47,15 @@ class NorfairTracker:
         **parameters: Any,
     ) -> None:
         try:
-            import norfair
+            norfair: Any = import_module("norfair")
         except ImportError as error:
             raise ConfigError(
                 "the baseline norfair needs the package norfair: "
                 "pip install rich filterpy && pip install --no-deps norfair"
             ) from error
-        self._detection: Any = norfair.Detection
+        self._detection = norfair.Detection
         try:
-            self._tracker: Any = norfair.Tracker(
+            self._tracker = norfair.Tracker(
                 distance_function="iou",
                 distance_threshold=distance_threshold,
                 filter_factory=norfair.OptimizedKalmanFilterFactory(R=measurement_noise),

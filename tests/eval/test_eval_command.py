@@ -145,6 +145,14 @@ def test_the_same_input_gives_the_same_bytes(run, truth, capsys):
         (lambda run, truth: (run, run.parent / "gone.csv"), "gone.csv"),
         (lambda run, truth: (in_milliseconds(run), truth), "different units of time"),
         (lambda run, truth: (much_later(run), truth), "no common timestamps"),
+        (lambda run, truth: (run, with_columns(truth, relative)), "different units: the boxes of the truth"),
+        (lambda run, truth: (with_columns(run / "causal.csv", relative), truth), "the boxes of the tracks"),
+        (lambda run, truth: (run, with_columns(truth, numbered)), "the truth has no identities"),
+        (lambda run, truth: (run, with_columns(truth, nameless)), "column 'object_id' is missing"),
+        (
+            lambda run, truth: (run / "causal.csv", with_columns(truth, early_and_late)),
+            "no track is there at",
+        ),
     ],
 )
 def test_wrong_pairs_end_with_code_2_and_one_line(break_it, sentence, run, truth, capsys):
@@ -153,6 +161,44 @@ def test_wrong_pairs_end_with_code_2_and_one_line(break_it, sentence, run, truth
     assert (code, out) == (2, "")
     assert err.count("\n") == 1
     assert sentence in err
+
+
+def with_columns(path, change):
+    header, *lines = path.read_text().splitlines()
+    rows = [
+        change(k, dict(zip(header.split(","), line.split(","), strict=True))) for k, line in enumerate(lines)
+    ]
+    path.write_text(
+        "\n".join([",".join(rows[0]), *(",".join(map(str, row.values())) for row in rows)]) + "\n"
+    )
+    return path
+
+
+def relative(_, row):
+    return row | {name: float(row[name]) / 1280 for name in ("left", "top", "width", "height")}
+
+
+def numbered(k, row):
+    return row | {"object_id": k}
+
+
+def nameless(_, row):
+    return {name: value for name, value in row.items() if name != "object_id"}
+
+
+def early_and_late(_, row):
+    """Frames before the tracks' first row and long after their last one."""
+    return row | {"t": float(row["t"]) + (-1.0 if float(row["t"]) < 1.0 else 5.0)}
+
+
+def test_a_run_that_found_nothing_at_the_truths_frames_is_judged_if_it_says_that_it_looked(
+    run, truth, capsys
+):
+    frames = [row.split(",")[0] for row in with_columns(truth, early_and_late).read_text().splitlines()[1:]]
+    (run / "scans.csv").write_text("t,sensor,detections\n" + "".join(f"{t},rgb,0\n" for t in frames))
+    (run / "smoothed.csv").unlink()
+    code, out, _ = call(capsys, run, "--gt", truth, "--json", "-")
+    assert (code, json.loads(out)["causal"]["FN"]) == (0, 40)
 
 
 def in_milliseconds(run):

@@ -8,6 +8,7 @@ import pytest
 from jeat_graph.errors import DataError
 from jeat_graph.eval.load import restrict_classes
 from jeat_graph.eval.metrics import evaluate
+from jeat_graph.eval.pairing import check_lives
 
 from .data import make_tracks, make_truth
 
@@ -32,7 +33,7 @@ def test_different_units_of_time(factor):
 
 def test_different_units_of_time_at_different_rates():
     fast = np.arange(500) * 10.0  # 100 Hz in milliseconds
-    with pytest.raises(DataError, match="tracks seem to be in milliseconds or frames"):
+    with pytest.raises(DataError, match="times of the tracks seem to be milliseconds or frames"):
         judge(make_truth(T, [1] * 100, BOX), make_tracks(fast, [1] * 500, np.tile(BOX[0], (500, 1))))
 
 
@@ -47,6 +48,16 @@ def test_truth_without_identities():
         judge(make_truth([0.0, 0.0], [-1, -1], BOX[:2]), make_tracks([0.0], [1], BOX[:1]))
 
 
+def test_truth_whose_identities_are_numbers_of_rows():
+    truth = make_truth(T, np.arange(100), BOX)
+    with pytest.raises(
+        DataError, match="no identities: each of its 100 boxes in 100 frames has an object_id of"
+    ):
+        judge(truth, make_tracks(T, [1] * 100, BOX))
+    judge(make_truth([0.0, 0.05], [1, 2], BOX[:2]), make_tracks([0.0, 0.05], [1, 1], BOX[:2]))
+    judge(make_truth(T, np.arange(100) // 2, BOX), make_tracks(T, [1] * 100, BOX))
+
+
 def test_an_object_twice_in_one_frame():
     with pytest.raises(DataError, match="object 3 twice at t = 0 s"):
         judge(make_truth([0.0, 0.0, 0.0], [3, 3, 4], BOX[:3]), make_tracks([0.0], [1], BOX[:1]))
@@ -57,9 +68,29 @@ def test_truth_without_frames():
         judge(make_truth([], [], []), make_tracks([0.0], [1], BOX[:1]))
 
 
-def test_boxes_relative_to_the_picture():
-    with pytest.raises(DataError, match="relative to the picture's size instead of in pixels"):
-        judge(make_truth(T, [1] * 100, BOX), make_tracks(T, [1] * 100, BOX / 1280))
+@pytest.mark.parametrize(("truth", "tracks", "which"), [(1, 1280, "tracks"), (1280, 1, "truth")])
+def test_boxes_relative_to_the_picture(truth, tracks, which):
+    with pytest.raises(DataError, match=f"different units: the boxes of the {which} lie within 0.0"):
+        judge(make_truth(T, [1] * 100, BOX / truth), make_tracks(T, [1] * 100, BOX / tracks))
+
+
+def test_boxes_relative_to_the_picture_on_both_sides_are_of_one_unit():
+    scores = judge(make_truth(T, [1] * 100, BOX / 1280), make_tracks(T, [1] * 100, BOX / 1280))
+    assert scores.MOTA == 100.0
+
+
+def test_no_common_timestamps_though_one_covers_the_other():
+    ends = (T < 1.0) | (T > 4.0)
+    truth = make_truth(T[ends], [1] * ends.sum(), BOX[ends])
+    middle = (T > 2.0) & (T < 3.0)
+    with pytest.raises(DataError, match="no track is there at any of the truth's 39 frames"):
+        check_lives(truth, make_tracks(T[middle], [1] * middle.sum(), BOX[middle]))
+
+
+@pytest.mark.parametrize("times", [[0.5, 4.5], [0.9, 0.91], [4.5, 4.6]])
+def test_a_track_over_a_single_frame_of_the_truth_is_common_enough(times):
+    ends = (T < 1.0) | (T > 4.0)
+    check_lives(make_truth(T[ends], [1] * ends.sum(), BOX[ends]), make_tracks(times, [1, 1], BOX[:2]))
 
 
 def test_no_sequence_and_a_threshold_out_of_range():
