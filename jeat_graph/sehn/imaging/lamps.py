@@ -44,7 +44,8 @@ def light_lamps(
         if look.parked[v]:
             power = candela[2] * facing
         elif k < 2:
-            power = 0.5 * beam_candela(forward, -(dx * cos - dy * sin), -dz, lights)
+            right = -(dx * cos - dy * sin)
+            power = 0.5 * beam_candela(forward, right, -dz, lights.beam_candela, lights.beam_stray)
         else:
             power = (candela[0] + (candela[1] - candela[0]) * brake) * facing
         at = out.lamp[j, v, k]

@@ -111,10 +111,11 @@ def lamp_lux(x: float, y: float, z: float, nx: float, ny: float, nz: float, ligh
 
 
 @njit(cache=True)
-def beam_candela(forward: float, right: float, up: float, lights: Lights) -> float:
+def beam_candela(forward: float, right: float, up: float, peak: float, stray: float) -> float:
     """Intensity of a vehicle's low beams towards a place, given from the lamps along the vehicle's axes (m).
 
-    Bright below a soft cut-off 0.3° under the horizon, falling to the sides; stray light above.
+    Bright below a soft cut-off 0.3° under the horizon, falling to the sides; stray light above. `peak` is the
+    greatest intensity (cd), `stray` the share of it above the cut-off.
     """
     if forward <= 0.05:
         return 0.0
@@ -127,9 +128,7 @@ def beam_candela(forward: float, right: float, up: float, lights: Lights) -> flo
     share = 1.0 / (narrow * wide * steep)
     narrow, wide, steep = share * wide * steep, share * narrow * steep, share * narrow * wide
     across = 0.75 * narrow * narrow * narrow + 0.25 * wide * wide * wide
-    return lights.beam_candela * (
-        lights.beam_stray * wide + (1.0 - lights.beam_stray) * edge * steep * across
-    )
+    return peak * (stray * wide + (1.0 - stray) * edge * steep * across)
 
 
 @njit(cache=True)
@@ -155,5 +154,5 @@ def beam_lux(
     # The window takes the light to zero smoothly; a lamp is no point, hence the constant below.
     window = 1.0 - r2 / (limit * limit)
     r2 += 0.3
-    candela = beam_candela(forward, dx * cos - dy * sin, dz, lights)
+    candela = beam_candela(forward, dx * cos - dy * sin, dz, lights.beam_candela, lights.beam_stray)
     return candela * facing / (r2 * math.sqrt(r2)) * window * window

@@ -17,7 +17,7 @@ from jeat_graph.sehn.imaging.layers import Layers, meets
 from jeat_graph.sehn.imaging.lighting import Lights
 from jeat_graph.sehn.imaging.moments import Look, Moments
 from jeat_graph.sehn.imaging.optics import Optics
-from jeat_graph.sehn.imaging.road_light import cast_beam, cast_shadow
+from jeat_graph.sehn.imaging.road_light import cast_beams, cast_shadow
 from jeat_graph.sehn.imaging.shapes import PARTS
 from jeat_graph.sehn.imaging.tiles import TILE_H, TILE_W, View
 
@@ -65,10 +65,10 @@ def paint_tile(
                 add_lamps(row0, column0, rows, columns, j, v, moments, optics, layers)
             if meets(moments.touch[j, v, 0], row0, column0):
                 cast_shadow(row0, column0, rows, columns, j, v, ground, moments, look, lights, layers)
-    for n in range(counts[2]):
-        v = who[2, n]
-        if moments.fade[j, v] > 0.0:
-            cast_beam(row0, column0, rows, columns, j, v, ground, moments, look, lights, view, layers)
+    if counts[2]:
+        cast_beams(
+            row0, column0, rows, columns, j, who, counts[2], ground, moments, look, lights, view, layers
+        )
     _compose(row0, column0, rows, columns, ground, lights, layers, out)
     for n in range(counts[1]):
         v = who[1, n]

@@ -6,6 +6,7 @@ import math
 
 from numba import njit
 
+from jeat_graph.arrays import IntArray
 from jeat_graph.sehn.imaging.background import Background
 from jeat_graph.sehn.imaging.layers import Layers
 from jeat_graph.sehn.imaging.lighting import LAMP_HEIGHT_M, Lights, beam_candela
@@ -62,72 +63,83 @@ def cast_shadow(
 
 
 @njit(cache=True)
-def cast_beam(
-    row0: int, column0: int, rows: int, columns: int, j: int, v: int, ground: Background, moments: Moments,
-    look: Look, lights: Lights, view: View, layers: Layers,
+def cast_beams(
+    row0: int, column0: int, rows: int, columns: int, j: int, who: IntArray, count: int, ground: Background,
+    moments: Moments, look: Look, lights: Lights, view: View, layers: Layers,
 ) -> None:  # fmt: skip
-    """Add the light of a vehicle's beams on the ground and on barriers."""
-    x, y, sin, cos = moments.pose[j, v]
-    front, fade = 0.5 * look.size[v, 0], moments.fade[j, v]
-    x, y = x + front * sin, y + front * cos
-    limit = lights.beam_range_m
-    R, eye = view.rotation, view.eye
-    fx, fy, cx, cy = view.lens[0], view.lens[1], view.lens[2], view.lens[3]
-    reaches = _reaches(row0, column0, rows, columns, x, y, sin, cos, fade, ground, lights)
-    for r in range(rows):
-        for c in range(columns):
-            row, column, p = row0 + r, column0 + c, r * TILE_W + c
-            if reaches and ground.albedo[row, column, 1] > 0.0:
-                dx, dy = ground.place[row, column, 0] - x, ground.place[row, column, 1] - y
-                forward = dx * sin + dy * cos
-                r2 = dx * dx + dy * dy + LAMP_HEIGHT_M * LAMP_HEIGHT_M
-                if forward > 0.05 and r2 < limit * limit:
-                    window = 1.0 - r2 / (limit * limit)
+    """Add the light of the beams of `count` vehicles (who[2]) on the ground and on barriers."""
+    limit2 = lights.beam_range_m**2
+    peak, stray = lights.beam_candela, lights.beam_stray
+    lift = LAMP_HEIGHT_M
+    place, albedo, beams = ground.place, ground.albedo, layers.beams
+    first, last = place[row0, column0], place[row0 + rows - 1, column0 + columns - 1]
+    across = (first[0] - last[0]) ** 2 + (first[1] - last[1]) ** 2
+    for n in range(count):
+        v = who[2, n]
+        fade = moments.fade[j, v]
+        if fade <= 0.0:
+            continue
+        sin, cos = moments.pose[j, v, 2], moments.pose[j, v, 3]
+        x = moments.pose[j, v, 0] + 0.5 * look.size[v, 0] * sin
+        y = moments.pose[j, v, 1] + 0.5 * look.size[v, 0] * cos
+        # Whether the beams matter on this tile is told by its corners, unless these are near the lamps.
+        nearest, ahead, most = math.inf, -math.inf, 0.0
+        for k in range(4):
+            row, column = row0 + (rows - 1) * (k >> 1), column0 + (columns - 1) * (k & 1)
+            dx, dy = place[row, column, 0] - x, place[row, column, 1] - y
+            forward, r2 = dx * sin + dy * cos, dx * dx + dy * dy + lift * lift
+            candela = fade * beam_candela(forward, dx * cos - dy * sin, -lift, peak, stray)
+            here = candela * lift / (r2 * math.sqrt(r2))
+            lux = ground.lux[row, column]
+            most = max(most, here / lux if lux > 0.0 else math.inf)
+            nearest, ahead = min(nearest, r2), max(ahead, forward)
+            if lux <= 0.0:
+                ahead = math.inf
+        if ahead <= 0.0 or (nearest > _FAR_TILES * _FAR_TILES * across and most < _NEGLIGIBLE):
+            continue
+        for r in range(rows):
+            for c in range(columns):
+                dx, dy = place[row0 + r, column0 + c, 0] - x, place[row0 + r, column0 + c, 1] - y
+                forward, r2 = dx * sin + dy * cos, dx * dx + dy * dy + lift * lift
+                if forward > 0.05 and r2 < limit2 and albedo[row0 + r, column0 + c, 1] > 0.0:
+                    window = 1.0 - r2 / limit2
                     # A lamp is no point: the constant keeps its light finite beside it.
                     r2 += 0.3
-                    candela = beam_candela(forward, dx * cos - dy * sin, -LAMP_HEIGHT_M, lights) * fade
-                    lux = candela * LAMP_HEIGHT_M / (r2 * math.sqrt(r2)) * window * window
-                    layers.beams[p, 0] += lux
-            if ground.front_cover[row, column] > 0.0:
-                Z = ground.front_depth[row, column]
-                X, Y = (column + 0.5 - cx) / fx, (row + 0.5 - cy) / fy
-                wall = eye[0] + Z * (X * R[0, 0] + Y * R[1, 0] + R[2, 0])
-                dx, dy = wall - x, eye[1] + Z * (X * R[0, 1] + Y * R[1, 1] + R[2, 1]) - y
-                forward = dx * sin + dy * cos
-                # Only beams from the side that the camera sees.
-                facing = abs(dx) if (dx < 0.0) == (wall < eye[0]) else 0.0
-                r2 = dx * dx + dy * dy
-                if forward > 0.05 and r2 < limit * limit and facing > 0.0:
-                    window = 1.0 - r2 / (limit * limit)
-                    r2 += 0.3
-                    rise = _WALL_HEIGHT_M - LAMP_HEIGHT_M
-                    candela = beam_candela(forward, dx * cos - dy * sin, rise, lights) * fade
-                    layers.beams[p, 1] += candela * facing / (r2 * math.sqrt(r2)) * window * window
+                    candela = beam_candela(forward, dx * cos - dy * sin, -lift, peak, stray)
+                    lux = fade * candela * lift / (r2 * math.sqrt(r2)) * window * window
+                    beams[r * TILE_W + c, 0] += lux
+    for r in range(rows):
+        for c in range(columns):
+            if ground.front_cover[row0 + r, column0 + c] > 0.0:
+                beams[r * TILE_W + c, 1] = _on_barrier(
+                    row0 + r, column0 + c, j, who, count, ground, moments, look, lights, view
+                )
 
 
 @njit(cache=True)
-def _reaches(
-    row0: int, column0: int, rows: int, columns: int, x: float, y: float, sin: float, cos: float, fade: float,
-    ground: Background, lights: Lights,
-) -> bool:  # fmt: skip
-    """Say whether beams from (x, y) matter on a tile's ground, by its corners; if in doubt, yes."""
-    most, least_lux = 0.0, math.inf
-    nearest, ahead = math.inf, -math.inf
-    for k in range(4):
-        row, column = row0 + (rows - 1) * (k >> 1), column0 + (columns - 1) * (k & 1)
-        lux = ground.lux[row, column]
-        if lux <= 0.0:
-            return True
-        dx, dy = ground.place[row, column, 0] - x, ground.place[row, column, 1] - y
-        forward, right = dx * sin + dy * cos, dx * cos - dy * sin
-        r2 = dx * dx + dy * dy + LAMP_HEIGHT_M * LAMP_HEIGHT_M
-        candela = beam_candela(forward, right, -LAMP_HEIGHT_M, lights)
-        most = max(most, fade * candela * LAMP_HEIGHT_M / (r2 * math.sqrt(r2)))
-        nearest, ahead = min(nearest, r2), max(ahead, forward)
-        least_lux = min(least_lux, lux)
-    if ahead <= 0.0:
-        return False
-    first, last = ground.place[row0, column0], ground.place[row0 + rows - 1, column0 + columns - 1]
-    across = (first[0] - last[0]) ** 2 + (first[1] - last[1]) ** 2
-    # Near the lamps the corners do not tell what is between them.
-    return nearest < _FAR_TILES * _FAR_TILES * across or most > _NEGLIGIBLE * least_lux
+def _on_barrier(
+    row: int, column: int, j: int, who: IntArray, count: int, ground: Background, moments: Moments,
+    look: Look, lights: Lights, view: View,
+) -> float:  # fmt: skip
+    """Illuminance of a barrier by beams, from the side that the camera sees (lux)."""
+    R, eye, lens = view.rotation, view.eye, view.lens
+    limit2 = lights.beam_range_m**2
+    Z = ground.front_depth[row, column]
+    X, Y = (column + 0.5 - lens[2]) / lens[0], (row + 0.5 - lens[3]) / lens[1]
+    wall_x = eye[0] + Z * (X * R[0, 0] + Y * R[1, 0] + R[2, 0])
+    wall_y = eye[1] + Z * (X * R[0, 1] + Y * R[1, 1] + R[2, 1])
+    total = 0.0
+    for n in range(count):
+        v = who[2, n]
+        sin, cos = moments.pose[j, v, 2], moments.pose[j, v, 3]
+        dx = wall_x - moments.pose[j, v, 0] - 0.5 * look.size[v, 0] * sin
+        dy = wall_y - moments.pose[j, v, 1] - 0.5 * look.size[v, 0] * cos
+        forward, r2 = dx * sin + dy * cos, dx * dx + dy * dy
+        if forward > 0.05 and r2 < limit2 and (dx < 0.0) == (wall_x < eye[0]):
+            window = 1.0 - r2 / limit2
+            r2 += 0.3
+            rise = _WALL_HEIGHT_M - LAMP_HEIGHT_M
+            candela = beam_candela(forward, dx * cos - dy * sin, rise, lights.beam_candela, lights.beam_stray)
+            fade = moments.fade[j, v]
+            total += fade * candela * abs(dx) / (r2 * math.sqrt(r2)) * window * window
+    return total
