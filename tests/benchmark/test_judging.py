@@ -5,6 +5,7 @@ import operator
 import numpy as np
 import pytest
 
+from jeat_graph.benchmark import peer_search
 from jeat_graph.benchmark.association_table import SYNCHRONOUS, association_table
 from jeat_graph.benchmark.common import scenario_table
 from jeat_graph.benchmark.contenders import (
@@ -17,10 +18,10 @@ from jeat_graph.benchmark.contenders import (
     streams,
 )
 from jeat_graph.benchmark.judging import in_processes, spread, summarise
-from jeat_graph.benchmark.peer_search import peers_here
+from jeat_graph.benchmark.peer_search import peers_here, search_parameters, search_table
 from jeat_graph.benchmark.recordings import find_kitti, kitti, simulated
 from jeat_graph.config_io import load_config
-from jeat_graph.eval.baselines.search import grid
+from jeat_graph.eval.baselines.search import SEARCH_GRIDS, grid
 
 
 def entry(row, scenario, mota):
@@ -76,6 +77,25 @@ def test_a_missing_package_is_said_and_its_trackers_are_left_out(monkeypatch, ca
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert "Norfair left out (pip install rich filterpy && pip install --no-deps norfair)" in said
+
+
+def test_a_search_says_what_it_gained_on_each_stream(monkeypatch):
+    pytest.importorskip("trackers", reason="needs the package trackers (extra baselines)")
+    monkeypatch.setitem(SEARCH_GRIDS, "sort", {"minimum_consecutive_frames": (1, 20)})
+    monkeypatch.setattr(peer_search, "SEARCH_DURATION_S", 1.0)
+    found = search_parameters(["sort"], ("rgb", "evt"), None, 1)
+    assert list(found) == ["sort/rgb", "sort/evt", "sort/rgb+evt"]
+    for one in found.values():
+        # One second is short: who waits for a third frame, or for 20, loses.
+        assert one["parameters"] == {"minimum_consecutive_frames": 1}
+        assert one["best"]["MOTA"] > one["default"]["MOTA"]
+        assert one["tried"] == 3
+    before, after = (found["sort/evt"][when]["HOTA"] for when in ("default", "best"))
+    table = search_table(found, "searched")
+    row = dict(zip(table.columns, table.rows[1], strict=True))
+    assert row[""] == "sort/evt"
+    assert row["HOTA"] == f"{before:.1f} → {after:.1f}"
+    assert row["best"] == "minimum_consecutive_frames 1"
 
 
 def test_every_parameter_that_was_found_belongs_to_a_grid():
