@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import gc
+import os
+import subprocess
+import sys
+import time
 from dataclasses import fields
 
 import numpy as np
@@ -11,7 +16,7 @@ from jeat_graph import load_config
 from jeat_graph.errors import JeatGraphError
 from jeat_graph.smoothing.behind import SmoothingHere
 from jeat_graph.smoothing.recorder import StepRecorder
-from jeat_graph.smoothing.worker import SmoothingWorker
+from jeat_graph.smoothing.worker import SmoothingWorker, _portable
 from jeat_graph.trajectories import Trajectories
 
 from .conftest import make_tracker, recording, run
@@ -71,12 +76,129 @@ def test_a_worker_that_dies_is_reported():
         tracker.finish()
 
 
-def test_an_error_in_the_worker_reaches_the_caller():
+@pytest.mark.parametrize("call", ["smoothed", "finish"])
+def test_an_error_in_the_worker_reaches_whoever_waits_for_it_and_all_who_ask_later(call):
     worker = SmoothingWorker(load_config("default"))
     worker._send("consume", "no packet")
-    worker._answers.poll(30.0)
+    with pytest.raises(AttributeError) as error:
+        getattr(worker, call)()
+    assert "_serve" in error.value.__notes__[0]
+    for name in ("drain", "smoothed", "finish", "counts"):
+        with pytest.raises(JeatGraphError, match="failed"):
+            getattr(worker, name)()
+
+
+def test_an_error_in_the_worker_ends_the_run_of_a_tracker_that_never_asks():
+    tracker = make_tracker("smoother.worker=true", "smoother.chunk=1")
+    tracker._smoothers._send("consume", "no packet")
+    tracker._smoothers._answers.poll(30.0)
     with pytest.raises(AttributeError):
-        worker.drain()
+        run(tracker, DETECTIONS)
+
+
+def test_an_error_that_cannot_be_sent_is_told_in_words():
+    class LocalError(Exception):
+        pass
+
+    error = _portable(LocalError("no way"))
+    assert isinstance(error, JeatGraphError)
+    assert "LocalError" in str(error)
+    assert "no way" in str(error)
+    assert isinstance(_portable(ValueError("as it is")), ValueError)
+
+
+def test_a_tracker_that_never_saw_a_scan_has_no_rows():
+    tracker = make_tracker("smoother.worker=true")
+    for table in (tracker.smoothed(), tracker.drain_smoothed(), tracker.finish()):
+        assert len(table) == 0
+        assert table.sensors == tracker.sensor_names
+    assert tracker.smoother_counts == dict.fromkeys(tracker.smoother_counts, 0)
+
+
+def test_after_the_end_there_is_nothing_more_and_no_error():
+    tracker = make_tracker("smoother.worker=true")
+    run(tracker, DETECTIONS)
+    assert len(tracker.finish()) > 300
+    for call in (tracker.finish, tracker.smoothed, tracker.drain_smoothed):
+        assert len(call()) == 0
+    assert tracker.smoother_counts["tracks"] == 2
+
+
+def test_two_trackers_with_workers_do_not_meddle():
+    one, two = make_tracker("smoother.worker=true"), make_tracker("smoother.worker=true")
+    other = recording(duration=1.0, seed=5)
+    run(one, DETECTIONS)
+    run(two, other)
+    tables = one.finish(), two.finish()
+    for table, detections in zip(tables, (DETECTIONS, other), strict=True):
+        alone = make_tracker()
+        run(alone, detections)
+        assert same_bytes(table, alone.finish())
+
+
+def test_an_answer_that_nobody_waited_for_is_not_taken_for_the_next():
+    """An interrupt may end the waiting, not the worker."""
+    tracker, here = make_tracker("smoother.worker=true"), make_tracker()
+    steps = zip(tracker.run(DETECTIONS), here.run(DETECTIONS), strict=True)
+    for _ in range(100):
+        next(steps)
+    worker = tracker._smoothers
+    worker._asked += 1
+    worker._send("consume", worker._recorder.take())
+    worker._send("smoothed", worker._asked)
+    here.smoothed()
+    for _ in range(100):
+        next(steps)
+    assert same_bytes(tracker.smoothed(), here.smoothed())
+
+
+def ends(pid: int, within_s: float = 10.0) -> bool:
+    """Whether a process ends within some time."""
+    for _ in range(int(within_s / 0.05)):
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            return True
+        time.sleep(0.05)
+    return False
+
+
+def test_a_tracker_that_is_dropped_takes_its_worker_along():
+    tracker = make_tracker("smoother.worker=true")
+    tracker.smoothed()
+    pid = tracker._smoothers._process.pid
+    del tracker
+    gc.collect()
+    assert ends(pid)
+
+
+SCRIPT = """
+import os, signal, sys
+sys.path.insert(0, {folder!r})
+from conftest import make_tracker, recording, run
+
+if __name__ == "__main__":
+    cars = tuple((0.0, 9.0, {{"start": (100.0 + 90.0 * k, 100.0 + 40.0 * k)}}) for k in range(10))
+    tracker = make_tracker("smoother.worker=true")
+    print(tracker._smoothers._process.pid, flush=True)
+    if {started}:
+        tracker.smoothed()
+    run(tracker, recording(duration=4.0, cars=cars))
+    if {killed}:
+        os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+@pytest.mark.parametrize(("started", "killed"), [(True, False), (False, False), (True, True)])
+def test_a_program_that_ends_without_finish_ends_and_so_does_its_worker(tmp_path, started, killed):
+    """Though all waits to be sent, as the worker has not begun yet; and though nobody can tell it."""
+    script = tmp_path / "script.py"
+    script.write_text(SCRIPT.format(folder=os.path.dirname(__file__), started=started, killed=killed))
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode == 0) != killed, done.stderr
+    assert "Traceback" not in done.stderr
+    assert ends(int(done.stdout))
 
 
 def test_the_histories_are_not_here():
