@@ -103,8 +103,8 @@ def update_with_error(
         The axis' share of the normalised innovation squared, y² / S.
     """
     D = len(m)
-    e = MOTION + max(error, 0)
-    h = lever if error >= 0 else 0.0
+    # Without an error state there may be none in the block either.
+    e, h = (MOTION + error, lever) if error >= 0 else (0, 0.0)
     for j in range(D):
         u[j] = P[0, j] + h * P[e, j]
     S = u[0] + h * u[e] + R

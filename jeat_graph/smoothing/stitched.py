@@ -115,16 +115,18 @@ def _join(parts: Sequence[TrackHistory], scan_t: FloatArray, config: Config) -> 
     """One history of several in order of time, with rows at all steps in between."""
     whole = TrackHistory(parts[0].track_id, config, ErrorStates.of(config), keep=True)
     looks: list[Looks] = []
+    births = [float(part.measurements[0][0, 0]) for part in parts]
     for k, part in enumerate(parts):
         for rows in part.measurements:
             whole.take(rows)
         mine = part.looks
         if k + 1 < len(parts):
             # The earlier fragment may still have coasted when the later one was born.
-            start = parts[k + 1].looks.t[0]
-            mine = mine.take(mine.t < start)
-            low = int(np.searchsorted(scan_t, mine.t[-1], side="right"))
-            high = int(np.searchsorted(scan_t, start, side="left"))
+            mine = mine.take(mine.t < births[k + 1])
+            # At a low output rate a fragment may have lived between two rows.
+            since = mine.t[-1] if len(mine) else births[k]
+            low = int(np.searchsorted(scan_t, since, side="right"))
+            high = int(np.searchsorted(scan_t, births[k + 1], side="left"))
             looks += [mine, Looks.unseen(scan_t[low:high])]
         else:
             looks.append(mine)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from jeat_graph.filters.aekf import predict
+from jeat_graph.filters.aekf import predict, update_block
 from jeat_graph.filters.coloured import expected, predict_errors, update_centre, update_with_error
 from jeat_graph.filters.motion import process_noise, transition
 
@@ -80,6 +80,17 @@ def test_a_sensor_without_memory_updates_as_in_the_paper_s_state():
     assert np.allclose(wide[:, :, :3], mean, rtol=1e-12)
     assert is_close(wide_cov[:, :, :3, :3], cov)
     assert np.array_equal(wide_cov[:, :, 3:, 3:], np.tile(np.eye(2), (10, 2, 1, 1)))
+
+
+@pytest.mark.parametrize("update", [update_with_error, update_with_error.py_func])
+def test_a_block_without_error_states_is_updated_as_the_paper_s(update):
+    """With nothing read beyond its end, which only the plain function would notice."""
+    mean, cov = random_tracks(np.random.default_rng(5), 1, 0)
+    m, P = mean[0, 1].copy(), cov[0, 1].copy()
+    nis = update(m, P, 3.0, 2.0, 1.5, -1, np.empty(3))
+    assert nis == pytest.approx(update_block(mean[0, 1], cov[0, 1], 3.0, 2.0), rel=1e-12)
+    assert np.allclose(m, mean[0, 1], rtol=1e-12)
+    assert is_close(P, cov[0, 1])
 
 
 def test_after_a_long_gap_no_variance_is_lost_to_rounding():

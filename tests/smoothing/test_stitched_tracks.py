@@ -36,6 +36,21 @@ def test_the_joined_track_has_rows_in_the_gap_near_the_truth():
         assert np.abs(mine.mean[:, 0] - x).max() < 12.0
 
 
+@pytest.mark.parametrize("rate_hz", [0.5, 1.0, 20.0])
+def test_a_fragment_that_lived_between_two_rows_joins_the_others(rate_hz):
+    """The joint changes at most which rows there are: one at each time that the rate asks for."""
+    blinking = recording(duration=4.5, cars=TWO_CARS, blind=((1.2, 1.6), (1.8, 2.2)))
+    options = ("smoother.engine=rts", "lifecycle.max_gap_confirmed_s=0.15")
+    every, some = make_tracker(*options), make_tracker(*options, f"smoother.output_rate_hz={rate_hz}")
+    run(every, blinking)
+    run(some, blinking)
+    every, some = every.finish(), some.finish()
+    kept = every.take(np.isclose(every.t * rate_hz % 1.0, 0.0, atol=1e-6))
+    assert len(np.unique(kept.track_id)) == 2
+    assert np.array_equal(some.t, kept.t)
+    assert np.array_equal(some.mean, kept.mean)
+
+
 def test_stitching_can_be_switched_off():
     tracker = make_tracker("smoother.engine=rts", "smoother.stitch=false")
     causal = run(tracker, VANISHED)
