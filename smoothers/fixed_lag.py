@@ -216,10 +216,11 @@ class FixedLagSmoother:
                 window.lever[here],
                 window.error[here],
             )
-            graph.add_prior(self._oldest, *prior)
             rows = window.key_rows()
             if len(rows) > 1:
                 self._segments(graph, np.append(rows[:-1:STRIDE], rows[-1]))
+            # After the steps, since the heaviest rows have to be the first (`segment_rows`).
+            graph.add_prior(self._oldest, *prior)
             gtsam = GtsamWindow(window.size)
             gtsam.update(graph, self._oldest, self._next - self._oldest, range(0))
             self._gtsam = gtsam

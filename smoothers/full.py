@@ -50,7 +50,6 @@ def smooth_full(track: TrackData, weights: FloatArray | None = None) -> Smoothed
         track.lever[:first],
         track.error[:first],
     )
-    graph.add_prior(0, *prior)
     segments = factors.segment_rows(
         (0,) * track.size,
         np.arange(len(track)),
@@ -65,6 +64,8 @@ def smooth_full(track: TrackData, weights: FloatArray | None = None) -> Smoothed
         reference,
     )
     graph.add_segments(0, *segments)
+    # After the steps, since the heaviest rows have to be the first (`segment_rows`).
+    graph.add_prior(0, *prior)
     vectors, conditional, gain = graph.solve(len(track))
     cov, gain = factors.unscale_cov(conditional), factors.unscale_gain(gain)
     _marginals(cov, gain)

@@ -11,7 +11,7 @@ COLOURS = [(), (0.3, 0.08)]
 
 
 @pytest.mark.parametrize("memory", COLOURS)
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, 1, 2, 3, 34, 53])
 def test_equals_the_dense_solution_on_harsh_timing(harsh, dense, blocks, scaled, relative, seed, memory):
     track = harsh(seed, memory=memory)
     smoothed = smooth_full(track)
