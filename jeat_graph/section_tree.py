@@ -128,6 +128,8 @@ def convert(hint: Any, value: Any, where: str) -> Any:
         if len(args) != len(value):
             raise ConfigError(f"{where}: must have {len(args)} entries, not {len(value)}")
         return tuple(convert(a, v, where) for a, v in zip(args, value, strict=True))
+    if hint is float and isinstance(value, str) and re.fullmatch(_EXPONENT, value):
+        value = float(value)  # YAML 1.1 takes 1e-3, without a point and a sign, for text
     good = (
         isinstance(value, bool)
         if hint is bool
@@ -147,4 +149,5 @@ def plain(value: Any) -> Any:
     return value
 
 
+_EXPONENT = r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+"
 _WORDS = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}

@@ -69,6 +69,10 @@ def test_the_paper_preset_has_the_papers_constants(path, value):
         ("moton.jerk_px=1", ["moton", "motion"]),
         ("sensors.rgb.rate_hs=1", ["sensors.rgb.rate_hs", "sensors.rgb.rate_hz"]),
         ("sensors.rbg.rate_hz=1", ["rbg", "rgb"]),
+        ("sensors.rgb.corelated_share=0", ["sensors.rgb.corelated_share", "sensors.rgb.correlated_share"]),
+        ("sensors.rgb.memory=1", ["sensors.rgb.memory", "sensors.rgb.memory_s"]),
+        ("motion.jerk_per_grow=1", ["motion.jerk_per_grow", "motion.jerk_per_growth"]),
+        ("smoother.workers=true", ["smoother.workers", "smoother.worker"]),
     ],
 )
 def test_an_unknown_key_names_the_nearest_known_one(override, words):
@@ -90,6 +94,14 @@ def test_an_unknown_preset_names_the_nearest_one():
         ("sensors.evt.p_detect=1.5", ["sensors.evt.p_detect", "1.5", "[0.01, 0.999]"]),
         ("sensors.evt.sigma_px=.nan", ["sensors.evt.sigma_px", "nan"]),
         ("sensors.evt.rate_hz=.inf", ["sensors.evt.rate_hz", "inf"]),
+        ("sensors.rgb.correlated_share=1", ["sensors.rgb.correlated_share", "1.0", "[0.0, 0.99]"]),
+        ("sensors.rgb.correlated_share=-0.1", ["sensors.rgb.correlated_share", "-0.1", "[0.0, 0.99]"]),
+        ("sensors.evt.memory_s=0", ["sensors.evt.memory_s", "[0.001, 10000.0]", "(s)"]),
+        ("sensors.evt.memory_s=1e5", ["sensors.evt.memory_s", "100000.0", "(s)"]),
+        ("motion.jerk_per_growth=-1", ["motion.jerk_per_growth", "-1.0", "[0.0, inf]"]),
+        ("motion.jerk_per_growth=steep", ["motion.jerk_per_growth", "number", "steep"]),
+        ("smoother.worker=2", ["smoother.worker", "true or false"]),
+        ("smoother.worker=yes please", ["smoother.worker", "true or false"]),
         ("lifecycle.confirm_hits=0", ["lifecycle.confirm_hits", "0"]),
         ("lifecycle.confirm_hits=2.5", ["lifecycle.confirm_hits", "whole number"]),
         ("motion.jerk_px=fast", ["motion.jerk_px", "number", "fast"]),
@@ -120,6 +132,33 @@ def test_overrides_are_laid_over_the_preset_one_after_the_other():
     assert config.sensors["rgb"] == dataclasses.replace(base.sensors["rgb"], rate_hz=30.0)
     assert config.sensors["evt"] == base.sensors["evt"]
     assert load_config("default") == base, "an override must not reach the next load"
+
+
+@pytest.mark.parametrize("text", ["2e-3", "2E-3", ".2e-2", "20e-4", "+2.e-3", "2.0e-3"])
+def test_a_number_may_have_an_exponent_with_or_without_a_point(text):
+    assert load_config("default", [f"sensors.evt.memory_s={text}"]).sensors["evt"].memory_s == 0.002
+
+
+@pytest.mark.parametrize("text", ["e5", "1e", "1e5s", "1 e5", "'0x1e5'"])
+def test_what_only_looks_like_an_exponent_is_no_number(text):
+    assert "must be a number" in refusal("default", [f"sensors.evt.memory_s={text}"])
+
+
+def test_errors_with_memory_perspective_and_the_worker_can_be_set_by_hand():
+    config = load_config(
+        "paper",
+        [
+            "sensors.rgb.correlated_share=0.99",
+            "sensors.rgb.memory_s=0.001",
+            "motion.jerk_per_growth=10",
+            "smoother.worker=true",
+        ],
+    )
+    rgb = config.sensors["rgb"]
+    assert (rgb.correlated_share, rgb.memory_s) == (0.99, 0.001)
+    assert config.sensors["evt"].correlated_share == 0.0
+    assert config.motion.jerk_per_growth == 10.0
+    assert config.smoother.worker is True
 
 
 def test_a_section_that_the_preset_leaves_out_can_be_overridden(tmp_path):
