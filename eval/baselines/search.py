@@ -28,18 +28,18 @@ SEARCH_GRIDS: dict[str, dict[str, tuple[float | int | bool, ...]]] = {
         "minimum_iou_threshold": (0.1, 0.3),
     },
     "bytetrack": {
-        "track_activation_threshold": (0.5, 0.7, 0.9),
+        "track_activation_threshold": (0.3, 0.5, 0.7, 0.9),
         "high_conf_det_threshold": (0.2, 0.4, 0.6, 0.8),
         "minimum_consecutive_frames": (1, 2),
         "minimum_iou_threshold": (0.1, 0.3),
     },
     "ocsort": {
-        "high_conf_det_threshold": (0.3, 0.5, 0.6, 0.7, 0.9),
+        "high_conf_det_threshold": (0.1, 0.3, 0.5, 0.6, 0.7, 0.9),
         "minimum_consecutive_frames": (1, 3),
         "minimum_iou_threshold": (0.1, 0.3),
     },
     "botsort": {
-        "track_activation_threshold": (0.5, 0.7, 0.9),
+        "track_activation_threshold": (0.3, 0.5, 0.7, 0.9),
         "high_conf_det_threshold": (0.2, 0.4, 0.6, 0.8),
         "minimum_consecutive_frames": (1, 2),
         "minimum_iou_threshold_first_assoc": (0.1, 0.2),

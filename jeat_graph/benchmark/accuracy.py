@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from jeat_graph.benchmark import common
 from jeat_graph.benchmark.association_table import association_names, association_table, judge_synchronous
-from jeat_graph.benchmark.contenders import KITTI_BEST, SIMULATED_BEST, Peer, ours, peers
+from jeat_graph.benchmark.contenders import Peer, ours, peers
 from jeat_graph.benchmark.judging import (
     BaselineJob,
     OursJob,
@@ -19,6 +19,7 @@ from jeat_graph.benchmark.judging import (
     judge_recordings,
     summarise,
 )
+from jeat_graph.benchmark.peer_parameters import KITTI_BEST, SIMULATED_BEST
 from jeat_graph.benchmark.peer_search import peers_here, search_parameters, search_table
 from jeat_graph.benchmark.provenance import provenance
 from jeat_graph.benchmark.recordings import Recording, find_kitti, kitti, simulated

@@ -16,14 +16,7 @@ NAMES = {
     "norfair": "Norfair",
 }
 
-# Best MOTA of the grids in `eval.baselines.search`, found by `benchmark accuracy --search` on other
-# recordings than those that are judged: the first 8 s of seed 100 of all three scenarios, one set of
-# parameters for all lights.
-SIMULATED_BEST: dict[str, dict[str, Any]] = {}
-
-# The same on the KITTI sequences. These *are* the judged ones: the peers are given that advantage.
-KITTI_BEST: dict[str, dict[str, Any]] = {}
-
+# Where the parameters in `peer_parameters` were searched, beside KITTI.
 SEARCH_SEED = 100
 SEARCH_DURATION_S = 8.0
 
