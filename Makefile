@@ -54,6 +54,7 @@ $(VENV)/.run: pyproject.toml | $(BIN)/python
 $(VENV)/.test: pyproject.toml $(VENV)/.run
 	@echo "make: installing what the tests need"
 	@$(PIP) --editable '.[test]'
+	@$(PIP) --no-deps norfair==2.3.0
 	@touch $@
 
 $(VENV)/.lint: pyproject.toml | $(BIN)/python

@@ -12,7 +12,7 @@ from jeat_graph.config import Config
 from jeat_graph.config_io import config_to_dict
 from jeat_graph.version import __version__
 
-_PACKAGES = ("numpy", "scipy", "numba", "trackeval", "gtsam", "trackers", "supervision")
+_PACKAGES = ("numpy", "scipy", "numba", "trackeval", "gtsam", "trackers", "norfair", "supervision")
 
 
 def provenance(settings: Mapping[str, Any], configs: Mapping[str, Config]) -> dict[str, Any]:

@@ -187,12 +187,12 @@ def tables(result: Mapping[str, Any]) -> dict[str, Table]:
     motion: list[dict[str, Cell]] = []
     for place, rows in groups.items():
         for row, found in rows.items():
-            scores.append({"": place, "estimate": row} | {m: _text(found, m) for m in _SCORES})
+            scores.append({"": place, "estimate": row, **{m: _text(found, m) for m in _SCORES}})
             if all("nees" in one and np.isfinite(one["nees"]) for one in found):
                 line: dict[str, Cell] = {m: _text(found, m, 2) for m in _MOTION}
                 anees = [one["nees"] / 2.0 for one in found]
                 line["ANEES of position"] = f"{min(anees):.2f} … {max(anees):.2f}"
-                motion.append({"": place, "estimate": row} | line)
+                motion.append({"": place, "estimate": row, **line})
     matched: list[dict[str, Cell]] = []
     for place, entries in result["drawn"].items():
         first = entries[0]
@@ -208,7 +208,7 @@ def tables(result: Mapping[str, Any]) -> dict[str, Table]:
                     "ANEES (95 %)": f"{entry['anees']:.2f} ({entry['low']:.2f} … {entry['high']:.2f})",
                 }
             )
-    seeds = common.over_seeds(len(result["settings"]["seeds"])).replace(" of MOTA", "")
+    seeds = common.over_seeds(len(result["settings"]["seeds"]))
     return {
         "smoothing": Table.from_records(
             scores, title=f"Causal against smoothed, {seeds}; KITTI: of sequences"
