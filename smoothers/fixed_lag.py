@@ -2,7 +2,7 @@
 
 The values come from GTSAM's incremental fixed-lag smoother (or, with `use_gtsam=False`, from our own
 pass over the window). GTSAM solves for every `STRIDE`-th state, its *anchors*; those in between are
-eliminated before (`factors.py`) and follow from the anchor after them, exactly. The covariances do not
+eliminated before (`whitened.py`) and follow from the anchor after them, exactly. The covariances do not
 depend on the measured values, and come from the pass over our own arrays in both cases: the same numbers
 as GTSAM's marginals (tested), at a twentieth of the cost (about 1 ms for one marginal at the far end of a
 window of a second at 120 Hz).
@@ -15,11 +15,12 @@ import numpy.typing as npt
 
 from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.errors import DataError
-from jeat_graph.smoothers import factors
-from jeat_graph.smoothers.backward import fill_back
+from jeat_graph.smoothers.gains import fill_back
 from jeat_graph.smoothers.gtsam_window import GtsamWindow
+from jeat_graph.smoothers.linear_graph import LinearGraph
 from jeat_graph.smoothers.measurements import COINCIDENT_S, Measurements, check_measurements, group_times
 from jeat_graph.smoothers.track_data import SmoothedTrack
+from jeat_graph.smoothers.whitened import prior_rows, segment_rows
 from jeat_graph.smoothers.window import Window
 
 #: GTSAM solves for one state in so many. More would hardly be faster: what is left is the cost of a chunk.
@@ -170,14 +171,14 @@ class FixedLagSmoother:
             window.insert(float(t), z, r, lever, int(error))
             self._gtsam, self._outdated = None, self._use_gtsam
 
-    def _segments(self, graph: factors.LinearGraph, ends: IntArray) -> None:
+    def _segments(self, graph: LinearGraph, ends: IntArray) -> None:
         """Add all steps and measurements after the row `ends`[0], an anchor, and make the others anchors."""
         w = self._live()
         count = len(ends) - 1
         steps = ((0,) * w.size, ends, w.t, w.q, w.memory)
         taken = slice(w.taken, w.taken_end)
         measured = (w.z[taken], w.info[taken], w.lever[taken], w.error[taken])
-        rows = factors.segment_rows(*steps, w.row[taken], *measured, w.reference)
+        rows = segment_rows(*steps, w.row[taken], *measured, w.reference)
         graph.add_segments(int(w.anchor[ends[0]]), *rows)
         w.anchor[ends[1:]] = np.arange(self._next, self._next + count)
         self._next += count
@@ -185,7 +186,7 @@ class FixedLagSmoother:
     def _extend(self, gtsam: GtsamWindow, ends: IntArray) -> None:
         """Tell GTSAM of the rows after its newest anchor; if that fails, build its window anew."""
         window, first = self._live(), self._next
-        graph = factors.LinearGraph(window.size)
+        graph = LinearGraph(window.size)
         self._segments(graph, ends)
         anchors = window.anchor[window.first : window.end]
         oldest = int(anchors[np.argmax(anchors >= 0)])
@@ -203,11 +204,11 @@ class FixedLagSmoother:
         window.anchor[window.first : window.end] = -1
         window.anchor[window.first] = self._oldest = self._next
         self._next += 1
-        graph = factors.LinearGraph(window.size)
+        graph = LinearGraph(window.size)
         try:
             held = window.row[window.taken : window.taken_end]
             here = slice(window.taken, window.taken + int(np.searchsorted(held, window.first, side="right")))
-            prior = factors.prior_rows(
+            prior = prior_rows(
                 window.base_mean,
                 window.base_cov,
                 window.reference[window.first],
@@ -219,7 +220,6 @@ class FixedLagSmoother:
             rows = window.key_rows()
             if len(rows) > 1:
                 self._segments(graph, np.append(rows[:-1:STRIDE], rows[-1]))
-            # After the steps, since the heaviest rows have to be the first (`segment_rows`).
             graph.add_prior(self._oldest, *prior)
             gtsam = GtsamWindow(window.size)
             gtsam.update(graph, self._oldest, self._next - self._oldest, range(0))

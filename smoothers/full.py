@@ -11,9 +11,11 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.arrays import FloatArray
-from jeat_graph.smoothers import factors
+from jeat_graph.smoothers.linear_graph import LinearGraph
 from jeat_graph.smoothers.rts import filter_track, information
+from jeat_graph.smoothers.scaling import unscale_cov, unscale_gain, unscale_mean
 from jeat_graph.smoothers.track_data import SmoothedTrack, TrackData
+from jeat_graph.smoothers.whitened import prior_rows, segment_rows
 
 
 @njit(cache=True)
@@ -39,9 +41,9 @@ def smooth_full(track: TrackData, weights: FloatArray | None = None) -> Smoothed
     """
     info = information(track, weights)
     reference, _ = filter_track(track, weights)
-    graph = factors.LinearGraph(track.size)
+    graph = LinearGraph(track.size)
     first = int(np.searchsorted(track.key, 0, side="right"))
-    prior = factors.prior_rows(
+    prior = prior_rows(
         track.prior_mean,
         track.prior_cov,
         reference[0],
@@ -50,7 +52,7 @@ def smooth_full(track: TrackData, weights: FloatArray | None = None) -> Smoothed
         track.lever[:first],
         track.error[:first],
     )
-    segments = factors.segment_rows(
+    segments = segment_rows(
         (0,) * track.size,
         np.arange(len(track)),
         track.t,
@@ -64,9 +66,8 @@ def smooth_full(track: TrackData, weights: FloatArray | None = None) -> Smoothed
         reference,
     )
     graph.add_segments(0, *segments)
-    # After the steps, since the heaviest rows have to be the first (`segment_rows`).
     graph.add_prior(0, *prior)
     vectors, conditional, gain = graph.solve(len(track))
-    cov, gain = factors.unscale_cov(conditional), factors.unscale_gain(gain)
+    cov, gain = unscale_cov(conditional), unscale_gain(gain)
     _marginals(cov, gain)
-    return SmoothedTrack(track.t, track.q, factors.unscale_mean(vectors, reference), cov, gain)
+    return SmoothedTrack(track.t, track.q, unscale_mean(vectors, reference), cov, gain)

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.arrays import FloatArray
-from jeat_graph.smoothers import factors
+from jeat_graph.smoothers.linear_graph import LinearGraph, zero_values
+from jeat_graph.smoothers.scaling import axis_blocks, unscale_cov, unscale_mean
 
 #: Timestamps as GTSAM sees them: with a lag of one, a state at -2 is out of the window.
 _STAYS, _LEAVES, _LAG = 0.0, -2.0, 1.0
@@ -44,11 +45,11 @@ class GtsamWindow:
         params.enableRelinearization = False
         self._smoother: Any = gtsam.IncrementalFixedLagSmoother(_LAG, params)
 
-    def update(self, graph: factors.LinearGraph, first: int, count: int, leaving: Iterable[int]) -> None:
+    def update(self, graph: LinearGraph, first: int, count: int, leaving: Iterable[int]) -> None:
         """Add factors and the states `first`, …, `first` + `count` - 1, and marginalise those leaving."""
         stamps = dict.fromkeys(range(first, first + count), _STAYS)
         stamps.update(dict.fromkeys(leaving, _LEAVES))
-        values = factors.zero_values(range(first, first + count), self._size)
+        values = zero_values(range(first, first + count), self._size)
         self._smoother.update(graph.as_nonlinear(), values, stamps)
 
     def means(self, keys: Sequence[int], reference: FloatArray) -> FloatArray:
@@ -60,14 +61,14 @@ class GtsamWindow:
         vectors = self._smoother.getDelta().vector(list(keys))
         if not np.isfinite(vectors).all():
             raise RuntimeError("GTSAM gave a mean that is not finite")
-        return factors.unscale_mean(vectors, reference)
+        return unscale_mean(vectors, reference)
 
     def cov(self, key: int) -> FloatArray:
         """Return the marginal covariance (2, n, n) of one state of the window."""
-        blocks = factors.axis_blocks(self._smoother.marginalCovariance(key))
+        blocks = axis_blocks(self._smoother.marginalCovariance(key))
         if not np.isfinite(blocks).all():
             raise RuntimeError("GTSAM gave a covariance that is not finite")
-        return factors.unscale_cov(blocks)
+        return unscale_cov(blocks)
 
     def factor_slots(self) -> int:
         """Return how many factor slots GTSAM holds; it must not grow with the length of the track."""

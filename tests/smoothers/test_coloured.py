@@ -9,7 +9,7 @@ from scipy.stats import chi2
 from jeat_graph.errors import DataError
 from jeat_graph.smoothers.engine import ENGINES, make_smoother
 from jeat_graph.smoothers.interpolation import interpolate
-from jeat_graph.smoothers.rts import filter_track, smooth_rts, smooth_rts_batch
+from jeat_graph.smoothers.rts import filter_track, smooth_rts
 from jeat_graph.smoothers.track_data import TrackData
 
 from .conftest import sampled as draw
@@ -134,8 +134,3 @@ def test_a_memory_must_be_positive_and_finite(harsh, memory):
 def test_a_prior_must_fit_the_error_states(harsh):
     with pytest.raises(DataError, match="prior_mean must have shape"):
         replace(harsh(0), memory=np.array([0.1]))
-
-
-def test_tracks_of_a_batch_share_their_error_states(harsh):
-    with pytest.raises(DataError, match="same error states"):
-        smooth_rts_batch([harsh(0), harsh(0, memory=MEMORY)])

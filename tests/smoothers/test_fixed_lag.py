@@ -195,7 +195,7 @@ def test_a_measurement_older_than_the_window_is_refused_and_counted(sampled):
 @pytest.mark.parametrize("memory", COLOURS)
 def test_an_indeterminate_system_is_met_by_a_rebuild(sampled, scaled, monkeypatch, memory):
     """Factors that go missing leave a state free, at which GTSAM throws; the track does not notice."""
-    from jeat_graph.smoothers.factors import LinearGraph
+    from jeat_graph.smoothers.linear_graph import LinearGraph
 
     track, _ = sampled(8, seconds=4.0, q=1000.0, memory=memory)
     smoother = start(track)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from jeat_graph.errors import DataError
-from jeat_graph.smoothers.rts import filter_track, smooth_ends, smooth_rts, smooth_rts_batch
+from jeat_graph.smoothers.rts import filter_track, smooth_ends, smooth_rts
 from jeat_graph.smoothers.track_data import TrackData
 
 #: White errors, and two sensors with a memory (s).
@@ -54,14 +54,6 @@ def test_filter_equals_two_updates_in_turn_at_coincident_stamps(harsh):
             K = P[:, 0] / (P[0, 0] + track.r[row, axis])
             m, P = m + K * (track.z[row, axis] - m[0]), P - np.outer(K, P[0])
         assert np.allclose(filter_track(track)[0][-1, axis], m, rtol=1e-9, atol=1e-7)
-
-
-def test_a_batch_gives_each_track_what_it_gets_alone(harsh):
-    tracks = [harsh(seed, 20 + seed) for seed in range(3)]
-    for track, together in zip(tracks, smooth_rts_batch(tracks), strict=True):
-        alone = smooth_rts(track)
-        assert np.array_equal(together.mean, alone.mean)
-        assert np.array_equal(together.cov, alone.cov)
 
 
 @pytest.mark.parametrize("memory", COLOURS)

@@ -1,59 +1,25 @@
-"""Everything that GTSAM wants and nobody else should know: scaled states, whitened linear factors.
+"""Motion and measurements as whitened rows on scaled states (`scaling.py`), for GTSAM's linear factors.
 
-Inside GTSAM a state is one vector of 2 n, the two axes' blocks D ([p, v, a, e_1, …] - reference) one
-after the other, with D = diag(1, τ, τ², 1, …): in px and s the process noise of a step of a few ms is so
-badly conditioned that elimination gives up. The reference of each state is the filter's mean; steps of
-0.1 ms weigh as much as 1e10, and against that only small numbers keep their digits. GTSAM's linear
-factors take diagonal noise only, so each row is divided by its standard deviation here ("whitened") and
-the factor carries unit noise.
+These take diagonal noise only, so each row is divided by its standard deviation here ("whitened") and the
+factor carries unit noise.
 
 GTSAM need not know every state. What several steps and their measurements say about the states at the
 two ends is a linear factor as well: the states in between are eliminated here, at a fraction of the cost
 of a variable there. Nothing is lost: they follow from the state after them by the filter's gains.
+
+The heaviest of the rows that meet in an elimination have to be the first, or QR loses digits (Cox, Higham,
+Stability of Householder QR factorization for weighted least squares problems, 1998): motion comes before
+measurements within a factor, and the steps before a prior in a graph.
 """
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 from numba import njit
 
 from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.smoothers.scaling import TAU_S, scale
 from jeat_graph.smoothers.transitions import error_steps, step_cov
-
-#: Time scale τ of the scaled state (s): about the interval between measurements.
-TAU_S = 0.05
-
-
-def scale(size: int) -> FloatArray:
-    """Return the diagonal (n,) of D for states of `size` components."""
-    out = np.ones(size)
-    out[1:3] = TAU_S, TAU_S**2
-    return out
-
-
-def unscale_mean(vectors: FloatArray, reference: FloatArray) -> FloatArray:
-    """Turn GTSAM's vectors (..., 2 n) into means (..., 2, n) in px and s, given their reference."""
-    return np.asarray(vectors.reshape(reference.shape) / scale(reference.shape[-1]) + reference)
-
-
-def unscale_cov(blocks: FloatArray) -> FloatArray:
-    """Turn the axes' covariances (..., n, n) of scaled states into those in px and s."""
-    D = scale(blocks.shape[-1])
-    return np.asarray(blocks / (D[:, None] * D))
-
-
-def axis_blocks(matrices: FloatArray) -> FloatArray:
-    """Return the two diagonal blocks (..., 2, n, n) of matrices (..., 2 n, 2 n); the rest is zero."""
-    n = matrices.shape[-1] // 2
-    return np.stack([matrices[..., :n, :n], matrices[..., n:, n:]], axis=-3)
-
-
-def unscale_gain(gain: FloatArray) -> FloatArray:
-    """Turn smoother gains (..., n, n) between scaled states into those between states in px and s."""
-    D = scale(gain.shape[-1])
-    return np.asarray(gain * (D / D[:, None]))
 
 
 @njit(cache=True)
@@ -155,8 +121,7 @@ def segment_rows(
                         old[j, x] = P[j, x]
             _whiten(dims, P, A, c, L)
             for j in range(n):
-                # Both axes' motion comes before all measurements: the heaviest rows have to be the first,
-                # or orthogonal elimination loses digits.
+                # Both axes' motion comes before all measurements.
                 place = 2 * j + a
                 b[s, place] = c[j]
                 for x in range(n):
@@ -248,83 +213,3 @@ def prior_rows(
             h = h * reference[axis, column]
         b[rows] = root * (z[:, axis] - reference[axis, 0] - h)
     return A, b
-
-
-class LinearGraph:
-    """A GTSAM linear factor graph on numbered states, filled from arrays of rows.
-
-    Args:
-        size: components of a state per axis, n.
-    """
-
-    def __init__(self, size: int) -> None:
-        import gtsam
-
-        self._gtsam: Any = gtsam
-        self._size = size
-        self.graph: Any = gtsam.GaussianFactorGraph()
-        self._unit: dict[int, Any] = {}
-
-    def _noise(self, rows: int) -> Any:
-        """Unit noise of so many rows."""
-        if rows not in self._unit:
-            self._unit[rows] = self._gtsam.noiseModel.Unit.Create(rows)
-        return self._unit[rows]
-
-    def add_prior(self, key: int, A: FloatArray, b: FloatArray) -> None:
-        """Add the rows of `prior_rows` on state `key`."""
-        self.graph.add(key, A, b, self._noise(len(b)))
-
-    def add_segments(
-        self, first: int, A0: FloatArray, A1: FloatArray, b: FloatArray, counts: IntArray
-    ) -> None:
-        """Add the rows of `segment_rows` on the states `first`, `first` + 1 and so on."""
-        add = self.graph.add
-        for i, count in enumerate(counts.tolist()):
-            add(first + i, A0[i, :count], first + i + 1, A1[i, :count], b[i, :count], self._noise(count))
-
-    def as_nonlinear(self) -> Any:
-        """Convert for GTSAM's smoothers, which take nonlinear factors only.
-
-        The linearisation point (zeros) is essential: without it the result is silently wrong.
-        """
-        return self._gtsam.LinearContainerFactor.ConvertLinearGraph(
-            self.graph, zero_values(self.graph.keyVector(), self._size)
-        )
-
-    def solve(self, keys: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Solve for the states 0 to `keys` - 1 by QR elimination in order of time.
-
-        Returns:
-            vectors (K, 2 n), conditional covariances (K, 2, n, n) of each state given its successor, and
-            gains (K, 2, n, n), the last zero, all scaled: y_k = G_k y_{k+1} + constant + noise.
-
-        Raises:
-            RuntimeError: GTSAM's, if the system is indeterminate.
-        """
-        ordering = self._gtsam.Ordering()
-        for k in range(keys):
-            ordering.push_back(k)
-        net = self.graph.eliminateSequential(ordering, self._gtsam.EliminateQR)
-        width = 2 * self._size
-        vectors = net.optimize().vector().reshape(keys, width)
-        R, S = np.empty((keys, width, width)), np.zeros((keys, width, width))
-        for k in range(keys):
-            conditional = net.at(k)
-            R[k] = conditional.R()
-            if k < keys - 1:
-                S[k] = conditional.S()
-        root = np.linalg.inv(R)
-        gain = -(root @ S)
-        cov = root @ root.transpose(0, 2, 1)
-        return vectors, axis_blocks(cov), axis_blocks(gain)
-
-
-def zero_values(keys: Any, size: int) -> Any:
-    """Return GTSAM values with a zero state of `size` components per axis for each of `keys`."""
-    import gtsam
-
-    values, zero = gtsam.Values(), np.zeros(2 * size)
-    for key in keys:
-        values.insert(key, zero)
-    return values
