@@ -147,7 +147,7 @@ class TrackHistory:
         looks = self.looks
         chosen = (looks.t <= end) & ((looks.t <= self._last + COINCIDENT_S) | looks.held)
         # Of two steps at one time the later one counts.
-        chosen &= np.diff(looks.t, append=np.inf) > 0.0
+        chosen[:-1] &= looks.t[1:] > looks.t[:-1]
         if not len(path) or not chosen.any():
             return None
         existence = looks.hindsight()[chosen]

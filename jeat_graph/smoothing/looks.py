@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -32,7 +32,7 @@ class Looks:
 
     def take(self, rows: slice | npt.NDArray[np.intp] | BoolArray) -> Looks:
         """Return some of the steps."""
-        return Looks(*(getattr(self, f.name)[rows] for f in fields(self)))
+        return Looks(self.t[rows], self.existence[rows], self.used[rows], self.held[rows])
 
     @staticmethod
     def empty() -> Looks:
@@ -53,7 +53,12 @@ class Looks:
             return parts[0]
         if not parts:
             return Looks.empty()
-        return Looks(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Looks)))
+        return Looks(
+            np.concatenate([part.t for part in parts]),
+            np.concatenate([part.existence for part in parts]),
+            np.concatenate([part.used for part in parts]),
+            np.concatenate([part.held for part in parts]),
+        )
 
     def hindsight(self) -> FloatArray:
         """Existence (K,) seen from the end: what exists later has existed since its birth.

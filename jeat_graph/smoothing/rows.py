@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
-from jeat_graph.arrays import FloatArray
+from jeat_graph.arrays import BoolArray, FloatArray
 from jeat_graph.config import Config
 from jeat_graph.smoothers.interpolation import interpolate
 from jeat_graph.smoothers.size import SmoothedSize
@@ -40,23 +41,44 @@ def rows_of(
     held = looks.t > path.t[-1]
     mean[held, :, 1:] = 0.0
     size = sizes.at(np.minimum(t, sizes.t[-1]))
-    low = mean[:, :, 0] - 0.5 * size
-    high = low + size
-    keep = np.ones(len(t), dtype=np.bool_)
+    boxes, visible = _boxes(mean, size, config.image.width, config.image.height, config.output.clip)
+    keep: slice | BoolArray = slice(None)
     if config.output.clip:
-        picture = np.array([config.image.width, config.image.height])
-        inner_low, inner_high = np.maximum(low, 0.0), np.minimum(high, picture)
-        inside = np.maximum(inner_high - inner_low, 0.0).prod(axis=1) / size.prod(axis=1)
-        keep = (inside > 0.0) & (inside >= config.output.min_visible)
-        low, high = inner_low, inner_high
+        keep = (visible > 0.0) & (visible >= config.output.min_visible)
+        if keep.all():
+            keep = slice(None)
     var = np.diagonal(cov, axis1=2, axis2=3)
     return Trajectories(
         t=looks.t[keep],
-        track_id=np.full(np.count_nonzero(keep), track_id, dtype=np.int64),
-        boxes=np.concatenate([low, high - low], axis=1)[keep],
+        track_id=np.full(len(t), track_id, dtype=np.int64)[keep],
+        boxes=boxes[keep],
         existence=existence[keep],
         mean=mean.transpose(0, 2, 1).reshape(-1, 6)[keep],
         var=var.transpose(0, 2, 1).reshape(-1, 6)[keep],
         used=looks.used[keep],
         sensors=config.sensor_names,
     )
+
+
+@njit(cache=True)
+def _boxes(
+    mean: FloatArray, size: FloatArray, width: float, height: float, clip: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Boxes (K, 4) left, top, width, height of states (K, 2, 3) and sizes (K, 2), clipped or not (px).
+
+    And (K,) the part of each that lies in the picture.
+    """
+    boxes, visible = np.empty((len(size), 4)), np.empty(len(size))
+    for i in range(len(size)):
+        area = inside = 1.0
+        for axis, edge in ((0, width), (1, height)):
+            low = mean[i, axis, 0] - 0.5 * size[i, axis]
+            high = low + size[i, axis]
+            inner_low, inner_high = max(low, 0.0), min(high, edge)
+            area *= size[i, axis]
+            inside *= max(inner_high - inner_low, 0.0)
+            if clip:
+                low, high = inner_low, inner_high
+            boxes[i, axis], boxes[i, 2 + axis] = low, high - low
+        visible[i] = inside / area if area > 0.0 else 0.0
+    return boxes, visible

@@ -22,28 +22,34 @@ class SizeWindow:
     def __init__(self, t: float, mean: FloatArray, cov: FloatArray, density: float) -> None:
         self._base = (t, mean, cov)
         self._density = density
-        self._t = np.zeros(0)
-        self._log_size = np.zeros((0, 2))
-        self._var = np.zeros((0, 2))
+        self._parts: list[tuple[FloatArray, FloatArray, FloatArray]] = []
 
     def append(self, t: FloatArray, log_size: FloatArray, var: FloatArray) -> None:
         """Take in measured sizes: times (M,) s, ln width and height (M, 2), variances (M, 2)."""
-        self._t = np.concatenate([self._t, t])
-        self._log_size = np.concatenate([self._log_size, log_size])
-        self._var = np.concatenate([self._var, var])
+        self._parts.append((t, log_size, var))
 
     def smooth(self) -> SmoothedSize:
         """Smooth all since the base, given all measurements so far."""
-        return self._solve(len(self._t))
+        return self._solve(*self._waiting())
 
     def advance(self, t: float) -> None:
         """Make the sizes up to time `t` final: the base moves there, and what came before is forgotten."""
-        count = int(np.searchsorted(self._t, t + COINCIDENT_S, side="right"))
+        waiting = self._waiting()
+        count = int(np.searchsorted(waiting[0], t + COINCIDENT_S, side="right"))
         # With nothing after it, the last smoothed size is the filtered one.
-        filtered = self._solve(count)
+        past, later = ([column[part] for column in waiting] for part in (slice(count), slice(count, None)))
+        filtered = self._solve(*past)
         self._base = (float(filtered.t[-1]), filtered.mean[-1], filtered.cov[-1])
-        self._t, self._log_size, self._var = self._t[count:], self._log_size[count:], self._var[count:]
+        self._parts = [(later[0], later[1], later[2])]
 
-    def _solve(self, count: int) -> SmoothedSize:
-        density = np.full(count, self._density)
-        return smooth_size(*self._base, self._t[:count], self._log_size[:count], self._var[:count], density)
+    def _waiting(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """All measurements since the base: times (M,), sizes (M, 2), variances (M, 2)."""
+        if not self._parts:
+            return np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2))
+        if len(self._parts) > 1:
+            t, log_size, var = zip(*self._parts, strict=True)
+            self._parts = [(np.concatenate(t), np.concatenate(log_size), np.concatenate(var))]
+        return self._parts[0]
+
+    def _solve(self, t: FloatArray, log_size: FloatArray, var: FloatArray) -> SmoothedSize:
+        return smooth_size(*self._base, t, log_size, var, np.full(len(t), self._density))
