@@ -31,8 +31,8 @@ class Innovations:
     """What the measurements of one track said that its filter had not expected.
 
     Attributes:
-        t: (K,) times of keys with a measurement (s); coincident measurements are one.
-        error: (K, 2) innovation (px).
+        t: (M,) times (s); of coincident measurements the later ones are judged given the earlier.
+        error: (M, 2) innovation (px).
         var: (M, 2) its variance S (px²).
     """
 

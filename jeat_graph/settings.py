@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.association.joint import JOINT, SEQUENTIAL, SLOTS
-from jeat_graph.config import Config
+from jeat_graph.config import Config, SensorConfig
 
 # Costs of the paper's problem are d² <= gate; leaving a row out must cost more than any sum of them, so that
 # as many pairs as possible are taken. Small enough that sums keep ten digits behind the point.
@@ -116,6 +117,19 @@ class Settings(NamedTuple):
     output_min_visible: float
 
 
+def error_states(sensors: Sequence[SensorConfig]) -> tuple[IntArray, FloatArray]:
+    """Number the error states of the sensors whose errors have memory, in their order.
+
+    Args:
+        sensors: S sensors.
+
+    Returns:
+        (S,) the error state of each, counted from 0, or -1; (B,) correlation time of each error state (s).
+    """
+    lasting = np.array([s.correlated_share > 0.0 for s in sensors])
+    return np.where(lasting, np.cumsum(lasting) - 1, -1), np.array([s.memory_s for s in sensors])[lasting]
+
+
 def sensor_arrays(config: Config) -> SensorArrays:
     """Collect the parameters of the sensors into arrays, in the order of `config.sensor_names`."""
     sensors = [config.sensors[name] for name in config.sensor_names]
@@ -128,13 +142,13 @@ def sensor_arrays(config: Config) -> SensorArrays:
             for s, c in zip(sensors, curves, strict=True)
         ]
     )
-    lasting = np.array([s.correlated_share > 0.0 for s in sensors])
+    error, memory = error_states(sensors)
     return SensorArrays(
         sigma_px=np.array([s.sigma_px for s in sensors]),
         rho=np.array([[s.rho_x, s.rho_y] for s in sensors]),
         share=np.array([s.correlated_share for s in sensors]),
-        error=np.where(lasting, np.cumsum(lasting) - 1, -1),
-        memory=np.array([s.memory_s for s in sensors])[lasting],
+        error=error,
+        memory=memory,
         size_var=np.array([[s.sigma_log_width**2, s.sigma_log_height**2] for s in sensors]),
         bias=np.array([s.bias for s in sensors]),
         p_detect=np.array([s.p_detect for s in sensors]),

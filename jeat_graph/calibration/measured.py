@@ -12,6 +12,7 @@ import numpy.typing as npt
 from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.calibration.matches import SensorMatches
 from jeat_graph.config import SensorConfig
+from jeat_graph.settings import error_states
 
 # Motion shows in samples this far apart. The errors of a size, which the filter takes for white, persist over
 # neighbouring scans: taken at every scan of a fast sensor they would pass for growth.
@@ -65,8 +66,7 @@ def measured_tracks(
     rho = np.repeat([(s.rho_x, s.rho_y) for _, s in parts], rows, axis=0)
     sigma = np.repeat([s.sigma_px for _, s in parts], rows)
     share = np.repeat([s.correlated_share for _, s in parts], rows)
-    lasting = np.array([s.correlated_share > 0.0 for _, s in parts])
-    error = np.repeat(np.where(lasting, np.cumsum(lasting) - 1, -1), rows)
+    error, memory = error_states([s for _, s in parts])
     log_sigma = np.repeat([(s.sigma_log_width, s.sigma_log_height) for _, s in parts], rows, axis=0)
     order = np.lexsort((t, key[:, 1], key[:, 0]))
     change = np.any(np.diff(key[order], axis=0) != 0, axis=1)
@@ -82,8 +82,8 @@ def measured_tracks(
         z=sort(box[:, :2] + (0.5 - bias[:, :2]) * side),
         R=sort((1.0 - share[:, None]) * variance),
         lever=sort(np.sqrt(share[:, None] * variance)),
-        error=sort(error),
-        memory=np.array([s.memory_s for _, s in parts])[lasting],
+        error=sort(np.repeat(error, rows)),
+        memory=memory,
         side=sort(np.sqrt(side.prod(axis=1))),
         start=start,
         log_size=sort(np.log(side) - bias[:, 2:]),

@@ -26,7 +26,8 @@ class SizeWindow:
 
     def append(self, t: FloatArray, log_size: FloatArray, var: FloatArray) -> None:
         """Take in measured sizes: times (M,) s, ln width and height (M, 2), variances (M, 2)."""
-        self._parts.append((t, log_size, var))
+        # Columns of a table as arrays of their own, for one compiled form of what comes next.
+        self._parts.append((t.copy(), log_size.copy(), var.copy()))
 
     def smooth(self) -> SmoothedSize:
         """Smooth all since the base, given all measurements so far."""

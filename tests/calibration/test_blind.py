@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from jeat_graph.calibration.blind import calibrate_blind, follow
+from jeat_graph.calibration.blind import calibrate_blind
+from jeat_graph.calibration.tracked import follow
 from jeat_graph.config import SensorConfig
 from jeat_graph.config_io import load_config
 from jeat_graph.detections import Detections
