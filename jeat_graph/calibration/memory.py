@@ -57,9 +57,11 @@ def _pairs(error: FloatArray, key: IntArray, t: FloatArray) -> tuple[FloatArray,
     """Lags (P,) (s) and normalised products (P,) of the errors of all pairs of one object within the lag."""
     order = np.lexsort((t, key[:, 1], key[:, 0]))
     u = np.clip(error[order], -_CLIP, _CLIP)
+    lags, products = [np.zeros(0)], [np.zeros(0)]
+    if not u.any():
+        return lags[0], products[0]  # a perfect detector, or none
     u = u / np.sqrt(np.mean(u**2))
     keys, times = key[order], t[order]
-    lags, products = [np.zeros(0)], [np.zeros(0)]
     for step in range(1, len(times)):
         gap = times[step:] - times[:-step]
         near = (keys[step:] == keys[:-step]).all(axis=1) & (gap <= _MAX_LAG_S)

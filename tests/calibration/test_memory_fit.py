@@ -47,3 +47,10 @@ def test_white_errors_have_no_memory():
 def test_too_few_pairs_say_nothing():
     share, _ = fit_memory(*drawn(np.random.default_rng(3), 5, np.arange(4) / 20.0, 0.9, 1.0))
     assert share == 0.0
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("count", [0, 400])
+def test_a_perfect_detector_has_no_memory(count):
+    nothing = np.zeros((count, 2))
+    assert fit_memory(nothing, nothing.astype(np.int64), 0.05 * np.arange(count))[0] == 0.0
