@@ -178,8 +178,8 @@ class Tracker:
 
         Their whole life: the time before confirmation and gaps included, up to the last detection. With a
         fixed lag the rows older than that are final; all others may still change. (The call makes the
-        smoothers take in what they had set aside, so that later values may differ in their last digits from a
-        run without it.)
+        smoothers take in what they had set aside: with a fixed lag some states become final a part of a chunk
+        earlier than in a run without it, and differ from there by what that part would have told.)
 
         Raises:
             JeatGraphError: the configuration asks for no smoother.
