@@ -113,9 +113,11 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
     folds = common.kitti_folds(args)
     if folds is not None:
         best = _parameters(found["kitti"]) if "kitti" in found else KITTI_BEST
-        real = ours(default, paper, "calibrated", _REAL)
+        folder, targets = folds
+        first = next(iter(targets.values()))
+        real = ours(first, start(load_config("paper"), first), "calibrated", _REAL)
         result["association"]["names"] |= association_names(real)
-        result |= measure_kitti(args, *folds, peers(_REAL, best, names))
+        result |= measure_kitti(args, folder, targets, peers(_REAL, best, names))
         result["kitti_peer_parameters"] = best
     return result
 
