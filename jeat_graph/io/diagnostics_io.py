@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
 from jeat_graph.diagnostics import Diagnostics
+from jeat_graph.io.piecewise import PiecewiseWriter
 from jeat_graph.io.table_writer import TableWriter, round_decimals, round_significant
 from jeat_graph.io.tables import read_table
 
@@ -18,7 +18,7 @@ _EXISTENCE_DECIMALS = 6
 _FLUSH_ROWS = 8192
 
 
-class DiagnosticsWriter:
+class DiagnosticsWriter(PiecewiseWriter):
     """Write the table piece by piece, in bounded memory; a context manager, as `TrajectoryWriter`.
 
     Args:
@@ -26,28 +26,17 @@ class DiagnosticsWriter:
     """
 
     def __init__(self, path: str | Path) -> None:
+        super().__init__()
         self._writer = TableWriter(path)
         self._pending: list[Diagnostics] = []
         self._rows = 0
 
-    def __enter__(self) -> Self:
-        self._writer.__enter__()
+    def _begin(self) -> None:
+        self._stack.enter_context(self._writer)
         self._writer.append(_columns(Diagnostics.concatenate([])))
-        return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        try:
-            if error is None:
-                self._flush()
-        except BaseException as failure:
-            self._writer.__exit__(type(failure), failure, failure.__traceback__)
-            raise
-        self._writer.__exit__(kind, error, trace)
+    def _finish(self) -> None:
+        self._flush()
 
     def append(self, table: Diagnostics) -> None:
         """Add the rows of one step."""

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +13,7 @@ from jeat_graph.errors import ConfigError, DataError
 from jeat_graph.events import EventArray
 from jeat_graph.io.atomic import atomic_path
 from jeat_graph.io.events_dsec import LABEL, US_PER_MS
+from jeat_graph.io.piecewise import PiecewiseWriter
 
 COMPRESSIONS = ("gzip", "none", "blosc")
 # Rows of one HDF5 chunk, and what the writer keeps in memory. Fixed, because the bytes depend on it.
@@ -23,7 +22,7 @@ _LATEST_US = 2**32 - 1
 _COLUMNS = {"x": np.uint16, "y": np.uint16, "p": np.uint8, "t": np.uint32}
 
 
-class EventWriter:
+class EventWriter(PiecewiseWriter):
     """A context manager that writes events as they come; the file appears only when it is complete.
 
     The bytes are the same however the events are cut into pieces.
@@ -38,10 +37,10 @@ class EventWriter:
     """
 
     def __init__(self, path: str | Path, size_px: tuple[int, int], compression: str = "gzip") -> None:
+        super().__init__()
         self._path = Path(path)
         self._size_px = size_px
         self._filter = compression_filter(compression)
-        self._stack = ExitStack()
         self._file: Any = None
         self._pending: list[EventArray] = []
         self._pending_rows = 0
@@ -50,27 +49,12 @@ class EventWriter:
         self._per_ms: list[IntArray] = []
         self._duration_us = 0
 
-    def __enter__(self) -> Self:
+    def _begin(self) -> None:
         import h5py
 
         temporary = self._stack.enter_context(atomic_path(self._path))
         # "earliest" keeps to the oldest structures that hold the data, which DSEC's own readers know.
         self._file = self._stack.enter_context(h5py.File(temporary, "w", libver="earliest"))
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        try:
-            if error is None:
-                self._finish()
-        except BaseException as failure:
-            self._stack.__exit__(type(failure), failure, failure.__traceback__)
-            raise
-        self._stack.__exit__(kind, error, trace)
 
     def append(self, events: EventArray, until_us: int | None = None) -> None:
         """Add events that follow those before.

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +12,7 @@ import numpy.typing as npt
 from jeat_graph.arrays import FloatArray
 from jeat_graph.errors import DataError
 from jeat_graph.io.atomic import atomic_path
+from jeat_graph.io.piecewise import PiecewiseWriter
 from jeat_graph.io.tables import PARQUET_SUFFIXES
 
 # Rows kept in memory, and a Parquet row group. Fixed, because the bytes of a Parquet file depend on it.
@@ -21,7 +20,7 @@ _CHUNK_ROWS = 1 << 16
 _MOST_DECIMALS = 22  # 10^22 is the largest power of ten that a float holds exactly
 
 
-class TableWriter:
+class TableWriter(PiecewiseWriter):
     """A context manager that writes rows and makes the file visible only when it is complete.
 
     NaN, masked entries and empty text become blank fields (CSV) or nulls (Parquet, but for the text). Numbers
@@ -34,33 +33,21 @@ class TableWriter:
     """
 
     def __init__(self, path: str | Path, *, header: bool = True, delimiter: str = ",") -> None:
+        super().__init__()
         self._path = Path(path)
         self._header = header
         self._delimiter = delimiter
         self._parquet = self._path.suffix.lower() in PARQUET_SUFFIXES
-        self._stack = ExitStack()
         self._pending: list[Any] = []
         self._rows = 0
         self._sink: Any = None
         self._target: Path | None = None
 
-    def __enter__(self) -> Self:
+    def _begin(self) -> None:
         self._target = self._stack.enter_context(atomic_path(self._path))
-        return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        try:
-            if error is None:
-                self._write(everything=True)
-        except BaseException as failure:
-            self._stack.__exit__(type(failure), failure, failure.__traceback__)
-            raise
-        self._stack.__exit__(kind, error, trace)
+    def _finish(self) -> None:
+        self._write(everything=True)
 
     def append(self, columns: Mapping[str, npt.NDArray[Any]]) -> None:
         """Add rows; every call gives the same columns in the same order.

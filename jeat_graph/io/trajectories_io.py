@@ -9,8 +9,7 @@ from __future__ import annotations
 import graphlib
 from collections.abc import Iterable
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from jeat_graph.errors import DataError
 from jeat_graph.io import kitti, motchallenge
 from jeat_graph.io.formats import recognise
 from jeat_graph.io.frames import check_rate
+from jeat_graph.io.piecewise import PiecewiseWriter
 from jeat_graph.io.plain_text import frames_of
 from jeat_graph.io.table_writer import TableWriter, round_decimals, round_significant, write_columns
 from jeat_graph.io.tables import Table, read_table
@@ -36,7 +36,7 @@ _FLUSH_ROWS = 8192
 _MOST_SENSORS = 63  # bits of `Trajectories.used`
 
 
-class TrajectoryWriter:
+class TrajectoryWriter(PiecewiseWriter):
     """Write a table of the contract piece by piece, in bounded memory.
 
     Use it as a context manager. The file appears at `path` when the `with` block ends without an error, and
@@ -47,30 +47,17 @@ class TrajectoryWriter:
     """
 
     def __init__(self, path: str | Path) -> None:
+        super().__init__()
         self._writer = TableWriter(path)
         self._pending: list[Trajectories] = []
         self._rows = 0
 
-    def __enter__(self) -> Self:
-        self._writer.__enter__()
-        self._writer.append(
-            table_columns(Trajectories.empty())
-        )  # so that a run without tracks has a header too
-        return self
+    def _begin(self) -> None:
+        self._stack.enter_context(self._writer)
+        self._writer.append(table_columns(Trajectories.empty()))  # a run without tracks has a header too
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        try:
-            if error is None:
-                self._flush()
-        except BaseException as failure:
-            self._writer.__exit__(type(failure), failure, failure.__traceback__)
-            raise
-        self._writer.__exit__(kind, error, trace)
+    def _finish(self) -> None:
+        self._flush()
 
     def append(self, table: Trajectories) -> None:
         """Add the rows of a table, which is copied: the caller may use its arrays again.
