@@ -155,6 +155,12 @@ class WholeTrackSmoother:
         self._parts = []
 
 
+def load_engine(engine: str) -> None:
+    """Load what an engine needs, now rather than in the middle of a live run: GTSAM takes a while."""
+    if engine in ("fixed-lag", "full"):
+        import gtsam  # noqa: F401
+
+
 def make_smoother(
     engine: str,
     prior_t: float,

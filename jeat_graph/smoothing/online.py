@@ -9,6 +9,7 @@ import numpy as np
 
 from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.config import Config
+from jeat_graph.smoothers.engine import load_engine
 from jeat_graph.smoothing.history import TrackHistory
 from jeat_graph.smoothing.looks import Looks
 from jeat_graph.smoothing.priors import ErrorStates
@@ -54,6 +55,7 @@ class TrackSmoothers:
         self._config = config
         self._errors = ErrorStates.of(config)
         settings = config.smoother
+        load_engine(settings.engine)
         self._whole = settings.engine in WHOLE
         self._stitch = settings.stitch and self._whole
         self._rate_hz = settings.output_rate_hz
