@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +21,26 @@ from jeat_graph.trajectories import Trajectories
 
 #: Engines that solve for a track once it has ended; only with these can fragments be stitched.
 WHOLE = ("full", "rts")
+
+
+class _Share(NamedTuple):
+    """What a packet holds of one track.
+
+    Attributes:
+        looks: its steps that the table has rows at.
+        confirmed: whether the track was confirmed in any of them.
+        rows: (M, 1 + WIDTH) measurements, or None.
+    """
+
+    looks: Looks
+    confirmed: bool
+    rows: FloatArray | None
+
+    def give_to(self, history: TrackHistory) -> None:
+        """Hand it to the track's history."""
+        history.watch(self.looks, self.confirmed)
+        if self.rows is not None:
+            history.take(self.rows)
 
 
 class TrackSmoothers:
@@ -61,50 +82,80 @@ class TrackSmoothers:
         self._rate_hz = settings.output_rate_hz
         self._histories: dict[int, TrackHistory] = {}
         self._done: list[TrackHistory] = []
-        self._to_do: deque[TrackHistory] = deque()
+        self._shares: dict[int, deque[_Share]] = {}
+        self._to_do: deque[int] = deque()
         self._ready = WaitingRows(config.sensor_names)
         self._scan_t: list[FloatArray] = []
 
     def consume(self, packet: Packet | None) -> None:
-        """Give the steps of a packet to the tracks and end those that are over; `work` does the rest."""
-        self.work()
+        """Set the steps of a packet before the tracks, for `work` to do, and end the tracks that are over."""
         if packet is None:
             return
         if self._stitch:
             self._scan_t.append(packet.t[packet.wanted])
+        rows = dict(_split_updates(packet))
         for track_id, looks, confirmed in self._split_looks(packet):
-            history = self._histories.get(track_id)
-            if history is None:
+            if track_id not in self._histories:
                 history = TrackHistory(track_id, self._config, self._errors, keep=self._stitch)
                 self._histories[track_id] = history
-            history.watch(looks, confirmed)
-        for track_id, rows in _split_updates(packet):
-            self._histories[track_id].take(rows)
+            share = _Share(looks, confirmed, rows.get(track_id))
+            self._shares.setdefault(track_id, deque()).append(share)
+            self._to_do.append(track_id)
         for track_id in packet.ended:
-            history = self._histories.pop(track_id)
-            if self._stitch and history.confirmed:
-                self._done.append(history)
-            else:
-                self._end(history)
-        if not self._whole:
-            self._to_do.extend(self._histories.values())
+            self._end_track(track_id)
+        if self._whole:
+            self.work()
 
     @property
     def waiting(self) -> int:
-        """How many tracks have work to be done."""
-        return len(self._to_do)
+        """How many shares of packets wait to be worked on."""
+        return sum(len(shares) for shares in self._shares.values())
 
     def work(self, most: int | None = None) -> None:
-        """Feed the smoothers of at most so many tracks, all if not given, and collect final rows."""
+        """Work on at most so many shares, all if not given: feed the smoothers, collect final rows.
+
+        Each track's shares are worked on one by one and in their order, so that it does not matter when.
+        """
         while self._to_do and most != 0:
-            history = self._to_do.popleft()
+            track_id = self._to_do.popleft()
+            if track_id not in self._shares:
+                continue  # it has ended, and all it had waiting was done then
+            self._work_on(track_id)
+            most = None if most is None else most - 1
+
+    def _work_on(self, track_id: int) -> None:
+        """Work on the oldest share of a track."""
+        shares, history = self._shares[track_id], self._histories[track_id]
+        shares.popleft().give_to(history)
+        if not shares:
+            del self._shares[track_id]
+        if not self._whole:
             history.feed()
             self._collect(history.departed())
-            most = None if most is None else most - 1
+
+    def _end_track(self, track_id: int) -> None:
+        """End a track: all its shares at once, of the last only what its smoother takes with the end."""
+        shares = self._shares.get(track_id, deque())
+        while len(shares) > 1:
+            self._work_on(track_id)
+        history = self._histories.pop(track_id)
+        for last in self._shares.pop(track_id, deque()):
+            last.give_to(history)
+        if self._stitch and history.confirmed:
+            self._done.append(history)
+        else:
+            self._end(history)
 
     def drain(self) -> Trajectories:
         """Return, and forget, the final rows that no later ones can precede, by time and identity."""
-        horizon = min((h.oldest for h in (*self._histories.values(), *self._done)), default=np.inf)
+        waiting = [
+            float(share.looks.t[0])
+            for shares in self._shares.values()
+            for share in shares
+            if len(share.looks)
+        ]
+        oldest = [history.oldest for history in (*self._histories.values(), *self._done)]
+        horizon = min(oldest + waiting, default=np.inf)
         table = self._gathered([])
         early = table.t < horizon
         self._ready.take()
