@@ -238,3 +238,19 @@ def test_packets_depend_on_the_steps_alone():
     assert sizes == [5] * len(sizes)
     assert len(sizes) == 10
     assert recorder.take() is None
+
+
+def test_a_track_that_ends_does_not_hurry_the_work_on_the_others():
+    """It hands over its packet early; what waits of the others goes on little by little."""
+    cars = [(0.0, 9.0, {"start": (100.0 + 90.0 * k, 100.0 + 40.0 * k)}) for k in range(8)]
+    cars.append((0.0, 1.0, {"start": (1000.0, 80.0)}))
+    tracker = make_tracker("smoother.chunk=48", "lifecycle.max_gap_confirmed_s=0.2")
+    waiting, ended = [0], []
+    for _ in tracker.run(recording(duration=2.0, cars=cars)):
+        waiting.append(tracker._smoothers._smoothers.waiting)
+        ended.append(tracker.smoother_counts["tracks"])
+    steps = np.diff(waiting)
+    # Ten shares at most wait from one packet: one a step is what gets them done in half the next.
+    assert ended[-1] == 1
+    assert steps.min() >= -2
+    assert max(waiting) > 8
