@@ -65,7 +65,7 @@ $(VENV)/.lint: pyproject.toml | $(BIN)/python
 # numba does not notice that a function called from another file has changed: new sources, all code anew.
 $(VENV)/.compiled: $(SOURCES) $(VENV)/.run
 	@find jeat_graph filters association smoothers \( -name '*.nbi' -o -name '*.nbc' \) -delete
-	@$(BIN)/python -m jeat_graph.warm_up
+	@$(BIN)/python -m jeat_graph.tracking.warm_up
 	@touch $@
 
 build/.wheel: $(SOURCES) $(shell find eval configs -name '*.py' -o -name '*.yaml') pyproject.toml | $(BIN)/python

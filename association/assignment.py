@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 
 
 @njit(cache=True)

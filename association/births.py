@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from jeat_graph.arrays import FloatArray, IntArray
-from jeat_graph.association.boxes import overlap
+from jeat_graph.association.overlap import overlap
+from jeat_graph.data.arrays import FloatArray, IntArray
 
 
 @njit(cache=True)

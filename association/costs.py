@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numba import njit
 
-from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 
 
 @njit(cache=True)

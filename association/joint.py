@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.association.assignment import assign
+from jeat_graph.data.arrays import FloatArray, IntArray
 
 SLOTS = 0
 JOINT = 1

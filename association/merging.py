@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from jeat_graph.arrays import FloatArray
-from jeat_graph.association.boxes import overlap
+from jeat_graph.association.overlap import overlap
+from jeat_graph.data.arrays import FloatArray
 
 
 @njit(cache=True)

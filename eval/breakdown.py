@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.eval.frames import Frames
 from jeat_graph.eval.matching import matched_entries
 

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.breakdown import DISTANCE_BINS_M
 from jeat_graph.eval.frames import build_frames
 from jeat_graph.eval.kinematics import matched_errors
 from jeat_graph.eval.lagged import Innovations, States, states_at
 from jeat_graph.eval.tables import Cell, Table
 from jeat_graph.smoothers.track_data import TrackData
-from jeat_graph.trajectories import GroundTruth, Trajectories
 
 #: Lags of the curve (s).
 LAGS_S = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0)

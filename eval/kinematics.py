@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.eval.frames import Frames
 from jeat_graph.eval.matching import matched_entries
 

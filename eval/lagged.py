@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.smoothers.backward import backward_between
 from jeat_graph.smoothers.rts import Filtered, run_filter, smooth_rts
 from jeat_graph.smoothers.track_data import COINCIDENT_S, MOTION, TrackData

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray
-from jeat_graph.errors import DataError
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.pairing import check_lives, check_pair, check_truth
-from jeat_graph.run_directory import read_instants
-from jeat_graph.trajectories import GroundTruth, Trajectories
+from jeat_graph.runs.directory import read_instants
 
 BY_FRAME = ("motchallenge", "kitti")
 # Where truth and result both count frames, and no rate is known, any rate is as good as another.

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 
 
 def match(iou: FloatArray, threshold: float) -> IntArray:

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray
-from jeat_graph.errors import DataError
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.frames import Frames, Kind, build_frames
-from jeat_graph.trajectories import GroundTruth, Trajectories
 
 # Scores in per cent; the others are counts.
 SHARES = ("MOTA", "MOTP", "HOTA", "DetA", "AssA", "LocA", "IDF1", "IDP", "IDR")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray
 
 
 def _intersection(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray, IntArray
-from jeat_graph.errors import DataError
-from jeat_graph.trajectories import GroundTruth, Trajectories
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.trajectories import GroundTruth, Trajectories
 
 # In other units, step and duration of a clock both differ: by one factor if both record at one rate, else by
 # factors that are at least both large. Frames against seconds is a factor of the frame rate, 10 or more.

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray, IntArray
-from jeat_graph.errors import DataError
-from jeat_graph.trajectories import Trajectories
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.trajectories import Trajectories
 
 # Two clocks that agree to a microsecond are one: times are often written with few digits.
 TIME_TOLERANCE_S = 1e-6

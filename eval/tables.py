@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from jeat_graph.errors import ConfigError
+from jeat_graph.data.errors import ConfigError
 
 Cell = str | float | int | None
 FORMATS = ("text", "markdown", "csv", "latex", "json")

@@ -6,7 +6,7 @@ import math
 
 from numba import njit
 
-from jeat_graph.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray
 
 # Beyond these a size is no vehicle's, and a growth none that a picture shows for longer than a moment.
 _MOST_LOG_SIZE = 12.0

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from jeat_graph.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray
 
 
 @njit(cache=True)

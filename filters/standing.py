@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from numba import njit
 
-from jeat_graph.arrays import FloatArray
-from jeat_graph.filters.aekf import log_gaussian
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.filters.kalman import log_gaussian
 
 _MOST_ODDS = 30.0
 

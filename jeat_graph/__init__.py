@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 from jeat_graph.version import __version__
 
 if TYPE_CHECKING:
-    from jeat_graph.config import Config
-    from jeat_graph.config_io import load_config
-    from jeat_graph.detections import Detections, Scan
-    from jeat_graph.errors import JeatGraphError
-    from jeat_graph.tracker import Tracker
-    from jeat_graph.trajectories import GroundTruth, Trajectories
+    from jeat_graph.config.reading import load_config
+    from jeat_graph.config.schema import Config
+    from jeat_graph.data.detections import Detections, Scan
+    from jeat_graph.data.errors import JeatGraphError
+    from jeat_graph.data.trajectories import GroundTruth, Trajectories
+    from jeat_graph.tracking.tracker import Tracker
 
 __all__ = [
     "Config",
@@ -27,14 +27,14 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Config": "config",
-    "load_config": "config_io",
-    "Detections": "detections",
-    "Scan": "detections",
-    "JeatGraphError": "errors",
-    "Tracker": "tracker",
-    "GroundTruth": "trajectories",
-    "Trajectories": "trajectories",
+    "Config": "config.schema",
+    "load_config": "config.reading",
+    "Detections": "data.detections",
+    "Scan": "data.detections",
+    "JeatGraphError": "data.errors",
+    "Tracker": "tracking.tracker",
+    "GroundTruth": "data.trajectories",
+    "Trajectories": "data.trajectories",
 }
 
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from numba import njit
 
-from jeat_graph.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray
 
 
 @njit(cache=True)

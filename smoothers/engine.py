@@ -7,10 +7,10 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.arrays import FloatArray
-from jeat_graph.errors import ConfigError
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.errors import ConfigError
 from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
-from jeat_graph.smoothers.full import smooth_full
+from jeat_graph.smoothers.gtsam.full import smooth_full
 from jeat_graph.smoothers.measurements import COINCIDENT_S, Measurements, check_measurements
 from jeat_graph.smoothers.robust import robust_weights
 from jeat_graph.smoothers.rts import smooth_rts

@@ -13,14 +13,14 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.arrays import FloatArray, IntArray
-from jeat_graph.errors import DataError
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.errors import DataError
 from jeat_graph.smoothers.gains import fill_back
-from jeat_graph.smoothers.gtsam_window import GtsamWindow
-from jeat_graph.smoothers.linear_graph import LinearGraph
+from jeat_graph.smoothers.gtsam.linear_graph import LinearGraph
+from jeat_graph.smoothers.gtsam.whitened import prior_rows, segment_rows
+from jeat_graph.smoothers.gtsam.window import GtsamWindow
 from jeat_graph.smoothers.measurements import COINCIDENT_S, Measurements, check_measurements, group_times
 from jeat_graph.smoothers.track_data import SmoothedTrack
-from jeat_graph.smoothers.whitened import prior_rows, segment_rows
 from jeat_graph.smoothers.window import Window
 
 #: GTSAM solves for one state in so many. More would hardly be faster: what is left is the cost of a chunk.

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from jeat_graph.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.filters.motion import process_noise, transition
 from jeat_graph.smoothers.track_data import SmoothedTrack
 from jeat_graph.smoothers.transitions import motion_matrices

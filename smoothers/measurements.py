@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from jeat_graph.arrays import BoolArray, FloatArray, IntArray
-from jeat_graph.errors import DataError
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.errors import DataError
 
 #: Measurements closer than this (s) share one state. Within a microsecond nothing on a road moves,
 #: while the process noise of such a step, of order Δ⁵, would only spoil the arithmetic.

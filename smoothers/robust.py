@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray
-from jeat_graph.errors import ConfigError
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.errors import ConfigError
 from jeat_graph.smoothers.rts import smooth_rts
 from jeat_graph.smoothers.track_data import MOTION, SmoothedTrack, TrackData
 

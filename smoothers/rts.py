@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.smoothers.backward import smooth_rows
 from jeat_graph.smoothers.forward import filter_rows
 from jeat_graph.smoothers.track_data import SmoothedTrack, TrackData

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.arrays import FloatArray, IntArray
-from jeat_graph.errors import DataError
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.errors import DataError
 from jeat_graph.smoothers.measurements import COINCIDENT_S, Measurements, check_measurements, group_times
 
 __all__ = ["COINCIDENT_S", "MOTION", "SmoothedTrack", "TrackData"]

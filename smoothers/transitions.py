@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from jeat_graph.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.filters.motion import process_noise, transition
 
 # Process noise of white jerk is q² Δ u_i u_j times this, with u = (Δ², Δ, 1) (paper eq. 2).

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.smoothers.backward import smooth_rows
 from jeat_graph.smoothers.forward import filter_rows
 from jeat_graph.smoothers.measurements import COINCIDENT_S, Measurements

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray, IntArray
-from jeat_graph.detections import Detections
-from jeat_graph.errors import DataError, UnknownSensorError
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.errors import DataError, UnknownSensorError
 from jeat_graph.eval.baselines.frames import BaselineFrame
 from jeat_graph.eval.overlap import pairwise_iou
 from jeat_graph.eval.resampling import TIME_TOLERANCE_S

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.errors import ConfigError
+from jeat_graph.data.errors import ConfigError
 from jeat_graph.eval.baselines.frames import BaselineFrame, TrackedFrame
 
 # The largest 1 - IoU in Norfair's own demonstrations with boxes; all else are its constructor's defaults.

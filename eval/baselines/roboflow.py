@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray
-from jeat_graph.errors import ConfigError
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.errors import ConfigError
 from jeat_graph.eval.baselines.frames import BaselineFrame, TrackedFrame
 
 # Name: class in `trackers`, and what is set differently from its defaults.

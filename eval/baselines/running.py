@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.detections import Detections
-from jeat_graph.errors import ConfigError
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.errors import ConfigError
+from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.eval.baselines.frames import FrameTracker
 from jeat_graph.eval.baselines.inputs import baseline_frames, sensor_rate
 from jeat_graph.eval.baselines.norfair import NorfairTracker
 from jeat_graph.eval.baselines.roboflow import ROBOFLOW, RoboflowTracker
-from jeat_graph.trajectories import Trajectories
 
 # Name: packages that it needs.
 BASELINES: dict[str, tuple[str, ...]] = {

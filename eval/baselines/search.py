@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.detections import Detections
-from jeat_graph.errors import DataError
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.eval.baselines.running import run_baseline
 from jeat_graph.eval.metrics import Scores, evaluate
-from jeat_graph.trajectories import GroundTruth
 
 SEARCH_GRIDS: dict[str, dict[str, tuple[float | int | bool, ...]]] = {
     "sort": {

@@ -12,8 +12,8 @@ from jeat_graph.benchmark.judging import OursJob, in_processes, judge_ours, judg
 from jeat_graph.benchmark.provenance import provenance
 from jeat_graph.benchmark.recordings import kitti
 from jeat_graph.benchmark.steps import rows
-from jeat_graph.config import Config
-from jeat_graph.config_io import load_config
+from jeat_graph.config.reading import load_config
+from jeat_graph.config.schema import Config
 
 if TYPE_CHECKING:
     from jeat_graph.eval.tables import Table

@@ -24,8 +24,8 @@ from jeat_graph.benchmark.peer_search import peers_here, search_parameters, sear
 from jeat_graph.benchmark.provenance import provenance
 from jeat_graph.benchmark.recordings import Recording, find_kitti, kitti, simulated
 from jeat_graph.benchmark.steps import start
-from jeat_graph.config import Config
-from jeat_graph.config_io import load_config
+from jeat_graph.config.reading import load_config
+from jeat_graph.config.schema import Config
 
 if TYPE_CHECKING:
     from jeat_graph.eval.tables import Cell, Table

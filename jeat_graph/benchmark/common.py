@@ -9,13 +9,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jeat_graph.argument_types import counting, natural, positive
 from jeat_graph.benchmark.judging import METRICS, fold_config, in_processes
 from jeat_graph.benchmark.readme import update_readme
 from jeat_graph.benchmark.recordings import DURATION_S, KITTI_SEQUENCES, SCENARIOS, SEEDS, find_kitti
-from jeat_graph.config import Config
-from jeat_graph.config_io import config_from_dict
-from jeat_graph.errors import DataError
+from jeat_graph.config.argument_types import counting, natural, positive
+from jeat_graph.config.reading import config_from_dict
+from jeat_graph.config.schema import Config
+from jeat_graph.data.errors import DataError
 
 if TYPE_CHECKING:
     from jeat_graph.eval.tables import Table
@@ -45,7 +45,7 @@ def settings(args: argparse.Namespace) -> dict[str, Any]:
     Raises:
         ConfigError: unknown scenario.
     """
-    from jeat_graph.sehn.scenario import load_scenario
+    from jeat_graph.simulation.scenario import load_scenario
 
     scenarios = tuple(args.scenarios or SCENARIOS)
     for name in scenarios:

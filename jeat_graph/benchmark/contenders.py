@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from jeat_graph.config import Config
+from jeat_graph.config.schema import Config
 
 NAMES = {
     "sort": "SORT",

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.smoothers.track_data import TrackData
 
 # (rate in Hz, standard deviation in px, share with memory, memory in s) of an event and an RGB detector.

@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray, IntArray
-from jeat_graph.events import EventArray
-from jeat_graph.sehn.imaging.carla_pixel import carla_advance, make_carla_model, make_carla_state
-from jeat_graph.sehn.imaging.config import CarlaEventConfig, ImagingConfig
-from jeat_graph.sehn.imaging.event_sink import make_sink, to_events
-from jeat_graph.sehn.imaging.lighting import LUMINANCE
-from jeat_graph.sehn.imaging.renderer import Renderer
-from jeat_graph.sehn.imaging.rgb_camera import choose_exposure
-from jeat_graph.sehn.imaging.source import RenderedSource
-from jeat_graph.sehn.scenario import load_scenario
-from jeat_graph.sehn.streams import stream
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.events import EventArray
+from jeat_graph.simulation.imaging.carla_pixel import carla_advance, make_carla_model, make_carla_state
+from jeat_graph.simulation.imaging.config import CarlaEventConfig, ImagingConfig
+from jeat_graph.simulation.imaging.event_sink import make_sink, to_events
+from jeat_graph.simulation.imaging.lighting import LUMINANCE
+from jeat_graph.simulation.imaging.renderer import Renderer
+from jeat_graph.simulation.imaging.rgb_camera import choose_exposure
+from jeat_graph.simulation.imaging.source import RenderedSource
+from jeat_graph.simulation.scenario import load_scenario
+from jeat_graph.simulation.streams import stream
 
 BASELINE = "baseline"
 ALL = "all three"

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.sehn.imaging.config import ImagingConfig
-from jeat_graph.sehn.imaging.source import RenderedSource
-from jeat_graph.sehn.scenario import load_scenario
+from jeat_graph.simulation.imaging.config import ImagingConfig
+from jeat_graph.simulation.imaging.source import RenderedSource
+from jeat_graph.simulation.scenario import load_scenario
 
 SPEEDS = (0.0, 10.0, 30.0, 100.0, 300.0, float("inf"))  # edges of the classes (px/s)
 _LEAST_VISIBLE = 0.8

@@ -9,14 +9,14 @@ from collections.abc import Mapping
 from statistics import mean
 from typing import TYPE_CHECKING, Any
 
-from jeat_graph.argument_types import counting, natural, positive
 from jeat_graph.benchmark import common
 from jeat_graph.benchmark.event_noise import BASELINE, measure_noise
 from jeat_graph.benchmark.event_rates import SPEEDS, measure_rates
 from jeat_graph.benchmark.judging import in_processes
 from jeat_graph.benchmark.provenance import provenance
-from jeat_graph.section_tree import plain
-from jeat_graph.sehn.imaging.config import load_imaging
+from jeat_graph.config.argument_types import counting, natural, positive
+from jeat_graph.config.section_tree import plain
+from jeat_graph.simulation.imaging.config import load_imaging
 
 if TYPE_CHECKING:
     from jeat_graph.eval.tables import Cell, Table

@@ -12,8 +12,8 @@ from statistics import mean, stdev
 from typing import Any, TypeVar
 
 from jeat_graph.benchmark.recordings import KITTI_IMAGE, Recording, kitti, simulated
-from jeat_graph.config import Config
-from jeat_graph.config_io import load_config
+from jeat_graph.config.reading import load_config
+from jeat_graph.config.schema import Config
 
 METRICS = ("MOTA", "MOTP", "HOTA", "IDF1")
 COUNTS = ("FP", "FN", "IDSW")
@@ -83,7 +83,7 @@ def judge_recordings(
         sensors: which sensors the tracker is given; all by default.
     """
     from jeat_graph.eval.metrics import evaluate
-    from jeat_graph.tracker import track
+    from jeat_graph.tracking.tracker import track
 
     configs = [config] * len(recordings) if isinstance(config, Config) else config
     pairs = [(one.truth, track(c, one.only(sensors))) for c, one in zip(configs, recordings, strict=True)]

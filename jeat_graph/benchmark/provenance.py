@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from jeat_graph.config import Config
-from jeat_graph.config_io import config_to_dict
+from jeat_graph.config.reading import config_to_dict
+from jeat_graph.config.schema import Config
 from jeat_graph.version import __version__
 
 _PACKAGES = ("numpy", "scipy", "numba", "trackeval", "gtsam", "trackers", "norfair", "supervision")

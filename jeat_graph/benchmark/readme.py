@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from jeat_graph.errors import DataError
+from jeat_graph.data.errors import DataError
 from jeat_graph.io.atomic import open_atomic
 
 _BLOCK = re.compile(r"(<!-- table: (?P<name>[\w-]+) -->\n)(?P<old>.*?)(<!-- end -->)", re.DOTALL)

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray
-from jeat_graph.detections import Detections
-from jeat_graph.trajectories import GroundTruth
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.trajectories import GroundTruth
 
 SCENARIOS = ("day", "night", "night-nolight")
 # Judged on these; the presets were calibrated on seeds 100 and 101, the baselines' parameters searched on
@@ -48,8 +48,8 @@ class Recording:
 @lru_cache(maxsize=8)
 def simulated(scenario: str, seed: int, duration_s: float = DURATION_S) -> Recording:
     """Simulate a recording; the last few are kept."""
-    from jeat_graph.sehn.scenario import load_scenario
-    from jeat_graph.sehn.simulate import simulate
+    from jeat_graph.simulation.scenario import load_scenario
+    from jeat_graph.simulation.simulate import simulate
 
     detections, truth = simulate(load_scenario(scenario), seed=seed, duration_s=duration_s)
     return Recording(f"{scenario}/{seed}", detections, truth)

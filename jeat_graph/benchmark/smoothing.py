@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray
 from jeat_graph.benchmark import common
 from jeat_graph.benchmark.drawn import DrawnTrack, from_model, from_paths
 from jeat_graph.benchmark.judging import in_processes, spread
 from jeat_graph.benchmark.provenance import provenance
 from jeat_graph.benchmark.recordings import Recording, kitti, simulated
-from jeat_graph.config import Config
-from jeat_graph.config_io import load_config
+from jeat_graph.config.reading import load_config
+from jeat_graph.config.schema import Config
+from jeat_graph.data.arrays import FloatArray
 
 if TYPE_CHECKING:
     from jeat_graph.eval.lagged import States
@@ -107,10 +107,10 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
 
 def judge(job: Job) -> list[dict[str, Any]]:
     """Track with one engine and judge the smoothed table; with the first engine the causal one too."""
+    from jeat_graph.data.trajectories import Trajectories
     from jeat_graph.eval.judge import judge_runs
     from jeat_graph.eval.load import JudgedRun
-    from jeat_graph.tracker import Tracker
-    from jeat_graph.trajectories import Trajectories
+    from jeat_graph.tracking.tracker import Tracker
 
     recording = _recording(job)
     smoother = replace(job.config.smoother, engine=_ENGINES[job.engine], stitch=True, worker=False)

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from jeat_graph.argument_types import counting
 from jeat_graph.benchmark.readme import update_readme
 from jeat_graph.benchmark.speed_worker import SCANS_A_MINUTE, ask
+from jeat_graph.config.argument_types import counting
 
 OBJECTS = (10, 50, 200, 1000)
 VEHICLES = (30, 100, 300)
@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     """Measure, print the tables, write the files."""
     if args.quick:
         args.objects, args.frames, args.warm_up, args.repeats = args.objects[:2], 20, 15, 1
-    from jeat_graph.warm_up import notice_if_cold
+    from jeat_graph.tracking.warm_up import notice_if_cold
 
     notice_if_cold()
     # The first child may have to compile; its time counts nowhere.
@@ -157,8 +157,8 @@ def _tables(result: dict[str, Any]) -> str:
 
 def _write(result: dict[str, Any], args: argparse.Namespace) -> None:
     from jeat_graph.benchmark.provenance import provenance
-    from jeat_graph.benchmark.speed_plot import plot_speed
-    from jeat_graph.config_io import load_config
+    from jeat_graph.config.reading import load_config
+    from jeat_graph.drawing.speed import plot_speed
     from jeat_graph.io.atomic import open_atomic
 
     settings = {key: getattr(args, key) for key in ("objects", "frames", "warm_up", "repeats", "clock")}

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray
 
 # A 4K picture, on which a thousand boxes find room without covering each other for long.
 WIDTH_PX = 3840.0

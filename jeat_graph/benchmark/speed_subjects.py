@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.benchmark.speed_scene import HEIGHT_PX, WIDTH_PX, Frame
-from jeat_graph.config_io import load_config
-from jeat_graph.detections import Scan
-from jeat_graph.errors import ConfigError
-from jeat_graph.tracker import Tracker
+from jeat_graph.config.reading import load_config
+from jeat_graph.data.detections import Scan
+from jeat_graph.data.errors import ConfigError
+from jeat_graph.tracking.tracker import Tracker
 
 #: Ours: preset and engine of the smoother.
 OURS = {

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray
 from jeat_graph.benchmark.speed_scene import Scene, make_frames
 from jeat_graph.benchmark.speed_subjects import REFERENCE, make_subject, stepper, tracker_for
-from jeat_graph.detections import Scan
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.detections import Scan
 
 RATE_HZ = 20.0
 _CLOCKS: dict[str, Callable[[], int]] = {"wall": time.perf_counter_ns, "cpu": time.thread_time_ns}

@@ -7,8 +7,8 @@ from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from jeat_graph.config import Config, SensorConfig
-from jeat_graph.config_io import config_from_dict, config_to_dict
+from jeat_graph.config.reading import config_from_dict, config_to_dict
+from jeat_graph.config.schema import Config, SensorConfig
 
 
 @dataclass(frozen=True)

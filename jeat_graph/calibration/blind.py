@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.calibration.motion import (
     LEAST_JERK_PER_SIZE,
     PERSPECTIVE_RESERVE,
@@ -31,10 +30,11 @@ from jeat_graph.calibration.motion import (
 from jeat_graph.calibration.rates import scan_rate
 from jeat_graph.calibration.sensor import fit_detection, fit_precision
 from jeat_graph.calibration.tracked import TrackedDetections, follow
-from jeat_graph.config import Config, MotionConfig, SensorConfig
-from jeat_graph.detections import Detections
-from jeat_graph.errors import DataError
-from jeat_graph.settings import error_states
+from jeat_graph.config.kernel_form import error_states
+from jeat_graph.config.schema import Config, MotionConfig, SensorConfig
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.errors import DataError
 
 _MIN_LENGTH = 5
 # A detector's errors persist over neighbouring scans; one detection a sensor and period is taken as

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.calibration.matches import SensorMatches
-from jeat_graph.config import SensorConfig
-from jeat_graph.settings import error_states
+from jeat_graph.config.kernel_form import error_states
+from jeat_graph.config.schema import SensorConfig
+from jeat_graph.data.arrays import FloatArray, IntArray
 
 # Motion shows in samples this far apart. The errors of a size, which the filter takes for white, persist over
 # neighbouring scans: taken at every scan of a fast sensor they would pass for growth.

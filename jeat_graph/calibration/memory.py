@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import least_squares
 
-from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 
 # Lags over which the correlation is looked at; errors that last longer are a bias as far as tracks can tell.
 _MAX_LAG_S = 1.5

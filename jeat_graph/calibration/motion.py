@@ -9,13 +9,13 @@ import numpy as np
 from numba import njit
 from scipy.optimize import minimize
 
-from jeat_graph.arrays import FloatArray, IntArray
 from jeat_graph.calibration.measured import MeasuredTracks
-from jeat_graph.config import MotionConfig, SizeConfig
-from jeat_graph.errors import DataError
-from jeat_graph.filters.aekf import predict, predict_size, update_block
-from jeat_graph.filters.coloured import MOTION, expected, predict_errors, update_with_error
+from jeat_graph.config.schema import MotionConfig, SizeConfig
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.errors import DataError
+from jeat_graph.filters.coloured_noise import MOTION, expected, predict_errors, update_with_error
 from jeat_graph.filters.jerk import jerk_density
+from jeat_graph.filters.kalman import predict, predict_size, update_block
 from jeat_graph.filters.motion import size_process_noise, size_transition
 
 # Innovations beyond this many standard deviations are outliers and count as if they were this large.

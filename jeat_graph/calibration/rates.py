@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from jeat_graph.detections import Detections
+from jeat_graph.data.detections import Detections
 
 
 def scan_rate(recordings: Sequence[Detections], sensor: str) -> float:

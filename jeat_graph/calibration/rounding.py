@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields, replace
 from typing import Any
 
-from jeat_graph.config import Config
+from jeat_graph.config.schema import Config
 
 _DIGITS = 4
 

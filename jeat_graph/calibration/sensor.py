@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import isotonic_regression, minimize, minimize_scalar
 
-from jeat_graph.arrays import BoolArray, FloatArray
 from jeat_graph.calibration.matches import SensorMatches
 from jeat_graph.calibration.memory import fit_memory
-from jeat_graph.config import SensorConfig
-from jeat_graph.errors import DataError
+from jeat_graph.config.schema import SensorConfig
+from jeat_graph.data.arrays import BoolArray, FloatArray
+from jeat_graph.data.errors import DataError
 
 _MIN_PAIRS = 20
 _MAX_KNOTS = 12

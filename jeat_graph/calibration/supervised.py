@@ -12,10 +12,10 @@ from jeat_graph.calibration.measured import measured_tracks
 from jeat_graph.calibration.motion import fit_motion, fit_size
 from jeat_graph.calibration.rates import scan_rate
 from jeat_graph.calibration.sensor import calibrate_sensor
-from jeat_graph.config import BirthConfig, Config, SensorConfig
-from jeat_graph.detections import Detections
-from jeat_graph.errors import DataError
-from jeat_graph.trajectories import GroundTruth
+from jeat_graph.config.schema import BirthConfig, Config, SensorConfig
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.trajectories import GroundTruth
 
 Recording = tuple[Detections, GroundTruth]
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from jeat_graph.arrays import BoolArray, FloatArray, IntArray
-from jeat_graph.config import Config
-from jeat_graph.detections import Detections
-from jeat_graph.errors import DataError
-from jeat_graph.lifecycle import occluded_fraction
-from jeat_graph.tracker import track
+from jeat_graph.config.schema import Config
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.errors import DataError
+from jeat_graph.filters.existence import occluded_fraction
+from jeat_graph.tracking.tracker import track
 
 _MIN_ROWS = 50
 # Tracks are followed through gaps as long as this, so that the misses in them are counted.

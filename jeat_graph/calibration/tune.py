@@ -14,12 +14,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from jeat_graph.config import Config
-from jeat_graph.detections import Detections
-from jeat_graph.errors import DataError
+from jeat_graph.config.schema import Config
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.eval.metrics import evaluate
-from jeat_graph.tracker import track
-from jeat_graph.trajectories import GroundTruth
+from jeat_graph.tracking.tracker import track
 
 Recording = tuple[Detections, GroundTruth]
 

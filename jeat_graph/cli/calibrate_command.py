@@ -7,14 +7,14 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jeat_graph.errors import ConfigError, DataError
+from jeat_graph.data.errors import ConfigError, DataError
 
 if TYPE_CHECKING:
     from jeat_graph.calibration.tune import Choice
-    from jeat_graph.config import Config
-    from jeat_graph.detections import Detections
+    from jeat_graph.config.schema import Config
+    from jeat_graph.data.detections import Detections
+    from jeat_graph.data.trajectories import GroundTruth
     from jeat_graph.eval.tables import Cell, Table
-    from jeat_graph.trajectories import GroundTruth
 
 HELP = "Estimate sensors and motion from recordings, with or without truth, and write a configuration."
 
@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Calibrate, write the configuration, and print what was estimated."""
-    from jeat_graph.config_io import load_config, save_config
+    from jeat_graph.config.reading import load_config, save_config
     from jeat_graph.io.detections_io import read_detections
     from jeat_graph.io.truth_io import read_truth
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from jeat_graph.config import Config
-    from jeat_graph.detections import Detections
+    from jeat_graph.config.schema import Config
+    from jeat_graph.data.detections import Detections
 
 HELP = "compare filter and smoothers on a run: errors, error against lag, consistency; tables and pictures"
 
@@ -42,12 +42,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Track again, compare, print the tables, write `compare.json` and the pictures."""
+    from jeat_graph.drawing.comparison import write_plots
     from jeat_graph.eval.compare import LAGS_S, ComparedTrack, compare
-    from jeat_graph.eval.compare_plots import write_plots
     from jeat_graph.eval.tables import to_json
     from jeat_graph.io.atomic import open_atomic
     from jeat_graph.io.truth_io import read_truth
-    from jeat_graph.smoothing.records import record_tracks
+    from jeat_graph.tracking.records import record_tracks
 
     folder = Path(args.run_directory)
     truth = None if args.gt is None else read_truth(args.gt)
@@ -86,8 +86,8 @@ def recorded_inputs(folder: Path, moved: list[str] | None = None) -> tuple[Confi
     Raises:
         DataError: there is no run, or an input is missing or has changed since.
     """
-    from jeat_graph.config_io import config_from_dict
-    from jeat_graph.errors import DataError
+    from jeat_graph.config.reading import config_from_dict
+    from jeat_graph.data.errors import DataError
     from jeat_graph.io.detections_io import read_many, split_name
     from jeat_graph.io.hashing import sha256_of
 

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from jeat_graph.arrays import FloatArray
-    from jeat_graph.config import Config
-    from jeat_graph.detections import Detections
+    from jeat_graph.config.schema import Config
+    from jeat_graph.data.arrays import FloatArray
+    from jeat_graph.data.detections import Detections
+    from jeat_graph.data.trajectories import Trajectories
     from jeat_graph.eval.metrics import Scores
     from jeat_graph.eval.tables import Table
-    from jeat_graph.sehn.simulate import Recording
-    from jeat_graph.trajectories import Trajectories
+    from jeat_graph.simulation.simulate import Recording
 
 HELP = "simulate a highway at night, track it with both sensors and with each alone, and show what comes out"
 COLUMNS = ("sensors", "MOTA", "IDF1", "HOTA", "FP", "FN", "IDSW")
@@ -35,16 +35,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Simulate, track, judge, draw, and say where everything is."""
-    from jeat_graph.config_io import load_config
-    from jeat_graph.input_checks import check_detections
+    from jeat_graph.config.reading import load_config
     from jeat_graph.io.detections_io import write_detections
     from jeat_graph.io.trajectories_io import read_trajectories
     from jeat_graph.io.truth_io import write_truth
-    from jeat_graph.run_directory import RunDirectory
-    from jeat_graph.sehn.scenario import load_scenario
-    from jeat_graph.sehn.simulate import record
-    from jeat_graph.tracking_run import RunOptions, RunRecord, describe_inputs, write_run
-    from jeat_graph.warm_up import notice_if_cold
+    from jeat_graph.runs.directory import RunDirectory
+    from jeat_graph.runs.input_checks import check_detections
+    from jeat_graph.runs.tracking_run import RunOptions, RunRecord, describe_inputs, write_run
+    from jeat_graph.simulation.scenario import load_scenario
+    from jeat_graph.simulation.simulate import record
+    from jeat_graph.tracking.warm_up import notice_if_cold
 
     config = load_config(args.config)
     scenario = load_scenario(args.scenario)
@@ -87,7 +87,7 @@ def _compare(recording: Recording, config: Config, causal: Trajectories, smoothe
     from jeat_graph.eval.metrics import evaluate
     from jeat_graph.eval.tables import Cell, Table
     from jeat_graph.io.trajectories_io import read_trajectories
-    from jeat_graph.tracker import track
+    from jeat_graph.tracking.tracker import track
 
     detections, truth = recording.detections, recording.truth
     names = " + ".join(detections.sensors)
@@ -112,8 +112,8 @@ def _causal_scores(recording: Recording, detections: Detections, table: Trajecto
 def _draw(recording: Recording, table: Trajectories, stem: Path, scenario: str) -> list[Path]:
     import numpy as np
 
-    from jeat_graph.pictures import DAY, NIGHT, Backdrop, save_pictures
-    from jeat_graph.sehn.markings import marking_lines
+    from jeat_graph.drawing.run_picture import DAY, NIGHT, Backdrop, save_pictures
+    from jeat_graph.simulation.world.markings import marking_lines
 
     camera, truth = recording.scene.camera, recording.truth
     end = float(truth.frame_times()[-1])

@@ -7,12 +7,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jeat_graph.argument_types import positive, share
-from jeat_graph.errors import DataError
+from jeat_graph.config.argument_types import positive, share
+from jeat_graph.data.errors import DataError
 
 if TYPE_CHECKING:
+    from jeat_graph.data.trajectories import GroundTruth
     from jeat_graph.eval.tables import Table
-    from jeat_graph.trajectories import GroundTruth
 
 HELP = "Judge a run, a trajectory table, or a MOTChallenge or KITTI result against ground truth."
 FORMATS = ("text", "markdown", "csv", "latex")

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from jeat_graph.errors import JeatGraphError
+from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.version import __version__
 
 # Each module has HELP (one line), add_arguments(parser) and run(args). Modules are imported only when their

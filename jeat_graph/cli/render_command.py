@@ -8,11 +8,11 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jeat_graph.argument_types import positive
-from jeat_graph.errors import DataError
+from jeat_graph.config.argument_types import positive
+from jeat_graph.data.errors import DataError
 
 if TYPE_CHECKING:
-    from jeat_graph.render.show import Show
+    from jeat_graph.drawing.movie.show import Show
 
 HELP = "draw a run over video, frames or events, or a simulated segment, as an MP4 video or one PNG picture"
 _LARGEST_PX = 8192
@@ -59,8 +59,8 @@ def size(text: str) -> tuple[int, int]:
 
 def run(args: argparse.Namespace) -> int:
     """Open what is to be drawn, and draw it."""
-    from jeat_graph.render.movie import write_png
-    from jeat_graph.render.sources import Wanted, open_show
+    from jeat_graph.drawing.movie.film import write_png
+    from jeat_graph.drawing.movie.sources import Wanted, open_show
 
     out = Path(args.out)
     _check_out(out, args.at is not None)
@@ -97,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
 def _write_movie(show: Show, rate_hz: float, out: Path) -> None:
     from tqdm import tqdm
 
-    from jeat_graph.render.movie import MovieWriter
+    from jeat_graph.drawing.movie.film import MovieWriter
 
     hidden = not sys.stderr.isatty()
     with MovieWriter(out, show.size_px, rate_hz) as movie:

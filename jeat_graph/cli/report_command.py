@@ -7,10 +7,10 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jeat_graph.argument_types import positive
+from jeat_graph.config.argument_types import positive
 
 if TYPE_CHECKING:
-    from jeat_graph.report.figures import ComparedRun
+    from jeat_graph.drawing.page.figures import ComparedRun
 
 HELP = "write a run as one self-contained HTML page: scores, map, and the curves of every track"
 
@@ -38,10 +38,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Read the run, compare if its inputs are there, write the page."""
-    from jeat_graph.errors import DataError
+    from jeat_graph.data.errors import DataError
+    from jeat_graph.drawing.page.document import render_page
     from jeat_graph.io.atomic import open_atomic
-    from jeat_graph.report.page import render_page
-    from jeat_graph.report.run_data import load_run_data
+    from jeat_graph.runs.recorded import load_run_data
 
     out = Path(args.out)
     if out.is_dir():
@@ -62,11 +62,11 @@ def _compare(args: argparse.Namespace) -> tuple[ComparedRun | None, str | None]:
     if args.no_compare:
         return None, "Filter against smoother was left out (--no-compare)."
     from jeat_graph.cli.compare_command import recorded_inputs
-    from jeat_graph.errors import DataError
+    from jeat_graph.data.errors import DataError
+    from jeat_graph.drawing.page.figures import compared_run
     from jeat_graph.eval.compare import ComparedTrack, compare
     from jeat_graph.io.truth_io import read_truth
-    from jeat_graph.report.figures import compared_run
-    from jeat_graph.smoothing.records import record_tracks
+    from jeat_graph.tracking.records import record_tracks
 
     folder = Path(args.run_directory)
     if not folder.is_dir():

@@ -10,12 +10,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jeat_graph.argument_types import counting
-from jeat_graph.errors import ConfigError
+from jeat_graph.config.argument_types import counting
+from jeat_graph.data.errors import ConfigError
 
 if TYPE_CHECKING:
-    from jeat_graph.sehn.dataset.workers import SourceFactory
-    from jeat_graph.sehn.scenario import Scenario
+    from jeat_graph.simulation.dataset.workers import SourceFactory
+    from jeat_graph.simulation.scenario import Scenario
 
 HELP = "simulate a highway seen by an RGB and an event camera: detections or pictures, and truth"
 _DENSITIES = ("sparse", "normal", "dense")
@@ -102,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
         if getattr(args, name) is not None:
             flag = "--" + name.replace("_", "-")
             raise ConfigError(f"{flag} does not go with --sensors {args.sensors}")
-    from jeat_graph.sehn.scenario import load_scenario
+    from jeat_graph.simulation.scenario import load_scenario
 
     scenario = load_scenario(args.scenario, args.density)
     if args.sensors == "detections":
@@ -113,7 +113,7 @@ def run(args: argparse.Namespace) -> int:
 def _detections(args: argparse.Namespace, scenario: Scenario) -> int:
     from tqdm import tqdm
 
-    from jeat_graph.sehn.dataset.detection_set import STEPS, write_detection_set
+    from jeat_graph.simulation.dataset.detection_set import STEPS, write_detection_set
 
     duration = _DURATION_S if args.duration is None else args.duration
     with tqdm(total=STEPS, desc="simulate", disable=not sys.stderr.isatty(), leave=False) as bar:
@@ -130,10 +130,10 @@ def _detections(args: argparse.Namespace, scenario: Scenario) -> int:
 def _pictures(args: argparse.Namespace, scenario: Scenario) -> int:
     from tqdm import tqdm
 
-    from jeat_graph.sehn.dataset.protocol import Protocol
-    from jeat_graph.sehn.dataset.recording import record_dataset
-    from jeat_graph.sehn.dataset.workers import available_cores
-    from jeat_graph.sehn.scenario import scenario_to_yaml
+    from jeat_graph.simulation.dataset.protocol import Protocol
+    from jeat_graph.simulation.dataset.recording import record_dataset
+    from jeat_graph.simulation.dataset.workers import available_cores
+    from jeat_graph.simulation.scenario import scenario_to_yaml
 
     given = {
         "video": args.video,
@@ -171,8 +171,8 @@ def _pictures(args: argparse.Namespace, scenario: Scenario) -> int:
 
 
 def _renderer(args: argparse.Namespace, scenario: Scenario, frames: int) -> SourceFactory:
-    from jeat_graph.sehn.imaging.config import load_imaging
-    from jeat_graph.sehn.imaging.source import RenderedSource
+    from jeat_graph.simulation.imaging.config import load_imaging
+    from jeat_graph.simulation.imaging.source import RenderedSource
 
     tree: dict[str, Any] = {} if args.imaging is None else _read_yaml(Path(args.imaging))
     if args.size is not None or "width" not in (tree.get("render") or {}):
@@ -182,9 +182,9 @@ def _renderer(args: argparse.Namespace, scenario: Scenario, frames: int) -> Sour
 
 
 def _carla_source(args: argparse.Namespace, scenario: Scenario, frames: int) -> SourceFactory:
-    from jeat_graph.sehn.carla.config import CarlaConfig
-    from jeat_graph.sehn.carla.session import client_api
-    from jeat_graph.sehn.carla.source import CarlaSource
+    from jeat_graph.simulation.carla.config import CarlaConfig
+    from jeat_graph.simulation.carla.session import client_api
+    from jeat_graph.simulation.carla.source import CarlaSource
 
     client_api()  # says so now if it is not installed
     width, height = args.size or _SIZE
@@ -196,7 +196,7 @@ def _carla_source(args: argparse.Namespace, scenario: Scenario, frames: int) -> 
 def _verify(folder: Path) -> int:
     from tqdm import tqdm
 
-    from jeat_graph.sehn.dataset.verify import file_count, verify
+    from jeat_graph.simulation.dataset.verify import file_count, verify
 
     problems = 0
     count = file_count(folder)
@@ -212,7 +212,7 @@ def _verify(folder: Path) -> int:
 
 
 def _read_yaml(path: Path) -> dict[str, Any]:
-    from jeat_graph.section_tree import read_tree
+    from jeat_graph.config.section_tree import read_tree
 
     if not path.is_file():
         raise ConfigError(f"{path}: no such file")

@@ -12,11 +12,11 @@ from types import FrameType
 from typing import TYPE_CHECKING, Self
 
 if TYPE_CHECKING:
-    from jeat_graph.config import Config
+    from jeat_graph.config.schema import Config
+    from jeat_graph.data.trajectories import Trajectories
     from jeat_graph.io.scan_lines import Batch
     from jeat_graph.io.trajectories_io import TrajectoryWriter
-    from jeat_graph.tracker import Tracker
-    from jeat_graph.trajectories import Trajectories
+    from jeat_graph.tracking.tracker import Tracker
 
 HELP = "track scans that arrive on stdin, as JSON lines or CSV, and write the tracks of each moment to stdout"
 STDIN = "<stdin>"
@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Track until the input ends, the reader of the output goes away, or an interrupt."""
-    from jeat_graph.tracker import Tracker
+    from jeat_graph.tracking.tracker import Tracker
 
     tracker = Tracker(_config(args))
     _warm_up(tracker.config)
@@ -86,8 +86,8 @@ def run(args: argparse.Namespace) -> int:
 def _config(args: argparse.Namespace) -> Config:
     from dataclasses import replace
 
-    from jeat_graph.config_io import load_config
-    from jeat_graph.errors import ConfigError
+    from jeat_graph.config.reading import load_config
+    from jeat_graph.data.errors import ConfigError
 
     config = load_config(args.config, args.overrides)
     if args.smoothed is None:
@@ -101,8 +101,8 @@ def _warm_up(config: Config) -> None:
     """Load the compiled code before the first scan arrives, which should not wait for it."""
     from dataclasses import replace
 
-    from jeat_graph.tracker import Tracker
-    from jeat_graph.warm_up import notice_if_cold
+    from jeat_graph.tracking.tracker import Tracker
+    from jeat_graph.tracking.warm_up import notice_if_cold
 
     notice_if_cold()
     spare = Tracker(replace(config, smoother=replace(config.smoother, worker=False)))
@@ -129,7 +129,7 @@ def _track(tracker: Tracker, args: argparse.Namespace, output: _Output, interrup
 
 
 def _step(tracker: Tracker, batch: Batch) -> Trajectories:
-    from jeat_graph.errors import DataError, TimeOrderError, UnknownSensorError
+    from jeat_graph.data.errors import DataError, TimeOrderError, UnknownSensorError
 
     try:
         return tracker.step(batch.scans)
@@ -144,7 +144,7 @@ class _Output:
     """Lines to stdout, each flushed at once, and smoothed rows to a file that appears at the end."""
 
     def __init__(self, tracker: Tracker, form: str, smoothed: str | None) -> None:
-        from jeat_graph.errors import DataError
+        from jeat_graph.data.errors import DataError
 
         if smoothed is not None and Path(smoothed).is_dir():
             raise DataError("is a folder; --smoothed must name a file", smoothed)
@@ -172,7 +172,7 @@ class _Output:
         self._stack.__exit__(*error)  # type: ignore[arg-type]
 
     def write(self, t: float, table: Trajectories) -> None:
-        from jeat_graph.tracking_run import STEPS_PER_DRAIN
+        from jeat_graph.runs.tracking_run import STEPS_PER_DRAIN
 
         sys.stdout.write(self._line(t, table))
         sys.stdout.flush()

@@ -7,7 +7,7 @@ import sys
 import time
 from pathlib import Path
 
-from jeat_graph.argument_types import positive
+from jeat_graph.config.argument_types import positive
 
 HELP = "track the vehicles in files of detections and write a run directory"
 INPUT_FORMATS = ("csv", "parquet", "motchallenge", "kitti", "prophesee", "coco")
@@ -80,12 +80,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Read, check, track, and write the run directory."""
-    from jeat_graph.config_io import load_config
-    from jeat_graph.input_checks import check_detections
+    from jeat_graph.config.reading import load_config
     from jeat_graph.io.detections_io import read_many, split_name
-    from jeat_graph.run_directory import RunDirectory
-    from jeat_graph.tracking_run import RunOptions, RunRecord, describe_inputs, write_run
-    from jeat_graph.warm_up import notice_if_cold
+    from jeat_graph.runs.directory import RunDirectory
+    from jeat_graph.runs.input_checks import check_detections
+    from jeat_graph.runs.tracking_run import RunOptions, RunRecord, describe_inputs, write_run
+    from jeat_graph.tracking.warm_up import notice_if_cold
 
     begin = time.perf_counter()
     overrides = list(args.overrides)

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray
-from jeat_graph.errors import DataError
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.errors import DataError
 from jeat_graph.io.csv_text import read_text
 from jeat_graph.io.frames import check_rate
 

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.arrays import BoolArray, FloatArray, IntArray
-from jeat_graph.errors import DataError
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.errors import DataError
 from jeat_graph.io.atomic import open_atomic
 from jeat_graph.io.csv_text import read_text
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.arrays import BoolArray, FloatArray
-from jeat_graph.detections import Detections, find_bad_row
-from jeat_graph.errors import DataError
+from jeat_graph.data.arrays import BoolArray, FloatArray
+from jeat_graph.data.detections import Detections, find_bad_row
+from jeat_graph.data.errors import DataError
 from jeat_graph.io import coco, kitti, motchallenge, prophesee
 from jeat_graph.io.formats import recognise
 from jeat_graph.io.frames import check_rate, fill_frames, gap_times, scale_scores, score_hint

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.diagnostics import Diagnostics
+from jeat_graph.data.diagnostics import Diagnostics
 from jeat_graph.io.piecewise import PiecewiseWriter
 from jeat_graph.io.table_writer import TableWriter, round_decimals, round_significant
 from jeat_graph.io.tables import read_table

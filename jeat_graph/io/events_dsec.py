@@ -23,9 +23,9 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.arrays import IntArray
-from jeat_graph.errors import DataError
-from jeat_graph.events import EventArray
+from jeat_graph.data.arrays import IntArray
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.events import EventArray
 
 US_PER_MS = 1000
 LABEL = "by_motion"

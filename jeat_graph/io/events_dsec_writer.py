@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.arrays import IntArray
-from jeat_graph.errors import ConfigError, DataError
-from jeat_graph.events import EventArray
+from jeat_graph.data.arrays import IntArray
+from jeat_graph.data.errors import ConfigError, DataError
+from jeat_graph.data.events import EventArray
 from jeat_graph.io.atomic import atomic_path
 from jeat_graph.io.events_dsec import LABEL, US_PER_MS
 from jeat_graph.io.piecewise import PiecewiseWriter

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.errors import DataError
-from jeat_graph.events import EventArray
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.events import EventArray
 from jeat_graph.io.csv_text import read_bytes
 
 _NAMES = {"t": ("t", "ts", "timestamp"), "x": ("x",), "y": ("y",), "p": ("p", "pol", "polarity")}

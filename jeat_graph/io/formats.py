@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from jeat_graph.errors import DataError
+from jeat_graph.data.errors import DataError
 
 FORMATS = ("csv", "parquet", "motchallenge", "kitti", "prophesee", "coco")
 _MAGIC = {b"PAR1": "parquet", b"\x93NUMPY": "prophesee"}

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray, IntArray
-from jeat_graph.errors import DataError
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.errors import DataError
 
 # More empty scans than this come from a wrong frame number, rate or time unit, not from a camera.
 _MOST_FILLED = 5_000_000

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
-from jeat_graph.errors import DataError
+from jeat_graph.data.errors import DataError
 
 
 def sha256_of(path: str | Path) -> str:

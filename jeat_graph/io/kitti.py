@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.io.plain_text import read_plain
 from jeat_graph.io.tables import Table
 

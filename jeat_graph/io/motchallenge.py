@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray
-from jeat_graph.errors import DataError
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.errors import DataError
 from jeat_graph.io.frames import check_rate
 from jeat_graph.io.plain_text import read_plain
 from jeat_graph.io.tables import Table

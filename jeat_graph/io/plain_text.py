@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray, IntArray
-from jeat_graph.errors import DataError
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.errors import DataError
 from jeat_graph.io.csv_text import CsvBody, read_text
 from jeat_graph.io.tables import Table, table_of
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.io.atomic import atomic_path
 
 # Field names and types of DSEC-Detection's `tracks.npy`.

@@ -7,8 +7,8 @@ import json
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
-from jeat_graph.detections import Scan
-from jeat_graph.errors import DataError
+from jeat_graph.data.detections import Scan
+from jeat_graph.data.errors import DataError
 
 _KEYS = ("t", "sensor", "boxes", "scores")
 _COLUMNS = ("t", "sensor", "left", "top", "width", "height", "score")

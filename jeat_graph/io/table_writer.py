@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.arrays import FloatArray
-from jeat_graph.errors import DataError
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.errors import DataError
 from jeat_graph.io.atomic import atomic_path
 from jeat_graph.io.piecewise import PiecewiseWriter
 from jeat_graph.io.tables import PARQUET_SUFFIXES

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.arrays import BoolArray, FloatArray, IntArray
-from jeat_graph.errors import DataError
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.errors import DataError
 from jeat_graph.io.csv_text import CsvBody, read_bytes, read_text
 
 PARQUET_SUFFIXES = (".parquet", ".pq")

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from typing import Any
 
+from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.table_writer import csv_lines
 from jeat_graph.io.trajectories_io import BOX, COLUMNS, MEAN, VAR, table_columns
-from jeat_graph.trajectories import Trajectories
 
 
 def json_line(t: float, table: Trajectories) -> str:

@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.arrays import FloatArray, IntArray
-from jeat_graph.errors import DataError
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io import kitti, motchallenge
 from jeat_graph.io.formats import recognise
 from jeat_graph.io.frames import check_rate
@@ -22,7 +23,6 @@ from jeat_graph.io.piecewise import PiecewiseWriter
 from jeat_graph.io.plain_text import frames_of
 from jeat_graph.io.table_writer import TableWriter, round_decimals, round_significant, write_columns
 from jeat_graph.io.tables import Table, read_table
-from jeat_graph.trajectories import Trajectories
 
 BOX = ("left", "top", "width", "height")
 MEAN = ("x", "y", "vx", "vy", "ax", "ay")

@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.arrays import BoolArray, FloatArray, IntArray
-from jeat_graph.errors import DataError
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.io import kitti, motchallenge, prophesee
 from jeat_graph.io.formats import recognise
 from jeat_graph.io.frames import check_rate, fill_frames, gap_times
 from jeat_graph.io.plain_text import check_sizes, frames_of
 from jeat_graph.io.table_writer import write_columns
 from jeat_graph.io.tables import Table, read_table
-from jeat_graph.trajectories import GroundTruth
 
 _BOX = ("left", "top", "width", "height")
 _REQUIRED = ("t", "object_id", *_BOX)

@@ -22,8 +22,8 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.arrays import FloatArray, IntArray
-from jeat_graph.errors import DataError
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.errors import DataError
 
 RgbImage = npt.NDArray[np.uint8]
 

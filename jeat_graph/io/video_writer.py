@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.errors import ConfigError, DataError
+from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.io.atomic import atomic_path
 from jeat_graph.io.video import FRAME_TIMES, VIDEO_FILES, RgbImage, quietly
 

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from jeat_graph.association.births import choose_births
-from jeat_graph.association.boxes import overlap
+from jeat_graph.association.overlap import overlap
 
 
 def iou(a, b):

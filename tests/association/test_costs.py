@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from jeat_graph.association.costs import likelihood_cost, log_evidence, log_score_ratio
-from jeat_graph.association.gating import gated_pairs
+from jeat_graph.association.gates import gated_pairs
 
 PROBABILITY = st.floats(0.01, 0.99)
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import multivariate_normal
 
-from jeat_graph.association.gating import gated_pairs
+from jeat_graph.association.gates import gated_pairs
 
 
 def random_scene(rng, tracks, dets, sensors=2, width=300.0):

@@ -29,7 +29,7 @@ def test_the_result_holds_what_is_needed_to_repeat_it(ablation):
 def test_scores_of_a_row_are_those_of_its_configuration(ablation):
     from jeat_graph.benchmark.judging import judge_recordings
     from jeat_graph.benchmark.recordings import simulated
-    from jeat_graph.config_io import config_from_dict
+    from jeat_graph.config.reading import config_from_dict
 
     result = json.loads((ablation / "ablation.json").read_text())
     last = result["records"][-1]

@@ -8,8 +8,8 @@ import pytest
 
 from jeat_graph.benchmark.event_noise import ALL, BASELINE, matched, measures
 from jeat_graph.cli.main import main
-from jeat_graph.events import EventArray
-from jeat_graph.sehn.imaging.config import CarlaEventConfig
+from jeat_graph.data.events import EventArray
+from jeat_graph.simulation.imaging.config import CarlaEventConfig
 
 
 def events(rows: list[tuple[int, int, int, int]]) -> EventArray:

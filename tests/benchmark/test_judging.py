@@ -19,7 +19,7 @@ from jeat_graph.benchmark.judging import in_processes, spread, summarise
 from jeat_graph.benchmark.peer_parameters import KITTI_BEST, SIMULATED_BEST
 from jeat_graph.benchmark.peer_search import peers_here, search_parameters, search_table
 from jeat_graph.benchmark.recordings import find_kitti, kitti, simulated
-from jeat_graph.config_io import load_config
+from jeat_graph.config.reading import load_config
 from jeat_graph.eval.baselines.search import SEARCH_GRIDS, grid
 
 

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.benchmark.readme import fill_tables, update_readme
-from jeat_graph.errors import DataError
+from jeat_graph.data.errors import DataError
 
 TEXT = "# Title\n\n<!-- table: a -->\nold\n<!-- end -->\n\ntext\n<!-- table: b-c -->\n<!-- end -->\ntail\n"
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from jeat_graph.benchmark.steps import STEPS, rows, start
-from jeat_graph.config_io import load_config
-from jeat_graph.sehn.scenario import load_scenario
-from jeat_graph.sehn.simulate import simulate
-from jeat_graph.tracker import track
+from jeat_graph.config.reading import load_config
+from jeat_graph.simulation.scenario import load_scenario
+from jeat_graph.simulation.simulate import simulate
+from jeat_graph.tracking.tracker import track
 
 
 @pytest.mark.parametrize("target", ["default", "kitti"])

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from jeat_graph.detections import Detections
-from jeat_graph.trajectories import GroundTruth
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.trajectories import GroundTruth
 
 SIGMA, RHO, LOG_SIGMA = 1.2, 0.03, 0.06
 BIAS = (0.05, -0.04, 0.06, -0.03)

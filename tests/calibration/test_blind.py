@@ -7,10 +7,10 @@ import pytest
 
 from jeat_graph.calibration.blind import calibrate_blind
 from jeat_graph.calibration.tracked import follow
-from jeat_graph.config import SensorConfig
-from jeat_graph.config_io import load_config
-from jeat_graph.detections import Detections
-from jeat_graph.errors import DataError
+from jeat_graph.config.reading import load_config
+from jeat_graph.config.schema import SensorConfig
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.errors import DataError
 
 
 @pytest.fixture(scope="module")

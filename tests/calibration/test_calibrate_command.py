@@ -3,7 +3,7 @@
 import pytest
 
 from jeat_graph.cli.main import main
-from jeat_graph.config_io import load_config
+from jeat_graph.config.reading import load_config
 from jeat_graph.io.detections_io import write_detections
 from jeat_graph.io.truth_io import write_truth
 

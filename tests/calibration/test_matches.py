@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from jeat_graph.calibration.matches import match_sensor
-from jeat_graph.detections import Detections, Scan
-from jeat_graph.errors import DataError
-from jeat_graph.trajectories import GroundTruth
+from jeat_graph.data.detections import Detections, Scan
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.trajectories import GroundTruth
 
 
 def truth(rows, ignore=()):

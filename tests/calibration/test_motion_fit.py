@@ -6,7 +6,7 @@ from scipy.stats import multivariate_normal
 
 from jeat_graph.calibration.measured import MeasuredTracks
 from jeat_graph.calibration.motion import VELOCITY_RESERVE, fit_motion, fit_size, innovation_loss, size_loss
-from jeat_graph.config import SizeConfig
+from jeat_graph.config.schema import SizeConfig
 
 
 def white_jerk(dt, q):
@@ -152,7 +152,7 @@ def test_rate_density_of_sizes_is_found_again():
 
 
 def test_too_short_tracks_are_refused():
-    from jeat_graph.errors import DataError
+    from jeat_graph.data.errors import DataError
 
     with pytest.raises(DataError, match="detected three times"):
         fit_motion(tracks_of(np.zeros(2), np.zeros((2, 2)), 1.0, 1.0, np.array([0, 2])), SizeConfig())

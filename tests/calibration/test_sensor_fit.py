@@ -66,7 +66,7 @@ def test_precision_curve_follows_the_true_precision():
 @settings(max_examples=60, deadline=None)
 @given(st.lists(st.tuples(st.floats(0, 1), st.booleans()), min_size=1, max_size=300))
 def test_precision_curve_is_always_valid_in_a_configuration(rows):
-    from jeat_graph.config import SensorConfig
+    from jeat_graph.config.schema import SensorConfig
 
     score, correct = np.array([r[0] for r in rows]), np.array([r[1] for r in rows])
     knots = fit_precision(score, correct)

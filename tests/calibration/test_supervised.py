@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from jeat_graph.calibration.supervised import calibrate
-from jeat_graph.config_io import load_config
-from jeat_graph.detections import Detections
-from jeat_graph.errors import DataError
+from jeat_graph.config.reading import load_config
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.errors import DataError
 
 
 @pytest.fixture(scope="module")

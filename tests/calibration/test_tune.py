@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from jeat_graph.calibration.supervised import calibrate
 from jeat_graph.calibration.tune import knobs, plateau, shorten, tracking_score, tune
-from jeat_graph.config_io import load_config
-from jeat_graph.errors import DataError
+from jeat_graph.config.reading import load_config
+from jeat_graph.data.errors import DataError
 
 
 def test_the_middle_of_a_plateau_beats_a_higher_peak():

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from jeat_graph.cli.main import main
-from jeat_graph.pictures import Backdrop, save_pictures, standing_tracks
-from jeat_graph.trajectories import Trajectories
+from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.drawing.run_picture import Backdrop, save_pictures, standing_tracks
 
 SHORT = ["--duration", "3"]
 

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jeat_graph.config import Config, MotionConfig, NoiseConfig, SensorConfig, check
-from jeat_graph.config_io import config_from_dict, config_to_dict, load_config, preset_names, save_config
-from jeat_graph.errors import ConfigError
+from jeat_graph.config.reading import config_from_dict, config_to_dict, load_config, preset_names, save_config
+from jeat_graph.config.schema import Config, MotionConfig, NoiseConfig, SensorConfig, check
+from jeat_graph.data.errors import ConfigError
 
 
 def write(tmp_path, text, name="my.yaml"):

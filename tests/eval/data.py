@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from jeat_graph.detections import Detections
-from jeat_graph.trajectories import GroundTruth, Trajectories
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.trajectories import GroundTruth, Trajectories
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 KITTI = ("0004", "0005", "0008", "0010", "0018")

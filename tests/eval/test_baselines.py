@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jeat_graph.detections import Detections, Scan
-from jeat_graph.errors import ConfigError, UnknownSensorError
+from jeat_graph.data.detections import Detections, Scan
+from jeat_graph.data.errors import ConfigError, UnknownSensorError
 from jeat_graph.eval.baselines import (
     SEARCH_GRIDS,
     baseline_frames,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from jeat_graph.detections import Detections, Scan
-from jeat_graph.errors import ConfigError
+from jeat_graph.data.detections import Detections, Scan
+from jeat_graph.data.errors import ConfigError
 from jeat_graph.eval.baselines import judge_baseline, run_baseline
 from jeat_graph.eval.baselines.frames import BaselineFrame
 from jeat_graph.eval.baselines.norfair import NorfairTracker

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.compare import ComparedTrack, chi2_bounds, compare, lag_name, whiteness
 from jeat_graph.eval.lagged import states_at, with_times
 from jeat_graph.smoothers.rts import filter_track, smooth_rts
 from jeat_graph.smoothers.track_data import TrackData
-from jeat_graph.trajectories import GroundTruth, Trajectories
 
 JERK = 60.0
 NOISE = 2.0

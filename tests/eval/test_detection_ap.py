@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from jeat_graph.detections import Detections
-from jeat_graph.errors import DataError
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.errors import DataError
 from jeat_graph.eval.detection_ap import detection_ap, nearest_scans
 
 from .data import make_truth

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from jeat_graph.errors import DataError
+from jeat_graph.data.errors import DataError
 from jeat_graph.eval.load import restrict_classes
 from jeat_graph.eval.metrics import evaluate
 from jeat_graph.eval.pairing import check_lives

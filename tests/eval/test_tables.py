@@ -8,7 +8,7 @@ import json
 
 import pytest
 
-from jeat_graph.errors import ConfigError
+from jeat_graph.data.errors import ConfigError
 from jeat_graph.eval.tables import Table, to_json
 
 RECORDS = [{"name": "a_b", "MOTA": 98.7654, "FP": 12}, {"name": "c|d", "MOTA": float("nan"), "FP": None}]

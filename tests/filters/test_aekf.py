@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import norm
 
-from jeat_graph.filters.aekf import log_gaussian, predict, predict_size, update_block
-from jeat_graph.filters.coloured import update_centre
+from jeat_graph.filters.coloured_noise import update_centre
+from jeat_graph.filters.kalman import log_gaussian, predict, predict_size, update_block
 
 SMALLEST_NORMAL = np.finfo(np.float64).tiny
 

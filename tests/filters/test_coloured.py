@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from jeat_graph.filters.aekf import predict, update_block
-from jeat_graph.filters.coloured import expected, predict_errors, update_centre, update_with_error
+from jeat_graph.filters.coloured_noise import expected, predict_errors, update_centre, update_with_error
+from jeat_graph.filters.kalman import predict, update_block
 from jeat_graph.filters.motion import process_noise, transition
 
 MEMORY = np.array([0.15, 0.4])

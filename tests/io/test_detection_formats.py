@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from jeat_graph.errors import DataError
+from jeat_graph.data.errors import DataError
 from jeat_graph.io.detections_io import read_detections
 from jeat_graph.io.formats import recognise
 

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jeat_graph.detections import Detections, Scan
-from jeat_graph.errors import DataError
+from jeat_graph.data.detections import Detections, Scan
+from jeat_graph.data.errors import DataError
 from jeat_graph.io.detections_io import read_detections, read_many, write_detections
 
 HEADER = "t,sensor,left,top,width,height,score"

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jeat_graph.errors import ConfigError, DataError
-from jeat_graph.events import EventArray
+from jeat_graph.data.errors import ConfigError, DataError
+from jeat_graph.data.events import EventArray
 from jeat_graph.io import events_dsec_writer
 from jeat_graph.io.events_dsec import EventFile
 from jeat_graph.io.events_dsec_writer import COMPRESSIONS, EventWriter

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from jeat_graph.errors import DataError
+from jeat_graph.data.errors import DataError
 from jeat_graph.io.events_npy import events_of, read_events_npy
 
 ROWS = [(10, 1, 2, 1), (10, 3, 4, -1), (25, 5, 6, 0)]

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from jeat_graph.errors import DataError
+from jeat_graph.data.errors import DataError
 from jeat_graph.io.detections_io import read_detections
 from jeat_graph.io.trajectories_io import COLUMNS, read_trajectories
 from jeat_graph.io.truth_io import read_truth

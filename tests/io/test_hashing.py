@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from jeat_graph.errors import DataError
+from jeat_graph.data.errors import DataError
 from jeat_graph.io.hashing import sha256_of
 
 

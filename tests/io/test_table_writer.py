@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from jeat_graph.errors import DataError
+from jeat_graph.data.errors import DataError
 from jeat_graph.io.table_writer import TableWriter, round_decimals, round_significant, write_columns
 
 

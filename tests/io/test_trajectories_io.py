@@ -13,7 +13,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jeat_graph.errors import DataError
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.trajectories_io import (
     COLUMNS,
     TrajectoryWriter,
@@ -23,7 +24,6 @@ from jeat_graph.io.trajectories_io import (
     write_motchallenge,
     write_trajectories,
 )
-from jeat_graph.trajectories import Trajectories
 
 FORMATS = pytest.mark.parametrize("name", ["t.csv", "t.parquet"])
 

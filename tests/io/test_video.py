@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from jeat_graph.errors import ConfigError, DataError
+from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.io.video import open_frames
 from jeat_graph.io.video_writer import FrameWriter
 

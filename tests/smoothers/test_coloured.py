@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from jeat_graph.errors import DataError
+from jeat_graph.data.errors import DataError
 from jeat_graph.smoothers.engine import ENGINES, make_smoother
 from jeat_graph.smoothers.interpolation import interpolate
 from jeat_graph.smoothers.rts import filter_track, smooth_rts

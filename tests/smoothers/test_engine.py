@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from jeat_graph.errors import ConfigError
+from jeat_graph.data.errors import ConfigError
 from jeat_graph.smoothers.engine import ENGINES, make_smoother
 from jeat_graph.smoothers.rts import smooth_rts
 from jeat_graph.smoothers.track_data import SmoothedTrack

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jeat_graph.errors import DataError
+from jeat_graph.data.errors import DataError
 from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
 from jeat_graph.smoothers.measurements import Measurements
 from jeat_graph.smoothers.rts import filter_track, smooth_rts
@@ -195,7 +195,7 @@ def test_a_measurement_older_than_the_window_is_refused_and_counted(sampled):
 @pytest.mark.parametrize("memory", COLOURS)
 def test_an_indeterminate_system_is_met_by_a_rebuild(sampled, scaled, monkeypatch, memory):
     """Factors that go missing leave a state free, at which GTSAM throws; the track does not notice."""
-    from jeat_graph.smoothers.linear_graph import LinearGraph
+    from jeat_graph.smoothers.gtsam.linear_graph import LinearGraph
 
     track, _ = sampled(8, seconds=4.0, q=1000.0, memory=memory)
     smoother = start(track)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jeat_graph.smoothers.full import smooth_full
+from jeat_graph.smoothers.gtsam.full import smooth_full
 from jeat_graph.smoothers.interpolation import bridge, interpolate
 from jeat_graph.smoothers.rts import smooth_rts
 

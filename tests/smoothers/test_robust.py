@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from jeat_graph.errors import ConfigError
+from jeat_graph.data.errors import ConfigError
 from jeat_graph.smoothers.robust import KERNELS, left_out_distances, robust_weights
 from jeat_graph.smoothers.rts import smooth_rts
 

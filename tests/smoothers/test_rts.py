@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jeat_graph.errors import DataError
+from jeat_graph.data.errors import DataError
 from jeat_graph.smoothers.rts import filter_track, smooth_ends, smooth_rts
 from jeat_graph.smoothers.track_data import TrackData
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jeat_graph.errors import DataError
+from jeat_graph.data.errors import DataError
 from jeat_graph.smoothers.size import smooth_size
 
 PRIOR_MEAN = np.array([[4.0, 0.0], [3.5, 0.1]])

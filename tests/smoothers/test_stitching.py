@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from jeat_graph.smoothers.stitching import (
+from jeat_graph.smoothers.linking import (
     FragmentEnds,
     candidate_pairs,
     foreseeable,

@@ -1,0 +1,108 @@
+"""Read configurations from presets, YAML files and `key=value` overrides, and write them back."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import typing
+from collections.abc import Iterable, Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from jeat_graph.config.schema import Config, SensorConfig
+from jeat_graph.config.section_tree import build, check_keys, plain, read_tree
+from jeat_graph.data.errors import ConfigError
+
+
+def preset_names() -> list[str]:
+    """Names of the presets that come with the package, in alphabetical order."""
+    folder = resources.files("jeat_graph.configs")
+    return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".yaml"))
+
+
+def load_config(name_or_path: str | Path = "default", overrides: Iterable[str] = ()) -> Config:
+    """Load a preset by name, or a YAML file by path, and apply `key=value` overrides.
+
+    A file may name a preset as `base`; what it says itself is laid over it.
+
+    Args:
+        name_or_path: a preset (`default`, `paper`, …) or the path of a YAML file.
+        overrides: texts such as `motion.jerk_per_size=4` or `sensors.rgb.rate_hz=30`.
+
+    Raises:
+        ConfigError: no such preset or file, YAML that cannot be read, unknown key, bad value.
+    """
+    tree = read_tree(str(name_or_path), preset_names(), _preset_text, "preset")
+    for text in overrides:
+        _apply_override(tree, text)
+    return config_from_dict(tree)
+
+
+def config_from_dict(tree: Mapping[str, Any]) -> Config:
+    """Build a configuration from nested mappings, refusing keys that do not exist.
+
+    Raises:
+        ConfigError: names the unknown key and the nearest known one, or the bad value.
+    """
+    sensors = tree.get("sensors")
+    if not isinstance(sensors, Mapping) or not sensors:
+        raise ConfigError("sensors: at least one sensor must be declared")
+    parts: dict[str, Any] = {
+        "sensors": {
+            str(name): build(SensorConfig, value, f"sensors.{name}.") for name, value in sensors.items()
+        }
+    }
+    check_keys(tree, [f.name for f in dataclasses.fields(Config)], "")
+    hints = typing.get_type_hints(Config)
+    for f in dataclasses.fields(Config):
+        if f.name != "sensors" and f.name in tree:
+            parts[f.name] = build(hints[f.name], tree[f.name], f.name + ".")
+    return Config(**parts)
+
+
+def config_to_dict(config: Config) -> dict[str, Any]:
+    """Return the configuration as nested plain mappings, lists and numbers."""
+    tree: dict[str, Any] = plain(dataclasses.asdict(config))
+    return tree
+
+
+def save_config(config: Config, path: str | Path, comment: str = "") -> None:
+    """Write a configuration as YAML that `load_config` reads back to an equal one."""
+    from jeat_graph.io.atomic import open_atomic
+
+    head = "".join(f"# {line}\n" for line in comment.splitlines())
+    with open_atomic(path) as file:
+        file.write(head + yaml.safe_dump(config_to_dict(config), sort_keys=False, allow_unicode=True))
+
+
+def _preset_text(name: str) -> str:
+    return (resources.files("jeat_graph.configs") / f"{name}.yaml").read_text(encoding="utf-8")
+
+
+def _apply_override(tree: dict[str, Any], text: str) -> None:
+    key, equals, raw = text.partition("=")
+    if not equals or not key.strip():
+        raise ConfigError(f"--set {text!r}: must read key=value")
+    try:
+        value = yaml.safe_load(raw)
+    except yaml.YAMLError:
+        raise ConfigError(f"--set {text!r}: the value cannot be read") from None
+    *path, last = key.strip().split(".")
+    node = tree
+    for step in path:
+        child = node.get(step)
+        if child is None and node is tree:
+            child = {}  # a section the preset leaves at its defaults; an unknown one is refused later
+        elif child is None:
+            near = difflib.get_close_matches(step, [str(k) for k in node], 1)
+            raise ConfigError(
+                f"--set {key}: {step!r} is not declared" + (f"; did you mean {near[0]}?" if near else "")
+            )
+        if not isinstance(child, dict):
+            raise ConfigError(f"--set {key}: {step!r} has no keys below it")
+        node[step] = dict(child)
+        node = node[step]
+    node[last] = value

@@ -1,0 +1,153 @@
+"""Frozen dataclasses from YAML: a tree of mappings, read with its bases, checked key by key."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import re
+import types
+import typing
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from jeat_graph.data.errors import ConfigError
+
+
+def read_tree(
+    source: str, names: Sequence[str], text_of: Callable[[str], str], kind: str, seen: tuple[str, ...] = ()
+) -> dict[str, Any]:
+    """Read a named tree, or one from a file, laid over the one it names as `base`.
+
+    Args:
+        source: a name, or the path of a YAML file.
+        names: the names there are.
+        text_of: gives the YAML text of a name.
+        kind: what a name stands for, in messages.
+        seen: sources on the way here; one that comes again is an error.
+
+    Raises:
+        ConfigError: no such name or file, YAML that cannot be read, a base that leads back to itself.
+    """
+    if source in seen:
+        raise ConfigError(f"{source}: `base` leads back to itself")
+    if source in names:
+        text = text_of(source)
+    else:
+        path = Path(source)
+        if not path.is_file():
+            near = difflib.get_close_matches(source, names, 1)
+            hint = f"; did you mean {near[0]}?" if near else f"; {kind}s: {', '.join(names)}"
+            raise ConfigError(f"{source}: no such configuration file or {kind}{hint}")
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise ConfigError(f"{source}: cannot be read: {error}") from None
+    try:
+        tree = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        place = f"{source}:{mark.line + 1}" if mark is not None else source
+        raise ConfigError(f"{place}: not valid YAML: {getattr(error, 'problem', error)}") from None
+    if not isinstance(tree, dict):
+        raise ConfigError(f"{source}: must hold `key: value` lines")
+    base = tree.pop("base", None)
+    if base is None:
+        return tree
+    return merge(read_tree(str(base), names, text_of, kind, (*seen, source)), tree)
+
+
+def merge(low: Mapping[str, Any], high: Mapping[str, Any]) -> dict[str, Any]:
+    """Lay `high` over `low`, mapping by mapping."""
+    out = dict(low)
+    for key, value in high.items():
+        both = isinstance(value, Mapping) and isinstance(out.get(key), Mapping)
+        out[key] = merge(out[key], value) if both else value
+    return out
+
+
+def check_keys(tree: Mapping[str, Any], known: Sequence[str], where: str) -> None:
+    """Refuse keys that do not exist, naming the nearest that does.
+
+    Raises:
+        ConfigError: names the unknown key under the path `where`.
+    """
+    for key in tree:
+        if key not in known:
+            near = difflib.get_close_matches(str(key), known, 1, cutoff=0.4)
+            hint = f"; did you mean {where}{near[0]}?" if near else f"; known: {', '.join(known)}"
+            raise ConfigError(f"unknown key {where}{key}{hint}")
+
+
+def build(kind: type[Any], tree: Any, where: str) -> Any:
+    """Build a dataclass, and those in its fields, from nested mappings.
+
+    Args:
+        kind: the dataclass.
+        tree: mapping of its fields; None for none.
+        where: path of the section, ending in a dot, for messages.
+
+    Raises:
+        ConfigError: unknown key, wrong type or bad value, with its full path.
+    """
+    if tree is None:
+        tree = {}
+    if not isinstance(tree, Mapping):
+        raise ConfigError(f"{where[:-1]}: must hold `key: value` lines, not {tree!r}")
+    hints = typing.get_type_hints(kind)
+    check_keys(tree, list(hints), where)
+    values = {key: convert(hints[key], value, where + str(key)) for key, value in tree.items()}
+    try:
+        return kind(**values)
+    except ConfigError as error:
+        # A section checks itself without knowing where it stands; its own name gives way to the full path.
+        raise ConfigError(where + re.sub(r"^[a-z_]+\.", "", str(error))) from None
+
+
+def convert(hint: Any, value: Any, where: str) -> Any:
+    """Check a value against a field's type; whole numbers serve as numbers, lists as tuples.
+
+    Raises:
+        ConfigError: names the field `where`, and what it takes.
+    """
+    if dataclasses.is_dataclass(hint):
+        return build(typing.cast(type[Any], hint), value, where + ".")
+    origin = typing.get_origin(hint)
+    if origin in (typing.Union, types.UnionType):
+        if value is None:
+            return None
+        return convert(next(a for a in typing.get_args(hint) if a is not type(None)), value, where)
+    if origin is tuple:
+        if not isinstance(value, list | tuple):
+            raise ConfigError(f"{where}: must be a list, not {value!r}")
+        args = typing.get_args(hint)
+        if args[-1] is Ellipsis:
+            return tuple(convert(args[0], v, where) for v in value)
+        if len(args) != len(value):
+            raise ConfigError(f"{where}: must have {len(args)} entries, not {len(value)}")
+        return tuple(convert(a, v, where) for a, v in zip(args, value, strict=True))
+    if hint is float and isinstance(value, str) and re.fullmatch(_EXPONENT, value):
+        value = float(value)  # YAML 1.1 takes 1e-3, without a point and a sign, for text
+    good = (
+        isinstance(value, bool)
+        if hint is bool
+        else isinstance(value, int | float if hint is float else hint) and not isinstance(value, bool)
+    )
+    if not good:
+        raise ConfigError(f"{where}: must be {_WORDS[hint]}, not {value!r}")
+    return float(value) if hint is float else value
+
+
+def plain(value: Any) -> Any:
+    """Turn tuples in nested mappings into lists, the form in which YAML and JSON hold them."""
+    if isinstance(value, dict):
+        return {key: plain(v) for key, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(v) for v in value]
+    return value
+
+
+_EXPONENT = r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+"
+_WORDS = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}

@@ -1,0 +1,284 @@
+"""Detections: what the sensors' detectors reported, scan by scan.
+
+A *scan* is everything one sensor reported at one time. A scan without boxes is data too: it says that
+the sensor looked and found nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.errors import DataError
+
+
+def check_boxes(boxes: npt.ArrayLike, scores: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Convert and check boxes and scores.
+
+    Args:
+        boxes: (M, 4) left, top, width, height in px; all finite, width and height > 0.
+        scores: (M,) detector confidence in [0, 1].
+
+    Returns:
+        The boxes (M, 4) and scores (M,) as contiguous float64 arrays.
+
+    Raises:
+        DataError: wrong shape, a value that is not finite, a size that is not positive, or a score
+            outside [0, 1]. The message names the first row at fault.
+    """
+    try:
+        b = np.ascontiguousarray(boxes, dtype=np.float64)
+        s = np.ascontiguousarray(scores, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise DataError("boxes must have shape (M, 4) and scores shape (M,), all of them numbers") from None
+    if b.size == 0:
+        b = b.reshape(0, 4)
+    if b.ndim != 2 or b.shape[1] != 4:
+        raise DataError(f"boxes must have shape (M, 4), not {b.shape}")
+    if s.shape != (b.shape[0],):
+        raise DataError(f"scores must have shape ({b.shape[0]},), not {s.shape}")
+    bad = find_bad_row(b, s)
+    if bad is not None:
+        row, what = bad
+        raise DataError(f"box {row}: {what}")
+    return b, s
+
+
+def find_bad_row(boxes: FloatArray, scores: FloatArray) -> tuple[int, str] | None:
+    """Find the first row that is not a detection: (row, what is wrong), or None if all are good.
+
+    Args:
+        boxes: (M, 4) left, top, width, height.
+        scores: (M,) confidence.
+    """
+    finite: BoolArray = np.all(np.isfinite(boxes), axis=1)
+    # NaN compares false everywhere, so each test is written for what is good.
+    size = (boxes[:, 2] > 0.0) & (boxes[:, 3] > 0.0)
+    score = (scores >= 0.0) & (scores <= 1.0)
+    good = finite & size & score
+    if good.all():
+        return None
+    row = int(np.argmin(good))
+    left, top, width, height = boxes[row]
+    if not finite[row]:
+        return row, f"left, top, width, height must be finite, got {left}, {top}, {width}, {height}"
+    if not size[row]:
+        return row, f"width and height must be positive, got {width} x {height}"
+    return row, f"score must be in [0, 1], got {scores[row]}"
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """All detections of one sensor at one time.
+
+    Attributes:
+        t: time (s), finite.
+        sensor: name of the sensor.
+        boxes: (M, 4) left, top, width, height (px); M may be 0.
+        scores: (M,) confidence in [0, 1].
+
+    Raises:
+        DataError: if any value is not valid (see `check_boxes`).
+    """
+
+    t: float
+    sensor: str
+    boxes: FloatArray
+    scores: FloatArray
+
+    def __post_init__(self) -> None:
+        t = float(self.t)
+        if not np.isfinite(t):
+            raise DataError(f"the time of a scan must be finite, got {self.t}")
+        boxes, scores = check_boxes(self.boxes, self.scores)
+        object.__setattr__(self, "t", t)
+        object.__setattr__(self, "boxes", boxes)
+        object.__setattr__(self, "scores", scores)
+
+    def __len__(self) -> int:
+        return len(self.scores)
+
+
+@dataclass(frozen=True, eq=False)
+class Detections:
+    """Scans of any number of sensors, in time order, in columns.
+
+    Attributes:
+        sensors: names of the sensors that occur, in alphabetical order.
+        scan_t: (K,) time of each scan (s), not decreasing.
+        scan_sensor: (K,) index into `sensors`.
+        scan_start: (K + 1,) scan k owns the rows `scan_start[k]:scan_start[k + 1]`.
+        boxes: (N, 4) left, top, width, height (px).
+        scores: (N,) confidence in [0, 1].
+        classes: (N,) class names (empty text where unknown), or None if no class is known.
+    """
+
+    sensors: tuple[str, ...]
+    scan_t: FloatArray
+    scan_sensor: IntArray
+    scan_start: IntArray
+    boxes: FloatArray
+    scores: FloatArray
+    classes: npt.NDArray[np.str_] | None = None
+
+    @staticmethod
+    def from_rows(
+        t: npt.ArrayLike,
+        sensor: Sequence[str] | npt.NDArray[np.str_],
+        boxes: npt.ArrayLike,
+        scores: npt.ArrayLike,
+        empty: npt.ArrayLike | None = None,
+        classes: Sequence[str] | npt.NDArray[np.str_] | None = None,
+    ) -> Detections:
+        """Group rows, in any order, into scans. Rows of one scan keep their order.
+
+        Args:
+            t: (R,) time of each row (s).
+            sensor: (R,) sensor name of each row.
+            boxes: (R, 4) left, top, width, height (px); ignored where `empty`.
+            scores: (R,) confidence; ignored where `empty`.
+            empty: (R,) true where the row only says that the scan took place; none by default.
+            classes: (R,) class of each row, optional.
+
+        Raises:
+            DataError: a time or a box that is not valid; the message names the row.
+        """
+        time = np.asarray(t, dtype=np.float64).reshape(-1)
+        names = np.asarray(sensor, dtype=np.str_).reshape(-1)
+        b = np.asarray(boxes, dtype=np.float64).reshape(-1, 4)
+        s = np.asarray(scores, dtype=np.float64).reshape(-1)
+        gap = np.zeros(len(time), dtype=bool) if empty is None else np.asarray(empty, dtype=bool)
+        if not len(time) == len(names) == len(b) == len(s) == len(gap):
+            raise DataError("t, sensor, boxes, scores and empty must have one entry a row")
+        if not np.isfinite(time).all():
+            row = int(np.argmin(np.isfinite(time)))
+            raise DataError(f"row {row}: t must be finite, got {time[row]}")
+        rows = np.flatnonzero(~gap)
+        bad = find_bad_row(b[rows], s[rows])
+        if bad is not None:
+            raise DataError(f"row {rows[bad[0]]}: {bad[1]}")
+
+        sensors, code = np.unique(names, return_inverse=True)
+        code = code.reshape(-1)
+        order = np.lexsort((np.arange(len(time)), code, time))
+        new_scan = np.ones(len(time), dtype=bool)
+        new_scan[1:] = (np.diff(time[order]) != 0) | (np.diff(code[order]) != 0)
+        first = np.flatnonzero(new_scan)
+        scan_of_row = np.cumsum(new_scan) - 1
+        keep = ~gap[order]
+        count = np.bincount(scan_of_row[keep], minlength=len(first))
+        kept = order[keep]
+        return Detections(
+            sensors=tuple(str(name) for name in sensors),
+            scan_t=time[order][first],
+            scan_sensor=code[order][first].astype(np.int64),
+            scan_start=np.concatenate(([0], np.cumsum(count))).astype(np.int64),
+            boxes=np.ascontiguousarray(b[kept]),
+            scores=np.ascontiguousarray(s[kept]),
+            classes=None if classes is None else np.asarray(classes, dtype=np.str_)[kept],
+        )
+
+    @staticmethod
+    def from_scans(scans: Iterable[Scan]) -> Detections:
+        """Collect scans, in any order; scans of one sensor at one time become one."""
+        items = list(scans)
+        rows = [max(len(scan), 1) for scan in items]
+        blank = np.full((1, 4), np.nan)
+        return Detections.from_rows(
+            t=np.repeat([scan.t for scan in items], rows),
+            sensor=np.repeat([scan.sensor for scan in items], rows) if items else [],
+            boxes=np.concatenate([scan.boxes if len(scan) else blank for scan in items] or [blank[:0]]),
+            scores=np.concatenate(
+                [scan.scores if len(scan) else blank[:, 0] for scan in items] or [blank[:0, 0]]
+            ),
+            empty=np.repeat([len(scan) == 0 for scan in items], rows),
+        )
+
+    @staticmethod
+    def concatenate(parts: Sequence[Detections]) -> Detections:
+        """Merge several recordings of one scene (say, one file a sensor) into one.
+
+        Rows of one sensor at one time that stand in several parts become one scan.
+        """
+        columns = [part.to_rows() for part in parts]
+        has_class = any(part.classes is not None for part in parts)
+        return Detections.from_rows(
+            t=np.concatenate([column[0] for column in columns]),
+            sensor=np.concatenate([column[1] for column in columns]),
+            boxes=np.concatenate([column[2] for column in columns]),
+            scores=np.concatenate([column[3] for column in columns]),
+            empty=np.concatenate([column[4] for column in columns]),
+            classes=np.concatenate([column[5] for column in columns]) if has_class else None,
+        )
+
+    def to_rows(
+        self,
+    ) -> tuple[
+        FloatArray, npt.NDArray[np.str_], FloatArray, FloatArray, npt.NDArray[np.bool_], npt.NDArray[np.str_]
+    ]:
+        """Flatten to one row a detection, and one row for each empty scan.
+
+        Returns:
+            t (R,), sensor (R,), boxes (R, 4) and scores (R,) (NaN in rows of empty scans),
+            empty (R,), classes (R,) (empty text where unknown).
+        """
+        count = np.diff(self.scan_start)
+        rows = np.maximum(count, 1)
+        scan = np.repeat(np.arange(len(count)), rows)
+        empty = count[scan] == 0
+        boxes = np.full((len(scan), 4), np.nan)
+        scores = np.full(len(scan), np.nan)
+        boxes[~empty] = self.boxes
+        scores[~empty] = self.scores
+        names = np.asarray(self.sensors, dtype=np.str_)
+        classes = np.zeros(len(scan), dtype=np.str_ if self.classes is None else self.classes.dtype)
+        if self.classes is not None:
+            classes[~empty] = self.classes
+        sensor = names[self.scan_sensor[scan]] if len(scan) else np.zeros(0, dtype=np.str_)
+        return self.scan_t[scan], sensor, boxes, scores, empty, classes
+
+    @property
+    def num_scans(self) -> int:
+        """Number of scans K, the empty ones included."""
+        return len(self.scan_t)
+
+    def __len__(self) -> int:
+        return len(self.scores)
+
+    def scan(self, k: int) -> Scan:
+        """Return scan `k` (0 <= k < num_scans)."""
+        rows = slice(int(self.scan_start[k]), int(self.scan_start[k + 1]))
+        return _trusted_scan(
+            float(self.scan_t[k]), self.sensors[self.scan_sensor[k]], self.boxes[rows], self.scores[rows]
+        )
+
+    def scans(self) -> Iterator[Scan]:
+        """Iterate over the scans in time order."""
+        return (self.scan(k) for k in range(self.num_scans))
+
+    def batches(self) -> Iterator[list[Scan]]:
+        """Iterate over groups of scans of different sensors at one and the same time."""
+        starts = np.flatnonzero(np.diff(self.scan_t, prepend=-np.inf) != 0)
+        ends = np.append(starts, self.num_scans)[1:]
+        for start, end in zip(starts, ends, strict=True):
+            yield [self.scan(k) for k in range(start, end)]
+
+    def select(self, sensors: Iterable[str]) -> Detections:
+        """Keep the scans of some sensors only; names that do not occur are passed over."""
+        wanted = set(sensors)
+        keep = np.array([name in wanted for name in self.sensors], dtype=bool)
+        return Detections.from_scans(self.scan(k) for k in range(self.num_scans) if keep[self.scan_sensor[k]])
+
+
+def _trusted_scan(t: float, sensor: str, boxes: FloatArray, scores: FloatArray) -> Scan:
+    """Make a scan of arrays that were checked already, without checking them again."""
+    scan = object.__new__(Scan)
+    object.__setattr__(scan, "t", t)
+    object.__setattr__(scan, "sensor", sensor)
+    object.__setattr__(scan, "boxes", boxes)
+    object.__setattr__(scan, "scores", scores)
+    return scan

@@ -1,0 +1,133 @@
+"""Trajectory tables: estimates of many tracks at many times, in columns.
+
+The causal table of a run, its smoothed table and the tracks of one moment are all of this type.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.errors import DataError
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectories:
+    """Estimates of tracks, one row a track and time.
+
+    Attributes:
+        t: (N,) time (s).
+        track_id: (N,) identity, never reused within a run.
+        boxes: (N, 4) left, top, width, height (px), clipped to the picture if its size is known.
+        existence: (N,) probability that the track is a vehicle.
+        mean: (N, 6) x, y, vx, vy, ax, ay of the box centre (px, px/s, px/s²), not clipped.
+        var: (N, 6) variances of `mean`.
+        used: (N,) bit k is set where a detection of `sensors[k]` was used at `t`.
+        sensors: names of the sensors, at most 63.
+
+    Raises:
+        DataError: if the columns differ in length or shape.
+    """
+
+    t: FloatArray
+    track_id: IntArray
+    boxes: FloatArray
+    existence: FloatArray
+    mean: FloatArray
+    var: FloatArray
+    used: IntArray
+    sensors: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        n = len(self.t)
+        for name, width in (("boxes", 4), ("mean", 6), ("var", 6)):
+            if getattr(self, name).shape != (n, width):
+                raise DataError(f"{name} must have shape ({n}, {width}), not {getattr(self, name).shape}")
+        for name in ("track_id", "existence", "used"):
+            if getattr(self, name).shape != (n,):
+                raise DataError(f"{name} must have shape ({n},), not {getattr(self, name).shape}")
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    @staticmethod
+    def empty(sensors: tuple[str, ...] = ()) -> Trajectories:
+        """Return a table without rows."""
+        return Trajectories(
+            t=np.zeros(0),
+            track_id=np.zeros(0, dtype=np.int64),
+            boxes=np.zeros((0, 4)),
+            existence=np.zeros(0),
+            mean=np.zeros((0, 6)),
+            var=np.zeros((0, 6)),
+            used=np.zeros(0, dtype=np.int64),
+            sensors=sensors,
+        )
+
+    @staticmethod
+    def concatenate(parts: Sequence[Trajectories]) -> Trajectories:
+        """Stack tables that name the same sensors, in the order given."""
+        if not parts:
+            return Trajectories.empty()
+        columns = [f.name for f in fields(Trajectories) if f.name != "sensors"]
+        if any(part.sensors != parts[0].sensors for part in parts):
+            raise DataError("tables of different sensors cannot be joined")
+        stacked = {name: np.concatenate([getattr(part, name) for part in parts]) for name in columns}
+        return Trajectories(**stacked, sensors=parts[0].sensors)
+
+    def take(self, rows: npt.ArrayLike) -> Trajectories:
+        """Return the rows chosen by an index or mask array."""
+        index = np.asarray(rows)
+        columns = {f.name: getattr(self, f.name)[index] for f in fields(self) if f.name != "sensors"}
+        return Trajectories(**columns, sensors=self.sensors)
+
+    def sensor_text(self) -> list[str]:
+        """Names of the sensors used in each row, joined by `|`; empty where the track coasted."""
+        text = {
+            int(mask): "|".join(name for k, name in enumerate(self.sensors) if mask >> k & 1)
+            for mask in np.unique(self.used)
+        }
+        return [text[int(mask)] for mask in self.used]
+
+
+@dataclass(frozen=True, eq=False)
+class GroundTruth:
+    """True boxes of objects, one row an object and time.
+
+    Attributes:
+        t: (N,) time (s).
+        object_id: (N,) identity.
+        boxes: (N, 4) left, top, width, height (px).
+        motion: (N, 6) x, y, vx, vy, ax, ay of the box centre (px, px/s, px/s²), or None if not known.
+        ignore: (N,) true where the object is neither to be found nor to be held against a track.
+        classes: (N,) class names, or None.
+        distance: (N,) distance from the camera (m), or None.
+        frames: (T,) all the times at which truth was recorded, also those without any object.
+    """
+
+    t: FloatArray
+    object_id: IntArray
+    boxes: FloatArray
+    motion: FloatArray | None
+    ignore: npt.NDArray[np.bool_]
+    classes: npt.NDArray[np.str_] | None = None
+    distance: FloatArray | None = None
+    frames: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        n = len(self.t)
+        if self.boxes.shape != (n, 4) or self.object_id.shape != (n,) or self.ignore.shape != (n,):
+            raise DataError("the columns of the truth differ in length")
+        if self.motion is not None and self.motion.shape != (n, 6):
+            raise DataError(f"motion must have shape ({n}, 6), not {self.motion.shape}")
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def frame_times(self) -> FloatArray:
+        """Times at which the truth was recorded, ascending (T,)."""
+        return np.unique(self.t) if self.frames is None else self.frames

@@ -1,0 +1,194 @@
+"""Pictures of a comparison: trajectories with their 2σ bands, error over time, and what delay buys."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.eval.compare import Comparison, Samples, lag_name
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# Colours that stay apart for colour-blind readers and in print.
+FILTER, LAGGED, FULL, TRUTH = "#d1662b", "#7a6fb0", "#1f6f8b", "#222222"
+MOST_TRACKS = 3
+BIN_S = 0.5
+LONGEST_LINE_S = 0.25
+_STYLE: Any = {
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e6e6e6",
+    "grid.linewidth": 0.8,
+    "axes.axisbelow": True,
+    "axes.edgecolor": "#888888",
+    "font.size": 10,
+    "axes.titlesize": 11,
+    "axes.titlelocation": "left",
+    "legend.frameon": False,
+    "figure.dpi": 110,
+    "svg.hashsalt": "jeat-graph",  # ids inside the SVG are then the same each time
+}
+
+
+def write_plots(comparison: Comparison, folder: str | Path) -> list[Path]:
+    """Draw all pictures that a comparison with truth allows, each as PNG and SVG.
+
+    Args:
+        comparison: with samples; without them nothing is drawn.
+        folder: where to write.
+
+    Returns:
+        The files written.
+    """
+    if comparison.samples is None or not len(comparison.samples):
+        return []
+    import matplotlib as mpl
+    from matplotlib import pyplot as plt
+
+    from jeat_graph.io.atomic import atomic_path
+
+    samples, written = comparison.samples, []
+    backend = mpl.get_backend()
+    plt.switch_backend("agg")
+    try:
+        with mpl.rc_context(_STYLE):
+            figures = {
+                "trajectories": _trajectories(plt, samples),
+                "error-over-time": _error_over_time(plt, samples, comparison.lags_s),
+                "rmse-against-lag": _rmse_against_lag(plt, comparison),
+            }
+            for name, figure in figures.items():
+                for suffix in (".png", ".svg"):
+                    path = Path(folder) / (name + suffix)
+                    with atomic_path(path) as temporary:
+                        figure.savefig(temporary, metadata={"Date": None} if suffix == ".svg" else None)
+                    written.append(path)
+                plt.close(figure)
+    finally:
+        plt.switch_backend(backend)
+    return written
+
+
+def _trajectories(plt: Any, samples: Samples) -> Figure:
+    """Position error and velocity of the best-observed tracks, with 2σ bands."""
+    ids, count = np.unique(samples.track_id, return_counts=True)
+    chosen = ids[np.argsort(-count, kind="stable")[:MOST_TRACKS]]
+    figure, axes = plt.subplots(
+        len(chosen), 2, figsize=(11.0, 2.7 * len(chosen) + 0.8), squeeze=False, layout="constrained"
+    )
+    for row, identity in enumerate(chosen.tolist()):
+        mine = np.flatnonzero(samples.track_id == identity)
+        mine = mine[np.argsort(samples.t[mine])]
+        for column, (order, title, unit) in enumerate(
+            ((0, "error of x", "px"), (1, "velocity in x", "px/s"))
+        ):
+            axis = axes[row, column]
+            # Where the track was not matched for a while, a line would claim what nobody measured.
+            t = np.where(np.diff(samples.t[mine], append=np.inf) > LONGEST_LINE_S, np.nan, samples.t[mine])
+            true = samples.truth[mine, 0, order]
+            for name, colour, alpha in (("filter", FILTER, 0.20), ("full", FULL, 0.35)):
+                value = samples.states[name].mean[mine, 0, order] - (true if order == 0 else 0.0)
+                sigma = np.sqrt(samples.states[name].cov[mine, 0, order, order])
+                axis.fill_between(
+                    t, value - 2.0 * sigma, value + 2.0 * sigma, color=colour, alpha=alpha, lw=0
+                )
+                label = {"filter": "filter ± 2σ", "full": "smoothed ± 2σ"}[name]
+                axis.plot(t, value, color=colour, lw=1.4, label=label)
+            axis.plot(t, 0.0 * t if order == 0 else true, color=TRUTH, lw=1.0, ls="--", label="truth")
+            _limit(axis, samples, mine, order)
+            axis.set_title(f"track {identity}: {title}")
+            axis.set_ylabel(unit)
+    for axis in axes[-1]:
+        axis.set_xlabel("time (s)")
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return figure  # type: ignore[no-any-return]
+
+
+def _limit(axis: Any, samples: Samples, mine: Any, order: int) -> None:
+    """Keep the wide band of a track's first moments from flattening all the rest."""
+    true = samples.truth[mine, 0, order]
+    values = [samples.states[name].mean[mine, 0, order] for name in ("filter", "full")]
+    if order == 0:
+        values = [value - true for value in values]
+    else:
+        values.append(true)
+    spread = np.sqrt(samples.states["filter"].cov[mine, 0, order, order])
+    low, high = np.quantile(np.concatenate(values), [0.01, 0.99])
+    margin = 3.0 * float(np.median(spread))
+    axis.set_ylim(low - margin, high + margin)
+
+
+def _error_over_time(plt: Any, samples: Samples, lags_s: Sequence[float]) -> Figure:
+    """RMSE of all tracks in bins of time, for the filter, one lag between, and the whole track."""
+    middle = min((lag for lag in lags_s if lag > 0.0), key=lambda lag: abs(lag - 0.2), default=0.0)
+    shown = [("filter", "filter", FILTER), ("full", "whole track", FULL)]
+    if middle > 0.0:
+        shown.insert(1, (lag_name(middle), f"lag {middle:g} s", LAGGED))
+    start = samples.t.min()
+    bin_ = ((samples.t - start) / BIN_S).astype(int)
+    centre = start + (np.arange(bin_.max() + 1) + 0.5) * BIN_S
+    figure, axes = plt.subplots(2, 1, figsize=(9.0, 5.6), sharex=True, layout="constrained")
+    for axis, order, title, unit in (
+        (axes[0], 0, "Position", "px"),
+        (axes[1], 1, "Velocity", "px/s"),
+    ):
+        for name, label, colour in shown:
+            error = samples.states[name].mean[:, :, order] - samples.truth[:, :, order]
+            axis.plot(centre, _binned_rmse(error, bin_), color=colour, lw=1.8, label=label)
+        axis.set_ylim(bottom=0.0)
+        axis.set_title(f"{title}: RMSE of all tracks ({unit}), in bins of {BIN_S:g} s")
+    axes[1].set_xlabel("time (s)")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return figure  # type: ignore[no-any-return]
+
+
+def _binned_rmse(error: FloatArray, bin_: Any) -> FloatArray:
+    count = np.bincount(bin_)
+    total = np.bincount(bin_, weights=(error**2).sum(axis=1))
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.sqrt(total / np.where(count > 0, count, np.nan)))
+
+
+def _rmse_against_lag(plt: Any, comparison: Comparison) -> Figure:
+    """How much accuracy how much delay buys."""
+    curve, errors = comparison.values["lag_curve"], comparison.values["errors"]
+    lags = np.array([one["lag_s"] for one in curve])
+    figure, axes = plt.subplots(1, 3, figsize=(12.0, 3.8), layout="constrained")
+    for axis, part, unit in zip(
+        axes, ("position", "velocity", "acceleration"), ("px", "px/s", "px/s²"), strict=True
+    ):
+        value = np.array([one[f"{part}_rmse"] for one in curve])
+        full, base = errors["full"][f"{part}_rmse"], errors["filter"][f"{part}_rmse"]
+        axis.plot(lags, value, color=FULL, lw=2.0, marker="o", ms=4)
+        axis.axhline(full, color=TRUTH, lw=1.0, ls="--")
+        below = f"whole track {full:.3g} {unit} ({100.0 * full / base:.0f} % of the filter's)"
+        axis.annotate(
+            below,
+            (1.0, full),
+            xycoords=("axes fraction", "data"),
+            xytext=(0, -5),
+            textcoords="offset points",
+            ha="right",
+            va="top",
+            fontsize=9,
+        )
+        axis.annotate(
+            f"filter {base:.3g} {unit}",
+            (lags[0], value[0]),
+            xytext=(8, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=9,
+            color=FILTER,
+        )
+        axis.plot(lags[:1], value[:1], color=FILTER, marker="o", ms=6, ls="")
+        axis.set_ylim(0.0, 1.12 * max(value.max(), base))
+        axis.set_title(f"{part.capitalize()} RMSE ({unit})")
+        axis.set_xlabel("lag (s)")
+    return figure  # type: ignore[no-any-return]

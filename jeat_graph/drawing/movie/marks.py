@@ -1,0 +1,166 @@
+"""Boxes, ellipses, trails and names drawn into a picture."""
+
+from __future__ import annotations
+
+import colorsys
+
+import numpy as np
+
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.drawing.movie.moments import Marks
+from jeat_graph.io.video import RgbImage
+
+Colour = tuple[int, int, int]
+
+TRUTH: Colour = (235, 235, 235)
+IGNORED: Colour = (120, 120, 120)
+INK: Colour = (240, 240, 240)
+SHADE: Colour = (0, 0, 0)
+SIGMAS = 2.0
+_GOLDEN = 0.61803398875
+_SHIFT = 4  # OpenCV takes coordinates in sixteenths of a pixel
+_DASH_PX, _GAP_PX = 6.0, 4.0
+_FAR_PX = 30_000.0  # beyond it OpenCV's fixed-point coordinates would overflow
+
+
+def track_colour(track_id: int, lightness: float = 0.62) -> Colour:
+    """Colour of a track; neighbouring identities get hues far apart (multiples of the golden ratio)."""
+    red, green, blue = colorsys.hls_to_rgb(track_id * _GOLDEN % 1.0, lightness, 0.85)
+    return round(255 * red), round(255 * green), round(255 * blue)
+
+
+class Canvas:
+    """A picture that is drawn into, in coordinates of the tracks.
+
+    Args:
+        image: (H, W, 3) uint8, drawn into.
+        scale: pixels of the picture for one of the tracks' coordinates, x and y.
+    """
+
+    def __init__(self, image: RgbImage, scale: tuple[float, float]) -> None:
+        self.image = image
+        self._scale = np.array(scale)
+        self.unit = max(float(image.shape[0]) / 720.0, 0.75)  # thickness of lines and size of text go with it
+
+    def solid_box(self, box: FloatArray, colour: Colour, thickness: float) -> None:
+        """Draw a box (4,) with an unbroken line on a dark rim."""
+        corners = self._corners(box)
+        for tint, width in ((SHADE, self._width(thickness) + 2), (colour, self._width(thickness))):
+            self._polyline(corners, tint, width, closed=True)
+
+    def thin_box(self, box: FloatArray, colour: Colour) -> None:
+        """Draw a box (4,) with the thinnest line."""
+        self._polyline(self._corners(box), colour, 1, closed=True)
+
+    def dashed_box(self, box: FloatArray, colour: Colour, thickness: float) -> None:
+        """Draw a box (4,) with a broken line."""
+        import cv2
+
+        pieces = dashes(self._corners(box), _DASH_PX * self.unit, _GAP_PX * self.unit)
+        if len(pieces):
+            lines = list(self._fixed(pieces.reshape(-1, 2)).reshape(-1, 2, 2))
+            cv2.polylines(
+                self.image, lines, False, colour, self._width(thickness), lineType=cv2.LINE_AA, shift=_SHIFT
+            )
+
+    def ellipse(self, centre: FloatArray, sigma: FloatArray, colour: Colour) -> None:
+        """Draw the ellipse of 2σ around a centre (2,) px; nothing where σ (2,) is not known."""
+        import cv2
+
+        if not np.isfinite(sigma).all():
+            return
+        middle = self._fixed(np.asarray(centre)[None] * self._scale)[0]
+        axes = self._fixed(np.maximum(SIGMAS * sigma * self._scale, 0.5)[None])[0]
+        place = (int(middle[0]), int(middle[1]))
+        size = (int(axes[0]), int(axes[1]))
+        cv2.ellipse(self.image, place, size, 0, 0, 360, colour, 1, lineType=cv2.LINE_AA, shift=_SHIFT)
+
+    def trail(self, points: FloatArray, colour: Colour, thickness: float) -> None:
+        """Draw a line through points (L, 2)."""
+        if len(points) > 1:
+            self._polyline(np.asarray(points) * self._scale, colour, self._width(thickness), closed=False)
+
+    def name(self, box: FloatArray, text: str, colour: Colour) -> None:
+        """Write a text above a box (4,), within the picture."""
+        left, top = np.asarray(box)[:2] * self._scale
+        self.text(text, (float(left), float(top) - 4.0 * self.unit), colour, 0.42)
+
+    def text(self, text: str, place: tuple[float, float], colour: Colour, size: float) -> None:
+        """Write a text with its lower left corner at a pixel, moved so that it is within the picture."""
+        import cv2
+
+        font, scale = cv2.FONT_HERSHEY_SIMPLEX, size * self.unit
+        (width, height), _ = cv2.getTextSize(text, font, scale, 1)
+        x = int(min(max(place[0], 2.0), max(self.image.shape[1] - width - 2.0, 2.0)))
+        y = int(min(max(place[1], height + 2.0), self.image.shape[0] - 3.0))
+        stroke = max(round(self.unit), 1)
+        for tint, thickness in ((SHADE, stroke + 2), (colour, stroke)):
+            cv2.putText(self.image, text, (x, y), font, scale, tint, thickness, cv2.LINE_AA)
+
+    def _width(self, thickness: float) -> int:
+        return max(round(thickness * self.unit), 1)
+
+    def _corners(self, box: FloatArray) -> FloatArray:
+        left, top, width, height = box
+        x, y = (left, left + width), (top, top + height)
+        points = np.array([[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]])
+        return np.asarray(points * self._scale)
+
+    def _fixed(self, points: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.int32]]:
+        near = np.clip(points, -_FAR_PX, _FAR_PX)
+        return np.rint(near * (1 << _SHIFT)).astype(np.int32)
+
+    def _polyline(self, points: FloatArray, colour: Colour, width: int, *, closed: bool) -> None:
+        import cv2
+
+        cv2.polylines(
+            self.image, [self._fixed(points)], closed, colour, width, lineType=cv2.LINE_AA, shift=_SHIFT
+        )
+
+
+def dashes(corners: FloatArray, dash: float, gap: float) -> FloatArray:
+    """Cut the outline of a polygon into dashes; each side begins and ends with one.
+
+    Args:
+        corners: (C, 2) px.
+        dash: wanted length of a dash (px).
+        gap: wanted length of the gaps (px).
+
+    Returns:
+        (D, 2, 2) first and last point of each dash.
+    """
+    out = []
+    for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        length = float(np.hypot(*(end - start)))
+        count = min(max(int((length + gap) // (dash + gap)), 1), 1000)
+        # What is left over goes into the gaps.
+        begin = np.arange(count) * ((length - dash) / max(count - 1, 1))
+        if length <= dash or count == 1:
+            out.append(np.array([[start, end]]))
+            continue
+        direction = (end - start) / length
+        first = start + begin[:, None] * direction
+        out.append(np.stack([first, first + dash * direction], axis=1))
+    return np.concatenate(out)
+
+
+def draw_causal(canvas: Canvas, marks: Marks, *, trails: bool) -> None:
+    """Draw causal tracks: unbroken boxes, ellipses, trails, names."""
+    for k, track_id in enumerate(marks.track_id.tolist()):
+        colour = track_colour(track_id)
+        if trails:
+            canvas.trail(marks.trails[k], colour, 1.5)
+        canvas.ellipse(marks.centre[k], marks.sigma[k], colour)
+        canvas.solid_box(marks.boxes[k], colour, 1.6)
+        canvas.name(marks.boxes[k], str(track_id), colour)
+
+
+def draw_smoothed(canvas: Canvas, marks: Marks, *, names: bool) -> None:
+    """Draw smoothed tracks: broken, paler boxes, ellipses, trails, and names unless others wrote them."""
+    for k, track_id in enumerate(marks.track_id.tolist()):
+        colour = track_colour(track_id, 0.82)
+        canvas.trail(marks.trails[k], colour, 1.5)
+        canvas.ellipse(marks.centre[k], marks.sigma[k], colour)
+        canvas.dashed_box(marks.boxes[k], colour, 1.6)
+        if names:
+            canvas.name(marks.boxes[k], str(track_id), colour)

@@ -1,0 +1,92 @@
+"""A run as pictures: backgrounds side by side, each with everything drawn on it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.drawing.movie.backgrounds import Background
+from jeat_graph.drawing.movie.marks import IGNORED, INK, TRUTH, Canvas, draw_causal, draw_smoothed
+from jeat_graph.drawing.movie.moments import TracksAt, TruthAt
+from jeat_graph.io.video import RgbImage
+
+_MARGIN_PX = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class Show:
+    """All that is needed to draw a run at given times.
+
+    Attributes:
+        times: (T,) ascending (s).
+        backgrounds: at least one, drawn from left to right.
+        field_px: width and height of the picture that the tracks' coordinates belong to.
+        panel_px: width and height at which each background is drawn, both even.
+        causal: tracks, or None.
+        smoothed: tracks, or None.
+        truth: true boxes, or None.
+    """
+
+    times: FloatArray
+    backgrounds: Sequence[Background]
+    field_px: tuple[float, float]
+    panel_px: tuple[int, int]
+    causal: TracksAt | None = None
+    smoothed: TracksAt | None = None
+    truth: TruthAt | None = None
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height of the whole."""
+        return self.panel_px[0] * len(self.backgrounds), self.panel_px[1]
+
+    def picture(self, k: int) -> RgbImage:
+        """Draw time number `k`: (H, W, 3) uint8."""
+        panels = [self._panel(background, k) for background in self.backgrounds]
+        return panels[0] if len(panels) == 1 else np.concatenate(panels, axis=1)
+
+    def _panel(self, background: Background, k: int) -> RgbImage:
+        import cv2
+
+        t = float(self.times[k])
+        image = background.image(t)
+        if image.shape[1::-1] == self.panel_px:
+            image = image.copy()
+        else:
+            smaller = image.shape[1] > self.panel_px[0]
+            how = cv2.INTER_AREA if smaller else cv2.INTER_LINEAR
+            image = np.asarray(cv2.resize(image, self.panel_px, interpolation=how), dtype=np.uint8)
+        scale = (self.panel_px[0] / self.field_px[0], self.panel_px[1] / self.field_px[1])
+        canvas = Canvas(image, scale)
+        self._draw(canvas, k, t)
+        edge = _MARGIN_PX * canvas.unit
+        canvas.text(f"t = {t:.3f} s", (edge, image.shape[0] - edge), INK, 0.6)
+        if background.name:
+            canvas.text(background.name, (edge, 2.6 * edge), INK, 0.6)
+        return image
+
+    def _draw(self, canvas: Canvas, k: int, t: float) -> None:
+        if self.causal is not None:
+            draw_causal(canvas, self.causal.at(k), trails=self.smoothed is None)
+        if self.smoothed is not None:
+            draw_smoothed(canvas, self.smoothed.at(k), names=self.causal is None)
+        if self.truth is not None:
+            wanted, ignored = self.truth.at(t)
+            for boxes, colour in ((ignored, IGNORED), (wanted, TRUTH)):
+                for box in boxes:
+                    canvas.thin_box(box, colour)
+        used = [
+            text
+            for shown, text in (
+                (self.causal, "solid: causal"),
+                (self.smoothed, "dashed: smoothed"),
+                (self.truth, "thin: truth"),
+            )
+            if shown is not None
+        ]
+        if used:
+            height, width = canvas.image.shape[:2]
+            canvas.text(", ".join(used), (width, height - _MARGIN_PX * canvas.unit), INK, 0.42)

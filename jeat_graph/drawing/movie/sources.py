@@ -1,0 +1,236 @@
+"""What the user gave: a run, a segment of a simulation, frames, events, truth; made into a `Show`."""
+
+from __future__ import annotations
+
+import json
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.trajectories import GroundTruth, Trajectories
+from jeat_graph.drawing.movie.backgrounds import Background, Events, Frames, Plain
+from jeat_graph.drawing.movie.moments import TracksAt, TruthAt
+from jeat_graph.drawing.movie.show import Show
+from jeat_graph.simulation.dataset.layout import EVENTS, SEGMENTS, TRUTH
+
+DEFAULT_RATE_HZ = 25.0
+_SAME_SHAPE = 0.01
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is to be drawn; None is "as it comes".
+
+    Attributes:
+        run: run directory, table of tracks, or folder of a simulated segment.
+        frames: video or folder of frames.
+        events: file of events.
+        truth: true boxes.
+        only: `causal` or `smoothed`, to leave the other out.
+        rate_hz: pictures per second; by default one for each frame, or 25.
+        size_px: width and height of each picture.
+        start_s: first time (s).
+        end_s: last time (s).
+        at_s: one time only (s).
+        frame_rate_hz: frames per second of files and folders that count frames.
+        window_s: how long events are shown (s); by default the time of a picture.
+    """
+
+    run: Path
+    frames: Path | None = None
+    events: Path | None = None
+    truth: Path | None = None
+    only: str | None = None
+    rate_hz: float | None = None
+    size_px: tuple[int, int] | None = None
+    start_s: float | None = None
+    end_s: float | None = None
+    at_s: float | None = None
+    frame_rate_hz: float | None = None
+    window_s: float | None = None
+
+
+def open_show(wanted: Wanted, stack: ExitStack) -> tuple[Show, float, list[str]]:
+    """Open everything that is to be drawn.
+
+    Args:
+        wanted: what the user asked for.
+        stack: closes the files that are read from.
+
+    Returns:
+        What to draw, pictures per second, and warnings of one line each.
+
+    Raises:
+        DataError: a file is missing or not valid, or nothing lies in the asked times.
+    """
+    from jeat_graph.io.events_dsec import EventFile
+    from jeat_graph.io.truth_io import read_truth
+    from jeat_graph.io.video import open_frames
+    from jeat_graph.runs.directory import read_instants
+
+    tables, wanted = _resolve(wanted)
+    frames = events = None
+    if wanted.frames is not None:
+        frames = Frames(stack.enter_context(open_frames(wanted.frames, wanted.frame_rate_hz)))
+    truth = None
+    if wanted.truth is not None:
+        truth = read_truth(wanted.truth, rate_hz=wanted.frame_rate_hz)
+    rate_hz = wanted.rate_hz or _rate_of(frames) or DEFAULT_RATE_HZ
+    if wanted.events is not None:
+        window_s = wanted.window_s if wanted.window_s is not None else 1.0 / rate_hz
+        events = Events(stack.enter_context(EventFile(wanted.events)), window_s)
+    times = _times(wanted, _span(frames, events, tables, truth), frames, rate_hz)
+
+    backgrounds: list[Background] = [one for one in (frames, events) if one is not None]
+    configured = _configured_size(wanted.run)
+    field, warnings = _field(configured, backgrounds, tables, truth)
+    if not backgrounds:
+        backgrounds.append(Plain((round(field[0]), round(field[1]))))
+    panel = wanted.size_px or (round(field[0]), round(field[1]))
+    instants = read_instants(wanted.run) if wanted.run.is_dir() else None
+    shown = {kind: TracksAt(table, times, kind, instants) for kind, table in tables.items()}
+    show = Show(
+        times=times,
+        backgrounds=backgrounds,
+        field_px=field,
+        panel_px=(panel[0] + panel[0] % 2, panel[1] + panel[1] % 2),  # MPEG-4 wants even sizes
+        causal=shown.get("causal"),
+        smoothed=shown.get("smoothed"),
+        truth=None if truth is None else TruthAt(truth),
+    )
+    return show, rate_hz, warnings
+
+
+def _resolve(wanted: Wanted) -> tuple[dict[str, Trajectories], Wanted]:
+    """Read the tracks; a segment without tracks stands for its own frames, events and truth."""
+    from dataclasses import replace
+
+    from jeat_graph.eval.load import tables_of
+    from jeat_graph.io.trajectories_io import read_trajectories
+
+    run = wanted.run
+    if run.is_dir() and (run / SEGMENTS).is_dir():
+        raise DataError(f"is a whole data set; give one of its segments, such as {SEGMENTS}/000000", run)
+    own = run.is_dir() and (run / TRUTH).is_file() and ((run / EVENTS).is_file() or _has_frames(run))
+    if own and not any(run.glob("causal.*")) and not any(run.glob("smoothed.*")):
+        if wanted.only is not None:
+            raise DataError(f"is a simulated segment and has no tracks, so --only {wanted.only} fails", run)
+        return {}, replace(
+            wanted,
+            frames=wanted.frames or (run if _has_frames(run) else None),
+            events=wanted.events or (run / EVENTS if (run / EVENTS).is_file() else None),
+            truth=wanted.truth or run / TRUTH,
+        )
+    files = tables_of(run)
+    if wanted.only is not None and wanted.only not in files:
+        raise DataError(f"has no {wanted.only} table", run)
+    kinds = [wanted.only] if wanted.only is not None else list(files)
+    return {kind: read_trajectories(files[kind], rate_hz=wanted.frame_rate_hz) for kind in kinds}, wanted
+
+
+def _has_frames(folder: Path) -> bool:
+    from jeat_graph.io.video import VIDEO_FILES
+
+    return any((folder / name).exists() for name in VIDEO_FILES.values())
+
+
+def _rate_of(frames: Frames | None) -> float | None:
+    if frames is None or len(frames.times_s) < 2:
+        return None
+    return 1.0 / float(np.median(np.diff(frames.times_s)))
+
+
+def _span(
+    frames: Frames | None,
+    events: Events | None,
+    tables: dict[str, Trajectories],
+    truth: GroundTruth | None,
+) -> tuple[float, float]:
+    """First and last time (s): of the frames, else of the events, else of tracks and truth."""
+    if frames is not None:
+        return float(frames.times_s[0]), float(frames.times_s[-1])
+    if events is not None:
+        return events.span_s
+    times = [table.t for table in tables.values()]
+    if truth is not None:
+        times.append(truth.frame_times())
+    joined = np.concatenate(times)
+    if not len(joined):
+        raise DataError("there is nothing to draw: no tracks, frames, events or truth")
+    return float(joined.min()), float(joined.max())
+
+
+def _times(wanted: Wanted, span: tuple[float, float], frames: Frames | None, rate_hz: float) -> FloatArray:
+    """Times of the pictures (T,), at least one (s)."""
+    if wanted.at_s is not None:
+        return np.array([wanted.at_s])
+    start = span[0] if wanted.start_s is None else wanted.start_s
+    end = span[1] if wanted.end_s is None else wanted.end_s
+    if end < start:
+        raise DataError(f"--end {end:g} s lies before the start, {start:g} s")
+    if frames is not None and wanted.rate_hz is None:
+        times = frames.times_s[(frames.times_s >= start - 1e-6) & (frames.times_s <= end + 1e-6)]
+    else:
+        times = start + np.arange(int((end - start) * rate_hz + 1e-6) + 1) / rate_hz
+        times = times[(times >= span[0] - 1e-6) & (times <= span[1] + 1e-6)]
+    if not len(times):
+        raise DataError(
+            f"there is nothing to draw from {start:g} s to {end:g} s; the recording lasts from {span[0]:g} s "
+            f"to {span[1]:g} s"
+        )
+    return np.asarray(times, dtype=np.float64)
+
+
+def _configured_size(run: Path) -> tuple[float, float] | None:
+    """Picture that a run was configured for, None if it does not say."""
+    path = run / "run.json"
+    if not path.is_file():
+        return None
+    try:
+        image = json.loads(path.read_text(encoding="utf-8"))["config"]["image"]
+        return float(image["width"]), float(image["height"])
+    except (OSError, ValueError, KeyError, TypeError):
+        raise DataError("is not the record of a run", path) from None
+
+
+def _field(
+    configured: tuple[float, float] | None,
+    backgrounds: list[Background],
+    tables: dict[str, Trajectories],
+    truth: GroundTruth | None,
+) -> tuple[tuple[float, float], list[str]]:
+    """Size of the picture that the boxes' coordinates belong to, and warnings."""
+    if not backgrounds:
+        return configured or _reach(tables, truth), []
+    first = (float(backgrounds[0].size_px[0]), float(backgrounds[0].size_px[1]))
+    warnings = [
+        f"{one.name}: {one.size_px[0]} x {one.size_px[1]} px are stretched to the shape of the frames"
+        for one in backgrounds[1:]
+        if not _alike(one.size_px, first)
+    ]
+    if configured is None:
+        return first, warnings
+    if _alike(configured, first):
+        return configured, warnings  # a smaller or larger copy of the same picture
+    warnings.append(
+        f"the run was made for pictures of {configured[0]:g} x {configured[1]:g} px, but these have "
+        f"{first[0]:g} x {first[1]:g}; boxes are drawn in pixels of the latter"
+    )
+    return first, warnings
+
+
+def _alike(a: tuple[float, float], b: tuple[float, float]) -> bool:
+    return abs(a[0] * b[1] / (a[1] * b[0]) - 1.0) < _SAME_SHAPE
+
+
+def _reach(tables: dict[str, Trajectories], truth: GroundTruth | None) -> tuple[float, float]:
+    boxes = [table.boxes for table in tables.values()] + ([] if truth is None else [truth.boxes])
+    ends = np.concatenate([one[:, :2] + one[:, 2:] for one in boxes])
+    if not len(ends):
+        return 1280.0, 720.0
+    width, height = np.ceil(np.clip(ends.max(axis=0), 16.0, 8192.0)).tolist()
+    return float(width), float(height)

@@ -1,0 +1,1 @@
+"""Run directories: tracking a recording into one, and reading what it recorded."""

@@ -1,0 +1,131 @@
+"""The directory of a run: its files appear together when all of them are complete, `run.json` last."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.errors import DataError
+
+RUN_JSON = "run.json"
+SCANS = "scans.csv"
+DIAGNOSTICS = "diagnostics.csv"
+TABLES = ("causal", "smoothed")
+SUFFIXES = {"csv": ".csv", "parquet": ".parquet", "motchallenge": ".mot.txt", "kitti": ".kitti.txt"}
+_TABLE_FILES = (kind + suffix for kind in TABLES for suffix in SUFFIXES.values())
+RUN_FILES = (*_TABLE_FILES, SCANS, DIAGNOSTICS, RUN_JSON)
+
+
+class RunDirectory:
+    """A context manager that puts the files of a run into a folder, all of them or none.
+
+    Write each file to `path(name)`. They stand in a hidden folder until the `with` block ends without an
+    error, and then take their places. Files of an earlier run in the same folder are replaced, and removed
+    where this run has none of that name; any other file there is left alone. After an error the folder is as
+    it was before.
+
+    Args:
+        folder: where the run shall stand; made if it is missing.
+        inputs: files the run is made from, which it must not replace.
+
+    Raises:
+        DataError: `folder` is a file, or an input is one of the files that would be replaced.
+    """
+
+    def __init__(self, folder: str | Path, inputs: Iterable[str | Path] = ()) -> None:
+        self.folder = Path(folder)
+        if self.folder.exists() and not self.folder.is_dir():
+            raise DataError("is a file; --out must be a folder", folder)
+        own = {(self.folder / name).resolve() for name in RUN_FILES}
+        for path in inputs:
+            if Path(path).resolve() in own:
+                raise DataError(
+                    f"would be replaced by a file of the run; choose another --out than {folder}", path
+                )
+        self._staging: Path | None = None
+        self._made: list[Path] = []
+
+    def path(self, name: str) -> Path:
+        """Where to write the file that shall be called `name`."""
+        if self._staging is None:
+            raise RuntimeError("the run directory must be entered with `with` before files are written")
+        return self._staging / name
+
+    def __enter__(self) -> Self:
+        missing = self.folder
+        while not missing.exists():
+            self._made.append(missing)
+            missing = missing.parent
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self._staging = Path(tempfile.mkdtemp(dir=self.folder, prefix=".unfinished-"))
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        assert self._staging is not None
+        try:
+            if error is None:
+                self._publish(self._staging)
+        finally:
+            shutil.rmtree(self._staging, ignore_errors=True)
+            if error is not None:
+                self._remove_made()
+
+    def _publish(self, staging: Path) -> None:
+        # Without run.json the folder holds no run: it goes first and comes last.
+        (self.folder / RUN_JSON).unlink(missing_ok=True)
+        new = sorted((p.name for p in staging.iterdir()), key=lambda name: (name == RUN_JSON, name))
+        for name in RUN_FILES:
+            if name not in new:
+                (self.folder / name).unlink(missing_ok=True)
+        for name in new:
+            (staging / name).replace(self.folder / name)
+
+    def _remove_made(self) -> None:
+        for folder in self._made:
+            try:
+                folder.rmdir()
+            except OSError:
+                return
+
+
+def write_scans(detections: Detections, path: str | Path) -> None:
+    """Write the scans that a run was made from: `t, sensor, detections`, one row a scan, empty ones included.
+
+    A trajectory table cannot say that there was no track at a time; this list says that the tracker ran then.
+    """
+    from jeat_graph.io.table_writer import write_columns
+
+    names = np.asarray(detections.sensors, dtype=np.str_)
+    columns: dict[str, Any] = {
+        "t": detections.scan_t + 0.0,
+        "sensor": names[detections.scan_sensor] if detections.num_scans else np.zeros(0, dtype=np.str_),
+        "detections": np.diff(detections.scan_start),
+    }
+    write_columns(columns, path)
+
+
+def read_instants(folder: str | Path) -> FloatArray | None:
+    """Times at which the tracker of a run gave output, ascending (I,), or None if the run does not say.
+
+    Raises:
+        DataError: `scans.csv` is there but not valid.
+    """
+    from jeat_graph.io.tables import read_table
+
+    path = Path(folder) / SCANS
+    if not path.is_file():
+        return None
+    return np.unique(read_table(path, ("t", "sensor", "detections")).number("t"))

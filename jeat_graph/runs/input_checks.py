@@ -1,0 +1,97 @@
+"""Do these detections fit this configuration? What does not is said before the tracker starts."""
+
+from __future__ import annotations
+
+import difflib
+
+import numpy as np
+
+from jeat_graph.config.reading import load_config, preset_names
+from jeat_graph.config.schema import Config
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.errors import DataError, UnknownSensorError
+
+# A box at the edge may have its centre outside; a recording of another picture size has far more of them.
+MOST_OUTSIDE = 0.05
+# A clock that differs this much from the declared one is worth a word: rates decide about clutter and misses.
+RATE_FACTOR = 1.5
+
+
+def check_detections(detections: Detections, config: Config, names: str = "the detections") -> list[str]:
+    """Check a recording against the configuration that shall track it.
+
+    Args:
+        detections: the recording.
+        config: the configuration.
+        names: what the user calls the recording, for messages.
+
+    Returns:
+        Warnings, each one line.
+
+    Raises:
+        DataError: there is no scan at all, or the boxes do not belong to a picture of this size.
+        UnknownSensorError: a sensor that the configuration does not declare.
+    """
+    if not detections.num_scans:
+        raise DataError(
+            "no scans: a recording needs at least one row, with t and sensor if nothing was found", names
+        )
+    _check_sensors(detections, config, names)
+    warnings = [] if len(detections) else [f"{names}: all scans are empty, so there is nothing to track"]
+    return warnings + _check_picture(detections, config, names) + _check_rates(detections, config, names)
+
+
+def _check_sensors(detections: Detections, config: Config, names: str) -> None:
+    unknown = [name for name in detections.sensors if name not in config.sensors]
+    if not unknown:
+        return
+    name = unknown[0]
+    near = difflib.get_close_matches(name, config.sensor_names, 1)
+    rate = _rate_hz(detections, detections.sensors.index(name))
+    fitting = [p for p in preset_names() if set(detections.sensors) <= load_config(p).sensors.keys()]
+    setting = "rate_hz: 20" if rate is None else f"rate_hz: {rate:.3g}"
+    raise UnknownSensorError(
+        f"{names}: sensor {name!r} is not declared (declared: {', '.join(config.sensor_names)})"
+        + (f"; did you mean {near[0]!r}?" if near else ";")
+        + (f" use --config {fitting[0]}," if fitting else "")
+        + f" declare it with --set 'sensors.{name}={{{setting}}}' or in a file from `jeat-graph calibrate`,"
+        + " or rename it with NAME=path"
+    )
+
+
+def _check_picture(detections: Detections, config: Config, names: str) -> list[str]:
+    boxes, width, height = detections.boxes, config.image.width, config.image.height
+    if not len(boxes):
+        return []
+    centre = boxes[:, :2] + 0.5 * boxes[:, 2:]
+    outside = (centre < 0.0).any(axis=1) | (centre[:, 0] > width) | (centre[:, 1] > height)
+    count, total = int(outside.sum()), len(boxes)
+    if not count:
+        return []
+    low, high = centre.min(axis=0), centre.max(axis=0)
+    found = (
+        f"{names}: {count} of {total} box centres lie outside the picture of {width:g} x {height:g} px "
+        f"(they reach from {low[0]:.0f}, {low[1]:.0f} to {high[0]:.0f}, {high[1]:.0f})"
+    )
+    if count > MOST_OUTSIDE * total:
+        raise DataError(f"{found}; give the picture's size: --set image.width=W --set image.height=H")
+    return [found]
+
+
+def _check_rates(detections: Detections, config: Config, names: str) -> list[str]:
+    warnings = []
+    for k, name in enumerate(detections.sensors):
+        rate, declared = _rate_hz(detections, k), config.sensors[name].rate_hz
+        if rate is not None and not 1.0 / RATE_FACTOR < rate / declared < RATE_FACTOR:
+            warnings.append(
+                f"{names}: sensor {name!r} scans at {rate:.3g} Hz, but is declared with {declared:g} Hz "
+                f"(--set sensors.{name}.rate_hz={rate:.3g})"
+            )
+    return warnings
+
+
+def _rate_hz(detections: Detections, sensor: int) -> float | None:
+    """Rate (Hz) by the median step of a sensor's clock, or None if it has fewer than three scans."""
+    times = detections.scan_t[detections.scan_sensor == sensor]
+    step = float(np.median(np.diff(times))) if len(times) > 2 else 0.0
+    return 1.0 / step if step > 0.0 else None

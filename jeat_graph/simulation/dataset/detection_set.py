@@ -1,0 +1,80 @@
+"""The folder of a simulation at the level of detections: tables, truth, settings, manifest."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from jeat_graph.io.atomic import open_atomic
+from jeat_graph.io.detections_io import write_detections
+from jeat_graph.io.hashing import sha256_of
+from jeat_graph.io.truth_io import write_truth
+from jeat_graph.simulation.dataset.layout import CAMERA, DETECTIONS, MANIFEST, SCENARIO, TRUTH
+from jeat_graph.simulation.scenario import Scenario, scenario_to_yaml
+from jeat_graph.simulation.simulate import record
+from jeat_graph.version import __version__
+
+STEPS = 3  # calls of `on_step`
+
+
+def write_detection_set(
+    scenario: Scenario, name: str, out: Path, seed: int, duration_s: float, on_step: Callable[[], object]
+) -> dict[str, Any]:
+    """Simulate a recording and write `detections.csv`, `gt.csv`, the settings and the manifest.
+
+    Args:
+        scenario: the settings.
+        name: what the user calls them.
+        out: the folder; files of these names in it are replaced.
+        seed: not negative.
+        duration_s: length (s).
+        on_step: called three times on the way.
+
+    Returns:
+        The manifest.
+
+    Raises:
+        ConfigError: a seed or a duration that is not valid.
+    """
+    recording = record(scenario, seed, duration_s)
+    on_step()
+    detections, truth = recording.detections, recording.truth
+    write_detections(detections, out / DETECTIONS)
+    on_step()
+    write_truth(truth, out / TRUTH)
+    on_step()
+    with open_atomic(out / SCENARIO) as file:
+        file.write(scenario_to_yaml(scenario))
+    with open_atomic(out / CAMERA) as file:
+        file.write(yaml.safe_dump(recording.scene.camera.to_dict(), sort_keys=False))
+    boxes = np.diff(detections.scan_start)
+    sensors = {
+        sensor: {
+            "scans": int((detections.scan_sensor == k).sum()),
+            "detections": int(boxes[detections.scan_sensor == k].sum()),
+        }
+        for k, sensor in enumerate(detections.sensors)
+    }
+    manifest: dict[str, Any] = {
+        "version": __version__,
+        "scenario": name,
+        "seed": seed,
+        "duration_s": duration_s,
+        "density": scenario.traffic.density,
+        "sensors": sensors,
+        "truth": {
+            "frames": len(truth.frame_times()),
+            "boxes": len(truth),
+            "ignored": int(truth.ignore.sum()),
+            "objects": len(np.unique(truth.object_id)),
+        },
+        "sha256": {file: sha256_of(out / file) for file in (DETECTIONS, TRUTH, SCENARIO, CAMERA)},
+    }
+    with open_atomic(out / MANIFEST) as file:
+        file.write(json.dumps(manifest, indent=2) + "\n")
+    return manifest

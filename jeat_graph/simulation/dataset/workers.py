@@ -1,0 +1,130 @@
+"""Make segments in processes of their own; the result does not depend on how many there are."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from jeat_graph.data.errors import JeatGraphError
+from jeat_graph.simulation.dataset.protocol import Protocol
+from jeat_graph.simulation.dataset.segment_writer import write_segment
+from jeat_graph.simulation.segment import SegmentSource
+
+SourceFactory = Callable[[], SegmentSource]
+_POLL_S = 0.3  # between looks at how many frames are done
+
+
+@dataclass
+class _Worker:
+    """What a process keeps from one segment to the next."""
+
+    source: SegmentSource
+    root: Path
+    protocol: Protocol
+    counter: Any
+
+
+_worker: _Worker | None = None
+
+
+def available_cores() -> int:
+    """Return the number of cores that this process may use."""
+    affinity = getattr(os, "sched_getaffinity", None)
+    return len(affinity(0)) if affinity is not None else (os.cpu_count() or 1)
+
+
+def make_segments(
+    factory: SourceFactory,
+    root: Path,
+    protocol: Protocol,
+    indices: Sequence[int],
+    workers: int,
+    on_frames: Callable[[int], object],
+) -> Generator[dict[str, Any], None, None]:
+    """Make segments and yield the entry of each as it is done, in any order.
+
+    Args:
+        factory: makes the source; with several workers it must be picklable, as a `functools.partial` of a
+            class is.
+        root: the data set's folder.
+        protocol: how to store.
+        indices: which segments.
+        workers: number of processes; 1 works in this one.
+        on_frames: called with the number of frames done since the last call.
+
+    Raises:
+        JeatGraphError: what the source or the writer raised, or that a process has died.
+    """
+    if workers <= 1 or len(indices) <= 1:
+        source = factory()
+        for index in indices:
+            yield write_segment(source, index, root, protocol, lambda: on_frames(1))
+        return
+    yield from _in_processes(factory, root, protocol, indices, workers, on_frames)
+
+
+def _in_processes(
+    factory: SourceFactory,
+    root: Path,
+    protocol: Protocol,
+    indices: Sequence[int],
+    workers: int,
+    on_frames: Callable[[int], object],
+) -> Generator[dict[str, Any], None, None]:
+    context = multiprocessing.get_context("spawn")  # fork would copy the threads' locks of other libraries
+    counter = context.Value("q", 0)
+    threads = max(1, available_cores() // workers)
+    before = set(multiprocessing.active_children())
+    pool = ProcessPoolExecutor(
+        min(workers, len(indices)), context, _begin, (factory, root, protocol, counter, threads)
+    )
+    shown = 0
+    try:
+        pending: set[Future[dict[str, Any]]] = {pool.submit(_make, index) for index in indices}
+        while pending:
+            done, pending = wait(pending, _POLL_S, FIRST_COMPLETED)
+            frames = int(counter.value)
+            on_frames(frames - shown)
+            shown = frames
+            for future in done:
+                yield future.result()
+        pool.shutdown()
+    except BrokenProcessPool:
+        raise JeatGraphError(
+            "a worker process died (out of memory?); what is done is kept, run again to go on"
+        ) from None
+    finally:
+        # After an error, an interrupt, or when the caller has seen enough: do not wait for running segments.
+        pool.shutdown(wait=False, cancel_futures=True)
+        for child in set(multiprocessing.active_children()) - before:
+            child.terminate()
+            child.join()
+
+
+def _begin(factory: SourceFactory, root: Path, protocol: Protocol, counter: Any, threads: int) -> None:
+    global _worker
+    import cv2
+    import numba
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process deals with Ctrl-C
+    cv2.setNumThreads(threads)
+    numba.set_num_threads(min(threads, numba.get_num_threads()))
+    _worker = _Worker(factory(), root, protocol, counter)
+
+
+def _make(index: int) -> dict[str, Any]:
+    assert _worker is not None
+    worker = _worker
+
+    def count() -> None:
+        with worker.counter.get_lock():
+            worker.counter.value += 1
+
+    return write_segment(worker.source, index, worker.root, worker.protocol, count)

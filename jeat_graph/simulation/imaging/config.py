@@ -1,0 +1,158 @@
+"""Settings of the renderer and of the two cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from jeat_graph.config.schema import check, choice, number
+from jeat_graph.config.section_tree import build
+
+
+@dataclass(frozen=True)
+class RenderConfig:
+    """The renderer. Radiance is photometric: luminance in cd/m², in three linear channels."""
+
+    width: int = number(640, "px", "width of the pictures; the scenario's camera is scaled to it", 16)
+    height: int = number(384, "px", "height of the pictures; what the camera's aspect exceeds is cut", 16)
+    sun_altitude_deg: float = number(35.0, "deg", "altitude of the sun where there is daylight", 1.0, 90.0)
+    sun_azimuth_deg: float = number(-60.0, "deg", "azimuth, 0 along the road, 90 right", -180.0, 180.0)
+    sun_share: float = number(0.7, "1", "share of the daylight that comes straight from the sun", 0.0, 0.95)
+    headlights_below_lux: float = number(1000.0, "lux", "vehicles have their lights on below this daylight")
+    headlight_candela: float = number(
+        14000.0, "cd", "a vehicle's low beams together, at their peak (UN R112: 2 × 5,100 cd or more at 75R)"
+    )
+    headlight_stray: float = number(
+        0.02, "1", "share of the peak that low beams send above the cut-off (UN R112, zone III: 0.04 at most)"
+    )
+    taillight_candela: float = number(8.0, "cd", "one tail light (UN R7: 4 to 17 cd)")
+    brakelight_candela: float = number(80.0, "cd", "one brake light (UN R7: 60 to 260 cd)")
+    parking_candela: float = number(1.5, "cd", "one light of a parked vehicle, steady")
+    glare_share: float = number(
+        0.08, "1", "share of a light's image that the lens scatters around it (glow)", 0.0, 0.9
+    )
+    glare_radius: float = number(
+        0.06, "1", "how far glow reaches, as a fraction of the picture's width", 0.005, 0.2
+    )
+    max_step_px: float = number(
+        1.0, "px", "no vehicle moves farther than this from one rendering to the next", 0.1, 8.0
+    )
+    far_m: float = number(230.0, "m", "vehicles beyond are not drawn", 30.0)
+
+    def __post_init__(self) -> None:
+        check(self, "render.")
+
+
+@dataclass(frozen=True)
+class RGBConfig:
+    """The RGB camera: linear sensor with the photon-transfer noise of EMVA 1288, then gamma and 8 bit."""
+
+    exposure_s: float = number(0.0, "s", "exposure time; 0: automatic, by the light of the static scene")
+    max_exposure_s: float = number(0.02, "s", "longest automatic exposure", open_low=True)
+    min_exposure_s: float = number(0.0001, "s", "shortest automatic exposure", open_low=True)
+    gain: float = number(0.0, "1", "gain before the converter, 1: full well at white; 0: automatic")
+    max_gain: float = number(16.0, "1", "largest automatic gain", 1.0)
+    target: float = number(0.18, "1", "linear level that automatic exposure gives the road", 0.01, 1.0)
+    responsivity: float = number(
+        10000.0,
+        "e-/(cd/m²·s)",
+        "electrons per luminance and time: 5 µm pixel, f/2, 50 % quantum efficiency",
+        open_low=True,
+    )
+    full_well_e: float = number(12000.0, "e-", "full well of a pixel", open_low=True)
+    read_noise_e: float = number(3.0, "e-", "temporal dark noise (EMVA 1288), std")
+    gamma: float = number(2.2, "1", "exponent of the picture's encoding", 1.0, 4.0)
+    readout_s: float = number(
+        0.005, "s", "time from the first to the last row's exposure (rolling shutter); 0: global shutter"
+    )
+    rate_hz: float = number(20.0, "Hz", "nominal rate of frames", open_low=True)
+    jitter_s: float = number(0.0005, "s", "std of a frame's time about the nominal one")
+
+    def __post_init__(self) -> None:
+        check(self, "rgb.")
+
+
+@dataclass(frozen=True)
+class EventCameraConfig:
+    """The event camera: `physical`, a pixel circuit on linear radiance, or `carla`, as that simulator does.
+
+    Physical pixels follow ESIM (Rebecq, Gehrig, Scaramuzza 2018) with the noise sources of v2e (Hu, Liu,
+    Delbruck 2021).
+    """
+
+    mode: str = choice("physical", ("physical", "carla"), "which model")
+    threshold_on: float = number(0.2, "ln", "contrast threshold of brighter events (v2e: 0.2)", 0.01)
+    threshold_off: float = number(0.2, "ln", "contrast threshold of darker events (v2e: 0.2)", 0.01)
+    threshold_sigma: float = number(
+        0.03, "ln", "fixed mismatch of thresholds between pixels, std (v2e: 0.03)"
+    )
+    refractory_s: float = number(0.0005, "s", "dead time of a pixel after an event (v2e: 0.5 ms)")
+    cutoff_max_hz: float = number(
+        300.0, "Hz", "photoreceptor's bandwidth in good light; 0: unlimited (v2e: up to 300 Hz)"
+    )
+    cutoff_hz_per_cd_m2: float = number(
+        30.0,
+        "Hz/(cd/m²)",
+        "bandwidth per luminance where light limits it (Graça et al. 2023: proportional below about 10 lux)",
+    )
+    cutoff_min_hz: float = number(10.0, "Hz", "bandwidth in the dark, which the dark current keeps up", 0.1)
+    dark_luminance: float = number(
+        0.005, "cd/m²", "luminance whose photocurrent equals the dark current (Nozaki, Delbruck 2017)"
+    )
+    leak_rate_hz: float = number(0.1, "Hz", "rate of leak events, always brighter (v2e `noisy`: 0.1)")
+    shot_rate_hz: float = number(1.0, "Hz", "rate of shot-noise events of a pixel in the dark (v2e: 1 to 10)")
+    shot_bright_factor: float = number(0.25, "1", "factor on that rate in bright light (v2e: 0.25)", 0.0, 1.0)
+    shot_half_luminance: float = number(
+        0.3, "cd/m²", "luminance at which half of the fall is done", open_low=True
+    )
+    rate_spread_decades: float = number(
+        0.1, "decades", "spread of leak and shot rates over pixels, std (v2e `noise_rate_cov_decades`: 0.1)"
+    )
+
+    def __post_init__(self) -> None:
+        check(self, "evt.")
+
+
+@dataclass(frozen=True)
+class CarlaEventConfig:
+    """CARLA's DVS sensor (its attributes by their names there) and the picture that it looks at."""
+
+    tick_hz: float = number(100.0, "Hz", "simulation ticks; the sensor compares their pictures", 10.0)
+    positive_threshold: float = number(0.3, "ln", "C+ (CARLA: 0.3)", 0.01)
+    negative_threshold: float = number(0.3, "ln", "C- (CARLA: 0.3)", 0.01)
+    sigma_threshold: float = number(
+        0.1, "ln", "σ of the thresholds, redrawn for each pixel and tick (CARLA: 0; paper: above 0, then 0)"
+    )
+    refractory_period_ns: int = number(0, "ns", "dead time (CARLA: 0; paper: 10,000)", 0)
+    log_eps: float = number(0.001, "1", "ε in ln(ε + I/255) (CARLA: 0.001; paper: 0.01)", open_low=True)
+    render_noise_dn: float = number(
+        0.5,
+        "DN",
+        "std of the picture's flicker before it is rounded to 8 bit: film grain, and temporal anti-aliasing, "
+        "which moves the sampling points each tick",
+    )
+
+    def __post_init__(self) -> None:
+        check(self, "carla.")
+
+
+@dataclass(frozen=True)
+class ImagingConfig:
+    """Renderer and cameras."""
+
+    render: RenderConfig = field(default_factory=RenderConfig)
+    rgb: RGBConfig = field(default_factory=RGBConfig)
+    evt: EventCameraConfig = field(default_factory=EventCameraConfig)
+    carla: CarlaEventConfig = field(default_factory=CarlaEventConfig)
+
+
+def load_imaging(tree: Mapping[str, Any] | None = None) -> ImagingConfig:
+    """Build the settings from nested mappings; what is not named keeps its default.
+
+    Raises:
+        ConfigError: unknown key (with the nearest known one) or bad value.
+    """
+    out = build(ImagingConfig, tree, "imaging.")
+    assert isinstance(out, ImagingConfig)
+    return out

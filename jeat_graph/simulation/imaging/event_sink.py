@@ -1,0 +1,83 @@
+"""Where the pixels' kernels put their events."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from jeat_graph.data.arrays import BoolArray, IntArray
+from jeat_graph.data.events import EventArray
+
+
+class Sink(NamedTuple):
+    """Room for events; `used` (1,) of it is taken.
+
+    Attributes:
+        used: (1,) events so far.
+        t_us: (C,) µs.
+        pixel: (C,) row · width + column.
+        polarity: (C,) 1 brighter, 0 darker.
+        by_motion: (C,) cause.
+    """
+
+    used: IntArray
+    t_us: IntArray
+    pixel: IntArray
+    polarity: npt.NDArray[np.uint8]
+    by_motion: BoolArray
+
+
+@njit(cache=True)
+def make_sink(capacity: int) -> Sink:
+    """Make room for `capacity` events."""
+    return Sink(
+        np.zeros(1, dtype=np.int64),
+        np.empty(capacity, dtype=np.int64),
+        np.empty(capacity, dtype=np.int64),
+        np.empty(capacity, dtype=np.uint8),
+        np.empty(capacity, dtype=np.bool_),
+    )
+
+
+@njit(cache=True)
+def with_room(sink: Sink, more: int) -> Sink:
+    """Return the sink, or a larger copy if it has no room for `more` events."""
+    used = sink.used[0]
+    if used + more <= len(sink.t_us):
+        return sink
+    out = make_sink(2 * (used + more))
+    out.used[0] = used
+    out.t_us[:used] = sink.t_us[:used]
+    out.pixel[:used] = sink.pixel[:used]
+    out.polarity[:used] = sink.polarity[:used]
+    out.by_motion[:used] = sink.by_motion[:used]
+    return out
+
+
+@njit(cache=True)
+def put(sink: Sink, t_us: float, pixel: int, brighter: bool, by_motion: bool) -> None:
+    """Add an event at the nearest microsecond; whoever calls has made room."""
+    n = sink.used[0]
+    if n < len(sink.t_us):
+        sink.t_us[n] = int(np.floor(t_us + 0.5))
+        sink.pixel[n] = pixel
+        sink.polarity[n] = 1 if brighter else 0
+        sink.by_motion[n] = by_motion
+        sink.used[0] = n + 1
+
+
+def to_events(sink: Sink, width: int) -> EventArray:
+    """Sort the events by time; those of one time keep the order of their pixels' tiles."""
+    used = int(sink.used[0])
+    order = np.argsort(sink.t_us[:used], kind="stable")
+    pixel = sink.pixel[:used][order]
+    return EventArray(
+        t_us=sink.t_us[:used][order],
+        x=(pixel % width).astype(np.uint16),
+        y=(pixel // width).astype(np.uint16),
+        polarity=sink.polarity[:used][order],
+        by_motion=sink.by_motion[:used][order],
+    )

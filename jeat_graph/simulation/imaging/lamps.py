@@ -1,0 +1,119 @@
+"""The vehicles' own lamps in the picture, and what hides them."""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.simulation.imaging.lighting import LAMP_HEIGHT_M, Lights, beam_candela
+from jeat_graph.simulation.imaging.moments import Look, Moments
+from jeat_graph.simulation.imaging.optics import Optics
+
+LAMPS = 4  # two in front, two behind
+_LAMP_SIGMA_M = 0.07
+_TAIL_ABOVE_M = 0.2  # how much higher than headlights tail lamps stand
+_LAMP_ACROSS = 0.39  # of the width, from the middle
+_HIDDEN_M = 0.2  # way through another vehicle after which a lamp is hidden
+
+
+@njit(cache=True)
+def light_lamps(
+    out: Moments, j: int, v: int, brake: float, look: Look, lens: FloatArray, eye: FloatArray,
+    rotation: FloatArray, lights: Lights, candela: FloatArray,
+) -> None:  # fmt: skip
+    """Place the lamps of a vehicle in the picture: two in front, two behind."""
+    x, y, sin, cos = out.pose[j, v]
+    length, wide = look.size[v, 0], look.size[v, 1]
+    fx, fy, cx, cy = lens[0], lens[1], lens[2], lens[3]
+    for k in range(LAMPS):
+        ahead = 1.0 if k < 2 else -1.0
+        across = _LAMP_ACROSS * wide * (1.0 if k & 1 else -1.0)
+        along = 0.5 * length * ahead
+        z = LAMP_HEIGHT_M + (0.0 if k < 2 else _TAIL_ABOVE_M)
+        dx, dy = x + along * sin + across * cos - eye[0], y + along * cos - across * sin - eye[1]
+        dz = z - eye[2]
+        Z = rotation[2, 0] * dx + rotation[2, 1] * dy + rotation[2, 2] * dz
+        # From the lamp to the eye, along the vehicle's axes.
+        forward = -(dx * sin + dy * cos) * ahead
+        if Z < 2.0 or forward <= 0.0:
+            continue
+        distance2 = dx * dx + dy * dy + dz * dz
+        facing = forward / math.sqrt(distance2)
+        if look.parked[v]:
+            power = candela[2] * facing
+        elif k < 2:
+            right = -(dx * cos - dy * sin)
+            power = 0.5 * beam_candela(forward, right, -dz, lights.beam_candela, lights.beam_stray)
+        else:
+            power = (candela[0] + (candela[1] - candela[0]) * brake) * facing
+        at = out.lamp[j, v, k]
+        at[0] = fx * (rotation[0, 0] * dx + rotation[0, 1] * dy + rotation[0, 2] * dz) / Z + cx
+        at[1] = fy * (rotation[1, 0] * dx + rotation[1, 1] * dy + rotation[1, 2] * dz) / Z + cy
+        at[2] = Z
+        at[3] = math.sqrt((_LAMP_SIGMA_M * fx / Z) ** 2 + 0.25)
+        red = k >= 2
+        for c in range(3):
+            tint = lights.tail_tint[c] if red else lights.head_tint[c]
+            out.lamp_flux[j, v, k, c] = out.fade[j, v] * power * fx * fy / distance2 * tint
+
+
+@njit(cache=True)
+def hide_lamps(out: Moments, j: int, look: Look, eye: FloatArray, optics: Optics, every: IntArray) -> None:
+    """Dim the lamps that stand behind other vehicles, and say how far their glow reaches."""
+    for v in range(len(look.kind)):
+        if (j + 1) % every[v] != 0:
+            continue
+        box = out.touch[j, v, 1]
+        box[0], box[1], box[2], box[3] = 1e9, 1e9, -1e9, -1e9
+        for k in range(LAMPS):
+            if out.lamp_flux[j, v, k, 0] <= 0.0:
+                continue
+            x, y, sin, cos = out.pose[j, v]
+            along = (0.5 if k < 2 else -0.5) * look.size[v, 0]
+            across = _LAMP_ACROSS * look.size[v, 1] * (1.0 if k & 1 else -1.0)
+            px, py = x + along * sin + across * cos, y + along * cos - across * sin
+            pz = LAMP_HEIGHT_M + (0.0 if k < 2 else _TAIL_ABOVE_M)
+            free = 1.0
+            for w in range(len(look.kind)):
+                if w != v and out.fade[j, w] > 0.0:
+                    # Nearer vehicles only; a ray that passes through one is dimmed by its way inside it.
+                    if out.pose[j, w, 1] > py + 10.0:
+                        continue
+                    inside = chord(px, py, pz, eye[0], eye[1], eye[2], out.pose[j, w], look.size[w])
+                    free *= 1.0 - min(1.0, inside / _HIDDEN_M)
+            out.lamp_seen[j, v, k] = free
+            if free > 0.0:
+                u, vv = out.lamp[j, v, k, 0], out.lamp[j, v, k, 1]
+                reach = max(optics.reach_px, 4.0 * out.lamp[j, v, k, 3])
+                box[0], box[1] = min(box[0], u - reach), min(box[1], vv - reach)
+                box[2], box[3] = max(box[2], u + reach), max(box[3], vv + reach)
+
+
+@njit(cache=True)
+def chord(
+    ax: float, ay: float, az: float, bx: float, by: float, bz: float, pose: FloatArray, size: FloatArray
+) -> float:
+    """Length (m) of the part of the way from a to b that lies within a vehicle's box, a little shrunk."""
+    sin, cos = pose[2], pose[3]
+    ox, oy = ax - pose[0], ay - pose[1]
+    dx, dy, dz = bx - ax, by - ay, bz - az
+    low, high = 0.0, 1.0
+    for axis in range(3):
+        if axis == 0:
+            start, step, most = ox * sin + oy * cos, dx * sin + dy * cos, 0.48 * size[0]
+        elif axis == 1:
+            start, step, most = ox * cos - oy * sin, dx * cos - dy * sin, 0.46 * size[1]
+        else:
+            start, step, most = az, dz, 0.92 * size[2]
+        least = -most if axis < 2 else 0.0
+        if abs(step) < 1e-12:
+            if start < least or start > most:
+                return 0.0
+            continue
+        first, second = (least - start) / step, (most - start) / step
+        low, high = max(low, min(first, second)), min(high, max(first, second))
+    if high <= low:
+        return 0.0
+    return (high - low) * math.sqrt(dx * dx + dy * dy + dz * dz)

@@ -1,0 +1,158 @@
+"""Lights of the scene as plain numbers for the kernels: sky, sun, street lamps, headlights."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.simulation.imaging.config import RenderConfig
+from jeat_graph.simulation.imaging.smooth import clamp01
+from jeat_graph.simulation.world.scene import Scene
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB primaries (ITU-R BT.709)
+LAMP_HEIGHT_M = 0.65  # of headlights above the road
+_FAR_LAMPS_M = 400.0
+# A beam is drawn as far as it adds this fraction of the light that is there anyway, and no farther.
+_BEAM_SHARE, _BEAM_MIN_M, _BEAM_MAX_M = 0.005, 6.0, 90.0
+
+
+def _tint(red: float, green: float, blue: float) -> FloatArray:
+    # A tint has luminance 1, so that lux and cd/m² keep their meaning.
+    colour = np.array([red, green, blue])
+    out: FloatArray = colour / (LUMINANCE @ colour)
+    return out
+
+
+class Lights(NamedTuple):
+    """Lights of one scene.
+
+    Attributes:
+        sky_lux: horizontal illuminance by the sky (lux).
+        sun_lux: the same by the sun; 0 at night.
+        sun: (3,) direction towards the sun.
+        lamps: (L, 3) places of the street lamps (m).
+        lamp_candela: intensity of one lamp (cd).
+        on: whether vehicles have their lights on.
+        beam_candela: peak of a vehicle's low beams (cd).
+        beam_stray: share of it above the cut-off.
+        beam_range_m: distance at which beams are cut off.
+        sky_tint: (3,) colour of the sky's light, luminance 1.
+        sun_tint: (3,) the same of the sun.
+        lamp_tint: (3,) the same of the lamps.
+        head_tint: (3,) the same of headlights.
+        tail_tint: (3,) the same of tail lights.
+    """
+
+    sky_lux: float
+    sun_lux: float
+    sun: FloatArray
+    lamps: FloatArray
+    lamp_candela: float
+    on: bool
+    beam_candela: float
+    beam_stray: float
+    beam_range_m: float
+    sky_tint: FloatArray
+    sun_tint: FloatArray
+    lamp_tint: FloatArray
+    head_tint: FloatArray
+    tail_tint: FloatArray
+
+
+def lights_of(scene: Scene, config: RenderConfig) -> Lights:
+    """Collect the lights of a scene."""
+    light = scene.light.config
+    day = light.ambient_lux >= config.headlights_below_lux
+    share = config.sun_share if day else 0.0
+    altitude, azimuth = math.radians(config.sun_altitude_deg), math.radians(config.sun_azimuth_deg)
+    lamps = scene.light.lamps(_FAR_LAMPS_M)
+    y = np.linspace(10.0, 120.0, 50)
+    there = float(np.median(scene.light.illuminance(np.full_like(y, 6.0), y)))
+    reach = (config.headlight_candela * LAMP_HEIGHT_M / max(_BEAM_SHARE * there, 1e-12)) ** (1.0 / 3.0)
+    return Lights(
+        sky_lux=light.ambient_lux * (1.0 - share),
+        sun_lux=light.ambient_lux * share,
+        sun=np.array(
+            [
+                math.cos(altitude) * math.sin(azimuth),
+                math.cos(altitude) * math.cos(azimuth),
+                math.sin(altitude),
+            ]
+        ),
+        lamps=lamps,
+        lamp_candela=light.lamp_candela,
+        on=not day,
+        beam_candela=config.headlight_candela,
+        beam_stray=config.headlight_stray,
+        beam_range_m=min(max(reach, _BEAM_MIN_M), _BEAM_MAX_M),
+        sky_tint=_tint(0.85, 0.95, 1.25) if day else _tint(0.7, 0.9, 1.3),
+        sun_tint=_tint(1.05, 1.0, 0.9),
+        lamp_tint=_tint(1.0, 0.78, 0.45),
+        head_tint=_tint(1.0, 1.0, 0.95),
+        tail_tint=_tint(1.0, 0.06, 0.04),
+    )
+
+
+@njit(cache=True)
+def lamp_lux(x: float, y: float, z: float, nx: float, ny: float, nz: float, lights: Lights) -> float:
+    """Illuminance by all street lamps of a surface at (x, y, z) with unit normal n (lux)."""
+    total = 0.0
+    for k in range(len(lights.lamps)):
+        dx, dy, dz = lights.lamps[k, 0] - x, lights.lamps[k, 1] - y, lights.lamps[k, 2] - z
+        r2 = dx * dx + dy * dy + dz * dz
+        facing = dx * nx + dy * ny + dz * nz
+        if facing > 0.0:
+            total += lights.lamp_candela * facing / (r2 * math.sqrt(r2))
+    return total
+
+
+@njit(cache=True)
+def beam_candela(forward: float, right: float, up: float, peak: float, stray: float) -> float:
+    """Intensity of a vehicle's low beams towards a place, given from the lamps along the vehicle's axes (m).
+
+    Bright below a soft cut-off 0.3° under the horizon, falling to the sides; stray light above. `peak` is the
+    greatest intensity (cd), `stray` the share of it above the cut-off.
+    """
+    if forward <= 0.05:
+        return 0.0
+    inverse = 1.0 / forward
+    side, down = right * inverse, -up * inverse
+    edge = clamp01((down - 0.0017) / 0.009)
+    edge = edge * edge * (3.0 - 2.0 * edge)
+    # Powers of rational bells, over one division: this is what a dark scene's rendering time goes into.
+    narrow, wide, steep = 1.0 + (side / 0.27) ** 2, 1.0 + (side / 0.8) ** 2, 1.0 + (down / 0.06) ** 2
+    share = 1.0 / (narrow * wide * steep)
+    narrow, wide, steep = share * wide * steep, share * narrow * steep, share * narrow * wide
+    across = 0.75 * narrow * narrow * narrow + 0.25 * wide * wide * wide
+    return peak * (stray * wide + (1.0 - stray) * edge * steep * across)
+
+
+@njit(cache=True)
+def beam_lux(
+    x: float, y: float, z: float, nx: float, ny: float, nz: float,
+    lamp_x: float, lamp_y: float, sin: float, cos: float, lights: Lights,
+) -> float:  # fmt: skip
+    """Illuminance of a surface at (x, y, z) with unit normal n by one vehicle's beams (lux).
+
+    The lamps stand at (lamp_x, lamp_y) and shine towards (sin, cos) in the road's plane.
+    """
+    dx, dy, dz = x - lamp_x, y - lamp_y, z - LAMP_HEIGHT_M
+    forward = dx * sin + dy * cos
+    if forward <= 0.05 or forward >= lights.beam_range_m:
+        return 0.0
+    r2 = dx * dx + dy * dy + dz * dz
+    limit = lights.beam_range_m
+    if r2 >= limit * limit:
+        return 0.0
+    facing = -(dx * nx + dy * ny + dz * nz)
+    if facing <= 0.0:
+        return 0.0
+    # The window takes the light to zero smoothly; a lamp is no point, hence the constant below.
+    window = 1.0 - r2 / (limit * limit)
+    r2 += 0.3
+    candela = beam_candela(forward, dx * cos - dy * sin, dz, lights.beam_candela, lights.beam_stray)
+    return candela * facing / (r2 * math.sqrt(r2)) * window * window

@@ -1,0 +1,222 @@
+"""Projection of the vehicles' bodies: outlines, faces, depths."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.simulation.imaging.config import RenderConfig
+from jeat_graph.simulation.imaging.faces import light_face
+from jeat_graph.simulation.imaging.lamps import LAMPS, hide_lamps, light_lamps
+from jeat_graph.simulation.imaging.lighting import Lights
+from jeat_graph.simulation.imaging.moments import Look, Moments
+from jeat_graph.simulation.imaging.optics import Optics
+from jeat_graph.simulation.imaging.reach import touch
+from jeat_graph.simulation.imaging.shapes import BOTTOM, EDGES, FACE_CORNERS, PARTS, body_table
+from jeat_graph.simulation.world.camera import Camera
+from jeat_graph.simulation.world.vehicles import KINDS
+
+NEAR_M = 0.5
+_MOST_SLANT = 6.0  # a face seen at a grazing angle is filtered no wider than this
+_BODIES = body_table(tuple(kind.name for kind in KINDS))
+
+
+def project_moments(
+    times: FloatArray,
+    pose: FloatArray,
+    more: FloatArray,
+    look: Look,
+    camera: Camera,
+    lights: Lights,
+    optics: Optics,
+    config: RenderConfig,
+    every: IntArray,
+) -> Moments:
+    """Project vehicles at J times.
+
+    Args:
+        times: (J,) s.
+        pose: as `line_up` returns it.
+        more: as `line_up` returns it.
+        look: what the vehicles look like.
+        camera: the camera.
+        lights: of the scene.
+        optics: of the lens.
+        config: settings.
+        every: (V,) a vehicle is projected at each so-many-th time only, the last one included; where it is
+            not, only its pose stands.
+    """
+    count, vehicles = pose.shape[:2]
+    p = (count, vehicles, PARTS)
+    out = Moments(
+        times=times,
+        pose=pose,
+        fade=np.ascontiguousarray(more[..., 0]),
+        part_box=np.zeros((*p, 4)),
+        hull_count=np.zeros(p, dtype=np.int64),
+        hull=np.zeros((*p, 6, 3)),
+        face_count=np.zeros(p, dtype=np.int64),
+        face=np.zeros((*p, 3), dtype=np.int64),
+        face_side=np.zeros((*p, 3, 4, 3)),
+        face_depth=np.zeros((*p, 3, 3)),
+        face_light=np.zeros((*p, 3, 3)),
+        face_slant=np.zeros((*p, 3)),
+        depth=np.zeros((*p, 2)),
+        lamp=np.zeros((count, vehicles, LAMPS, 4)),
+        lamp_flux=np.zeros((count, vehicles, LAMPS, 3)),
+        lamp_seen=np.zeros((count, vehicles, LAMPS)),
+        touch=np.zeros((count, vehicles, 3, 4)),
+    )
+    candela = np.array([config.taillight_candela, config.brakelight_candela, config.parking_candela])
+    lens = np.array([camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height])
+    _project(
+        out, np.ascontiguousarray(more[..., 1]), look, lens, camera.position,
+        np.ascontiguousarray(camera.rotation), lights, optics, candela, _BODIES,
+        every,
+    )  # fmt: skip
+    return out
+
+
+@njit(cache=True)
+def _project(
+    out: Moments, brake: FloatArray, look: Look, lens: FloatArray, eye: FloatArray, rotation: FloatArray,
+    lights: Lights, optics: Optics, candela: FloatArray, bodies: FloatArray,
+    every: IntArray,
+) -> None:  # fmt: skip
+    fx, fy, cx, cy = lens[0], lens[1], lens[2], lens[3]
+    corner = np.empty((8, 3))
+    pixel = np.empty((8, 3))
+    seen = np.empty(6, dtype=np.bool_)
+    forward = rotation[2]
+    for j in range(len(out.times)):
+        for v in range(len(look.kind)):
+            if out.fade[j, v] <= 0.0 or (j + 1) % every[v] != 0:
+                continue
+            x, y, sin, cos = out.pose[j, v]
+            length, wide, high = look.size[v]
+            low_m, high_m = _in_front(x, y, sin, cos, wide, high, eye, forward)
+            for part in range(PARTS):
+                body = bodies[look.kind[v], part]
+                if min(body[1], body[3]) * length <= low_m or max(body[0], body[2]) * length >= high_m:
+                    continue
+                mid_x, mid_y, mid_z, mid_u, mid_v = 0.0, 0.0, 0.0, 0.0, 0.0
+                for k in range(8):
+                    top = k & 1
+                    along = length * body[2 * top + (k >> 2)]
+                    along = min(max(along, low_m), high_m)
+                    across = wide * body[4 + top] * (1.0 if k & 2 else -1.0)
+                    z = high * body[6 + top]
+                    corner[k, 0] = x + along * sin + across * cos
+                    corner[k, 1] = y + along * cos - across * sin
+                    corner[k, 2] = z
+                    dx, dy, dz = corner[k, 0] - eye[0], corner[k, 1] - eye[1], z - eye[2]
+                    X = rotation[0, 0] * dx + rotation[0, 1] * dy + rotation[0, 2] * dz
+                    Y = rotation[1, 0] * dx + rotation[1, 1] * dy + rotation[1, 2] * dz
+                    Z = rotation[2, 0] * dx + rotation[2, 1] * dy + rotation[2, 2] * dz
+                    pixel[k, 0], pixel[k, 1], pixel[k, 2] = fx * X / Z + cx, fy * Y / Z + cy, Z
+                    mid_x += corner[k, 0] / 8.0
+                    mid_y += corner[k, 1] / 8.0
+                    mid_z += z / 8.0
+                    mid_u += pixel[k, 0] / 8.0
+                    mid_v += pixel[k, 1] / 8.0
+                left, up = pixel[:, 0].min() - 1.0, pixel[:, 1].min() - 1.0
+                right, low = pixel[:, 0].max() + 1.0, pixel[:, 1].max() + 1.0
+                out.part_box[j, v, part] = np.array([left, up, right, low])
+                out.depth[j, v, part, 0] = pixel[:, 2].min()
+                out.depth[j, v, part, 1] = pixel[:, 2].max()
+                faces = 0
+                for f in range(6):
+                    a, b = corner[FACE_CORNERS[f, 0]], corner[FACE_CORNERS[f, 1]]
+                    c, d = corner[FACE_CORNERS[f, 2]], corner[FACE_CORNERS[f, 3]]
+                    e1, e2 = c - a, d - b
+                    nx = e1[1] * e2[2] - e1[2] * e2[1]
+                    ny = e1[2] * e2[0] - e1[0] * e2[2]
+                    nz = e1[0] * e2[1] - e1[1] * e2[0]
+                    size = math.sqrt(nx * nx + ny * ny + nz * nz)
+                    seen[f] = False
+                    if size < 1e-12:
+                        continue
+                    outward = nx * (a[0] - mid_x) + ny * (a[1] - mid_y) + nz * (a[2] - mid_z)
+                    size = math.copysign(size, outward)
+                    nx, ny, nz = nx / size, ny / size, nz / size
+                    facing = nx * (eye[0] - a[0]) + ny * (eye[1] - a[1]) + nz * (eye[2] - a[2])
+                    seen[f] = facing > 1e-6
+                    if not seen[f] or f == BOTTOM or faces == 3:
+                        continue
+                    out.face[j, v, part, faces] = f
+                    _face_planes(out, j, v, part, faces, nx, ny, nz, facing, pixel, rotation, lens)
+                    far = math.sqrt((eye[0] - mid_x) ** 2 + (eye[1] - mid_y) ** 2 + (eye[2] - mid_z) ** 2)
+                    out.face_slant[j, v, part, faces] = min(_MOST_SLANT, far / facing)
+                    light = out.face_light[j, v, part, faces]
+                    light_face(out, j, v, look, lights, (a + c) / 2.0, nx, ny, nz, light)
+                    faces += 1
+                out.face_count[j, v, part] = faces
+                sides = 0
+                middle = np.array([mid_u, mid_v, 0.0])
+                for k in range(12):
+                    if seen[EDGES[k, 2]] != seen[EDGES[k, 3]] and sides < 6:
+                        _half_plane(
+                            pixel[EDGES[k, 0]], pixel[EDGES[k, 1]], middle, out.hull[j, v, part, sides]
+                        )
+                        sides += 1
+                out.hull_count[j, v, part] = sides
+            touch(out, j, v, look, lens, eye, rotation, lights)
+            if lights.on:
+                light_lamps(out, j, v, brake[j, v], look, lens, eye, rotation, lights, candela)
+        if lights.on:
+            hide_lamps(out, j, look, eye, optics, every)
+
+
+@njit(cache=True)
+def _in_front(
+    x: float, y: float, sin: float, cos: float, wide: float, high: float, eye: FloatArray, forward: FloatArray
+) -> tuple[float, float]:
+    """Range along a vehicle (m) in which its whole cross-section is in front of the near plane."""
+    slope = forward[0] * sin + forward[1] * cos
+    base = forward[0] * (x - eye[0]) + forward[1] * (y - eye[1]) - forward[2] * eye[2]
+    base -= 0.5 * wide * abs(forward[0] * cos - forward[1] * sin)
+    base += min(0.0, high * forward[2])
+    if slope > 1e-9:
+        return (NEAR_M - base) / slope, np.inf
+    if slope < -1e-9:
+        return -np.inf, (NEAR_M - base) / slope
+    return (np.inf if base < NEAR_M else -np.inf), np.inf
+
+
+@njit(cache=True)
+def _face_planes(
+    out: Moments, j: int, v: int, part: int, slot: int, nx: float, ny: float, nz: float, facing: float,
+    pixel: FloatArray, rotation: FloatArray, lens: FloatArray,
+) -> None:  # fmt: skip
+    """Write the depth plane and the half-planes of a face with unit normal n, `facing` m before the eye."""
+    f = out.face[j, v, part, slot]
+    fx, fy, cx, cy = lens[0], lens[1], lens[2], lens[3]
+    # Inverse depth is linear in the picture: n · ray / (n · (corner - eye)).
+    scale = -1.0 / facing
+    n0 = rotation[0, 0] * nx + rotation[0, 1] * ny + rotation[0, 2] * nz
+    n1 = rotation[1, 0] * nx + rotation[1, 1] * ny + rotation[1, 2] * nz
+    n2 = rotation[2, 0] * nx + rotation[2, 1] * ny + rotation[2, 2] * nz
+    plane = out.face_depth[j, v, part, slot]
+    plane[0], plane[1] = scale * n0 / fx, scale * n1 / fy
+    plane[2] = scale * (n2 - n0 * cx / fx - n1 * cy / fy)
+    centre = (pixel[FACE_CORNERS[f, 0]] + pixel[FACE_CORNERS[f, 2]]) / 2.0
+    for k in range(4):
+        start, end = pixel[FACE_CORNERS[f, k]], pixel[FACE_CORNERS[f, (k + 1) % 4]]
+        _half_plane(start, end, centre, out.face_side[j, v, part, slot, k])
+
+
+@njit(cache=True)
+def _half_plane(p: FloatArray, q: FloatArray, inside: FloatArray, out: FloatArray) -> None:
+    """Write the half-plane beyond the line through two pixels, on the side of a third."""
+    a, b = p[1] - q[1], q[0] - p[0]
+    reach = abs(a) + abs(b)
+    if reach < 1e-9:
+        out[0], out[1], out[2] = 0.0, 0.0, 1.0
+        return
+    if a * (inside[0] - p[0]) + b * (inside[1] - p[1]) < 0.0:
+        reach = -reach
+    out[0], out[1] = a / reach, b / reach
+    out[2] = 0.5 - out[0] * p[0] - out[1] * p[1]

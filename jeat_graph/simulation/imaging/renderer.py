@@ -1,0 +1,127 @@
+"""The renderer of one scene: static picture, vehicles at any times, and which tiles they change."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.simulation.imaging.background import Background, make_background
+from jeat_graph.simulation.imaging.config import RenderConfig
+from jeat_graph.simulation.imaging.layers import make_layers
+from jeat_graph.simulation.imaging.lighting import lights_of
+from jeat_graph.simulation.imaging.moments import Look, Moments, line_up
+from jeat_graph.simulation.imaging.optics import optics_of
+from jeat_graph.simulation.imaging.paint import PALETTE
+from jeat_graph.simulation.imaging.painter import Stage, paint_tile
+from jeat_graph.simulation.imaging.plan import Plan, make_plan, who_touches
+from jeat_graph.simulation.imaging.projection import project_moments
+from jeat_graph.simulation.imaging.tiles import TILE, TILE_H, TILE_W, tile_raster, view_of
+from jeat_graph.simulation.streams import stream
+from jeat_graph.simulation.world.scene import Scene, VehicleStates
+
+_NEAR_M = -25.0
+
+
+class Renderer:
+    """Renders one scene.
+
+    Attributes:
+        scene: what is rendered.
+        config: how.
+        background: the static picture.
+        tiles: (T, 2) first row and column of each tile.
+    """
+
+    def __init__(self, scene: Scene, config: RenderConfig, seed: int) -> None:
+        """Render the static picture, and give each vehicle a colour by `seed`."""
+        self.scene = scene
+        self.config = config
+        self.lights = lights_of(scene, config)
+        self.optics = optics_of(scene.camera, config)
+        self.view = view_of(scene.camera)
+        self.background: Background = make_background(scene, self.lights, self.optics, config)
+        self.tiles = tile_raster(scene.camera.width, scene.camera.height)
+        self._layers = make_layers()
+        rng = stream(seed, "paint")
+        total = max(1, len(scene.fleet) + len(scene.parked_fleet))
+        palette = np.array(PALETTE)
+        self._colours = palette[rng.integers(0, len(palette), total)] * rng.uniform(0.85, 1.15, (total, 1))
+
+    def plan(
+        self, start_s: float, end_s: float, duration_s: float | None = None, step_px: float | None = None
+    ) -> Plan:
+        """Plan what is to be rendered from `start_s` to `end_s`.
+
+        Args:
+            start_s: s.
+            end_s: s.
+            duration_s: time in which the steps are taken, if not all of it (s).
+            step_px: how far an edge may move in a step, if not as configured (px).
+        """
+        times = np.array([start_s, 0.5 * (start_s + end_s), end_s])
+        states = self.scene.states_at(times, self.config.far_m, _NEAR_M)
+        look, row = self._look(states)
+        one = np.ones(len(row), dtype=np.int64)
+        moments = self._project(states, times, look, one)
+        velocity = np.zeros((len(row), 2))
+        column = np.searchsorted(look.number, states.object_id)
+        np.maximum.at(velocity, column, np.abs(states.velocity[:, :2]))
+        duration = end_s - start_s if duration_s is None else duration_s
+        step = self.config.max_step_px if step_px is None else step_px
+        return make_plan(moments, velocity, look, self.tiles, self.view, step, duration, self.lights.on)
+
+    def moments(self, times: FloatArray, look: Look, every: IntArray | None = None) -> Moments:
+        """Project the vehicles of a plan at `times` (J,) (s), each as often as `every` (V,) says."""
+        states = self.scene.states_at(times, self.config.far_m, _NEAR_M)
+        stride = np.ones(len(look.number), dtype=np.int64) if every is None else every
+        return self._project(states, times, look, stride)
+
+    def stage(self, moments: Moments, look: Look) -> Stage:
+        """Put together what tiles are painted from."""
+        return Stage(self.background, moments, look, self.lights, self.optics, self.view, self._layers)
+
+    def picture(self, time_s: float) -> FloatArray:
+        """Render the whole picture at one time: radiance (H, W, 3) in cd/m²."""
+        plan = self.plan(time_s, time_s)
+        out = self.background.whole.copy()
+        stage = self.stage(self.moments(np.array([time_s]), plan.look), plan.look)
+        _paint_all(out, self.tiles, plan.boxes, stage)
+        return out
+
+    def _look(self, states: VehicleStates) -> tuple[Look, IntArray]:
+        number, first = np.unique(states.object_id, return_index=True)
+        look = Look(
+            kind=states.kind[first],
+            size=states.size[first],
+            colour=self._colours[(number - 1) % len(self._colours)],
+            salt=100 + number,
+            way=states.direction[first],
+            parked=states.parked[first],
+            number=number,
+        )
+        return look, first.astype(np.int64)
+
+    def _project(self, states: VehicleStates, times: FloatArray, look: Look, every: IntArray) -> Moments:
+        pose, more = line_up(states, look.number, len(times), self.config.far_m)
+        return project_moments(
+            times, pose, more, look, self.scene.camera, self.lights, self.optics, self.config, every
+        )
+
+
+@njit(cache=True)
+def _paint_all(out: FloatArray, tiles: IntArray, boxes: FloatArray, stage: Stage) -> None:
+    """Paint the tiles that vehicles touch, at the first of the moments, into a picture (H, W, 3)."""
+    height, width = out.shape[:2]
+    who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)
+    counts = np.zeros(3, dtype=np.int64)
+    patch = np.zeros((TILE, 3))
+    for n in range(len(tiles)):
+        row0, column0 = tiles[n]
+        if who_touches(row0, column0, boxes, who, counts) == 0:
+            continue
+        paint_tile(row0, column0, 0, who, counts, stage, patch)
+        for r in range(min(TILE_H, height - row0)):
+            for c in range(min(TILE_W, width - column0)):
+                for k in range(3):
+                    out[row0 + r, column0 + c, k] = patch[r * TILE_W + c, k]

@@ -1,0 +1,112 @@
+"""The RGB camera: exposure, motion blur, noise and 8 bit.
+
+Rows are exposed in turn (rolling shutter): each row for the same time, the last row's exposure begins
+`readout_s` after the first row's. A frame's time is the middle of the middle row's exposure.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.simulation.imaging.config import RGBConfig
+from jeat_graph.simulation.imaging.lighting import LUMINANCE
+from jeat_graph.simulation.imaging.painter import Stage, paint_tile
+from jeat_graph.simulation.imaging.plan import who_touches
+from jeat_graph.simulation.imaging.renderer import Renderer
+from jeat_graph.simulation.imaging.tiles import TILE, TILE_H, TILE_W
+
+_EASE = 2.0  # a mean over time needs half the samples that events do
+
+
+@dataclass(frozen=True)
+class Exposure:
+    """Exposure time (s) and gain of a segment's frames."""
+
+    time_s: float
+    gain: float
+
+    def scale(self, config: RGBConfig) -> float:
+        """Linear level, 1 for white, per luminance (1/(cd/m²))."""
+        return config.responsivity * self.time_s * self.gain / config.full_well_e
+
+
+def choose_exposure(config: RGBConfig, static: FloatArray) -> Exposure:
+    """Exposure as configured, or such that the static picture's lower half gets the target level.
+
+    Args:
+        config: of the camera.
+        static: (H, W, 3) radiance of the picture without vehicles (cd/m²).
+    """
+    road = float(np.median(static[len(static) // 2 :] @ LUMINANCE))
+    wanted = config.target * config.full_well_e / max(config.responsivity * road, 1e-12)
+    time = config.exposure_s or float(np.clip(wanted, config.min_exposure_s, config.max_exposure_s))
+    gain = config.gain or float(np.clip(wanted / time, 1.0, config.max_gain))
+    return Exposure(time, gain)
+
+
+def expose(renderer: Renderer, time_s: float, exposure_s: float, readout_s: float) -> FloatArray:
+    """Mean radiance (H, W, 3) of each pixel over its exposure (cd/m²)."""
+    begin, end = time_s - 0.5 * (exposure_s + readout_s), time_s + 0.5 * (exposure_s + readout_s)
+    step_px = _EASE * renderer.config.max_step_px
+    plan = renderer.plan(begin, end, duration_s=exposure_s, step_px=step_px)
+    # Samples in the middle of equal parts of the exposure, on one raster for all rows.
+    part = exposure_s / plan.most
+    extra = int(np.ceil(readout_s / part - 1e-9))
+    times: FloatArray = begin + part * (np.arange(plan.most + extra, dtype=np.float64) + 0.5)
+    moments = renderer.moments(times, plan.look)
+    height = renderer.background.lux.shape[0]
+    middle = np.minimum(renderer.tiles[:, 0] + TILE_H / 2.0, height)
+    first = np.round(extra * middle / height).astype(np.int64)
+    out = renderer.background.whole.copy()
+    _expose(out, renderer.tiles, plan.boxes, plan.steps, first, plan.most, renderer.stage(moments, plan.look))
+    return out
+
+
+def electrons(radiance: FloatArray, time_s: float, config: RGBConfig, rng: np.random.Generator) -> FloatArray:
+    """Charge that is read from each pixel (e-): Poisson photoelectrons up to full well, plus read noise."""
+    mean = np.maximum(radiance, 0.0) * (config.responsivity * time_s)
+    # Far above full well the noise does not matter, and large means cost more.
+    charge = rng.poisson(np.minimum(mean, 2.0 * config.full_well_e)).astype(np.float64)
+    out: FloatArray = np.minimum(charge, config.full_well_e)
+    out += config.read_noise_e * rng.standard_normal(out.shape)
+    return out
+
+
+def develop(charge: FloatArray, gain: float, config: RGBConfig) -> npt.NDArray[np.uint8]:
+    """Gain, gamma and rounding to 8 bit."""
+    level = np.clip(charge * (gain / config.full_well_e), 0.0, 1.0)
+    return np.floor(255.0 * level ** (1.0 / config.gamma) + 0.5).astype(np.uint8)
+
+
+@njit(cache=True)
+def _expose(
+    out: FloatArray, tiles: IntArray, boxes: FloatArray, steps: IntArray, first: IntArray, available: int,
+    stage: Stage,
+) -> None:  # fmt: skip
+    """Replace the tiles that vehicles touch by the mean of their samples, from each tile's first on."""
+    height, width = out.shape[:2]
+    who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)
+    counts = np.zeros(3, dtype=np.int64)
+    patch = np.zeros((TILE, 3))
+    for n in range(len(tiles)):
+        count = steps[n]
+        if count == 0:
+            continue
+        row0, column0 = tiles[n]
+        who_touches(row0, column0, boxes, who, counts)
+        stride = available // count
+        rows, columns = min(TILE_H, height - row0), min(TILE_W, width - column0)
+        out[row0 : row0 + rows, column0 : column0 + columns] = 0.0
+        for k in range(count):
+            # The sample next to the middle of its part, which is the middle itself where the part is one.
+            j = first[n] + k * stride + stride // 2
+            paint_tile(row0, column0, j, who, counts, stage, patch)
+            for r in range(rows):
+                for c in range(columns):
+                    for channel in range(3):
+                        out[row0 + r, column0 + c, channel] += patch[r * TILE_W + c, channel] / count

@@ -1,0 +1,51 @@
+"""Truth of a frame: boxes, poses and motion of the vehicles, with what of them is visible."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.simulation.segment import FrameTruth
+from jeat_graph.simulation.world.boxes import project_boxes
+from jeat_graph.simulation.world.camera import Camera
+from jeat_graph.simulation.world.scene import VehicleStates
+from jeat_graph.simulation.world.vehicles import KIND_NAMES
+
+
+def frame_truth(states: VehicleStates, camera: Camera, visible: FloatArray, min_side_px: float) -> FrameTruth:
+    """Make the truth of one time.
+
+    Args:
+        states: N vehicles at that time.
+        camera: the camera.
+        visible: (N,) fraction of each vehicle that can be seen.
+        min_side_px: vehicles whose clipped box is thinner or lower are left out.
+
+    Returns:
+        Vehicles by ascending id. Yaw is the direction of the vehicle's front, from +x towards +y.
+    """
+    projected = project_boxes(states, camera)
+    extent = projected.clipped[:, 2:] - projected.clipped[:, :2]
+    keep = np.flatnonzero((extent >= min_side_px).all(axis=1))
+    rows = keep[np.argsort(states.object_id[keep])]
+    front = states.pose[rows, 2] + np.where(states.direction[rows] < 0, np.pi, 0.0)
+    yaw = np.pi / 2.0 - front
+    zero = np.zeros(len(rows))
+    return FrameTruth(
+        object_id=states.object_id[rows],
+        class_name=KIND_NAMES[states.kind[rows]],
+        boxes=np.concatenate([projected.clipped[rows, :2], extent[rows]], axis=1),
+        visible=visible[rows],
+        motion=projected.motion[rows],
+        size=states.size[rows],
+        pose=np.column_stack(
+            [
+                states.pose[rows, :2],
+                states.size[rows, 2] / 2.0,
+                zero,
+                zero,
+                np.arctan2(np.sin(yaw), np.cos(yaw)),
+            ]
+        ),
+        velocity=np.column_stack([states.velocity[rows, :2], zero]),
+    )

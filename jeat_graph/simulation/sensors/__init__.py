@@ -1,0 +1,1 @@
+"""Simulated detectors: what each sensor finds of the world, with noise, misses and false boxes."""

@@ -1,0 +1,1 @@
+"""The simulated world: road, vehicles, traffic, light and camera, at any time."""

@@ -1,0 +1,297 @@
+"""Traffic on the highway: driving vehicles on a ring, parked ones on the shoulders.
+
+The road that the camera sees is a part of a ring, so that the density stays as configured without a model
+of arrivals: who leaves at one end comes in at the other, out of sight, as a new object.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from jeat_graph.config.schema import check, choice, number
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.errors import ConfigError
+from jeat_graph.simulation.world.following import (
+    STANDSTILL_GAP_M,
+    Drivers,
+    distances_ahead,
+    follow,
+    lane_change_gain,
+)
+from jeat_graph.simulation.world.paths import Paths
+from jeat_graph.simulation.world.road import Road
+from jeat_graph.simulation.world.vehicles import KIND_NAMES, KINDS, Fleet
+
+DENSITIES = ("sparse", "normal", "dense")
+_WARM_UP_S = 15.0
+_MARGIN_S = 1.0  # paths reach this much before time zero and past the end
+
+
+@dataclass(frozen=True)
+class TrafficConfig:
+    """How much traffic there is and how it drives."""
+
+    density: str = choice("normal", DENSITIES, "which of the vehicle counts below applies")
+    vehicles_sparse: float = number(9.0, "vehicles", "driving vehicles within view_m, sparse traffic")
+    vehicles_normal: float = number(20.0, "vehicles", "driving vehicles within view_m, normal traffic")
+    vehicles_dense: float = number(34.0, "vehicles", "driving vehicles within view_m, dense traffic")
+    parked: int = number(2, "vehicles", "vehicles parked on the shoulders within view", 0, 12)
+    view_m: float = number(150.0, "m", "length of road that the counts refer to", open_low=True)
+    ring_m: float = number(420.0, "m", "length of the ring, of which the camera sees a part", 300.0)
+    behind_m: float = number(130.0, "m", "how much of the ring lies behind the gantry", 30.0)
+    speed_factor: float = number(1.0, "1", "factor on every desired speed", 0.1, 2.0)
+    headway_s: tuple[float, float] = number((0.5, 0.9), "s", "lowest and highest desired time gap", 0.4, 5.0)
+    response_s: float = number(
+        0.25, "s", "time constant with which acceleration follows the driver", 0.05, 1.0
+    )
+    brake_rate_hz: float = number(0.01, "1/s", "how often a driver brakes for no visible reason")
+    brake_m_s2: tuple[float, float] = number((1.0, 3.5), "m/s²", "how hard, lowest and highest")
+    lane_change_gain: float = number(0.25, "m/s²", "gain in acceleration that makes a driver change lane")
+    lane_change_s: tuple[float, float] = number((3.5, 5.5), "s", "duration, shortest and longest", 1.0, 20.0)
+    sway_m: float = number(0.15, "m", "greatest amplitude of the sway within a lane", 0.0, 0.25)
+    step_s: float = number(0.05, "s", "simulation step; jerk is constant within it", 0.005, 0.1)
+
+    def __post_init__(self) -> None:
+        check(self, "traffic.")
+        if self.behind_m + self.view_m + 60.0 > self.ring_m:
+            raise ConfigError("traffic.ring_m: must be longer than behind_m + view_m + 60 (m)")
+
+    @property
+    def vehicles_in_view(self) -> float:
+        """Driving vehicles within `view_m` at the chosen density."""
+        return float(getattr(self, f"vehicles_{self.density}"))
+
+    @property
+    def ring_count(self) -> int:
+        """Number of driving vehicles on the whole ring."""
+        return round(self.vehicles_in_view / self.view_m * self.ring_m)
+
+
+@dataclass(frozen=True, eq=False)
+class Traffic:
+    """Driving vehicles and their paths.
+
+    Attributes:
+        paths: motion of the V vehicles.
+        direction: (V,) +1 away from the camera, -1 towards it.
+        cruise: (V,) desired speed (m/s), which turns sway into heading.
+    """
+
+    paths: Paths
+    direction: IntArray
+    cruise: FloatArray
+
+
+def simulate_traffic(
+    rng: np.random.Generator, fleet: Fleet, road: Road, config: TrafficConfig, duration_s: float
+) -> Traffic:
+    """Let the fleet drive on the ring for `duration_s`, after a warm-up.
+
+    Args:
+        rng: random stream of the traffic.
+        fleet: the V driving vehicles.
+        road: lanes.
+        config: settings.
+        duration_s: how long the paths must reach beyond time zero (s).
+
+    Raises:
+        ConfigError: more vehicles than the ring has room for.
+    """
+    lane = _assign_lanes(rng, fleet, road)
+    s, gap = _place(rng, fleet, lane, road, config)
+    drivers = _draw_drivers(rng, fleet, lane, road, config)
+    count, dt = len(fleet), config.step_s
+    v = np.minimum(drivers.speed, np.maximum((gap - STANDSTILL_GAP_M) / drivers.headway, 1.0))
+    a = np.zeros(count)
+    start = -_MARGIN_S - _WARM_UP_S
+    steps = math.ceil((duration_s + _MARGIN_S - start) / dt)
+    decide_every = max(1, round(0.25 / dt))
+
+    occupied = np.zeros((count, road.num_lanes), dtype=bool)
+    occupied[np.arange(count), lane] = True
+    from_lane, last_lane = lane.copy(), lane.copy()
+    change_end = np.full(count, -np.inf)
+    brake_end, brake = np.full(count, -np.inf), np.zeros(count)
+    along = np.empty((steps, count, 4))
+    changes: list[tuple[int, float, float, float]] = []
+
+    for k in range(steps):
+        now = start + k * dt
+        done = change_end == now
+        if done.any():
+            occupied[done] = False
+            occupied[done, last_lane[done]] = True
+            from_lane[done] = last_lane[done]
+        ahead = distances_ahead(s, config.ring_m)
+        # While changing, a driver minds the leader of either lane: the nearer one may be the less pressing.
+        wish = np.minimum(
+            follow(v, ahead, occupied[:, from_lane].T, drivers),
+            follow(v, ahead, occupied[:, last_lane].T, drivers),
+        )
+        startled = rng.random(count) < config.brake_rate_hz * dt
+        brake_end = np.where(startled, now + rng.uniform(0.5, 2.0, count), brake_end)
+        brake = np.where(startled, rng.uniform(*config.brake_m_s2, count), brake)
+        target = np.where(now < brake_end, np.minimum(wish, -brake), wish)
+        # Braking fades out with speed, so that nobody rolls backwards.
+        target = np.maximum(target, -v)
+        if k % decide_every == 0 and count:
+            chosen = _choose_lane_changes(
+                rng, wish, v, ahead, occupied, last_lane, now > change_end + 2.0, fleet, road, drivers, config
+            )
+            for vehicle, lane_to in chosen:
+                length = math.ceil(float(rng.uniform(*config.lane_change_s)) / dt)
+                shift = float(road.lane_x[lane_to] - road.lane_x[last_lane[vehicle]])
+                changes.append((vehicle, now, length * dt, shift))
+                # Computed as the loop computes `now`, so that the comparison above is exact.
+                change_end[vehicle] = start + (k + length) * dt
+                last_lane[vehicle] = lane_to
+                occupied[vehicle, lane_to] = True
+        j = (target - a) / config.response_s
+        along[k] = np.stack([s, v, a, j], axis=1)
+        s = s + dt * (v + dt * (a / 2.0 + dt * j / 6.0))
+        v = v + dt * (a + dt * j / 2.0)
+        a = a + dt * j
+
+    columns = list(zip(*changes, strict=True)) if changes else [(), (), (), ()]
+    sway = np.stack(
+        [
+            config.sway_m * rng.uniform(0.2, 1.0, count),
+            2.0 * np.pi / rng.uniform(6.0, 15.0, count),
+            rng.uniform(0.0, 2.0 * np.pi, count),
+        ],
+        axis=1,
+    )
+    keep = round(_WARM_UP_S / dt)
+    paths = Paths(
+        start_s=start + keep * dt,
+        step_s=dt,
+        along=along[keep:],
+        lane_x=road.lane_x[lane],
+        change_vehicle=np.array(columns[0], dtype=np.int64),
+        change_start=np.array(columns[1], dtype=np.float64),
+        change_duration=np.array(columns[2], dtype=np.float64),
+        change_shift=np.array(columns[3], dtype=np.float64),
+        sway=sway,
+    )
+    return Traffic(paths=paths, direction=road.direction[lane], cruise=drivers.speed)
+
+
+def park(
+    rng: np.random.Generator, fleet: Fleet, road: Road, near_m: float = 28.0, far_m: float = 120.0
+) -> FloatArray:
+    """Park vehicles on the shoulders, apart from each other.
+
+    Args:
+        rng: random stream of the parking.
+        fleet: the P parked vehicles.
+        road: shoulders.
+        near_m: nearest place along the road (m).
+        far_m: farthest place along the road (m).
+
+    Returns:
+        (P, 3) x, y of the vehicle's centre (m) and its heading (rad).
+    """
+    count = len(fleet)
+    side = rng.permutation(np.arange(count) % 2)
+    slot = (far_m - near_m) / max(count, 1)
+    play = np.maximum(slot - fleet.size[:, 0] - 2.0, 0.0) if count else np.zeros(0)
+    y = near_m + slot * (rng.permutation(count) + 0.5) + play * rng.uniform(-0.5, 0.5, count)
+    x = road.shoulder_x[side] + rng.uniform(-0.15, 0.15, count)
+    return np.stack([x, y, rng.normal(0.0, 0.01, count)], axis=1)
+
+
+def _assign_lanes(rng: np.random.Generator, fleet: Fleet, road: Road) -> IntArray:
+    """Spread the vehicles over the lanes; trucks keep to the outer lanes."""
+    count, n = len(fleet), road.config.lanes_per_direction
+    length = fleet.size[:, 0] + 25.0
+    truck = KIND_NAMES[fleet.kind] == "truck"
+    load = np.zeros(road.num_lanes)
+    rank = road.rank_from_median(np.arange(road.num_lanes))
+    lane = np.empty(count, dtype=np.int64)
+    order = np.concatenate([np.flatnonzero(truck), np.flatnonzero(~truck)])
+    for vehicle in order:
+        allowed = rank >= max(n - 2, 0) if truck[vehicle] else rank >= 0
+        # Trucks prefer the outermost lane until it is far fuller than the next.
+        cost = load / (1.0 + 2.0 * rank * truck[vehicle]) + rng.uniform(0.0, 10.0, road.num_lanes)
+        pick = int(np.argmin(np.where(allowed, cost, np.inf)))
+        lane[vehicle] = pick
+        load[pick] += length[vehicle]
+    return lane
+
+
+def _place(
+    rng: np.random.Generator, fleet: Fleet, lane: IntArray, road: Road, config: TrafficConfig
+) -> tuple[FloatArray, FloatArray]:
+    """Place the vehicles of each lane on the ring, with random gaps: positions (V,), gaps ahead (V,) in m."""
+    s, gap = np.empty(len(fleet)), np.empty(len(fleet))
+    least = STANDSTILL_GAP_M + 1.0
+    for k in range(road.num_lanes):
+        who = rng.permutation(np.flatnonzero(lane == k))
+        if not len(who):
+            continue
+        length = fleet.size[who, 0]
+        free = config.ring_m - float(length.sum()) - least * len(who)
+        if free < 0.0:
+            raise ConfigError(f"traffic: {len(fleet)} vehicles have no room on a ring of {config.ring_m} m")
+        gap[who] = least + free * rng.dirichlet(np.full(len(who), 6.0))
+        half = length / 2.0
+        spacing = half + gap[who] + np.roll(half, -1)
+        s[who] = (
+            rng.uniform(0.0, config.ring_m) + np.concatenate([[0.0], np.cumsum(spacing[:-1])])
+        ) % config.ring_m
+    return s, gap
+
+
+def _draw_drivers(
+    rng: np.random.Generator, fleet: Fleet, lane: IntArray, road: Road, config: TrafficConfig
+) -> Drivers:
+    low, high = np.array([kind.speed for kind in KINDS])[fleet.kind].T
+    # Whoever starts nearer to the median is more likely in a hurry.
+    inner = 1.0 - road.rank_from_median(lane) / max(road.config.lanes_per_direction - 1, 1)
+    eager = np.clip(0.6 * rng.random(len(fleet)) + 0.4 * inner, 0.0, 1.0)
+    return Drivers(
+        speed=config.speed_factor * (low + (high - low) * eager),
+        headway=rng.uniform(*config.headway_s, len(fleet)),
+        acceleration=np.array([kind.max_acceleration for kind in KINDS])[fleet.kind],
+        length=fleet.size[:, 0],
+    )
+
+
+def _choose_lane_changes(
+    rng: np.random.Generator,
+    own: FloatArray,
+    v: FloatArray,
+    ahead: FloatArray,
+    occupied: BoolArray,
+    lane: IntArray,
+    free: BoolArray,
+    fleet: Fleet,
+    road: Road,
+    drivers: Drivers,
+    config: TrafficConfig,
+) -> list[tuple[int, int]]:
+    """Pick at most one lane change a direction, the one that gains most: (vehicle, new lane)."""
+    n = road.config.lanes_per_direction
+    truck = KIND_NAMES[fleet.kind] == "truck"
+    best_gain, best_lane = np.full(len(v), -np.inf), lane.copy()
+    for shift in (-1, 1):
+        to = lane + shift
+        inside = (to >= 0) & (to < road.num_lanes)
+        to = np.where(inside, to, lane)
+        allowed = inside & (road.direction[to] == road.direction[lane]) & free & (v > 10.0)
+        allowed &= ~(truck & (road.rank_from_median(to) < max(n - 2, 0)))
+        gain = np.where(allowed, lane_change_gain(own, v, ahead, occupied, to, drivers), -np.inf)
+        better = gain > best_gain
+        best_gain, best_lane = np.where(better, gain, best_gain), np.where(better, to, best_lane)
+    # Now and then someone changes without need: to the exit, or back to the outer lane.
+    threshold = np.where(rng.random(len(v)) < 0.004, -0.3, config.lane_change_gain)
+    chosen = []
+    for direction in (-1, 1):
+        margin = np.where(road.direction[lane] == direction, best_gain - threshold, -np.inf)
+        vehicle = int(np.argmax(margin))
+        if margin[vehicle] > 0.0:
+            chosen.append((vehicle, int(best_lane[vehicle])))
+    return chosen

@@ -1,0 +1,1 @@
+"""The online tracker: scans in, tracks out, one compiled step a batch; smoothing behind it."""

@@ -1,0 +1,57 @@
+"""Removal of rows from the arrays of all tracks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy.typing as npt
+from numba import njit
+
+from jeat_graph.data.arrays import IntArray
+from jeat_graph.tracking.state import TrackArrays
+
+
+@njit(cache=True)
+def keep_rows(tracks: TrackArrays, rows: IntArray) -> None:
+    """Move the rows that stay to the front of all arrays, in place.
+
+    One array after the other, so that a step which drops one old track of a thousand does not copy a thousand
+    tracks field by field.
+
+    Args:
+        tracks: state.
+        rows: (K,) rows that stay, ascending.
+    """
+    first = 0
+    while first < len(rows) and rows[first] == first:
+        first += 1
+    if first == len(rows):
+        return
+    _shift(tracks.mean, rows, first)
+    _shift(tracks.cov, rows, first)
+    _shift(tracks.size_mean, rows, first)
+    _shift(tracks.size_cov, rows, first)
+    _shift(tracks.anchor, rows, first)
+    _shift(tracks.anchor_var, rows, first)
+    _shift(tracks.anchor_t, rows, first)
+    _shift(tracks.still_odds, rows, first)
+    _shift(tracks.standing, rows, first)
+    _shift(tracks.scale, rows, first)
+    _shift(tracks.p_detect, rows, first)
+    _shift(tracks.hidden, rows, first)
+    _shift(tracks.existence, rows, first)
+    _shift(tracks.confirmed, rows, first)
+    _shift(tracks.track_id, rows, first)
+    _shift(tracks.hits, rows, first)
+    _shift(tracks.t_birth, rows, first)
+    _shift(tracks.t_update, rows, first)
+    _shift(tracks.used, rows, first)
+
+
+@njit(cache=True)
+def _shift(array: npt.NDArray[Any], rows: IntArray, first: int) -> None:
+    flat = array.reshape(array.shape[0], -1)
+    for k in range(first, len(rows)):
+        source = rows[k]
+        for c in range(flat.shape[1]):
+            flat[k, c] = flat[source, c]

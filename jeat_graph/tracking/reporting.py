@@ -1,0 +1,73 @@
+"""The causal table of one moment: which tracks are reported, and as what."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from jeat_graph.config.kernel_form import Settings
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.filters.existence import track_boxes, visible_fraction
+from jeat_graph.tracking.state import TrackArrays
+
+
+@njit(cache=True)
+def report(
+    tracks: TrackArrays, num_tracks: int, t: float, settings: Settings
+) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray, FloatArray, IntArray]:
+    """Collect the confirmed tracks that are alive now.
+
+    Args:
+        tracks: state of all tracks.
+        num_tracks: number of living ones.
+        t: time of the state (s).
+        settings: scalars of the configuration.
+
+    Returns:
+        Columns of `Trajectories`: t (R,), track_id (R,), boxes (R, 4), existence (R,), mean (R, 6),
+        var (R, 6), used (R,).
+    """
+    boxes = track_boxes(tracks.mean[:num_tracks], tracks.size_mean[:num_tracks])
+    width, height = settings.image_width, settings.image_height
+    rows = np.empty(num_tracks, dtype=np.int64)
+    count = 0
+    for i in range(num_tracks):
+        if not tracks.confirmed[i]:
+            continue
+        gap = t - tracks.t_update[i]
+        if gap > settings.output_max_gap_s and not tracks.standing[i]:
+            continue
+        if settings.by_existence and tracks.existence[i] < settings.output_min_existence:
+            continue
+        if settings.output_clip:
+            visible = visible_fraction(boxes[i], width, height)
+            if visible <= 0.0 or visible < settings.output_min_visible:
+                continue
+        rows[count] = i
+        count += 1
+    out_boxes = np.empty((count, 4))
+    mean = np.empty((count, 6))
+    var = np.empty((count, 6))
+    for r in range(count):
+        i = rows[r]
+        for axis in range(2):
+            low = boxes[i, axis]
+            high = low + boxes[i, 2 + axis]
+            if settings.output_clip:
+                low = max(low, 0.0)
+                high = min(high, width if axis == 0 else height)
+            out_boxes[r, axis] = low
+            out_boxes[r, 2 + axis] = high - low
+            for d in range(3):
+                mean[r, 2 * d + axis] = tracks.mean[i, axis, d]
+                var[r, 2 * d + axis] = tracks.cov[i, axis, d, d]
+    chosen = rows[:count]
+    return (
+        np.full(count, t),
+        tracks.track_id[chosen],
+        out_boxes,
+        tracks.existence[chosen],
+        mean,
+        var,
+        tracks.used[chosen],
+    )

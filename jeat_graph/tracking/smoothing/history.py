@@ -1,0 +1,160 @@
+"""One track's past: what it took in, its smoother, and the rows not handed out yet."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jeat_graph.config.schema import Config
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.smoothers.engine import TrackSmoother, make_smoother
+from jeat_graph.smoothers.track_data import COINCIDENT_S, SmoothedTrack
+from jeat_graph.tracking.smoothing.looks import Looks
+from jeat_graph.tracking.smoothing.priors import (
+    ErrorStates,
+    measurements_of,
+    prior_of,
+    size_prior_of,
+    sizes_of,
+)
+from jeat_graph.tracking.smoothing.rows import rows_of
+from jeat_graph.tracking.smoothing.sizes import SizeWindow
+from jeat_graph.tracking.update_log import WIDTH
+
+
+class TrackHistory:
+    """What is kept of one track for its smoothed trajectory.
+
+    As long as the track is tentative its measurements only wait. Once it is confirmed a smoother takes them,
+    those of the tentative time first.
+
+    Args:
+        track_id: identity.
+        config: settings of the smoother, the sizes and the output.
+        errors: the sensors' errors with memory.
+        keep: keep all measurements until the end, which stitching needs.
+
+    Attributes:
+        track_id: identity.
+        confirmed: whether the track has ever been confirmed.
+        measurements: measurements (M, 1 + WIDTH) that wait, or all of them if `keep`, in pieces; the first
+            row of the first piece is the birth.
+        smoother: the smoother, once there is one.
+    """
+
+    def __init__(self, track_id: int, config: Config, errors: ErrorStates, keep: bool) -> None:
+        self.track_id = track_id
+        self.confirmed = False
+        self.measurements: list[FloatArray] = []
+        self._looks: list[Looks] = []
+        self.smoother: TrackSmoother | None = None
+        self._config = config
+        self._errors = errors
+        self._keep = keep
+        self._sizes: SizeWindow | None = None
+        self._fed = 0  # pieces of `measurements` that the smoother has had
+        self._tail = SmoothedTrack.empty()  # the last state handed out: rows may lie between it and the next
+        self._last = -np.inf  # time of the last measurement
+
+    @property
+    def looks(self) -> Looks:
+        """Steps of its life that have no row yet."""
+        if len(self._looks) != 1:
+            self._looks = [Looks.concatenate(self._looks)]
+        return self._looks[0]
+
+    @property
+    def oldest(self) -> float:
+        """Time of the first step without a row (s), or infinity."""
+        return next((float(looks.t[0]) for looks in self._looks if len(looks)), np.inf)
+
+    def take(self, rows: FloatArray) -> None:
+        """Add measurements (M, 1 + WIDTH) in order of time."""
+        self.measurements.append(rows)
+        self._last = float(rows[-1, 0])
+
+    def watch(self, looks: Looks, confirmed: bool) -> None:
+        """Add steps that the track has lived through, and whether it was confirmed in one of them."""
+        if len(looks):
+            self._looks.append(looks)
+        self.confirmed = self.confirmed or confirmed
+
+    def feed(self) -> None:
+        """Give the smoother what waits, if the track is confirmed."""
+        if not self.confirmed or self._fed == len(self.measurements):
+            return
+        rows = np.concatenate(self.measurements[self._fed :])
+        if self.smoother is None:
+            settings = self._config.smoother
+            self.smoother = make_smoother(
+                settings.engine,
+                *prior_of(rows[0], self._errors),
+                lag_s=settings.lag_s,
+                chunk=settings.chunk,
+                robust=settings.robust,
+                memory=self._errors.memory,
+            )
+            self._sizes = SizeWindow(*size_prior_of(rows[0]), self._config.size.rate_density)
+            rows = rows[1:]
+        assert self._sizes is not None
+        if self._keep:
+            self._fed = len(self.measurements)
+        else:
+            self.measurements = []
+        if len(rows):
+            self.smoother.feed(*measurements_of(rows, self._errors))
+            self._sizes.append(*sizes_of(rows))
+
+    def departed(self) -> Trajectories | None:
+        """Return the rows that have become final since the last call, or None."""
+        if self.smoother is None:
+            return None
+        piece = self.smoother.departed()
+        if not len(piece):
+            return None
+        assert self._sizes is not None
+        end = float(piece.t[-1])
+        rows = self._rows(piece, end)
+        self._sizes.advance(end)
+        self._tail = piece.select(slice(-1, None))
+        looks = self.looks
+        self._looks = [looks.take(slice(int(np.searchsorted(looks.t, end, side="right")), None))]
+        return rows
+
+    def current(self) -> tuple[Trajectories | None, Trajectories | None]:
+        """Take in all that waits; return the rows that are final then, as `departed`, and all others."""
+        self.feed()
+        if self.smoother is None:
+            return None, None
+        piece = self.smoother.current()
+        final = self.departed()
+        return final, self._rows(piece, np.inf)
+
+    def finish(self) -> Trajectories | None:
+        """Return all rows not returned yet, and free the smoother; None for a tentative track."""
+        if self.smoother is None:
+            return None
+        return self._rows(self.smoother.finish(), np.inf)
+
+    def whole(self) -> FloatArray:
+        """Return all measurements (M, 1 + WIDTH), the birth first; needs `keep`."""
+        return np.concatenate(self.measurements) if self.measurements else np.zeros((0, 1 + WIDTH))
+
+    def close(self) -> None:
+        """Free the smoother and all that waits."""
+        if self.smoother is not None:
+            self.smoother.close()
+        self.measurements = []
+
+    def _rows(self, piece: SmoothedTrack, end: float) -> Trajectories | None:
+        """Rows of the steps up to time `end` (s); after the last measurement only where the track is held."""
+        assert self._sizes is not None
+        path = SmoothedTrack.concatenate([self._tail, piece]) if len(self._tail) else piece
+        looks = self.looks
+        chosen = (looks.t <= end) & ((looks.t <= self._last + COINCIDENT_S) | looks.held)
+        # Of two steps at one time the later one counts.
+        chosen[:-1] &= looks.t[1:] > looks.t[:-1]
+        if not len(path) or not chosen.any():
+            return None
+        existence = looks.hindsight()[chosen]
+        return rows_of(self.track_id, path, self._sizes.smooth(), looks.take(chosen), existence, self._config)

@@ -1,0 +1,134 @@
+"""Taking down what a tracker does, some steps at a time, for those who work behind it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jeat_graph.config.schema import Config
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.tracking.state import TrackArrays
+from jeat_graph.tracking.update_log import WIDTH, UpdateLog
+
+
+class Packet(NamedTuple):
+    """Some consecutive steps of a tracker: plain arrays, fit to be sent to another process.
+
+    Attributes:
+        t: (K,) times of the steps (s).
+        wanted: (K,) whether the smoothed table gets rows at the step.
+        counts: (K,) living tracks after each step; their L = Σ counts rows follow one another below.
+        ids: (L,) identities.
+        existence: (L,) probability of existence.
+        used: (L,) bit k is set where a detection of sensor k was taken.
+        confirmed: (L,) whether the track is confirmed.
+        held: (L,) whether it is reported as standing still.
+        updates: (M, 1 + WIDTH) times and rows of the update log.
+        ended: identities of the tracks that ended.
+    """
+
+    t: FloatArray
+    wanted: BoolArray
+    counts: IntArray
+    ids: IntArray
+    existence: FloatArray
+    used: IntArray
+    confirmed: BoolArray
+    held: BoolArray
+    updates: FloatArray
+    ended: list[int]
+
+
+class StepRecorder:
+    """Takes down each step of a tracker at the least cost, and hands out packets of steps.
+
+    A packet is full after so many steps as a smoother takes measurements at once, or when a confirmed track
+    has ended, so that its smoother is freed at once. When that is depends on the steps alone.
+
+    Args:
+        config: settings of the smoother.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self._steps = max(config.smoother.chunk, 1)
+        self._rate_hz = config.smoother.output_rate_hz
+        self._bin = -np.inf
+        self._ids: IntArray = np.zeros(0, dtype=np.int64)
+        self._confirmed: BoolArray = np.zeros(0, dtype=np.bool_)
+        self._ended: list[int] = []
+        self._updates: list[tuple[float, FloatArray]] = []
+        self._looks: list[tuple[float, bool, IntArray, FloatArray, IntArray, BoolArray, BoolArray]] = []
+
+    def record(
+        self, t: float, tracks: TrackArrays, n: int, births: int, log: UpdateLog, reported: IntArray
+    ) -> bool:
+        """Take down one step.
+
+        Args:
+            t: time of the step (s).
+            tracks: state after it.
+            n: living tracks.
+            births: how many of these were born in it.
+            log: what the tracks took in.
+            reported: identities in the causal table of the step, ascending.
+
+        Returns:
+            Whether the packet is full.
+        """
+        count = int(log.count[0])
+        if count:
+            self._updates.append((t, log.rows[:count].copy()))
+        ids, confirmed = tracks.track_id[:n].copy(), tracks.confirmed[:n].copy()
+        held = np.zeros(n, dtype=np.bool_)
+        held[np.searchsorted(ids, reported)] = True
+        held &= tracks.standing[:n]
+        self._looks.append(
+            (
+                t,
+                self._row_wanted(t),
+                ids,
+                tracks.existence[:n].copy(),
+                tracks.used[:n].copy(),
+                confirmed,
+                held,
+            )
+        )
+        over = False
+        if n - births != len(self._ids):
+            gone = ~np.isin(self._ids, ids)
+            self._ended.extend(self._ids[gone].tolist())
+            over = bool(self._confirmed[gone].any())
+        self._ids, self._confirmed = ids, confirmed
+        return over or len(self._looks) >= self._steps
+
+    def take(self) -> Packet | None:
+        """Return the steps taken down since the last call, or None if there are none."""
+        if not self._looks:
+            return None
+        t, wanted, ids, existence, used, confirmed, held = zip(*self._looks, strict=True)
+        when = np.repeat([u[0] for u in self._updates], [len(u[1]) for u in self._updates])
+        rows = [u[1] for u in self._updates] or [np.zeros((0, WIDTH))]
+        packet = Packet(
+            np.array(t),
+            np.array(wanted, dtype=np.bool_),
+            np.array([len(part) for part in ids], dtype=np.int64),
+            np.concatenate(ids),
+            np.concatenate(existence),
+            np.concatenate(used),
+            np.concatenate(confirmed),
+            np.concatenate(held),
+            np.concatenate([when[:, None], np.concatenate(rows)], axis=1),
+            self._ended,
+        )
+        self._looks, self._updates, self._ended = [], [], []
+        return packet
+
+    def _row_wanted(self, t: float) -> bool:
+        """Whether the table gets rows at this step: the first one in each interval of the output's rate."""
+        if self._rate_hz <= 0.0:
+            return True
+        bin_ = np.floor(t * self._rate_hz + 1e-9)
+        wanted = bool(bin_ > self._bin)
+        self._bin = bin_
+        return wanted

@@ -1,0 +1,56 @@
+"""Smoothing of a living track's box size with a lag."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.smoothers.size import SmoothedSize, smooth_size
+from jeat_graph.smoothers.track_data import COINCIDENT_S
+
+
+class SizeWindow:
+    """Measured sizes of one track that are not final yet, and the filtered size before them.
+
+    Args:
+        t: time of the track's birth (s).
+        mean: (2, 2) prior of ln width and ln height with their rates (ln px, 1/s).
+        cov: (2, 2, 2) its covariance.
+        density: root spectral density of the rates (1/s^1.5).
+    """
+
+    def __init__(self, t: float, mean: FloatArray, cov: FloatArray, density: float) -> None:
+        self._base = (t, mean, cov)
+        self._density = density
+        self._parts: list[tuple[FloatArray, FloatArray, FloatArray]] = []
+
+    def append(self, t: FloatArray, log_size: FloatArray, var: FloatArray) -> None:
+        """Take in measured sizes: times (M,) s, ln width and height (M, 2), variances (M, 2)."""
+        # Columns of a table as arrays of their own, for one compiled form of what comes next.
+        self._parts.append((t.copy(), log_size.copy(), var.copy()))
+
+    def smooth(self) -> SmoothedSize:
+        """Smooth all since the base, given all measurements so far."""
+        return self._solve(*self._waiting())
+
+    def advance(self, t: float) -> None:
+        """Make the sizes up to time `t` final: the base moves there, and what came before is forgotten."""
+        waiting = self._waiting()
+        count = int(np.searchsorted(waiting[0], t + COINCIDENT_S, side="right"))
+        # With nothing after it, the last smoothed size is the filtered one.
+        past, later = ([column[part] for column in waiting] for part in (slice(count), slice(count, None)))
+        filtered = self._solve(*past)
+        self._base = (float(filtered.t[-1]), filtered.mean[-1], filtered.cov[-1])
+        self._parts = [(later[0], later[1], later[2])]
+
+    def _waiting(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """All measurements since the base: times (M,), sizes (M, 2), variances (M, 2)."""
+        if not self._parts:
+            return np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2))
+        if len(self._parts) > 1:
+            t, log_size, var = zip(*self._parts, strict=True)
+            self._parts = [(np.concatenate(t), np.concatenate(log_size), np.concatenate(var))]
+        return self._parts[0]
+
+    def _solve(self, t: FloatArray, log_size: FloatArray, var: FloatArray) -> SmoothedSize:
+        return smooth_size(*self._base, t, log_size, var, np.full(len(t), self._density))

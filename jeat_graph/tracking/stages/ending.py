@@ -1,0 +1,69 @@
+"""Confirmation and end of tracks."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from jeat_graph.association.merging import find_duplicates
+from jeat_graph.config.kernel_form import Settings
+from jeat_graph.filters.existence import track_boxes
+from jeat_graph.tracking.compaction import keep_rows
+from jeat_graph.tracking.state import TrackArrays
+
+
+@njit(cache=True)
+def confirm(tracks: TrackArrays, n: int, t: float, settings: Settings) -> None:
+    """Confirm the tracks that have earned it: by existence, or by age and hits (paper, track lifecycle)."""
+    for i in range(n):
+        if settings.by_existence:
+            earned = tracks.existence[i] >= settings.confirm_existence
+        else:
+            old = t - tracks.t_birth[i] >= settings.confirm_age_s
+            earned = old and tracks.hits[i] >= settings.confirm_hits
+        # No branch, on purpose: compiled with one, this loop was seen to clear flags it must not touch.
+        tracks.confirmed[i] = tracks.confirmed[i] or earned
+        if not settings.by_existence:
+            tracks.existence[i] = 1.0 if tracks.confirmed[i] else 0.5
+
+
+@njit(cache=True)
+def remove_ended(tracks: TrackArrays, n: int, t: float, settings: Settings) -> int:
+    """Remove tracks that are over, out of the picture, or duplicates; return the number left, in order."""
+    boxes = track_boxes(tracks.mean[:n], tracks.size_mean[:n])
+    remove = np.zeros(n, dtype=np.bool_)
+    if settings.merge and n > 1:
+        velocity = np.empty((n, 2))
+        velocity_var = np.empty((n, 2))
+        for i in range(n):
+            for axis in range(2):
+                velocity[i, axis] = tracks.mean[i, axis, 1]
+                velocity_var[i, axis] = tracks.cov[i, axis, 1, 1]
+        remove = find_duplicates(
+            boxes,
+            velocity,
+            velocity_var,
+            tracks.confirmed[:n],
+            settings.merge_min_overlap,
+            settings.merge_velocity_gate,
+        )
+    rows = np.empty(n, dtype=np.int64)
+    kept = 0
+    for i in range(n):
+        gap = t - tracks.t_update[i]
+        most = settings.max_gap_confirmed_s if tracks.confirmed[i] else settings.max_gap_tentative_s
+        if tracks.confirmed[i] and tracks.standing[i]:
+            most = max(most, settings.standing_gap_s)
+        x, y = tracks.mean[i, 0, 0], tracks.mean[i, 1, 0]
+        outside = x < 0.0 or y < 0.0 or x > settings.image_width or y > settings.image_height
+        doubted = settings.by_existence and tracks.existence[i] < settings.delete_existence
+        # A state that overflowed (a coasting track on wild input) must not survive as NaN.
+        broken = not (math.isfinite(x) and math.isfinite(y))
+        if remove[i] or gap > most or doubted or broken or (settings.leave_picture and outside):
+            continue
+        rows[kept] = i
+        kept += 1
+    keep_rows(tracks, rows[:kept])
+    return kept

@@ -1,0 +1,111 @@
+"""State of all tracks at once: a structure of preallocated arrays, one row a track, the oldest first."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.data.arrays import FloatArray, IntArray
+
+
+class TrackArrays(NamedTuple):
+    """Arrays of capacity C for tracks and S sensors; rows beyond the number of living tracks are unused.
+
+    Attributes:
+        mean: (C, 2, 3 + B) per axis [p, v, a] of the box centre (px, px/s, px/s²), and the errors with memory
+            of B sensors (`filters/coloured.py`).
+        cov: (C, 2, 3 + B, 3 + B) covariance per axis; the axes are independent.
+        size_mean: (C, 2, 2) ln width and ln height, each with its rate (1/s).
+        size_cov: (C, 2, 2, 2) covariance of each.
+        anchor: (C, 2) where the track is if it stands still (px).
+        anchor_var: (C, 2) variances of that point (px²).
+        anchor_t: (C,) since when it may have stood there (s).
+        still_odds: (C,) log odds of standing against moving.
+        standing: (C,) whether the track counts as standing.
+        scale: (C, S) noise scale s of paper eq. 5.
+        p_detect: (C, S) running estimate of each sensor's probability of detecting this track.
+        hidden: (C, S) probability that the track, if it exists, is hidden from each sensor for now.
+        existence: (C,) probability that the track is a vehicle.
+        confirmed: (C,) whether it has been confirmed.
+        track_id: (C,) identity, ascending.
+        hits: (C,) number of detections taken.
+        t_birth: (C,) time of the first detection (s).
+        t_update: (C,) time of the last one (s).
+        used: (C,) bit s is set where sensor s's detection was taken in the last step.
+    """
+
+    mean: FloatArray
+    cov: FloatArray
+    size_mean: FloatArray
+    size_cov: FloatArray
+    anchor: FloatArray
+    anchor_var: FloatArray
+    anchor_t: FloatArray
+    still_odds: FloatArray
+    standing: npt.NDArray[np.bool_]
+    scale: FloatArray
+    p_detect: FloatArray
+    hidden: FloatArray
+    existence: FloatArray
+    confirmed: npt.NDArray[np.bool_]
+    track_id: IntArray
+    hits: IntArray
+    t_birth: FloatArray
+    t_update: FloatArray
+    used: IntArray
+
+
+class SceneArrays(NamedTuple):
+    """What is learnt of the scene as a whole.
+
+    Attributes:
+        clutter: (S,) expected false boxes in a scan of each sensor.
+        p_detect: (S,) each sensor's mean probability of detecting a confirmed track: light and darkness.
+        undetected: (1,) expected number of vehicles in the scene that have no track yet.
+    """
+
+    clutter: FloatArray
+    p_detect: FloatArray
+    undetected: FloatArray
+
+
+def allocate(capacity: int, num_sensors: int, num_errors: int = 0) -> TrackArrays:
+    """Allocate zeroed arrays for `capacity` tracks, `num_sensors` sensors and `num_errors` error states."""
+    dim = 3 + num_errors
+    return TrackArrays(
+        mean=np.zeros((capacity, 2, dim)),
+        cov=np.zeros((capacity, 2, dim, dim)),
+        size_mean=np.zeros((capacity, 2, 2)),
+        size_cov=np.zeros((capacity, 2, 2, 2)),
+        anchor=np.zeros((capacity, 2)),
+        anchor_var=np.zeros((capacity, 2)),
+        anchor_t=np.zeros(capacity),
+        still_odds=np.zeros(capacity),
+        standing=np.zeros(capacity, dtype=np.bool_),
+        scale=np.zeros((capacity, num_sensors)),
+        p_detect=np.zeros((capacity, num_sensors)),
+        hidden=np.zeros((capacity, num_sensors)),
+        existence=np.zeros(capacity),
+        confirmed=np.zeros(capacity, dtype=np.bool_),
+        track_id=np.zeros(capacity, dtype=np.int64),
+        hits=np.zeros(capacity, dtype=np.int64),
+        t_birth=np.zeros(capacity),
+        t_update=np.zeros(capacity),
+        used=np.zeros(capacity, dtype=np.int64),
+    )
+
+
+def grow(tracks: TrackArrays, num_tracks: int, capacity: int) -> TrackArrays:
+    """Return arrays of at least `capacity` rows that hold the first `num_tracks` rows of `tracks`.
+
+    Capacity grows by doubling, so that n births cost O(n) copies in all.
+    """
+    old = len(tracks.existence)
+    if capacity <= old:
+        return tracks
+    larger = allocate(max(capacity, 2 * old), tracks.scale.shape[1], tracks.mean.shape[2] - 3)
+    for source, target in zip(tracks, larger, strict=True):
+        target[:num_tracks] = source[:num_tracks]
+    return larger

@@ -1,0 +1,44 @@
+"""Compile the tracker ahead of its first use; numba keeps the machine code beside the sources.
+
+Run `python -m jeat_graph.tracking.warm_up` after an installation or an update, so that no user waits for it.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+NOTICE = "compiling the tracker for this machine, once (about half a minute) …"
+
+
+def is_compiled() -> bool:
+    """Tell whether machine code of the tracker's step is there for this version of Python."""
+    from jeat_graph.tracking.step import step
+
+    version = f"py{sys.version_info.major}{sys.version_info.minor}"
+    folder = Path(str(step.stats.cache_path))
+    return any(folder.glob(f"step.step-*.{version}.nbi"))
+
+
+def notice_if_cold() -> None:
+    """Say on stderr that the first step will take a while, if it will."""
+    if not is_compiled():
+        print(f"jeat-graph: {NOTICE}", file=sys.stderr, flush=True)
+
+
+def warm_up() -> None:
+    """Track a vehicle for a second with each preset, smoother included, which compiles all they need."""
+    from jeat_graph.config.reading import load_config
+    from jeat_graph.tracking.tracker import Tracker
+
+    for preset in ("default", "paper"):
+        tracker = Tracker(load_config(preset))
+        for k in range(20):
+            box = [100.0 + 5.0 * k, 100.0, 40.0, 30.0]
+            tracker.step([(0.05 * k, name, [box], [0.9]) for name in tracker.sensor_names])
+        tracker.finish()
+
+
+if __name__ == "__main__":
+    notice_if_cold()
+    warm_up()

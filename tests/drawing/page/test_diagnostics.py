@@ -1,0 +1,150 @@
+"""The table of diagnostics: what `track --diagnostics` says of each update."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from jeat_graph import Tracker, load_config
+from jeat_graph.cli.main import main
+from jeat_graph.data.diagnostics import Diagnostics
+from jeat_graph.data.errors import DataError, JeatGraphError
+from jeat_graph.eval.lagged import states_at
+from jeat_graph.io.detections_io import write_detections
+from jeat_graph.io.diagnostics_io import COLUMNS, read_diagnostics, write_diagnostics
+from jeat_graph.io.trajectories_io import read_trajectories
+from jeat_graph.simulation.scenario import load_scenario
+from jeat_graph.simulation.simulate import record
+from jeat_graph.tracking.records import record_tracks
+
+HEAD = ",".join(COLUMNS)
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return record(load_scenario("night"), 5, 2.0).detections
+
+
+def collect(config, detections):
+    tracker = Tracker(config, diagnostics=True)
+    parts = []
+    for batch in detections.batches():
+        tracker.step(batch)
+        parts.append(tracker.last_updates())
+    return Diagnostics.concatenate(parts)
+
+
+def test_nis_is_that_of_an_independent_filter_over_the_same_measurements(recording):
+    config = load_config(
+        "default", ["standing.enabled=false", "motion.jerk_per_size=0", "motion.jerk_per_growth=0"]
+    )
+    one_sensor = recording.select(["rgb"])
+    table = collect(config, one_sensor)
+    records, _ = record_tracks(config, one_sensor)
+    assert len(records) > 5
+    for one in records:
+        _, _, _, innovations = states_at(one.data, one.data.t[:1], [])
+        mine = table.nis[table.track_id == one.track_id]
+        assert np.isnan(mine[0])
+        np.testing.assert_allclose(mine[1:], innovations.nis(), rtol=1e-6, atol=1e-9)
+
+
+def test_noise_scale_is_the_one_before_the_detection_adapted_it_by_equation_5(recording):
+    noise = load_config("default").noise
+    table = collect(load_config("default"), recording)
+    pairs = np.unique(np.stack([table.track_id, table.sensor]), axis=1).T
+    checked = 0
+    for track_id, sensor in pairs.tolist():
+        mine = table.take((table.track_id == track_id) & (table.sensor == sensor))
+        surprise = np.where(np.isnan(mine.nis), 0.0, mine.nis / 2.0 - 1.0)
+        wanted = mine.noise_scale * (1.0 + noise.adaptation_rate * surprise)
+        wanted = np.clip(wanted, noise.scale_min, noise.scale_max)
+        np.testing.assert_allclose(mine.noise_scale[1:], wanted[:-1], rtol=1e-12)
+        checked += len(wanted) - 1
+    assert checked > 1000
+
+
+def test_each_update_of_a_reported_track_stands_in_the_column_sensors(tmp_path, recording):
+    source = tmp_path / "d.csv"
+    write_detections(recording, source)
+    assert main(["track", str(source), "--out", str(tmp_path / "run"), "--diagnostics"]) == 0
+    causal = read_trajectories(tmp_path / "run" / "causal.csv")
+    table = read_diagnostics(tmp_path / "run" / "diagnostics.csv")
+    told = {
+        (t, i, name)
+        for t, i, text in zip(causal.t, causal.track_id, causal.sensor_text(), strict=True)
+        for name in text.split("|")
+        if name
+    }
+    logged = {(t, i, table.sensors[s]) for t, i, s in zip(table.t, table.track_id, table.sensor, strict=True)}
+    assert told <= logged
+    confirmed = set(zip(causal.t, causal.track_id, strict=True))
+    assert {one for one in logged if one[:2] in confirmed} == told
+
+
+def test_the_option_changes_no_byte_of_the_other_tables(tmp_path, recording):
+    source = tmp_path / "d.csv"
+    write_detections(recording, source)
+    for name, more in (("a", []), ("b", ["--diagnostics"]), ("c", ["--diagnostics"])):
+        assert main(["track", str(source), "--out", str(tmp_path / name), *more]) == 0
+    for file in ("causal.csv", "smoothed.csv"):
+        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
+    assert not (tmp_path / "a" / "diagnostics.csv").exists()
+    assert (tmp_path / "b" / "diagnostics.csv").read_bytes() == (
+        tmp_path / "c" / "diagnostics.csv"
+    ).read_bytes()
+
+
+def test_a_run_without_the_option_removes_the_table_of_an_earlier_one(tmp_path, recording):
+    source, out = tmp_path / "d.csv", tmp_path / "run"
+    write_detections(recording, source)
+    assert main(["track", str(source), "--out", str(out), "--diagnostics"]) == 0
+    assert main(["track", str(source), "--out", str(out)]) == 0
+    assert not (out / "diagnostics.csv").exists()
+
+
+def test_it_works_without_a_smoother_too(recording):
+    with_smoother = collect(load_config("default"), recording)
+    without = collect(load_config("default", ["smoother.engine=none"]), recording)
+    np.testing.assert_array_equal(with_smoother.nis, without.nis)
+
+
+def test_what_is_written_is_read_again(tmp_path: Path):
+    table = Diagnostics(
+        t=np.array([0.0, 0.5]),
+        track_id=np.array([3, 4]),
+        sensor=np.array([1, 0]),
+        nis=np.array([np.nan, 2.25]),
+        noise_scale=np.array([1.0, 1.5]),
+        existence=np.array([0.75, np.nan]),
+        sensors=("evt", "rgb"),
+    )
+    write_diagnostics(table, tmp_path / "d.csv")
+    back = read_diagnostics(tmp_path / "d.csv")
+    for name in COLUMNS:
+        np.testing.assert_array_equal(getattr(back, name), getattr(table, name))
+    assert back.sensors == table.sensors
+
+
+def test_a_tracker_without_diagnostics_says_how_to_get_them():
+    with pytest.raises(JeatGraphError, match="diagnostics=True"):
+        Tracker(load_config("default")).last_updates()
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("0,1,rgb,-1,1,1", "nis must not be negative"),
+        ("0,1,rgb,1,0,1", "noise_scale must be positive"),
+        ("0,1,rgb,1,1,1.5", "existence must be in"),
+        ("0,1,,1,1,1", "sensor is missing"),
+        ("0,x,rgb,1,1,1", "track_id"),
+    ],
+)
+def test_a_bad_line_is_named(tmp_path: Path, line, message):
+    path = tmp_path / "diagnostics.csv"
+    path.write_text(f"{HEAD}\n0,1,rgb,,1,0.5\n{line}\n", encoding="utf-8")
+    with pytest.raises(DataError, match=rf"diagnostics\.csv:3: .*{message}"):
+        read_diagnostics(path)

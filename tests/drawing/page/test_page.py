@@ -1,0 +1,338 @@
+"""The page of a run: its figures are those of the tables, and it needs nothing but itself."""
+
+from __future__ import annotations
+
+import json
+import re
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from jeat_graph.cli.main import main
+from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.io.diagnostics_io import read_diagnostics
+from jeat_graph.io.trajectories_io import read_trajectories, write_trajectories
+
+
+@pytest.fixture(scope="module")
+def causal(full_run):
+    return read_trajectories(full_run.run / "causal.csv")
+
+
+@pytest.fixture(scope="module")
+def smoothed(full_run):
+    return read_trajectories(full_run.run / "smoothed.csv")
+
+
+@pytest.fixture(scope="module")
+def diagnostics(full_run):
+    return read_diagnostics(full_run.run / "diagnostics.csv")
+
+
+def test_nothing_is_asked_of_a_network(full_run):
+    text = full_run.page.read_text(encoding="utf-8")
+    assert "http://" not in text
+    assert "https://" not in text
+    assert "@import" not in text
+    assert re.findall(r"url\(", text) == []
+    for tag, attributes in full_run.html.tags:
+        for name in ("src", "href", "xlink:href", "data", "srcset", "action"):
+            value = attributes.get(name)
+            assert value is None or value.startswith("data:"), (tag, name)
+    policies = [one for one in full_run.html.attributes("meta") if "http-equiv" in one]
+    assert policies[0]["content"].startswith("default-src 'none'")
+
+
+def test_the_same_run_gives_the_same_bytes(full_run, tmp_path):
+    again = tmp_path / "again.html"
+    assert main(["report", str(full_run.run), "--gt", str(full_run.truth), "--out", str(again)]) == 0
+    assert again.read_bytes() == full_run.page.read_bytes()
+
+
+def test_scores_are_those_of_eval(full_run, tmp_path):
+    scores = tmp_path / "scores.json"
+    assert main(["eval", str(full_run.run), "--gt", str(full_run.truth), "--json", str(scores)]) == 0
+    wanted = json.loads(scores.read_text())
+    shown = {row["table"]: row for row in full_run.html.tables[""]}
+    assert set(shown) == {"causal", "smoothed"}
+    for kind, values in wanted.items():
+        for name in ("MOTA", "IDF1", "HOTA", "position_rmse"):
+            assert shown[kind][name] == f"{values[name]:.2f}"
+        assert shown[kind]["FN"] == str(values["FN"])
+
+
+def test_counts_are_those_of_the_tables(full_run, causal, smoothed):
+    rows = {row["table"]: row for row in full_run.html.tables["Tracks"]}
+    for kind, table in (("causal", causal), ("smoothed", smoothed)):
+        ids = np.unique(table.track_id)
+        lives = [np.ptp(table.t[table.track_id == i]) for i in ids]
+        assert rows[kind]["tracks"] == str(len(ids))
+        assert rows[kind]["rows"] == str(len(table))
+        assert rows[kind]["longest (s)"] == f"{max(lives):.2f}"
+        assert rows[kind]["rows without any detection (%)"] == f"{100 * np.mean(table.used == 0):.2f}"
+
+
+def test_consistency_by_sensor_is_that_of_the_diagnostics(full_run, causal, smoothed, diagnostics):
+    reported = np.isin(diagnostics.track_id, np.union1d(causal.track_id, smoothed.track_id))
+    rows = {row["sensor"]: row for row in full_run.html.tables["Consistency by sensor"]}
+    assert set(rows) == {"evt", "rgb"}
+    for k, name in enumerate(diagnostics.sensors):
+        mine = reported & (diagnostics.sensor == k)
+        nis = diagnostics.nis[mine]
+        inside = (nis >= 0.0506) & (nis <= 7.3778)
+        assert rows[name]["updates"] == str(mine.sum())
+        assert rows[name]["mean NIS / 2"] == f"{np.nanmean(nis) / 2:.3f}"
+        share = 100 * inside.sum() / np.isfinite(nis).sum()
+        assert rows[name]["NIS within 95 % bounds (%)"] == f"{share:.1f}"
+        assert rows[name]["median s"] == f"{np.median(diagnostics.noise_scale[mine]):.2f}"
+
+
+def test_every_track_is_on_the_map_in_the_list_and_has_curves(full_run, causal, smoothed):
+    ids = [str(i) for i in np.union1d(causal.track_id, smoothed.track_id)]
+    groups = [one["data-id"] for one in full_run.html.attributes("g") if one.get("class") == "track"]
+    assert groups == ids
+    assert [row["track"] for row in full_run.html.tables["All tracks"]] == ids
+    assert [str(one["id"]) for one in full_run.html.data["tracks"]] == ids
+
+
+def test_the_map_draws_each_track_where_its_table_has_it(full_run, causal):
+    paths = re.findall(r'data-id="(\d+)".*?class="now" d="([^"]+)"', full_run.page.read_text(), re.DOTALL)
+    assert paths
+    for track_id, path in paths:
+        steps = np.array([[float(v) for v in step.split()] for step in re.findall(r"[Mml]([-.\d ]+)", path)])
+        mine = causal.take(causal.track_id == int(track_id))
+        drawn = np.cumsum(steps, axis=0)
+        np.testing.assert_allclose(drawn[0], mine.mean[0, :2], atol=0.051)
+        np.testing.assert_allclose(drawn[-1], mine.mean[-1, :2], atol=0.051)
+        nearest = np.abs(drawn[:, None] - mine.mean[None, :, :2]).max(axis=2).min(axis=1)
+        assert nearest.max() < 0.051
+
+
+def test_curves_hold_values_of_the_tables(full_run, causal, diagnostics):
+    data = full_run.html.data
+    start = data["start_ms"]
+    names = data["sensors"]
+    for one in data["tracks"]:
+        mine = diagnostics.take(diagnostics.track_id == one["id"])
+        for k, name in enumerate(names):
+            here = (mine.sensor == mine.sensors.index(name)) & np.isfinite(mine.nis)
+            ms = np.rint(1e3 * mine.t[here]).astype(int)
+            told = dict(zip((ms - start).tolist(), mine.nis[here].tolist(), strict=True))
+            for t, v in zip(one["nis"][k]["t"], one["nis"][k]["v"], strict=True):
+                assert v == pytest.approx(told[t], rel=1e-3)
+            if here.any():
+                assert max(one["nis"][k]["v"]) == pytest.approx(mine.nis[here].max(), rel=1e-3)
+        rows = causal.take(causal.track_id == one["id"])
+        motion = one["motion"]
+        t = (np.array(motion["t"]) + start) / 1e3
+        near = np.abs(rows.t[None] - t[:, None]) < 1.1e-3  # times are shown to the millisecond
+        for name, wanted in (("vx", rows.mean[:, 2]), ("svy", np.sqrt(rows.var[:, 3]))):
+            same = np.isclose(np.array(motion[name])[:, None], wanted, rtol=1e-3, atol=1e-2)
+            assert (near & same).any(axis=1).all()
+
+
+def test_difference_of_filter_and_smoother_is_that_of_the_rows(full_run, causal, smoothed):
+    data = full_run.html.data
+    checked = 0
+    for one in data["tracks"]:
+        early = causal.take(causal.track_id == one["id"])
+        late = smoothed.take(smoothed.track_id == one["id"])
+        for ms, dx in zip(one["motion"]["t"], one["motion"]["dx"], strict=True):
+            t = (ms + data["start_ms"]) / 1e3
+            a, b = np.abs(early.t - t) < 6e-4, np.abs(late.t - t) < 6e-4
+            if dx is not None and a.sum() == 1 and b.sum() == 1:
+                assert dx == pytest.approx(
+                    float(early.mean[a, 0][0] - late.mean[b, 0][0]), rel=1e-3, abs=2e-3
+                )
+                checked += 1
+    assert checked > 500
+
+
+def test_sensor_bins_hold_each_use_of_a_sensor(full_run, causal):
+    data = full_run.html.data
+    for one in data["tracks"]:
+        rows = causal.take(causal.track_id == one["id"])
+        for k, name in enumerate(data["sensors"]):
+            ms = 1e3 * rows.t[rows.used >> rows.sensors.index(name) & 1 > 0] - data["start_ms"]
+            for use in ms.tolist():
+                bins = np.array(one["used"][k])
+                low = one["from"] + bins * one["bin"]
+                assert ((low <= use + 1.5) & (use <= low + one["bin"] + 1.5)).any()
+
+
+def test_inputs_version_and_timings_stand_on_the_page(full_run):
+    record = json.loads((full_run.run / "run.json").read_text())
+    inputs = full_run.html.tables["Inputs"][0]
+    assert inputs["SHA-256"] == record["inputs"][0]["sha256"]
+    assert inputs["bytes"] == str(record["inputs"][0]["bytes"])
+    assert f"jeat-graph {record['version']}" in full_run.html.said
+    timings = {row["what"]: row["value"] for row in full_run.html.tables["Timings"]}
+    assert timings["track_s"] == f"{record['timings']['track_s']:.4f}"
+
+
+def test_filter_against_smoother_brings_the_pictures_of_compare_with_a_text(full_run):
+    pictures = full_run.html.attributes("img")
+    assert len(pictures) == 3
+    assert all(len(one["alt"]) > 40 for one in pictures)
+    assert any("px/s² for the whole track" in one["alt"] for one in pictures)
+
+
+def test_headings_go_down_one_level_at_a_time(full_run):
+    levels = [int(tag[1]) for tag, _ in full_run.html.tags if re.fullmatch(r"h\d", tag)]
+    assert levels[0] == 1
+    assert levels.count(1) == 1
+    assert all(b - a <= 1 for a, b in pairwise(levels))
+
+
+def test_controls_have_names(full_run):
+    html = full_run.html
+    assert html.attributes("html")[0]["lang"] == "en"
+    labelled = {one["for"] for one in html.attributes("label")}
+    assert {one["id"] for one in html.attributes("select")} <= labelled
+    assert all("scope" in one for one in html.attributes("th"))
+    assert html.attributes("svg")[0]["aria-label"].startswith("Map of the picture plane")
+
+
+def test_a_run_without_diagnostics_says_which_option_makes_them(copy_of, report):
+    html = report(copy_of("diagnostics.csv"))
+    assert "track --diagnostics" in html.said
+    assert "Consistency by sensor" not in html.tables
+    assert all(one["nis"] is None and one["scale"] is None for one in html.data["tracks"])
+
+
+def test_a_run_without_smoothed_table_is_shown_and_says_so(copy_of, report, causal):
+    html = report(copy_of("smoothed.csv"))
+    assert "There is no smoothed table" in html.said
+    assert [row["table"] for row in html.tables["Tracks"]] == ["causal"]
+    assert len(html.data["tracks"]) == len(np.unique(causal.track_id))
+    assert "dx" not in html.data["tracks"][0]["motion"]
+
+
+def test_a_run_without_record_is_shown_and_says_so(copy_of, report):
+    assert "There is no run.json" in report(copy_of("run.json")).said
+
+
+def test_inputs_that_are_gone_leave_out_the_comparison_with_the_reason(copy_of, tmp_path):
+    run = copy_of()
+    record = json.loads((run / "run.json").read_text())
+    record["reading"]["detections"] = [str(tmp_path / "gone.csv")]
+    (run / "run.json").write_text(json.dumps(record))
+    out = tmp_path / "page.html"
+    assert main(["report", str(run), "--out", str(out)]) == 0
+    text = out.read_text()
+    assert "Filter against smoother is not shown" in text
+    assert "--detections" in text
+
+
+def test_a_single_table_is_shown_and_named_as_one(full_run, report):
+    html = report(full_run.run / "smoothed.csv")
+    assert "This is a single table, not a run directory" in html.said
+    assert [row["table"] for row in html.tables["Tracks"]] == ["smoothed"]
+
+
+def test_an_empty_run_is_a_page_without_script(tmp_path, report):
+    run = tmp_path / "run"
+    run.mkdir()
+    write_trajectories(Trajectories.empty(("rgb",)), run / "causal.csv")
+    write_trajectories(Trajectories.empty(("rgb",)), run / "smoothed.csv")
+    html = report(run)
+    assert "This run has no tracks." in html.said
+    assert html.attributes("script") == []
+
+
+def test_a_single_row_is_enough(tmp_path, report):
+    run = tmp_path / "run"
+    run.mkdir()
+    one = Trajectories(
+        t=np.array([1.5]),
+        track_id=np.array([7]),
+        boxes=np.array([[10.0, 20.0, 30.0, 40.0]]),
+        existence=np.array([0.9]),
+        mean=np.array([[25.0, 40.0, 0, 0, 0, 0]]),
+        var=np.ones((1, 6)),
+        used=np.array([1]),
+        sensors=("rgb",),
+    )
+    write_trajectories(one, run / "causal.csv")
+    data = report(run).data
+    assert data["tracks"][0]["id"] == 7
+    assert data["start_ms"] == 1500
+
+
+HOSTILE = "</script><script>alert(1)</script>\"'&"
+
+
+def test_hostile_names_of_sensors_and_files_stay_text(tmp_path, report):
+    run = tmp_path / "run<b>&amp;"
+    run.mkdir()
+    n = 5
+    table = Trajectories(
+        t=np.arange(n) * 0.1,
+        track_id=np.ones(n, dtype=np.int64),
+        boxes=np.tile([10.0, 20.0, 30.0, 40.0], (n, 1)),
+        existence=np.ones(n),
+        mean=np.tile([25.0, 40.0, 0, 0, 0, 0], (n, 1)),
+        var=np.ones((n, 6)),
+        used=np.ones(n, dtype=np.int64),
+        sensors=(HOSTILE,),
+    )
+    write_trajectories(table, run / "causal.csv")
+    (run / "run.json").write_text(
+        json.dumps(
+            {
+                "inputs": [{"path": HOSTILE, "bytes": 1, "sha256": HOSTILE}],
+                "warnings": [HOSTILE],
+                "config": {"sensors": {HOSTILE: {}}},
+                "config_name": HOSTILE,
+                "version": HOSTILE,
+                "timings": {HOSTILE: 1.0},
+            }
+        )
+    )
+    html = report(run)
+    assert len(html.attributes("script")) == 2
+    assert html.attributes("b") == []
+    assert html.data["sensors"] == [HOSTILE]
+    assert html.tables["Inputs"][0]["file"] == HOSTILE
+    assert html.tables["Timings"][0]["what"] == HOSTILE
+    assert f"Warning of the run: {HOSTILE}" in html.said
+    assert "Run run<b>&amp;" in html.said
+
+
+def test_many_long_tracks_stay_below_five_megabytes(tmp_path, report):
+    tracks, steps = 50, 3000
+    rng = np.random.default_rng(1)
+    t = np.repeat(np.arange(steps) * 0.01, tracks)
+    n = len(t)
+    table = Trajectories(
+        t=t,
+        track_id=np.tile(np.arange(1, tracks + 1), steps),
+        boxes=rng.uniform(1, 500, (n, 4)),
+        existence=rng.uniform(0, 1, n),
+        mean=rng.normal(300, 100, (n, 6)),
+        var=rng.uniform(1, 100, (n, 6)),
+        used=rng.integers(0, 4, n),
+        sensors=("evt", "rgb"),
+    )
+    run = tmp_path / "run"
+    run.mkdir()
+    write_trajectories(table, run / "causal.csv")
+    write_trajectories(table, run / "smoothed.csv")
+    assert len(report(run).text) < 5e6
+
+
+def test_what_is_no_run_is_refused(tmp_path, capsys):
+    assert main(["report", str(tmp_path), "--out", str(tmp_path / "x.html")]) == 2
+    assert "neither causal.csv nor smoothed.csv" in capsys.readouterr().err
+    assert not (tmp_path / "x.html").exists()
+
+
+@pytest.mark.parametrize("text", ["{", "[1]"])
+def test_a_record_that_is_no_record_is_refused(copy_of, tmp_path, capsys, text):
+    run = copy_of()
+    (run / "run.json").write_text(text)
+    assert main(["report", str(run), "--out", str(tmp_path / "x.html")]) == 2
+    caught = capsys.readouterr().err
+    assert "run.json" in caught
+    assert caught.count("\n") == 1

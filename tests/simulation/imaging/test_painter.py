@@ -1,0 +1,111 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from jeat_graph.simulation.imaging.lighting import LUMINANCE
+from jeat_graph.simulation.imaging.smooth import clamp01
+from jeat_graph.simulation.world.light import LightConfig
+
+from .scenes import CAR, DARK, DAY, LAMPS, renderer_of
+
+OTHERS = [CAR, (1, -4.0, 30.0, -25.0, 4.7, 1.9, 1.72), (3, 9.0, 26.0, 22.0, 11.0, 2.5, 3.7)]
+
+
+@pytest.mark.parametrize("light", [DAY, LAMPS, DARK])
+def test_without_vehicles_there_is_the_static_picture(light: LightConfig) -> None:
+    renderer = renderer_of([], light)
+    np.testing.assert_array_equal(renderer.picture(0.0), renderer.background.whole)
+
+
+@pytest.mark.parametrize("light", [DAY, LAMPS, DARK])
+def test_radiance_is_finite_and_not_negative(light: LightConfig) -> None:
+    picture = renderer_of(OTHERS, light).picture(0.3)
+    assert np.isfinite(picture).all()
+    assert (picture >= 0.0).all()
+
+
+def test_what_is_dark_is_dark() -> None:
+    road = [
+        float(np.median(renderer_of(OTHERS, light).picture(0.0)[60:] @ LUMINANCE))
+        for light in (DAY, LAMPS, DARK)
+    ]
+    assert road[0] > 100.0 * road[1] > 1000.0 * road[2]
+
+
+def test_the_road_has_the_luminance_of_a_diffuse_surface() -> None:
+    renderer = renderer_of([], DAY)
+    ground = renderer.background
+    bare = (ground.front_cover == 0.0) & (ground.lux == ground.lux.max())
+    luminance, albedo = ground.back[bare] @ LUMINANCE, ground.albedo[bare] @ LUMINANCE
+    np.testing.assert_allclose(luminance, albedo * 20000.0 / np.pi, rtol=0.02)
+
+
+def test_street_lamps_light_the_road_as_the_scene_says() -> None:
+    renderer = renderer_of([], LAMPS)
+    ground = renderer.background
+    near = (ground.front_cover == 0.0) & (ground.lux > 0.0)
+    near &= (ground.place[..., 1] < 80.0) & (np.abs(ground.place[..., 0]) < 15.0)
+    expected = renderer.scene.light.illuminance(ground.place[near, 0], ground.place[near, 1])
+    # Lamps beyond the last one by which the scene counts add a little.
+    np.testing.assert_allclose(ground.lux[near], expected, rtol=0.03)
+
+
+@pytest.mark.parametrize("light", [DAY, LAMPS, DARK])
+def test_radiance_changes_continuously_with_motion(light: LightConfig) -> None:
+    renderer = renderer_of(OTHERS, light)
+    start = np.log(renderer.picture(0.5) @ LUMINANCE + 0.005)
+    change = [
+        float(np.abs(np.log(renderer.picture(0.5 + dt) @ LUMINANCE + 0.005) - start).max())
+        for dt in (4e-4, 1e-4)
+    ]
+    # A jump would stay when the step is made smaller.
+    assert change[1] < 0.4 * change[0]
+
+
+def test_a_bodys_cover_is_the_part_of_the_pixel_within_its_outline() -> None:
+    renderer = renderer_of([CAR], DAY)
+    moments = renderer.moments(np.array([0.0]), renderer.plan(0.0, 0.0).look)
+    sides = moments.hull[0, 0, 1, : moments.hull_count[0, 0, 1]]
+    box = moments.part_box[0, 0, 1]
+    fine = (np.arange(24) + 0.5) / 24
+    worst, total = 0.0, [0.0, 0.0]
+    for row in range(int(box[1]), int(box[3]) + 1):
+        for column in range(int(box[0]), int(box[2]) + 1):
+            u, v = np.meshgrid(column + fine, row + fine)
+            inside = np.all([s[0] * u + s[1] * v + s[2] >= 0.5 for s in sides], axis=0).mean()
+            cover = np.prod([clamp01(s[0] * (column + 0.5) + s[1] * (row + 0.5) + s[2]) for s in sides])
+            worst = max(worst, abs(cover - inside))
+            total[0] += cover
+            total[1] += inside
+    assert worst < 0.2
+    assert total[0] == pytest.approx(total[1], rel=0.02)
+
+
+def test_headlights_flare_over_more_pixels_than_they_cover() -> None:
+    rows = [(0, -6.0, 40.0, -25.0, 4.4, 1.8, 1.46)]
+    with_glow = renderer_of(rows, DARK).picture(0.0) @ LUMINANCE
+    without = renderer_of(rows, DARK, glare_share=0.0).picture(0.0) @ LUMINANCE
+    assert (with_glow > 1.0).sum() > 2 * (without > 1.0).sum() > 0
+
+
+def test_beams_light_the_road_before_a_vehicle_and_not_behind_it() -> None:
+    renderer = renderer_of([CAR], DARK, glare_share=0.0, taillight_candela=0.0)
+    gain = (renderer.picture(0.0) - renderer.background.whole) @ LUMINANCE
+    x, y = renderer.background.place[..., 0], renderer.background.place[..., 1]
+    road = (renderer.background.lux > 0.0) & (np.abs(x - CAR[1]) < 1.0)
+    assert gain[road & (y > 46.0) & (y < 60.0)].min() > 0.0
+    assert np.abs(gain[road & (y > 20.0) & (y < 34.0)]).max() == 0.0
+
+
+def test_a_vehicle_hides_what_is_behind_it() -> None:
+    hidden = (0, 9.0, 42.0, 20.0, 4.4, 1.7, 1.4)
+    truck = (3, 9.0, 26.0, 20.0, 12.0, 2.5, 3.9)
+    alone = renderer_of([truck], DAY, headlights_below_lux=0.0).picture(0.0)
+    both = renderer_of([truck, hidden], DAY, headlights_below_lux=0.0)
+    moments = both.moments(np.array([0.0]), both.plan(0.0, 0.0).look)
+    outline = moments.hull[0, 0, 1, : moments.hull_count[0, 0, 1]]
+    rows, columns = np.mgrid[0:112, 0:192] + 0.5
+    inside = np.all([s[0] * columns + s[1] * rows + s[2] >= 1.0 for s in outline], axis=0)
+    assert inside.sum() > 100
+    np.testing.assert_array_equal(both.picture(0.0)[inside], alone[inside])
