@@ -1,1 +1,1 @@
-"""The data that flows through the package: detections, trajectories, events, and errors that users can meet."""
+"""The data that flows through the package: detections, trajectories, events, and a user's errors."""
