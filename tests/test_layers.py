@@ -1,0 +1,318 @@
+"""The walls of the house: who may import whom, how long a file is, how many parameters a function takes."""
+
+from __future__ import annotations
+
+import ast
+import re
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+#: Folders at the top of the repository that are parts of the package once it is installed.
+TOP = ("filters", "association", "smoothers", "eval", "configs")
+#: Low to high: a module imports from its own layer and from those before it. The first name that fits
+#: counts; "" is the package itself, as its users import it.
+LAYERS = (
+    ("version", "data.arrays", "data.errors"),
+    ("filters", "association"),
+    ("smoothers",),
+    ("data",),
+    ("config", "configs"),
+    ("io",),
+    ("tracking",),
+    ("eval",),
+    ("runs",),
+    ("",),
+    ("calibration", "drawing", "simulation", "road", "detection", "live"),
+    ("benchmark",),
+    ("cli",),
+    ("__main__",),
+)
+MAX_LINES = 300
+MAX_PARAMETERS = 8
+
+# What is not yet as it should be. These lists only ever become shorter.
+KNOWN_UPWARD = {
+    ("config.reading", "io.atomic"),
+    ("data.diagnostics", "tracking.update_log"),
+    ("eval.load", "runs.directory"),
+}
+KNOWN_CIRCLES: set[str] = set()
+KNOWN_LONG_FILES = {
+    "eval/compare.py": 351,
+    "jeat_graph/config/schema.py": 358,
+    "jeat_graph/drawing/run_picture.py": 304,
+    "jeat_graph/io/tables.py": 306,
+}
+KNOWN_GTSAM = {"smoothers.engine"}
+KNOWN_WIDE_FUNCTIONS = {
+    "association.gates.gated_pairs": 12,
+    "association.gates._fill": 17,
+    "calibration.motion.innovation_loss": 13,
+    "simulation.imaging.background._trace": 10,
+    "simulation.imaging.bodies.add_body": 12,
+    "simulation.imaging.bodies.add_lamps": 9,
+    "simulation.imaging.bodies.add_glow": 10,
+    "simulation.imaging.event_camera._run_physical": 11,
+    "simulation.imaging.event_camera._run_carla": 11,
+    "simulation.imaging.faces.light_face": 10,
+    "simulation.imaging.lamps.light_lamps": 10,
+    "simulation.imaging.lighting.beam_lux": 11,
+    "simulation.imaging.paint.paint": 12,
+    "simulation.imaging.projection.project_moments": 9,
+    "simulation.imaging.projection._project": 11,
+    "simulation.imaging.projection._face_planes": 12,
+    "simulation.imaging.road_light.cast_shadow": 11,
+    "simulation.imaging.road_light.cast_beams": 13,
+    "simulation.imaging.road_light._on_barrier": 10,
+    "simulation.world.traffic._choose_lane_changes": 11,
+    "smoothers.adjoint.back_over_measurement": 9,
+    "smoothers.adjoint.smooth_one": 9,
+    "smoothers.backward.smooth_rows": 19,
+    "smoothers.backward.backward_between": 13,
+    "smoothers.forward.filter_rows": 18,
+    "smoothers.gtsam.whitened.segment_rows": 11,
+    "smoothers.track_data.TrackData.from_measurements": 10,
+    "tracking.stages.associating.associate": 9,
+    "tracking.stages.beginning.give_birth": 10,
+    "tracking.stages.beginning.start_track": 9,
+    "tracking.stages.learning.learn_scene": 11,
+    "tracking.stages.updating.take": 10,
+    "tracking.stages.updating.update_matched": 11,
+    "tracking.stages.updating.take_second_views": 9,
+    "tracking.step.step": 14,
+    "tracking.update_log.log_update": 9,
+}
+
+
+class Import(NamedTuple):
+    """One import: the module that imports, the one imported, and whether it runs (or is for types only)."""
+
+    importer: str
+    imported: str
+    runs: bool
+
+
+@cache
+def modules() -> dict[str, Path]:
+    """Every module by its name within the package ("" is the package itself)."""
+    paths = [path for folder in TOP for path in (ROOT / folder).rglob("*.py")]
+    found = {}
+    for path in [*paths, *(ROOT / "jeat_graph").rglob("*.py")]:
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        parts = parts[parts[0] == "jeat_graph" :]
+        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+@cache
+def tree(name: str) -> ast.Module:
+    """The syntax tree of a module."""
+    return ast.parse(modules()[name].read_text(encoding="utf-8"))
+
+
+def names_imported(node: ast.AST) -> list[str]:
+    """Dotted names that an import statement may stand for, the longest first for each."""
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    if isinstance(node, ast.ImportFrom):
+        assert not node.level, "imports are absolute"
+        return [f"{node.module}.{alias.name}" for alias in node.names]
+    return []
+
+
+def module_of(dotted: str) -> str | None:
+    """The module of ours that a dotted name lies in, or None for others' packages."""
+    package, _, rest = dotted.partition(".")
+    if package != "jeat_graph":
+        return None
+    while rest not in modules():
+        rest = rest.rpartition(".")[0]
+    return rest
+
+
+def for_types_only(node: ast.AST) -> bool:
+    """Whether a statement is `if TYPE_CHECKING:`."""
+    return isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+
+
+def imports_within(node: ast.AST, runs: bool = True) -> list[tuple[str, bool]]:
+    """All dotted names imported at or below a node, inside functions too, and whether each import runs."""
+    found = [(name, runs) for name in names_imported(node)]
+    for child in ast.iter_child_nodes(node):
+        found += imports_within(child, runs and not for_types_only(child))
+    return found
+
+
+@cache
+def imports() -> list[Import]:
+    """Every import of one module of ours by another."""
+    return [
+        Import(name, imported, runs)
+        for name in modules()
+        for dotted, runs in imports_within(tree(name))
+        if (imported := module_of(dotted)) is not None and imported != name
+    ]
+
+
+def layer(name: str) -> int:
+    """How high a module stands."""
+    for height, members in enumerate(LAYERS):
+        if any(name == member or (member and name.startswith(f"{member}.")) for member in members):
+            return height
+    raise AssertionError(f"{name} has no place in any layer")
+
+
+def circles(edges: dict[str, set[str]]) -> list[list[str]]:
+    """Strongly connected groups of more than one node, sorted (Tarjan, 1972)."""
+    number: dict[str, int] = {}
+    low: dict[str, int] = {}
+    stack: list[str] = []
+    groups: list[list[str]] = []
+
+    def visit(node: str) -> None:
+        number[node] = low[node] = len(number)
+        stack.append(node)
+        for target in sorted(edges.get(node, ())):
+            if target not in number:
+                visit(target)
+            if target in stack:
+                low[node] = min(low[node], low[target])
+        if low[node] == number[node]:
+            cut = stack.index(node)
+            group = sorted(stack[cut:])
+            del stack[cut:]
+            if len(group) > 1:
+                groups.append(group)
+
+    for node in sorted(edges):
+        if node not in number:
+            visit(node)
+    return sorted(groups)
+
+
+def functions(node: ast.AST, prefix: str) -> list[tuple[str, ast.FunctionDef | ast.AsyncFunctionDef]]:
+    """Every function below a node with its full name."""
+    found = []
+    for child in ast.iter_child_nodes(node):
+        name = f"{prefix}.{child.name}" if hasattr(child, "name") else prefix
+        if isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef):
+            found.append((name, child))
+        found += functions(child, name)
+    return found
+
+
+def parameters(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    """Number of parameters without self and cls; those behind a star count once."""
+    given = function.args
+    named = [arg.arg for arg in (*given.posonlyargs, *given.args, *given.kwonlyargs)]
+    return (
+        len([name for name in named if name not in ("self", "cls")]) + bool(given.vararg) + bool(given.kwarg)
+    )
+
+
+def says_why_so_many(function: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
+    """Whether this is a compiled kernel whose docstring has a sentence about its parameters or arguments."""
+    compiled = any("njit" in ast.unparse(decorator) for decorator in function.decorator_list)
+    return compiled and bool(re.search(r"\b(parameters|arguments)\b", ast.get_docstring(function) or ""))
+
+
+def test_imports_go_downwards_only():
+    upward = {(i.importer, i.imported) for i in imports() if layer(i.imported) > layer(i.importer)}
+    assert sorted(upward - KNOWN_UPWARD) == []
+
+
+def test_eval_never_imports_the_tracker():
+    reached = {i.imported for i in imports() if layer(i.importer) == layer("eval")}
+    assert sorted(name for name in reached if layer(name) == layer("tracking")) == []
+
+
+def test_only_its_own_box_imports_gtsam():
+    users = {
+        name
+        for name in modules()
+        for dotted, _ in imports_within(tree(name))
+        if dotted.split(".")[0] == "gtsam"
+    }
+    assert users, "GTSAM is used"
+    outside = {name for name in users if not name.startswith("smoothers.gtsam.")}
+    assert sorted(outside - KNOWN_GTSAM) == []
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    edges: dict[str, set[str]] = {}
+    for importer, imported, runs in imports():
+        if runs:
+            edges.setdefault(importer, set()).add(imported)
+    assert [group for group in circles(edges) if " ".join(group) not in KNOWN_CIRCLES] == []
+
+
+def test_no_module_lies_loose_beside_the_rooms():
+    loose = {path.name for path in (ROOT / "jeat_graph").iterdir() if path.is_file()}
+    assert loose == {"__init__.py", "__main__.py", "version.py", "py.typed"}
+
+
+def test_every_module_says_what_it_is():
+    assert [name for name in sorted(modules()) if not ast.get_docstring(tree(name))] == []
+
+
+def test_no_file_is_too_long():
+    lines = {
+        path.relative_to(ROOT).as_posix(): len(path.read_text(encoding="utf-8").splitlines())
+        for path in modules().values()
+    }
+    long = {name: num for name, num in lines.items() if num > KNOWN_LONG_FILES.get(name, MAX_LINES)}
+    assert long == {}
+
+
+def test_no_function_takes_too_many_parameters():
+    wide = {}
+    for module in modules():
+        for name, function in functions(tree(module), module):
+            number = parameters(function)
+            if number > KNOWN_WIDE_FUNCTIONS.get(name, MAX_PARAMETERS) and not says_why_so_many(function):
+                wide[name] = number
+    assert wide == {}
+
+
+# The checks themselves, on houses whose walls are known.
+
+
+def test_circles_are_found():
+    assert circles({"a": {"b"}, "b": {"c"}, "c": {"a", "d"}, "d": {"e"}, "f": {"g"}, "g": {"f"}}) == [
+        ["a", "b", "c"],
+        ["f", "g"],
+    ]
+    assert circles({"a": {"b", "c"}, "b": {"c"}}) == []
+
+
+def test_imports_inside_functions_count_and_those_for_types_do_not_run():
+    source = (
+        "def f():\n    from jeat_graph.cli import main\nif TYPE_CHECKING:\n    import jeat_graph.io.video\n"
+    )
+    assert imports_within(ast.parse(source)) == [
+        ("jeat_graph.cli.main", True),
+        ("jeat_graph.io.video", False),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("source", "number"),
+    [
+        ("def f(self, a, /, b, *, c): ...", 3),
+        ("def f(*args, a=1, **options): ...", 3),
+        ("def f(): ...", 0),
+    ],
+)
+def test_parameters_are_counted(source, number):
+    assert parameters(ast.parse(source).body[0]) == number
+
+
+def test_layers_ascend():
+    low = "data.errors filters.motion smoothers.rts data.detections config.schema io.csv_text tracking.step"
+    high = "eval.metrics runs.directory drawing.palette benchmark.speed cli.main __main__"
+    assert all(layer(one) < layer(next_one) for one, next_one in pairwise(f"{low} {high}".split()))
