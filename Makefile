@@ -5,6 +5,7 @@
 #   make lint    style, format and docstrings
 #   make types   type-check the built package
 #   make build   build the wheel (in dist/)
+#   make docs    build the documentation (in docs/_build/html)
 #   make clean   remove what was built and computed, .venv included
 
 PYTHONS := python3 python3.13 python3.12 python3.11
@@ -15,7 +16,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
 SOURCES := $(shell find jeat_graph filters association smoothers -name '*.py')
 
-.PHONY: demo test lint types build clean
+.PHONY: demo test lint types build docs clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.compiled
@@ -37,8 +38,13 @@ types: build/.installed
 
 build: build/.wheel
 
+# A warning is an error: a link or a name that leads nowhere.
+docs: $(VENV)/.docs
+	@$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
+	@echo "make: open docs/_build/html/index.html"
+
 clean:
-	rm -rf $(VENV) build dist demo *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) build dist demo docs/_build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:
@@ -55,6 +61,11 @@ $(VENV)/.test: pyproject.toml $(VENV)/.run
 	@echo "make: installing what the tests need"
 	@$(PIP) --editable '.[test]'
 	@$(PIP) --no-deps norfair==2.3.0
+	@touch $@
+
+$(VENV)/.docs: pyproject.toml $(VENV)/.run
+	@echo "make: installing what builds the documentation"
+	@$(PIP) --editable '.[docs]'
 	@touch $@
 
 $(VENV)/.lint: pyproject.toml | $(BIN)/python

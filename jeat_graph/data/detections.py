@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, TextArray
 from jeat_graph.data.errors import DataError
 
 
@@ -123,16 +123,16 @@ class Detections:
     scan_start: IntArray
     boxes: FloatArray
     scores: FloatArray
-    classes: npt.NDArray[np.str_] | None = None
+    classes: TextArray | None = None
 
     @staticmethod
     def from_rows(
         t: npt.ArrayLike,
-        sensor: Sequence[str] | npt.NDArray[np.str_],
+        sensor: Sequence[str] | TextArray,
         boxes: npt.ArrayLike,
         scores: npt.ArrayLike,
         empty: npt.ArrayLike | None = None,
-        classes: Sequence[str] | npt.NDArray[np.str_] | None = None,
+        classes: Sequence[str] | TextArray | None = None,
     ) -> Detections:
         """Group rows, in any order, into scans. Rows of one scan keep their order.
 
@@ -217,9 +217,7 @@ class Detections:
 
     def to_rows(
         self,
-    ) -> tuple[
-        FloatArray, npt.NDArray[np.str_], FloatArray, FloatArray, npt.NDArray[np.bool_], npt.NDArray[np.str_]
-    ]:
+    ) -> tuple[FloatArray, TextArray, FloatArray, FloatArray, npt.NDArray[np.bool_], TextArray]:
         """Flatten to one row a detection, and one row for each empty scan.
 
         Returns:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray, IntArray, TextArray
 from jeat_graph.data.errors import DataError
 
 
@@ -114,7 +114,7 @@ class GroundTruth:
     boxes: FloatArray
     motion: FloatArray | None
     ignore: npt.NDArray[np.bool_]
-    classes: npt.NDArray[np.str_] | None = None
+    classes: TextArray | None = None
     distance: FloatArray | None = None
     frames: FloatArray | None = None
 

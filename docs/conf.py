@@ -1,0 +1,41 @@
+"""Settings of the documentation, built by `make docs` (Sphinx, MyST Markdown, furo)."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent / "_ext"))
+
+from jeat_graph.version import __version__
+
+project = "jeat-graph"
+author = "The jeat-graph authors"
+copyright = author
+release = version = __version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "generated_reference",
+    "mathml",
+]
+myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
+myst_heading_anchors = 3
+autodoc_member_order = "bysource"
+autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented_params"
+napoleon_google_docstring = True
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True
+nitpicky = False
+exclude_patterns = ["_build", "_ext"]
+
+html_theme = "furo"
+html_title = "jeat-graph"
+html_static_path = ["_static"]
+html_css_files = ["extra.css"]
+html_copy_source = False
+html_show_sphinx = False
+autodoc_type_aliases = {name: name for name in ("FloatArray", "IntArray", "BoolArray", "TextArray")}
