@@ -20,6 +20,7 @@ COMMANDS = (
     "stream",
     "eval",
     "compare",
+    "count",
     "render",
     "report",
     "calibrate",

@@ -1,0 +1,97 @@
+"""`jeat-graph count`: how many vehicles crossed a line in the picture, by direction, class and interval."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.config.argument_types import positive
+from jeat_graph.data.errors import DataError
+from jeat_graph.eval.counting import Line
+
+HELP = "count vehicles over lines in the picture, by direction, with intervals"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument("source", metavar="RUN", help="run directory or trajectory table")
+    parser.add_argument(
+        "--line",
+        action="append",
+        required=True,
+        metavar="[NAME=]X1,Y1,X2,Y2",
+        help="a line in px, crossed to its left or right as seen from its first point; may be repeated",
+    )
+    parser.add_argument(
+        "--interval", type=positive, metavar="S", help="length of one interval (default: all)"
+    )
+    parser.add_argument("--out", metavar="FILE", help="write the counts as CSV (default: print a table)")
+    parser.add_argument("--crossings", metavar="FILE", help="also write every crossing as CSV")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Count."""
+    from jeat_graph.eval import counting
+    from jeat_graph.eval.load import tables_of
+    from jeat_graph.eval.tables import Table
+    from jeat_graph.io.table_writer import write_columns
+    from jeat_graph.io.trajectories_io import read_trajectories
+
+    lines = [_line(text, k) for k, text in enumerate(args.line, 1)]
+    names = [line.name for line in lines]
+    if len(set(names)) < len(names):
+        raise DataError(f"--line: {max(names, key=names.count)} is the name of two lines")
+    tables = tables_of(Path(args.source))
+    kind = "smoothed" if "smoothed" in tables else "causal"
+    table = read_trajectories(tables[kind])
+    found = [c for line in lines for c in counting.crossings(table, line)]
+    first, last = (float(table.t.min()), float(table.t.max())) if len(table) else (0.0, 0.0)
+    step = args.interval or max(last - first, 1e-9) * (1.0 + 1e-9)
+    edges = first + step * np.arange(int(np.ceil((last - first) / step + 1e-12)) + 1)
+    edges[-1] = max(edges[-1], np.nextafter(last, np.inf))
+    counts = counting.count(found, edges)
+    if args.crossings:
+        write_columns(_columns(found, counting.Crossing), args.crossings)
+    if args.out:
+        write_columns(_columns(counts, counting.Count), args.out)
+        print(f"wrote {args.out}: {len(found)} crossings ({kind} tracks)", file=sys.stderr)
+    else:
+        records = [
+            {
+                "line": c.line,
+                "direction": c.direction,
+                **({"class": c.vehicle_class} if any(c.vehicle_class for c in counts) else {}),
+                "from (s)": round(c.t_from, 3),
+                "to (s)": round(c.t_to, 3),
+                "vehicles": c.count,
+                "95 %": f"{c.low} … {c.high}",
+            }
+            for c in counts
+        ]
+        print(Table.from_records(records).render() if records else "no track crosses a line")
+    return 0
+
+
+def _line(text: str, number: int) -> Line:
+    """Read `NAME=x1,y1,x2,y2`; without a name it is `line-1` and so on."""
+    name, equals, ends = text.rpartition("=")
+    try:
+        x1, y1, x2, y2 = (float(part) for part in ends.split(","))
+    except ValueError:
+        raise DataError(f"--line {text}: must read x1,y1,x2,y2 in px, or NAME=x1,y1,x2,y2") from None
+    return Line(x1, y1, x2, y2, name if equals else f"line-{number}")
+
+
+def _columns(rows: list[Any], kind: type) -> dict[str, npt.NDArray[Any]]:
+    """One column an attribute; classes that are not known are left out."""
+    names = [f.name for f in dataclasses.fields(kind)]
+    columns = {name: np.array([getattr(row, name) for row in rows]) for name in names}
+    if not any(row.vehicle_class for row in rows):
+        del columns["vehicle_class"]
+    return columns

@@ -1,0 +1,127 @@
+"""To and from the objects of other libraries: pandas tables, `supervision.Detections`, results of detectors.
+
+None of these libraries is imported unless one of its objects is asked for; what comes in is recognised by the
+attributes it has.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.data.arrays import FloatArray, TextArray
+from jeat_graph.data.errors import DataError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class Boxes(NamedTuple):
+    """Boxes as a detector gives them, in the form that scans take.
+
+    Attributes:
+        boxes: (M, 4) left, top, width, height (px).
+        scores: (M,) confidence in [0, 1].
+        classes: (M,) class names, or None where the detector says none.
+    """
+
+    boxes: FloatArray
+    scores: FloatArray
+    classes: TextArray | None
+
+
+def boxes_of(source: Any, scores: npt.ArrayLike | None = None) -> Boxes:
+    """Read boxes from whatever a detector returns.
+
+    Args:
+        source: `supervision.Detections`; a result of `ultralytics` (one picture, or a list of one); or an
+            array (M, 4) of left, top, width, height in px, or (M, 5) with the score behind.
+        scores: (M,) confidence in [0, 1] for boxes that come without; 1 where neither says it.
+
+    Raises:
+        DataError: nothing of the above, or shapes that do not fit.
+    """
+    if isinstance(source, (list, tuple)) and len(source) == 1 and hasattr(source[0], "boxes"):
+        source = source[0]
+    if hasattr(source, "xyxy") and hasattr(source, "confidence"):
+        return _from_supervision(source, scores)
+    if hasattr(source, "boxes") and hasattr(source.boxes, "xyxy"):
+        return _from_ultralytics(source)
+    try:
+        table = np.asarray(source, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise DataError(
+            "give boxes as an array (M, 4) of left, top, width, height, as supervision.Detections, or as a "
+            f"result with boxes.xyxy; not {type(source).__name__}"
+        ) from None
+    if table.size == 0:
+        table = table.reshape(0, 4)
+    if table.ndim != 2 or table.shape[1] not in (4, 5):
+        raise DataError(f"boxes must have shape (M, 4), or (M, 5) with scores, not {table.shape}")
+    if scores is None:
+        scores = table[:, 4] if table.shape[1] == 5 else np.ones(len(table))
+    return Boxes(table[:, :4], np.asarray(scores, dtype=np.float64), None)
+
+
+def from_xyxy(corners: npt.ArrayLike) -> FloatArray:
+    """Turn boxes (M, 4) left, top, right, bottom into left, top, width, height."""
+    box = np.array(corners, dtype=np.float64).reshape(-1, 4)
+    box[:, 2:] -= box[:, :2]
+    return box
+
+
+def to_xyxy(boxes: FloatArray) -> FloatArray:
+    """Turn boxes (M, 4) left, top, width, height into left, top, right, bottom."""
+    return np.hstack([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]])
+
+
+def _from_supervision(source: Any, scores: npt.ArrayLike | None) -> Boxes:
+    found = source.confidence if scores is None else scores
+    count = len(source.xyxy)
+    confidence = np.ones(count) if found is None else np.asarray(found, dtype=np.float64)
+    names = source.data.get("class_name") if hasattr(source, "data") else None
+    if names is None and source.class_id is not None:
+        names = np.asarray(source.class_id)
+    classes = None if names is None else np.asarray(names).astype(np.str_)
+    return Boxes(from_xyxy(source.xyxy), confidence, classes)
+
+
+def _from_ultralytics(result: Any) -> Boxes:
+    boxes = result.boxes
+    classes = None
+    if getattr(boxes, "cls", None) is not None:
+        names = getattr(result, "names", None) or {}
+        codes = _array(boxes.cls).astype(int).tolist()
+        classes = np.array([str(names[c]) if c in _keys(names) else str(c) for c in codes], dtype=np.str_)
+    return Boxes(from_xyxy(_array(boxes.xyxy)), _array(boxes.conf).reshape(-1), classes)
+
+
+def _keys(names: Any) -> Any:
+    return names if isinstance(names, dict) else range(len(names))
+
+
+def _array(values: Any) -> FloatArray:
+    """Array of a tensor, wherever it lies."""
+    for step in ("detach", "cpu"):
+        values = getattr(values, step)() if hasattr(values, step) else values
+    return np.asarray(values, dtype=np.float64)
+
+
+def columns_of(table: pd.DataFrame, needed: tuple[str, ...], what: str) -> dict[str, npt.NDArray[Any]]:
+    """Columns of a data frame by name.
+
+    Args:
+        table: the data frame.
+        needed: columns that must be there.
+        what: what the table is to be, for the message.
+
+    Raises:
+        DataError: a column is missing; the message names it and those that are there.
+    """
+    missing = [name for name in needed if name not in table.columns]
+    if missing:
+        there = ", ".join(str(name) for name in table.columns)
+        raise DataError(f"{what} need the column {missing[0]}; the table has {there}")
+    return {str(name): table[name].to_numpy() for name in table.columns}

@@ -1,0 +1,55 @@
+"""`jeat-graph count`."""
+
+from __future__ import annotations
+
+import pandas as pd
+import pytest
+
+from jeat_graph.cli.main import main
+
+HEADER = "t,track_id,left,top,width,height,existence,x,y,vx,vy,ax,ay," + ",".join(
+    f"var_{name}" for name in ("x", "y", "vx", "vy", "ax", "ay")
+)
+
+
+@pytest.fixture
+def run(tmp_path):
+    """A table of two vehicles that drive down the picture and one that drives up."""
+    rows = []
+    for track, (x, start, speed) in enumerate([(20, 0, 100), (40, -30, 100), (70, 100, -100)], 1):
+        for k in range(11):
+            y = start + speed * 0.1 * k
+            rows.append(f"{0.1 * k},{track},{x - 5},{y - 5},10,10,0.99,{x},{y},0,{speed},0,0,1,1,1,1,1,1,rgb")
+    path = tmp_path / "causal.csv"
+    path.write_text(HEADER + ",sensors\n" + "\n".join(rows) + "\n")
+    return path
+
+
+def test_counts_are_printed_and_written(run, tmp_path, capsys):
+    out, single = tmp_path / "counts.csv", tmp_path / "crossings.csv"
+    line = ["--line", "gate=0,50,100,50"]
+    assert main(["count", str(run), *line]) == 0
+    shown = capsys.readouterr().out
+    assert "gate" in shown
+    assert "right" in shown
+    assert main(["count", str(run), *line, "--out", str(out), "--crossings", str(single)]) == 0
+    counts = pd.read_csv(out)
+    assert dict(zip(counts.direction, counts["count"], strict=True)) == {"left": 1, "right": 2}
+    found = pd.read_csv(single)
+    assert sorted(found.t.round(6)) == pytest.approx([0.5, 0.5, 0.8])
+
+
+def test_intervals_split_the_counts(run, tmp_path):
+    out = tmp_path / "counts.csv"
+    assert main(["count", str(run), "--line", "0,50,100,50", "--interval", "0.6", "--out", str(out)]) == 0
+    counts = pd.read_csv(out).query("direction == 'right'")
+    assert counts["count"].tolist() == [1, 1]
+    assert counts.line.tolist() == ["line-1", "line-1"]
+
+
+@pytest.mark.parametrize("text", ["0,50,100", "a,b,c,d", "0,50,0,50", "gate=1,2,3,nan"])
+def test_a_line_that_is_none_is_one_clear_line(run, text, capsys):
+    assert main(["count", str(run), "--line", text]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("jeat-graph count: ")
+    assert error.count("\n") == 1

@@ -1,0 +1,68 @@
+"""Objects of other libraries as detections."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.interop import boxes_of, from_xyxy, to_xyxy
+
+CORNERS = np.array([[10.0, 20.0, 50.0, 80.0], [0.0, 0.0, 5.0, 6.0]])
+BOXES = np.array([[10.0, 20.0, 40.0, 60.0], [0.0, 0.0, 5.0, 6.0]])
+
+
+def test_corners_and_sizes_are_two_ways_to_say_one_box():
+    assert np.array_equal(from_xyxy(CORNERS), BOXES)
+    assert np.array_equal(to_xyxy(BOXES), CORNERS)
+
+
+def test_an_array_of_five_columns_brings_its_scores():
+    found = boxes_of(np.hstack([BOXES, [[0.3], [0.7]]]))
+    assert np.array_equal(found.boxes, BOXES)
+    assert found.scores.tolist() == [0.3, 0.7]
+    assert boxes_of(BOXES).scores.tolist() == [1.0, 1.0]
+    assert boxes_of([]).boxes.shape == (0, 4)
+
+
+def test_supervision_detections_keep_boxes_scores_and_class_names():
+    sv = pytest.importorskip("supervision")
+    source = sv.Detections(
+        xyxy=CORNERS,
+        confidence=np.array([0.9, 0.4]),
+        class_id=np.array([2, 7]),
+        data={"class_name": np.array(["car", "truck"])},
+    )
+    found = boxes_of(source)
+    assert np.array_equal(found.boxes, BOXES)
+    assert found.scores.tolist() == [0.9, 0.4]
+    assert found.classes.tolist() == ["car", "truck"]
+    assert boxes_of(sv.Detections.empty()).boxes.shape == (0, 4)
+
+
+class Tensor:
+    """A tensor that lives elsewhere, as torch's do."""
+
+    def __init__(self, values):
+        self._values = values
+
+    def cpu(self):
+        return np.asarray(self._values)
+
+
+@pytest.mark.parametrize("names", [{2: "car", 7: "truck"}, ["a", "b", "car", "", "", "", "", "truck"]])
+def test_results_of_ultralytics_are_known_by_their_attributes(names):
+    boxes = SimpleNamespace(xyxy=Tensor(CORNERS), conf=Tensor([0.9, 0.4]), cls=Tensor([2.0, 7.0]))
+    result = SimpleNamespace(boxes=boxes, names=names)
+    for source in (result, [result]):
+        found = boxes_of(source)
+        assert np.array_equal(found.boxes, BOXES)
+        assert found.classes.tolist() == ["car", "truck"]
+
+
+@pytest.mark.parametrize("source", ["boxes", object(), np.zeros((2, 3)), np.zeros(4)])
+def test_what_is_no_box_is_refused_with_what_would_be(source):
+    with pytest.raises(DataError, match="boxes"):
+        boxes_of(source)
