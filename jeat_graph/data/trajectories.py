@@ -13,10 +13,11 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray, IntArray, TextArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.views import TrajectoryViews
 
 
-@dataclass(frozen=True, eq=False)
-class Trajectories:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectories(TrajectoryViews):
     """Estimates of tracks, one row a track and time.
 
     Attributes:

@@ -1,0 +1,199 @@
+"""Ways to look at a table of trajectories: data frame, one track, a span of time, a plot, a short summary."""
+
+from __future__ import annotations
+
+import html
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.interop import columns_of, to_xyxy
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+BOX = ("left", "top", "width", "height")
+MEAN = ("x", "y", "vx", "vy", "ax", "ay")
+VAR = tuple(f"var_{name}" for name in MEAN)
+_SHOWN_ROWS = 8
+
+
+class TrajectoryViews:
+    """What `Trajectories` offers beside its columns; see there for the attributes."""
+
+    if TYPE_CHECKING:
+        t: FloatArray
+        track_id: IntArray
+        boxes: FloatArray
+        existence: FloatArray
+        mean: FloatArray
+        var: FloatArray
+        used: IntArray
+        sensors: tuple[str, ...]
+
+        def take(self, rows: npt.ArrayLike) -> Self: ...  # noqa: D102
+        def sensor_text(self) -> list[str]: ...  # noqa: D102
+        def __len__(self) -> int: ...
+
+    @property
+    def xyxy(self) -> FloatArray:
+        """Boxes (N, 4) as left, top, right, bottom (px)."""
+        return to_xyxy(self.boxes)
+
+    @property
+    def center(self) -> FloatArray:
+        """Centres of the boxes (N, 2), not clipped to the picture (px)."""
+        return self.mean[:, :2]
+
+    @property
+    def velocity(self) -> FloatArray:
+        """Velocities of the centres (N, 2) (px/s)."""
+        return self.mean[:, 2:4]
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariances (N, 2, 2) of the centres (px²); the two axes are independent in the model."""
+        return self.var[:, :2, None] * np.eye(2)
+
+    def of(self, track_id: int) -> Self:
+        """Return the rows of one track, in their order; none if there is no such track."""
+        return self.take(self.track_id == track_id)
+
+    def between(self, t0: float, t1: float) -> Self:
+        """Return the rows with t0 <= t <= t1 (s)."""
+        return self.take((self.t >= t0) & (self.t <= t1))
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return the table as a data frame with the columns of `causal.csv`, not rounded."""
+        import pandas as pd
+
+        columns: dict[str, Any] = {"t": self.t, "track_id": self.track_id}
+        columns |= {name: self.boxes[:, k] for k, name in enumerate(BOX)}
+        columns["existence"] = self.existence
+        columns |= {name: self.mean[:, k] for k, name in enumerate(MEAN)}
+        columns |= {name: self.var[:, k] for k, name in enumerate(VAR)}
+        columns["sensors"] = self.sensor_text()
+        return pd.DataFrame(columns)
+
+    @classmethod
+    def from_pandas(cls, frame: pd.DataFrame) -> Self:
+        """Read a data frame with the columns of `causal.csv`, such as `to_pandas` gives.
+
+        Raises:
+            DataError: a column is missing, or a sensor is named that cannot be.
+        """
+        c = columns_of(frame, ("t", "track_id", *BOX, "existence", *MEAN, *VAR, "sensors"), "trajectories")
+        texts = [str(text) if isinstance(text, str) else "" for text in c["sensors"]]
+        names = sorted({name for text in texts for name in text.split("|") if name})
+        if len(names) > 63:
+            raise DataError("a table names at most 63 sensors")
+        bit = {name: 1 << k for k, name in enumerate(names)}
+        used = [sum(bit[name] for name in text.split("|") if name) for text in texts]
+
+        def stack(columns: tuple[str, ...]) -> FloatArray:
+            return np.column_stack([np.asarray(c[name], dtype=np.float64) for name in columns])
+
+        return cls(  # type: ignore[call-arg]  # the fields are those of Trajectories
+            t=np.asarray(c["t"], dtype=np.float64),
+            track_id=np.asarray(c["track_id"], dtype=np.int64),
+            boxes=stack(BOX),
+            existence=np.asarray(c["existence"], dtype=np.float64),
+            mean=stack(MEAN),
+            var=stack(VAR),
+            used=np.array(used, dtype=np.int64),
+            sensors=tuple(names),
+        )
+
+    def to_supervision(self) -> Any:
+        """Return the rows as `supervision.Detections` with `tracker_id`, for its annotators.
+
+        The existence probability stands in `confidence`. Take the rows of one moment: a step's table, or
+        `between(t, t)`.
+
+        Raises:
+            ImportError: the package `supervision` is not installed.
+        """
+        import supervision
+
+        return supervision.Detections(
+            xyxy=self.xyxy,
+            confidence=self.existence.copy(),
+            class_id=np.zeros(len(self), dtype=int),
+            tracker_id=self.track_id.astype(int),
+        )
+
+    def plot(self, kind: str = "picture", ax: Any = None) -> Any:
+        """Draw the tracks with matplotlib.
+
+        Args:
+            kind: `picture` for the paths in the picture plane, `timeline` for the life of each track, `speed`
+                for the image speed over time.
+            ax: axes to draw into; new ones by default.
+
+        Returns:
+            The axes.
+
+        Raises:
+            DataError: no such kind.
+        """
+        from matplotlib import pyplot as plt
+
+        if kind not in ("picture", "timeline", "speed"):
+            raise DataError(f"kind {kind!r}: there are picture, timeline and speed")
+        ax = plt.subplots()[1] if ax is None else ax
+        for track_id in np.unique(self.track_id):
+            rows = self.of(int(track_id))
+            if kind == "picture":
+                ax.plot(*rows.center.T, linewidth=1, label=str(track_id))
+            elif kind == "timeline":
+                ax.plot(rows.t, np.full(len(rows), track_id), linewidth=3)
+            else:
+                ax.plot(rows.t, np.hypot(*rows.velocity.T), linewidth=1, label=str(track_id))
+        names = {"picture": ("x (px)", "y (px)"), "timeline": ("t (s)", "track"), "speed": ("t (s)", "px/s")}
+        ax.set_xlabel(names[kind][0])
+        ax.set_ylabel(names[kind][1])
+        if kind == "picture":
+            if not ax.yaxis_inverted():
+                ax.invert_yaxis()  # y points down in a picture
+            ax.set_aspect("equal")
+        return ax
+
+    def __repr__(self) -> str:
+        if not len(self):
+            return "Trajectories: no tracks"
+        tracks = len(np.unique(self.track_id))
+        head = f"Trajectories: {len(self)} rows, {tracks} track{'s' * (tracks != 1)}, "
+        lines = [head + f"{self.t.min():g} to {self.t.max():g} s"]
+        for k in range(min(len(self), _SHOWN_ROWS)):
+            box = " ".join(f"{v:.1f}" for v in self.boxes[k])
+            speed = float(np.hypot(*self.mean[k, 2:4]))
+            text = f"track {self.track_id[k]} at [{box}] px, {speed:.1f} px/s"
+            lines.append(f"  {self.t[k]:.3f} s  {text}, existence {self.existence[k]:.2f}")
+        if len(self) > _SHOWN_ROWS:
+            lines.append(f"  … {len(self) - _SHOWN_ROWS} more rows")
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        """Return a short table for notebooks."""
+        head = ("t (s)", "track", "box (px)", "velocity (px/s)", "existence", "seen by")
+        rows = []
+        texts = self.take(np.arange(min(len(self), _SHOWN_ROWS))).sensor_text()
+        for k, seen in enumerate(texts):
+            box = ", ".join(f"{v:.1f}" for v in self.boxes[k])
+            vx, vy = self.mean[k, 2:4]
+            cells = (
+                f"{self.t[k]:.3f}",
+                str(self.track_id[k]),
+                box,
+                f"{vx:.1f}, {vy:.1f}",
+                f"{self.existence[k]:.2f}",
+                html.escape(seen),
+            )
+            rows.append("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>")
+        tracks = len(np.unique(self.track_id))
+        note = f"{len(self)} rows, {tracks} tracks"
+        header = "".join(f"<th>{name}</th>" for name in head)
+        return f"<table><tr>{header}</tr>{''.join(rows)}</table><p>{note}</p>"

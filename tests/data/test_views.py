@@ -1,0 +1,93 @@
+"""Ways to look at trajectory tables."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.trajectories import Trajectories
+
+
+@pytest.fixture
+def table():
+    rng = np.random.default_rng(1)
+    n = 12
+    return Trajectories(
+        t=np.repeat(np.arange(4) * 0.5, 3),
+        track_id=np.tile([1, 2, 5], 4),
+        boxes=rng.uniform(1.0, 50.0, (n, 4)),
+        existence=rng.uniform(0.5, 1.0, n),
+        mean=rng.normal(0.0, 10.0, (n, 6)),
+        var=rng.uniform(0.1, 2.0, (n, 6)),
+        used=np.array([0, 1, 2, 3] * 3),
+        sensors=("evt", "rgb"),
+    )
+
+
+def test_a_table_survives_the_way_to_pandas_and_back(table):
+    frame = table.to_pandas()
+    assert list(frame.columns[:6]) == ["t", "track_id", "left", "top", "width", "height"]
+    assert frame.sensors.tolist()[:4] == ["", "evt", "rgb", "evt|rgb"]
+    back = Trajectories.from_pandas(frame)
+    for name in ("t", "track_id", "boxes", "existence", "mean", "var", "used"):
+        assert np.array_equal(getattr(back, name), getattr(table, name)), name
+    assert back.sensors == table.sensors
+
+
+def test_a_missing_column_is_named(table):
+    with pytest.raises(DataError, match="existence"):
+        Trajectories.from_pandas(table.to_pandas().drop(columns="existence"))
+
+
+def test_a_frame_of_the_written_table_is_read(tmp_path, table):
+    from jeat_graph.io.trajectories_io import write_trajectories
+
+    write_trajectories(table, tmp_path / "causal.csv")
+    back = Trajectories.from_pandas(pd.read_csv(tmp_path / "causal.csv"))
+    assert np.allclose(back.mean, table.mean, atol=1e-3)
+    assert np.array_equal(back.used, table.used)
+
+
+def test_one_track_and_a_span_of_time(table):
+    assert table.of(2).track_id.tolist() == [2] * 4
+    assert len(table.of(99)) == 0
+    assert table.between(0.5, 1.0).t.tolist() == [0.5] * 3 + [1.0] * 3
+
+
+def test_corners_centres_velocities_and_covariances(table):
+    assert np.allclose(table.xyxy[:, 2:] - table.xyxy[:, :2], table.boxes[:, 2:])
+    assert np.array_equal(table.center, table.mean[:, :2])
+    assert np.array_equal(table.velocity, table.mean[:, 2:4])
+    assert np.array_equal(np.diagonal(table.covariance, axis1=1, axis2=2), table.var[:, :2])
+
+
+def test_supervision_takes_the_tracks(table):
+    sv = pytest.importorskip("supervision")
+    now = table.between(0.5, 0.5).to_supervision()
+    assert isinstance(now, sv.Detections)
+    assert now.tracker_id.tolist() == [1, 2, 5]
+    assert np.allclose(now.xyxy, table.between(0.5, 0.5).xyxy)
+
+
+def test_the_summary_is_short_and_says_how_much_there_is(table):
+    text = repr(table)
+    assert text.startswith("Trajectories: 12 rows, 3 tracks, 0 to 1.5 s")
+    assert text.count("\n") == 9
+    assert repr(Trajectories.empty()) == "Trajectories: no tracks"
+    assert "<script" not in Trajectories.empty(("<script>",))._repr_html_()
+    assert table._repr_html_().count("<tr>") == 9
+
+
+@pytest.mark.parametrize("kind", ["picture", "timeline", "speed"])
+def test_plots_have_a_line_a_track(table, kind):
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    assert len(table.plot(kind).lines) == 3
+
+
+def test_another_kind_of_plot_is_refused(table):
+    with pytest.raises(DataError, match="timeline"):
+        table.plot("pie")
