@@ -1,26 +1,26 @@
-"""CLEAR, identity and HOTA metrics of tracks against truth, pooled over sequences.
+"""All tracking scores of tracks against truth, pooled over sequences: CLEAR, identity and HOTA.
 
-The arithmetic is that of the PyPI package `trackeval` (the reference implementation of HOTA, which the
-MOTChallenge and KITTI servers use); this module feeds its metric classes and reads their results.
-
-Sources: CLEAR: Bernardin and Stiefelhagen 2008; identity: Ristani et al. 2016; HOTA: Luiten et al. 2021.
+Each metric has a file of its own, `clear`, `identity` and `hota`; this one gathers what they say. The values
+are those of TrackEval, which the MOTChallenge and KITTI servers use.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
-
-import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
+from jeat_graph.eval.clear import clear_counts, pooled_clear
 from jeat_graph.eval.frames import Frames, Kind, build_frames
+from jeat_graph.eval.hota import hota_counts, pooled_hota
+from jeat_graph.eval.identity import identity_counts, pooled_identity
+from jeat_graph.eval.overlapping import overlapping_pairs
 
 # Scores in per cent; the others are counts.
 SHARES = ("MOTA", "MOTP", "HOTA", "DetA", "AssA", "LocA", "IDF1", "IDP", "IDR")
+COUNTS = ("TP", "FP", "FN", "IDSW", "MT", "PT", "ML", "Frag")
 
 
 @dataclass(frozen=True)
@@ -130,56 +130,26 @@ def score_frames(sequences: Sequence[Frames], *, iou: float = 0.5) -> Scores:
         raise DataError("there is no sequence to judge")
     if not 0.0 < iou <= 1.0:
         raise DataError(f"the IoU threshold must be in (0, 1], not {iou:g}")
-    return pooled_scores([trackeval_input(frames) for frames in sequences], iou=iou)
-
-
-def trackeval_input(frames: Frames) -> dict[str, Any]:
-    """Lay one sequence out as `trackeval` wants it: identities numbered from 0, lists by frame."""
-    truth_ids, truth_code = np.unique(frames.truth_id, return_inverse=True)
-    track_ids, track_code = np.unique(frames.tracks.track_id, return_inverse=True)
-    return {
-        "num_timesteps": len(frames),
-        "num_gt_ids": len(truth_ids),
-        "num_tracker_ids": len(track_ids),
-        "num_gt_dets": len(truth_code),
-        "num_tracker_dets": len(track_code),
-        "gt_ids": np.split(truth_code.reshape(-1), frames.truth_start[1:-1]),
-        "tracker_ids": np.split(track_code.reshape(-1), frames.track_start[1:-1]),
-        "similarity_scores": list(frames.iou),
-    }
-
-
-def pooled_scores(data: Sequence[dict[str, Any]], *, iou: float = 0.5) -> Scores:
-    """Score sequences given as `trackeval` dictionaries, and pool them as the benchmarks do.
-
-    Args:
-        data: one dictionary a sequence (see `trackeval_input`).
-        iou: smallest IoU of a match in CLEAR and identity metrics.
-    """
-    from trackeval.metrics import CLEAR, HOTA, Identity
-
-    # PRINT_CONFIG: stdout belongs to our results.
-    config = {"THRESHOLD": iou, "PRINT_CONFIG": False}
-    results: dict[str, Any] = {}
-    for metric in (CLEAR(dict(config)), Identity(dict(config)), HOTA()):
-        one_by_one = {str(k): metric.eval_sequence(d) for k, d in enumerate(data)}
-        results |= metric.combine_sequences(one_by_one)
-
-    def percent(name: str) -> float:
-        return 100.0 * float(np.mean(results[name]))
-
-    def total(name: str) -> int:
-        return int(sum(d[name] for d in data))
-
-    values: dict[str, Any] = {name: percent(name) for name in SHARES}
-    values |= {name: int(results[f"CLR_{name}"]) for name in ("TP", "FP", "FN")}
-    values |= {name: int(results[name]) for name in ("IDSW", "MT", "PT", "ML", "Frag")}
+    pairs = [overlapping_pairs(frames) for frames in sequences]
+    clear = pooled_clear([clear_counts(one, iou) for one in pairs])
+    identity = pooled_identity([identity_counts(one, iou) for one in pairs])
+    hota = pooled_hota([hota_counts(one) for one in pairs])
+    counts = {name: getattr(clear, name) for name in COUNTS}
     return Scores(
-        **values,
-        truth_boxes=total("num_gt_dets"),
-        truth_ids=total("num_gt_ids"),
-        track_boxes=total("num_tracker_dets"),
-        track_ids=total("num_tracker_ids"),
-        frames=total("num_timesteps"),
-        sequences=len(data),
+        MOTA=100.0 * clear.mota,
+        MOTP=100.0 * clear.motp,
+        HOTA=100.0 * float(hota.hota.mean()),
+        DetA=100.0 * float(hota.deta.mean()),
+        AssA=100.0 * float(hota.assa.mean()),
+        LocA=100.0 * float(hota.loca.mean()),
+        IDF1=100.0 * identity.idf1,
+        IDP=100.0 * identity.idp,
+        IDR=100.0 * identity.idr,
+        **counts,
+        truth_boxes=sum(int(one.truth_count.sum()) for one in pairs),
+        truth_ids=sum(len(one.truth_boxes_of) for one in pairs),
+        track_boxes=sum(int(one.track_count.sum()) for one in pairs),
+        track_ids=sum(len(one.track_boxes_of) for one in pairs),
+        frames=sum(len(one.truth_count) for one in pairs),
+        sequences=len(pairs),
     )

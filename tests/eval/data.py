@@ -13,6 +13,7 @@ from jeat_graph.data.trajectories import GroundTruth, Trajectories
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 KITTI = ("0004", "0005", "0008", "0010", "0018")
+TUD_RATE_HZ = 25.0
 
 
 def need(path: Path) -> Path:
@@ -79,4 +80,12 @@ def make_tracks(t, ids, boxes, motion=None, var=None) -> Trajectories:
         mean=mean,
         var=np.full((n, 6), np.nan) if var is None else np.asarray(var, dtype=float),
         used=np.zeros(n, dtype=np.int64),
+    )
+
+
+def tud_pair(name):
+    truth, result = tud(name, "gt.txt"), tud(name, "test.txt")
+    return (
+        make_truth((truth[:, 0] - 1) / TUD_RATE_HZ, truth[:, 1], truth[:, 2:6]),
+        make_tracks((result[:, 0] - 1) / TUD_RATE_HZ, result[:, 1], result[:, 2:6]),
     )

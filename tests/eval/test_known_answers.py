@@ -9,21 +9,12 @@ import pytest
 
 from jeat_graph.eval.metrics import evaluate
 
-from .data import make_tracks, make_truth, tud
+from .data import make_tracks, make_truth, tud_pair
 
-RATE_HZ = 25.0
 KNOWN = {
     "TUD-Campus": {"IDF1": 0.557659, "MOTA": 0.526462, "FP": 13, "FN": 150, "IDSW": 7},
     "TUD-Stadtmitte": {"IDF1": 0.644619, "MOTA": 0.564014, "FP": 45, "FN": 452, "IDSW": 7},
 }
-
-
-def tud_pair(name):
-    truth, result = tud(name, "gt.txt"), tud(name, "test.txt")
-    return (
-        make_truth((truth[:, 0] - 1) / RATE_HZ, truth[:, 1], truth[:, 2:6]),
-        make_tracks((result[:, 0] - 1) / RATE_HZ, result[:, 1], result[:, 2:6]),
-    )
 
 
 @pytest.mark.parametrize("kind", ["causal", "smoothed"])
