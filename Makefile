@@ -4,6 +4,7 @@
 #   make test    run all tests
 #   make lint    style, format and docstrings
 #   make types   type-check the built package
+#   make bounds  run the numerical tests with the oldest versions allowed of what is needed
 #   make build   build the wheel (in dist/)
 #   make docs    build the documentation (in docs/_build/html)
 #   make clean   remove what was built and computed, .venv included
@@ -16,7 +17,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
 SOURCES := $(shell find jeat_graph filters association smoothers -name '*.py')
 
-.PHONY: demo test lint types build docs clean
+.PHONY: demo test lint types bounds build docs clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.compiled
@@ -35,6 +36,9 @@ lint: $(VENV)/.lint
 # The folders at the top of the repository become one package only when it is built, so that is what is checked.
 types: build/.installed
 	@cd build && venv/bin/mypy --config-file ../pyproject.toml --cache-dir ../.mypy_cache -p jeat_graph
+
+bounds: | $(BIN)/python
+	@PYTHON=$(BIN)/python .ci/bounds
 
 build: build/.wheel
 
@@ -60,7 +64,7 @@ $(VENV)/.run: pyproject.toml | $(BIN)/python
 $(VENV)/.test: pyproject.toml $(VENV)/.run
 	@echo "make: installing what the tests need"
 	@$(PIP) --editable '.[test]'
-	@$(PIP) --no-deps norfair==2.3.0
+	@$(PIP) --no-deps 'trackers>=2.6,<3' norfair==2.3.0 'trackeval>=1.3,<2'
 	@touch $@
 
 $(VENV)/.docs: pyproject.toml $(VENV)/.run

@@ -77,7 +77,8 @@ def make_tracker(name: str, rate_hz: float, **parameters: Any) -> Any:
         import trackers
     except ImportError as error:
         raise ConfigError(
-            "the baselines need the package trackers: pip install 'jeat-graph[baselines]'"
+            "the baselines need the package trackers: "
+            "pip install 'jeat-graph[baselines]' && pip install --no-deps trackers"
         ) from error
     cls, fixed = ROBOFLOW[name]
     try:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from jeat_graph.eval.tables import Cell, Table
 
 _INSTALL = {
-    "trackers": "pip install 'jeat-graph[baselines]'",
+    "trackers": "pip install 'jeat-graph[baselines]' && pip install --no-deps trackers",
     "supervision": "pip install 'jeat-graph[baselines]'",
     "norfair": "pip install rich filterpy && pip install --no-deps norfair",
 }

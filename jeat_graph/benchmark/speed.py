@@ -67,7 +67,8 @@ def _steps(args: argparse.Namespace) -> list[dict[str, Any]]:
         found = ask({"job": "peers"})
         names += found
         if not found:
-            print("the peers are not installed: pip install 'jeat-graph[baselines]'", file=sys.stderr)
+            how = "pip install 'jeat-graph[baselines]' && pip install --no-deps trackers"
+            print(f"the peers are not installed: {how}", file=sys.stderr)
     objects = sorted(args.objects)
     rows = []
     work = tqdm(
