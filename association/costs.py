@@ -1,6 +1,6 @@
 """Costs of giving a detection to a track.
 
-The paper's cost is the squared Mahalanobis distance, which `gating.gated_pairs` returns. It prefers, for the
+The paper's cost is the squared Mahalanobis distance, which `gates.gated_pairs` returns. It prefers, for the
 same residual, the *less* certain sensor and the *less* confident detection, because d² falls as R grows. The
 likelihood ratio has the term ln det S and so does not have this fault.
 """
@@ -12,6 +12,7 @@ import math
 import numpy as np
 from numba import njit
 
+from jeat_graph.association.gates import Pairs
 from jeat_graph.data.arrays import FloatArray, IntArray
 
 
@@ -30,10 +31,7 @@ def log_score_ratio(calibrated: float, overall: float) -> float:
 
 @njit(cache=True)
 def log_evidence(
-    rows: IntArray,
-    cols: IntArray,
-    log_density: FloatArray,
-    log_size_density: FloatArray,
+    pairs: Pairs,
     p_detect: FloatArray,
     log_score: FloatArray,
     log_clutter: FloatArray,
@@ -44,10 +42,7 @@ def log_evidence(
     ln Λ = ln P_D + ln N(y; 0, S) + ln N(size residual) + ln LR(score) − ln λ.
 
     Args:
-        rows: (P,) track of each pair.
-        cols: (P,) detection of each pair.
-        log_density: (P,) ln N(y; 0, S), per px².
-        log_size_density: (P,) ln N of the size residual, per (ln px)².
+        pairs: the P pairs inside the gates.
         p_detect: (N, S) probability that sensor s detects track i now.
         log_score: (M,) `log_score_ratio` of each detection.
         log_clutter: (S,) ln of the clutter density (per px² and (ln px)², in one scan).
@@ -56,14 +51,15 @@ def log_evidence(
     Returns:
         (P,) ln Λ.
     """
+    rows = pairs.rows
     out = np.empty(len(rows))
     for p in range(len(rows)):
-        j = cols[p]
+        j = pairs.cols[p]
         s = sensor[j]
         out[p] = (
             math.log(max(p_detect[rows[p], s], 1e-12))
-            + log_density[p]
-            + log_size_density[p]
+            + pairs.log_density[p]
+            + pairs.log_size_density[p]
             + log_score[j]
             - log_clutter[s]
         )

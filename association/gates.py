@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -10,100 +11,104 @@ from numba import njit
 from jeat_graph.data.arrays import FloatArray, IntArray
 
 
-@njit(cache=True)
-def gated_pairs(
-    position: FloatArray,
-    position_var: FloatArray,
-    noise: FloatArray,
-    log_size: FloatArray,
-    log_size_var: FloatArray,
-    size_noise: FloatArray,
-    z: FloatArray,
-    z_log_size: FloatArray,
-    weight: FloatArray,
-    sensor: IntArray,
-    gate: float,
-    size_gate: float,
-) -> tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray]:
-    """List the pairs of track and detection inside the gates.
+class Expected(NamedTuple):
+    """What N tracks are expected to show S sensors.
 
-    The detections are sorted by x once and each track looks only at those within its gate's width, so the
-    full N x M matrix is never built.
-
-    Args:
+    Attributes:
         position: (N, S, 2) expected centre of a detection of sensor s on track i (px).
         position_var: (N, S, 2) its variances, before the detection's white noise (px²).
         noise: (N, S, 2) variances of that noise, at weight 1 (px²).
         log_size: (N, 2) predicted ln width, ln height.
         log_size_var: (N, 2) their variances.
         size_noise: (S, 2) measurement variances of ln width, ln height.
+    """
+
+    position: FloatArray
+    position_var: FloatArray
+    noise: FloatArray
+    log_size: FloatArray
+    log_size_var: FloatArray
+    size_noise: FloatArray
+
+
+class Found(NamedTuple):
+    """What M detections measured.
+
+    Attributes:
         z: (M, 2) detected centres (px).
-        z_log_size: (M, 2) detected ln width, ln height.
+        log_size: (M, 2) detected ln width, ln height.
         weight: (M,) factor on a detection's measurement variance (g of the paper).
         sensor: (M,) sensor of each detection, 0 … S − 1.
+    """
+
+    z: FloatArray
+    log_size: FloatArray
+    weight: FloatArray
+    sensor: IntArray
+
+
+class Pairs(NamedTuple):
+    """P pairs of track and detection inside the gates, in ascending order of both.
+
+    Attributes:
+        rows: (P,) tracks.
+        cols: (P,) detections.
+        d2: (P,) squared Mahalanobis distance of the centres (paper eq. 6).
+        log_density: (P,) ln N(y; 0, S), per px².
+        log_size_density: (P,) ln N of the size residual, per (ln px)².
+    """
+
+    rows: IntArray
+    cols: IntArray
+    d2: FloatArray
+    log_density: FloatArray
+    log_size_density: FloatArray
+
+
+@njit(cache=True)
+def gated_pairs(expected: Expected, found: Found, gate: float, size_gate: float) -> Pairs:
+    """List the pairs of track and detection inside the gates.
+
+    The detections are sorted by x once and each track looks only at those within its gate's width, so the
+    full N x M matrix is never built.
+
+    Args:
+        expected: what the tracks are expected to show.
+        found: what the detections measured.
         gate: χ² bound on the Mahalanobis distance d² of the centre (2 degrees of freedom).
         size_gate: χ² bound on that of the size; +inf for no size gate.
-
-    Returns:
-        rows (P,) tracks and cols (P,) detections in ascending order of both; d2 (P,) squared Mahalanobis
-        distance of the centres (paper eq. 6); log_density (P,) ln N(y; 0, S); log_size_density (P,)
-        ln N of the size residual.
     """
-    num_tracks = position.shape[0]
-    num_dets = z.shape[0]
-    capacity = 4 * (num_tracks + num_dets) + 16
+    capacity = 4 * (expected.position.shape[0] + found.z.shape[0]) + 16
     while True:
-        rows = np.empty(capacity, dtype=np.int64)
-        cols = np.empty(capacity, dtype=np.int64)
         values = np.empty((3, capacity))
-        count = _fill(
-            rows,
-            cols,
+        pairs = Pairs(
+            np.empty(capacity, dtype=np.int64),
+            np.empty(capacity, dtype=np.int64),
             values[0],
             values[1],
             values[2],
-            position,
-            position_var,
-            noise,
-            log_size,
-            log_size_var,
-            size_noise,
-            z,
-            z_log_size,
-            weight,
-            sensor,
-            gate,
-            size_gate,
         )
+        count = _fill(pairs, expected, found, gate, size_gate)
         if count >= 0:
-            return rows[:count], cols[:count], values[0, :count], values[1, :count], values[2, :count]
+            return Pairs(
+                pairs.rows[:count],
+                pairs.cols[:count],
+                pairs.d2[:count],
+                pairs.log_density[:count],
+                pairs.log_size_density[:count],
+            )
         capacity *= 4
 
 
 @njit(cache=True)
-def _fill(
-    rows: IntArray,
-    cols: IntArray,
-    d2: FloatArray,
-    log_density: FloatArray,
-    log_size_density: FloatArray,
-    position: FloatArray,
-    position_var: FloatArray,
-    noise: FloatArray,
-    log_size: FloatArray,
-    log_size_var: FloatArray,
-    size_noise: FloatArray,
-    z: FloatArray,
-    z_log_size: FloatArray,
-    weight: FloatArray,
-    sensor: IntArray,
-    gate: float,
-    size_gate: float,
-) -> int:
-    """Write the pairs of `gated_pairs` into its five results; return how many, or -1 if they do not fit.
+def _fill(pairs: Pairs, expected: Expected, found: Found, gate: float, size_gate: float) -> int:
+    """Write the pairs of `gated_pairs`; return how many, or -1 if they do not fit.
 
     A function of its own, because arrays that may be replaced inside the loop make it five times slower.
     """
+    rows, cols, d2, log_density, log_size_density = pairs
+    position, position_var, noise, log_size, log_size_var, size_noise = expected
+    z, z_log_size, weight, sensor = found
     num_tracks = position.shape[0]
     num_dets = z.shape[0]
     capacity = len(rows)

@@ -8,10 +8,6 @@ from numba import njit
 from jeat_graph.association.assignment import assign
 from jeat_graph.data.arrays import FloatArray, IntArray
 
-SLOTS = 0
-JOINT = 1
-SEQUENTIAL = 2
-
 
 @njit(cache=True)
 def associate_slots(

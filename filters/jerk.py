@@ -53,7 +53,7 @@ def track_jerk(
         jerk_per_growth: as there.
         factor: 1, or less while the track stands.
     """
-    # A runaway extrapolation of a size must not overflow, as in `lifecycle.track_boxes`.
+    # A runaway extrapolation of a size must not overflow, as in `association.boxes.track_boxes`.
     side = math.exp(min(0.5 * (size_mean[0, 0] + size_mean[1, 0]), _MOST_LOG_SIZE))
     growth = 0.5 * (size_mean[0, 1] + size_mean[1, 1])
     return factor * jerk_density(side, growth, jerk_px, jerk_per_size, jerk_per_growth)

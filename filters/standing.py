@@ -18,18 +18,18 @@ _MOST_ODDS = 30.0
 
 
 @njit(cache=True)
-def still_evidence(anchor: FloatArray, anchor_var: FloatArray, z: FloatArray, R: FloatArray) -> float:
+def still_evidence(rest_point: FloatArray, rest_var: FloatArray, z: FloatArray, R: FloatArray) -> float:
     """Log density of a measurement under the model of a point that stays.
 
     Args:
-        anchor: (2,) the point (px).
-        anchor_var: (2,) its variances (px²).
+        rest_point: (2,) the point (px).
+        rest_var: (2,) its variances (px²).
         z: (2,) measured centre (px).
         R: (2,) variances of the measurement (px²).
     """
     total = 0.0
     for axis in range(2):
-        total += log_gaussian(z[axis] - anchor[axis], anchor_var[axis] + R[axis])
+        total += log_gaussian(z[axis] - rest_point[axis], rest_var[axis] + R[axis])
     return total
 
 
@@ -50,12 +50,12 @@ def moving_evidence(mean: FloatArray, cov: FloatArray, z: FloatArray, R: FloatAr
 
 
 @njit(cache=True)
-def update_anchor(anchor: FloatArray, anchor_var: FloatArray, z: FloatArray, R: FloatArray) -> None:
+def update_rest_point(rest_point: FloatArray, rest_var: FloatArray, z: FloatArray, R: FloatArray) -> None:
     """Update the point that stays with a measurement, in place; arguments as in `still_evidence`."""
     for axis in range(2):
-        gain = anchor_var[axis] / (anchor_var[axis] + R[axis])
-        anchor[axis] += gain * (z[axis] - anchor[axis])
-        anchor_var[axis] *= 1.0 - gain
+        gain = rest_var[axis] / (rest_var[axis] + R[axis])
+        rest_point[axis] += gain * (z[axis] - rest_point[axis])
+        rest_var[axis] *= 1.0 - gain
 
 
 @njit(cache=True)

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from jeat_graph.association.boxes import occluded_fraction
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
-from jeat_graph.filters.existence import occluded_fraction
 from jeat_graph.tracking.tracker import track
 
 _MIN_ROWS = 50

@@ -32,7 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Calibrate, write the configuration, and print what was estimated."""
-    from jeat_graph.config.reading import load_config, save_config
+    from jeat_graph.config.reading import load_config
+    from jeat_graph.io.config_io import save_config
     from jeat_graph.io.detections_io import read_detections
     from jeat_graph.io.truth_io import read_truth
 

@@ -1,36 +1,81 @@
-"""The configuration as flat numbers and arrays, the form in which compiled kernels take it."""
+"""The configuration in the form in which compiled kernels take it: named tuples of numbers and arrays.
+
+The tuples of settings are made from the schema: each number and flag of a section, and each property that
+derives one from them (a bound from a probability, a number from a name), stands under its own name, as
+`settings.motion.jerk_px`. A setting added to the schema is there for kernels without another line.
+"""
 
 from __future__ import annotations
 
-import math
+import typing
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import fields, is_dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple, NewType
 
 import numpy as np
 
-from jeat_graph.association.joint import JOINT, SEQUENTIAL, SLOTS
 from jeat_graph.config.schema import Config, SensorConfig
 from jeat_graph.data.arrays import FloatArray, IntArray
 
-# Costs of the paper's problem are d² <= gate; leaving a row out must cost more than any sum of them, so that
-# as many pairs as possible are taken. Small enough that sums keep ten digits behind the point.
-_TAKE_ALL = 1.0e5
+_SCALARS = (bool, int, float)
+
+
+def _members(section: type[Any]) -> dict[str, type[Any]]:
+    """Names and types of the numbers and flags of a section, declared or derived, in their order."""
+    hints = typing.get_type_hints(section)
+    declared = {f.name: hints[f.name] for f in fields(section)}
+    derived = {
+        name: typing.get_type_hints(value.fget)["return"]
+        for name, value in vars(section).items()
+        if isinstance(value, property)
+    }
+    return {name: kind for name, kind in {**declared, **derived}.items() if kind in _SCALARS}
+
+
+def _sections() -> dict[str, type[Any]]:
+    """Sections of the configuration that kernels know, by their names."""
+    hints = typing.get_type_hints(Config)
+    return {
+        f.name: hints[f.name]
+        for f in fields(Config)
+        if is_dataclass(hints[f.name]) and f.metadata.get("kernels", True)
+    }
+
+
+def _tuple_class(name: str, members: dict[str, type[Any]]) -> type[Any]:
+    """Make a named tuple and keep it in this module, where numba's cache on disk looks for it again."""
+    made = NamedTuple(name, list(members.items()))  # type: ignore[misc]
+    made.__module__ = __name__
+    globals()[name] = made
+    return made
+
+
+_SECTION_TUPLES = {
+    name: _tuple_class(section.__name__.replace("Config", "Settings"), _members(section))
+    for name, section in _sections().items()
+}
+
+if TYPE_CHECKING:
+    # The tuples have the names and types of the schema, so a kernel's use of a setting is checked against it.
+    Settings = NewType("Settings", Config)
+else:
+    Settings = _tuple_class("Settings", {**_SECTION_TUPLES, **_members(Config)})
 
 
 class SensorArrays(NamedTuple):
-    """Parameters of the S sensors, in alphabetical order of their names (see `config.SensorConfig`).
+    """Parameters of the S sensors, in alphabetical order of their names (see `config.sensors`).
 
     Attributes:
         sigma_px: (S,) px.
         rho: (S, 2) fraction of width and height.
-        share: (S,) share of the centre's noise variance that has memory.
+        correlated_share: (S,) share of the centre's noise variance that is correlated in time.
         error: (S,) the sensor's error state, counted from 0; -1 where its errors are white.
-        memory: (B,) correlation time of each error state (s).
+        correlation_time_s: (B,) correlation time of each error state (s).
         size_var: (S, 2) variances of ln width, ln height.
         bias: (S, 4) centre x / width, centre y / height, ln width, ln height.
         p_detect: (S,) prior of a new track.
-        clutter: (S,) expected false boxes a scan.
-        period: (S,) nominal time between scans (s).
+        clutter_per_scan: (S,) expected false boxes a scan.
+        period_s: (S,) nominal time between scans (s).
         precision: (S,) overall.
         curve_score: (S, K) knots of the calibrated precision, padded with the last.
         curve_precision: (S, K) its values.
@@ -40,14 +85,14 @@ class SensorArrays(NamedTuple):
 
     sigma_px: FloatArray
     rho: FloatArray
-    share: FloatArray
+    correlated_share: FloatArray
     error: IntArray
-    memory: FloatArray
+    correlation_time_s: FloatArray
     size_var: FloatArray
     bias: FloatArray
     p_detect: FloatArray
-    clutter: FloatArray
-    period: FloatArray
+    clutter_per_scan: FloatArray
+    period_s: FloatArray
     precision: FloatArray
     curve_score: FloatArray
     curve_precision: FloatArray
@@ -55,70 +100,27 @@ class SensorArrays(NamedTuple):
     blind_speed: FloatArray
 
 
-class Settings(NamedTuple):
-    """All scalars of `config.Config`; names follow its sections, gates are χ² bounds."""
+class Model(NamedTuple):
+    """All that a step of the tracker knows beforehand: its sensors and its settings.
 
-    image_width: float
-    image_height: float
-    jerk_px: float
-    jerk_per_size: float
-    jerk_per_growth: float
-    velocity_std_px: float
-    velocity_std_per_size: float
-    acceleration_std_px: float
-    acceleration_std_per_size: float
-    standing: bool
-    standing_enter: float
-    standing_leave: float
-    standing_age_s: float
-    standing_memory: float
-    standing_drift: float
-    standing_speed_std: float
-    standing_jerk: float
-    standing_gap_s: float
-    size_rate_density: float
-    size_rate_std: float
-    adaptation_rate: float
-    scale_min: float
-    scale_max: float
-    score_weighting: bool
-    score_floor: float
-    method: int
-    likelihood: bool
-    second_pass: bool
-    gate: float
-    size_gate: float
-    unassigned_cost: float
-    log_clutter_volume: float
-    scene_memory_s: float
-    by_existence: bool
-    confirm_existence: float
-    delete_existence: float
-    lifetime_s: float
-    hidden_prior: float
-    hidden_memory_s: float
-    p_detect_weight: float
-    p_detect_min: float
-    p_detect_max: float
-    confirm_age_s: float
-    confirm_hits: int
-    max_gap_confirmed_s: float
-    max_gap_tentative_s: float
-    leave_picture: bool
-    arrival_rate: float
-    birth_min_existence: float
-    birth_max_overlap: float
-    merge: bool
-    merge_min_overlap: float
-    merge_velocity_gate: float
-    output_min_existence: float
-    output_max_gap_s: float
-    output_clip: bool
-    output_min_visible: float
+    Attributes:
+        sensors: parameters of the S sensors.
+        settings: numbers and flags of the configuration, by section.
+        priority: (S,) sensors in the order in which the sequential association serves them.
+    """
+
+    sensors: SensorArrays
+    settings: Settings
+    priority: IntArray
+
+
+def kernel_model(config: Config) -> Model:
+    """Return a configuration as compiled kernels take it."""
+    return Model(sensor_arrays(config), kernel_settings(config), priority_order(config))
 
 
 def error_states(sensors: Sequence[SensorConfig]) -> tuple[IntArray, FloatArray]:
-    """Number the error states of the sensors whose errors have memory, in their order.
+    """Number the error states of the sensors whose errors are correlated in time, in their order.
 
     Args:
         sensors: S sensors.
@@ -142,94 +144,37 @@ def sensor_arrays(config: Config) -> SensorArrays:
             for s, c in zip(sensors, curves, strict=True)
         ]
     )
-    error, memory = error_states(sensors)
+    error, correlation_time_s = error_states(sensors)
+    same = {
+        name: np.array([getattr(s, name) for s in sensors], dtype=np.float64)
+        for name in _members(SensorConfig)
+        if name in SensorArrays._fields
+    }
     return SensorArrays(
-        sigma_px=np.array([s.sigma_px for s in sensors]),
+        **same,
         rho=np.array([[s.rho_x, s.rho_y] for s in sensors]),
-        share=np.array([s.correlated_share for s in sensors]),
         error=error,
-        memory=memory,
+        correlation_time_s=correlation_time_s,
         size_var=np.array([[s.sigma_log_width**2, s.sigma_log_height**2] for s in sensors]),
         bias=np.array([s.bias for s in sensors]),
-        p_detect=np.array([s.p_detect for s in sensors]),
-        clutter=np.array([s.clutter_per_scan for s in sensors]),
-        period=np.array([1.0 / s.rate_hz for s in sensors]),
-        precision=np.array([s.precision for s in sensors]),
+        period_s=np.array([1.0 / s.rate_hz for s in sensors]),
         curve_score=score,
         curve_precision=np.array([[p[1] for p in c] for c in curves]),
-        tempering=np.array([s.tempering for s in sensors]),
-        blind_speed=np.array([s.blind_speed for s in sensors]),
     )
 
 
 def kernel_settings(config: Config) -> Settings:
-    """Flatten the configuration, with probabilities of gates turned into χ² bounds."""
-    c = config
-    likelihood = c.association.cost == "likelihood"
-    return Settings(
-        image_width=c.image.width,
-        image_height=c.image.height,
-        jerk_px=c.motion.jerk_px,
-        jerk_per_size=c.motion.jerk_per_size,
-        jerk_per_growth=c.motion.jerk_per_growth,
-        velocity_std_px=c.motion.velocity_std_px,
-        velocity_std_per_size=c.motion.velocity_std_per_size,
-        acceleration_std_px=c.motion.acceleration_std_px,
-        acceleration_std_per_size=c.motion.acceleration_std_per_size,
-        standing=c.standing.enabled,
-        standing_enter=c.standing.enter_odds,
-        standing_age_s=c.standing.min_age_s,
-        standing_leave=c.standing.leave_odds,
-        standing_memory=c.standing.memory,
-        standing_drift=c.standing.drift_per_size,
-        standing_speed_std=c.standing.speed_std_per_size,
-        standing_jerk=c.standing.jerk_factor,
-        standing_gap_s=c.standing.max_gap_s,
-        size_rate_density=c.size.rate_density,
-        size_rate_std=c.size.rate_std,
-        adaptation_rate=c.noise.adaptation_rate,
-        scale_min=c.noise.scale_min,
-        scale_max=c.noise.scale_max,
-        score_weighting=c.noise.score_weighting,
-        score_floor=c.noise.score_floor,
-        method={"slots": SLOTS, "joint": JOINT, "sequential": SEQUENTIAL}[c.association.method],
-        likelihood=likelihood,
-        second_pass=c.association.second_pass and c.association.method != "slots",
-        gate=_chi2_bound(c.association.gate_probability),
-        size_gate=_chi2_bound(c.association.gate_probability) if c.association.size_gate else float("inf"),
-        unassigned_cost=0.0 if likelihood else _TAKE_ALL,
-        log_clutter_volume=float(np.log(c.image.width * c.image.height * c.association.log_size_range**2)),
-        scene_memory_s=c.lifecycle.scene_memory_s,
-        by_existence=c.lifecycle.method == "existence",
-        confirm_existence=c.lifecycle.confirm_existence,
-        delete_existence=c.lifecycle.delete_existence,
-        lifetime_s=c.lifecycle.lifetime_s,
-        hidden_prior=c.lifecycle.hidden_prior,
-        hidden_memory_s=c.lifecycle.hidden_memory_s,
-        p_detect_weight=c.lifecycle.p_detect_weight,
-        p_detect_min=c.lifecycle.p_detect_min,
-        p_detect_max=c.lifecycle.p_detect_max,
-        confirm_age_s=c.lifecycle.confirm_age_s,
-        confirm_hits=c.lifecycle.confirm_hits,
-        max_gap_confirmed_s=c.lifecycle.max_gap_confirmed_s,
-        max_gap_tentative_s=c.lifecycle.max_gap_tentative_s,
-        leave_picture=c.lifecycle.leave_picture,
-        arrival_rate=c.birth.arrival_rate_hz,
-        birth_min_existence=c.birth.min_existence,
-        birth_max_overlap=c.birth.max_overlap,
-        merge=c.merge.enabled,
-        merge_min_overlap=c.merge.min_overlap,
-        merge_velocity_gate=_chi2_bound(c.merge.gate_probability),
-        output_min_existence=c.output.min_existence,
-        output_max_gap_s=c.output.max_gap_s,
-        output_clip=c.output.clip,
-        output_min_visible=c.output.min_visible,
-    )
+    """Return the numbers and flags of a configuration as nested named tuples.
 
+    Each has the type that the schema declares, whatever it was set with: kernels are compiled for types.
+    """
 
-def _chi2_bound(probability: float) -> float:
-    """Bound below which a χ² variable of 2 degrees of freedom lies with this probability, −2 ln(1 − p)."""
-    return -2.0 * math.log1p(-probability)
+    def values(source: Any) -> dict[str, Any]:
+        return {name: kind(getattr(source, name)) for name, kind in _members(type(source)).items()}
+
+    sections = {name: made(**values(getattr(config, name))) for name, made in _SECTION_TUPLES.items()}
+    make: Any = Settings
+    return typing.cast(Settings, make(**sections, **values(config)))
 
 
 def priority_order(config: Config) -> IntArray:

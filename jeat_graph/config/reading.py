@@ -1,4 +1,4 @@
-"""Read configurations from presets, YAML files and `key=value` overrides, and write them back."""
+"""Read configurations from presets, YAML files and `key=value` overrides."""
 
 from __future__ import annotations
 
@@ -67,15 +67,6 @@ def config_to_dict(config: Config) -> dict[str, Any]:
     """Return the configuration as nested plain mappings, lists and numbers."""
     tree: dict[str, Any] = plain(dataclasses.asdict(config))
     return tree
-
-
-def save_config(config: Config, path: str | Path, comment: str = "") -> None:
-    """Write a configuration as YAML that `load_config` reads back to an equal one."""
-    from jeat_graph.io.atomic import open_atomic
-
-    head = "".join(f"# {line}\n" for line in comment.splitlines())
-    with open_atomic(path) as file:
-        file.write(head + yaml.safe_dump(config_to_dict(config), sort_keys=False, allow_unicode=True))
 
 
 def _preset_text(name: str) -> str:

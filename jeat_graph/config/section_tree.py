@@ -102,8 +102,8 @@ def build(kind: type[Any], tree: Any, where: str) -> Any:
     try:
         return kind(**values)
     except ConfigError as error:
-        # A section checks itself without knowing where it stands; its own name gives way to the full path.
-        raise ConfigError(where + re.sub(r"^[a-z_]+\.", "", str(error))) from None
+        # A section names its fields without knowing where it stands (`fields.check`).
+        raise ConfigError(f"{where}{error}") from None
 
 
 def convert(hint: Any, value: Any, where: str) -> Any:

@@ -1,4 +1,4 @@
-"""From boxes to measurements: centre, log size, calibrated precision, noise weight."""
+"""From the boxes of one instant to what the filter takes in: centres, log sizes, calibrated precisions."""
 
 from __future__ import annotations
 
@@ -9,15 +9,37 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.association.costs import log_score_ratio
-from jeat_graph.config.kernel_form import SensorArrays, Settings
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.config.kernel_form import Model
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.filters.noise import score_weight
 
+# A calibrated precision is never certain, or a single score would outweigh all else that is known.
+_LEAST_PRECISION, _MOST_PRECISION = 0.002, 0.998
 
-class Measurements(NamedTuple):
-    """The detections of one batch as the filter takes them.
+
+class Arrivals(NamedTuple):
+    """The detections of all scans of one instant, as they arrive.
 
     Attributes:
+        t: time (s).
+        boxes: (M, 4) left, top, width, height (px).
+        scores: (M,) in [0, 1].
+        sensor: (M,) sensor index of each.
+        present: (S,) which sensors looked, including those that found nothing.
+    """
+
+    t: float
+    boxes: FloatArray
+    scores: FloatArray
+    sensor: IntArray
+    present: BoolArray
+
+
+class Batch(NamedTuple):
+    """The detections of one instant as the filter takes them.
+
+    Attributes:
+        t: time (s).
         z: (M, 2) box centre, the sensor's bias removed (px).
         log_size: (M, 2) ln width, ln height, the sensor's bias removed.
         boxes: (M, 4) the corresponding left, top, width, height (px).
@@ -25,8 +47,10 @@ class Measurements(NamedTuple):
         log_score: (M,) ln of the score's likelihood ratio.
         weight: (M,) factor on the measurement variance (g of the paper).
         sensor: (M,) sensor index.
+        present: (S,) which sensors looked, including those that found nothing.
     """
 
+    t: float
     z: FloatArray
     log_size: FloatArray
     boxes: FloatArray
@@ -34,6 +58,7 @@ class Measurements(NamedTuple):
     log_score: FloatArray
     weight: FloatArray
     sensor: IntArray
+    present: BoolArray
 
 
 @njit(cache=True)
@@ -49,18 +74,10 @@ def interpolate(x: float, knots: FloatArray, values: FloatArray) -> float:
 
 
 @njit(cache=True)
-def prepare(
-    boxes: FloatArray, scores: FloatArray, sensor: IntArray, sensors: SensorArrays, settings: Settings
-) -> Measurements:
-    """Turn a batch of detections into measurements.
-
-    Args:
-        boxes: (M, 4) left, top, width, height (px).
-        scores: (M,) in [0, 1].
-        sensor: (M,) sensor index.
-        sensors: parameters of the sensors.
-        settings: scalars of the configuration.
-    """
+def prepare(arrivals: Arrivals, model: Model) -> Batch:
+    """Turn the detections of one instant into measurements: bias removed, scores calibrated."""
+    sensors, noise = model.sensors, model.settings.noise
+    boxes, scores, sensor = arrivals.boxes, arrivals.scores, arrivals.sensor
     num = len(scores)
     z = np.empty((num, 2))
     log_size = np.empty((num, 2))
@@ -77,9 +94,8 @@ def prepare(
             true_side = math.exp(log_size[j, axis])
             corrected[j, 2 + axis] = true_side
             corrected[j, axis] = z[j, axis] - 0.5 * true_side
-        precision[j] = min(
-            max(interpolate(scores[j], sensors.curve_score[s], sensors.curve_precision[s]), 0.002), 0.998
-        )
+        calibrated = interpolate(scores[j], sensors.curve_score[s], sensors.curve_precision[s])
+        precision[j] = min(max(calibrated, _LEAST_PRECISION), _MOST_PRECISION)
         log_score[j] = log_score_ratio(precision[j], sensors.precision[s])
-        weight[j] = score_weight(scores[j], settings.score_floor) if settings.score_weighting else 1.0
-    return Measurements(z, log_size, corrected, precision, log_score, weight, sensor)
+        weight[j] = score_weight(scores[j], noise.score_floor) if noise.score_weighting else 1.0
+    return Batch(arrivals.t, z, log_size, corrected, precision, log_score, weight, sensor, arrivals.present)

@@ -1,4 +1,4 @@
-"""Removal of rows from the arrays of all tracks."""
+"""Removal of ended tracks from the arrays that hold the state of all tracks."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ def keep_rows(tracks: TrackArrays, rows: IntArray) -> None:
     _shift(tracks.cov, rows, first)
     _shift(tracks.size_mean, rows, first)
     _shift(tracks.size_cov, rows, first)
-    _shift(tracks.anchor, rows, first)
-    _shift(tracks.anchor_var, rows, first)
-    _shift(tracks.anchor_t, rows, first)
-    _shift(tracks.still_odds, rows, first)
+    _shift(tracks.rest_point, rows, first)
+    _shift(tracks.rest_var, rows, first)
+    _shift(tracks.rest_since, rows, first)
+    _shift(tracks.standing_log_odds, rows, first)
     _shift(tracks.standing, rows, first)
     _shift(tracks.scale, rows, first)
     _shift(tracks.p_detect, rows, first)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from jeat_graph.association.boxes import track_boxes, visible_fraction
 from jeat_graph.config.kernel_form import Settings
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.filters.existence import track_boxes, visible_fraction
 from jeat_graph.tracking.state import TrackArrays
 
 
@@ -21,27 +21,28 @@ def report(
         tracks: state of all tracks.
         num_tracks: number of living ones.
         t: time of the state (s).
-        settings: scalars of the configuration.
+        settings: numbers and flags of the configuration.
 
     Returns:
         Columns of `Trajectories`: t (R,), track_id (R,), boxes (R, 4), existence (R,), mean (R, 6),
         var (R, 6), used (R,).
     """
     boxes = track_boxes(tracks.mean[:num_tracks], tracks.size_mean[:num_tracks])
-    width, height = settings.image_width, settings.image_height
+    image, output = settings.image, settings.output
+    width, height = image.width, image.height
     rows = np.empty(num_tracks, dtype=np.int64)
     count = 0
     for i in range(num_tracks):
         if not tracks.confirmed[i]:
             continue
         gap = t - tracks.t_update[i]
-        if gap > settings.output_max_gap_s and not tracks.standing[i]:
+        if gap > output.max_gap_s and not tracks.standing[i]:
             continue
-        if settings.by_existence and tracks.existence[i] < settings.output_min_existence:
+        if settings.lifecycle.by_existence and tracks.existence[i] < output.min_existence:
             continue
-        if settings.output_clip:
+        if output.clip:
             visible = visible_fraction(boxes[i], width, height)
-            if visible <= 0.0 or visible < settings.output_min_visible:
+            if visible <= 0.0 or visible < output.min_visible:
                 continue
         rows[count] = i
         count += 1
@@ -53,7 +54,7 @@ def report(
         for axis in range(2):
             low = boxes[i, axis]
             high = low + boxes[i, 2 + axis]
-            if settings.output_clip:
+            if output.clip:
                 low = max(low, 0.0)
                 high = min(high, width if axis == 0 else height)
             out_boxes[r, axis] = low

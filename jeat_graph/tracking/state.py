@@ -14,15 +14,15 @@ class TrackArrays(NamedTuple):
     """Arrays of capacity C for tracks and S sensors; rows beyond the number of living tracks are unused.
 
     Attributes:
-        mean: (C, 2, 3 + B) per axis [p, v, a] of the box centre (px, px/s, px/s²), and the errors with memory
-            of B sensors (`filters/coloured.py`).
+        mean: (C, 2, 3 + B) per axis [p, v, a] of the box centre (px, px/s, px/s²), and the correlated
+            errors of B sensors (`filters/coloured_noise.py`).
         cov: (C, 2, 3 + B, 3 + B) covariance per axis; the axes are independent.
         size_mean: (C, 2, 2) ln width and ln height, each with its rate (1/s).
         size_cov: (C, 2, 2, 2) covariance of each.
-        anchor: (C, 2) where the track is if it stands still (px).
-        anchor_var: (C, 2) variances of that point (px²).
-        anchor_t: (C,) since when it may have stood there (s).
-        still_odds: (C,) log odds of standing against moving.
+        rest_point: (C, 2) where the track is if it stands still (px).
+        rest_var: (C, 2) variances of that point (px²).
+        rest_since: (C,) since when it may have stood there (s).
+        standing_log_odds: (C,) log odds of standing against moving.
         standing: (C,) whether the track counts as standing.
         scale: (C, S) noise scale s of paper eq. 5.
         p_detect: (C, S) running estimate of each sensor's probability of detecting this track.
@@ -40,10 +40,10 @@ class TrackArrays(NamedTuple):
     cov: FloatArray
     size_mean: FloatArray
     size_cov: FloatArray
-    anchor: FloatArray
-    anchor_var: FloatArray
-    anchor_t: FloatArray
-    still_odds: FloatArray
+    rest_point: FloatArray
+    rest_var: FloatArray
+    rest_since: FloatArray
+    standing_log_odds: FloatArray
     standing: npt.NDArray[np.bool_]
     scale: FloatArray
     p_detect: FloatArray
@@ -57,7 +57,7 @@ class TrackArrays(NamedTuple):
     used: IntArray
 
 
-class SceneArrays(NamedTuple):
+class Scene(NamedTuple):
     """What is learnt of the scene as a whole.
 
     Attributes:
@@ -79,10 +79,10 @@ def allocate(capacity: int, num_sensors: int, num_errors: int = 0) -> TrackArray
         cov=np.zeros((capacity, 2, dim, dim)),
         size_mean=np.zeros((capacity, 2, 2)),
         size_cov=np.zeros((capacity, 2, 2, 2)),
-        anchor=np.zeros((capacity, 2)),
-        anchor_var=np.zeros((capacity, 2)),
-        anchor_t=np.zeros(capacity),
-        still_odds=np.zeros(capacity),
+        rest_point=np.zeros((capacity, 2)),
+        rest_var=np.zeros((capacity, 2)),
+        rest_since=np.zeros(capacity),
+        standing_log_odds=np.zeros(capacity),
         standing=np.zeros(capacity, dtype=np.bool_),
         scale=np.zeros((capacity, num_sensors)),
         p_detect=np.zeros((capacity, num_sensors)),

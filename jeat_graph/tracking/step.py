@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import numpy as np
 from numba import njit
 
-from jeat_graph.config.kernel_form import SensorArrays, Settings
-from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
-from jeat_graph.tracking.batch import prepare
+from jeat_graph.config.kernel_form import Model
+from jeat_graph.tracking.batch import Arrivals, prepare
 from jeat_graph.tracking.stages.associating import associate
 from jeat_graph.tracking.stages.beginning import give_birth
 from jeat_graph.tracking.stages.ending import confirm, remove_ended
 from jeat_graph.tracking.stages.learning import count_misses, learn_scene
 from jeat_graph.tracking.stages.predicting import current_p_detect, expect_detections, predict_all
 from jeat_graph.tracking.stages.updating import take_second_views, update_matched
-from jeat_graph.tracking.state import SceneArrays, TrackArrays
+from jeat_graph.tracking.state import Scene, TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog
 
 
@@ -24,56 +22,43 @@ def step(
     num_tracks: int,
     next_id: int,
     dt: float,
-    t: float,
-    boxes: FloatArray,
-    scores: FloatArray,
-    sensor: IntArray,
-    present: BoolArray,
-    scene: SceneArrays,
-    sensors: SensorArrays,
-    settings: Settings,
-    priority: IntArray,
+    arrivals: Arrivals,
+    scene: Scene,
+    model: Model,
     log: UpdateLog,
 ) -> tuple[int, int]:
-    """Advance all tracks to time `t` and take in one batch of scans, in place.
+    """Advance all tracks to the time of some detections and take these in, in place.
 
     Args:
         tracks: state; its capacity must be at least `num_tracks` + M.
         num_tracks: number of living tracks N.
         next_id: identity of the next track to be born.
         dt: time since the last step (s), >= 0.
-        t: time of the batch (s).
-        boxes: (M, 4) left, top, width, height of the detections of all scans of the batch (px).
-        scores: (M,) in [0, 1].
-        sensor: (M,) sensor index of each detection.
-        present: (S,) which sensors looked at `t`, including those that found nothing.
+        arrivals: the M detections of all scans of one instant.
         scene: running estimates of clutter, P_D and undetected vehicles; updated.
-        sensors: parameters of the sensors.
-        settings: scalars of the configuration.
-        priority: (S,) order of the sequential association.
+        model: sensors and settings.
         log: takes down what the tracks take in; of capacity 0 where nobody asks.
 
     Returns:
         The number of living tracks and the next identity.
     """
-    n = num_tracks
+    n, settings = num_tracks, model.settings
     log.count[0] = 0
-    predict_all(tracks, n, dt, sensors, settings)
-    batch = prepare(boxes, scores, sensor, sensors, settings)
-    p_detect = current_p_detect(tracks, n, present, sensors, settings)
-    expectation = expect_detections(tracks, n, sensors)
-    match, evidence = associate(tracks, n, batch, expectation, p_detect, scene, sensors, settings, priority)
-    taken = np.zeros(len(scores), dtype=np.int64)
-    update_matched(tracks, n, t, batch, expectation, match, evidence, taken, sensors, settings, log)
-    if settings.second_pass:
-        take_second_views(tracks, n, t, batch, match, taken, sensors, settings, log)
-    learn_scene(tracks, n, dt, batch, match, taken, p_detect, present, scene, sensors, settings)
-    count_misses(tracks, n, match, p_detect, present, settings)
-    confirm(tracks, n, t, settings)
-    n = remove_ended(tracks, n, t, settings)
-    n, next_id = give_birth(tracks, n, next_id, t, batch, taken, scene, sensors, settings, log)
+    predict_all(tracks, n, dt, model)
+    batch = prepare(arrivals, model)
+    p_detect = current_p_detect(tracks, n, batch.present, model)
+    expectation = expect_detections(tracks, n, model.sensors)
+    association = associate(tracks, n, batch, expectation, p_detect, scene, model)
+    update_matched(tracks, n, batch, expectation, association, model, log)
+    if settings.association.second_views:
+        take_second_views(tracks, n, batch, association, model, log)
+    learn_scene(tracks, n, dt, batch, association, p_detect, scene, model)
+    count_misses(tracks, n, batch, association, p_detect, settings)
+    confirm(tracks, n, batch.t, settings)
+    n = remove_ended(tracks, n, batch.t, settings)
+    n, next_id = give_birth(tracks, n, next_id, batch, association, scene, model, log)
     # Vehicles that this batch could have shown and did not are rarer from now on.
-    for s in range(len(present)):
-        if present[s]:
+    for s in range(len(batch.present)):
+        if batch.present[s]:
             scene.undetected[0] *= 1.0 - scene.p_detect[s]
     return n, next_id

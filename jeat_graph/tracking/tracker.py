@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.config.kernel_form import kernel_settings, priority_order, sensor_arrays
+from jeat_graph.config.kernel_form import kernel_model
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.diagnostics import Diagnostics
 from jeat_graph.data.errors import JeatGraphError, TimeOrderError, UnknownSensorError
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.tracking.batch import Arrivals
 from jeat_graph.tracking.reporting import report
-from jeat_graph.tracking.state import SceneArrays, allocate, grow
+from jeat_graph.tracking.state import Scene, allocate, grow
 from jeat_graph.tracking.step import step
 from jeat_graph.tracking.update_log import allocate_log
 
@@ -53,13 +54,12 @@ class Tracker:
         self._diagnostics = diagnostics
         self.sensor_names = config.sensor_names
         self._index = {name: k for k, name in enumerate(self.sensor_names)}
-        self._sensors = sensor_arrays(config)
-        self._settings = kernel_settings(config)
-        self._priority = priority_order(config)
-        self._tracks = allocate(_FIRST_CAPACITY, len(self.sensor_names), len(self._sensors.memory))
-        self._scene = SceneArrays(
-            clutter=self._sensors.clutter.copy(),
-            p_detect=self._sensors.p_detect.copy(),
+        self._model = kernel_model(config)
+        sensors = self._model.sensors
+        self._tracks = allocate(_FIRST_CAPACITY, len(self.sensor_names), len(sensors.correlation_time_s))
+        self._scene = Scene(
+            clutter=sensors.clutter_per_scan.copy(),
+            p_detect=sensors.p_detect.copy(),
             undetected=np.array([config.birth.initial]),
         )
         self._num_tracks = 0
@@ -135,15 +135,9 @@ class Tracker:
             self._num_tracks,
             self._next_id,
             dt,
-            t,
-            boxes,
-            scores,
-            sensor,
-            present,
+            Arrivals(t, boxes, scores, sensor, present),
             self._scene,
-            self._sensors,
-            self._settings,
-            self._priority,
+            self._model,
             self._log,
         )
         self._t = t
@@ -156,7 +150,7 @@ class Tracker:
     def causal(self) -> Trajectories:
         """Return the tracks that are reported now, as the last step did."""
         t = 0.0 if self._t is None else self._t
-        columns = report(self._tracks, self._num_tracks, t, self._settings)
+        columns = report(self._tracks, self._num_tracks, t, self._model.settings)
         return Trajectories(*columns, sensors=self.sensor_names)
 
     def last_updates(self) -> Diagnostics:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from jeat_graph.association.costs import likelihood_cost, log_evidence, log_score_ratio
-from jeat_graph.association.gates import gated_pairs
+from jeat_graph.association.gates import Expected, Found, Pairs, gated_pairs
 
 PROBABILITY = st.floats(0.01, 0.99)
 
@@ -16,25 +16,19 @@ PROBABILITY = st.floats(0.01, 0.99)
 def two_sensors(residual, variances, weights=(1.0, 1.0), track_var=4.0):
     """One track, one detection of each of two sensors at the same residual; d² and cost of both pairs."""
     flat, small = np.zeros((1, 2)), np.full((1, 2), 0.01)
-    rows, cols, d2, density, size_density = gated_pairs(
+    expected = Expected(
         np.zeros((1, 2, 2)),
         np.full((1, 2, 2), track_var),
         np.repeat(np.array(variances), 2).reshape(1, 2, 2),
         flat,
         small,
         np.full((2, 2), 0.01),
-        np.full((2, 2), residual),
-        np.zeros((2, 2)),
-        np.array(weights),
-        np.array([0, 1]),
-        1e6,
-        np.inf,
     )
+    found = Found(np.full((2, 2), residual), np.zeros((2, 2)), np.array(weights), np.array([0, 1]))
+    pairs = gated_pairs(expected, found, 1e6, np.inf)
     p_detect, sensor = np.full((1, 2), 0.9), np.array([0, 1])
-    evidence = log_evidence(
-        rows, cols, density, size_density, p_detect, np.zeros(2), np.full(2, -10.0), sensor
-    )
-    return d2, likelihood_cost(rows, cols, evidence, np.array([0.9]), p_detect, sensor)
+    evidence = log_evidence(pairs, p_detect, np.zeros(2), np.full(2, -10.0), sensor)
+    return pairs.d2, likelihood_cost(pairs.rows, pairs.cols, evidence, np.array([0.9]), p_detect, sensor)
 
 
 @pytest.mark.parametrize("residual", [0.0, 0.5, 1.0, 2.0])
@@ -67,15 +61,16 @@ def test_a_score_of_the_average_precision_says_nothing():
     assert log_score_ratio(0.9, 0.8) > 0.0 > log_score_ratio(0.7, 0.8)
 
 
-@given(seed=st.integers(0, 10**6), pairs=st.integers(0, 20))
+@given(seed=st.integers(0, 10**6), num=st.integers(0, 20))
 @settings(max_examples=50, deadline=None)
-def test_evidence_and_cost_are_their_formulas(seed, pairs):
+def test_evidence_and_cost_are_their_formulas(seed, num):
     rng = np.random.default_rng(seed)
-    rows, cols = rng.integers(0, 5, pairs), rng.integers(0, 6, pairs)
-    density, size_density = rng.normal(-5, 3, pairs), rng.normal(0, 1, pairs)
+    rows, cols = rng.integers(0, 5, num), rng.integers(0, 6, num)
+    density, size_density = rng.normal(-5, 3, num), rng.normal(0, 1, num)
+    pairs = Pairs(rows, cols, np.zeros(num), density, size_density)
     p_detect, existence = rng.uniform(0.01, 0.99, (5, 2)), rng.uniform(0.01, 0.99, 5)
     score, clutter, sensor = rng.normal(size=6), rng.normal(-12, 1, 2), rng.integers(0, 2, 6)
-    evidence = log_evidence(rows, cols, density, size_density, p_detect, score, clutter, sensor)
+    evidence = log_evidence(pairs, p_detect, score, clutter, sensor)
     cost = likelihood_cost(rows, cols, evidence, existence, p_detect, sensor)
     for p, (i, j) in enumerate(zip(rows, cols, strict=True)):
         pd, r = p_detect[i, sensor[j]], existence[i]
@@ -105,9 +100,8 @@ def test_certain_and_impossible_inputs_stay_finite():
     for r in (0.0, 1.0):
         for pd in (0.0, 1.0):
             p_detect = np.array([[pd]])
-            evidence = log_evidence(
-                index, index, np.zeros(1), np.zeros(1), p_detect, np.zeros(1), np.zeros(1), index
-            )
+            pairs = Pairs(index, index, np.zeros(1), np.zeros(1), np.zeros(1))
+            evidence = log_evidence(pairs, p_detect, np.zeros(1), np.zeros(1), index)
             cost = likelihood_cost(index, index, evidence, np.array([r]), p_detect, index)
             assert np.isfinite(evidence).all()
             assert np.isfinite(cost).all()

@@ -6,28 +6,31 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import multivariate_normal
 
-from jeat_graph.association.gates import gated_pairs
+from jeat_graph.association.gates import Expected, Found, gated_pairs
 
 
 def random_scene(rng, tracks, dets, sensors=2, width=300.0):
     """Arguments of `gated_pairs` up to the gates."""
-    return (
+    expected = Expected(
         rng.uniform(0.0, width, (tracks, 1, 2)) + rng.normal(0.0, 2.0, (tracks, sensors, 2)),
         rng.uniform(1.0, 60.0, (tracks, sensors, 2)),
         rng.uniform(1.0, 30.0, (tracks, sensors, 2)),
         rng.normal(4.0, 0.3, (tracks, 2)),
         rng.uniform(0.001, 0.05, (tracks, 2)),
         rng.uniform(0.005, 0.05, (sensors, 2)),
+    )
+    found = Found(
         rng.uniform(0.0, width, (dets, 2)),
         rng.normal(4.0, 0.3, (dets, 2)),
         rng.uniform(1.0, 10.0, dets),
         rng.integers(0, sensors, dets),
     )
+    return expected, found
 
 
-def all_pairs(
-    position, var, noise, log_size, size_var, size_noise, z, z_size, weight, sensor, gate, size_gate
-):
+def all_pairs(expected, found, gate, size_gate):
+    position, var, noise, log_size, size_var, size_noise = expected
+    z, z_size, weight, sensor = found
     out = []
     for i in range(len(position)):
         for j in range(len(z)):
@@ -76,16 +79,8 @@ def test_a_detection_on_the_gate_is_inside():
     one, flat = np.ones((1, 2)), np.zeros((1, 2))
     z = np.array([[6.0, 0.0]])
     arguments = (
-        flat[None],
-        one[None],
-        np.ones((1, 1, 2)),
-        flat,
-        one,
-        one,
-        z,
-        flat,
-        np.ones(1),
-        np.zeros(1, dtype=np.int64),
+        Expected(flat[None], one[None], np.ones((1, 1, 2)), flat, one, one),
+        Found(z, flat, np.ones(1), np.zeros(1, dtype=np.int64)),
     )
     assert len(gated_pairs(*arguments, 18.0, np.inf)[0]) == 1
     assert len(gated_pairs(*arguments, 17.999, np.inf)[0]) == 0

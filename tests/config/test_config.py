@@ -6,9 +6,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jeat_graph.config.reading import config_from_dict, config_to_dict, load_config, preset_names, save_config
-from jeat_graph.config.schema import Config, MotionConfig, NoiseConfig, SensorConfig, check
+from jeat_graph.config.fields import check
+from jeat_graph.config.reading import config_from_dict, config_to_dict, load_config, preset_names
+from jeat_graph.config.schema import Config, MotionConfig, NoiseConfig, SensorConfig
 from jeat_graph.data.errors import ConfigError
+from jeat_graph.io.config_io import save_config
 
 
 def write(tmp_path, text, name="my.yaml"):
@@ -90,7 +92,7 @@ def test_an_unknown_preset_names_the_nearest_one():
     [
         ("noise.adaptation_rate=2", ["noise.adaptation_rate", "2", "[0.0, 1.0]"]),
         ("noise.scale_min=0", ["noise.scale_min", "(0.0, inf]"]),
-        ("noise.scale_min=6", ["noise.scale_min", "noise.scale_max"]),
+        ("noise.scale_min=6", ["noise.scale_min", "scale_max"]),
         ("sensors.evt.p_detect=1.5", ["sensors.evt.p_detect", "1.5", "[0.01, 0.999]"]),
         ("sensors.evt.sigma_px=.nan", ["sensors.evt.sigma_px", "nan"]),
         ("sensors.evt.rate_hz=.inf", ["sensors.evt.rate_hz", "inf"]),
@@ -254,4 +256,4 @@ def test_a_section_is_accepted_exactly_if_each_value_is_within_its_bounds(rate, 
         assert not good
     else:
         assert good
-        check(noise, "noise.")
+        check(noise)

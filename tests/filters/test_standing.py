@@ -10,8 +10,8 @@ from jeat_graph.filters.standing import (
     moving_evidence,
     stand_still,
     still_evidence,
-    update_anchor,
     update_odds,
+    update_rest_point,
     zero_update,
 )
 
@@ -83,12 +83,12 @@ def test_evidence_of_each_model_is_its_gaussian_density():
     assert moving_evidence(mean, cov, z, R) == pytest.approx(moving)
 
 
-def test_the_anchor_is_the_weighted_mean_of_what_was_measured():
+def test_the_point_of_rest_is_the_weighted_mean_of_what_was_measured():
     rng = np.random.default_rng(3)
     z, R = rng.normal(size=(20, 2)) * 4.0, rng.uniform(0.5, 9.0, (20, 2))
     anchor, var = z[0].copy(), R[0].copy()
     for k in range(1, 20):
-        update_anchor(anchor, var, z[k], R[k])
+        update_rest_point(anchor, var, z[k], R[k])
     assert np.allclose(anchor, (z / R).sum(axis=0) / (1.0 / R).sum(axis=0))
     assert np.allclose(var, 1.0 / (1.0 / R).sum(axis=0))
 
@@ -117,7 +117,7 @@ def test_a_point_at_rest_gains_odds_and_one_that_moves_loses_them():
             log_odds = update_odds(
                 log_odds, still_evidence(anchor, var, z, R), moving_evidence(mean, cov, z, R), 0.95
             )
-            update_anchor(anchor, var, z, R)
+            update_rest_point(anchor, var, z, R)
         odds[speed] = log_odds
     assert odds[0.0] > 5.0
     assert odds[40.0] < -5.0

@@ -7,14 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from jeat_graph.association.boxes import occluded_fraction, track_boxes, visible_fraction
 from jeat_graph.filters.existence import (
     existence_after_hit,
     existence_after_miss,
     hidden_after_miss,
     motion_visibility,
-    occluded_fraction,
-    track_boxes,
-    visible_fraction,
 )
 
 PROBABILITY = st.floats(0.001, 0.999)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from jeat_graph.config.schema import check, number
+from jeat_graph.config.fields import check, number
 from jeat_graph.data.errors import ConfigError
 
 TOWN = "Town04"  # whose outer ring is a highway of several lanes (paper, "Dataset setup")
@@ -47,9 +47,9 @@ class CarlaConfig:
     timeout_s: float = number(30.0, "s", "longest wait for the server", open_low=True)
 
     def __post_init__(self) -> None:
-        check(self, "carla.")
+        check(self)
         if self.spawn_near_m >= self.spawn_m:
-            raise ConfigError("carla.spawn_near_m: must be less than spawn_m (m)")
+            raise ConfigError("spawn_near_m: must be less than spawn_m (m)")
 
     @property
     def tick_s(self) -> float:

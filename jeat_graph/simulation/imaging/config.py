@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from jeat_graph.config.schema import check, choice, number
+from jeat_graph.config.fields import check, choice, number
 from jeat_graph.config.section_tree import build
 
 
@@ -41,7 +41,7 @@ class RenderConfig:
     far_m: float = number(230.0, "m", "vehicles beyond are not drawn", 30.0)
 
     def __post_init__(self) -> None:
-        check(self, "render.")
+        check(self)
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class RGBConfig:
     jitter_s: float = number(0.0005, "s", "std of a frame's time about the nominal one")
 
     def __post_init__(self) -> None:
-        check(self, "rgb.")
+        check(self)
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ class EventCameraConfig:
     )
 
     def __post_init__(self) -> None:
-        check(self, "evt.")
+        check(self)
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ class CarlaEventConfig:
     )
 
     def __post_init__(self) -> None:
-        check(self, "carla.")
+        check(self)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jeat_graph.config.schema import check, number
+from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.simulation.sensors.sequences import sticky_uniform
@@ -26,9 +26,9 @@ class ClutterConfig:
     size_spread: float = number(0.5, "ln px", "std of its logarithm", 0.0, 2.0)
 
     def __post_init__(self) -> None:
-        check(self, "clutter.")
+        check(self)
         if self.per_scan * self.persistent_share > 0.95 * self.places:
-            raise ConfigError("clutter.places: too few for persistent_share * per_scan false boxes a scan")
+            raise ConfigError("places: too few for persistent_share * per_scan false boxes a scan")
 
 
 def draw_clutter(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jeat_graph.config.schema import check, number
+from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.simulation.world.truth import Views
 
@@ -31,7 +31,7 @@ class DetectabilityConfig:
     half_blur: float = number(0.5, "1", "blur as a fraction of the box size that halves the probability")
 
     def __post_init__(self) -> None:
-        check(self, "detect.")
+        check(self)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from jeat_graph.config.schema import number
+from jeat_graph.config.fields import number
 from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.simulation.sensors.clutter import ClutterConfig, draw_clutter

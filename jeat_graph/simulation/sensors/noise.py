@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jeat_graph.config.schema import check, number
+from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.simulation.sensors.detectability import Conditions
 from jeat_graph.simulation.sensors.sequences import correlated
@@ -28,7 +28,7 @@ class NoiseModel:
     outlier_factor: float = number(4.0, "1", "how much larger those errors are", 1.0)
 
     def __post_init__(self) -> None:
-        check(self, "noise.")
+        check(self)
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class ScoreModel:
     memory_s: float = number(0.3, "s", "correlation time of half of the variance", open_low=True)
 
     def __post_init__(self) -> None:
-        check(self, "score.")
+        check(self)
 
 
 def perturb(

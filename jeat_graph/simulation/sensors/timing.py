@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jeat_graph.config.schema import check, number
+from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import BoolArray, FloatArray
 
 _TICK_S = 1e-6
@@ -24,7 +24,7 @@ class TimingConfig:
     blank_duration_s: float = number(0.1, "s", "mean length of such a burst", open_low=True)
 
     def __post_init__(self) -> None:
-        check(self, "timing.")
+        check(self)
 
 
 @dataclass(frozen=True, eq=False)

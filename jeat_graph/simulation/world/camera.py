@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.config.schema import check, number
+from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import FloatArray
 
 
@@ -32,7 +32,7 @@ class CameraConfig:
     yaw_deg: float = number(0.0, "deg", "turn to the right", -60.0, 60.0)
 
     def __post_init__(self) -> None:
-        check(self, "camera.")
+        check(self)
 
 
 @dataclass(frozen=True, eq=False)

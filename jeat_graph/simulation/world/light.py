@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jeat_graph.config.schema import check, number
+from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import BoolArray, FloatArray
 
 
@@ -25,7 +25,7 @@ class LightConfig:
     parked_lux: float = number(1.5, "lux", "what a parked vehicle's flashers add, at 50 m")
 
     def __post_init__(self) -> None:
-        check(self, "light.")
+        check(self)
 
 
 @dataclass(frozen=True)

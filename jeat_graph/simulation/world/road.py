@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jeat_graph.config.schema import check, number
+from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import FloatArray, IntArray
 
 
@@ -20,7 +20,7 @@ class RoadConfig:
     shoulder_m: float = number(3.0, "m", "width of the paved shoulder outside the outer lane", 2.6)
 
     def __post_init__(self) -> None:
-        check(self, "road.")
+        check(self)
 
 
 @dataclass(frozen=True, eq=False)

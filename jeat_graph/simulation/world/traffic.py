@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jeat_graph.config.schema import check, choice, number
+from jeat_graph.config.fields import check, choice, number
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.simulation.world.following import (
@@ -55,9 +55,9 @@ class TrafficConfig:
     step_s: float = number(0.05, "s", "simulation step; jerk is constant within it", 0.005, 0.1)
 
     def __post_init__(self) -> None:
-        check(self, "traffic.")
+        check(self)
         if self.behind_m + self.view_m + 60.0 > self.ring_m:
-            raise ConfigError("traffic.ring_m: must be longer than behind_m + view_m + 60 (m)")
+            raise ConfigError("ring_m: must be longer than behind_m + view_m + 60 (m)")
 
     @property
     def vehicles_in_view(self) -> float:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.config.schema import check, number
+from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.trajectories import GroundTruth
@@ -35,9 +35,9 @@ class TruthConfig:
     )
 
     def __post_init__(self) -> None:
-        check(self, "truth.")
+        check(self)
         if self.horizon_m < self.range_m:
-            raise ConfigError("truth.horizon_m: must not be less than range_m (m)")
+            raise ConfigError("horizon_m: must not be less than range_m (m)")
 
 
 @dataclass(frozen=True, eq=False)

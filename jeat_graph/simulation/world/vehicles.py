@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jeat_graph.config.schema import check, number
+from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import FloatArray, IntArray
 
 
@@ -48,7 +48,7 @@ class FleetConfig:
     truck: float = number(0.13, "1", "weight of trucks")
 
     def __post_init__(self) -> None:
-        check(self, "fleet.")
+        check(self)
 
 
 @dataclass(frozen=True, eq=False)

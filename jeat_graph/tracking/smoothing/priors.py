@@ -40,7 +40,7 @@ class ErrorStates(NamedTuple):
     def of(config: Config) -> ErrorStates:
         """Return those of a configuration, just as the filter has them."""
         arrays = sensor_arrays(config)
-        return ErrorStates(arrays.error, arrays.memory)
+        return ErrorStates(arrays.error, arrays.correlation_time_s)
 
 
 def prior_of(birth: FloatArray, errors: ErrorStates) -> tuple[float, FloatArray, FloatArray]:

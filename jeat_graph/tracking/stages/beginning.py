@@ -1,4 +1,4 @@
-"""New tracks from detections that no track took."""
+"""New tracks from the detections of one instant that no track took."""
 
 from __future__ import annotations
 
@@ -8,16 +8,17 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.association.births import choose_births
-from jeat_graph.config.kernel_form import SensorArrays, Settings
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.association.boxes import track_boxes
+from jeat_graph.config.kernel_form import Model, SensorArrays
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.filters.coloured_noise import MOTION
-from jeat_graph.filters.existence import track_boxes
 from jeat_graph.filters.noise import base_variance
-from jeat_graph.tracking.batch import Measurements
+from jeat_graph.tracking.batch import Batch
+from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.ending import confirm
 from jeat_graph.tracking.stages.predicting import jerk_of, split_noise
-from jeat_graph.tracking.stages.updating import take
-from jeat_graph.tracking.state import SceneArrays, TrackArrays
+from jeat_graph.tracking.stages.updating import Noise, update_track
+from jeat_graph.tracking.state import Scene, TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog, log_birth, log_update
 
 
@@ -26,72 +27,65 @@ def give_birth(
     tracks: TrackArrays,
     n: int,
     next_id: int,
-    t: float,
-    batch: Measurements,
-    taken: IntArray,
-    scene: SceneArrays,
-    sensors: SensorArrays,
-    settings: Settings,
+    batch: Batch,
+    association: Association,
+    scene: Scene,
+    model: Model,
     log: UpdateLog,
 ) -> tuple[int, int]:
     """Start tracks from leftovers; returns the number of tracks and the next identity."""
-    existence = birth_existence(batch, scene, settings)
+    settings = model.settings
+    existence = birth_existence(batch, scene, model)
     parents, partner = choose_births(
         batch.boxes,
         existence,
         batch.sensor,
-        taken,
+        association.taken,
         track_boxes(tracks.mean[:n], tracks.size_mean[:n]),
-        settings.birth_min_existence,
-        settings.birth_max_overlap,
+        settings.birth.min_existence,
+        settings.birth.max_overlap,
     )
     for b in range(len(parents)):
-        start_track(tracks, n + b, next_id + b, t, parents[b], batch, sensors, settings, log)
+        start_track(tracks, n + b, next_id + b, batch, parents[b], model, log)
         tracks.existence[n + b] = existence[parents[b]]
         tracks.p_detect[n + b] = scene.p_detect
-        tracks.hidden[n + b] = settings.hidden_prior
+        tracks.hidden[n + b] = settings.lifecycle.hidden_prior
         tracks.hidden[n + b, batch.sensor[parents[b]]] = 0.0
     for j in range(len(partner)):
         if partner[j] >= 0:
             i = n + partner[j]
-            R, lever = own_noise(batch, j, sensors)
-            take(tracks, i, t, j, batch, R, lever, sensors, settings, log)
+            update_track(tracks, i, batch, j, own_noise(batch, j, model.sensors), model, log)
             # Two sensors' false boxes seldom coincide: each view's chance to be false remains.
             tracks.existence[i] = 1.0 - (1.0 - tracks.existence[i]) * (1.0 - batch.precision[j])
-    confirm(tracks, n + len(parents), t, settings)
+    confirm(tracks, n + len(parents), batch.t, settings)
     return n + len(parents), next_id + len(parents)
 
 
 @njit(cache=True)
-def own_noise(batch: Measurements, j: int, sensors: SensorArrays) -> tuple[FloatArray, FloatArray]:
-    """Noise of detection `j` by its own size, where no track's is known.
-
-    Returns:
-        (2,) variances of the white part (px²) and (2,) levers of the sensor's error state (px).
-    """
+def own_noise(batch: Batch, j: int, sensors: SensorArrays) -> Noise:
+    """Noise of detection `j` by its own size, where no track's is known."""
     s = batch.sensor[j]
-    white, lever = np.empty(2), np.empty(2)
+    white, coloured_std = np.empty(2), np.empty(2)
     for axis in range(2):
         base = base_variance(sensors.sigma_px[s], sensors.rho[s, axis], batch.boxes[j, 2 + axis])
         r, h = split_noise(base, s, sensors)
-        white[axis], lever[axis] = r * batch.weight[j], h
-    return white, lever
+        white[axis], coloured_std[axis] = r * batch.weight[j], h
+    return Noise(white, coloured_std)
 
 
 @njit(cache=True)
-def birth_existence(batch: Measurements, scene: SceneArrays, settings: Settings) -> FloatArray:
+def birth_existence(batch: Batch, scene: Scene, model: Model) -> FloatArray:
     """Probability (M,) that a detection which no track took is of a vehicle not tracked before.
 
     u P_D LR(score) / (u P_D LR(score) + λ): u vehicles in the scene are expected to have no track yet, and
     most leftovers are clutter however high their score (Williams 2015, the Poisson part of the mixture).
     """
+    image, lifecycle = model.settings.image, model.settings.lifecycle
     out = np.empty(len(batch.precision))
     for j in range(len(out)):
         s = batch.sensor[j]
         x, y = batch.z[j]
-        if settings.leave_picture and not (
-            0.0 <= x <= settings.image_width and 0.0 <= y <= settings.image_height
-        ):
+        if lifecycle.leave_picture and not (0.0 <= x <= image.width and 0.0 <= y <= image.height):
             out[j] = -1.0  # it would end in the same step
             continue
         true = scene.undetected[0] * scene.p_detect[s] * math.exp(batch.log_score[j])
@@ -104,42 +98,41 @@ def start_track(
     tracks: TrackArrays,
     i: int,
     track_id: int,
-    t: float,
+    batch: Batch,
     j: int,
-    batch: Measurements,
-    sensors: SensorArrays,
-    settings: Settings,
+    model: Model,
     log: UpdateLog,
 ) -> None:
     """Fill row `i` with a new track at detection `j`; `give_birth` adds what the scene says of it."""
+    sensors, motion, t = model.sensors, model.settings.motion, batch.t
     s = batch.sensor[j]
     side = math.sqrt(batch.boxes[j, 2] * batch.boxes[j, 3])
+    velocity_std = motion.velocity_std_px + motion.velocity_std_per_size * side
+    acceleration_std = motion.acceleration_std_px + motion.acceleration_std_per_size * side
     tracks.mean[i] = 0.0
     tracks.cov[i] = 0.0
     tracks.size_mean[i] = 0.0
     tracks.size_cov[i] = 0.0
-    white, lever = own_noise(batch, j, sensors)
-    R = white + lever * lever
+    noise = own_noise(batch, j, sensors)
+    R = noise.white + noise.coloured_std * noise.coloured_std
     for axis in range(2):
         tracks.mean[i, axis, 0] = batch.z[j, axis]
-        tracks.anchor[i, axis] = batch.z[j, axis]
-        tracks.anchor_var[i, axis] = R[axis]
+        tracks.rest_point[i, axis] = batch.z[j, axis]
+        tracks.rest_var[i, axis] = R[axis]
         tracks.cov[i, axis, 0, 0] = R[axis]
-        tracks.cov[i, axis, 1, 1] = (settings.velocity_std_px + settings.velocity_std_per_size * side) ** 2
-        tracks.cov[i, axis, 2, 2] = (
-            settings.acceleration_std_px + settings.acceleration_std_per_size * side
-        ) ** 2
+        tracks.cov[i, axis, 1, 1] = velocity_std**2
+        tracks.cov[i, axis, 2, 2] = acceleration_std**2
         for e in range(MOTION, tracks.mean.shape[2]):
             tracks.cov[i, axis, e, e] = 1.0
         if sensors.error[s] >= 0:
             # p = z − h e − w: what the detection is off by, the position is off by the other way.
             e = MOTION + sensors.error[s]
-            tracks.cov[i, axis, 0, e] = tracks.cov[i, axis, e, 0] = -lever[axis]
+            tracks.cov[i, axis, 0, e] = tracks.cov[i, axis, e, 0] = -noise.coloured_std[axis]
         tracks.size_mean[i, axis, 0] = batch.log_size[j, axis]
         tracks.size_cov[i, axis, 0, 0] = sensors.size_var[s, axis]
-        tracks.size_cov[i, axis, 1, 1] = settings.size_rate_std**2
-    tracks.anchor_t[i] = t
-    tracks.still_odds[i] = 0.0
+        tracks.size_cov[i, axis, 1, 1] = model.settings.size.rate_std**2
+    tracks.rest_since[i] = t
+    tracks.standing_log_odds[i] = 0.0
     tracks.standing[i] = False
     tracks.scale[i] = 1.0
     tracks.confirmed[i] = False
@@ -149,6 +142,16 @@ def start_track(
     tracks.t_update[i] = t
     tracks.used[i] = 1 << s
     if len(log.rows) > 0:
-        jerk = jerk_of(tracks, i, settings)
-        log_update(log, track_id, s, batch.z[j], white, lever, jerk, batch.log_size[j], sensors.size_var[s])
+        jerk = jerk_of(tracks, i, model.settings)
+        log_update(
+            log,
+            track_id,
+            s,
+            batch.z[j],
+            noise.white,
+            noise.coloured_std,
+            jerk,
+            batch.log_size[j],
+            sensors.size_var[s],
+        )
         log_birth(log, tracks.cov[i], tracks.size_cov[i])

@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numba import njit
 
+from jeat_graph.association.boxes import track_boxes
 from jeat_graph.association.merging import find_duplicates
 from jeat_graph.config.kernel_form import Settings
-from jeat_graph.filters.existence import track_boxes
 from jeat_graph.tracking.compaction import keep_rows
 from jeat_graph.tracking.state import TrackArrays
 
@@ -17,15 +17,16 @@ from jeat_graph.tracking.state import TrackArrays
 @njit(cache=True)
 def confirm(tracks: TrackArrays, n: int, t: float, settings: Settings) -> None:
     """Confirm the tracks that have earned it: by existence, or by age and hits (paper, track lifecycle)."""
+    lifecycle = settings.lifecycle
     for i in range(n):
-        if settings.by_existence:
-            earned = tracks.existence[i] >= settings.confirm_existence
+        if lifecycle.by_existence:
+            earned = tracks.existence[i] >= lifecycle.confirm_existence
         else:
-            old = t - tracks.t_birth[i] >= settings.confirm_age_s
-            earned = old and tracks.hits[i] >= settings.confirm_hits
-        # No branch, on purpose: compiled with one, this loop was seen to clear flags it must not touch.
+            old = t - tracks.t_birth[i] >= lifecycle.confirm_age_s
+            earned = old and tracks.hits[i] >= lifecycle.confirm_hits
+        # No branch, on purpose: with one, numba was seen to compile a loop that clears the flags of others.
         tracks.confirmed[i] = tracks.confirmed[i] or earned
-        if not settings.by_existence:
+        if not lifecycle.by_existence:
             tracks.existence[i] = 1.0 if tracks.confirmed[i] else 0.5
 
 
@@ -33,8 +34,9 @@ def confirm(tracks: TrackArrays, n: int, t: float, settings: Settings) -> None:
 def remove_ended(tracks: TrackArrays, n: int, t: float, settings: Settings) -> int:
     """Remove tracks that are over, out of the picture, or duplicates; return the number left, in order."""
     boxes = track_boxes(tracks.mean[:n], tracks.size_mean[:n])
+    image, lifecycle, merge = settings.image, settings.lifecycle, settings.merge
     remove = np.zeros(n, dtype=np.bool_)
-    if settings.merge and n > 1:
+    if merge.enabled and n > 1:
         velocity = np.empty((n, 2))
         velocity_var = np.empty((n, 2))
         for i in range(n):
@@ -46,22 +48,22 @@ def remove_ended(tracks: TrackArrays, n: int, t: float, settings: Settings) -> i
             velocity,
             velocity_var,
             tracks.confirmed[:n],
-            settings.merge_min_overlap,
-            settings.merge_velocity_gate,
+            merge.min_overlap,
+            merge.gate_bound,
         )
     rows = np.empty(n, dtype=np.int64)
     kept = 0
     for i in range(n):
         gap = t - tracks.t_update[i]
-        most = settings.max_gap_confirmed_s if tracks.confirmed[i] else settings.max_gap_tentative_s
+        most = lifecycle.max_gap_confirmed_s if tracks.confirmed[i] else lifecycle.max_gap_tentative_s
         if tracks.confirmed[i] and tracks.standing[i]:
-            most = max(most, settings.standing_gap_s)
+            most = max(most, settings.standing.max_gap_s)
         x, y = tracks.mean[i, 0, 0], tracks.mean[i, 1, 0]
-        outside = x < 0.0 or y < 0.0 or x > settings.image_width or y > settings.image_height
-        doubted = settings.by_existence and tracks.existence[i] < settings.delete_existence
+        outside = x < 0.0 or y < 0.0 or x > image.width or y > image.height
+        doubted = lifecycle.by_existence and tracks.existence[i] < lifecycle.delete_existence
         # A state that overflowed (a coasting track on wild input) must not survive as NaN.
         broken = not (math.isfinite(x) and math.isfinite(y))
-        if remove[i] or gap > most or doubted or broken or (settings.leave_picture and outside):
+        if remove[i] or gap > most or doubted or broken or (lifecycle.leave_picture and outside):
             continue
         rows[kept] = i
         kept += 1

@@ -1,28 +1,36 @@
-"""What a batch teaches of single tracks that it missed, and of the scene as a whole."""
+"""What one instant teaches of the tracks that a sensor missed, and of clutter and detection as a whole."""
 
 from __future__ import annotations
 
 from numba import njit
 
-from jeat_graph.config.kernel_form import SensorArrays, Settings
-from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.config.kernel_form import Model, Settings
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.filters.existence import existence_after_miss, hidden_after_miss
-from jeat_graph.tracking.batch import Measurements
-from jeat_graph.tracking.state import SceneArrays, TrackArrays
+from jeat_graph.tracking.batch import Batch
+from jeat_graph.tracking.stages.associating import Association
+from jeat_graph.tracking.state import Scene, TrackArrays
+
+# Share of a sensor's configured clutter below which no estimate goes: without any, one detection were proof.
+_LEAST_CLUTTER = 0.1
+# A few tracks say less of a sensor than many; ten count in full.
+_LOOK_WEIGHT = 0.1
 
 
 @njit(cache=True)
 def count_misses(
     tracks: TrackArrays,
     n: int,
-    match: IntArray,
+    batch: Batch,
+    association: Association,
     p_detect: FloatArray,
-    present: BoolArray,
     settings: Settings,
 ) -> None:
     """Lower existence and P_D of the tracks that a sensor looked for and did not find."""
-    if not settings.by_existence:
+    lifecycle = settings.lifecycle
+    if not lifecycle.by_existence:
         return
+    match, present = association.match, batch.present
     for i in range(n):
         for s in range(len(present)):
             if not present[s] or match[i, s] >= 0:
@@ -34,7 +42,9 @@ def count_misses(
             if tracks.hidden[i, s] < 1.0:
                 awake = min(p_detect[i, s] / (1.0 - tracks.hidden[i, s]), 0.999)
                 tracks.hidden[i, s] = min(hidden_after_miss(tracks.hidden[i, s], awake), 0.999)
-            tracks.p_detect[i, s] = max(own - settings.p_detect_weight * visible * own, settings.p_detect_min)
+            tracks.p_detect[i, s] = max(
+                own - lifecycle.p_detect_weight * visible * own, lifecycle.p_detect_min
+            )
 
 
 @njit(cache=True)
@@ -42,25 +52,25 @@ def learn_scene(
     tracks: TrackArrays,
     n: int,
     dt: float,
-    batch: Measurements,
-    match: IntArray,
-    taken: IntArray,
+    batch: Batch,
+    association: Association,
     p_detect: FloatArray,
-    present: BoolArray,
-    scene: SceneArrays,
-    sensors: SensorArrays,
-    settings: Settings,
+    scene: Scene,
+    model: Model,
 ) -> None:
     """Follow each present sensor's clutter and P_D, and the vehicles that wait to be detected, in place.
 
     Clutter is what probably was no vehicle; P_D the share of the looks at confirmed tracks that found them,
     each weighed by how visible the track was.
     """
+    sensors, settings = model.sensors, model.settings
+    lifecycle, present = settings.lifecycle, batch.present
+    match, taken = association.match, association.taken
     # However long nobody looked, those who arrived have left again after their time in the picture.
-    expected = scene.undetected[0] + settings.arrival_rate * dt
-    most = settings.arrival_rate * settings.lifetime_s
+    expected = scene.undetected[0] + settings.birth.arrival_rate_hz * dt
+    most = settings.birth.arrival_rate_hz * lifecycle.lifetime_s
     scene.undetected[0] = max(scene.undetected[0], min(expected, most))
-    if settings.scene_memory_s <= 0.0:
+    if lifecycle.scene_memory_s <= 0.0:
         return
     for s in range(len(present)):
         if not present[s]:
@@ -80,13 +90,10 @@ def learn_scene(
         for j in range(len(taken)):
             if not taken[j] and batch.sensor[j] == s:
                 false += 1.0 - batch.precision[j]
-        weight = min(sensors.period[s] / settings.scene_memory_s, 1.0)
-        # Were the clutter to reach zero, a single detection would be proof.
-        scene.clutter[s] = max(
-            scene.clutter[s] + weight * (false - scene.clutter[s]), 0.1 * sensors.clutter[s]
-        )
-        # A few tracks say less of a sensor than many; ten count in full.
-        share = scene.p_detect[s] + weight * min(0.1 * looks, 1.0) * (
+        weight = min(sensors.period_s[s] / lifecycle.scene_memory_s, 1.0)
+        least = _LEAST_CLUTTER * sensors.clutter_per_scan[s]
+        scene.clutter[s] = max(scene.clutter[s] + weight * (false - scene.clutter[s]), least)
+        share = scene.p_detect[s] + weight * min(_LOOK_WEIGHT * looks, 1.0) * (
             hits / max(looks, 1e-9) - scene.p_detect[s]
         )
-        scene.p_detect[s] = min(max(share, settings.p_detect_min), settings.p_detect_max)
+        scene.p_detect[s] = min(max(share, lifecycle.p_detect_min), lifecycle.p_detect_max)

@@ -8,88 +8,95 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from jeat_graph.config.kernel_form import SensorArrays, Settings
+from jeat_graph.association.boxes import occluded_fraction, track_boxes, visible_fraction
+from jeat_graph.config.kernel_form import Model, SensorArrays, Settings
 from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.filters.coloured_noise import expected, predict_errors
-from jeat_graph.filters.existence import motion_visibility, occluded_fraction, track_boxes, visible_fraction
+from jeat_graph.filters.existence import motion_visibility
 from jeat_graph.filters.jerk import track_jerk
 from jeat_graph.filters.kalman import predict, predict_size
 from jeat_graph.filters.noise import base_variance
 from jeat_graph.tracking.state import TrackArrays
 
+# A small rest remains: what should be invisible is still taken if it is detected.
+_LEAST_VISIBLE = 1e-5
+# A size beyond e^12 px, from a runaway extrapolation, must not overflow.
+_MOST_LOG_SIZE = 12.0
+
 
 @njit(cache=True, forceinline=True)
 def jerk_of(tracks: TrackArrays, i: int, settings: Settings) -> float:
     """Root spectral density of the jerk of track `i` now (px/s^2.5)."""
-    factor = settings.standing_jerk if tracks.standing[i] else 1.0
+    factor = settings.standing.jerk_factor if tracks.standing[i] else 1.0
     return track_jerk(
         tracks.size_mean[i],
-        settings.jerk_px,
-        settings.jerk_per_size,
-        settings.jerk_per_growth,
+        settings.motion.jerk_px,
+        settings.motion.jerk_per_size,
+        settings.motion.jerk_per_growth,
         factor,
     )
 
 
 @njit(cache=True)
-def predict_all(tracks: TrackArrays, n: int, dt: float, sensors: SensorArrays, settings: Settings) -> None:
+def predict_all(tracks: TrackArrays, n: int, dt: float, model: Model) -> None:
     """Predict motion, size and existence of the first `n` tracks by `dt` seconds, in place."""
     tracks.used[:n] = 0
     if dt <= 0.0:
         return
+    sensors, settings = model.sensors, model.settings
     jerk = np.empty(n)
     for i in range(n):
-        side = math.exp(min(0.5 * (tracks.size_mean[i, 0, 0] + tracks.size_mean[i, 1, 0]), 12.0))
+        side = math.exp(min(0.5 * (tracks.size_mean[i, 0, 0] + tracks.size_mean[i, 1, 0]), _MOST_LOG_SIZE))
         jerk[i] = jerk_of(tracks, i, settings)
-        drift = settings.standing_drift * side
-        tracks.anchor_var[i] += drift * drift * dt
+        drift = settings.standing.drift_per_size * side
+        tracks.rest_var[i] += drift * drift * dt
     predict(tracks.mean[:n], tracks.cov[:n], jerk, dt)
-    if len(sensors.memory):
-        predict_errors(tracks.mean[:n], tracks.cov[:n], sensors.memory, dt)
-    predict_size(tracks.size_mean[:n], tracks.size_cov[:n], settings.size_rate_density, dt)
-    if settings.by_existence:
-        survival = math.exp(-dt / settings.lifetime_s)
-        relax = 1.0 - math.exp(-dt / settings.hidden_memory_s)
+    if len(sensors.correlation_time_s):
+        predict_errors(tracks.mean[:n], tracks.cov[:n], sensors.correlation_time_s, dt)
+    predict_size(tracks.size_mean[:n], tracks.size_cov[:n], settings.size.rate_density, dt)
+    lifecycle = settings.lifecycle
+    if lifecycle.by_existence:
+        survival = math.exp(-dt / lifecycle.lifetime_s)
+        relax = 1.0 - math.exp(-dt / lifecycle.hidden_memory_s)
         for i in range(n):
             tracks.existence[i] *= survival
             for s in range(tracks.hidden.shape[1]):
-                tracks.hidden[i, s] += relax * (settings.hidden_prior - tracks.hidden[i, s])
+                tracks.hidden[i, s] += relax * (lifecycle.hidden_prior - tracks.hidden[i, s])
 
 
 @njit(cache=True)
-def current_p_detect(
-    tracks: TrackArrays, n: int, present: BoolArray, sensors: SensorArrays, settings: Settings
-) -> FloatArray:
+def current_p_detect(tracks: TrackArrays, n: int, present: BoolArray, model: Model) -> FloatArray:
     """Probability (n, S) that each sensor detects each track now; 0 for sensors that did not look.
 
     The track's own running P_D times what is known of this moment: the part of the box inside the picture and
     not hidden by nearer vehicles, and for an event camera the image speed.
     """
+    sensors, image = model.sensors, model.settings.image
     out = np.zeros((n, len(present)))
     boxes = track_boxes(tracks.mean[:n], tracks.size_mean[:n])
     occluded = occluded_fraction(boxes, tracks.existence[:n])
     for i in range(n):
-        inside = visible_fraction(boxes[i], settings.image_width, settings.image_height) * (1.0 - occluded[i])
+        inside = visible_fraction(boxes[i], image.width, image.height) * (1.0 - occluded[i])
         for s in range(len(present)):
             if present[s]:
                 seen = motion_visibility(tracks.mean[i], sensors.blind_speed[s])
-                # A small rest remains: what should be invisible is still taken if it is detected.
                 visible = inside * seen * (1.0 - tracks.hidden[i, s])
-                out[i, s] = tracks.p_detect[i, s] * max(visible, 1e-5)
+                out[i, s] = tracks.p_detect[i, s] * max(visible, _LEAST_VISIBLE)
     return out
 
 
 @njit(cache=True)
 def detection_variance(tracks: TrackArrays, i: int, s: int, axis: int, sensors: SensorArrays) -> float:
     """Variance (px²) of a detection of sensor `s` on track `i`, one axis, at weight 1: s · R_base(size)."""
-    side = math.exp(min(tracks.size_mean[i, axis, 0], 12.0))
+    side = math.exp(min(tracks.size_mean[i, axis, 0], _MOST_LOG_SIZE))
     return float(tracks.scale[i, s] * base_variance(sensors.sigma_px[s], sensors.rho[s, axis], side))
 
 
 @njit(cache=True)
 def split_noise(variance: float, s: int, sensors: SensorArrays) -> tuple[float, float]:
-    """Split the noise of sensor `s` into its white variance (px²) and the lever of its error state (px)."""
-    return (1.0 - sensors.share[s]) * variance, math.sqrt(sensors.share[s] * variance)
+    """Split the noise of sensor `s`: white variance (px²), standard deviation of the coloured part (px)."""
+    share = sensors.correlated_share[s]
+    return (1.0 - share) * variance, math.sqrt(share * variance)
 
 
 class Expectation(NamedTuple):
@@ -99,25 +106,25 @@ class Expectation(NamedTuple):
         centre: (N, S, 2) expected centre (px).
         var: (N, S, 2) its variance before the detection's white noise (px²).
         white: (N, S, 2) variance of that noise at weight 1 (px²).
-        lever: (N, S, 2) lever of the sensor's error state (px), 0 where there is none.
+        coloured_std: (N, S, 2) standard deviation of the coloured part of the noise (px), 0 for none.
     """
 
     centre: FloatArray
     var: FloatArray
     white: FloatArray
-    lever: FloatArray
+    coloured_std: FloatArray
 
 
 @njit(cache=True)
 def expect_detections(tracks: TrackArrays, n: int, sensors: SensorArrays) -> Expectation:
     """Say where each sensor would find each of the first `n` tracks, and with what noise."""
     shape = (n, len(sensors.sigma_px), 2)
-    centre, var, white, lever = np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape)
+    centre, var, white, coloured_std = np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape)
     for i in range(n):
         for s in range(shape[1]):
             for axis in range(2):
                 r, h = split_noise(detection_variance(tracks, i, s, axis, sensors), s, sensors)
-                white[i, s, axis], lever[i, s, axis] = r, h
+                white[i, s, axis], coloured_std[i, s, axis] = r, h
                 z, V = expected(tracks.mean[i, axis], tracks.cov[i, axis], h, sensors.error[s])
                 centre[i, s, axis], var[i, s, axis] = z, V
-    return Expectation(centre, var, white, lever)
+    return Expectation(centre, var, white, coloured_std)

@@ -1,14 +1,15 @@
-"""Taking detections in: filter, noise scale, size, standing, existence."""
+"""Update of tracks by the detections they take: motion, noise scale, size, standing, existence."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from jeat_graph.config.kernel_form import SensorArrays, Settings
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.config.kernel_form import Model, Settings
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.filters.coloured_noise import update_centre
 from jeat_graph.filters.existence import existence_after_hit
 from jeat_graph.filters.kalman import update_block
@@ -17,13 +18,26 @@ from jeat_graph.filters.standing import (
     moving_evidence,
     stand_still,
     still_evidence,
-    update_anchor,
     update_odds,
+    update_rest_point,
 )
-from jeat_graph.tracking.batch import Measurements
+from jeat_graph.tracking.batch import Batch
+from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.predicting import Expectation, expect_detections, jerk_of
 from jeat_graph.tracking.state import TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog, log_surprise, log_update
+
+
+class Noise(NamedTuple):
+    """Measurement noise of one detection.
+
+    Attributes:
+        white: (2,) variances of the white part (px²).
+        coloured_std: (2,) standard deviations of the part that is correlated in time (px), 0 for none.
+    """
+
+    white: FloatArray
+    coloured_std: FloatArray
 
 
 @njit(cache=True, forceinline=True)
@@ -31,53 +45,62 @@ def judge_standing(
     tracks: TrackArrays, i: int, t: float, z: FloatArray, R: FloatArray, settings: Settings
 ) -> None:
     """Weigh a measurement z (2,), R (2,) of track `i` under "stands" and "moves", before it is taken in."""
-    still = still_evidence(tracks.anchor[i], tracks.anchor_var[i], z, R)
+    standing = settings.standing
+    still = still_evidence(tracks.rest_point[i], tracks.rest_var[i], z, R)
     moving = moving_evidence(tracks.mean[i], tracks.cov[i], z, R)
-    odds = update_odds(tracks.still_odds[i], still, moving, settings.standing_memory)
-    tracks.still_odds[i] = odds
-    if odds < settings.standing_leave:
+    odds = update_odds(tracks.standing_log_odds[i], still, moving, standing.memory)
+    tracks.standing_log_odds[i] = odds
+    if odds < standing.leave_odds:
         # It moves: look for a place to stand from here on.
         tracks.standing[i] = False
-        tracks.still_odds[i] = settings.standing_leave
-        tracks.anchor[i] = z
-        tracks.anchor_var[i] = R
-        tracks.anchor_t[i] = t
+        tracks.standing_log_odds[i] = standing.leave_odds
+        tracks.rest_point[i] = z
+        tracks.rest_var[i] = R
+        tracks.rest_since[i] = t
         return
-    old = t - tracks.anchor_t[i] >= settings.standing_age_s
-    tracks.standing[i] = tracks.standing[i] or (old and odds > settings.standing_enter)
-    update_anchor(tracks.anchor[i], tracks.anchor_var[i], z, R)
+    old = t - tracks.rest_since[i] >= standing.min_age_s
+    tracks.standing[i] = tracks.standing[i] or (old and odds > standing.enter_odds)
+    update_rest_point(tracks.rest_point[i], tracks.rest_var[i], z, R)
 
 
 @njit(cache=True, forceinline=True)
-def take(
+def update_track(
     tracks: TrackArrays,
     i: int,
-    t: float,
+    batch: Batch,
     j: int,
-    batch: Measurements,
-    R: FloatArray,
-    lever: FloatArray,
-    sensors: SensorArrays,
-    settings: Settings,
+    noise: Noise,
+    model: Model,
     log: UpdateLog,
 ) -> None:
-    """Update track `i` with detection `j`: filter, size, noise scale, standing.
-
-    Its noise has white variances R (2,) (px²) and the lever (2,) (px) on the sensor's error with memory.
-    """
+    """Update track `i` with detection `j`: filter, size, noise scale, standing."""
+    sensors, settings = model.sensors, model.settings
+    R, coloured_std = noise.white, noise.coloured_std
     s = batch.sensor[j]
     if len(log.rows) > 0:
         jerk = jerk_of(tracks, i, settings)
         log_update(
-            log, tracks.track_id[i], s, batch.z[j], R, lever, jerk, batch.log_size[j], sensors.size_var[s]
+            log,
+            tracks.track_id[i],
+            s,
+            batch.z[j],
+            R,
+            coloured_std,
+            jerk,
+            batch.log_size[j],
+            sensors.size_var[s],
         )
-    if settings.standing:
-        # Both models take the error with memory for white: neither may gain by knowing it.
-        judge_standing(tracks, i, t, batch.z[j], R + lever * lever, settings)
-    nis = update_centre(tracks.mean[i], tracks.cov[i], batch.z[j], R, lever, sensors.error[s])
+    if settings.standing.enabled:
+        # Both models take the coloured noise for white, so that they are compared on equal terms.
+        judge_standing(tracks, i, batch.t, batch.z[j], R + coloured_std * coloured_std, settings)
+    nis = update_centre(tracks.mean[i], tracks.cov[i], batch.z[j], R, coloured_std, sensors.error[s])
     log_surprise(log, nis, tracks.scale[i, s])
     tracks.scale[i, s] = adapt_scale(
-        tracks.scale[i, s], nis, settings.adaptation_rate, settings.scale_min, settings.scale_max
+        tracks.scale[i, s],
+        nis,
+        settings.noise.adaptation_rate,
+        settings.noise.scale_min,
+        settings.noise.scale_max,
     )
     for side in range(2):
         update_block(
@@ -93,11 +116,11 @@ def take(
             tracks.cov[i],
             tracks.size_mean[i],
             tracks.size_cov[i],
-            settings.standing_speed_std,
+            settings.standing.speed_std_per_size,
             size,
         )
     tracks.hits[i] += 1
-    tracks.t_update[i] = t
+    tracks.t_update[i] = batch.t
     tracks.used[i] |= 1 << s
 
 
@@ -105,54 +128,50 @@ def take(
 def update_matched(
     tracks: TrackArrays,
     n: int,
-    t: float,
-    batch: Measurements,
+    batch: Batch,
     expectation: Expectation,
-    match: IntArray,
-    evidence: FloatArray,
-    taken: IntArray,
-    sensors: SensorArrays,
-    settings: Settings,
+    association: Association,
+    model: Model,
     log: UpdateLog,
 ) -> None:
     """Take the matched detections in, one sensor after another (equal to a stacked update); mark `taken`."""
+    sensors, lifecycle = model.sensors, model.settings.lifecycle
+    match, taken = association.match, association.taken
     for i in range(n):
         for s in range(match.shape[1]):
             j = match[i, s]
             if j < 0:
                 continue
             taken[j] = 1
-            R = expectation.white[i, s] * batch.weight[j]
-            take(tracks, i, t, j, batch, R, expectation.lever[i, s], sensors, settings, log)
-            if settings.by_existence:
+            noise = Noise(expectation.white[i, s] * batch.weight[j], expectation.coloured_std[i, s])
+            update_track(tracks, i, batch, j, noise, model, log)
+            if lifecycle.by_existence:
                 tracks.existence[i] = existence_after_hit(
-                    tracks.existence[i], evidence[i, s], sensors.tempering[s]
+                    tracks.existence[i], association.evidence[i, s], sensors.tempering[s]
                 )
             tracks.hidden[i, s] = 0.0
-            p = tracks.p_detect[i, s] + settings.p_detect_weight * (1.0 - tracks.p_detect[i, s])
-            tracks.p_detect[i, s] = min(p, settings.p_detect_max)
+            p = tracks.p_detect[i, s] + lifecycle.p_detect_weight * (1.0 - tracks.p_detect[i, s])
+            tracks.p_detect[i, s] = min(p, lifecycle.p_detect_max)
 
 
 @njit(cache=True)
 def take_second_views(
     tracks: TrackArrays,
     n: int,
-    t: float,
-    batch: Measurements,
-    match: IntArray,
-    taken: IntArray,
-    sensors: SensorArrays,
-    settings: Settings,
+    batch: Batch,
+    association: Association,
+    model: Model,
     log: UpdateLog,
 ) -> None:
     """Second pass of algorithm 1: each matched track takes the nearest gated leftover of another sensor.
 
     The distance is that to the track as the first detection has updated it. Entries of `match` are set.
     """
+    match, taken = association.match, association.taken
     leftover = np.flatnonzero(taken == 0)
     if not len(leftover):
         return
-    expectation = expect_detections(tracks, n, sensors)
+    expectation = expect_detections(tracks, n, model.sensors)
     for i in range(n):
         first = -1
         for s in range(match.shape[1]):
@@ -163,7 +182,7 @@ def take_second_views(
         for s in range(match.shape[1]):
             if s == first:
                 continue
-            best = settings.gate
+            best = model.settings.association.gate_bound
             chosen = -1
             for j in leftover:
                 if taken[j] or batch.sensor[j] != s:
@@ -178,6 +197,7 @@ def take_second_views(
                     chosen = int(j)
             if chosen >= 0:
                 white = expectation.white[i, s] * batch.weight[chosen]
-                take(tracks, i, t, chosen, batch, white, expectation.lever[i, s], sensors, settings, log)
+                noise = Noise(white, expectation.coloured_std[i, s])
+                update_track(tracks, i, batch, chosen, noise, model, log)
                 match[i, s] = chosen
                 taken[chosen] = 1

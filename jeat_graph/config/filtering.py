@@ -1,0 +1,76 @@
+"""Settings of the filters: picture, motion in it, standing still, growth of boxes, measurement noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from jeat_graph.config.fields import Section, flag, number
+from jeat_graph.data.errors import ConfigError
+
+
+@dataclass(frozen=True)
+class ImageConfig(Section):
+    """The picture that both sensors' boxes refer to."""
+
+    width: float = number(1280.0, "px", "width of the picture", open_low=True)
+    height: float = number(720.0, "px", "height of the picture", open_low=True)
+
+
+@dataclass(frozen=True)
+class MotionConfig(Section):
+    """Constant acceleration driven by white jerk (paper eq. 2) and the prior of a new track."""
+
+    jerk_px: float = number(0.0, "px/s^2.5", "root spectral density of jerk that does not depend on size")
+    jerk_per_size: float = number(
+        1.5, "1/s^2.5", "root spectral density of jerk per px of box size sqrt(w h)"
+    )
+    jerk_per_growth: float = number(
+        0.0, "1", "root spectral density of jerk by perspective, in units of box size · growth rate^2.5"
+    )
+    velocity_std_px: float = number(20.0, "px/s", "std of a new track's velocity")
+    velocity_std_per_size: float = number(3.0, "1/s", "std of a new track's velocity per px of box size")
+    acceleration_std_px: float = number(1.0, "px/s²", "std of a new track's acceleration", open_low=True)
+    acceleration_std_per_size: float = number(1.0, "1/s²", "the same per px of box size")
+
+
+@dataclass(frozen=True)
+class StandingConfig(Section):
+    """Tracks that stand still: hard to see for either sensor in the dark, and not to be lost."""
+
+    enabled: bool = flag(True, "look for tracks that stand still")
+    enter_odds: float = number(5.0, "1", "log odds at which a track counts as standing", -30.0, 30.0)
+    min_age_s: float = number(0.7, "s", "time at one place before a track may count as standing")
+    leave_odds: float = number(-2.0, "1", "log odds at which it no longer does", -30.0, 30.0)
+    memory: float = number(0.95, "1", "part of the log odds kept from one measurement to the next", 0.0, 1.0)
+    drift_per_size: float = number(0.02, "1/√s", "random walk of the point that stays, per px of box size")
+    speed_std_per_size: float = number(
+        0.05, "1/s", "std of the zero-velocity pseudo-measurement per px of box size", open_low=True
+    )
+    jerk_factor: float = number(0.1, "1", "factor on the jerk of a standing track", 0.0, 1.0)
+    max_gap_s: float = number(
+        10.0, "s", "a confirmed standing track is kept, and reported, this long without update"
+    )
+
+
+@dataclass(frozen=True)
+class SizeConfig(Section):
+    """Filter of ln width and ln height: a nearly constant rate of change."""
+
+    rate_density: float = number(0.5, "1/s^1.5", "root spectral density of the rate's white driving noise")
+    rate_std: float = number(0.5, "1/s", "std of a new track's rate of ln size")
+
+
+@dataclass(frozen=True)
+class NoiseConfig(Section):
+    """Adaptive measurement noise R = s R_base / g (paper eq. 5 and section on adaptive noise)."""
+
+    adaptation_rate: float = number(0.1, "1", "η of eq. 5", 0.0, 1.0)
+    scale_min: float = number(1.0, "1", "s_min of eq. 5 (paper .5)", open_low=True)
+    scale_max: float = number(5.0, "1", "s_max of eq. 5", open_low=True)
+    score_weighting: bool = flag(False, "divide R by max(score, score_floor)")
+    score_floor: float = number(0.1, "1", "floor of the score in R", 0.001, 1.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.scale_min > self.scale_max:
+            raise ConfigError("scale_min: must not be greater than scale_max")

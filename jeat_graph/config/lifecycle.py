@@ -1,0 +1,173 @@
+"""Settings of the life of a track: association, birth, confirmation, merging, end, and what is reported."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from jeat_graph.association.methods import METHODS, SLOTS
+from jeat_graph.config.fields import Section, choice, flag, number
+
+# Costs of the paper's problem are d² <= gate; leaving a row out must cost more than any sum of them, so that
+# as many pairs as possible are taken. Small enough that sums keep ten digits behind the point.
+_TAKE_ALL = 1.0e5
+
+
+def _chi2_bound(probability: float) -> float:
+    """Bound below which a χ² variable of 2 degrees of freedom lies with this probability, −2 ln(1 − p)."""
+    return -2.0 * math.log1p(-probability)
+
+
+@dataclass(frozen=True)
+class AssociationConfig(Section):
+    """How detections are given to tracks."""
+
+    method: str = choice(
+        "slots",
+        METHODS,
+        "slots: one joint problem with a slot per track and sensor; joint: the paper's, one match a track "
+        "and a second pass; sequential: sensor after sensor in the order of `priority`",
+    )
+    cost: str = choice("likelihood", ("likelihood", "mahalanobis"), "cost of a pair")
+    gate_probability: float = number(
+        1.0 - 1e-12,
+        "1",
+        "probability mass of the χ² gates; wide, for the likelihood decides",
+        0.5,
+        1.0 - 1e-13,
+    )
+    size_gate: bool = flag(True, "gate ln size too")
+    priority: tuple[str, ...] = field(
+        default=(), metadata={"doc": "order of sensors for `sequential`; those not named follow by name"}
+    )
+    second_pass: bool = flag(True, "joint and sequential: a matched track takes another sensor's leftover")
+    log_size_range: float = number(
+        3.0, "ln px", "range of ln width and of ln height over which false boxes spread", open_low=True
+    )
+
+    @property
+    def method_code(self) -> int:
+        """The number of `method`, see `association.methods`."""
+        return METHODS.index(self.method)
+
+    @property
+    def by_likelihood(self) -> bool:
+        """Whether pairs are judged by their likelihood ratio and not by their distance."""
+        return self.cost == "likelihood"
+
+    @property
+    def second_views(self) -> bool:
+        """Whether there is a second pass; slots leave nothing to it."""
+        return self.second_pass and METHODS.index(self.method) != SLOTS
+
+    @property
+    def gate_bound(self) -> float:
+        """Bound (χ², 2 degrees of freedom) on the squared Mahalanobis distance of the centre."""
+        return _chi2_bound(self.gate_probability)
+
+    @property
+    def size_gate_bound(self) -> float:
+        """Bound (χ², 2 degrees of freedom) on that of ln width and ln height; +inf for none."""
+        return _chi2_bound(self.gate_probability) if self.size_gate else math.inf
+
+    @property
+    def unassigned_cost(self) -> float:
+        """Cost of a track without detection: with distances as many pairs as possible are taken."""
+        return 0.0 if self.by_likelihood else _TAKE_ALL
+
+
+@dataclass(frozen=True)
+class LifecycleConfig(Section):
+    """When a track is confirmed, reported and given up."""
+
+    method: str = choice("existence", ("existence", "hits"), "Bernoulli existence, or the paper's hit counts")
+    confirm_existence: float = number(0.95, "1", "confirmed at this probability of existence", 0.0, 1.0)
+    delete_existence: float = number(0.001, "1", "deleted below this probability of existence", 0.0, 1.0)
+    lifetime_s: float = number(
+        20.0, "s", "mean time a vehicle stays in the picture (decay of existence)", open_low=True
+    )
+    hidden_prior: float = number(
+        0.1,
+        "1",
+        "share of the time for which a vehicle is hidden from a sensor, whatever the reason",
+        0.0,
+        0.9,
+    )
+    hidden_memory_s: float = number(
+        0.3, "s", "time after which a hidden vehicle may be visible again", open_low=True
+    )
+    scene_memory_s: float = number(
+        10.0, "s", "memory of the running estimates of each sensor's clutter and P_D; 0 keeps the configured"
+    )
+    p_detect_weight: float = number(0.05, "1", "weight of one look in a track's own P_D per sensor", 0.0, 1.0)
+    p_detect_min: float = number(0.05, "1", "least P_D of a track", 0.001, 0.999)
+    p_detect_max: float = number(0.98, "1", "greatest P_D of a track", 0.001, 0.999)
+    confirm_age_s: float = number(0.5, "s", "paper: age before confirmation")
+    confirm_hits: int = number(5, "1", "paper: hits before confirmation", low=1)
+    max_gap_confirmed_s: float = number(
+        1.0, "s", "a confirmed track without update is deleted after this (paper .5)"
+    )
+    max_silence_s: float = number(
+        300.0,
+        "s",
+        "after so long without any scan all tracks are over (longer predictions outgrow a double's digits)",
+        high=1000.0,
+        open_low=True,
+    )
+    leave_picture: bool = flag(True, "a track whose centre leaves the picture ends")
+    max_gap_tentative_s: float = number(
+        0.3, "s", "a tentative track without update is deleted after this (paper .2)"
+    )
+
+    @property
+    def by_existence(self) -> bool:
+        """Whether the probability of existence decides, and not hit counts."""
+        return self.method == "existence"
+
+
+@dataclass(frozen=True)
+class BirthConfig(Section):
+    """When a detection that no track took starts a new one."""
+
+    arrival_rate_hz: float = number(2.0, "1/s", "rate at which vehicles enter the scene")
+    initial: float = number(10.0, "1", "expected number of vehicles in the scene at the start")
+    min_existence: float = number(
+        0.002, "1", "least probability of existence with which a detection starts a track", 0.0, 1.0
+    )
+    max_overlap: float = number(
+        0.5,
+        "1",
+        "no birth where the IoU with a track, or with another birth of this batch, is above",
+        0.0,
+        1.0,
+    )
+
+
+@dataclass(frozen=True)
+class MergeConfig(Section):
+    """When two tracks are one vehicle; the older confirmed identity survives."""
+
+    enabled: bool = flag(True, "merge duplicates")
+    min_overlap: float = number(0.7, "1", "IoU above which two tracks may be one", 0.0, 1.0)
+    gate_probability: float = number(
+        0.99, "1", "χ² mass within which their velocities agree", 0.5, 1.0 - 1e-12
+    )
+
+    @property
+    def gate_bound(self) -> float:
+        """Bound (χ², 2 degrees of freedom) on the difference of two velocities."""
+        return _chi2_bound(self.gate_probability)
+
+
+@dataclass(frozen=True)
+class OutputConfig(Section):
+    """Which tracks the causal table reports."""
+
+    min_existence: float = number(0.5, "1", "reported only above this probability of existence", 0.0, 1.0)
+    max_gap_s: float = number(
+        0.12, "s", "reported only if updated within this time (paper: as long as it lives)"
+    )
+    clip: bool = flag(True, "clip boxes to the picture; drop those outside it")
+    min_visible: float = number(
+        0.3, "1", "reported only if this fraction of the box lies in the picture", 0.0, 1.0
+    )

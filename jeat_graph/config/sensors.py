@@ -1,0 +1,55 @@
+"""Settings of one sensor: how often it looks, how exact and how reliable its boxes are."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, field
+
+from jeat_graph.config.fields import Section, number
+from jeat_graph.data.errors import ConfigError
+
+
+@dataclass(frozen=True)
+class SensorConfig(Section):
+    """What is known of one sensor and its detector. `calibrate` estimates all of it from data."""
+
+    rate_hz: float = number(20.0, "Hz", "nominal rate of its scans", open_low=True)
+    sigma_px: float = number(2.0, "px", "noise of the box centre that does not depend on size", open_low=True)
+    rho_x: float = number(0.03, "1", "noise of the box centre in x as a fraction of the width (method: rho)")
+    rho_y: float = number(0.03, "1", "noise of the box centre in y as a fraction of the height (method: rho)")
+    correlated_share: float = number(
+        0.0, "1", "share of the centre's noise variance that persists from scan to scan", 0.0, 0.99
+    )
+    memory_s: float = number(0.2, "s", "correlation time of that share", 1e-3, 1e4)
+    sigma_log_width: float = number(0.08, "ln px", "noise of the logarithm of the width", open_low=True)
+    sigma_log_height: float = number(0.08, "ln px", "noise of the logarithm of the height", open_low=True)
+    bias: tuple[float, float, float, float] = number(
+        (0.0, 0.0, 0.0, 0.0),
+        "1",
+        "systematic error: centre x / width, centre y / height, ln width, ln height",
+        low=-1.0,
+        high=1.0,
+    )
+    p_detect: float = number(0.9, "1", "probability that a visible vehicle is detected", 0.01, 0.999)
+    clutter_per_scan: float = number(0.3, "boxes", "mean number of false boxes a scan", open_low=True)
+    precision: float = number(0.9, "1", "fraction of its boxes that are vehicles", 0.001, 0.999)
+    score_precision: tuple[tuple[float, float], ...] = field(
+        default=((0.0, 0.02), (1.0, 0.98)),
+        metadata={
+            "doc": "calibrated precision of a box of this score: (score, precision) knots, both rising"
+        },
+    )
+    tempering: float = number(
+        1.0, "1", "exponent on evidence, below 1 where false boxes repeat in time", 0.01, 1.0
+    )
+    blind_speed: float = number(
+        0.0, "px/s", "image speed below which the sensor sees nothing (events); 0: it sees what stands still"
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        knots = self.score_precision
+        ok = len(knots) >= 1 and all(0 <= s <= 1 and 0 <= p <= 1 for s, p in knots)
+        rising = all(b[0] > a[0] and b[1] >= a[1] for a, b in itertools.pairwise(knots))
+        if not (ok and rising):
+            raise ConfigError("score_precision: scores must rise, precisions must not fall, all in [0, 1]")

@@ -1,0 +1,38 @@
+"""Settings of smoothing: which engine, how far it looks back, and how fragments are joined."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from jeat_graph.config.fields import Section, choice, flag, number
+
+
+@dataclass(frozen=True)
+class SmootherConfig(Section):
+    """How the trajectories of confirmed tracks are smoothed."""
+
+    engine: str = choice(
+        "fixed-lag",
+        ("fixed-lag", "fixed-lag-rts", "full", "rts", "none"),
+        "fixed-lag: GTSAM with a window; full: GTSAM over each whole track once it has ended; fixed-lag-rts "
+        "and rts: the same by our own Rauch-Tung-Striebel pass; none: no smoothing",
+    )
+    lag_s: float = number(
+        1.0, "s", "fixed lag: a state is final once this much time has followed", open_low=True
+    )
+    chunk: int = number(48, "1", "fixed lag: measurements of a track per update", low=1)
+    robust: str = choice(
+        "none",
+        ("none", "cauchy", "student-t"),
+        "full and rts: kernel that weighs down outlying measurements",
+    )
+    output_rate_hz: float = number(0.0, "Hz", "rows per second of the smoothed table; 0: one at each scan")
+    worker: bool = flag(False, "smooth in a process of its own, so that no step of the tracker waits for it")
+    stitch: bool = flag(True, "full and rts: join the fragments of one vehicle when the recording ends")
+    stitch_max_gap_s: float = number(3.0, "s", "longest time between two fragments of one vehicle")
+    stitch_hidden_s: float = number(
+        0.5, "s", "mean time for which a vehicle is hidden while others are seen", open_low=True
+    )
+    stitch_gate_probability: float = number(
+        0.9999, "1", "probability mass of the χ² gate within which two fragments agree", 0.5, 1.0 - 1e-12
+    )
