@@ -2,6 +2,7 @@
 #
 #   make demo    simulate a highway at night, track it, judge the tracks, draw a picture (in demo/)
 #   make test    run all tests
+#   make live    the long form of the tests of live use: kills, brokers, late data (half an hour)
 #   make lint    style, format and docstrings
 #   make types   type-check the built package
 #   make bounds  run the numerical tests with the oldest versions allowed of what is needed
@@ -17,7 +18,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
 SOURCES := $(shell find jeat_graph filters association smoothers -name '*.py')
 
-.PHONY: demo test lint types bounds build docs clean
+.PHONY: demo test live lint types bounds build docs clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.compiled
@@ -26,6 +27,9 @@ demo: $(VENV)/.compiled
 test: $(VENV)/.test $(VENV)/.compiled
 	@echo "make: running the tests"
 	@$(BIN)/python -m pytest -n 2
+
+live: $(VENV)/.test $(VENV)/.compiled
+	@JEAT_GRAPH_FULL=1 $(BIN)/python -m pytest tests/live
 
 lint: $(VENV)/.lint
 	@$(BIN)/ruff check

@@ -18,6 +18,7 @@ COMMANDS = (
     "simulate",
     "track",
     "stream",
+    "batch",
     "eval",
     "compare",
     "count",

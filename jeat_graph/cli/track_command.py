@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
 from pathlib import Path
 
 from jeat_graph.config.argument_types import positive
@@ -80,49 +79,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Read, check, track, and write the run directory."""
-    from jeat_graph.config.reading import load_config
-    from jeat_graph.io.detections_io import read_many, split_name
-    from jeat_graph.runs.directory import RunDirectory
-    from jeat_graph.runs.input_checks import check_detections
-    from jeat_graph.runs.tracking_run import RunOptions, RunRecord, describe_inputs, write_run
-    from jeat_graph.tracking.warm_up import notice_if_cold
+    from jeat_graph.runs.track_files import TrackRequest, track_files
+    from jeat_graph.runs.tracking_run import RunOptions
 
-    begin = time.perf_counter()
     overrides = list(args.overrides)
     if args.smoother is not None:
         overrides.append(f"smoother.engine={args.smoother}")
-    config = load_config(args.config, overrides)
-    files = [str(split_name(item)[1]) for item in args.detections]
-    directory = RunDirectory(args.out, inputs=files)
-    options = RunOptions(
-        formats=tuple(dict.fromkeys(name for name in args.formats if name != "csv")),
-        frame_rate_hz=args.frame_rate if args.frame_rate is not None else args.rate,
-        progress=sys.stderr.isatty(),
-        diagnostics=args.diagnostics,
+    request = TrackRequest(
+        detections=tuple(str(item) for item in args.detections),
+        out=args.out,
+        config=args.config,
+        overrides=tuple(overrides),
+        rate_hz=args.rate,
+        input_format=args.input_format,
+        score_scale=args.score_scale,
+        images=args.images,
+        options=RunOptions(
+            formats=tuple(dict.fromkeys(name for name in args.formats if name != "csv")),
+            frame_rate_hz=args.frame_rate if args.frame_rate is not None else args.rate,
+            progress=sys.stderr.isatty(),
+            diagnostics=args.diagnostics,
+        ),
     )
-    reading = {
-        "rate_hz": args.rate,
-        "fmt": args.input_format,
-        "score_scale": args.score_scale,
-        "images": args.images,
-    }
-    detections = read_many(args.detections, **reading)
-    record = RunRecord(
-        source={
-            "config_name": args.config,
-            "overrides": overrides,
-            "inputs": describe_inputs(files),
-            "reading": {"detections": [str(item) for item in args.detections], **reading},
-        },
-        warnings=check_detections(detections, config, " + ".join(files)),
-    )
-    for warning in record.warnings:
-        print(f"jeat-graph track: warning: {warning}", file=sys.stderr)
-    record.timings["read_s"] = round(time.perf_counter() - begin, 4)
-    notice_if_cold()
-    with directory:
-        write_run(detections, config, directory, record, options)
-    counts = record.counts
-    print(f"{detections.num_scans} scans, {len(detections)} detections: {counts['tracks_reported']} tracks")
+    counts = track_files(request, _warn).counts
+    print(f"{counts['scans']} scans, {counts['detections']} detections: {counts['tracks_reported']} tracks")
     print(f"wrote {Path(args.out)}")
     return 0
+
+
+def _warn(text: str) -> None:
+    print(f"jeat-graph track: warning: {text}", file=sys.stderr)

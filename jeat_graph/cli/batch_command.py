@@ -1,0 +1,87 @@
+"""`jeat-graph batch`: a table of recordings in, a run directory for each and one table of all out."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from jeat_graph.config.argument_types import counting, natural
+
+HELP = "track many recordings in parallel, each once; failures are collected in a table"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    from jeat_graph.cli.track_command import ENGINES, OUTPUT_FORMATS
+
+    add = parser.add_argument
+    add(
+        "manifest",
+        metavar="MANIFEST",
+        help="CSV or Parquet, one recording a row: detections (files joined by ;) and, optional, name, "
+        "config, set (settings joined by ;), gt, rate; paths as seen from the manifest's folder",
+    )
+    add(
+        "--out",
+        required=True,
+        metavar="DIR",
+        help="gets runs/NAME, recordings.csv and, where truth is given, scores.json; run again, it goes on",
+    )
+    add("--engine", choices=("local", "ray"), default="local", help="where to work (default: local)")
+    add("--workers", type=counting, metavar="N", help="recordings at once (default: one a core)")
+    add("--retries", type=natural, default=1, metavar="N", help="tries again when a worker dies (default: 1)")
+    add("--address", metavar="ADDRESS", help="ray: a running cluster, say auto (default: one started here)")
+    add("--config", default="default", metavar="NAME|FILE", help="preset or YAML file (default: default)")
+    add(
+        "--set", dest="overrides", action="append", default=[], metavar="KEY=VALUE", help="change one setting"
+    )
+    add("--smoother", choices=ENGINES, help="engine of smoothed.csv, as in `track`")
+    add(
+        "--format",
+        dest="formats",
+        nargs="+",
+        action="extend",
+        default=[],
+        choices=OUTPUT_FORMATS,
+        metavar="NAME",
+        help="also write the tables as parquet, motchallenge, kitti",
+    )
+    add("--diagnostics", action="store_true", help="also write diagnostics.csv of each run")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Work on all recordings; 1 if any of them failed."""
+    from jeat_graph.eval.judge import summary_table
+    from jeat_graph.live.batch import TABLE, BatchOptions, run_batch
+    from jeat_graph.live.manifest import read_manifest
+    from jeat_graph.runs.tracking_run import RunOptions
+
+    recordings = read_manifest(args.manifest)
+    overrides = list(args.overrides)
+    if args.smoother is not None:
+        overrides.append(f"smoother.engine={args.smoother}")
+    options = BatchOptions(
+        config=args.config,
+        overrides=tuple(overrides),
+        options=RunOptions(
+            formats=tuple(dict.fromkeys(name for name in args.formats if name != "csv")),
+            diagnostics=args.diagnostics,
+        ),
+        engine=args.engine,
+        workers=args.workers,
+        retries=args.retries,
+        address=args.address,
+        progress=sys.stderr.isatty(),
+    )
+    result = run_batch(recordings, args.out, options)
+    if result.judged:
+        sys.stdout.write(summary_table(result.judged).render())
+    counts = {status: sum(one.status == status for one in result.outcomes) for status in ("done", "kept")}
+    print(
+        f"{len(result.outcomes)} recordings: {counts['done']} tracked, {counts['kept']} kept, "
+        f"{len(result.failed)} failed"
+    )
+    print(f"wrote {args.out}: see {TABLE}")
+    for one in result.failed:
+        print(f"jeat-graph batch: {one.name}: {one.error}", file=sys.stderr)
+    return 1 if result.failed else 0

@@ -1,0 +1,146 @@
+"""Where the recordings of a batch are worked on: processes of this machine, or a Ray cluster."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any, TypeVar
+
+from jeat_graph.data.errors import JeatGraphError
+
+ENGINES = ("local", "ray")
+_Job = TypeVar("_Job")
+_Result = TypeVar("_Result")
+_WAIT_S = 0.5  # between looks at whether an interrupt has come
+
+
+def run_local(
+    work: Callable[[_Job], _Result],
+    jobs: Sequence[_Job],
+    lost: Callable[[_Job], _Result],
+    *,
+    workers: int,
+    retries: int = 1,
+) -> Generator[_Result, None, None]:
+    """Work on jobs in processes of this machine; yield each result as it is there.
+
+    Each worker has a pool of its own, so that one that dies takes no other job with it than its own.
+
+    Args:
+        work: the work, importable by name.
+        jobs: what it is given, one after the other.
+        lost: the result of a job whose worker died each time.
+        workers: how many processes.
+        retries: how often a job whose worker died is given to another one.
+    """
+    from multiprocessing import active_children, get_context
+
+    before = set(active_children())
+    context = get_context("spawn")  # fork would copy the threads' locks of other libraries
+
+    def pool() -> ProcessPoolExecutor:
+        return ProcessPoolExecutor(1, context, _end_with_parent)
+
+    pools: dict[int, ProcessPoolExecutor] = {}
+    at_work: dict[Future[_Result], tuple[int, int, int]] = {}  # job's index, tries before, the worker
+    waiting = [(k, 0) for k in reversed(range(len(jobs)))]
+    free = list(range(min(workers, len(jobs))))
+    try:
+        while waiting or at_work:
+            while waiting and free:
+                (index, tries), slot = waiting.pop(), free.pop()
+                if slot not in pools:
+                    pools[slot] = pool()
+                at_work[pools[slot].submit(work, jobs[index])] = (index, tries, slot)
+            done, _ = wait(at_work, _WAIT_S, FIRST_COMPLETED)
+            for future in done:
+                index, tries, slot = at_work.pop(future)
+                free.append(slot)
+                try:
+                    yield future.result()
+                except BrokenProcessPool:
+                    pools.pop(slot).shutdown(wait=False)
+                    if tries < retries:
+                        waiting.append((index, tries + 1))
+                    else:
+                        yield lost(jobs[index])
+    finally:
+        # After an error or an interrupt: do not wait for what runs.
+        for one in pools.values():
+            one.shutdown(wait=not at_work, cancel_futures=True)
+        for child in set(active_children()) - before:
+            child.terminate()
+            child.join()
+
+
+def _end_with_parent() -> None:
+    """Leave interrupts to the parent, and end when it ends, however that happens."""
+    from multiprocessing import parent_process
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = parent_process()
+    assert parent is not None
+
+    def watch() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def run_on_ray(
+    work: Callable[[_Job], _Result],
+    jobs: Sequence[_Job],
+    lost: Callable[[_Job], _Result],
+    *,
+    workers: int | None = None,
+    retries: int = 3,
+    address: str | None = None,
+) -> Generator[_Result, None, None]:
+    """Work on jobs as tasks of a Ray cluster; yield each result as it is there.
+
+    A task whose worker or node dies is run again by Ray. Every node must see the files under the same paths.
+
+    Args:
+        work: the work.
+        jobs: what it is given.
+        lost: the result of a job whose worker died each time.
+        workers: processes of a cluster that is started here for the purpose; None for one a core.
+        retries: how often Ray runs a task again whose worker died.
+        address: of a running cluster (`auto`, `ray://host:10001`); None starts one on this machine.
+
+    Raises:
+        JeatGraphError: Ray is not installed, or the cluster cannot be reached.
+    """
+    try:
+        import ray
+    except ImportError:
+        raise JeatGraphError("--engine ray needs Ray: pip install 'jeat-graph[ray]'") from None
+    options: dict[str, Any] = {"log_to_driver": False, "logging_level": "error"}
+    if address is None:
+        options |= {"num_cpus": workers, "include_dashboard": False}
+    began = not ray.is_initialized()
+    if began:
+        try:
+            ray.init(address=address, **options)
+        except (ConnectionError, OSError, ValueError) as error:
+            raise JeatGraphError(f"no Ray cluster at {address}: {error}") from None
+    try:
+        # Only a worker's death is tried again: an error of the work itself would come again.
+        task = ray.remote(max_retries=retries, retry_exceptions=False, num_cpus=1)(work)
+        at_work = {task.remote(job): job for job in jobs}
+        while at_work:
+            done, _ = ray.wait(list(at_work), num_returns=1, timeout=_WAIT_S)
+            for reference in done:
+                job = at_work.pop(reference)
+                try:
+                    yield ray.get(reference)
+                except ray.exceptions.RayError:
+                    yield lost(job)
+    finally:
+        if began:
+            ray.shutdown()

@@ -1,0 +1,138 @@
+"""One recording of a batch: tracked into its run directory, or found there already, or failed and why."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import traceback
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from jeat_graph.data.errors import JeatGraphError
+from jeat_graph.runs.track_files import TrackRequest
+
+DONE, KEPT, FAILED = "done", "kept", "failed"
+_COUNTS = ("scans", "detections", "tracks_reported", "causal_rows", "smoothed_rows")
+_STAGING = ".unfinished-*"
+
+
+@dataclass(frozen=True)
+class Job:
+    """What a worker is told.
+
+    Attributes:
+        name: the recording's name.
+        request: what to track, and where to.
+    """
+
+    name: str
+    request: TrackRequest
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one recording.
+
+    Attributes:
+        name: the recording's name.
+        status: `done` now, `kept` from an earlier batch because nothing has changed, or `failed`.
+        counts: scans, detections, tracks and rows of the run, where there is one.
+        warnings: how many warnings its `run.json` holds.
+        error: why it failed, one line; empty if it did not.
+        trace: where an error that is not the input's came from; empty else.
+    """
+
+    name: str
+    status: str
+    counts: dict[str, int]
+    warnings: int = 0
+    error: str = ""
+    trace: str = ""
+
+
+def run_job(job: Job) -> Outcome:
+    """Track one recording; never raises but for an interrupt or the end of the process.
+
+    A run that is complete and was made from the same files with the same settings by the same version is
+    kept. So a job may be given twice: a worker that died after its last file was renamed, or before, leaves
+    either a whole run or none.
+    """
+    try:
+        out = Path(job.request.out)
+        known = _finished(job.request)
+        if known is not None:
+            return _outcome(job.name, KEPT, known)
+        for folder in out.glob(_STAGING):  # of a worker that was killed here
+            shutil.rmtree(folder, ignore_errors=True)
+        track_request(job.request)
+        return _outcome(job.name, DONE, _record_of(out))
+    except (JeatGraphError, OSError) as error:
+        return Outcome(job.name, FAILED, {}, error=_one_line(str(error)))
+    except Exception as error:  # one recording's trouble must not be the others'
+        what = _one_line(f"unexpected {type(error).__name__}: {error}")
+        return Outcome(job.name, FAILED, {}, error=what, trace=traceback.format_exc())
+
+
+def track_request(request: TrackRequest) -> None:
+    """Track, without a progress bar: the batch has one over all."""
+    from jeat_graph.runs.track_files import track_files
+
+    track_files(replace(request, options=replace(request.options, progress=False)))
+
+
+def _finished(request: TrackRequest) -> dict[str, Any] | None:
+    """The record of the run if it is there, whole, and what this request would make; else None."""
+    from jeat_graph.config.reading import config_to_dict
+    from jeat_graph.io.hashing import sha256_of
+    from jeat_graph.runs.directory import RUN_JSON
+    from jeat_graph.version import __version__
+
+    out = Path(request.out)
+    if not (out / RUN_JSON).is_file():
+        return None
+    record = _record_of(out)
+    wanted = json.loads(json.dumps(request.source()))
+    same = (
+        record.get("version") == __version__
+        and record.get("config") == json.loads(json.dumps(config_to_dict(request.load_config())))
+        and _hashes(record.get("inputs")) == _hashes(wanted["inputs"])
+        and _settings(record.get("reading")) == _settings(wanted["reading"])
+    )
+    files = record.get("files")
+    if not same or not isinstance(files, dict):
+        return None
+    whole = all(
+        (out / name).is_file() and sha256_of(out / name) == entry["sha256"] for name, entry in files.items()
+    )
+    return record if whole else None
+
+
+def _hashes(inputs: Any) -> list[str]:
+    return [entry["sha256"] for entry in inputs] if isinstance(inputs, list) else []
+
+
+def _settings(reading: Any) -> dict[str, Any]:
+    """How the files were read, but for their paths: a moved recording is the same recording."""
+    return {k: v for k, v in reading.items() if k != "detections"} if isinstance(reading, dict) else {}
+
+
+def _record_of(out: Path) -> dict[str, Any]:
+    from jeat_graph.runs.directory import RUN_JSON
+
+    content = json.loads((out / RUN_JSON).read_text(encoding="utf-8"))
+    return content if isinstance(content, dict) else {}
+
+
+def _outcome(name: str, status: str, record: dict[str, Any]) -> Outcome:
+    counts = record.get("counts", {})
+    return Outcome(
+        name,
+        status,
+        {key: int(counts[key]) for key in _COUNTS if key in counts},
+        len(record.get("warnings", [])),
+    )
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())

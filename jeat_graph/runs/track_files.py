@@ -1,0 +1,113 @@
+"""Files of detections in, a run directory out: what `track` does once, and `batch` for each recording."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from jeat_graph.runs.tracking_run import RunOptions, RunRecord, describe_inputs, write_run
+
+if TYPE_CHECKING:
+    from jeat_graph.config.schema import Config
+
+
+@dataclass(frozen=True)
+class TrackRequest:
+    """What shall be tracked, and how.
+
+    Attributes:
+        detections: files of one scene, say one a sensor; `NAME=path` names a sensor.
+        out: the run directory.
+        config: name of a preset or path of a YAML file.
+        overrides: `key=value` texts over it.
+        rate_hz: frame rate of files that count frames, or None.
+        input_format: format of the files if it shall not be recognised.
+        score_scale: how their scores are to be read, see `read_detections`.
+        images: COCO data set with the times of COCO results, or None.
+        options: how the run is written.
+    """
+
+    detections: tuple[str, ...]
+    out: str
+    config: str = "default"
+    overrides: tuple[str, ...] = ()
+    rate_hz: float | None = None
+    input_format: str | None = None
+    score_scale: str = "unit"
+    images: str | None = None
+    options: RunOptions = field(default_factory=RunOptions)
+
+    @property
+    def files(self) -> list[str]:
+        """Paths of the detections, without the sensors' names."""
+        from jeat_graph.io.detections_io import split_name
+
+        return [str(split_name(item)[1]) for item in self.detections]
+
+    def load_config(self) -> Config:
+        """Load the configuration.
+
+        Raises:
+            ConfigError: it is not valid.
+        """
+        from jeat_graph.config.reading import load_config
+
+        return load_config(self.config, self.overrides)
+
+    def source(self) -> dict[str, Any]:
+        """Describe the inputs as `run.json` has them.
+
+        Raises:
+            DataError: a file cannot be read.
+        """
+        return {
+            "config_name": self.config,
+            "overrides": list(self.overrides),
+            "inputs": describe_inputs(self.files),
+            "reading": {"detections": list(self.detections), **self._reading()},
+        }
+
+    def _reading(self) -> dict[str, Any]:
+        return {
+            "rate_hz": self.rate_hz,
+            "fmt": self.input_format,
+            "score_scale": self.score_scale,
+            "images": self.images,
+        }
+
+
+def track_files(request: TrackRequest, warn: Callable[[str], object] = lambda _: None) -> RunRecord:
+    """Read, check, track, and write the run directory; the folder is as it was if that fails.
+
+    Args:
+        request: what to do.
+        warn: called with each warning about the input before the tracking begins.
+
+    Returns:
+        What `run.json` says of the run.
+
+    Raises:
+        JeatGraphError: the configuration or a file is not valid, or they do not fit together.
+    """
+    from jeat_graph.io.detections_io import read_many
+    from jeat_graph.runs.directory import RunDirectory
+    from jeat_graph.runs.input_checks import check_detections
+    from jeat_graph.tracking.warm_up import notice_if_cold
+
+    begin = time.perf_counter()
+    config = request.load_config()
+    directory = RunDirectory(request.out, inputs=request.files)
+    detections = read_many(request.detections, **request._reading())
+    record = RunRecord(
+        source=request.source(), warnings=check_detections(detections, config, " + ".join(request.files))
+    )
+    for warning in record.warnings:
+        warn(warning)
+    record.timings["read_s"] = round(time.perf_counter() - begin, 4)
+    record.counts = {"scans": detections.num_scans, "detections": len(detections)}
+    notice_if_cold()
+    with directory:
+        write_run(detections, config, directory, record, request.options)
+    return record

@@ -1,0 +1,33 @@
+"""Short recordings for the tests of live use; with JEAT_GRAPH_FULL=1 the long form of each runs."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from jeat_graph.cli.main import main
+
+
+@pytest.fixture(scope="session")
+def full() -> bool:
+    """Whether the long form is asked for."""
+    return os.environ.get("JEAT_GRAPH_FULL", "") not in ("", "0")
+
+
+@pytest.fixture(scope="session")
+def simulated(tmp_path_factory):
+    """Make `detections.csv` and `gt.csv` of some simulated seconds, once a seed and duration; the folder."""
+    made: dict[tuple[int, float], Path] = {}
+
+    def make(seed: int, duration_s: float = 1.5) -> Path:
+        key = (seed, duration_s)
+        if key not in made:
+            folder = tmp_path_factory.mktemp("simulated")
+            options = ["--duration", str(duration_s), "--seed", str(seed)]
+            assert main(["simulate", "night", "--out", str(folder), *options]) == 0
+            made[key] = folder
+        return made[key]
+
+    return make

@@ -1,0 +1,208 @@
+"""`jeat-graph batch`: every recording once, whatever happens to the others or to the workers."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from jeat_graph.cli.main import main
+from jeat_graph.live.engines import run_local
+from jeat_graph.live.manifest import read_manifest
+
+TABLES = ("causal.csv", "smoothed.csv")
+
+
+@pytest.fixture
+def manifest(tmp_path, simulated):
+    """Write a manifest of `count` recordings with truth, and further lines; the path."""
+
+    def write(count: int, *more: str) -> Path:
+        lines = ["name,detections,gt,set"]
+        for k in range(count):
+            folder = simulated(k % 3)
+            lines.append(
+                f"r{k:02},{folder / 'detections.csv'},{folder / 'gt.csv'},output.min_existence=0.{k:02}"
+            )
+        path = tmp_path / "manifest.csv"
+        path.write_text("\n".join([*lines, *more]) + "\n")
+        return path
+
+    return write
+
+
+def rows_of(out: Path) -> list[dict[str, str]]:
+    with (out / "recordings.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+def in_series(path: Path, out: Path) -> None:
+    """Each recording of a manifest by `track`, one after the other."""
+    for one in read_manifest(path):
+        options = [text for setting in one.overrides for text in ("--set", setting)]
+        assert main(["track", *one.detections, "--out", str(out / one.name), *options]) == 0
+
+
+def assert_same_tables(path: Path, runs: Path, series: Path) -> None:
+    for one in read_manifest(path):
+        for name in TABLES:
+            assert (runs / one.name / name).read_bytes() == (series / one.name / name).read_bytes()
+
+
+def test_a_batch_makes_the_runs_of_track_and_pools_their_scores(manifest, tmp_path, capsys):
+    path, out = manifest(2), tmp_path / "out"
+    assert main(["batch", str(path), "--out", str(out), "--workers", "2"]) == 0
+    said = capsys.readouterr().out
+    assert "2 recordings: 2 tracked, 0 kept, 0 failed" in said
+    in_series(path, tmp_path / "series")
+    assert_same_tables(path, out / "runs", tmp_path / "series")
+    truths = [one.truth for one in read_manifest(path)]
+    runs = [str(tmp_path / "series" / one.name) for one in read_manifest(path)]
+    assert main(["eval", *runs, "--gt", *truths, "--json", str(tmp_path / "pooled.json")]) == 0
+    assert json.loads((out / "scores.json").read_text()) == json.loads((tmp_path / "pooled.json").read_text())
+    assert [row["status"] for row in rows_of(out)] == ["done"] * 2
+
+
+def test_a_second_call_keeps_what_is_there_and_makes_what_changed(manifest, tmp_path):
+    path, out = manifest(2), tmp_path / "out"
+    assert main(["batch", str(path), "--out", str(out)]) == 0
+    times = {name: (out / "runs" / name / "run.json").stat().st_mtime_ns for name in ("r00", "r01")}
+    (out / "runs" / "r01" / "causal.csv").write_text("damaged\n")
+    assert main(["batch", str(path), "--out", str(out)]) == 0
+    assert [row["status"] for row in rows_of(out)] == ["kept", "done"]
+    assert (out / "runs" / "r00" / "run.json").stat().st_mtime_ns == times["r00"]
+    assert (out / "runs" / "r01" / "run.json").stat().st_mtime_ns > times["r01"]
+    assert main(["batch", str(path), "--out", str(out), "--set", "birth.initial=3"]) == 0
+    assert [row["status"] for row in rows_of(out)] == ["done", "done"]
+
+
+def test_what_fails_is_in_the_table_and_stops_nobody(manifest, tmp_path, capsys):
+    (tmp_path / "bad.csv").write_text("t,sensor,left,top,width,height,score\n0,rgb,1,2,-3,4,1\n")
+    path, out = manifest(1, "bad,bad.csv,,", "missing,nowhere.csv,,"), tmp_path / "out"
+    assert main(["batch", str(path), "--out", str(out), "--workers", "1"]) == 1
+    assert "1 tracked, 0 kept, 2 failed" in capsys.readouterr().out
+    rows = {row["name"]: row for row in rows_of(out)}
+    assert (rows["r00"]["status"], rows["bad"]["status"]) == ("done", "failed")
+    assert "bad.csv:2" in rows["bad"]["error"]
+    assert "no such file" in rows["missing"]["error"]
+    assert not (out / "runs" / "bad").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("name,detections\n", "names no recording"),
+        ("name,detection\na,b.csv\n", "detections"),
+        ("detections,camra\na.csv,b\n", "unknown column 'camra'"),
+        ("name,detections\na,b.csv\na,c.csv\n", ":3: name 'a' is taken"),
+        ("name,detections\n../a,b.csv\n", ":2: name '../a' must be"),
+        ("name,detections,rate\na,b.csv,-1\n", "rate must be positive"),
+    ],
+)
+def test_a_bad_manifest_is_refused_before_anything_is_tracked(text, message, tmp_path, capsys):
+    path = tmp_path / "m.csv"
+    path.write_text(text)
+    assert main(["batch", str(path), "--out", str(tmp_path / "out")]) == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_several_files_and_a_sensors_name_are_found_beside_the_manifest(tmp_path):
+    (tmp_path / "m.csv").write_text("detections,config\nrgb=a/det.csv; evt=b.csv,kitti\n")
+    (one,) = read_manifest(tmp_path / "m.csv")
+    assert one.detections == (f"rgb={tmp_path}/a/det.csv", f"evt={tmp_path}/b.csv")
+    assert (one.name, one.config) == ("det", "kitti")
+
+
+def test_two_batches_never_work_in_one_folder(manifest, tmp_path, capsys):
+    fcntl = pytest.importorskip("fcntl")
+    out = tmp_path / "out"
+    out.mkdir()
+    with (out / ".batch.lock").open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        assert main(["batch", str(manifest(1)), "--out", str(out)]) == 2
+    assert "another batch is at work here" in capsys.readouterr().err
+
+
+WORK = """
+import os, signal, time
+from pathlib import Path
+
+def work(job):
+    folder, name, deaths = job
+    with open(Path(folder) / name, "a") as file:
+        file.write("x")
+    if len((Path(folder) / name).read_text()) <= deaths:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return name, "done"
+"""
+
+
+def lost(job):
+    return job[1], "lost"
+
+
+def test_a_worker_that_dies_costs_no_other_job_and_a_deadly_job_only_itself(tmp_path, monkeypatch):
+    (tmp_path / "deadly_work.py").write_text(WORK)
+    monkeypatch.syspath_prepend(tmp_path)
+    from deadly_work import work
+
+    jobs = [(str(tmp_path), f"j{k}", {2: 1, 4: 99}.get(k, 0)) for k in range(7)]
+    results = dict(run_local(work, jobs, lost, workers=2, retries=1))
+    assert results == {f"j{k}": "lost" if k == 4 else "done" for k in range(7)}
+    tries = {f"j{k}": len((tmp_path / f"j{k}").read_text()) for k in range(7)}
+    assert tries == {f"j{k}": 2 if k in (2, 4) else 1 for k in range(7)}
+
+
+def descendants(pid: int) -> dict[int, str]:
+    """Processes below one of ours, by number, with their command lines."""
+    children: dict[int, list[int]] = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            parent = int(stat.read_text().rsplit(")", 1)[1].split()[1])
+        except OSError:
+            continue
+        children.setdefault(parent, []).append(int(stat.parent.name))
+    found, to_do = {}, [pid]
+    while to_do:
+        for child in children.get(to_do.pop(), []):
+            to_do.append(child)
+            try:
+                found[child] = Path(f"/proc/{child}/cmdline").read_bytes().replace(b"\0", b" ").decode()
+            except OSError:
+                continue
+    return found
+
+
+def kill_at_work(runs: Path, killed: list[str]) -> None:
+    """Wait until a run has been begun, and kill the worker of Ray that is at it."""
+    while not killed:
+        time.sleep(0.01)
+        begun = [folder.parent.name for folder in runs.glob("*/.unfinished-*")]
+        workers = [pid for pid, line in descendants(os.getpid()).items() if line.startswith("ray::run_job")]
+        if begun and workers:
+            os.kill(workers[0], signal.SIGKILL)
+            killed.append(begun[0])
+
+
+def test_on_ray_a_killed_worker_costs_nothing_and_the_bytes_are_those_of_a_series(manifest, tmp_path, full):
+    pytest.importorskip("ray", reason="Ray is not installed")
+    if not Path("/proc/self/stat").exists():
+        pytest.skip("finds the worker's process in /proc")
+    path, out = manifest(64 if full else 3), tmp_path / "out"
+    killed: list[str] = []
+    killer = threading.Thread(target=kill_at_work, args=(out / "runs", killed), daemon=True)
+    killer.start()
+    assert main(["batch", str(path), "--out", str(out), "--engine", "ray", "--workers", "2"]) == 0
+    killer.join(timeout=1.0)
+    assert killed, "no worker was killed, so nothing was shown"
+    assert all(row["status"] in ("done", "kept") for row in rows_of(out))
+    assert not list((out / "runs").glob("*/.unfinished-*"))
+    in_series(path, tmp_path / "series")
+    assert_same_tables(path, out / "runs", tmp_path / "series")
