@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 from jeat_graph.benchmark.speed import ENGINES
-from jeat_graph.benchmark.speed_scene import Scene
-from jeat_graph.benchmark.speed_subjects import OURS, installed_peers, tracker_for
+from jeat_graph.benchmark.speed_subjects import installed_peers
 from jeat_graph.benchmark.speed_timing import summarise, time_side_by_side
-from jeat_graph.benchmark.speed_worker import resident_mib
 
 
 def run_times(**seconds):
@@ -53,42 +51,6 @@ def test_peers_hold_most_objects_of_the_scene():
     run = time_side_by_side(peers, 30, frames=10, warm_up=20, seed=0)
     # They report only what was detected in the frame (95 %); OC-SORT wants several hits in a row.
     assert all(run[name][1] > 0.75 * 30 for name in peers)
-
-
-def test_our_step_takes_less_cpu_than_an_eighth_of_bytetracks():
-    if not installed_peers():
-        pytest.skip("the package trackers is not installed")
-    runs = [
-        time_side_by_side(["default", "bytetrack"], 50, frames=30, warm_up=20, seed=seed, clock="cpu")
-        for seed in range(2)
-    ]
-    ours = summarise(runs)[0]
-    assert ours["times_faster"] >= 8.0
-
-
-def test_time_grows_no_faster_than_linearly_to_500_tracks():
-    median = {
-        num: summarise([time_side_by_side(["default"], num, frames=30, warm_up=20, seed=0, clock="cpu")])[0][
-            "median_ms"
-        ]
-        for num in (100, 500)
-    }
-    # Times of single frames scatter: a quarter more than five times is allowed.
-    assert median[500] <= 1.25 * 5.0 * median[100]
-
-
-def test_memory_is_flat_over_a_long_input():
-    tracker = tracker_for(*OURS["default"])
-    scene = Scene(4, seed=0)
-    rng = np.random.default_rng(0)
-    memory = []
-    for k in range(9000):
-        frame = scene.scan(k / 100, rng)
-        tracker.step((frame.t, "evt", frame.boxes, frame.scores))
-        if k % 3000 == 2999:
-            memory.append(resident_mib())
-    # 6,000 scans that each left as little as 100 bytes would show as 0.6 MiB.
-    assert memory[-1] - memory[0] < 0.5
 
 
 def test_the_command_writes_table_json_and_plots(tmp_path):

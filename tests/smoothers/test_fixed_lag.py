@@ -1,8 +1,5 @@
 """The fixed-lag smoother: exact, bounded, and never at the mercy of GTSAM's exceptions."""
 
-import gc
-import resource
-import time
 import weakref
 
 import numpy as np
@@ -308,34 +305,3 @@ def test_any_order_of_arrival_gives_finite_valid_states(feeds, chunk):
     sigma = np.sqrt(np.einsum("...ii->...i", whole.cov))
     assert np.linalg.eigvalsh(whole.cov / (sigma[..., :, None] * sigma[..., None, :])).min() > -1e-11
     assert smoother.fallbacks == 0
-
-
-def test_one_long_track_stays_flat_in_memory_and_time(sampled):
-    track, _ = sampled(11, seconds=100.0, q=1.0)
-    smoother = start(track)
-    seconds, slots = [], []
-    for i in range(0, 12_000 - 1200, 1200):
-        began = time.process_time()
-        for j in range(i, i + 1200, 6):
-            smoother.feed(*columns(track, slice(j, j + 6)))
-            smoother.departed()
-        seconds.append(time.process_time() - began)
-        slots.append(smoother._gtsam.factor_slots())
-    assert max(slots[2:]) <= slots[1] * 1.2
-    assert np.median(seconds[-4:]) < 1.5 * np.median(seconds[1:5])
-    assert smoother.rebuilds == 0
-
-
-def test_many_short_tracks_leave_no_memory_behind(sampled):
-    track, _ = sampled(12, seconds=0.5)
-
-    def lives(count):
-        for _ in range(count):
-            smoother = start(track)
-            smoother.feed(*columns(track))
-            smoother.finish()
-        gc.collect()
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-
-    warm = lives(100)
-    assert lives(200) - warm < 3000  # kB

@@ -1,0 +1,49 @@
+"""Time and memory, measured where nothing else of ours runs beside them.
+
+Parallel runs (`pytest -n 2`) leave this folder out; `make test` runs it by itself afterwards. Memory is read
+in a process of its own, in which no other test has left anything. Time is that of the processor, always
+compared with something measured in the same run, and of several turns the best counts: other work on the
+machine only ever adds.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+collect_ignore_glob = ["test_*.py"] if "PYTEST_XDIST_WORKER" in os.environ else []
+
+
+@pytest.fixture
+def measure():
+    """A function: name of a job in `jobs.py` and its arguments -> what it found, in a process of its own."""
+
+    def run(*arguments):
+        command = [sys.executable, Path(__file__).parent / "jobs.py", *arguments]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout)
+
+    return run
+
+
+@pytest.fixture
+def best():
+    """A function: actions -> least processor time (s) of each, over some turns in which all have their go."""
+
+    def run(*actions, turns=4):
+        seconds = [[] for _ in actions]
+        for action in actions:
+            action()
+        for _ in range(turns):
+            for action, spent in zip(actions, seconds, strict=True):
+                began = time.process_time()
+                action()
+                spent.append(time.process_time() - began)
+        return [min(spent) for spent in seconds]
+
+    return run

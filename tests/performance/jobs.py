@@ -1,0 +1,104 @@
+"""What is measured in a process of its own: `python jobs.py NAME [ARGUMENT]` prints what it found as JSON."""
+
+import gc
+import json
+import sys
+import time
+
+import numpy as np
+
+from jeat_graph import Tracker, load_config
+from jeat_graph.benchmark.speed_worker import resident_mib
+from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
+
+
+def traffic(num):
+    """Scans at 100 Hz: three vehicles that start anew every 3 s, clutter, and scans without detections."""
+    rng = np.random.default_rng(0)
+    size = np.array([40.0, 30.0])
+    clutter = np.hstack([rng.uniform([0, 0], [1200, 650], (997, 2)), rng.uniform(10, 60, (997, 2))])
+    noise = rng.normal(0, 1.0, (1009, 3, 2))
+    scores = np.full(4, 0.9)
+    for k in range(num):
+        t = 0.01 * k
+        age = t % 3.0
+        centre = np.array([[100 + 300 * age, 200], [1100 - 300 * age, 400], [300 + 100 * age, 600]])
+        boxes = np.empty((4, 4))
+        boxes[:3, :2] = centre + noise[k % 1009] - size / 2
+        boxes[:3, 2:] = size
+        boxes[3] = clutter[k % 997]
+        shown = 0 if k % 10 == 7 else 4 if k % 5 == 0 else 3
+        yield (t, "evt" if k % 6 else "rgb", boxes[:shown], scores[:shown])
+
+
+def live(preset):
+    """Memory of a tracker that is stepped for minutes (MiB, one reading per 50 s)."""
+    tracker, memory = Tracker(load_config(preset, ["smoother.engine=none"])), []
+    for k, scan in enumerate(traffic(25_000)):
+        tracker.step(scan)
+        if k % 5_000 == 4_999:
+            gc.collect()
+            memory.append(resident_mib())
+    return {"memory": memory, "born": tracker.num_born}
+
+
+def long_track():
+    """Memory (MiB) and processor time (s) of one vehicle that stays for minutes, with its smoother."""
+    tracker, rng, memory, spent = Tracker(load_config("default")), np.random.default_rng(0), [], []
+    began = time.process_time()
+    for k in range(24_000):
+        t = 0.01 * k
+        x, y = 640.0 + 400.0 * np.sin(0.3 * t), 360.0 + 200.0 * np.cos(0.2 * t)
+        box = np.array([[x - 30.0, y - 20.0, 60.0, 40.0]]) + rng.normal(0.0, [[1.5, 1.5, 0.5, 0.5]])
+        tracker.step((t, "rgb" if k % 5 == 0 else "evt", box, [0.95]))
+        if k % 480 == 479:
+            tracker.drain_smoothed()
+            now = time.process_time()
+            spent.append(now - began)
+            memory.append(resident_mib())
+            began = time.process_time()
+    born = tracker.num_born
+    tracker.finish()
+    return {"memory": memory, "spent": spent, "born": born, **tracker.smoother_counts}
+
+
+def short_tracks():
+    """Memory (MiB) while 150 vehicles come and go one after the other, with their smoothers."""
+    tracker, rng, t, memory = Tracker(load_config("default")), np.random.default_rng(1), 0.0, []
+    for track in range(150):
+        x, y = rng.uniform(200.0, 1000.0), rng.uniform(100.0, 600.0)
+        for k in range(40):
+            t += 0.01
+            box = np.array([[x + k - 30.0, y - 20.0, 60.0, 40.0]]) + rng.normal(0.0, 1.0, (1, 4))
+            tracker.step((t, "rgb" if k % 5 == 0 else "evt", box, [0.95]))
+        for sensor in ["rgb", "evt"] * 20:
+            t += 0.05
+            tracker.step((t, sensor, np.zeros((0, 4)), np.zeros(0)))
+        if track % 10 == 9:
+            tracker.drain_smoothed()
+            gc.collect()
+            memory.append(resident_mib())
+    left = len(tracker._smoothers._smoothers._histories)
+    return {"memory": memory, "left": left, **tracker.smoother_counts}
+
+
+def short_windows():
+    """Memory (MiB) while windows of half a second are filled and finished, one reading per 50 lives."""
+    rng, memory = np.random.default_rng(0), []
+    t = np.arange(0.01, 0.5, 0.008)
+    for life in range(400):
+        z = 600.0 + rng.normal(0.0, 2.0, (len(t), 2))
+        smoother = FixedLagSmoother(
+            0.0, z[0][:, None] * [1, 0, 0], np.tile(np.diag([9.0, 2500, 900]), (2, 1, 1))
+        )
+        smoother.feed(t, z, np.full((len(t), 2), 4.0), np.full(len(t), 100.0))
+        smoother.finish()
+        if life % 50 == 49:
+            gc.collect()
+            memory.append(resident_mib())
+    return {"memory": memory}
+
+
+if __name__ == "__main__":
+    name, *rest = sys.argv[1:]
+    print(json.dumps(globals()[name](*rest)))

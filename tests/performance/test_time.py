@@ -1,0 +1,146 @@
+"""Time compared with time: a peer's, that of a simpler way to the same, or of the same at another size."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from jeat_graph.benchmark.speed_subjects import installed_peers
+from jeat_graph.benchmark.speed_timing import summarise, time_side_by_side
+from jeat_graph.data.trajectories import GroundTruth, Trajectories
+from jeat_graph.eval.metrics import evaluate
+from jeat_graph.io.tables import read_table
+from jeat_graph.io.trajectories_io import read_trajectories, write_trajectories
+from jeat_graph.smoothers.engine import make_smoother
+from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
+from jeat_graph.smoothers.track_data import TrackData
+
+
+def sampled(seconds):
+    """A vehicle that moves evenly, measured at 100 Hz with an error of 2 px."""
+    t = np.arange(0.01, seconds, 0.01)
+    truth = np.stack([600 + 20 * np.sin(t), 300 + 10 * np.cos(t)], axis=1)
+    z = truth + np.random.default_rng(0).normal(0.0, 2.0, truth.shape)
+    mean = np.array([[600.0, 0.0, 0.0], [310.0, 0.0, 0.0]])
+    cov = np.tile(np.diag([9.0, 2500.0, 900.0]), (2, 1, 1))
+    return TrackData.from_measurements(0.0, mean, cov, t, z, np.full(z.shape, 4.0), np.full(len(t), 10.0))
+
+
+def frames(num, objects=50):
+    """True boxes and tracks of `num` frames."""
+    rng = np.random.default_rng(0)
+    t, ids = np.repeat(np.arange(num) * 0.05, objects), np.tile(np.arange(objects), num)
+    boxes = np.column_stack((rng.uniform(0, 1200, (len(t), 2)), rng.uniform(30, 60, (len(t), 2))))
+    found = boxes + rng.normal(0, 3, boxes.shape)
+    rest = {
+        "existence": np.ones(len(t)),
+        "mean": np.zeros((len(t), 6)),
+        "var": np.ones((len(t), 6)),
+        "used": np.ones(len(t), dtype=np.int64),
+        "sensors": ("rgb",),
+    }
+    truth = GroundTruth(t=t, object_id=ids, boxes=boxes, motion=None, ignore=np.zeros(len(t), dtype=bool))
+    return truth, Trajectories(t=t, track_id=ids, boxes=found, **rest)
+
+
+def test_our_step_takes_less_than_an_eighth_of_bytetracks():
+    if not installed_peers():
+        pytest.skip("the package trackers is not installed")
+    runs = [
+        time_side_by_side(["default", "bytetrack"], 50, frames=30, warm_up=20, seed=seed, clock="cpu")
+        for seed in range(2)
+    ]
+    assert summarise(runs)[0]["times_faster"] >= 8.0
+
+
+def test_a_step_grows_no_faster_than_linearly_to_500_tracks():
+    least = {
+        num: min(
+            np.quantile(
+                time_side_by_side(["default"], num, frames=30, warm_up=20, seed=0, clock="cpu")["default"][0],
+                0.25,
+            )
+            for _ in range(2)
+        )
+        for num in (100, 500)
+    }
+    # A fifth of the frames hold births and deaths that scatter: a quarter more than five times is allowed.
+    assert least[500] <= 1.25 * 5.0 * least[100]
+
+
+def test_rts_is_at_least_five_times_cheaper_than_fixed_lag(best):
+    track = sampled(10.0)
+    prior = (0.0, track.prior_mean, track.prior_cov)
+
+    def life(engine):
+        smoother = make_smoother(engine, *prior, memory=track.memory)
+        for i in range(0, len(track.z), 48):  # as many at a time as the tracker hands over
+            smoother.feed(*track.measurements().take(slice(i, i + 48)))
+            smoother.departed()
+        smoother.finish()
+
+    fixed_lag, rts = best(lambda: life("fixed-lag"), lambda: life("rts"))
+    assert 5 * rts <= fixed_lag
+
+
+def test_a_window_costs_no_more_after_a_minute(best):
+    track = sampled(90.0)
+    smoother = FixedLagSmoother(0.0, track.prior_mean, track.prior_cov, memory=track.memory)
+    position, slots = 0, []
+
+    def five_seconds():
+        nonlocal position
+        for i in range(position, position + 500, 6):
+            smoother.feed(*track.measurements().take(slice(i, min(i + 6, position + 500))))
+            smoother.departed()
+        position += 500
+        slots.append(smoother._gtsam.factor_slots())
+
+    (early,) = best(five_seconds, turns=4)
+    for _ in range(6):
+        five_seconds()
+    (late,) = best(five_seconds, turns=4)
+    assert late < 1.5 * early
+    assert max(slots[2:]) <= 1.2 * slots[1]
+    assert smoother.rebuilds == 0
+
+
+def test_judging_takes_no_longer_per_frame_where_there_are_more(best):
+    short, long = frames(100), frames(400)
+    one, four = best(lambda: evaluate([short]), lambda: evaluate([long]), turns=3)
+    assert four < 1.5 * 4 * one
+
+
+def test_a_table_is_read_faster_than_by_pythons_own_reader_and_conversion(tmp_path, best):
+    path, n = tmp_path / "long.csv", 100_000
+    path.write_text("a,b,name\n" + "0.1,2.25,rgb\n" * n, encoding="utf-8")
+
+    def ours():
+        table = read_table(path, ("a", "b", "name"))
+        return table.number("a"), table.number("b"), table.text("name")
+
+    def plain():
+        with path.open(newline="") as file:
+            rows = list(csv.reader(file))[1:]
+        return [float(row[0]) for row in rows], [float(row[1]) for row in rows], [row[2] for row in rows]
+
+    fast, slow = best(ours, plain)
+    assert fast < slow
+
+
+def write_plainly(table: Trajectories, path: Path) -> None:
+    """As many numbers, by Python's own writer."""
+    columns = np.column_stack([table.t, table.track_id, table.boxes, table.existence, table.mean, table.var])
+    with path.open("w", newline="") as file:
+        csv.writer(file).writerows([f"{value:.6f}" for value in row] for row in columns.tolist())
+
+
+def test_trajectories_are_written_faster_than_by_pythons_own_writer(tmp_path, best):
+    _, table = frames(400)
+    ours, plain = best(
+        lambda: write_trajectories(table, tmp_path / "ours.csv"),
+        lambda: write_plainly(table, tmp_path / "plain.csv"),
+    )
+    assert ours < plain
+    assert len(read_trajectories(tmp_path / "ours.csv")) == len(table)
