@@ -1,7 +1,9 @@
 # Every target does its own set-up in .venv and needs only make and Python 3.11 or later.
 #
 #   make demo    simulate a highway at night, track it, judge the tracks, draw a picture (in demo/)
-#   make test    run all tests
+#   make test    run all tests, those of time and memory by themselves
+#   make test-portable   run the numerical tests with other kernels, in random order (SEED=... repeats one)
+#   make licences   list the licences of everything installed with the package
 #   make live    the long form of the tests of live use: kills, brokers, late data (half an hour)
 #   make lint    style, format and docstrings
 #   make types   type-check the built package
@@ -16,9 +18,17 @@ PYTHON ?= $(firstword $(foreach name,$(PYTHONS),$(shell $(name) -c \
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
-SOURCES := $(shell find jeat_graph filters association smoothers -name '*.py')
+SOURCES := $(shell find jeat_graph filters association smoothers eval -name '*.py')
 
-.PHONY: demo test live lint types bounds build docs clean
+# Other kernels than this machine would choose: the oldest of OpenBLAS, none of NumPy's for newer processors, and
+# numba's for any processor of this kind, in a folder of their own.
+NUMERICAL := association calibration config eval filters simulation smoothers tracking
+SEED ?= $(shell date +%s)
+OTHER_KERNELS = OPENBLAS_CORETYPE=$(if $(filter x86_64 AMD64,$(shell uname -m)),Prescott,ARMV8) \
+	NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python .ci/kernels.py names)" \
+	NUMBA_CPU_NAME=generic NUMBA_CACHE_DIR=$(CURDIR)/$(VENV)/numba-generic
+
+.PHONY: demo test test-portable licences live lint types bounds build docs clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.compiled
@@ -26,7 +36,17 @@ demo: $(VENV)/.compiled
 
 test: $(VENV)/.test $(VENV)/.compiled
 	@echo "make: running the tests"
-	@$(BIN)/python -m pytest -n 2
+	@$(BIN)/python -m pytest -p no:randomly -n 2
+	@$(BIN)/python -m pytest -p no:randomly -n 0 tests/performance
+
+test-portable: $(VENV)/.test $(VENV)/.compiled
+	@rm -rf $(VENV)/numba-generic
+	@echo "make: running the numerical tests with other kernels, SEED=$(SEED)"
+	@$(OTHER_KERNELS) $(BIN)/python .ci/kernels.py check
+	@$(OTHER_KERNELS) $(BIN)/python -m pytest -n 2 --randomly-seed=$(SEED) $(NUMERICAL:%=tests/%)
+
+licences: $(VENV)/.test
+	@$(BIN)/python .ci/licences.py
 
 live: $(VENV)/.test $(VENV)/.compiled
 	@JEAT_GRAPH_FULL=1 $(BIN)/python -m pytest tests/live
@@ -78,12 +98,14 @@ $(VENV)/.docs: pyproject.toml $(VENV)/.run
 
 $(VENV)/.lint: pyproject.toml | $(BIN)/python
 	@echo "make: installing the linters"
-	@$(PIP) ruff interrogate
+	@$(BIN)/python -c "import tomllib; extras = tomllib.load(open('pyproject.toml', 'rb'))['project']; \
+		print(*extras['optional-dependencies']['lint'], sep='\n')" > $(VENV)/lint.txt
+	@$(PIP) -r $(VENV)/lint.txt
 	@touch $@
 
 # numba does not notice that a function called from another file has changed: new sources, all code anew.
 $(VENV)/.compiled: $(SOURCES) $(VENV)/.run
-	@find jeat_graph filters association smoothers \( -name '*.nbi' -o -name '*.nbc' \) -delete
+	@find jeat_graph filters association smoothers eval \( -name '*.nbi' -o -name '*.nbc' \) -delete
 	@$(BIN)/python -m jeat_graph.tracking.warm_up
 	@touch $@
 

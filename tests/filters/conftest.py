@@ -4,11 +4,6 @@ import importlib.util
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
-
-# The first call of a compiled function compiles it, which no deadline of a test should include.
-settings.register_profile("compiled", deadline=None)
-settings.load_profile("compiled")
 
 
 @pytest.fixture(scope="session")
