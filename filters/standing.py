@@ -75,7 +75,7 @@ def update_odds(odds: float, still: float, moving: float, memory: float) -> floa
 def zero_update(m: FloatArray, P: FloatArray, k: int, std: float) -> None:
     """Take in the pseudo-measurement that component `k` of a block is zero, in place (Joseph form).
 
-    Written out for H = e_k as in `aekf.update_block`, so that no variance is a difference of large numbers.
+    Written out for H = e_k as in `kalman.update_block`, so that no variance is a difference of large numbers.
 
     Args:
         m: (D,) mean.

@@ -48,7 +48,6 @@ KNOWN_LONG_FILES = {
 }
 KNOWN_GTSAM = {"smoothers.engine"}
 KNOWN_WIDE_FUNCTIONS = {
-    "calibration.motion.innovation_loss": 13,
     "simulation.imaging.background._trace": 10,
     "simulation.imaging.bodies.add_body": 12,
     "simulation.imaging.bodies.add_lamps": 9,

@@ -22,6 +22,7 @@ from jeat_graph.calibration.motion import (
     LEAST_JERK_PER_SIZE,
     PERSPECTIVE_RESERVE,
     VELOCITY_RESERVE,
+    CentreSeries,
     fit_size,
     growth_rates,
     innovation_loss,
@@ -117,7 +118,7 @@ def _fit_noise_and_motion(
 ) -> tuple[FloatArray, MotionConfig]:
     """Maximise the innovation likelihood over σ and ρ (S, 2) of every sensor and the motion model.
 
-    What the configuration says of errors with memory is kept: without truth, a slow error is motion.
+    What the configuration says of coloured noise is kept: without truth, a slow error is motion.
     """
     side = data.box[:, 2:]
     z = data.box[:, :2] + 0.5 * side
@@ -138,16 +139,16 @@ def _fit_noise_and_motion(
     )
     n = len(known)
     share = np.array([s.correlated_share for s in known])[data.sensor][:, None]
-    error_of, memory = error_states(known)
+    error_of, correlation_time = error_states(known)
 
     def loss(log_parameters: FloatArray) -> float:
         p = np.exp(np.clip(log_parameters, -8.0, 8.0))
         sigma2, rho2 = p[:n][data.sensor] ** 2, p[n : 2 * n][data.sensor] ** 2
         var = sigma2[:, None] + rho2[:, None] * side**2
-        white, lever = (1.0 - share) * var, np.sqrt(share * var)
-        noise = (white, lever, error_of[data.sensor], memory)
+        noise = ((1.0 - share) * var, np.sqrt(share * var), error_of[data.sensor], correlation_time)
+        series = CentreSeries(data.t, z, *noise, size, growth, start)
         pull = 0.02 * float(np.sum((log_parameters - first) ** 2))
-        return pull + float(innovation_loss(data.t, z, *noise, size, growth, start, *p[2 * n :]))
+        return pull + float(innovation_loss(series, *p[2 * n :]))
 
     found = _minimise(loss, first, 0.5)
     p = np.exp(np.clip(found, -8.0, 8.0))

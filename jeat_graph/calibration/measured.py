@@ -27,9 +27,9 @@ class MeasuredTracks:
         t: (K,) time (s), ascending within a track.
         z: (K, 2) centre without the sensor's bias (px).
         R: (K, 2) variances of its white noise (px²).
-        lever: (K, 2) levers of the sensor's error with memory (px).
+        coloured_std: (K, 2) standard deviations of its coloured noise (px).
         error: (K,) the sensor's error state, counted from 0, or -1.
-        memory: (B,) correlation times of the errors (s).
+        correlation_time: (B,) correlation times of the errors (s).
         side: (K,) sqrt(w h) (px).
         start: (T + 1,) track i owns the rows start[i]:start[i + 1].
         log_size: (K, 2) ln width and ln height without bias.
@@ -39,9 +39,9 @@ class MeasuredTracks:
     t: FloatArray
     z: FloatArray
     R: FloatArray
-    lever: FloatArray
+    coloured_std: FloatArray
     error: IntArray
-    memory: FloatArray
+    correlation_time: FloatArray
     side: FloatArray
     start: IntArray
     log_size: FloatArray
@@ -66,7 +66,7 @@ def measured_tracks(
     rho = np.repeat([(s.rho_x, s.rho_y) for _, s in parts], rows, axis=0)
     sigma = np.repeat([s.sigma_px for _, s in parts], rows)
     share = np.repeat([s.correlated_share for _, s in parts], rows)
-    error, memory = error_states([s for _, s in parts])
+    error, correlation_time = error_states([s for _, s in parts])
     log_sigma = np.repeat([(s.sigma_log_width, s.sigma_log_height) for _, s in parts], rows, axis=0)
     order = np.lexsort((t, key[:, 1], key[:, 0]))
     change = np.any(np.diff(key[order], axis=0) != 0, axis=1)
@@ -81,9 +81,9 @@ def measured_tracks(
         t=sort(t),
         z=sort(box[:, :2] + (0.5 - bias[:, :2]) * side),
         R=sort((1.0 - share[:, None]) * variance),
-        lever=sort(np.sqrt(share[:, None] * variance)),
+        coloured_std=sort(np.sqrt(share[:, None] * variance)),
         error=sort(np.repeat(error, rows)),
-        memory=memory,
+        correlation_time=correlation_time,
         side=sort(np.sqrt(side.prod(axis=1))),
         start=start,
         log_size=sort(np.log(side) - bias[:, 2:]),

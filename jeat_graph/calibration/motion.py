@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -32,17 +32,35 @@ PERSPECTIVE_RESERVE = 1.7
 LEAST_JERK_PER_SIZE = 0.3
 
 
+class CentreSeries(NamedTuple):
+    """Measured centres of many tracks, with all that their innovations depend on but the motion model.
+
+    Attributes:
+        t: (K,) times (s), ascending within a track.
+        z: (K, 2) measured centres (px).
+        R: (K, 2) variances of their white noise (px²).
+        coloured_std: (K, 2) standard deviations of their coloured noise (px).
+        error: (K,) the sensor's error state, counted from 0, or -1.
+        correlation_time: (B,) correlation times of the errors (s).
+        side: (K,) box size sqrt(w h) (px).
+        growth: (K,) rate of growth of ln size (1/s), from `growth_rates`.
+        start: (T + 1,) track i owns the rows start[i]:start[i + 1].
+    """
+
+    t: FloatArray
+    z: FloatArray
+    R: FloatArray
+    coloured_std: FloatArray
+    error: IntArray
+    correlation_time: FloatArray
+    side: FloatArray
+    growth: FloatArray
+    start: IntArray
+
+
 @njit(cache=True)
 def innovation_loss(
-    t: FloatArray,
-    z: FloatArray,
-    R: FloatArray,
-    lever: FloatArray,
-    error: IntArray,
-    memory: FloatArray,
-    side: FloatArray,
-    growth: FloatArray,
-    start: IntArray,
+    series: CentreSeries,
     jerk_per_size: float,
     jerk_per_growth: float,
     velocity_std_per_size: float,
@@ -51,21 +69,14 @@ def innovation_loss(
     """Robust negative log likelihood of the innovations of many tracks, both axes.
 
     Args:
-        t: (K,) times (s), ascending within a track.
-        z: (K, 2) measured centres (px).
-        R: (K, 2) variances of their white noise (px²).
-        lever: (K, 2) levers of the errors with memory (px).
-        error: (K,) the sensor's error state, counted from 0, or -1.
-        memory: (B,) correlation times of the errors (s).
-        side: (K,) box size sqrt(w h) (px).
-        growth: (K,) rate of growth of ln size (1/s), from `growth_rates`.
-        start: (T + 1,) track i owns the rows start[i]:start[i + 1].
+        series: measured centres of the tracks.
         jerk_per_size: root spectral density of jerk per px of size (1/s^2.5).
         jerk_per_growth: the same by perspective, in units of size · growth^2.5.
         velocity_std_per_size: std of a new track's velocity per px of size (1/s).
         acceleration_std_per_size: the same of its acceleration (1/s²).
     """
-    D = MOTION + len(memory)
+    t, z, R, coloured_std, error, correlation_time, side, growth, start = series
+    D = MOTION + len(correlation_time)
     loss = 0.0
     mean, cov, u, jerk = np.zeros((1, 2, D)), np.zeros((1, 2, D, D)), np.empty(D), np.empty(1)
     for i in range(len(start) - 1):
@@ -77,25 +88,25 @@ def innovation_loss(
                 for axis in range(2):
                     P = cov[0, axis]
                     mean[0, axis, 0] = z[k, axis]
-                    P[0, 0] = R[k, axis] + lever[k, axis] ** 2
+                    P[0, 0] = R[k, axis] + coloured_std[k, axis] ** 2
                     P[1, 1] = (velocity_std_per_size * side[k]) ** 2
                     P[2, 2] = (acceleration_std_per_size * side[k]) ** 2
                     for b in range(MOTION, D):
                         P[b, b] = 1.0
                     if error[k] >= 0:
-                        P[0, MOTION + error[k]] = P[MOTION + error[k], 0] = -lever[k, axis]
+                        P[0, MOTION + error[k]] = P[MOTION + error[k], 0] = -coloured_std[k, axis]
                 continue
             jerk[0] = jerk_density(side[k], growth[k], 0.0, jerk_per_size, jerk_per_growth)
             predict(mean, cov, jerk, dt)
-            predict_errors(mean, cov, memory, dt)
+            predict_errors(mean, cov, correlation_time, dt)
             for axis in range(2):
                 m, P, r = mean[0, axis], cov[0, axis], R[k, axis]
-                centre, var = expected(m, P, lever[k, axis], error[k])
+                centre, var = expected(m, P, coloured_std[k, axis], error[k])
                 S = var + r
                 e = abs(z[k, axis] - centre) / np.sqrt(S)
                 loss += 0.5 * np.log(S) + (0.5 * e * e if e < _HUBER else _HUBER * e - 0.5 * _HUBER**2)
                 r = r if e < _HUBER else r * (e / _HUBER) ** 2
-                update_with_error(m, P, z[k, axis], r, lever[k, axis], error[k], u)
+                update_with_error(m, P, z[k, axis], r, coloured_std[k, axis], error[k], u)
     return loss
 
 
@@ -192,24 +203,21 @@ def fit_motion(tracks: MeasuredTracks, size: SizeConfig) -> MotionConfig:
     growth = growth_rates(
         tracks.t, tracks.log_size, tracks.log_size_var, tracks.start, size.rate_density, size.rate_std
     )
+    series = CentreSeries(
+        tracks.t,
+        tracks.z,
+        tracks.R,
+        tracks.coloured_std,
+        tracks.error,
+        tracks.correlation_time,
+        tracks.side,
+        growth,
+        tracks.start,
+    )
 
     def loss(log_parameters: FloatArray) -> float:
         jerk, perspective, velocity, acceleration = np.exp(np.clip(log_parameters, -8.0, 8.0))
-        total = innovation_loss(
-            tracks.t,
-            tracks.z,
-            tracks.R,
-            tracks.lever,
-            tracks.error,
-            tracks.memory,
-            tracks.side,
-            growth,
-            tracks.start,
-            jerk,
-            perspective,
-            velocity,
-            acceleration,
-        )
+        total = innovation_loss(series, jerk, perspective, velocity, acceleration)
         # A weak pull to one keeps a parameter that the data say nothing of from running away.
         return total + 0.02 * float(np.sum(np.asarray(log_parameters) ** 2))
 

@@ -5,7 +5,14 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from jeat_graph.calibration.measured import MeasuredTracks
-from jeat_graph.calibration.motion import VELOCITY_RESERVE, fit_motion, fit_size, innovation_loss, size_loss
+from jeat_graph.calibration.motion import (
+    VELOCITY_RESERVE,
+    CentreSeries,
+    fit_motion,
+    fit_size,
+    innovation_loss,
+    size_loss,
+)
 from jeat_graph.config.schema import SizeConfig
 
 
@@ -61,7 +68,7 @@ def test_loss_is_the_density_of_a_track_under_the_white_jerk_model():
     both = np.column_stack([z, z])
     still, start = np.zeros(8), np.array([0, 8])
     noise = np.column_stack([R, R])
-    found = innovation_loss(t, both, noise, *white, side, still, start, 3.0, 0.0, 2.0, 1.5)
+    found = innovation_loss(CentreSeries(t, both, noise, *white, side, still, start), 3.0, 0.0, 2.0, 1.5)
     assert found == pytest.approx(2.0 * expected, rel=1e-9)
 
 
@@ -76,7 +83,7 @@ def test_loss_with_lasting_errors_is_the_density_with_their_covariance():
     both, noise = np.column_stack([z, z]), np.column_stack([R, R])
     errors = (np.column_stack([lever, lever]), np.zeros(8, dtype=np.int64), np.array([tau]))
     side, still, start = np.full(8, 50.0), np.zeros(8), np.array([0, 8])
-    found = innovation_loss(t, both, noise, *errors, side, still, start, 3.0, 7.0, 2.0, 1.5)
+    found = innovation_loss(CentreSeries(t, both, noise, *errors, side, still, start), 3.0, 7.0, 2.0, 1.5)
     assert found == pytest.approx(2.0 * expected, rel=1e-9)
 
 
@@ -86,9 +93,9 @@ def tracks_of(t, z, variance, side, start):
         t=t,
         z=z,
         R=np.full(z.shape, variance),
-        lever=np.zeros(z.shape),
+        coloured_std=np.zeros(z.shape),
         error=np.full(len(t), -1),
-        memory=np.zeros(0),
+        correlation_time=np.zeros(0),
         side=np.full(len(t), side),
         start=start,
         log_size=np.zeros(z.shape),
