@@ -8,8 +8,8 @@ an error e of unit variance that forgets exponentially (a Gauss-Markov process),
     z = p + h e + w,  h² = c s R_base,  var w = (1 - c) s R_base / g,
 
 with c the share of the variance that is coloured and h the standard deviation of that part. Source: shaping
-filter and state augmentation, Bryson, Johansen, "Linear filtering for time-varying systems using measurements containing
-colored noise", IEEE T-AC 10(1), 1965.
+filter and state augmentation, Bryson, Johansen, "Linear filtering for time-varying systems using measurements
+containing colored noise", IEEE T-AC 10(1), 1965.
 
 A block of state is [p, v, a, e_1, …, e_B]; with B = 0 it is the paper's.
 """

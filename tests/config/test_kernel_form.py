@@ -75,14 +75,7 @@ def test_sensors_stand_in_alphabetical_order_and_their_columns_have_the_schema_s
     columns = ("sigma_px", "correlated_share", "p_detect", "clutter_per_scan", "precision", "tempering")
     for k, name in enumerate(config.sensor_names):
         declared = config.sensors[name]
-        for same in (
-            "sigma_px",
-            "correlated_share",
-            "p_detect",
-            "clutter_per_scan",
-            "precision",
-            "tempering",
-        ):
+        for same in columns:
             assert getattr(sensors, same)[k] == getattr(declared, same)
         assert tuple(sensors.bias[k]) == declared.bias
         assert sensors.period_s[k] == 1.0 / declared.rate_hz

@@ -24,7 +24,7 @@ def confirm(tracks: TrackArrays, n: int, t: float, settings: Settings) -> None:
         else:
             old = t - tracks.t_birth[i] >= lifecycle.confirm_age_s
             earned = old and tracks.hits[i] >= lifecycle.confirm_hits
-        # No branch, on purpose: with one, numba compiles a loop that clears flags (tests/tracking/test_confirm).
+        # No branch, on purpose: with one, numba compiles a loop that clears flags (`test_confirm`).
         tracks.confirmed[i] = tracks.confirmed[i] or earned
         if not lifecycle.by_existence:
             tracks.existence[i] = 1.0 if tracks.confirmed[i] else 0.5
