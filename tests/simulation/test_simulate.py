@@ -17,7 +17,7 @@ from jeat_graph.io.truth_io import read_truth
 from jeat_graph.simulation.scenario import load_scenario, scenario_names
 from jeat_graph.simulation.simulate import record, simulate
 
-from .ap import average_precision
+from .sensors.ap import average_precision
 
 
 def fingerprint(detections: Detections, truth: GroundTruth) -> str:

@@ -11,9 +11,10 @@ from numba import njit
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.simulation.imaging.config import RenderConfig
 from jeat_graph.simulation.imaging.ground import Layout, ground_albedo, layout_of
-from jeat_graph.simulation.imaging.lighting import Lights, lamp_lux
+from jeat_graph.simulation.imaging.lighting import Lights, Surface, lamp_lux
 from jeat_graph.simulation.imaging.optics import Optics, splat_glow
 from jeat_graph.simulation.imaging.smooth import value_noise
+from jeat_graph.simulation.imaging.tiles import View, view_of
 from jeat_graph.simulation.world.camera import Camera
 from jeat_graph.simulation.world.scene import Scene
 
@@ -58,10 +59,7 @@ class Background(NamedTuple):
 def make_background(scene: Scene, lights: Lights, optics: Optics, config: RenderConfig) -> Background:
     """Render all that stands still."""
     camera = scene.camera
-    layers = _trace(
-        camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy,
-        camera.position, np.ascontiguousarray(camera.rotation), layout_of(scene.road.config), lights,
-    )  # fmt: skip
+    layers = _trace(view_of(camera), layout_of(scene.road.config), lights)
     back, _, _, _, front, _, cover, _ = layers
     glow = _lamp_glow(camera, lights, optics)
     whole = back * (1.0 - cover[..., None]) + front + glow
@@ -87,12 +85,12 @@ def _lamp_glow(camera: Camera, lights: Lights, optics: Optics) -> FloatArray:
 
 @njit(cache=True)
 def _trace(
-    width: int, height: int, fx: float, fy: float, cx: float, cy: float,
-    eye: FloatArray, rotation: FloatArray, layout: Layout, lights: Lights,
-) -> tuple[
-    FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray
-]:  # fmt: skip
+    view: View, layout: Layout, lights: Lights
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Cast rays through every pixel."""
+    fx, fy, cx, cy = view.lens[0], view.lens[1], view.lens[2], view.lens[3]
+    width, height = int(view.lens[4]), int(view.lens[5])
+    eye, rotation = view.eye, view.rotation
     back = np.zeros((height, width, 3))
     albedo = np.zeros((height, width, 3))
     place = np.zeros((height, width, 2))
@@ -159,7 +157,7 @@ def _trace(
                     sun = max(0.0, nx * lights.sun[0] + ny * lights.sun[1] + nz * lights.sun[2])
                     sun *= lights.sun_lux / lights.sun[2]
                     sky = lights.sky_lux * (0.55 + 0.45 * nz) + 0.05 * lights.sun_lux
-                    lamp_light = lamp_lux(x, y, z, nx, ny, nz, lights)
+                    lamp_light = lamp_lux(Surface(x, y, z, nx, ny, nz), lights)
                     cover[row, column] += share
                     front_depth[row, column] = min(front_depth[row, column], near)
                     for c in range(3):
@@ -190,7 +188,7 @@ def _trace(
                 if t_ground < t_tree and t_ground < _MAX_GROUND_M:
                     x, y = eye[0] + t_ground * dx, eye[1] + t_ground * dy
                     r, g, b = ground_albedo(x, y, layout)
-                    lamp_light = lamp_lux(x, y, 0.0, 0.0, 0.0, 1.0, lights)
+                    lamp_light = lamp_lux(Surface(x, y, 0.0, 0.0, 0.0, 1.0), lights)
                     lux[row, column] += share * (lights.sky_lux + lights.sun_lux + lamp_light)
                     # Where only a part of the pixel is ground its place is that part's, not between worlds.
                     place[row, column, 0], place[row, column, 1] = x, y
@@ -207,7 +205,8 @@ def _trace(
                     x, y, z = eye[0] + t_tree * dx, eye[1] + t_tree * dy, eye[2] + t_tree * dz
                     leaf = 0.04 * (1.0 + 0.6 * value_noise(1.5 * x + 1.5 * y, 1.5 * z, 15))
                     light = 0.5 * (lights.sky_lux + lights.sun_lux)
-                    light += 0.3 * lamp_lux(x, y, z, -math.copysign(1.0, x), 0.0, 0.0, lights)
+                    facing = Surface(x, y, z, -math.copysign(1.0, x), 0.0, 0.0)
+                    light += 0.3 * lamp_lux(facing, lights)
                     back[row, column, 0] += share * 0.7 * leaf * light / math.pi
                     back[row, column, 1] += share * leaf * light / math.pi
                     back[row, column, 2] += share * 0.45 * leaf * light / math.pi

@@ -7,24 +7,22 @@ import math
 from numba import njit
 
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.simulation.imaging.layers import Layers, insert, meets
-from jeat_graph.simulation.imaging.lighting import Lights
-from jeat_graph.simulation.imaging.moments import Look, Moments
-from jeat_graph.simulation.imaging.optics import Optics, core_at, glow_at
-from jeat_graph.simulation.imaging.paint import paint
+from jeat_graph.simulation.imaging.layers import insert, meets
+from jeat_graph.simulation.imaging.optics import core_at, glow_at
+from jeat_graph.simulation.imaging.paint import Body, paint
 from jeat_graph.simulation.imaging.smooth import clamp01
-from jeat_graph.simulation.imaging.tiles import TILE_W, View
+from jeat_graph.simulation.imaging.stage import Stage
+from jeat_graph.simulation.imaging.tiles import TILE_W, Tile
 
 _LAMP_AHEAD_M = 0.4
 _GLASS_MIRROR = 0.10
 
 
 @njit(cache=True)
-def add_body(
-    row0: int, column0: int, rows: int, columns: int, j: int, v: int, part: int, moments: Moments, look: Look,
-    lights: Lights, view: View, layers: Layers,
-) -> None:  # fmt: skip
+def add_body(tile: Tile, j: int, v: int, part: int, stage: Stage) -> None:
     """Add one body of one vehicle: its cover of each pixel is the product of its outline's half-planes."""
+    row0, column0, rows, columns = tile
+    moments, look, lights, view = stage.moments, stage.look, stage.lights, stage.camera
     sides = moments.hull_count[j, v, part]
     box = moments.part_box[j, v, part]
     if sides == 0 or not meets(box, row0, column0):
@@ -33,12 +31,12 @@ def add_body(
     border, light = moments.face_side[j, v, part], moments.face_light[j, v, part]
     faces, face = moments.face_count[j, v, part], moments.face[j, v, part]
     slant, fade = moments.face_slant[j, v, part], moments.fade[j, v]
-    length, wide, high = look.size[v]
     x, y, sin, cos = moments.pose[j, v]
-    kind, salt = look.kind[v], look.salt[v]
     fx, fy, cx, cy = view.lens[0], view.lens[1], view.lens[2], view.lens[3]
     R, eye = view.rotation, view.eye
+    length, wide, high = look.size[v]
     colour = (look.colour[v, 0], look.colour[v, 1], look.colour[v, 2])
+    body = Body(look.kind[v], part, length, wide, high, colour, look.salt[v])
     near, far = moments.depth[j, v, part, 0], moments.depth[j, v, part, 1]
     mirror = _GLASS_MIRROR * (lights.sky_lux + 0.2 * lights.sun_lux)
     tint = lights.sky_tint
@@ -70,10 +68,8 @@ def add_body(
                 dx = eye[0] - x + Z * (X * R[0, 0] + Y * R[1, 0] + R[2, 0])
                 dy = eye[1] - y + Z * (X * R[0, 1] + Y * R[1, 1] + R[2, 1])
                 dz = eye[2] + Z * (X * R[0, 2] + Y * R[1, 2] + R[2, 2])
-                pr, pg, pb, glass = paint(
-                    kind, part, face[f], dx * sin + dy * cos, dx * cos - dy * sin, dz, length, wide, high,
-                    Z / fx * slant[f], colour, salt,
-                )  # fmt: skip
+                along, across = dx * sin + dy * cos, dx * cos - dy * sin
+                pr, pg, pb, glass = paint(body, face[f], along, across, dz, Z / fx * slant[f])
                 red += weight * (pr * light[f, 0] + mirror * glass * tint[0])
                 green += weight * (pg * light[f, 1] + mirror * glass * tint[1])
                 blue += weight * (pb * light[f, 2] + mirror * glass * tint[2])
@@ -82,15 +78,14 @@ def add_body(
                 continue
             cover *= fade
             scale = cover / (total * math.pi)
-            insert(layers, r * TILE_W + c, depth, cover, red * scale, green * scale, blue * scale)
+            insert(stage.layers, r * TILE_W + c, depth, cover, red * scale, green * scale, blue * scale)
 
 
 @njit(cache=True)
-def add_lamps(
-    row0: int, column0: int, rows: int, columns: int, j: int, v: int, moments: Moments, optics: Optics,
-    layers: Layers,
-) -> None:  # fmt: skip
+def add_lamps(tile: Tile, j: int, v: int, stage: Stage) -> None:
     """Add the images of a vehicle's lamps, just before its body."""
+    row0, column0, rows, columns = tile
+    moments, optics, layers = stage.moments, stage.optics, stage.layers
     for k in range(4):
         red, green, blue = moments.lamp_flux[j, v, k]
         if red <= 0.0:
@@ -106,11 +101,10 @@ def add_lamps(
 
 
 @njit(cache=True)
-def add_glow(
-    row0: int, column0: int, rows: int, columns: int, j: int, v: int, k: int, moments: Moments,
-    optics: Optics, out: FloatArray,
-) -> None:  # fmt: skip
+def add_glow(tile: Tile, j: int, v: int, k: int, stage: Stage, out: FloatArray) -> None:
     """Add a lamp's glow, which lies over everything."""
+    row0, column0, rows, columns = tile
+    moments, optics = stage.moments, stage.optics
     reach = optics.reach_px
     u, w = moments.lamp[j, v, k, 0], moments.lamp[j, v, k, 1]
     seen = moments.lamp_seen[j, v, k]

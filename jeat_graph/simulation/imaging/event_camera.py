@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -28,15 +28,36 @@ from jeat_graph.simulation.imaging.event_pixel import (
 )
 from jeat_graph.simulation.imaging.event_sink import Sink, make_sink, to_events, with_room
 from jeat_graph.simulation.imaging.lighting import LUMINANCE
-from jeat_graph.simulation.imaging.painter import Stage, paint_tile
+from jeat_graph.simulation.imaging.painter import paint_tile
 from jeat_graph.simulation.imaging.plan import Plan, who_touches
 from jeat_graph.simulation.imaging.renderer import Renderer
+from jeat_graph.simulation.imaging.stage import Stage
 from jeat_graph.simulation.imaging.tiles import TILE, TILE_H, TILE_W
 from jeat_graph.simulation.streams import stream
 
 _SETTLE_STEPS = 8  # of pixels that see nothing move, while their photoreceptors still follow
 _FOLLOWING, _SETTLED = 0.01, 1e-6  # ln
 _LARGEST_CHANGE = 45.0  # ln of the largest ratio of luminances, with room to spare
+
+
+class Interval(NamedTuple):
+    """What the pixels see within an interval of time.
+
+    Attributes:
+        tiles: (T, 2) first row and column of the tiles.
+        boxes: (V, 3, 4) what each vehicle changes in the picture (px).
+        steps: (T,) how often each tile is painted; 0 where nothing changes.
+        times_us: (J + 1,) beginning of the interval and the J times of painting (µs).
+        static: (H, W) luminance of the picture without vehicles (cd/m²).
+        quiet: (T,) true where a tile's pixels see the static picture and have settled; changed.
+    """
+
+    tiles: IntArray
+    boxes: FloatArray
+    steps: IntArray
+    times_us: FloatArray
+    static: FloatArray
+    quiet: BoolArray
 
 
 class EventCamera:
@@ -104,10 +125,10 @@ class EventCamera:
         moments = r.moments(1e-6 * times_us[1:], plan.look, every)
         steps = np.where(plan.steps > 0, len(times_us) - 1, 0) if self._carla else plan.steps
         run = _run_carla if self._carla else _run_physical
-        sink, rendered = run(
-            r.tiles, plan.boxes, steps, times_us, self._static, self._quiet, r.stage(moments, plan.look),
-            self._model, self._state, make_sink(max(1 << 18, 2 * self._room)), self._room,
-        )  # fmt: skip
+        work = Interval(r.tiles, plan.boxes, steps, times_us, self._static, self._quiet)
+        sink = make_sink(max(1 << 18, 2 * self._room))
+        stage = r.stage(moments, plan.look)
+        sink, rendered = run(work, stage, self._model, self._state, sink, self._room)
         self.rendered += rendered
         return to_events(sink, self._width)
 
@@ -135,13 +156,10 @@ def _take(patch: FloatArray, columns: int, count: int, luminance: FloatArray) ->
 
 @njit(cache=True)
 def _run_physical(
-    tiles: IntArray, boxes: FloatArray, steps: IntArray, times_us: FloatArray, static: FloatArray,
-    quiet: BoolArray, stage: Stage, model: PixelModel, state: PixelState, sink: Sink, room: int,
-) -> tuple[Sink, int]:  # fmt: skip
-    """Take all pixels through an interval, tile by tile; returns the sink and how many tiles were painted.
-
-    A tile is `quiet` when its pixels see the static picture and have settled.
-    """
+    work: Interval, stage: Stage, model: PixelModel, state: PixelState, sink: Sink, room: int
+) -> tuple[Sink, int]:
+    """Take all pixels through an interval, tile by tile; returns the sink and how many tiles were painted."""
+    tiles, boxes, steps, times_us, static, quiet = work
     who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)
     counts = np.zeros(3, dtype=np.int64)
     patch = np.zeros((TILE, 3))
@@ -180,10 +198,10 @@ def _run_physical(
 
 @njit(cache=True)
 def _run_carla(
-    tiles: IntArray, boxes: FloatArray, steps: IntArray, times_us: FloatArray, static: FloatArray,
-    quiet: BoolArray, stage: Stage, model: CarlaModel, state: CarlaState, sink: Sink, room: int,
-) -> tuple[Sink, int]:  # fmt: skip
+    work: Interval, stage: Stage, model: CarlaModel, state: CarlaState, sink: Sink, room: int
+) -> tuple[Sink, int]:
     """Take all pixels from tick to tick, tile by tile; as `_run_physical`."""
+    tiles, boxes, steps, times_us, static, _ = work
     who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)
     counts = np.zeros(3, dtype=np.int64)
     patch = np.zeros((TILE, 3))

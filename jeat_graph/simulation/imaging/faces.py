@@ -5,7 +5,7 @@ from __future__ import annotations
 from numba import njit
 
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.simulation.imaging.lighting import Lights, beam_lux, lamp_lux
+from jeat_graph.simulation.imaging.lighting import Headlamps, Lights, Surface, beam_lux, lamp_lux
 from jeat_graph.simulation.imaging.moments import Look, Moments
 
 # A face is lit evenly; beams light it as at most this high, for most of their light falls on its lower part.
@@ -15,17 +15,17 @@ _BACK_LUX = 0.3  # what the road before a vehicle gives back of its own beams to
 
 @njit(cache=True)
 def light_face(
-    out: Moments, j: int, v: int, look: Look, lights: Lights, at: FloatArray,
-    nx: float, ny: float, nz: float, light: FloatArray,
-) -> None:  # fmt: skip
+    out: Moments, j: int, v: int, look: Look, at: Surface, lights: Lights, light: FloatArray
+) -> None:
     """Illuminance of a face at its centre by sky, sun, lamps and the beams of other vehicles."""
+    nx, ny, nz = at.nx, at.ny, at.nz
     sun = max(0.0, nx * lights.sun[0] + ny * lights.sun[1] + nz * lights.sun[2])
     sun *= lights.sun_lux / lights.sun[2]
     # A wall sees half the sky, and the road, which gives back a tenth of its light.
     sky = lights.sky_lux * (0.55 + 0.45 * nz) + 0.1 * lights.sun_lux * (0.5 - 0.5 * nz)
-    lamp = lamp_lux(at[0], at[1], at[2], nx, ny, nz, lights)
+    lamp = lamp_lux(at, lights)
     if len(lights.lamps):
-        lamp += 0.05 * lamp_lux(at[0], at[1], 0.0, 0.0, 0.0, 1.0, lights)
+        lamp += 0.05 * lamp_lux(Surface(at.x, at.y, 0.0, 0.0, 0.0, 1.0), lights)
     beams = 0.0
     if lights.on:
         for w in range(len(look.kind)):
@@ -33,8 +33,8 @@ def light_face(
                 continue
             ox, oy, sin, cos = out.pose[j, w]
             lamp_x, lamp_y = ox + 0.5 * look.size[w, 0] * sin, oy + 0.5 * look.size[w, 0] * cos
-            height = min(at[2], _LIT_HEIGHT_M)
-            beams += beam_lux(at[0], at[1], height, nx, ny, nz, lamp_x, lamp_y, sin, cos, lights)
+            low = Surface(at.x, at.y, min(at.z, _LIT_HEIGHT_M), nx, ny, nz)
+            beams += beam_lux(low, Headlamps(lamp_x, lamp_y, sin, cos), lights)
         if ny * out.pose[j, v, 3] + nx * out.pose[j, v, 2] > 0.5 and not look.parked[v]:
             beams += _BACK_LUX
     for c in range(3):

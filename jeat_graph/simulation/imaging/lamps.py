@@ -10,6 +10,7 @@ from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.simulation.imaging.lighting import LAMP_HEIGHT_M, Lights, beam_candela
 from jeat_graph.simulation.imaging.moments import Look, Moments
 from jeat_graph.simulation.imaging.optics import Optics
+from jeat_graph.simulation.imaging.tiles import View
 
 LAMPS = 4  # two in front, two behind
 _LAMP_SIGMA_M = 0.07
@@ -19,14 +20,12 @@ _HIDDEN_M = 0.2  # way through another vehicle after which a lamp is hidden
 
 
 @njit(cache=True)
-def light_lamps(
-    out: Moments, j: int, v: int, brake: float, look: Look, lens: FloatArray, eye: FloatArray,
-    rotation: FloatArray, lights: Lights, candela: FloatArray,
-) -> None:  # fmt: skip
+def light_lamps(out: Moments, j: int, v: int, brake: float, look: Look, view: View, lights: Lights) -> None:
     """Place the lamps of a vehicle in the picture: two in front, two behind."""
     x, y, sin, cos = out.pose[j, v]
     length, wide = look.size[v, 0], look.size[v, 1]
-    fx, fy, cx, cy = lens[0], lens[1], lens[2], lens[3]
+    fx, fy, cx, cy = view.lens[0], view.lens[1], view.lens[2], view.lens[3]
+    eye, rotation = view.eye, view.rotation
     for k in range(LAMPS):
         ahead = 1.0 if k < 2 else -1.0
         across = _LAMP_ACROSS * wide * (1.0 if k & 1 else -1.0)
@@ -42,12 +41,12 @@ def light_lamps(
         distance2 = dx * dx + dy * dy + dz * dz
         facing = forward / math.sqrt(distance2)
         if look.parked[v]:
-            power = candela[2] * facing
+            power = lights.parking_candela * facing
         elif k < 2:
             right = -(dx * cos - dy * sin)
             power = 0.5 * beam_candela(forward, right, -dz, lights.beam_candela, lights.beam_stray)
         else:
-            power = (candela[0] + (candela[1] - candela[0]) * brake) * facing
+            power = (lights.tail_candela + (lights.brake_candela - lights.tail_candela) * brake) * facing
         at = out.lamp[j, v, k]
         at[0] = fx * (rotation[0, 0] * dx + rotation[0, 1] * dy + rotation[0, 2] * dz) / Z + cx
         at[1] = fy * (rotation[1, 0] * dx + rotation[1, 1] * dy + rotation[1, 2] * dz) / Z + cy

@@ -40,6 +40,9 @@ class Lights(NamedTuple):
         beam_candela: peak of a vehicle's low beams (cd).
         beam_stray: share of it above the cut-off.
         beam_range_m: distance at which beams are cut off.
+        tail_candela: of one tail light (cd).
+        brake_candela: of one brake light (cd).
+        parking_candela: of one light of a parked vehicle (cd).
         sky_tint: (3,) colour of the sky's light, luminance 1.
         sun_tint: (3,) the same of the sun.
         lamp_tint: (3,) the same of the lamps.
@@ -56,11 +59,34 @@ class Lights(NamedTuple):
     beam_candela: float
     beam_stray: float
     beam_range_m: float
+    tail_candela: float
+    brake_candela: float
+    parking_candela: float
     sky_tint: FloatArray
     sun_tint: FloatArray
     lamp_tint: FloatArray
     head_tint: FloatArray
     tail_tint: FloatArray
+
+
+class Surface(NamedTuple):
+    """A small plane that light falls on: its place (x, y, z) in m and its unit normal."""
+
+    x: float
+    y: float
+    z: float
+    nx: float
+    ny: float
+    nz: float
+
+
+class Headlamps(NamedTuple):
+    """Where a vehicle's headlamps stand (m), and the direction in the road's plane in which they shine."""
+
+    x: float
+    y: float
+    sin: float
+    cos: float
 
 
 def lights_of(scene: Scene, config: RenderConfig) -> Lights:
@@ -89,6 +115,9 @@ def lights_of(scene: Scene, config: RenderConfig) -> Lights:
         beam_candela=config.headlight_candela,
         beam_stray=config.headlight_stray,
         beam_range_m=min(max(reach, _BEAM_MIN_M), _BEAM_MAX_M),
+        tail_candela=config.taillight_candela,
+        brake_candela=config.brakelight_candela,
+        parking_candela=config.parking_candela,
         sky_tint=_tint(0.85, 0.95, 1.25) if day else _tint(0.7, 0.9, 1.3),
         sun_tint=_tint(1.05, 1.0, 0.9),
         lamp_tint=_tint(1.0, 0.78, 0.45),
@@ -98,13 +127,13 @@ def lights_of(scene: Scene, config: RenderConfig) -> Lights:
 
 
 @njit(cache=True)
-def lamp_lux(x: float, y: float, z: float, nx: float, ny: float, nz: float, lights: Lights) -> float:
-    """Illuminance by all street lamps of a surface at (x, y, z) with unit normal n (lux)."""
+def lamp_lux(at: Surface, lights: Lights) -> float:
+    """Illuminance of a surface by all street lamps (lux)."""
     total = 0.0
     for k in range(len(lights.lamps)):
-        dx, dy, dz = lights.lamps[k, 0] - x, lights.lamps[k, 1] - y, lights.lamps[k, 2] - z
+        dx, dy, dz = lights.lamps[k, 0] - at.x, lights.lamps[k, 1] - at.y, lights.lamps[k, 2] - at.z
         r2 = dx * dx + dy * dy + dz * dz
-        facing = dx * nx + dy * ny + dz * nz
+        facing = dx * at.nx + dy * at.ny + dz * at.nz
         if facing > 0.0:
             total += lights.lamp_candela * facing / (r2 * math.sqrt(r2))
     return total
@@ -132,27 +161,22 @@ def beam_candela(forward: float, right: float, up: float, peak: float, stray: fl
 
 
 @njit(cache=True)
-def beam_lux(
-    x: float, y: float, z: float, nx: float, ny: float, nz: float,
-    lamp_x: float, lamp_y: float, sin: float, cos: float, lights: Lights,
-) -> float:  # fmt: skip
-    """Illuminance of a surface at (x, y, z) with unit normal n by one vehicle's beams (lux).
-
-    The lamps stand at (lamp_x, lamp_y) and shine towards (sin, cos) in the road's plane.
-    """
-    dx, dy, dz = x - lamp_x, y - lamp_y, z - LAMP_HEIGHT_M
-    forward = dx * sin + dy * cos
+def beam_lux(at: Surface, lamps: Headlamps, lights: Lights) -> float:
+    """Illuminance of a surface by one vehicle's beams (lux)."""
+    dx, dy, dz = at.x - lamps.x, at.y - lamps.y, at.z - LAMP_HEIGHT_M
+    forward = dx * lamps.sin + dy * lamps.cos
     if forward <= 0.05 or forward >= lights.beam_range_m:
         return 0.0
     r2 = dx * dx + dy * dy + dz * dz
     limit = lights.beam_range_m
     if r2 >= limit * limit:
         return 0.0
-    facing = -(dx * nx + dy * ny + dz * nz)
+    facing = -(dx * at.nx + dy * at.ny + dz * at.nz)
     if facing <= 0.0:
         return 0.0
     # The window takes the light to zero smoothly; a lamp is no point, hence the constant below.
     window = 1.0 - r2 / (limit * limit)
     r2 += 0.3
-    candela = beam_candela(forward, dx * cos - dy * sin, dz, lights.beam_candela, lights.beam_stray)
+    right = dx * lamps.cos - dy * lamps.sin
+    candela = beam_candela(forward, right, dz, lights.beam_candela, lights.beam_stray)
     return candela * facing / (r2 * math.sqrt(r2)) * window * window

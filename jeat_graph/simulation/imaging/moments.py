@@ -80,34 +80,44 @@ class Moments(NamedTuple):
     touch: FloatArray
 
 
-def line_up(
-    states: VehicleStates, number: IntArray, count: int, far_m: float
-) -> tuple[FloatArray, FloatArray]:
-    """Sort states of `count` times into a table of times by vehicles.
+class Placed(NamedTuple):
+    """V vehicles at J times, in the world.
+
+    Attributes:
+        times: (J,) s.
+        pose: (J, V, 4) x, y (m), sine and cosine of the direction of the vehicle's front.
+        fade: (J, V) how visible each is, 0 where it is not there or out of range, up to 1.
+        brake: (J, V) how hard it brakes, 0 to 1.
+    """
+
+    times: FloatArray
+    pose: FloatArray
+    fade: FloatArray
+    brake: FloatArray
+
+
+def line_up(states: VehicleStates, number: IntArray, times: FloatArray, far_m: float) -> Placed:
+    """Sort states of some times into a table of times by vehicles.
 
     Args:
         states: at the times.
         number: (V,) identities of the vehicles, ascending; others are left out.
-        count: number of times J.
+        times: (J,) of the states (s).
         far_m: m.
-
-    Returns:
-        Poses (J, V, 4) with x, y, sine and cosine of the front's direction; and how visible each vehicle is,
-        0 where it is not there, and how hard it brakes, (J, V, 2).
     """
     column = np.minimum(np.searchsorted(number, states.object_id), max(len(number) - 1, 0))
-    pose = np.zeros((count, len(number), 4))
-    more = np.zeros((count, len(number), 2))
+    shape = (len(times), len(number))
+    out = Placed(times, np.zeros((*shape, 4)), np.zeros(shape), np.zeros(shape))
     if not len(number):
-        return pose, more
+        return out
     known = number[column] == states.object_id
     front = np.where(states.direction < 0, np.pi, 0.0)
     heading = states.pose[:, 2] + front
     sin, cos = np.sin(heading), np.cos(heading)
     at = (states.frame[known], column[known])
-    pose[at] = np.column_stack([states.pose[:, :2], sin, cos])[known]
+    out.pose[at] = np.column_stack([states.pose[:, :2], sin, cos])[known]
     ahead = states.acceleration[:, 0] * sin + states.acceleration[:, 1] * cos
     # Vehicles come out of the distance gradually: one that appeared at once would be a burst of events.
-    fade = np.clip((far_m - states.pose[:, 1]) / _FADE_M, 0.0, 1.0)
-    more[at] = np.column_stack([fade, np.clip((-ahead - 0.6) / 0.8, 0.0, 1.0)])[known]
-    return pose, more
+    out.fade[at] = np.clip((far_m - states.pose[:, 1]) / _FADE_M, 0.0, 1.0)[known]
+    out.brake[at] = np.clip((-ahead - 0.6) / 0.8, 0.0, 1.0)[known]
+    return out

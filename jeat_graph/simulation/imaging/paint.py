@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from numba import njit
 
 from jeat_graph.simulation.imaging.shapes import FRONT, LEFT, REAR, RIGHT, TOP
@@ -16,27 +18,43 @@ _GLASS = 0.03
 _TYRE = 0.025
 
 
-@njit(cache=True)
-def paint(
-    kind: int, part: int, face: int, along: float, across: float, z: float,
-    length: float, width: float, height: float, soft: float, colour: tuple[float, float, float], salt: int,
-) -> tuple[float, float, float, float]:  # fmt: skip
-    """Albedo (red, green, blue) and share of glass at a place on a vehicle.
+class Body(NamedTuple):
+    """One of the bodies that a vehicle is made of.
 
-    Args:
+    Attributes:
         kind: index into `vehicles.KINDS`.
         part: 0 underbody, 1 body or trailer, 2 cabin.
-        face: of the part, as in `shapes`.
-        along: from the middle to the front (m).
-        across: from the middle to the vehicle's right (m).
-        z: above the road (m).
         length: of the vehicle (m).
         width: of the vehicle (m).
         height: of the vehicle (m).
-        soft: width of the filter, about a pixel on the face (m).
-        colour: paint's albedo.
+        colour: the paint's albedo, red, green, blue.
         salt: makes each vehicle's texture its own.
     """
+
+    kind: int
+    part: int
+    length: float
+    width: float
+    height: float
+    colour: tuple[float, float, float]
+    salt: int
+
+
+@njit(cache=True)
+def paint(
+    body: Body, face: int, along: float, across: float, z: float, soft: float
+) -> tuple[float, float, float, float]:
+    """Albedo (red, green, blue) and share of glass at a place on a vehicle.
+
+    Args:
+        body: which body, of what vehicle.
+        face: of the body, as in `shapes`.
+        along: from the middle to the front (m).
+        across: from the middle to the vehicle's right (m).
+        z: above the road (m).
+        soft: width of the filter, about a pixel on the face (m).
+    """
+    kind, part, length, width, height, colour, salt = body
     if part == 0:
         return _TYRE, _TYRE, _TYRE, 0.0
     r, g, b = colour

@@ -6,32 +6,16 @@ Each function loops over the pixels itself: handing all the tables to a function
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.simulation.imaging.background import Background
 from jeat_graph.simulation.imaging.bodies import add_body, add_glow, add_lamps
-from jeat_graph.simulation.imaging.layers import Layers, meets
-from jeat_graph.simulation.imaging.lighting import Lights
-from jeat_graph.simulation.imaging.moments import Look, Moments
-from jeat_graph.simulation.imaging.optics import Optics
+from jeat_graph.simulation.imaging.layers import meets
 from jeat_graph.simulation.imaging.road_light import cast_beams, cast_shadow
 from jeat_graph.simulation.imaging.shapes import PARTS
-from jeat_graph.simulation.imaging.tiles import TILE_H, TILE_W, View
-
-
-class Stage(NamedTuple):
-    """All that a tile is painted from: static picture, vehicles, lights, lens, camera, room to work."""
-
-    ground: Background
-    moments: Moments
-    look: Look
-    lights: Lights
-    optics: Optics
-    camera: View
-    layers: Layers
+from jeat_graph.simulation.imaging.stage import Stage
+from jeat_graph.simulation.imaging.tiles import TILE_H, TILE_W, Tile
 
 
 @njit(cache=True)
@@ -49,10 +33,9 @@ def paint_tile(
         stage: what there is to paint.
         out: (TILE, 3) radiance (cd/m²), TILE_W pixels a row; those beyond the picture are left as they are.
     """
-    ground, moments, look, layers = stage.ground, stage.moments, stage.look, stage.layers
-    lights, optics, view = stage.lights, stage.optics, stage.camera
-    height, width = ground.lux.shape
-    rows, columns = min(TILE_H, height - row0), min(TILE_W, width - column0)
+    moments, layers, on = stage.moments, stage.layers, stage.lights.on
+    height, width = stage.ground.lux.shape
+    tile = Tile(row0, column0, min(TILE_H, height - row0), min(TILE_W, width - column0))
     layers.filled[:] = 0
     layers.shade[:] = 1.0
     layers.beams[:] = 0.0
@@ -60,29 +43,26 @@ def paint_tile(
         v = who[0, n]
         if moments.fade[j, v] > 0.0:
             for part in range(PARTS):
-                add_body(row0, column0, rows, columns, j, v, part, moments, look, lights, view, layers)
-            if lights.on:
-                add_lamps(row0, column0, rows, columns, j, v, moments, optics, layers)
+                add_body(tile, j, v, part, stage)
+            if on:
+                add_lamps(tile, j, v, stage)
             if meets(moments.touch[j, v, 0], row0, column0):
-                cast_shadow(row0, column0, rows, columns, j, v, ground, moments, look, lights, layers)
+                cast_shadow(tile, j, v, stage)
     if counts[2]:
-        cast_beams(
-            row0, column0, rows, columns, j, who, counts[2], ground, moments, look, lights, view, layers
-        )
-    _compose(row0, column0, rows, columns, ground, lights, layers, out)
+        cast_beams(tile, j, who[2, : counts[2]], stage)
+    _compose(tile, stage, out)
     for n in range(counts[1]):
         v = who[1, n]
         for k in range(4):
             if moments.lamp_seen[j, v, k] > 0.0:
-                add_glow(row0, column0, rows, columns, j, v, k, moments, optics, out)
+                add_glow(tile, j, v, k, stage, out)
 
 
 @njit(cache=True)
-def _compose(
-    row0: int, column0: int, rows: int, columns: int, ground: Background, lights: Lights, layers: Layers,
-    out: FloatArray,
-) -> None:  # fmt: skip
+def _compose(tile: Tile, stage: Stage, out: FloatArray) -> None:
     """Lay everything over the ground, from far to near."""
+    row0, column0, rows, columns = tile
+    ground, lights, layers = stage.ground, stage.lights, stage.layers
     tint = lights.head_tint / math.pi
     sun = lights.sun_lux
     for r in range(rows):

@@ -8,15 +8,14 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.simulation.imaging.config import RenderConfig
 from jeat_graph.simulation.imaging.faces import light_face
 from jeat_graph.simulation.imaging.lamps import LAMPS, hide_lamps, light_lamps
-from jeat_graph.simulation.imaging.lighting import Lights
-from jeat_graph.simulation.imaging.moments import Look, Moments
+from jeat_graph.simulation.imaging.lighting import Lights, Surface
+from jeat_graph.simulation.imaging.moments import Look, Moments, Placed
 from jeat_graph.simulation.imaging.optics import Optics
 from jeat_graph.simulation.imaging.reach import touch
 from jeat_graph.simulation.imaging.shapes import BOTTOM, EDGES, FACE_CORNERS, PARTS, body_table
-from jeat_graph.simulation.world.camera import Camera
+from jeat_graph.simulation.imaging.tiles import View
 from jeat_graph.simulation.world.vehicles import KINDS
 
 NEAR_M = 0.5
@@ -25,36 +24,25 @@ _BODIES = body_table(tuple(kind.name for kind in KINDS))
 
 
 def project_moments(
-    times: FloatArray,
-    pose: FloatArray,
-    more: FloatArray,
-    look: Look,
-    camera: Camera,
-    lights: Lights,
-    optics: Optics,
-    config: RenderConfig,
-    every: IntArray,
+    placed: Placed, look: Look, every: IntArray, view: View, lights: Lights, optics: Optics
 ) -> Moments:
     """Project vehicles at J times.
 
     Args:
-        times: (J,) s.
-        pose: as `line_up` returns it.
-        more: as `line_up` returns it.
-        look: what the vehicles look like.
-        camera: the camera.
-        lights: of the scene.
-        optics: of the lens.
-        config: settings.
+        placed: where the vehicles are.
+        look: what they look like.
         every: (V,) a vehicle is projected at each so-many-th time only, the last one included; where it is
             not, only its pose stands.
+        view: the camera.
+        lights: of the scene.
+        optics: of the lens.
     """
-    count, vehicles = pose.shape[:2]
+    count, vehicles = placed.pose.shape[:2]
     p = (count, vehicles, PARTS)
     out = Moments(
-        times=times,
-        pose=pose,
-        fade=np.ascontiguousarray(more[..., 0]),
+        times=placed.times,
+        pose=placed.pose,
+        fade=placed.fade,
         part_box=np.zeros((*p, 4)),
         hull_count=np.zeros(p, dtype=np.int64),
         hull=np.zeros((*p, 6, 3)),
@@ -70,23 +58,16 @@ def project_moments(
         lamp_seen=np.zeros((count, vehicles, LAMPS)),
         touch=np.zeros((count, vehicles, 3, 4)),
     )
-    candela = np.array([config.taillight_candela, config.brakelight_candela, config.parking_candela])
-    lens = np.array([camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height])
-    _project(
-        out, np.ascontiguousarray(more[..., 1]), look, lens, camera.position,
-        np.ascontiguousarray(camera.rotation), lights, optics, candela, _BODIES,
-        every,
-    )  # fmt: skip
+    _project(out, placed.brake, look, every, view, lights, optics)
     return out
 
 
 @njit(cache=True)
 def _project(
-    out: Moments, brake: FloatArray, look: Look, lens: FloatArray, eye: FloatArray, rotation: FloatArray,
-    lights: Lights, optics: Optics, candela: FloatArray, bodies: FloatArray,
-    every: IntArray,
-) -> None:  # fmt: skip
-    fx, fy, cx, cy = lens[0], lens[1], lens[2], lens[3]
+    out: Moments, brake: FloatArray, look: Look, every: IntArray, view: View, lights: Lights, optics: Optics
+) -> None:
+    fx, fy, cx, cy = view.lens[0], view.lens[1], view.lens[2], view.lens[3]
+    eye, rotation = view.eye, view.rotation
     corner = np.empty((8, 3))
     pixel = np.empty((8, 3))
     seen = np.empty(6, dtype=np.bool_)
@@ -99,7 +80,7 @@ def _project(
             length, wide, high = look.size[v]
             low_m, high_m = _in_front(x, y, sin, cos, wide, high, eye, forward)
             for part in range(PARTS):
-                body = bodies[look.kind[v], part]
+                body = _BODIES[look.kind[v], part]
                 if min(body[1], body[3]) * length <= low_m or max(body[0], body[2]) * length >= high_m:
                     continue
                 mid_x, mid_y, mid_z, mid_u, mid_v = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -147,11 +128,14 @@ def _project(
                     if not seen[f] or f == BOTTOM or faces == 3:
                         continue
                     out.face[j, v, part, faces] = f
-                    _face_planes(out, j, v, part, faces, nx, ny, nz, facing, pixel, rotation, lens)
+                    centre = (a + c) / 2.0
+                    surface = Surface(centre[0], centre[1], centre[2], nx, ny, nz)
+                    _face_plane(out.face_depth[j, v, part, faces], surface, facing, view)
+                    _face_sides(out.face_side[j, v, part, faces], f, pixel)
                     far = math.sqrt((eye[0] - mid_x) ** 2 + (eye[1] - mid_y) ** 2 + (eye[2] - mid_z) ** 2)
                     out.face_slant[j, v, part, faces] = min(_MOST_SLANT, far / facing)
                     light = out.face_light[j, v, part, faces]
-                    light_face(out, j, v, look, lights, (a + c) / 2.0, nx, ny, nz, light)
+                    light_face(out, j, v, look, surface, lights, light)
                     faces += 1
                 out.face_count[j, v, part] = faces
                 sides = 0
@@ -163,9 +147,9 @@ def _project(
                         )
                         sides += 1
                 out.hull_count[j, v, part] = sides
-            touch(out, j, v, look, lens, eye, rotation, lights)
+            touch(out, j, v, look, view, lights)
             if lights.on:
-                light_lamps(out, j, v, brake[j, v], look, lens, eye, rotation, lights, candela)
+                light_lamps(out, j, v, brake[j, v], look, view, lights)
         if lights.on:
             hide_lamps(out, j, look, eye, optics, every)
 
@@ -187,25 +171,26 @@ def _in_front(
 
 
 @njit(cache=True)
-def _face_planes(
-    out: Moments, j: int, v: int, part: int, slot: int, nx: float, ny: float, nz: float, facing: float,
-    pixel: FloatArray, rotation: FloatArray, lens: FloatArray,
-) -> None:  # fmt: skip
-    """Write the depth plane and the half-planes of a face with unit normal n, `facing` m before the eye."""
-    f = out.face[j, v, part, slot]
-    fx, fy, cx, cy = lens[0], lens[1], lens[2], lens[3]
+def _face_plane(plane: FloatArray, face: Surface, facing: float, view: View) -> None:
+    """Write the depth plane (3,) of a face whose plane lies `facing` m before the eye."""
+    fx, fy, cx, cy = view.lens[0], view.lens[1], view.lens[2], view.lens[3]
+    rotation, nx, ny, nz = view.rotation, face.nx, face.ny, face.nz
     # Inverse depth is linear in the picture: n · ray / (n · (corner - eye)).
     scale = -1.0 / facing
     n0 = rotation[0, 0] * nx + rotation[0, 1] * ny + rotation[0, 2] * nz
     n1 = rotation[1, 0] * nx + rotation[1, 1] * ny + rotation[1, 2] * nz
     n2 = rotation[2, 0] * nx + rotation[2, 1] * ny + rotation[2, 2] * nz
-    plane = out.face_depth[j, v, part, slot]
     plane[0], plane[1] = scale * n0 / fx, scale * n1 / fy
     plane[2] = scale * (n2 - n0 * cx / fx - n1 * cy / fy)
+
+
+@njit(cache=True)
+def _face_sides(sides: FloatArray, f: int, pixel: FloatArray) -> None:
+    """Write the half-planes (4, 3) of face `f` from the pixels (8, 3) of its body's corners."""
     centre = (pixel[FACE_CORNERS[f, 0]] + pixel[FACE_CORNERS[f, 2]]) / 2.0
     for k in range(4):
         start, end = pixel[FACE_CORNERS[f, k]], pixel[FACE_CORNERS[f, (k + 1) % 4]]
-        _half_plane(start, end, centre, out.face_side[j, v, part, slot, k])
+        _half_plane(start, end, centre, sides[k])
 
 
 @njit(cache=True)

@@ -8,15 +8,13 @@ from jeat_graph.data.arrays import FloatArray
 from jeat_graph.simulation.imaging.lighting import Lights
 from jeat_graph.simulation.imaging.moments import Look, Moments
 from jeat_graph.simulation.imaging.shapes import PARTS
+from jeat_graph.simulation.imaging.tiles import View
 
 SHADOW_M = 0.9  # how far beside a vehicle its body keeps the sky's light off the road
 
 
 @njit(cache=True)
-def touch(
-    out: Moments, j: int, v: int, look: Look, lens: FloatArray, eye: FloatArray, rotation: FloatArray,
-    lights: Lights,
-) -> None:  # fmt: skip
+def touch(out: Moments, j: int, v: int, look: Look, view: View, lights: Lights) -> None:
     """Boxes of what a vehicle changes in the picture."""
     x, y, sin, cos = out.pose[j, v]
     length, wide, high = look.size[v]
@@ -38,9 +36,9 @@ def touch(
         px, py = x + along * sin + across * cos, y + along * cos - across * sin
         if k & 4:
             px, py = px + shift_x, py + shift_y
-        whole &= _grow(box, px, py, 0.0, lens, eye, rotation)
+        whole &= _grow(box, px, py, 0.0, view)
     if not whole and box[2] > box[0]:
-        box[3] = lens[5]
+        box[3] = view.lens[5]
     beam = out.touch[j, v, 2]
     beam[0], beam[1], beam[2], beam[3] = 1e9, 1e9, -1e9, -1e9
     if lights.on and not look.parked[v]:
@@ -52,17 +50,16 @@ def touch(
             across = min(max(across, -30.0), 30.0)
             forward += 0.5 * length
             px, py = x + forward * sin + across * cos, y + forward * cos - across * sin
-            whole &= _grow(beam, px, py, 0.0, lens, eye, rotation)
-            whole &= _grow(beam, px, py, 0.9, lens, eye, rotation)
+            whole &= _grow(beam, px, py, 0.0, view)
+            whole &= _grow(beam, px, py, 0.9, view)
         if not whole and beam[2] > beam[0]:
-            beam[0], beam[2], beam[3] = 0.0, lens[4], lens[5]
+            beam[0], beam[2], beam[3] = 0.0, view.lens[4], view.lens[5]
 
 
 @njit(cache=True)
-def _grow(
-    box: FloatArray, px: float, py: float, pz: float, lens: FloatArray, eye: FloatArray, rotation: FloatArray
-) -> bool:
+def _grow(box: FloatArray, px: float, py: float, pz: float, view: View) -> bool:
     """Grow a box by the image of a point; false where the point is behind the camera."""
+    lens, eye, rotation = view.lens, view.eye, view.rotation
     dx, dy, dz = px - eye[0], py - eye[1], pz - eye[2]
     Z = rotation[2, 0] * dx + rotation[2, 1] * dy + rotation[2, 2] * dz
     if Z < 1.0:

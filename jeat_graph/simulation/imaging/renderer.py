@@ -13,9 +13,10 @@ from jeat_graph.simulation.imaging.lighting import lights_of
 from jeat_graph.simulation.imaging.moments import Look, Moments, line_up
 from jeat_graph.simulation.imaging.optics import optics_of
 from jeat_graph.simulation.imaging.paint import PALETTE
-from jeat_graph.simulation.imaging.painter import Stage, paint_tile
+from jeat_graph.simulation.imaging.painter import paint_tile
 from jeat_graph.simulation.imaging.plan import Plan, make_plan, who_touches
 from jeat_graph.simulation.imaging.projection import project_moments
+from jeat_graph.simulation.imaging.stage import Stage
 from jeat_graph.simulation.imaging.tiles import TILE, TILE_H, TILE_W, tile_raster, view_of
 from jeat_graph.simulation.streams import stream
 from jeat_graph.simulation.world.scene import Scene, VehicleStates
@@ -103,10 +104,8 @@ class Renderer:
         return look, first.astype(np.int64)
 
     def _project(self, states: VehicleStates, times: FloatArray, look: Look, every: IntArray) -> Moments:
-        pose, more = line_up(states, look.number, len(times), self.config.far_m)
-        return project_moments(
-            times, pose, more, look, self.scene.camera, self.lights, self.optics, self.config, every
-        )
+        placed = line_up(states, look.number, times, self.config.far_m)
+        return project_moments(placed, look, every, self.view, self.lights, self.optics)
 
 
 @njit(cache=True)

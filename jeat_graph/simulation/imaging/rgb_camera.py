@@ -15,9 +15,10 @@ from numba import njit
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.simulation.imaging.config import RGBConfig
 from jeat_graph.simulation.imaging.lighting import LUMINANCE
-from jeat_graph.simulation.imaging.painter import Stage, paint_tile
+from jeat_graph.simulation.imaging.painter import paint_tile
 from jeat_graph.simulation.imaging.plan import who_touches
 from jeat_graph.simulation.imaging.renderer import Renderer
+from jeat_graph.simulation.imaging.stage import Stage
 from jeat_graph.simulation.imaging.tiles import TILE, TILE_H, TILE_W
 
 _EASE = 2.0  # a mean over time needs half the samples that events do

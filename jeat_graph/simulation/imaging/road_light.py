@@ -7,13 +7,11 @@ import math
 from numba import njit
 
 from jeat_graph.data.arrays import IntArray
-from jeat_graph.simulation.imaging.background import Background
-from jeat_graph.simulation.imaging.layers import Layers
-from jeat_graph.simulation.imaging.lighting import LAMP_HEIGHT_M, Lights, beam_candela
-from jeat_graph.simulation.imaging.moments import Look, Moments
+from jeat_graph.simulation.imaging.lighting import LAMP_HEIGHT_M, beam_candela
 from jeat_graph.simulation.imaging.reach import SHADOW_M
 from jeat_graph.simulation.imaging.smooth import clamp01
-from jeat_graph.simulation.imaging.tiles import TILE_W, View
+from jeat_graph.simulation.imaging.stage import Stage
+from jeat_graph.simulation.imaging.tiles import TILE_W, Tile
 
 _SHADOW_DEPTH = 0.75
 _SUN_EDGE_M = 0.3
@@ -23,11 +21,11 @@ _FAR_TILES = 1.5
 
 
 @njit(cache=True)
-def cast_shadow(
-    row0: int, column0: int, rows: int, columns: int, j: int, v: int, ground: Background, moments: Moments,
-    look: Look, lights: Lights, layers: Layers,
-) -> None:  # fmt: skip
+def cast_shadow(tile: Tile, j: int, v: int, stage: Stage) -> None:
     """Take the sky's light from the ground beside and below a vehicle, and the sun's beyond it."""
+    row0, column0, rows, columns = tile
+    ground, moments, look, lights = stage.ground, stage.moments, stage.look, stage.lights
+    layers = stage.layers
     x, y, sin, cos = moments.pose[j, v]
     half_a, half_b, high = 0.5 * look.size[v, 0], 0.5 * look.size[v, 1], look.size[v, 2]
     sun = lights.sun
@@ -63,19 +61,17 @@ def cast_shadow(
 
 
 @njit(cache=True)
-def cast_beams(
-    row0: int, column0: int, rows: int, columns: int, j: int, who: IntArray, count: int, ground: Background,
-    moments: Moments, look: Look, lights: Lights, view: View, layers: Layers,
-) -> None:  # fmt: skip
-    """Add the light of the beams of `count` vehicles (who[2]) on the ground and on barriers."""
+def cast_beams(tile: Tile, j: int, who: IntArray, stage: Stage) -> None:
+    """Add the light of the beams of some vehicles (who, (W,)) on the ground and on barriers."""
+    row0, column0, rows, columns = tile
+    ground, moments, look, lights = stage.ground, stage.moments, stage.look, stage.lights
     limit2 = lights.beam_range_m**2
     peak, stray = lights.beam_candela, lights.beam_stray
     lift = LAMP_HEIGHT_M
-    place, albedo, beams = ground.place, ground.albedo, layers.beams
+    place, albedo, beams = ground.place, ground.albedo, stage.layers.beams
     first, last = place[row0, column0], place[row0 + rows - 1, column0 + columns - 1]
     across = (first[0] - last[0]) ** 2 + (first[1] - last[1]) ** 2
-    for n in range(count):
-        v = who[2, n]
+    for v in who:
         fade = moments.fade[j, v]
         if fade <= 0.0:
             continue
@@ -111,26 +107,21 @@ def cast_beams(
     for r in range(rows):
         for c in range(columns):
             if ground.front_cover[row0 + r, column0 + c] > 0.0:
-                beams[r * TILE_W + c, 1] = _on_barrier(
-                    row0 + r, column0 + c, j, who, count, ground, moments, look, lights, view
-                )
+                beams[r * TILE_W + c, 1] = _on_barrier(row0 + r, column0 + c, j, who, stage)
 
 
 @njit(cache=True)
-def _on_barrier(
-    row: int, column: int, j: int, who: IntArray, count: int, ground: Background, moments: Moments,
-    look: Look, lights: Lights, view: View,
-) -> float:  # fmt: skip
+def _on_barrier(row: int, column: int, j: int, who: IntArray, stage: Stage) -> float:
     """Illuminance of a barrier by beams, from the side that the camera sees (lux)."""
-    R, eye, lens = view.rotation, view.eye, view.lens
+    moments, look, lights = stage.moments, stage.look, stage.lights
+    R, eye, lens = stage.camera.rotation, stage.camera.eye, stage.camera.lens
     limit2 = lights.beam_range_m**2
-    Z = ground.front_depth[row, column]
+    Z = stage.ground.front_depth[row, column]
     X, Y = (column + 0.5 - lens[2]) / lens[0], (row + 0.5 - lens[3]) / lens[1]
     wall_x = eye[0] + Z * (X * R[0, 0] + Y * R[1, 0] + R[2, 0])
     wall_y = eye[1] + Z * (X * R[0, 1] + Y * R[1, 1] + R[2, 1])
     total = 0.0
-    for n in range(count):
-        v = who[2, n]
+    for v in who:
         sin, cos = moments.pose[j, v, 2], moments.pose[j, v, 3]
         dx = wall_x - moments.pose[j, v, 0] - 0.5 * look.size[v, 0] * sin
         dy = wall_y - moments.pose[j, v, 1] - 0.5 * look.size[v, 0] * cos

@@ -22,6 +22,15 @@ class View(NamedTuple):
     rotation: FloatArray
 
 
+class Tile(NamedTuple):
+    """A tile within a picture: its first row and column, and how many of each lie in the picture."""
+
+    row: int
+    column: int
+    rows: int
+    columns: int
+
+
 def view_of(camera: Camera) -> View:
     """Take the camera apart."""
     lens = np.array([camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height])

@@ -7,6 +7,7 @@ choice follows MOBIL (Kesting, Treiber and Helbing, TRR 1999, 2007) without poli
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,6 +34,22 @@ class Drivers:
     headway: FloatArray
     acceleration: FloatArray
     length: FloatArray
+
+
+class Flow(NamedTuple):
+    """V vehicles on the ring at one time.
+
+    Attributes:
+        speed: (V,) m/s.
+        acceleration: (V,) what each driver wants in the present lane (m/s²).
+        ahead: (V, V) distances forward from i to j (m).
+        occupied: (V, L) lanes that each vehicle occupies.
+    """
+
+    speed: FloatArray
+    acceleration: FloatArray
+    ahead: FloatArray
+    occupied: BoolArray
 
 
 def idm_acceleration(
@@ -104,28 +121,19 @@ def follow(v: FloatArray, ahead: FloatArray, shared: BoolArray, drivers: Drivers
     return idm_acceleration(v, gap, closing, drivers.speed, drivers.headway, drivers.acceleration)
 
 
-def lane_change_gain(
-    own: FloatArray,
-    v: FloatArray,
-    ahead: FloatArray,
-    occupied: BoolArray,
-    target: IntArray,
-    drivers: Drivers,
-) -> FloatArray:
+def lane_change_gain(flow: Flow, target: IntArray, drivers: Drivers) -> FloatArray:
     """Gain in acceleration from changing to a target lane; -inf where that would be unsafe.
 
     Args:
-        own: (V,) acceleration in the present lane (m/s²).
-        v: (V,) speeds (m/s).
-        ahead: (V, V) distances forward from i to j (m).
-        occupied: (V, L) lanes that each vehicle occupies now.
+        flow: the vehicles now.
         target: (V,) lane to judge.
         drivers: what the drivers want.
 
     Returns:
         (V,) gain (m/s²).
     """
-    in_target = occupied[:, target].T  # (V, V): j occupies the target lane of i
+    own, v, ahead = flow.acceleration, flow.speed, flow.ahead
+    in_target = flow.occupied[:, target].T  # (V, V): j occupies the target lane of i
     half = drivers.length / 2.0
     rows = np.arange(len(v))
     leader, to_leader = leaders(ahead, in_target)

@@ -17,6 +17,7 @@ from jeat_graph.data.errors import ConfigError
 from jeat_graph.simulation.world.following import (
     STANDSTILL_GAP_M,
     Drivers,
+    Flow,
     distances_ahead,
     follow,
     lane_change_gain,
@@ -110,6 +111,7 @@ def simulate_traffic(
     steps = math.ceil((duration_s + _MARGIN_S - start) / dt)
     decide_every = max(1, round(0.25 / dt))
 
+    may_use = _lanes_of(fleet, road)
     occupied = np.zeros((count, road.num_lanes), dtype=bool)
     occupied[np.arange(count), lane] = True
     from_lane, last_lane = lane.copy(), lane.copy()
@@ -138,9 +140,9 @@ def simulate_traffic(
         # Braking fades out with speed, so that nobody rolls backwards.
         target = np.maximum(target, -v)
         if k % decide_every == 0 and count:
-            chosen = _choose_lane_changes(
-                rng, wish, v, ahead, occupied, last_lane, now > change_end + 2.0, fleet, road, drivers, config
-            )
+            flow = Flow(v, wish, ahead, occupied)
+            free = may_use & (now > change_end + 2.0)[:, None]
+            chosen = _choose_lane_changes(rng, flow, last_lane, free, road, drivers, config)
             for vehicle, lane_to in chosen:
                 length = math.ceil(float(rng.uniform(*config.lane_change_s)) / dt)
                 shift = float(road.lane_x[lane_to] - road.lane_x[last_lane[vehicle]])
@@ -203,20 +205,27 @@ def park(
     return np.stack([x, y, rng.normal(0.0, 0.01, count)], axis=1)
 
 
+def _lanes_of(fleet: Fleet, road: Road) -> BoolArray:
+    """Lanes that each vehicle may use, (V, L): trucks keep to the two outermost."""
+    rank = road.rank_from_median(np.arange(road.num_lanes))
+    truck = KIND_NAMES[fleet.kind] == "truck"
+    out: BoolArray = ~truck[:, None] | (rank >= max(road.config.lanes_per_direction - 2, 0))
+    return out
+
+
 def _assign_lanes(rng: np.random.Generator, fleet: Fleet, road: Road) -> IntArray:
     """Spread the vehicles over the lanes; trucks keep to the outer lanes."""
-    count, n = len(fleet), road.config.lanes_per_direction
     length = fleet.size[:, 0] + 25.0
     truck = KIND_NAMES[fleet.kind] == "truck"
     load = np.zeros(road.num_lanes)
     rank = road.rank_from_median(np.arange(road.num_lanes))
-    lane = np.empty(count, dtype=np.int64)
+    lane = np.empty(len(fleet), dtype=np.int64)
+    allowed = _lanes_of(fleet, road)
     order = np.concatenate([np.flatnonzero(truck), np.flatnonzero(~truck)])
     for vehicle in order:
-        allowed = rank >= max(n - 2, 0) if truck[vehicle] else rank >= 0
         # Trucks prefer the outermost lane until it is far fuller than the next.
         cost = load / (1.0 + 2.0 * rank * truck[vehicle]) + rng.uniform(0.0, 10.0, road.num_lanes)
-        pick = int(np.argmin(np.where(allowed, cost, np.inf)))
+        pick = int(np.argmin(np.where(allowed[vehicle], cost, np.inf)))
         lane[vehicle] = pick
         load[pick] += length[vehicle]
     return lane
@@ -262,28 +271,32 @@ def _draw_drivers(
 
 def _choose_lane_changes(
     rng: np.random.Generator,
-    own: FloatArray,
-    v: FloatArray,
-    ahead: FloatArray,
-    occupied: BoolArray,
+    flow: Flow,
     lane: IntArray,
-    free: BoolArray,
-    fleet: Fleet,
+    allowed: BoolArray,
     road: Road,
     drivers: Drivers,
     config: TrafficConfig,
 ) -> list[tuple[int, int]]:
-    """Pick at most one lane change a direction, the one that gains most: (vehicle, new lane)."""
-    n = road.config.lanes_per_direction
-    truck = KIND_NAMES[fleet.kind] == "truck"
+    """Pick at most one lane change a direction, the one that gains most: (vehicle, new lane).
+
+    Args:
+        rng: random stream of the traffic.
+        flow: the vehicles now.
+        lane: (V,) lane that each is in or changes to.
+        allowed: (V, L) lanes that each may change to.
+        road: lanes.
+        drivers: what the drivers want.
+        config: settings.
+    """
+    rows, v = np.arange(len(lane)), flow.speed
     best_gain, best_lane = np.full(len(v), -np.inf), lane.copy()
     for shift in (-1, 1):
         to = lane + shift
         inside = (to >= 0) & (to < road.num_lanes)
         to = np.where(inside, to, lane)
-        allowed = inside & (road.direction[to] == road.direction[lane]) & free & (v > 10.0)
-        allowed &= ~(truck & (road.rank_from_median(to) < max(n - 2, 0)))
-        gain = np.where(allowed, lane_change_gain(own, v, ahead, occupied, to, drivers), -np.inf)
+        may = inside & (road.direction[to] == road.direction[lane]) & allowed[rows, to] & (v > 10.0)
+        gain = np.where(may, lane_change_gain(flow, to, drivers), -np.inf)
         better = gain > best_gain
         best_gain, best_lane = np.where(better, gain, best_gain), np.where(better, to, best_lane)
     # Now and then someone changes without need: to the exit, or back to the outer lane.
