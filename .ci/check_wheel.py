@@ -20,7 +20,7 @@ def problems(wheel: Path) -> list[str]:
     ]
     wanted = set(NEEDED)
     wanted |= {f"jeat_graph/{path.as_posix()}" for path in Path("configs").rglob("*.yaml")}
-    modules = [*Path("jeat_graph").rglob("*.py")]
+    modules = [path for kind in ("py", "js", "css") for path in Path("jeat_graph").rglob(f"*.{kind}")]
     for folder in ("filters", "association", "smoothers", "eval", "configs"):
         modules += [Path("jeat_graph") / path for path in Path(folder).rglob("*.py")]
     wanted |= {path.as_posix() for path in modules}

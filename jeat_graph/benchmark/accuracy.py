@@ -19,8 +19,7 @@ from jeat_graph.benchmark.judging import (
     judge_recordings,
     summarise,
 )
-from jeat_graph.benchmark.peer_parameters import KITTI_BEST, SIMULATED_BEST
-from jeat_graph.benchmark.peer_search import peers_here, search_parameters, search_table
+from jeat_graph.benchmark.peer_search import peers_here, recorded_best, search_parameters, search_table
 from jeat_graph.benchmark.provenance import provenance
 from jeat_graph.benchmark.recordings import Recording, find_kitti, kitti, simulated
 from jeat_graph.benchmark.steps import start
@@ -76,7 +75,7 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
     names = [] if args.no_peers else peers_here()
     default, paper = load_config("default"), load_config("paper")
     found = search(args, names) if args.search and names else {}
-    best = _parameters(found["simulated"]) if "simulated" in found else SIMULATED_BEST
+    best = _parameters(found["simulated"]) if "simulated" in found else recorded_best("simulated")
     rows = ours(default, start(paper, default), "default", _SIMULATED)
     records: list[dict[str, Any]] = []
     duration = setup["duration_s"]
@@ -112,7 +111,7 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
     }
     folds = common.kitti_folds(args)
     if folds is not None:
-        best = _parameters(found["kitti"]) if "kitti" in found else KITTI_BEST
+        best = _parameters(found["kitti"]) if "kitti" in found else recorded_best("kitti")
         folder, targets = folds
         first = next(iter(targets.values()))
         real = ours(first, start(load_config("paper"), first), "calibrated", _REAL)

@@ -16,7 +16,7 @@ NAMES = {
     "norfair": "Norfair",
 }
 
-# Where the parameters in `peer_parameters` were searched, beside KITTI.
+# Where the parameters in `configs/peers` were searched, beside KITTI.
 SEARCH_SEED = 100
 SEARCH_DURATION_S = 8.0
 

@@ -1,9 +1,10 @@
-"""Which of the other trackers are there, and the search for their best parameters."""
+"""Says which of the other trackers are installed, and searches for their best parameters."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,6 +39,15 @@ def peers_here() -> list[str]:
             file=sys.stderr,
         )
     return here
+
+
+def recorded_best(name: str) -> dict[str, dict[str, Any]]:
+    """Read what a search has found before: `configs/peers/<name>.yaml`, by `contenders.key`."""
+    import yaml
+
+    file = resources.files("jeat_graph.configs") / "peers" / f"{name}.yaml"
+    found: dict[str, dict[str, Any]] = yaml.safe_load(file.read_text(encoding="utf-8"))
+    return found
 
 
 def search_parameters(

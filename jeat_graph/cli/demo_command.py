@@ -112,7 +112,9 @@ def _causal_scores(recording: Recording, detections: Detections, table: Trajecto
 def _draw(recording: Recording, table: Trajectories, stem: Path, scenario: str) -> list[Path]:
     import numpy as np
 
-    from jeat_graph.drawing.run_picture import DAY, NIGHT, Backdrop, save_pictures
+    from jeat_graph.drawing.palette import DAY, NIGHT
+    from jeat_graph.drawing.picture.figure import save_pictures
+    from jeat_graph.drawing.picture.plane import Backdrop
     from jeat_graph.simulation.world.markings import marking_lines
 
     camera, truth = recording.scene.camera, recording.truth

@@ -12,7 +12,7 @@ from jeat_graph.config.argument_types import positive
 from jeat_graph.data.errors import DataError
 
 if TYPE_CHECKING:
-    from jeat_graph.drawing.movie.show import Show
+    from jeat_graph.drawing.movie.panels import Movie
 
 HELP = "draw a run over video, frames or events, or a simulated segment, as an MP4 video or one PNG picture"
 _LARGEST_PX = 8192
@@ -60,11 +60,11 @@ def size(text: str) -> tuple[int, int]:
 def run(args: argparse.Namespace) -> int:
     """Open what is to be drawn, and draw it."""
     from jeat_graph.drawing.movie.film import write_png
-    from jeat_graph.drawing.movie.sources import Wanted, open_show
+    from jeat_graph.drawing.movie.sources import Request, open_movie
 
     out = Path(args.out)
     _check_out(out, args.at is not None)
-    wanted = Wanted(
+    request = Request(
         run=Path(args.run_directory),
         frames=_path(args.frames),
         events=_path(args.events),
@@ -78,31 +78,31 @@ def run(args: argparse.Namespace) -> int:
         frame_rate_hz=args.frame_rate,
         window_s=args.window,
     )
-    inputs = [path for path in (wanted.frames, wanted.events, wanted.truth) if path is not None]
+    inputs = [path for path in (request.frames, request.events, request.truth) if path is not None]
     if any(path.resolve() == out.resolve() for path in inputs):
         raise DataError("would be replaced by the result; choose another --out", out)
     with ExitStack() as stack:
-        show, rate_hz, warnings = open_show(wanted, stack)
+        movie, rate_hz, warnings = open_movie(request, stack)
         for warning in warnings:
             print(f"jeat-graph render: warning: {warning}", file=sys.stderr)
         if args.at is not None:
-            write_png(out, show.picture(0))
+            write_png(out, movie.picture(0))
         else:
-            _write_movie(show, rate_hz, out)
-    count, (width, height) = len(show.times), show.size_px
+            _write_movie(movie, rate_hz, out)
+    count, (width, height) = len(movie.times), movie.size_px
     print(f"wrote {out}: {count} picture{'s' * (count != 1)} of {width} x {height} px")
     return 0
 
 
-def _write_movie(show: Show, rate_hz: float, out: Path) -> None:
+def _write_movie(movie: Movie, rate_hz: float, out: Path) -> None:
     from tqdm import tqdm
 
     from jeat_graph.drawing.movie.film import MovieWriter
 
     hidden = not sys.stderr.isatty()
-    with MovieWriter(out, show.size_px, rate_hz) as movie:
-        for k in tqdm(range(len(show.times)), desc="render", unit="frame", disable=hidden, leave=False):
-            movie.append(show.picture(k))
+    with MovieWriter(out, movie.size_px, rate_hz) as writer:
+        for k in tqdm(range(len(movie.times)), desc="render", unit="frame", disable=hidden, leave=False):
+            writer.append(movie.picture(k))
 
 
 def _check_out(out: Path, one: bool) -> None:

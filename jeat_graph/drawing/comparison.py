@@ -1,4 +1,4 @@
-"""Pictures of a comparison: trajectories with their 2σ bands, error over time, and what delay buys."""
+"""Plots of a comparison of filter and smoothers: tracks with 2σ bands, error over time, error against lag."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.drawing.palette import AXES, FILTER, FULL, GRID, LAGGED, TRUTH
 from jeat_graph.eval.compare import Comparison, Samples, lag_name
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Colours that stay apart for colour-blind readers and in print.
-FILTER, LAGGED, FULL, TRUTH = "#d1662b", "#7a6fb0", "#1f6f8b", "#222222"
 MOST_TRACKS = 3
 BIN_S = 0.5
 LONGEST_LINE_S = 0.25
@@ -23,10 +22,10 @@ _STYLE: Any = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
-    "grid.color": "#e6e6e6",
+    "grid.color": GRID,
     "grid.linewidth": 0.8,
     "axes.axisbelow": True,
-    "axes.edgecolor": "#888888",
+    "axes.edgecolor": AXES,
     "font.size": 10,
     "axes.titlesize": 11,
     "axes.titlelocation": "left",

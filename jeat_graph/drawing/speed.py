@@ -1,4 +1,4 @@
-"""Log-log plot of time per frame against the number of objects."""
+"""Plots time per frame against the number of objects, both on logarithmic axes."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-_COLOURS = ("#0b6e99", "#58a4c4", "#7a5195", "#bc5090", "#d1495b", "#edae49", "#8d99ae")
+from jeat_graph.drawing.palette import LINES
 
 
 def plot_speed(rows: Sequence[dict[str, Any]], path: str | Path) -> None:
@@ -32,7 +32,7 @@ def plot_speed(rows: Sequence[dict[str, Any]], path: str | Path) -> None:
         x = [r["objects"] for r in mine]
         y = [r["median_ms"] for r in mine]
         ours = name.startswith(("default", "paper"))
-        colour = _COLOURS[k % len(_COLOURS)]
+        colour = LINES[k % len(LINES)]
         # Beside each other, so that whiskers of lines close together can be told apart.
         shifted = [v * (0.94 + 0.12 * k / max(len(names) - 1, 1)) for v in x]
         axes.vlines(shifted, y, [r["p99_ms"] for r in mine], color=colour, alpha=0.5, linewidth=1.2)

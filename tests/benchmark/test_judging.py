@@ -16,8 +16,7 @@ from jeat_graph.benchmark.contenders import (
     streams,
 )
 from jeat_graph.benchmark.judging import in_processes, spread, summarise
-from jeat_graph.benchmark.peer_parameters import KITTI_BEST, SIMULATED_BEST
-from jeat_graph.benchmark.peer_search import peers_here, search_parameters, search_table
+from jeat_graph.benchmark.peer_search import peers_here, recorded_best, search_parameters, search_table
 from jeat_graph.benchmark.recordings import find_kitti, kitti, simulated
 from jeat_graph.config.reading import load_config
 from jeat_graph.eval.baselines.search import SEARCH_GRIDS, grid
@@ -98,7 +97,8 @@ def test_a_search_says_what_it_gained_on_each_stream(monkeypatch):
 
 
 def test_every_parameter_that_was_found_belongs_to_a_grid():
-    for best, sensors in ((SIMULATED_BEST, ("rgb", "evt")), (KITTI_BEST, ("rgb", "lidar"))):
+    for recordings, sensors in (("simulated", ("rgb", "evt")), ("kitti", ("rgb", "lidar"))):
+        best = recorded_best(recordings)
         assert set(best) == {key(name, stream) for name in NAMES for stream in streams(sensors)}
         for where, parameters in best.items():
             assert parameters in list(grid(where.partition("/")[0]))

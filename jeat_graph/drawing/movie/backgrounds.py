@@ -1,4 +1,4 @@
-"""What lies behind the tracks: frames of a video, accumulated events, or nothing."""
+"""Backgrounds of a movie, behind the tracks: frames of a video, accumulated events, or plain darkness."""
 
 from __future__ import annotations
 
@@ -8,11 +8,10 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.events import EventArray
+from jeat_graph.drawing.palette import BRIGHTER, DARK, DARKER
 from jeat_graph.io.events_dsec import EventFile
 from jeat_graph.io.video import FrameSource, RgbImage
 
-DARK = (10, 13, 18)
-BRIGHTER, DARKER = (255, 176, 84), (86, 156, 255)
 # Events of one pixel at which its colour has come two thirds of the way (1 − 1/e).
 _SATURATION = 1.0
 _US_PER_S = 1e6
@@ -35,7 +34,7 @@ class Background(Protocol):
         """Return the picture (H, W, 3) at time `t` (s); not to be changed."""
 
 
-class Plain:
+class PlainBackground:
     """The same dark picture at all times."""
 
     name = ""
@@ -49,7 +48,7 @@ class Plain:
         return self._image
 
 
-class Frames:
+class VideoBackground:
     """Frames of a recording: at each time the last one taken, before the first the first."""
 
     name = "RGB"
@@ -68,7 +67,7 @@ class Frames:
         return self._source.frame(self.index(t))
 
 
-class Events:
+class EventBackground:
     """Events of the last moment before each time, brighter ones warm and darker ones blue.
 
     Args:

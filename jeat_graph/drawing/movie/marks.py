@@ -1,32 +1,18 @@
-"""Boxes, ellipses, trails and names drawn into a picture."""
+"""Draws boxes, ellipses, trails and names of tracks into a picture with OpenCV."""
 
 from __future__ import annotations
-
-import colorsys
 
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.drawing.movie.moments import Marks
+from jeat_graph.drawing.palette import RIM, Rgb, track_rgb
 from jeat_graph.io.video import RgbImage
 
-Colour = tuple[int, int, int]
-
-TRUTH: Colour = (235, 235, 235)
-IGNORED: Colour = (120, 120, 120)
-INK: Colour = (240, 240, 240)
-SHADE: Colour = (0, 0, 0)
 SIGMAS = 2.0
-_GOLDEN = 0.61803398875
 _SHIFT = 4  # OpenCV takes coordinates in sixteenths of a pixel
 _DASH_PX, _GAP_PX = 6.0, 4.0
 _FAR_PX = 30_000.0  # beyond it OpenCV's fixed-point coordinates would overflow
-
-
-def track_colour(track_id: int, lightness: float = 0.62) -> Colour:
-    """Colour of a track; neighbouring identities get hues far apart (multiples of the golden ratio)."""
-    red, green, blue = colorsys.hls_to_rgb(track_id * _GOLDEN % 1.0, lightness, 0.85)
-    return round(255 * red), round(255 * green), round(255 * blue)
 
 
 class Canvas:
@@ -42,17 +28,17 @@ class Canvas:
         self._scale = np.array(scale)
         self.unit = max(float(image.shape[0]) / 720.0, 0.75)  # thickness of lines and size of text go with it
 
-    def solid_box(self, box: FloatArray, colour: Colour, thickness: float) -> None:
+    def solid_box(self, box: FloatArray, colour: Rgb, thickness: float) -> None:
         """Draw a box (4,) with an unbroken line on a dark rim."""
         corners = self._corners(box)
-        for tint, width in ((SHADE, self._width(thickness) + 2), (colour, self._width(thickness))):
+        for tint, width in ((RIM, self._width(thickness) + 2), (colour, self._width(thickness))):
             self._polyline(corners, tint, width, closed=True)
 
-    def thin_box(self, box: FloatArray, colour: Colour) -> None:
+    def thin_box(self, box: FloatArray, colour: Rgb) -> None:
         """Draw a box (4,) with the thinnest line."""
         self._polyline(self._corners(box), colour, 1, closed=True)
 
-    def dashed_box(self, box: FloatArray, colour: Colour, thickness: float) -> None:
+    def dashed_box(self, box: FloatArray, colour: Rgb, thickness: float) -> None:
         """Draw a box (4,) with a broken line."""
         import cv2
 
@@ -63,7 +49,7 @@ class Canvas:
                 self.image, lines, False, colour, self._width(thickness), lineType=cv2.LINE_AA, shift=_SHIFT
             )
 
-    def ellipse(self, centre: FloatArray, sigma: FloatArray, colour: Colour) -> None:
+    def ellipse(self, centre: FloatArray, sigma: FloatArray, colour: Rgb) -> None:
         """Draw the ellipse of 2σ around a centre (2,) px; nothing where σ (2,) is not known."""
         import cv2
 
@@ -75,17 +61,17 @@ class Canvas:
         size = (int(axes[0]), int(axes[1]))
         cv2.ellipse(self.image, place, size, 0, 0, 360, colour, 1, lineType=cv2.LINE_AA, shift=_SHIFT)
 
-    def trail(self, points: FloatArray, colour: Colour, thickness: float) -> None:
+    def trail(self, points: FloatArray, colour: Rgb, thickness: float) -> None:
         """Draw a line through points (L, 2)."""
         if len(points) > 1:
             self._polyline(np.asarray(points) * self._scale, colour, self._width(thickness), closed=False)
 
-    def name(self, box: FloatArray, text: str, colour: Colour) -> None:
+    def name(self, box: FloatArray, text: str, colour: Rgb) -> None:
         """Write a text above a box (4,), within the picture."""
         left, top = np.asarray(box)[:2] * self._scale
         self.text(text, (float(left), float(top) - 4.0 * self.unit), colour, 0.42)
 
-    def text(self, text: str, place: tuple[float, float], colour: Colour, size: float) -> None:
+    def text(self, text: str, place: tuple[float, float], colour: Rgb, size: float) -> None:
         """Write a text with its lower left corner at a pixel, moved so that it is within the picture."""
         import cv2
 
@@ -94,7 +80,7 @@ class Canvas:
         x = int(min(max(place[0], 2.0), max(self.image.shape[1] - width - 2.0, 2.0)))
         y = int(min(max(place[1], height + 2.0), self.image.shape[0] - 3.0))
         stroke = max(round(self.unit), 1)
-        for tint, thickness in ((SHADE, stroke + 2), (colour, stroke)):
+        for tint, thickness in ((RIM, stroke + 2), (colour, stroke)):
             cv2.putText(self.image, text, (x, y), font, scale, tint, thickness, cv2.LINE_AA)
 
     def _width(self, thickness: float) -> int:
@@ -110,7 +96,7 @@ class Canvas:
         near = np.clip(points, -_FAR_PX, _FAR_PX)
         return np.rint(near * (1 << _SHIFT)).astype(np.int32)
 
-    def _polyline(self, points: FloatArray, colour: Colour, width: int, *, closed: bool) -> None:
+    def _polyline(self, points: FloatArray, colour: Rgb, width: int, *, closed: bool) -> None:
         import cv2
 
         cv2.polylines(
@@ -147,7 +133,7 @@ def dashes(corners: FloatArray, dash: float, gap: float) -> FloatArray:
 def draw_causal(canvas: Canvas, marks: Marks, *, trails: bool) -> None:
     """Draw causal tracks: unbroken boxes, ellipses, trails, names."""
     for k, track_id in enumerate(marks.track_id.tolist()):
-        colour = track_colour(track_id)
+        colour = track_rgb(track_id)
         if trails:
             canvas.trail(marks.trails[k], colour, 1.5)
         canvas.ellipse(marks.centre[k], marks.sigma[k], colour)
@@ -158,7 +144,7 @@ def draw_causal(canvas: Canvas, marks: Marks, *, trails: bool) -> None:
 def draw_smoothed(canvas: Canvas, marks: Marks, *, names: bool) -> None:
     """Draw smoothed tracks: broken, paler boxes, ellipses, trails, and names unless others wrote them."""
     for k, track_id in enumerate(marks.track_id.tolist()):
-        colour = track_colour(track_id, 0.82)
+        colour = track_rgb(track_id, 0.82)
         canvas.trail(marks.trails[k], colour, 1.5)
         canvas.ellipse(marks.centre[k], marks.sigma[k], colour)
         canvas.dashed_box(marks.boxes[k], colour, 1.6)

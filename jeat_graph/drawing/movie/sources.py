@@ -1,4 +1,4 @@
-"""What the user gave: a run, a segment of a simulation, frames, events, truth; made into a `Show`."""
+"""Opens what a movie is made of: a run or a simulated segment, with its frames, events and truth."""
 
 from __future__ import annotations
 
@@ -12,9 +12,14 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
-from jeat_graph.drawing.movie.backgrounds import Background, Events, Frames, Plain
+from jeat_graph.drawing.movie.backgrounds import (
+    Background,
+    EventBackground,
+    PlainBackground,
+    VideoBackground,
+)
 from jeat_graph.drawing.movie.moments import TracksAt, TruthAt
-from jeat_graph.drawing.movie.show import Show
+from jeat_graph.drawing.movie.panels import Movie
 from jeat_graph.simulation.dataset.layout import EVENTS, SEGMENTS, TRUTH
 
 DEFAULT_RATE_HZ = 25.0
@@ -22,8 +27,8 @@ _SAME_SHAPE = 0.01
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """What is to be drawn; None is "as it comes".
+class Request:
+    """What the user asks to be drawn; None leaves the choice to the files.
 
     Attributes:
         run: run directory, table of tracks, or folder of a simulated segment.
@@ -54,11 +59,11 @@ class Wanted:
     window_s: float | None = None
 
 
-def open_show(wanted: Wanted, stack: ExitStack) -> tuple[Show, float, list[str]]:
+def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[str]]:
     """Open everything that is to be drawn.
 
     Args:
-        wanted: what the user asked for.
+        request: what the user asked for.
         stack: closes the files that are read from.
 
     Returns:
@@ -72,28 +77,28 @@ def open_show(wanted: Wanted, stack: ExitStack) -> tuple[Show, float, list[str]]
     from jeat_graph.io.video import open_frames
     from jeat_graph.runs.directory import read_instants
 
-    tables, wanted = _resolve(wanted)
+    tables, request = _resolve(request)
     frames = events = None
-    if wanted.frames is not None:
-        frames = Frames(stack.enter_context(open_frames(wanted.frames, wanted.frame_rate_hz)))
+    if request.frames is not None:
+        frames = VideoBackground(stack.enter_context(open_frames(request.frames, request.frame_rate_hz)))
     truth = None
-    if wanted.truth is not None:
-        truth = read_truth(wanted.truth, rate_hz=wanted.frame_rate_hz)
-    rate_hz = wanted.rate_hz or _rate_of(frames) or DEFAULT_RATE_HZ
-    if wanted.events is not None:
-        window_s = wanted.window_s if wanted.window_s is not None else 1.0 / rate_hz
-        events = Events(stack.enter_context(EventFile(wanted.events)), window_s)
-    times = _times(wanted, _span(frames, events, tables, truth), frames, rate_hz)
+    if request.truth is not None:
+        truth = read_truth(request.truth, rate_hz=request.frame_rate_hz)
+    rate_hz = request.rate_hz or _rate_of(frames) or DEFAULT_RATE_HZ
+    if request.events is not None:
+        window_s = request.window_s if request.window_s is not None else 1.0 / rate_hz
+        events = EventBackground(stack.enter_context(EventFile(request.events)), window_s)
+    times = _times(request, _span(frames, events, tables, truth), frames, rate_hz)
 
     backgrounds: list[Background] = [one for one in (frames, events) if one is not None]
-    configured = _configured_size(wanted.run)
+    configured = _configured_size(request.run)
     field, warnings = _field(configured, backgrounds, tables, truth)
     if not backgrounds:
-        backgrounds.append(Plain((round(field[0]), round(field[1]))))
-    panel = wanted.size_px or (round(field[0]), round(field[1]))
-    instants = read_instants(wanted.run) if wanted.run.is_dir() else None
+        backgrounds.append(PlainBackground((round(field[0]), round(field[1]))))
+    panel = request.size_px or (round(field[0]), round(field[1]))
+    instants = read_instants(request.run) if request.run.is_dir() else None
     shown = {kind: TracksAt(table, times, kind, instants) for kind, table in tables.items()}
-    show = Show(
+    movie = Movie(
         times=times,
         backgrounds=backgrounds,
         field_px=field,
@@ -102,34 +107,34 @@ def open_show(wanted: Wanted, stack: ExitStack) -> tuple[Show, float, list[str]]
         smoothed=shown.get("smoothed"),
         truth=None if truth is None else TruthAt(truth),
     )
-    return show, rate_hz, warnings
+    return movie, rate_hz, warnings
 
 
-def _resolve(wanted: Wanted) -> tuple[dict[str, Trajectories], Wanted]:
+def _resolve(request: Request) -> tuple[dict[str, Trajectories], Request]:
     """Read the tracks; a segment without tracks stands for its own frames, events and truth."""
     from dataclasses import replace
 
     from jeat_graph.eval.load import tables_of
     from jeat_graph.io.trajectories_io import read_trajectories
 
-    run = wanted.run
+    run = request.run
     if run.is_dir() and (run / SEGMENTS).is_dir():
         raise DataError(f"is a whole data set; give one of its segments, such as {SEGMENTS}/000000", run)
     own = run.is_dir() and (run / TRUTH).is_file() and ((run / EVENTS).is_file() or _has_frames(run))
     if own and not any(run.glob("causal.*")) and not any(run.glob("smoothed.*")):
-        if wanted.only is not None:
-            raise DataError(f"is a simulated segment and has no tracks, so --only {wanted.only} fails", run)
+        if request.only is not None:
+            raise DataError(f"is a simulated segment and has no tracks, so --only {request.only} fails", run)
         return {}, replace(
-            wanted,
-            frames=wanted.frames or (run if _has_frames(run) else None),
-            events=wanted.events or (run / EVENTS if (run / EVENTS).is_file() else None),
-            truth=wanted.truth or run / TRUTH,
+            request,
+            frames=request.frames or (run if _has_frames(run) else None),
+            events=request.events or (run / EVENTS if (run / EVENTS).is_file() else None),
+            truth=request.truth or run / TRUTH,
         )
     files = tables_of(run)
-    if wanted.only is not None and wanted.only not in files:
-        raise DataError(f"has no {wanted.only} table", run)
-    kinds = [wanted.only] if wanted.only is not None else list(files)
-    return {kind: read_trajectories(files[kind], rate_hz=wanted.frame_rate_hz) for kind in kinds}, wanted
+    if request.only is not None and request.only not in files:
+        raise DataError(f"has no {request.only} table", run)
+    kinds = [request.only] if request.only is not None else list(files)
+    return {kind: read_trajectories(files[kind], rate_hz=request.frame_rate_hz) for kind in kinds}, request
 
 
 def _has_frames(folder: Path) -> bool:
@@ -138,15 +143,15 @@ def _has_frames(folder: Path) -> bool:
     return any((folder / name).exists() for name in VIDEO_FILES.values())
 
 
-def _rate_of(frames: Frames | None) -> float | None:
+def _rate_of(frames: VideoBackground | None) -> float | None:
     if frames is None or len(frames.times_s) < 2:
         return None
     return 1.0 / float(np.median(np.diff(frames.times_s)))
 
 
 def _span(
-    frames: Frames | None,
-    events: Events | None,
+    frames: VideoBackground | None,
+    events: EventBackground | None,
     tables: dict[str, Trajectories],
     truth: GroundTruth | None,
 ) -> tuple[float, float]:
@@ -164,15 +169,17 @@ def _span(
     return float(joined.min()), float(joined.max())
 
 
-def _times(wanted: Wanted, span: tuple[float, float], frames: Frames | None, rate_hz: float) -> FloatArray:
+def _times(
+    request: Request, span: tuple[float, float], frames: VideoBackground | None, rate_hz: float
+) -> FloatArray:
     """Times of the pictures (T,), at least one (s)."""
-    if wanted.at_s is not None:
-        return np.array([wanted.at_s])
-    start = span[0] if wanted.start_s is None else wanted.start_s
-    end = span[1] if wanted.end_s is None else wanted.end_s
+    if request.at_s is not None:
+        return np.array([request.at_s])
+    start = span[0] if request.start_s is None else request.start_s
+    end = span[1] if request.end_s is None else request.end_s
     if end < start:
         raise DataError(f"--end {end:g} s lies before the start, {start:g} s")
-    if frames is not None and wanted.rate_hz is None:
+    if frames is not None and request.rate_hz is None:
         times = frames.times_s[(frames.times_s >= start - 1e-6) & (frames.times_s <= end + 1e-6)]
     else:
         times = start + np.arange(int((end - start) * rate_hz + 1e-6) + 1) / rate_hz

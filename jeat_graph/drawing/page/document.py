@@ -1,17 +1,16 @@
-"""The page itself: one HTML file that asks nothing of any network."""
+"""Writes the page of a run: one HTML file with everything in it, which asks nothing of any network."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
 from html import escape
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from jeat_graph.drawing.page.figures import ComparedRun
 from jeat_graph.drawing.page.plane import map_svg
-from jeat_graph.drawing.page.script import JS
-from jeat_graph.drawing.page.style import CSS
 from jeat_graph.drawing.page.summary import (
     count_table,
     nis_interval,
@@ -43,7 +42,7 @@ def render_page(data: RunData, compared: ComparedRun | None = None, not_compared
         f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         f"<title>{escape(title)}</title>",
-        f"<style>{CSS}</style></head><body>",
+        f"<style>\n{_beside('page.css')}</style></head><body>",
         _header(data, name),
         "<main>",
         _notes(data, not_compared),
@@ -53,10 +52,15 @@ def render_page(data: RunData, compared: ComparedRun | None = None, not_compared
         _list(data),
         _details(data),
         "</main>",
-        f"<script>{JS}</script>" if len(data.track_ids()) else "",
+        f"<script>\n{_beside('page.js')}</script>" if len(data.track_ids()) else "",
         "</body></html>",
     ]
     return "\n".join(part for part in parts if part) + "\n"
+
+
+def _beside(name: str) -> str:
+    """Read a file that stands beside this module."""
+    return files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 
 def _header(data: RunData, name: str) -> str:

@@ -1,4 +1,4 @@
-"""The map: every track on the picture plane, as SVG inside the page."""
+"""Draws the map of the page: every track on the picture plane, as SVG."""
 
 from __future__ import annotations
 
@@ -7,17 +7,12 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.drawing.page.thinning import spread
+from jeat_graph.drawing.palette import track_hue
 from jeat_graph.runs.recorded import RunData, rows_of_tracks
 
 _BUDGET = 40_000  # points of all lines of one kind
 _LEAST_POINTS, _MOST_POINTS = 8, 400
-_GOLDEN = 0.61803398875
 _BREAK_S = 0.5  # rows further apart are not joined
-
-
-def hue(track_id: int) -> int:
-    """Hue (degrees) of a track; neighbouring identities lie far apart (multiples of the golden ratio)."""
-    return round(360.0 * (track_id * _GOLDEN % 1.0))
 
 
 def map_svg(data: RunData) -> str:
@@ -32,7 +27,7 @@ def map_svg(data: RunData) -> str:
             if track_id in paths
         )
         groups.append(
-            f'<g class="track" data-id="{track_id}" style="--h:{hue(track_id)}">'
+            f'<g class="track" data-id="{track_id}" style="--h:{round(360.0 * track_hue(track_id))}">'
             f"<title>track {track_id}</title>{lines}</g>"
         )
     label = (

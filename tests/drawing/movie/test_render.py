@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 from jeat_graph.cli.main import main
 from jeat_graph.data.events import EventArray
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
-from jeat_graph.drawing.movie.backgrounds import BRIGHTER, DARK, DARKER, accumulate
-from jeat_graph.drawing.movie.marks import Canvas, dashes, track_colour
+from jeat_graph.drawing.movie.backgrounds import accumulate
+from jeat_graph.drawing.movie.marks import Canvas, dashes
 from jeat_graph.drawing.movie.moments import TracksAt, TruthAt
+from jeat_graph.drawing.palette import BRIGHTER, DARK, DARKER, track_rgb
 from jeat_graph.io.trajectories_io import read_trajectories, write_trajectories
 from jeat_graph.io.truth_io import write_truth
 
@@ -209,7 +210,7 @@ def test_a_frame_is_shown_until_the_next_one(segment, picture):
 
 def test_tracks_lie_on_frames_and_events_alike(segment, run, picture):
     image = picture(run, 0.3, "--frames", segment, "--events", segment / "events.h5", "--only", "causal")
-    lit = close_to(image, track_colour(1), 60)
+    lit = close_to(image, track_rgb(1), 60)
     box = np.s_[30:60, 25:65]
     assert lit[:, :WIDTH][box].sum() > 50
     np.testing.assert_allclose(lit[:, :WIDTH][box].sum(), lit[:, WIDTH:][box].sum(), rtol=0.2)
@@ -260,7 +261,7 @@ def test_a_smaller_copy_of_the_video_is_drawn_on_in_its_own_scale(tmp_path, pict
     image = picture(run, 0.1, "--frames", frames, "--only", "causal", "--size", "320x192")
     same = picture(run, 0.1, "--only", "causal")
     np.testing.assert_array_equal(
-        close_to(image, track_colour(1), 30)[60:], close_to(same, track_colour(1), 30)[60:]
+        close_to(image, track_rgb(1), 30)[60:], close_to(same, track_rgb(1), 30)[60:]
     )
 
 

@@ -1,7 +1,3 @@
-"""The page's script: choose a track on the map or in the list, and read its curves at any moment."""
-
-# Plain JavaScript without any library. Texts from files reach the page through textContent only.
-JS = r"""
 (() => {
 'use strict';
 const data = JSON.parse(document.getElementById('data').textContent);
@@ -291,4 +287,3 @@ choose(byId.has(wanted) ? wanted : data.first);
 map.classList.toggle('some', byId.has(wanted));
 if (byId.has(wanted)) moveTo((byId.get(wanted).from + byId.get(wanted).to) / 2);
 })();
-"""

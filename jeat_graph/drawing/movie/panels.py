@@ -1,4 +1,4 @@
-"""A run as pictures: backgrounds side by side, each with everything drawn on it."""
+"""Draws a run at given times: backgrounds side by side, each with tracks and truth on it."""
 
 from __future__ import annotations
 
@@ -9,16 +9,17 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.drawing.movie.backgrounds import Background
-from jeat_graph.drawing.movie.marks import IGNORED, INK, TRUTH, Canvas, draw_causal, draw_smoothed
+from jeat_graph.drawing.movie.marks import Canvas, draw_causal, draw_smoothed
 from jeat_graph.drawing.movie.moments import TracksAt, TruthAt
+from jeat_graph.drawing.palette import IGNORED_BOX, TEXT, TRUE_BOX
 from jeat_graph.io.video import RgbImage
 
 _MARGIN_PX = 10.0
 
 
 @dataclass(frozen=True, eq=False)
-class Show:
-    """All that is needed to draw a run at given times.
+class Movie:
+    """What a movie of a run is drawn from.
 
     Attributes:
         times: (T,) ascending (s).
@@ -63,9 +64,9 @@ class Show:
         canvas = Canvas(image, scale)
         self._draw(canvas, k, t)
         edge = _MARGIN_PX * canvas.unit
-        canvas.text(f"t = {t:.3f} s", (edge, image.shape[0] - edge), INK, 0.6)
+        canvas.text(f"t = {t:.3f} s", (edge, image.shape[0] - edge), TEXT, 0.6)
         if background.name:
-            canvas.text(background.name, (edge, 2.6 * edge), INK, 0.6)
+            canvas.text(background.name, (edge, 2.6 * edge), TEXT, 0.6)
         return image
 
     def _draw(self, canvas: Canvas, k: int, t: float) -> None:
@@ -74,8 +75,8 @@ class Show:
         if self.smoothed is not None:
             draw_smoothed(canvas, self.smoothed.at(k), names=self.causal is None)
         if self.truth is not None:
-            wanted, ignored = self.truth.at(t)
-            for boxes, colour in ((ignored, IGNORED), (wanted, TRUTH)):
+            asked_for, ignored = self.truth.at(t)
+            for boxes, colour in ((ignored, IGNORED_BOX), (asked_for, TRUE_BOX)):
                 for box in boxes:
                     canvas.thin_box(box, colour)
         used = [
@@ -89,4 +90,4 @@ class Show:
         ]
         if used:
             height, width = canvas.image.shape[:2]
-            canvas.text(", ".join(used), (width, height - _MARGIN_PX * canvas.unit), INK, 0.42)
+            canvas.text(", ".join(used), (width, height - _MARGIN_PX * canvas.unit), TEXT, 0.42)
