@@ -43,28 +43,10 @@ KNOWN_UPWARD = {
 KNOWN_CIRCLES: set[str] = set()
 KNOWN_LONG_FILES = {
     "eval/compare.py": 351,
-    "jeat_graph/drawing/run_picture.py": 304,
     "jeat_graph/io/tables.py": 306,
 }
 KNOWN_GTSAM = {"smoothers.engine"}
 KNOWN_WIDE_FUNCTIONS = {
-    "simulation.imaging.background._trace": 10,
-    "simulation.imaging.bodies.add_body": 12,
-    "simulation.imaging.bodies.add_lamps": 9,
-    "simulation.imaging.bodies.add_glow": 10,
-    "simulation.imaging.event_camera._run_physical": 11,
-    "simulation.imaging.event_camera._run_carla": 11,
-    "simulation.imaging.faces.light_face": 10,
-    "simulation.imaging.lamps.light_lamps": 10,
-    "simulation.imaging.lighting.beam_lux": 11,
-    "simulation.imaging.paint.paint": 12,
-    "simulation.imaging.projection.project_moments": 9,
-    "simulation.imaging.projection._project": 11,
-    "simulation.imaging.projection._face_planes": 12,
-    "simulation.imaging.road_light.cast_shadow": 11,
-    "simulation.imaging.road_light.cast_beams": 13,
-    "simulation.imaging.road_light._on_barrier": 10,
-    "simulation.world.traffic._choose_lane_changes": 11,
     "smoothers.adjoint.back_over_measurement": 9,
     "smoothers.adjoint.smooth_one": 9,
     "smoothers.backward.smooth_rows": 19,

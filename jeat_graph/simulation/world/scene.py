@@ -10,8 +10,9 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.simulation.streams import stream
 from jeat_graph.simulation.world.camera import Camera, CameraConfig
 from jeat_graph.simulation.world.light import Light, LightConfig
+from jeat_graph.simulation.world.parking import park
 from jeat_graph.simulation.world.road import Road, RoadConfig
-from jeat_graph.simulation.world.traffic import Traffic, TrafficConfig, park, simulate_traffic
+from jeat_graph.simulation.world.traffic import Traffic, TrafficConfig, simulate_traffic
 from jeat_graph.simulation.world.vehicles import Fleet, FleetConfig, draw_fleet
 
 

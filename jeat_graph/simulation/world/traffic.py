@@ -1,4 +1,4 @@
-"""Traffic on the highway: driving vehicles on a ring, parked ones on the shoulders.
+"""Simulates traffic on the highway: vehicles that drive on a ring of road.
 
 The road that the camera sees is a part of a ring, so that the density stays as configured without a model
 of arrivals: who leaves at one end comes in at the other, out of sight, as a new object.
@@ -179,30 +179,6 @@ def simulate_traffic(
         sway=sway,
     )
     return Traffic(paths=paths, direction=road.direction[lane], cruise=drivers.speed)
-
-
-def park(
-    rng: np.random.Generator, fleet: Fleet, road: Road, near_m: float = 28.0, far_m: float = 120.0
-) -> FloatArray:
-    """Park vehicles on the shoulders, apart from each other.
-
-    Args:
-        rng: random stream of the parking.
-        fleet: the P parked vehicles.
-        road: shoulders.
-        near_m: nearest place along the road (m).
-        far_m: farthest place along the road (m).
-
-    Returns:
-        (P, 3) x, y of the vehicle's centre (m) and its heading (rad).
-    """
-    count = len(fleet)
-    side = rng.permutation(np.arange(count) % 2)
-    slot = (far_m - near_m) / max(count, 1)
-    play = np.maximum(slot - fleet.size[:, 0] - 2.0, 0.0) if count else np.zeros(0)
-    y = near_m + slot * (rng.permutation(count) + 0.5) + play * rng.uniform(-0.5, 0.5, count)
-    x = road.shoulder_x[side] + rng.uniform(-0.15, 0.15, count)
-    return np.stack([x, y, rng.normal(0.0, 0.01, count)], axis=1)
 
 
 def _lanes_of(fleet: Fleet, road: Road) -> BoolArray:
