@@ -1,4 +1,4 @@
-"""Rows of the accuracy tables: our tracker in several dresses, and the baselines with their parameters."""
+"""Rows of the accuracy tables: several configurations of ours, and other trackers with their parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tracks whose truth is known to the last digit: drawn from the model, or real paths with drawn noise."""
+"""Draws tracks with exactly known truth: from the motion model, or from real paths with simulated noise."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Noise of CARLA's event sensor and what the paper's three measures do against it, event by event."""
+"""Measures the noise of CARLA's event sensor, and what the paper's three remedies do against it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Events of the physical camera: a vehicle's, against its speed, and the background's noise."""
+"""Measures the physical event camera: a vehicle's events against its speed, and the background's noise."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Jobs that track and judge, run in several processes; the result does not depend on how many."""
+"""Tracks and judges in several processes; the result does not depend on how many."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is needed to repeat a benchmark: versions, machine, settings."""
+"""Records what is needed to repeat a benchmark: versions, machine, settings."""
 
 from __future__ import annotations
 

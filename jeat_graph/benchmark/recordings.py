@@ -1,4 +1,4 @@
-"""What trackers are judged on: simulated recordings by scenario and seed, and the real ones, if there."""
+"""Recordings that trackers are judged on: simulated ones by scenario and seed, and real ones if present."""
 
 from __future__ import annotations
 

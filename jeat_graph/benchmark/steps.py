@@ -1,4 +1,4 @@
-"""The way from one configuration to another, one change a row."""
+"""Steps from one configuration to another, one change each, for the table of the ablation."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from jeat_graph.data.trajectories import Trajectories
     from jeat_graph.eval.metrics import Scores
     from jeat_graph.eval.tables import Table
-    from jeat_graph.simulation.simulate import Recording
+    from jeat_graph.simulation.simulate import SimulatedRecording
 
 HELP = "simulate a highway at night, track it with both sensors and with each alone, and show what comes out"
 COLUMNS = ("sensors", "MOTA", "IDF1", "HOTA", "FP", "FN", "IDSW")
@@ -82,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _compare(recording: Recording, config: Config, causal: Trajectories, smoothed: Path) -> Table:
+def _compare(recording: SimulatedRecording, config: Config, causal: Trajectories, smoothed: Path) -> Table:
     """Scores of all sensors together (tracked already) and of each alone, at the truth's times."""
     from jeat_graph.eval.metrics import evaluate
     from jeat_graph.eval.tables import Cell, Table
@@ -101,7 +101,7 @@ def _compare(recording: Recording, config: Config, causal: Trajectories, smoothe
     return Table.from_records(records, COLUMNS)
 
 
-def _causal_scores(recording: Recording, detections: Detections, table: Trajectories) -> Scores:
+def _causal_scores(recording: SimulatedRecording, detections: Detections, table: Trajectories) -> Scores:
     import numpy as np
 
     from jeat_graph.eval.metrics import evaluate
@@ -109,7 +109,7 @@ def _causal_scores(recording: Recording, detections: Detections, table: Trajecto
     return evaluate([(recording.truth, table)], instants=[np.unique(detections.scan_t)])
 
 
-def _draw(recording: Recording, table: Trajectories, stem: Path, scenario: str) -> list[Path]:
+def _draw(recording: SimulatedRecording, table: Trajectories, stem: Path, scenario: str) -> list[Path]:
     import numpy as np
 
     from jeat_graph.drawing.palette import DAY, NIGHT
@@ -134,7 +134,9 @@ def _draw(recording: Recording, table: Trajectories, stem: Path, scenario: str) 
     return save_pictures(table, backdrop, stem, DAY if scenario.startswith("day") else NIGHT)
 
 
-def _errors(recording: Recording, table: Trajectories, t: float) -> tuple[FloatArray, frozenset[int]]:
+def _errors(
+    recording: SimulatedRecording, table: Trajectories, t: float
+) -> tuple[FloatArray, frozenset[int]]:
     """True boxes (M, 4) at a time of the truth that no track lies on, and tracks that lie on no true box."""
     import numpy as np
 

@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("detections", "pictures", "carla"),
         default="detections",
         help="detections (default); pictures: RGB frames and events of the built-in renderer; carla: those "
-        "of a running CARLA server",
+        "of a running CARLA server (experimental)",
     )
     parser.add_argument(
         "--verify",
@@ -82,7 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="YAML with settings of renderer and cameras (sections render, rgb, evt)",
     )
-    carla = parser.add_argument_group("with --sensors carla")
+    carla = parser.add_argument_group("with --sensors carla (experimental)")
     carla.add_argument("--carla-host", metavar="HOST", help="where the server runs (default localhost)")
     carla.add_argument("--carla-port", type=counting, metavar="PORT", help="its port (default 2000)")
 

@@ -1,4 +1,4 @@
-"""What a source of pictures gives, be it our renderer or CARLA: frame by frame, with events and truth."""
+"""One frame of a segment with its events and truth, as the renderer or CARLA delivers it."""
 
 from __future__ import annotations
 

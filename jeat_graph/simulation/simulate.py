@@ -1,4 +1,4 @@
-"""Simulate a recording: detections of all sensors, and the truth."""
+"""Simulates a recording: detections of all sensors, and the truth."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _DIGITS = 6  # of the truth's columns, so that a file holds exactly what is in m
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class SimulatedRecording:
     """A simulated recording.
 
     Attributes:
@@ -42,7 +42,7 @@ class Recording:
         return look(self.scene, times, self.scenario.truth).to_truth()
 
 
-def record(scenario: Scenario, seed: int = 0, duration_s: float = DEFAULT_DURATION_S) -> Recording:
+def record(scenario: Scenario, seed: int = 0, duration_s: float = DEFAULT_DURATION_S) -> SimulatedRecording:
     """Simulate a recording; the same arguments give the same bytes.
 
     Args:
@@ -69,7 +69,7 @@ def record(scenario: Scenario, seed: int = 0, duration_s: float = DEFAULT_DURATI
         if name == s.truth_sensor:
             truth = views.to_truth()
     assert truth is not None  # the scenario has checked that the sensor exists
-    return Recording(s, scene, Detections.concatenate(parts), _rounded(truth))
+    return SimulatedRecording(s, scene, Detections.concatenate(parts), _rounded(truth))
 
 
 def simulate(

@@ -1,4 +1,4 @@
-"""Pictures into an MP4 file, which appears only when it is complete."""
+"""Writes pictures into an MP4 file, which appears only when it is complete."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What there is to draw at each time: tracks of both tables, their trails, and the truth."""
+"""Looks up what is drawn at each time: tracks of both tables, their trails, and the truth."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The pictures of `compare`, carried inside the page."""
+"""Puts the plots of a comparison into the page, as images within the HTML."""
 
 from __future__ import annotations
 

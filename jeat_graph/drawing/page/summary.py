@@ -1,4 +1,4 @@
-"""The page's tables of numbers: scores, counts, consistency, the list of tracks."""
+"""Makes the page's tables of numbers: scores, counts, consistency, the list of tracks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fewer points that look the same: curves for a page, always thinned in the same way."""
+"""Thins curves to fewer points that look the same, always in the same way."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The curves of each track over its life, as plain values that the page's script draws."""
+"""Collects the curves of each track over its life, as plain values that the page's script draws."""
 
 from __future__ import annotations
 

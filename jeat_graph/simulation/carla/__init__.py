@@ -1,1 +1,1 @@
-"""Recorder of segments in CARLA. It was tested against the client package and a fake, never a server."""
+"""Experimental recorder of segments in CARLA, tested with its client and a fake, never on a server."""

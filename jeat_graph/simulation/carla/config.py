@@ -1,4 +1,4 @@
-"""Settings of a recording in CARLA."""
+"""Settings of a recording in CARLA (experimental)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A CARLA world made ready for one segment, and put back as it was, whatever happens."""
+"""Prepares a CARLA world for one segment, and puts it back as it was, whatever happens (experimental)."""
 
 from __future__ import annotations
 

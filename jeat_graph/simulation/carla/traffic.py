@@ -1,4 +1,4 @@
-"""Where the camera stands, where vehicles begin, and which vehicles there are."""
+"""Chooses where the camera stands, where vehicles begin, and which there are, in CARLA (experimental)."""
 
 from __future__ import annotations
 

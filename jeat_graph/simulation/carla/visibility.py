@@ -1,4 +1,4 @@
-"""How much of a vehicle can be seen, from a depth picture."""
+"""Measures how much of a vehicle can be seen, from a depth picture of CARLA (experimental)."""
 
 from __future__ import annotations
 

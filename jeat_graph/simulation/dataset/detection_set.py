@@ -1,4 +1,4 @@
-"""The folder of a simulation at the level of detections: tables, truth, settings, manifest."""
+"""Writes a simulation of detections into a folder: tables, truth, settings, manifest."""
 
 from __future__ import annotations
 

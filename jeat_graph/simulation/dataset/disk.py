@@ -1,4 +1,4 @@
-"""Is there room for the data set? Asked before it starts, and again with what its segments really took."""
+"""Checks that the disk has room for a data set, before it starts and while its segments grow."""
 
 from __future__ import annotations
 

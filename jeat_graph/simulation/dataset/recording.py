@@ -1,4 +1,4 @@
-"""Make a data set of pictures: segment by segment, in parallel, going on where a killed run stopped."""
+"""Makes a data set of pictures, segment by segment, in parallel, and goes on where a stopped run ended."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Write one segment: frames, events and truth, as the source gives them."""
+"""Writes one segment: frames, events and truth."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Truth of one segment, gathered frame by frame and written in all formats."""
+"""Gathers the truth of one segment frame by frame and writes it in all formats."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Check a simulated folder: are all files there, unchanged, and consistent with one another?"""
+"""Checks a simulated folder: are all files there, unchanged, and consistent with one another?"""
 
 from __future__ import annotations
 

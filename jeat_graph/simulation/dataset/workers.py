@@ -1,4 +1,4 @@
-"""Make segments in processes of their own; the result does not depend on how many there are."""
+"""Makes segments in processes of their own; the result does not depend on how many there are."""
 
 from __future__ import annotations
 

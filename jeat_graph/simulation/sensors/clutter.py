@@ -1,4 +1,4 @@
-"""False boxes: some anywhere and independent, some at fixed places again and again."""
+"""Draws false detections: some anywhere, some at fixed places again and again."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How probably a detector finds a vehicle: a product of factors, each with one cause."""
+"""Gives the probability that a detector finds a vehicle: a product of factors, each with one cause."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A sensor with its detector: from what is truly in the picture to scans of boxes and scores."""
+"""Simulates a sensor with its detector: scans of boxes and scores from what is truly in the picture."""
 
 from __future__ import annotations
 

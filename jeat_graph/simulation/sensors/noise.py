@@ -1,4 +1,4 @@
-"""How a detector's box differs from the true one, and the score that it gives."""
+"""Adds noise to a detector's boxes, and gives them scores."""
 
 from __future__ import annotations
 

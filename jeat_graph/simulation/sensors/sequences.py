@@ -1,4 +1,4 @@
-"""Random sequences along the life of each object: correlated noise, and choices that stick for a while."""
+"""Random sequences along the life of each object: correlated noise, and choices that last for a while."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When a sensor looks: nominal rate, jitter, dropped scans and bursts of scans that find nothing."""
+"""Draws the times of a sensor's scans: rate, jitter, dropped scans and bursts of empty ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Boxes in the picture from 3D boxes in the world, with the motion of their centres."""
+"""Projects 3D boxes of vehicles into the picture: 2D boxes, with the motion of their centres."""
 
 from __future__ import annotations
 

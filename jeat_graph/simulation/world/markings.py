@@ -1,4 +1,4 @@
-"""The road's markings in the picture, as a backdrop for drawings."""
+"""Projects the road's markings into the picture, as a backdrop for drawings."""
 
 from __future__ import annotations
 

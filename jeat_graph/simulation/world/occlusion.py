@@ -1,4 +1,4 @@
-"""Occlusion of boxes by nearer boxes, as a painter would cover them."""
+"""Computes how much of each box nearer boxes cover."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What there truly is to be seen in the picture, and the ground truth table made of it."""
+"""Finds which vehicles can be seen in the picture, and makes the ground truth table."""
 
 from __future__ import annotations
 
