@@ -107,9 +107,34 @@ def test_the_presets_smoothers_take_any_scans_too(preset, recording):
     table = tracker.finish()
     for column in (table.boxes, table.mean, table.var, table.existence):
         assert np.isfinite(column).all()
+    assert (table.var > 0).all()
+    assert ((table.existence >= 0) & (table.existence <= 1)).all()
+    assert len(set(zip(table.track_id.tolist(), table.t.tolist(), strict=True))) == len(table), "a row twice"
+    if recording:
+        assert (table.t >= recording[0][0].t).all()
+        assert (table.t <= recording[-1][0].t).all()
     # A table of a certain rate may pass over a track that lived between two of its rows, but it invents none.
     assert set(table.track_id.tolist()) <= set(range(1, tracker.num_born + 1))
     assert reported <= set(range(1, tracker.num_born + 1))
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_what_is_drawn_is_more_than_empty_tables(preset):
+    """The invariants above would hold for a tracker that never reports anything."""
+
+    @given(recording=recordings())
+    @settings(max_examples=100, deadline=None, database=None, suppress_health_check=list(HealthCheck))
+    def count(recording):
+        tracker = Tracker(CONFIGS[preset])
+        born.append(tracker.num_born)
+        for batch in recording:
+            rows.append(len(tracker.step(batch)))
+        born.append(tracker.num_born)
+
+    rows, born = [], []
+    count()
+    assert sum(born) > 100
+    assert sum(rows) > 20
 
 
 @pytest.mark.parametrize("epoch", [0.0, 2001000.46, 1.7e9])
