@@ -72,6 +72,16 @@ def test_a_zero_of_what_is_hardly_known_leaves_the_variance_of_the_measurement()
     assert np.linalg.det(P) > 0.0
 
 
+def test_no_covariance_is_lost_to_rounding_where_hardly_anything_was_known():
+    m, P = np.zeros(3), np.diag([1e12, 1e15, 1e9])
+    P[0, 1] = P[1, 0] = 0.5 * np.sqrt(1e27)
+    P[1, 2] = P[2, 1] = 0.5 * np.sqrt(1e24)
+    expected = P[1] * 1e-4 / (1e15 + 1e-4)  # P[1] - P[1, 1] / S · P[1] would be a difference of large numbers
+    zero_update(m, P, 1, 1e-2)
+    assert P[1] == pytest.approx(expected, rel=1e-12, abs=0.0)
+    assert np.array_equal(P, P.T)
+
+
 def test_evidence_of_each_model_is_its_gaussian_density():
     rng = np.random.default_rng(2)
     anchor, anchor_var = rng.normal(size=2), rng.uniform(0.1, 3.0, 2)

@@ -30,6 +30,12 @@ def test_no_evidence_makes_existence_certain_or_impossible(r, evidence, temperin
     assert 0.0 < existence_after_hit(r, evidence, tempering) < 1.0
 
 
+def test_one_hit_says_no_more_than_twenty_in_log_odds():
+    odds = math.log(1e-6 / (1.0 - 1e-6)) + 20.0
+    assert existence_after_hit(1e-6, 1e3, 1.0) == pytest.approx(1.0 / (1.0 + math.exp(-odds)), rel=1e-12)
+    assert existence_after_hit(1e-6, 1e3, 1.0) == existence_after_hit(1e-6, 1e300, 1.0)
+
+
 @given(r=PROBABILITY, p_detect=PROBABILITY)
 def test_a_miss_is_bayes_rule(r, p_detect):
     missed_and_there, missed = r * (1 - p_detect), r * (1 - p_detect) + (1 - r)
