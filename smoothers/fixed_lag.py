@@ -13,14 +13,14 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.smoothers.gains import fill_back
 from jeat_graph.smoothers.gtsam.linear_graph import LinearGraph
 from jeat_graph.smoothers.gtsam.whitened import prior_rows, segment_rows
 from jeat_graph.smoothers.gtsam.window import GtsamWindow
-from jeat_graph.smoothers.measurements import COINCIDENT_S, Measurements, check_measurements, group_times
-from jeat_graph.smoothers.track_data import SmoothedTrack
+from jeat_graph.smoothers.measurements import COINCIDENT_S, by_time, check_measurements, group_times
+from jeat_graph.smoothers.track_data import Prior, SmoothedTrack
 from jeat_graph.smoothers.window import Window
 
 #: GTSAM solves for one state in so many. More would hardly be faster: what is left is the cost of a chunk.
@@ -37,9 +37,7 @@ class FixedLagSmoother:
     newest one and have at least `chunk` keys after them leave the window, with what is known by then.
 
     Args:
-        prior_t: time of the prior (s).
-        prior_mean: (2, 3 + B) prior mean of [p, v, a, e_1, …, e_B] per axis (px, px/s, px/s², 1).
-        prior_cov: (2, 3 + B, 3 + B) prior covariance.
+        prior: what is known of the state before the measurements.
         lag_s: how far a state lies behind the newest when it leaves, at least (s).
         chunk: measurements per update. More make an update cheaper per measurement, and a state leave
             later.
@@ -54,9 +52,7 @@ class FixedLagSmoother:
 
     def __init__(
         self,
-        prior_t: float,
-        prior_mean: FloatArray,
-        prior_cov: FloatArray,
+        prior: Prior,
         *,
         lag_s: float = 1.0,
         chunk: int = 24,
@@ -66,52 +62,37 @@ class FixedLagSmoother:
         self.lag_s, self.chunk = lag_s, chunk
         self.rebuilds = self.fallbacks = self.too_late = 0
         self._memory = np.asarray(memory, dtype=np.float64)
-        prior = (np.asarray(prior_mean, dtype=np.float64), np.asarray(prior_cov, dtype=np.float64))
-        self._window: Window | None = Window(prior_t, *prior, self._memory)
+        self._window: Window | None = Window(prior, self._memory)
         self._use_gtsam = use_gtsam
         self._gtsam: GtsamWindow | None = None
         self._outdated = use_gtsam  # whether GTSAM's window has to be built from ours
         self._oldest = self._next = 0  # number of the oldest state inside GTSAM, and of the next one
-        self._pending: list[Measurements] = []
+        self._pending: list[RecordArray] = []
         self._waiting = 0
         self._departed: list[SmoothedTrack] = []
 
-    def feed(
-        self,
-        t: npt.ArrayLike,
-        z: npt.ArrayLike,
-        r: npt.ArrayLike,
-        q: npt.ArrayLike,
-        lever: npt.ArrayLike | None = None,
-        error: npt.ArrayLike | None = None,
-    ) -> None:
+    def feed(self, measured: RecordArray) -> None:
         """Take in accepted measurements, in any order.
 
         One that is older than the newest key, but inside the window, gets no key of its own; apart from
         that it counts as if it had come in time.
 
         Args:
-            t: (M,) times (s).
-            z: (M, 2) centres (px).
-            r: (M, 2) variances of the white part (px²), as the filter used them.
-            q: (M,) root spectral density of the jerk since the measurement before (px/s^2.5).
-            lever: (M, 2) standard deviation of the part with a memory (px); None for none.
-            error: (M,) index of its error state, or -1; None for -1.
+            measured: (M,) records, see `measurements.measurements`.
 
         Raises:
-            DataError: wrong shapes, numbers that are not finite, variances or densities <= 0, error states
-                that do not exist.
+            DataError: records of another kind, numbers that are not finite, variances or densities <= 0,
+                error states that do not exist.
         """
         window = self._live()
-        taken = check_measurements(t, z, r, q, lever, error, len(self._memory))
-        newest = window.newest + COINCIDENT_S
-        if taken.t.min(initial=np.inf) <= newest:
-            late = taken.t <= newest
-            self._take_late(taken.take(late))
-            taken = taken.take(~late)
-        if len(taken.t):
-            self._pending.append(taken)
-            self._waiting += len(taken.t)
+        check_measurements(measured, len(self._memory))
+        late = measured["t"] <= window.newest + COINCIDENT_S
+        if late.any():
+            self._take_late(measured[late])
+            measured = measured[~late]
+        if len(measured):
+            self._pending.append(measured)
+            self._waiting += len(measured)
         if self._waiting >= self.chunk:
             self._absorb()
 
@@ -149,10 +130,10 @@ class FixedLagSmoother:
         window = self._live()
         if not self._pending:
             return
-        taken = Measurements.concatenate(self._pending).by_time()
+        taken = by_time(np.concatenate(self._pending))
         self._pending, self._waiting = [], 0
-        key, opens = group_times(taken.t, window.newest)
-        window.append(taken.t[opens], key - 1, taken, opens)
+        key, opens = group_times(taken["t"], window.newest)
+        window.append(key - 1, taken, opens)
         if self._gtsam is not None:
             # The newest row is an anchor always, so that GTSAM knows all measurements.
             last = window.end - 1
@@ -161,14 +142,14 @@ class FixedLagSmoother:
             self._rebuild()
         self._depart()
 
-    def _take_late(self, late: Measurements) -> None:
+    def _take_late(self, late: RecordArray) -> None:
         """Add late measurements to the window; GTSAM's is to be built anew."""
         window = self._live()
-        for t, z, r, _, lever, error in zip(*late, strict=True):
-            if t < window.t[window.first] - COINCIDENT_S:
+        for one in late:
+            if one["t"] < window.t[window.first] - COINCIDENT_S:
                 self.too_late += 1
                 continue
-            window.insert(float(t), z, r, lever, int(error))
+            window.insert(one)
             self._gtsam, self._outdated = None, self._use_gtsam
 
     def _segments(self, graph: LinearGraph, ends: IntArray) -> None:

@@ -8,18 +8,39 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 from jeat_graph.data.errors import DataError
-from jeat_graph.smoothers.measurements import COINCIDENT_S, Measurements, check_measurements, group_times
+from jeat_graph.smoothers.measurements import (
+    COINCIDENT_S,
+    by_time,
+    check_measurements,
+    group_times,
+    measurements,
+)
 
-__all__ = ["COINCIDENT_S", "MOTION", "SmoothedTrack", "TrackData"]
+__all__ = ["COINCIDENT_S", "MOTION", "Prior", "SmoothedTrack", "TrackData"]
 
 #: Components of the motion: position, velocity, acceleration.
 MOTION = 3
+
+
+class Prior(NamedTuple):
+    """What is known of a track's state before its measurements.
+
+    Attributes:
+        t: time (s).
+        mean: (2, 3 + B) mean of [p, v, a, e_1, …, e_B] per axis (px, px/s, px/s², 1).
+        cov: (2, 3 + B, 3 + B) covariance.
+    """
+
+    t: float
+    mean: FloatArray
+    cov: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,31 +117,13 @@ class TrackData:
         return MOTION + len(self.memory)
 
     @staticmethod
-    def from_measurements(
-        prior_t: float,
-        prior_mean: npt.ArrayLike,
-        prior_cov: npt.ArrayLike,
-        t: npt.ArrayLike,
-        z: npt.ArrayLike,
-        r: npt.ArrayLike,
-        q: npt.ArrayLike,
-        lever: npt.ArrayLike | None = None,
-        error: npt.ArrayLike | None = None,
-        memory: npt.ArrayLike = (),
-    ) -> TrackData:
+    def from_measurements(prior: Prior, measured: RecordArray, memory: npt.ArrayLike = ()) -> TrackData:
         """Sort measurements by time and give coincident ones a common key.
 
         Args:
-            prior_t: time of the prior (s); no measurement may be older.
-            prior_mean: (2, 3 + B) prior mean per axis. If the track was born from a detection that the
-                prior already contains, that detection must not be among the measurements again.
-            prior_cov: (2, 3 + B, 3 + B) prior covariance.
-            t: (M,) times (s), in any order.
-            z: (M, 2) centres (px).
-            r: (M, 2) variances of the white part (px²).
-            q: (M,) root spectral density of the jerk since the measurement before (px/s^2.5).
-            lever: (M, 2) standard deviation of the part with a memory (px); None for none.
-            error: (M,) index of its error state, or -1; None for -1.
+            prior: what is known before; no measurement may be older. If the track was born from a detection
+                that the prior already contains, that detection must not be among the measurements again.
+            measured: (M,) records (`measurements.measurements`), in any order.
             memory: (B,) memory of the error states (s).
 
         Returns:
@@ -130,30 +133,35 @@ class TrackData:
             DataError: if a measurement is older than the prior, or an array is not valid.
         """
         memories = np.asarray(memory, dtype=np.float64).reshape(-1)
-        times = np.asarray(t, dtype=np.float64).reshape(-1)
-        centres = np.asarray(z, dtype=np.float64).reshape(-1, 2)
-        rows = check_measurements(times, centres, np.reshape(r, (-1, 2)), q, lever, error, len(memories))
-        rows = rows.by_time()
-        if len(rows.t) and rows.t[0] < prior_t - COINCIDENT_S:
-            raise DataError(f"a measurement at {rows.t[0]} s is older than the track's prior at {prior_t} s")
-        key, first = group_times(rows.t, prior_t)
+        check_measurements(measured, len(memories))
+        rows = by_time(measured)
+        if len(rows) and rows["t"][0] < prior.t - COINCIDENT_S:
+            raise DataError(
+                f"a measurement at {rows['t'][0]} s is older than the track's prior at {prior.t} s"
+            )
+        key, first = group_times(rows["t"], prior.t)
         return TrackData(
-            prior_mean=np.asarray(prior_mean, dtype=np.float64),
-            prior_cov=np.asarray(prior_cov, dtype=np.float64),
-            t=np.concatenate([[prior_t], rows.t[first]]),
-            q=np.concatenate([[0.0], rows.q[first]]),
+            prior_mean=np.asarray(prior.mean, dtype=np.float64),
+            prior_cov=np.asarray(prior.cov, dtype=np.float64),
+            t=np.concatenate([[prior.t], rows["t"][first]]),
+            q=np.concatenate([[0.0], rows["jerk"][first]]),
             key=key,
-            z=rows.z,
-            r=rows.r,
-            lever=rows.lever,
-            error=rows.error,
+            z=rows["z"].copy(),
+            r=rows["r"].copy(),
+            lever=rows["lever"].copy(),
+            error=rows["error"].copy(),
             memory=memories,
         )
 
-    def measurements(self) -> Measurements:
-        """Return the measurements alone, each with the time and the jerk of its key."""
+    @property
+    def prior(self) -> Prior:
+        """What is known of the state at key 0 before its measurements."""
+        return Prior(float(self.t[0]), self.prior_mean, self.prior_cov)
+
+    def measurements(self) -> RecordArray:
+        """Return the measurements alone (M,), each with the time and the jerk of its key."""
         key = self.key
-        return Measurements(self.t[key], self.z, self.r, self.q[key], self.lever, self.error)
+        return measurements(self.t[key], self.z, self.r, self.q[key], self.lever, self.error)
 
 
 @dataclass(frozen=True, eq=False)

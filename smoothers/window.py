@@ -12,10 +12,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 from jeat_graph.smoothers.backward import smooth_rows
 from jeat_graph.smoothers.forward import filter_rows
-from jeat_graph.smoothers.measurements import COINCIDENT_S, Measurements
+from jeat_graph.smoothers.measurements import COINCIDENT_S
+from jeat_graph.smoothers.track_data import Prior
 
 _ROWS = ("t", "q", "is_key", "anchor", "mean", "cov", "reference")
 _TAKEN = ("row", "z", "info", "lever", "error", "gain", "innovation", "variance")
@@ -26,9 +27,7 @@ class Window:
     """Rows of one track's window.
 
     Args:
-        t: time of the prior (s), the first key.
-        mean: (2, n) prior mean per axis (px, px/s, px/s², 1).
-        cov: (2, n, n) prior covariance.
+        prior: what is known of the state at the first key before the measurements.
         memory: (n - 3,) memory of the error states (s).
 
     Attributes:
@@ -59,7 +58,8 @@ class Window:
         variance: (M, 2) the variance of that (px²).
     """
 
-    def __init__(self, t: float, mean: FloatArray, cov: FloatArray, memory: FloatArray) -> None:
+    def __init__(self, prior: Prior, memory: FloatArray) -> None:
+        mean, cov = np.asarray(prior.mean, dtype=np.float64), np.asarray(prior.cov, dtype=np.float64)
         n = int(mean.shape[1])
         self.size = n
         self.first, self.end, self.taken, self.taken_end, self.late = 0, 1, 0, 0, 0
@@ -74,7 +74,7 @@ class Window:
         self.z, self.info, self.lever = np.empty((_ROOM, 2)), np.empty((_ROOM, 2)), np.empty((_ROOM, 2))
         self.gain = np.empty((_ROOM, 2, n))
         self.innovation, self.variance = np.empty((_ROOM, 2)), np.empty((_ROOM, 2))
-        self.t[0], self.mean[0], self.cov[0], self.reference[0] = t, mean, cov, mean
+        self.t[0], self.mean[0], self.cov[0], self.reference[0] = prior.t, mean, cov, mean
         self._dims = (0,) * n
 
     @property
@@ -88,39 +88,35 @@ class Window:
             return np.arange(self.first, self.end)
         return self.first + np.flatnonzero(self.is_key[self.first : self.end])
 
-    def append(self, t: FloatArray, key: IntArray, taken: Measurements, opens: IntArray) -> None:
+    def append(self, key: IntArray, taken: RecordArray, opens: IntArray) -> None:
         """Append keys, all later than the last row, and filter them.
 
         Args:
-            t: (J,) times of the keys (s), ascending.
             key: (M,) key of each measurement, counted from 0, ascending.
-            taken: the measurements.
-            opens: (J,) the first measurement of each key.
+            taken: (M,) the measurements, in order of time.
+            opens: (J,) the first measurement of each key, which gives it time and jerk.
         """
-        self._make_room(len(t), len(key))
+        self._make_room(len(opens), len(key))
         old, seen = self.end, self.taken_end
-        rows = slice(old, old + len(t))
-        self.t[rows], self.q[rows] = t, taken.q[opens]
+        rows = slice(old, old + len(opens))
+        self.t[rows], self.q[rows] = taken["t"][opens], taken["jerk"][opens]
         self.is_key[rows], self.anchor[rows] = True, -1
         self.end = rows.stop
         places = slice(seen, seen + len(key))
         self.row[places] = key + old
-        self.z[places], self.lever[places], self.error[places] = taken.z, taken.lever, taken.error
-        np.divide(1.0, taken.r, out=self.info[places])
+        self.z[places], self.lever[places], self.error[places] = taken["z"], taken["lever"], taken["error"]
+        np.divide(1.0, taken["r"], out=self.info[places])
         self.taken_end = places.stop
         self._filter(old, seen)
         self.reference[rows] = self.mean[rows]
 
-    def insert(self, t: float, z: FloatArray, r: FloatArray, lever: FloatArray, error: int) -> None:
+    def insert(self, one: np.void) -> None:
         """Take in a measurement that came late: into a row at its time, or into one of its own.
 
         Args:
-            t: time (s), not before the first row and not after the last.
-            z: (2,) measured centre (px).
-            r: (2,) variance of its white part (px²).
-            lever: (2,) factor of its error state (px).
-            error: index of that, or -1.
+            one: the measurement; its time is not before the first row and not after the last.
         """
+        t = float(one["t"])
         self._make_room(1, 1)
         times = self.t[self.first : self.end]
         row = self.first + int(np.argmin(np.abs(times - t)))
@@ -141,8 +137,8 @@ class Window:
             column = getattr(self, name)
             column[place + 1 : self.taken_end + 1] = column[place : self.taken_end].copy()
         self.taken_end += 1
-        self.row[place], self.z[place], self.info[place] = row, z, 1.0 / r
-        self.lever[place], self.error[place] = lever, error
+        self.row[place], self.z[place], self.info[place] = row, one["z"], 1.0 / one["r"]
+        self.lever[place], self.error[place] = one["lever"], one["error"]
         self._filter(row, self.taken + int(np.searchsorted(held, row)))
         if alone:
             self.reference[row] = self.mean[row]

@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.smoothers.track_data import TrackData
+from jeat_graph.filters.prior import write_prior
+from jeat_graph.smoothers.measurements import measurements
+from jeat_graph.smoothers.track_data import Prior, TrackData
 
 # (rate in Hz, standard deviation in px, share with memory, memory in s) of an event and an RGB detector.
 EVT, RGB = (100.0, 2.5, 0.5, 0.15), (20.0, 1.5, 0.5, 0.25)
@@ -116,21 +118,12 @@ def _measured(
     white = ((1.0 - share) * std**2)[:, None].repeat(2, axis=1)
     z = p + lever * error + np.sqrt(white) * rng.normal(size=p.shape)
     D = 5 if memory else 3
-    mean, cov = np.zeros((2, D)), np.zeros((2, D, D))
-    mean[:, 0] = z[0]
-    cov[:, range(D), range(D)] = [std[0] ** 2, _VELOCITY_STD**2, _ACCELERATION_STD**2, 1.0, 1.0][:D]
+    mean, cov = np.empty((2, D)), np.empty((2, D, D))
+    spread = np.full(2, _VELOCITY_STD**2), np.full(2, _ACCELERATION_STD**2)
     if memory:
-        e = 3 + int(sensor[0])
-        cov[:, 0, e] = cov[:, e, 0] = -lever[0, 0]
-    return TrackData.from_measurements(
-        float(t[0]),
-        mean,
-        cov,
-        t[1:],
-        z[1:],
-        white[1:],
-        np.full(len(t) - 1, jerk),
-        lever=lever[1:] if memory else None,
-        error=sensor[1:] if memory else None,
-        memory=tau if memory else (),
-    )
+        write_prior(z[0], white[0], lever[0], int(sensor[0]), *spread, mean, cov)
+        coloured = measurements(t[1:], z[1:], white[1:], np.full(len(t) - 1, jerk), lever[1:], sensor[1:])
+        return TrackData.from_measurements(Prior(float(t[0]), mean, cov), coloured, tau)
+    write_prior(z[0], std[[0, 0]] ** 2, np.zeros(2), -1, *spread, mean, cov)
+    plain = measurements(t[1:], z[1:], white[1:], np.full(len(t) - 1, jerk))
+    return TrackData.from_measurements(Prior(float(t[0]), mean, cov), plain)

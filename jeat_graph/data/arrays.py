@@ -11,3 +11,5 @@ FloatArray: TypeAlias = npt.NDArray[np.float64]
 IntArray: TypeAlias = npt.NDArray[np.int64]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 TextArray: TypeAlias = npt.NDArray[np.str_]
+#: Arrays of records (structured dtypes), such as `filters.measurement.MEASUREMENT`.
+RecordArray: TypeAlias = npt.NDArray[np.void]

@@ -8,13 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 from jeat_graph.data.errors import DataError
-from jeat_graph.tracking.update_log import COLUMNS
 
 #: Degrees of freedom of `Diagnostics.nis`: the centre's two coordinates.
 NIS_FREEDOM = 2
-_TRACK, _SENSOR, _NIS, _SCALE = (COLUMNS.index(name) for name in ("track_id", "sensor", "nis", "scale"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,18 +52,18 @@ class Diagnostics:
 
     @staticmethod
     def from_log(
-        t: float, rows: FloatArray, living: IntArray, existence: FloatArray, sensors: tuple[str, ...]
+        t: float, rows: RecordArray, living: IntArray, existence: FloatArray, sensors: tuple[str, ...]
     ) -> Diagnostics:
         """Read one step off the update log.
 
         Args:
             t: time of the step (s).
-            rows: (N, `update_log.WIDTH`) the log's rows in use.
+            rows: (N,) the log's records in use (`filters.measurement.MEASUREMENT`).
             living: (K,) identities of the tracks after the step, ascending.
             existence: (K,) their probabilities of being vehicles.
             sensors: names of the sensors.
         """
-        ids = rows[:, _TRACK].astype(np.int64)
+        ids = rows["track_id"].copy()
         now = np.full(len(ids), np.nan)
         if len(living):
             place = np.minimum(np.searchsorted(living, ids), len(living) - 1)
@@ -73,9 +71,9 @@ class Diagnostics:
         return Diagnostics(
             t=np.full(len(ids), t),
             track_id=ids,
-            sensor=rows[:, _SENSOR].astype(np.int64),
-            nis=rows[:, _NIS].copy(),
-            noise_scale=rows[:, _SCALE].copy(),
+            sensor=rows["sensor"].copy(),
+            nis=rows["nis"].copy(),
+            noise_scale=rows["scale"].copy(),
             existence=now,
             sensors=sensors,
         )

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import NamedTuple
 
-import numpy as np
-
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.smoothers.track_data import TrackData
-from jeat_graph.tracking.smoothing.priors import COLUMN, ErrorStates, track_data
+from jeat_graph.tracking.smoothing.priors import ErrorStates, track_data
 from jeat_graph.tracking.tracker import Tracker
 
 
@@ -61,6 +59,6 @@ def record_tracks(
     records = []
     for history in tracker.confirmed_histories():
         rows = history.whole()
-        sensor = rows[:, COLUMN["sensor"]].astype(np.int64)
+        sensor = rows["sensor"].copy()
         records.append(TrackRecord(history.track_id, track_data(rows, errors), sensor[1:], int(sensor[0])))
     return records, tracker.finish()

@@ -1,7 +1,7 @@
-"""What the filter took in during one step, for whoever wants the measurements of each track: the smoothers.
+"""The measurements that tracks took in during one step, for the smoothers and the diagnostics.
 
-The log is a preallocated table that compiled kernels fill. One of capacity 0 takes nothing and costs nothing,
-and no kernel ever reads it: the causal estimates are the same with and without it.
+The log is a preallocated array of records that compiled kernels fill. One of capacity 0 takes nothing and
+costs nothing, and no kernel ever reads it: the causal estimates are the same with and without it.
 """
 
 from __future__ import annotations
@@ -12,103 +12,81 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.config.kernel_form import SensorArrays
+from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
+from jeat_graph.filters.measurement import MEASUREMENT
+from jeat_graph.tracking.batch import Batch
 
-#: Columns of `UpdateLog.rows`. `R_x, R_y` are the variances of the white noise exactly as the filter used
-#: them, scale and weight included, `lever_x, lever_y` the levers of the sensor's error state; `jerk` is the
-#: root spectral density of the track's jerk at the time of the update; `birth` is 1 where the measurement
-#: started the track, and then `var_v_x` … `var_rate` are the other prior variances; `nis` is the normalised
-#: innovation squared of the centre (NaN at a birth) and `scale` the noise scale s that went into the noise.
-COLUMNS = (
-    "track_id",
-    "sensor",
-    "z_x",
-    "z_y",
-    "R_x",
-    "R_y",
-    "jerk",
-    "log_width",
-    "log_height",
-    "var_log_width",
-    "var_log_height",
-    "birth",
-    "var_v_x",
-    "var_v_y",
-    "var_a_x",
-    "var_a_y",
-    "var_rate",
-    "nis",
-    "scale",
-    "lever_x",
-    "lever_y",
-)
-WIDTH = len(COLUMNS)
+# A configuration may ask for no jerk at all; the smoothers want process noise that can be inverted.
+_LEAST_JERK = 1e-6
 
 
 class UpdateLog(NamedTuple):
     """The measurements that the last step gave to tracks.
 
     Attributes:
-        rows: (C, `WIDTH`) one measurement a row; C is at least the number of detections of the step, or 0.
+        rows: (C,) records (`MEASUREMENT`); C is at least the number of detections of the step, or 0.
         count: (1,) rows in use.
     """
 
-    rows: FloatArray
+    rows: RecordArray
     count: IntArray  # type: ignore[assignment]  # hides tuple.count, which nobody calls
 
 
 def allocate_log(capacity: int) -> UpdateLog:
     """Allocate a log for steps of at most `capacity` detections; 0 for a log that takes nothing."""
-    return UpdateLog(np.zeros((capacity, WIDTH)), np.zeros(1, dtype=np.int64))
+    return UpdateLog(np.zeros(capacity, dtype=MEASUREMENT), np.zeros(1, dtype=np.int64))
 
 
 @njit(cache=True)
 def log_update(
     log: UpdateLog,
     track_id: int,
-    sensor: int,
-    z: FloatArray,
+    j: int,
+    batch: Batch,
     R: FloatArray,
-    lever: FloatArray,
+    coloured_std: FloatArray,
     jerk: float,
-    log_size: FloatArray,
-    size_var: FloatArray,
+    sensors: SensorArrays,
 ) -> None:
     """Append one measurement, if there is room.
 
     Args:
         log: the log.
         track_id: the track that took it.
-        sensor: index of the sensor.
-        z: (2,) centre (px).
+        j: the detection.
+        batch: all detections of the step.
         R: (2,) variances of its white noise (px²).
-        lever: (2,) levers of the sensor's error state (px), 0 where it has none.
+        coloured_std: (2,) standard deviations of the part that is correlated in time (px), 0 for none.
         jerk: root spectral density of the track's jerk (px/s^2.5).
-        log_size: (2,) ln width, ln height.
-        size_var: (2,) their variances.
+        sensors: parameters of the sensors.
     """
     k = log.count[0]
     if k >= len(log.rows):
         return
-    row = log.rows[k]
-    row[0] = track_id
-    row[1] = sensor
+    row, s = log.rows[k], batch.sensor[j]
+    row.t = batch.t
+    row.track_id = track_id
+    row.sensor = s
+    row.birth = 0
+    row.error = sensors.error[s]
+    row.jerk = max(jerk, _LEAST_JERK)
+    row.rate_var = 0.0
+    row.nis = math.nan
+    row.scale = 1.0
     for axis in range(2):
-        row[2 + axis] = z[axis]
-        row[4 + axis] = R[axis]
-        row[7 + axis] = log_size[axis]
-        row[9 + axis] = size_var[axis]
-    row[6] = jerk
-    row[11:] = 0.0
-    row[17] = math.nan
-    row[18] = 1.0
-    for axis in range(2):
-        row[19 + axis] = lever[axis]
+        row.z[axis] = batch.z[j, axis]
+        row.r[axis] = R[axis]
+        row.lever[axis] = coloured_std[axis]
+        row.log_size[axis] = batch.log_size[j, axis]
+        row.size_var[axis] = sensors.size_var[s, axis]
+        row.velocity_var[axis] = 0.0
+        row.acceleration_var[axis] = 0.0
     log.count[0] = k + 1
 
 
 @njit(cache=True)
-def log_surprise(log: UpdateLog, nis: float, scale: float) -> None:
+def log_innovation(log: UpdateLog, nis: float, scale: float) -> None:
     """Note in the last row how well the measurement fitted the prediction.
 
     Args:
@@ -119,25 +97,28 @@ def log_surprise(log: UpdateLog, nis: float, scale: float) -> None:
     k = log.count[0] - 1
     if k < 0:
         return
-    log.rows[k, 17] = nis
-    log.rows[k, 18] = scale
+    log.rows[k].nis = nis
+    log.rows[k].scale = scale
 
 
 @njit(cache=True)
-def log_birth(log: UpdateLog, cov: FloatArray, size_cov: FloatArray) -> None:
-    """Mark the last row as a birth and note the prior of the new track.
+def log_birth(
+    log: UpdateLog, velocity_var: FloatArray, acceleration_var: FloatArray, rate_var: float
+) -> None:
+    """Mark the last row as a birth, and note the variances that its prior adds (`filters/prior.py`).
 
     Args:
         log: the log.
-        cov: (2, 3 + B, 3 + B) covariance of the new track.
-        size_cov: (2, 2, 2) covariance of its size.
+        velocity_var: (2,) of the velocity (px²/s²).
+        acceleration_var: (2,) of the acceleration (px²/s⁴).
+        rate_var: of the rate of ln width and ln height (1/s²).
     """
     k = log.count[0] - 1
     if k < 0:
         return
     row = log.rows[k]
-    row[11] = 1.0
+    row.birth = 1
+    row.rate_var = rate_var
     for axis in range(2):
-        row[12 + axis] = cov[axis, 1, 1]
-        row[14 + axis] = cov[axis, 2, 2]
-    row[16] = size_cov[0, 1, 1]
+        row.velocity_var[axis] = velocity_var[axis]
+        row.acceleration_var[axis] = acceleration_var[axis]

@@ -10,8 +10,9 @@ import pytest
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.compare import ComparedTrack, chi2_bounds, compare, lag_name, whiteness
 from jeat_graph.eval.lagged import states_at, with_times
+from jeat_graph.smoothers.measurements import measurements
 from jeat_graph.smoothers.rts import filter_track, smooth_rts
-from jeat_graph.smoothers.track_data import TrackData
+from jeat_graph.smoothers.track_data import Prior, TrackData
 
 JERK = 60.0
 NOISE = 2.0
@@ -40,21 +41,13 @@ def track(rng, n=120, dt=0.02):
     prior[:, 0] = z[0]
     cov = np.tile(np.diag([NOISE**2, 30.0**2, 20.0**2]), (2, 1, 1))
     r, q = np.full((n - 1, 2), NOISE**2), np.full(n - 1, JERK)
-    return TrackData.from_measurements(0.0, prior, cov, t[1:], z[1:], r, q), t, x
+    return TrackData.from_measurements(Prior(0.0, prior, cov), measurements(t[1:], z[1:], r, q)), t, x
 
 
 def part(data, until):
     """The same track, without the measurements after `until`."""
     keep = data.t[data.key] <= until + 1e-9
-    return TrackData.from_measurements(
-        data.t[0],
-        data.prior_mean,
-        data.prior_cov,
-        data.t[data.key][keep],
-        data.z[keep],
-        data.r[keep],
-        data.q[data.key][keep],
-    )
+    return TrackData.from_measurements(data.prior, data.measurements()[keep])
 
 
 def test_further_times_change_no_estimate():

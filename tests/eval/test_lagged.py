@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from jeat_graph.eval.lagged import states_at, with_times
+from jeat_graph.smoothers.measurements import measurements
 from jeat_graph.smoothers.rts import smooth_rts
-from jeat_graph.smoothers.track_data import TrackData
+from jeat_graph.smoothers.track_data import Prior, TrackData
 
 MEMORY = np.array([0.25, 0.1])
 PRIOR = np.tile(np.diag([4.0, 900.0, 400.0, 1.0, 1.0]), (2, 1, 1))
@@ -37,13 +38,15 @@ def coloured(seed, n=400, jerk=60.0):
         x = x @ F.T + noise
         z.append(x[:, 0] + lever[row] * x[:, 3 + error[row]] + rng.normal(size=2))
     r, q = np.ones((n, 2)), np.full(n, jerk)
-    return TrackData.from_measurements(0.0, np.zeros((2, 5)), PRIOR, t, z, r, q, lever, error, MEMORY)
+    return TrackData.from_measurements(
+        Prior(0.0, np.zeros((2, 5)), PRIOR), measurements(t, z, r, q, lever, error), MEMORY
+    )
 
 
 def until(data, t):
     """The same track, without the measurements after `t`."""
-    kept = data.measurements().take(data.t[data.key] <= t + 1e-9)
-    return TrackData.from_measurements(0.0, data.prior_mean, data.prior_cov, *kept, data.memory)
+    kept = data.measurements()[data.t[data.key] <= t + 1e-9]
+    return TrackData.from_measurements(data.prior, kept, data.memory)
 
 
 @pytest.mark.parametrize("lag", [0.0, 0.05, 0.3])

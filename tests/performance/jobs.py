@@ -10,6 +10,8 @@ import numpy as np
 from jeat_graph import Tracker, load_config
 from jeat_graph.benchmark.speed_worker import resident_mib
 from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
+from jeat_graph.smoothers.measurements import measurements
+from jeat_graph.smoothers.track_data import Prior
 
 
 def traffic(num):
@@ -88,10 +90,9 @@ def short_windows():
     t = np.arange(0.01, 0.5, 0.008)
     for life in range(400):
         z = 600.0 + rng.normal(0.0, 2.0, (len(t), 2))
-        smoother = FixedLagSmoother(
-            0.0, z[0][:, None] * [1, 0, 0], np.tile(np.diag([9.0, 2500, 900]), (2, 1, 1))
-        )
-        smoother.feed(t, z, np.full((len(t), 2), 4.0), np.full(len(t), 100.0))
+        mean, cov = z[0][:, None] * [1, 0, 0], np.tile(np.diag([9.0, 2500, 900]), (2, 1, 1))
+        smoother = FixedLagSmoother(Prior(0.0, mean, cov))
+        smoother.feed(measurements(t, z, np.full((len(t), 2), 4.0), np.full(len(t), 100.0)))
         smoother.finish()
         if life % 50 == 49:
             gc.collect()

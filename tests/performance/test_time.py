@@ -14,7 +14,8 @@ from jeat_graph.io.tables import read_table
 from jeat_graph.io.trajectories_io import read_trajectories, write_trajectories
 from jeat_graph.smoothers.engine import make_smoother
 from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
-from jeat_graph.smoothers.track_data import TrackData
+from jeat_graph.smoothers.measurements import measurements
+from jeat_graph.smoothers.track_data import Prior, TrackData
 
 
 def sampled(seconds):
@@ -24,7 +25,8 @@ def sampled(seconds):
     z = truth + np.random.default_rng(0).normal(0.0, 2.0, truth.shape)
     mean = np.array([[600.0, 0.0, 0.0], [310.0, 0.0, 0.0]])
     cov = np.tile(np.diag([9.0, 2500.0, 900.0]), (2, 1, 1))
-    return TrackData.from_measurements(0.0, mean, cov, t, z, np.full(z.shape, 4.0), np.full(len(t), 10.0))
+    measured = measurements(t, z, np.full(z.shape, 4.0), np.full(len(t), 10.0))
+    return TrackData.from_measurements(Prior(0.0, mean, cov), measured)
 
 
 def frames(num, objects=50):
@@ -71,12 +73,12 @@ def test_a_step_grows_no_faster_than_linearly_to_500_tracks():
 
 def test_rts_is_at_least_five_times_cheaper_than_fixed_lag(best):
     track = sampled(10.0)
-    prior = (0.0, track.prior_mean, track.prior_cov)
+    measured = track.measurements()
 
     def life(engine):
-        smoother = make_smoother(engine, *prior, memory=track.memory)
+        smoother = make_smoother(engine, track.prior, memory=track.memory)
         for i in range(0, len(track.z), 48):  # as many at a time as the tracker hands over
-            smoother.feed(*track.measurements().take(slice(i, i + 48)))
+            smoother.feed(measured[i : i + 48])
             smoother.departed()
         smoother.finish()
 
@@ -86,13 +88,13 @@ def test_rts_is_at_least_five_times_cheaper_than_fixed_lag(best):
 
 def test_a_window_costs_no_more_after_a_minute(best):
     track = sampled(90.0)
-    smoother = FixedLagSmoother(0.0, track.prior_mean, track.prior_cov, memory=track.memory)
+    smoother, measured = FixedLagSmoother(track.prior, memory=track.memory), track.measurements()
     position, slots = 0, []
 
     def five_seconds():
         nonlocal position
         for i in range(position, position + 500, 6):
-            smoother.feed(*track.measurements().take(slice(i, min(i + 6, position + 500))))
+            smoother.feed(measured[i : min(i + 6, position + 500)])
             smoother.departed()
         position += 500
         slots.append(smoother._gtsam.factor_slots())

@@ -7,7 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from jeat_graph.smoothers.track_data import TrackData
+from jeat_graph.smoothers.measurements import measurements
+from jeat_graph.smoothers.track_data import Prior, TrackData
 
 SCALE = np.array([1.0, 0.05, 0.0025])
 
@@ -89,7 +90,9 @@ def harsh(seed: int = 0, n: int = 60, q: float = 40.0, memory: tuple[float, ...]
     prior = coloured_prior(PRIOR_MEAN, PRIOR_COV, len(memory))
     error = np.where(rng.random(n) < 0.1, -1, np.where(slow, 0, 1)) if memory else np.full(n, -1)
     lever = np.where(error[:, None] >= 0, rng.uniform(1.0, 6.0, (n, 2)), 0.0)
-    return TrackData.from_measurements(0.0, *prior, t, z, r, density, lever, error, memory)
+    return TrackData.from_measurements(
+        Prior(0.0, *prior), measurements(t, z, r, density, lever, error), memory
+    )
 
 
 def sampled(
@@ -117,7 +120,9 @@ def sampled(
         states.append(x)
         z.append(x[:, 0] + (lever[row] * x[:, 3 + error[row]] if memory else 0.0))
     z = np.array(z) + rng.normal(size=(n, 2)) * np.sqrt(r)
-    track = TrackData.from_measurements(0.0, *prior, t, z, r, np.full(n, q), lever, error, memory)
+    track = TrackData.from_measurements(
+        Prior(0.0, *prior), measurements(t, z, r, np.full(n, q), lever, error), memory
+    )
     return track, np.array(states)
 
 

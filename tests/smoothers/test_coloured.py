@@ -9,8 +9,9 @@ from scipy.stats import chi2
 from jeat_graph.data.errors import DataError
 from jeat_graph.smoothers.engine import ENGINES, make_smoother
 from jeat_graph.smoothers.interpolation import interpolate
+from jeat_graph.smoothers.measurements import measurements
 from jeat_graph.smoothers.rts import filter_track, smooth_rts
-from jeat_graph.smoothers.track_data import TrackData
+from jeat_graph.smoothers.track_data import Prior, TrackData
 
 from .conftest import sampled as draw
 
@@ -20,13 +21,8 @@ MEMORY = (0.3, 0.08)
 def as_white(track):
     """The same measurements, their whole variance taken for white."""
     return TrackData.from_measurements(
-        float(track.t[0]),
-        track.prior_mean[:, :3],
-        track.prior_cov[:, :3, :3],
-        track.t[track.key],
-        track.z,
-        track.r + track.lever**2,
-        track.q[track.key],
+        Prior(float(track.t[0]), track.prior_mean[:, :3], track.prior_cov[:, :3, :3]),
+        measurements(track.t[track.key], track.z, track.r + track.lever**2, track.q[track.key]),
     )
 
 
@@ -120,9 +116,9 @@ def test_interpolation_gives_the_motion_alone(sampled):
 @pytest.mark.parametrize("engine", ENGINES)
 def test_an_error_state_that_does_not_exist_is_refused(sampled, engine):
     track, _ = sampled(3, seconds=1.0, memory=MEMORY)
-    smoother = make_smoother(engine, 0.0, track.prior_mean, track.prior_cov, memory=MEMORY)
+    smoother = make_smoother(engine, track.prior, memory=MEMORY)
     with pytest.raises(DataError, match="error states"):
-        smoother.feed([1.0], [[0.0, 0.0]], [[1.0, 1.0]], [1.0], [[1.0, 1.0]], [2])
+        smoother.feed(measurements([1.0], [[0.0, 0.0]], [[1.0, 1.0]], [1.0], [[1.0, 1.0]], [2]))
 
 
 @pytest.mark.parametrize("memory", [(0.0, 0.1), (np.inf, 0.1), (-1.0, 0.1)])

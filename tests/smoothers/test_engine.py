@@ -14,11 +14,10 @@ COLOURS = [(), (0.3, 0.08)]
 
 def life(engine, track, step=10, **options):
     """Feed a track as a live caller would; return all its states in order."""
-    prior = (float(track.t[0]), track.prior_mean, track.prior_cov)
-    smoother = make_smoother(engine, *prior, memory=track.memory, **options)
-    parts = []
-    for i in range(0, len(track.z), step):
-        smoother.feed(*track.measurements().take(slice(i, i + step)))
+    smoother = make_smoother(engine, track.prior, memory=track.memory, **options)
+    measured, parts = track.measurements(), []
+    for i in range(0, len(measured), step):
+        smoother.feed(measured[i : i + step])
         parts.append(smoother.departed())
     return SmoothedTrack.concatenate([*parts, smoother.finish()])
 
@@ -37,7 +36,7 @@ def test_every_engine_gives_the_whole_life_of_a_track(sampled, engine, memory):
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_track_that_ends_at_once_is_its_prior(sampled, engine, memory):
     track, _ = sampled(0, seconds=1.0, memory=memory)
-    smoother = make_smoother(engine, 3.0, track.prior_mean, track.prior_cov, memory=track.memory)
+    smoother = make_smoother(engine, track.prior._replace(t=3.0), memory=track.memory)
     result = smoother.finish()
     assert result.t.tolist() == [3.0]
     assert np.allclose(result.mean[0], track.prior_mean)
@@ -57,8 +56,8 @@ def test_the_same_measurements_give_the_same_bytes(sampled, engine, memory):
 def test_whole_track_engines_take_measurements_in_any_order(sampled, memory):
     track, _ = sampled(2, seconds=2.0, memory=memory)
     order = np.random.default_rng(0).permutation(len(track.z))
-    smoother = make_smoother("rts", 0.0, track.prior_mean, track.prior_cov, memory=track.memory)
-    smoother.feed(*track.measurements().take(order))
+    smoother = make_smoother("rts", track.prior, memory=track.memory)
+    smoother.feed(track.measurements()[order])
     assert np.allclose(smoother.finish().mean, smooth_rts(track).mean, rtol=1e-12)
 
 
@@ -76,12 +75,12 @@ def test_robust_re_weighting_is_an_option_of_the_whole_track(sampled):
 def test_the_filters_newest_state_is_the_last_of_the_current_ones(sampled, memory):
     track, _ = sampled(4, seconds=2.0, memory=memory)
     for engine in ENGINES:
-        smoother = make_smoother(engine, 0.0, track.prior_mean, track.prior_cov, memory=track.memory)
-        smoother.feed(*track.measurements())
+        smoother = make_smoother(engine, track.prior, memory=track.memory)
+        smoother.feed(track.measurements())
         assert np.abs(smoother.current().mean[-1] - smooth_rts(track).mean[-1])[:, 0].max() < 1e-6
 
 
 def test_an_unknown_engine_is_an_error(sampled):
     track, _ = sampled(0, seconds=1.0)
     with pytest.raises(ConfigError, match="fixed-lag"):
-        make_smoother("isam", 0.0, track.prior_mean, track.prior_cov)
+        make_smoother("isam", track.prior)

@@ -9,34 +9,32 @@ from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
-from jeat_graph.smoothers.measurements import Measurements
+from jeat_graph.smoothers.measurements import measurements
 from jeat_graph.smoothers.rts import filter_track, smooth_rts
-from jeat_graph.smoothers.track_data import SmoothedTrack, TrackData
+from jeat_graph.smoothers.track_data import Prior, SmoothedTrack, TrackData
 
 #: White errors, and two sensors with a memory (s).
 COLOURS = [(), (0.3, 0.08)]
 
 
-def columns(track, rows=slice(None)):
-    """Arguments of `feed` for measurements of a track."""
-    return tuple(track.measurements().take(rows))
+def some(track, rows=slice(None)):
+    """Some measurements of a track."""
+    return track.measurements()[rows]
 
 
 def start(track, **options):
-    prior = (float(track.t[0]), track.prior_mean, track.prior_cov)
-    return FixedLagSmoother(*prior, memory=track.memory, **options)
+    return FixedLagSmoother(track.prior, memory=track.memory, **options)
 
 
 def until(track, rows):
     """The same track with its first measurements only."""
-    prior = (float(track.t[0]), track.prior_mean, track.prior_cov)
-    return TrackData.from_measurements(*prior, *columns(track, slice(0, rows)), track.memory)
+    return TrackData.from_measurements(track.prior, some(track, slice(0, rows)), track.memory)
 
 
 def run(track, smoother, step=5):
     """Feed a track in small portions; return what departed and what was left at the end."""
     for i in range(0, len(track.z), step):
-        smoother.feed(*columns(track, slice(i, i + step)))
+        smoother.feed(some(track, slice(i, i + step)))
     left = smoother.current()
     return smoother.departed(), left
 
@@ -62,7 +60,7 @@ def test_departing_states_are_exact_given_what_was_known_by_then(
     track = harsh(seed, 200, memory=memory)
     smoother, count = start(track, lag_s=1.0, chunk=chunk, use_gtsam=use_gtsam), 0
     for row in range(len(track.z)):
-        smoother.feed(*columns(track, [row]))
+        smoother.feed(some(track, [row]))
         left = smoother.departed()
         exact = smooth_rts(until(track, row + 1))
         if len(left):
@@ -126,7 +124,7 @@ def test_covariances_are_gtsams_marginals(sampled, relative, memory):
 def test_finish_returns_the_whole_life_with_its_neighbour_covariances(sampled, memory):
     track, _ = sampled(3, seconds=4.0, memory=memory)
     smoother = start(track)
-    smoother.feed(*columns(track))
+    smoother.feed(some(track))
     whole, exact = smoother.finish(), smooth_rts(track)
     assert np.array_equal(whole.t, exact.t)
     assert np.allclose(whole.gain, exact.gain, rtol=1e-9, atol=1e-12)
@@ -135,8 +133,8 @@ def test_finish_returns_the_whole_life_with_its_neighbour_covariances(sampled, m
 def test_a_gap_longer_than_the_lag_is_survived(sampled):
     whole, _ = sampled(4, seconds=12.0, q=3000.0)
     t = whole.t[whole.key]
-    seen = columns(whole, (t < 3.0) | (t > 9.0))
-    track = TrackData.from_measurements(0.0, whole.prior_mean, whole.prior_cov, *seen, whole.memory)
+    seen = some(whole, (t < 3.0) | (t > 9.0))
+    track = TrackData.from_measurements(whole.prior, seen, whole.memory)
     smoother = start(track)
     joined, exact = SmoothedTrack.concatenate(run(track, smoother)), smooth_rts(track)
     assert smoother.rebuilds == smoother.fallbacks == 0
@@ -148,10 +146,10 @@ def test_a_late_measurement_counts_as_if_it_had_come_in_time(sampled, scaled, re
     track, _ = sampled(5, seconds=2.0, q=300.0, memory=memory)
     late = np.array([200, 180, 150])
     smoother = start(track)
-    smoother.feed(*columns(track, np.setdiff1d(np.arange(len(track.z)), late)))
+    smoother.feed(some(track, np.setdiff1d(np.arange(len(track.z)), late)))
     smoother.current()
     for row in late:
-        smoother.feed(*columns(track, [row]))
+        smoother.feed(some(track, [row]))
     left, exact = smoother.current(), smooth_rts(track)
     same = np.searchsorted(exact.t, left.t)
     assert smoother.rebuilds == 0
@@ -165,15 +163,15 @@ def test_a_late_measurement_counts_as_if_it_had_come_in_time(sampled, scaled, re
 def test_a_late_measurement_at_the_time_of_a_key_is_exact(sampled, scaled, relative, memory):
     track, _ = sampled(6, seconds=1.5, memory=memory)
     smoother = start(track)
-    smoother.feed(*columns(track))
+    smoother.feed(some(track))
     smoother.current()
     row = 100
-    again = track.measurements().take([row])
-    again = again._replace(z=again.z + 3.0)
-    smoother.feed(*again)
+    again = some(track, [row])
+    again["z"] += 3.0
+    smoother.feed(again)
     left = smoother.current()
-    both = Measurements.concatenate([track.measurements(), again])
-    twice = TrackData.from_measurements(0.0, track.prior_mean, track.prior_cov, *both, track.memory)
+    both = np.concatenate([track.measurements(), again])
+    twice = TrackData.from_measurements(track.prior, both, track.memory)
     exact = smooth_rts(twice).select(slice(len(twice) - len(left), None))
     assert scaled(left.mean, exact.mean) < 1e-5
     assert relative(left.cov, exact.cov) < 1e-9
@@ -182,9 +180,9 @@ def test_a_late_measurement_at_the_time_of_a_key_is_exact(sampled, scaled, relat
 def test_a_measurement_older_than_the_window_is_refused_and_counted(sampled):
     track, _ = sampled(7, seconds=3.0)
     smoother = start(track)
-    smoother.feed(*columns(track))
+    smoother.feed(some(track))
     before = smoother.current()
-    smoother.feed(*columns(track, [10]))
+    smoother.feed(some(track, [10]))
     assert smoother.too_late == 1
     assert np.array_equal(smoother.current().mean, before.mean)
 
@@ -197,7 +195,7 @@ def test_an_indeterminate_system_is_met_by_a_rebuild(sampled, scaled, monkeypatc
     track, _ = sampled(8, seconds=4.0, q=1000.0, memory=memory)
     smoother = start(track)
     half = len(track.z) // 2
-    smoother.feed(*columns(track, slice(0, half)))
+    smoother.feed(some(track, slice(0, half)))
     with monkeypatch.context() as broken:
         whole = LinearGraph.add_segments
 
@@ -206,9 +204,9 @@ def test_an_indeterminate_system_is_met_by_a_rebuild(sampled, scaled, monkeypatc
             whole(self, first, A0, A1, b, np.full_like(counts, 2))  # of the motion, and nothing measured
 
         broken.setattr(LinearGraph, "add_segments", lossy)
-        smoother.feed(*columns(track, slice(half, half + 30)))
+        smoother.feed(some(track, slice(half, half + 30)))
     assert smoother.rebuilds == 1
-    smoother.feed(*columns(track, slice(half + 30, None)))
+    smoother.feed(some(track, slice(half + 30, None)))
     left, exact = smoother.current(), smooth_rts(track)
     assert smoother.rebuilds == 1
     assert smoother.fallbacks == 0
@@ -220,9 +218,9 @@ def test_a_rebuild_keeps_late_measurements(sampled, scaled, memory):
     track, _ = sampled(9, seconds=2.5, memory=memory)
     late = np.array([250, 270])
     smoother = start(track)
-    smoother.feed(*columns(track, np.setdiff1d(np.arange(len(track.z)), late)))
+    smoother.feed(some(track, np.setdiff1d(np.arange(len(track.z)), late)))
     smoother.current()
-    smoother.feed(*columns(track, late))
+    smoother.feed(some(track, late))
     before = smoother.current()
     smoother._rebuild()
     assert scaled(smoother.current().mean, before.mean) < 1e-5
@@ -234,7 +232,8 @@ def test_absurd_scales_give_finite_states_and_no_exception():
     z = np.zeros((n, 2))
     r = np.where(np.arange(n)[:, None] % 2, 1e-12, 1e12) * np.ones(2)
     cov = np.tile(np.diag([1e14, 1e14, 1e14]), (2, 1, 1))
-    track = TrackData.from_measurements(0.0, np.zeros((2, 3)), cov, t, z, r, np.full(n, 1e-9))
+    prior = Prior(0.0, np.zeros((2, 3)), cov)
+    track = TrackData.from_measurements(prior, measurements(t, z, r, np.full(n, 1e-9)))
     smoother = start(track, chunk=10)
     result = SmoothedTrack.concatenate([*run(track, smoother)])
     assert np.isfinite(result.mean).all()
@@ -244,12 +243,12 @@ def test_absurd_scales_give_finite_states_and_no_exception():
 def test_a_closed_smoother_frees_gtsam_at_once(sampled):
     track, _ = sampled(10, seconds=1.0)
     smoother = start(track)
-    smoother.feed(*columns(track))
+    smoother.feed(some(track))
     alive = weakref.ref(smoother._gtsam)
     smoother.close()
     assert alive() is None
     with pytest.raises(DataError, match="closed"):
-        smoother.feed(*columns(track))
+        smoother.feed(some(track))
 
 
 def test_bad_numbers_are_refused(sampled):
@@ -257,19 +256,19 @@ def test_bad_numbers_are_refused(sampled):
     smoother = start(track)
     for z, r, q in (([[np.nan, 0]], [[1, 1]], [1]), ([[0, 0]], [[0, 1]], [1]), ([[0, 0]], [[1, 1]], [0])):
         with pytest.raises(DataError):
-            smoother.feed([1.0], z, r, q)
+            smoother.feed(measurements([1.0], z, r, q))
 
 
 @pytest.mark.parametrize("memory", COLOURS)
 def test_a_measurement_at_the_time_of_the_prior_belongs_to_its_state(sampled, scaled, relative, memory):
     track, _ = sampled(13, seconds=0.5, memory=memory)
-    first = track.measurements().take([0])
-    first = first._replace(t=np.zeros(1), z=first.z + 5)
-    rows = Measurements.concatenate([first, track.measurements()])
-    prior = (track.prior_mean, track.prior_cov)
-    exact = smooth_rts(TrackData.from_measurements(0.0, *prior, *rows, track.memory))
+    first = some(track, [0])
+    first["t"] = 0.0
+    first["z"] += 5
+    rows = np.concatenate([first, track.measurements()])
+    exact = smooth_rts(TrackData.from_measurements(track.prior, rows, track.memory))
     smoother = start(track)
-    smoother.feed(*rows)
+    smoother.feed(rows)
     left = smoother.finish()
     assert np.array_equal(left.t, track.t)
     assert scaled(left.mean, exact.mean) < 1e-6
@@ -293,10 +292,12 @@ def test_a_measurement_at_the_time_of_the_prior_belongs_to_its_state(sampled, sc
     chunk=st.integers(1, 10),
 )
 def test_any_order_of_arrival_gives_finite_valid_states(feeds, chunk):
-    prior = (np.zeros((2, 5)), np.tile(np.diag([9.0, 2500.0, 900.0, 1.0, 1.0]), (2, 1, 1)))
-    smoother, now, parts = FixedLagSmoother(0.0, *prior, chunk=chunk, memory=(0.3, 0.08)), 0.0, []
+    prior = Prior(0.0, np.zeros((2, 5)), np.tile(np.diag([9.0, 2500.0, 900.0, 1.0, 1.0]), (2, 1, 1)))
+    smoother, now, parts = FixedLagSmoother(prior, chunk=chunk, memory=(0.3, 0.08)), 0.0, []
     for step, z, r, q, lever, error in feeds:
-        smoother.feed([max(now + step, 0.0)], [[z, -z]], [[r, r]], [q], [[lever, lever]], [error])
+        smoother.feed(
+            measurements([max(now + step, 0.0)], [[z, -z]], [[r, r]], [q], [[lever, lever]], [error])
+        )
         now = max(now, now + step)
         parts.append(smoother.departed())
     whole = SmoothedTrack.concatenate([*parts, smoother.finish()])

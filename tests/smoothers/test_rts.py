@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.smoothers.measurements import measurements
 from jeat_graph.smoothers.rts import filter_track, smooth_ends, smooth_rts
-from jeat_graph.smoothers.track_data import TrackData
+from jeat_graph.smoothers.track_data import Prior, TrackData
 
 #: White errors, and two sensors with a memory (s).
 COLOURS = [(), (0.3, 0.08)]
@@ -78,7 +79,7 @@ def test_weights_scale_the_information_of_measurements(harsh):
 def test_a_track_without_measurements_is_its_prior(harsh):
     track = harsh(0)
     none = np.zeros((0, 2))
-    alone = TrackData.from_measurements(5.0, track.prior_mean, track.prior_cov, [], none, none, [])
+    alone = TrackData.from_measurements(track.prior._replace(t=5.0), measurements([], none, none, []))
     assert np.array_equal(smooth_rts(alone).mean[0], track.prior_mean)
 
 
@@ -94,7 +95,7 @@ def test_covariances_stay_valid_and_never_above_the_filters(steps, q, r):
     n = len(t)
     z = np.zeros((n, 2))
     track = TrackData.from_measurements(
-        0.0, np.zeros((2, 3)), np.stack([prior] * 2), t, z, z + r, np.full(n, q)
+        Prior(0.0, np.zeros((2, 3)), np.stack([prior] * 2)), measurements(t, z, z + r, np.full(n, q))
     )
     smoothed, (_, filtered) = smooth_rts(track), filter_track(track)
     unit = np.sqrt(np.einsum("...ii->...i", filtered))
@@ -137,10 +138,12 @@ def test_normalised_errors_are_chi_square_on_matched_models(sampled):
 def test_times_before_the_prior_are_refused(harsh):
     track = harsh(0)
     with pytest.raises(DataError, match="older than the track's prior"):
-        TrackData.from_measurements(1.0, track.prior_mean, track.prior_cov, [0.5], [[0, 0]], [[1, 1]], [1.0])
+        TrackData.from_measurements(
+            track.prior._replace(t=1.0), measurements([0.5], [[0, 0]], [[1, 1]], [1.0])
+        )
 
 
 def test_a_variance_that_is_not_positive_is_refused(harsh):
     track = harsh(0)
     with pytest.raises(DataError, match="positive"):
-        TrackData.from_measurements(0.0, track.prior_mean, track.prior_cov, [0.5], [[0, 0]], [[0, 1]], [1.0])
+        TrackData.from_measurements(track.prior, measurements([0.5], [[0, 0]], [[0, 1]], [1.0]))

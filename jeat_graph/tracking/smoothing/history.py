@@ -5,21 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from jeat_graph.config.schema import Config
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.arrays import RecordArray
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.filters.measurement import MEASUREMENT
 from jeat_graph.smoothers.engine import TrackSmoother, make_smoother
 from jeat_graph.smoothers.track_data import COINCIDENT_S, SmoothedTrack
 from jeat_graph.tracking.smoothing.looks import Looks
-from jeat_graph.tracking.smoothing.priors import (
-    ErrorStates,
-    measurements_of,
-    prior_of,
-    size_prior_of,
-    sizes_of,
-)
+from jeat_graph.tracking.smoothing.priors import ErrorStates, prior_of, size_prior_of
 from jeat_graph.tracking.smoothing.rows import rows_of
 from jeat_graph.tracking.smoothing.sizes import SizeWindow
-from jeat_graph.tracking.update_log import WIDTH
 
 
 class TrackHistory:
@@ -37,7 +31,7 @@ class TrackHistory:
     Attributes:
         track_id: identity.
         confirmed: whether the track has ever been confirmed.
-        measurements: measurements (M, 1 + WIDTH) that wait, or all of them if `keep`, in pieces; the first
+        measurements: measurements (M,) that wait, or all of them if `keep`, in pieces; the first
             row of the first piece is the birth.
         smoother: the smoother, once there is one.
     """
@@ -45,7 +39,7 @@ class TrackHistory:
     def __init__(self, track_id: int, config: Config, errors: ErrorStates, keep: bool) -> None:
         self.track_id = track_id
         self.confirmed = False
-        self.measurements: list[FloatArray] = []
+        self.measurements: list[RecordArray] = []
         self._looks: list[Looks] = []
         self.smoother: TrackSmoother | None = None
         self._config = config
@@ -68,10 +62,10 @@ class TrackHistory:
         """Time of the first step without a row (s), or infinity."""
         return next((float(looks.t[0]) for looks in self._looks if len(looks)), np.inf)
 
-    def take(self, rows: FloatArray) -> None:
-        """Add measurements (M, 1 + WIDTH) in order of time."""
+    def take(self, rows: RecordArray) -> None:
+        """Add measurements (M,) in order of time."""
         self.measurements.append(rows)
-        self._last = float(rows[-1, 0])
+        self._last = float(rows["t"][-1])
 
     def watch(self, looks: Looks, confirmed: bool) -> None:
         """Add steps that the track has lived through, and whether it was confirmed in one of them."""
@@ -88,13 +82,13 @@ class TrackHistory:
             settings = self._config.smoother
             self.smoother = make_smoother(
                 settings.engine,
-                *prior_of(rows[0], self._errors),
+                prior_of(rows[0], self._errors),
                 lag_s=settings.lag_s,
                 chunk=settings.chunk,
                 robust=settings.robust,
                 memory=self._errors.memory,
             )
-            self._sizes = SizeWindow(*size_prior_of(rows[0]), self._config.size.rate_density)
+            self._sizes = SizeWindow(size_prior_of(rows[0]), self._config.size.rate_density)
             rows = rows[1:]
         assert self._sizes is not None
         if self._keep:
@@ -102,8 +96,8 @@ class TrackHistory:
         else:
             self.measurements = []
         if len(rows):
-            self.smoother.feed(*measurements_of(rows, self._errors))
-            self._sizes.append(*sizes_of(rows))
+            self.smoother.feed(rows)
+            self._sizes.append(rows)
 
     def departed(self) -> Trajectories | None:
         """Return the rows that have become final since the last call, or None."""
@@ -136,9 +130,9 @@ class TrackHistory:
             return None
         return self._rows(self.smoother.finish(), np.inf)
 
-    def whole(self) -> FloatArray:
-        """Return all measurements (M, 1 + WIDTH), the birth first; needs `keep`."""
-        return np.concatenate(self.measurements) if self.measurements else np.zeros((0, 1 + WIDTH))
+    def whole(self) -> RecordArray:
+        """Return all measurements (M,), the birth first; needs `keep`."""
+        return np.concatenate([np.zeros(0, dtype=MEASUREMENT), *self.measurements])
 
     def close(self) -> None:
         """Free the smoother and all that waits."""

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jeat_graph.config.schema import Config
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.smoothers.engine import load_engine
 from jeat_graph.tracking.smoothing.history import TrackHistory
@@ -29,12 +29,12 @@ class _Share(NamedTuple):
     Attributes:
         looks: its steps that the table has rows at.
         confirmed: whether the track was confirmed in any of them.
-        rows: (M, 1 + WIDTH) measurements, or None.
+        rows: (M,) measurements, or None.
     """
 
     looks: Looks
     confirmed: bool
-    rows: FloatArray | None
+    rows: RecordArray | None
 
     def give_to(self, history: TrackHistory) -> None:
         """Hand it to the track's history."""
@@ -236,9 +236,9 @@ class TrackSmoothers:
             yield track_id, rows, bool(confirmed[part].any())
 
 
-def _split_updates(packet: Packet) -> Iterator[tuple[int, FloatArray]]:
-    """The measurements of a packet, track by track, with their times."""
-    owner = packet.updates[:, 1].astype(np.int64)
+def _split_updates(packet: Packet) -> Iterator[tuple[int, RecordArray]]:
+    """The measurements of a packet, track by track."""
+    owner = packet.updates["track_id"]
     order = np.argsort(owner, kind="stable")
     table = packet.updates[order]
     for track_id, part in _groups(owner[order]):

@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from jeat_graph.config.schema import Config
-from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, RecordArray
+from jeat_graph.filters.measurement import MEASUREMENT
 from jeat_graph.tracking.state import TrackArrays
-from jeat_graph.tracking.update_log import WIDTH, UpdateLog
+from jeat_graph.tracking.update_log import UpdateLog
 
 
 class Packet(NamedTuple):
@@ -24,7 +25,7 @@ class Packet(NamedTuple):
         used: (L,) bit k is set where a detection of sensor k was taken.
         confirmed: (L,) whether the track is confirmed.
         held: (L,) whether it is reported as standing still.
-        updates: (M, 1 + WIDTH) times and rows of the update log.
+        updates: (M,) records of the update log.
         ended: identities of the tracks that ended.
     """
 
@@ -36,7 +37,7 @@ class Packet(NamedTuple):
     used: IntArray
     confirmed: BoolArray
     held: BoolArray
-    updates: FloatArray
+    updates: RecordArray
     ended: list[int]
 
 
@@ -57,7 +58,7 @@ class StepRecorder:
         self._ids: IntArray = np.zeros(0, dtype=np.int64)
         self._confirmed: BoolArray = np.zeros(0, dtype=np.bool_)
         self._ended: list[int] = []
-        self._updates: list[tuple[float, FloatArray]] = []
+        self._updates: list[RecordArray] = []
         self._looks: list[tuple[float, bool, IntArray, FloatArray, IntArray, BoolArray, BoolArray]] = []
 
     def record(
@@ -78,7 +79,7 @@ class StepRecorder:
         """
         count = int(log.count[0])
         if count:
-            self._updates.append((t, log.rows[:count].copy()))
+            self._updates.append(log.rows[:count].copy())
         ids, confirmed = tracks.track_id[:n].copy(), tracks.confirmed[:n].copy()
         held = np.zeros(n, dtype=np.bool_)
         held[np.searchsorted(ids, reported)] = True
@@ -107,8 +108,6 @@ class StepRecorder:
         if not self._looks:
             return None
         t, wanted, ids, existence, used, confirmed, held = zip(*self._looks, strict=True)
-        when = np.repeat([u[0] for u in self._updates], [len(u[1]) for u in self._updates])
-        rows = [u[1] for u in self._updates] or [np.zeros((0, WIDTH))]
         packet = Packet(
             np.array(t),
             np.array(wanted, dtype=np.bool_),
@@ -118,7 +117,7 @@ class StepRecorder:
             np.concatenate(used),
             np.concatenate(confirmed),
             np.concatenate(held),
-            np.concatenate([when[:, None], np.concatenate(rows)], axis=1),
+            np.concatenate([np.zeros(0, dtype=MEASUREMENT), *self._updates]),
             self._ended,
         )
         self._looks, self._updates, self._ended = [], [], []

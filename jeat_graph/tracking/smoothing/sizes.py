@@ -4,30 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray, RecordArray
 from jeat_graph.smoothers.size import SmoothedSize, smooth_size
-from jeat_graph.smoothers.track_data import COINCIDENT_S
+from jeat_graph.smoothers.track_data import COINCIDENT_S, Prior
 
 
 class SizeWindow:
     """Measured sizes of one track that are not final yet, and the filtered size before them.
 
     Args:
-        t: time of the track's birth (s).
-        mean: (2, 2) prior of ln width and ln height with their rates (ln px, 1/s).
-        cov: (2, 2, 2) its covariance.
+        prior: ln width and ln height with their rates at the birth (2, 2), (2, 2, 2) (ln px, 1/s).
         density: root spectral density of the rates (1/s^1.5).
     """
 
-    def __init__(self, t: float, mean: FloatArray, cov: FloatArray, density: float) -> None:
-        self._base = (t, mean, cov)
+    def __init__(self, prior: Prior, density: float) -> None:
+        self._base = prior
         self._density = density
-        self._parts: list[tuple[FloatArray, FloatArray, FloatArray]] = []
+        self._parts: list[tuple[FloatArray, ...]] = []
 
-    def append(self, t: FloatArray, log_size: FloatArray, var: FloatArray) -> None:
-        """Take in measured sizes: times (M,) s, ln width and height (M, 2), variances (M, 2)."""
-        # Columns of a table as arrays of their own, for one compiled form of what comes next.
-        self._parts.append((t.copy(), log_size.copy(), var.copy()))
+    def append(self, measured: RecordArray) -> None:
+        """Take in the sizes of measurements (M,)."""
+        # Fields of records as arrays of their own, for one compiled form of what comes next.
+        self._parts.append(tuple(measured[name].copy() for name in ("t", "log_size", "size_var")))
 
     def smooth(self) -> SmoothedSize:
         """Smooth all since the base, given all measurements so far."""
@@ -40,10 +38,10 @@ class SizeWindow:
         # With nothing after it, the last smoothed size is the filtered one.
         past, later = ([column[part] for column in waiting] for part in (slice(count), slice(count, None)))
         filtered = self._solve(*past)
-        self._base = (float(filtered.t[-1]), filtered.mean[-1], filtered.cov[-1])
+        self._base = Prior(float(filtered.t[-1]), filtered.mean[-1], filtered.cov[-1])
         self._parts = [(later[0], later[1], later[2])]
 
-    def _waiting(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _waiting(self) -> tuple[FloatArray, ...]:
         """All measurements since the base: times (M,), sizes (M, 2), variances (M, 2)."""
         if not self._parts:
             return np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from jeat_graph.config.schema import Config
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray, RecordArray
 from jeat_graph.filters.coloured_noise import MOTION
 from jeat_graph.smoothers.linking import FREEDOM, FragmentEnds, link, seeing_time
 from jeat_graph.smoothers.rts import smooth_ends
@@ -15,7 +15,7 @@ from jeat_graph.smoothers.size import SmoothedSize
 from jeat_graph.smoothers.track_data import TrackData
 from jeat_graph.tracking.smoothing.history import TrackHistory
 from jeat_graph.tracking.smoothing.looks import Looks
-from jeat_graph.tracking.smoothing.priors import COLUMN, ErrorStates, size_prior_of, sizes_of, track_data
+from jeat_graph.tracking.smoothing.priors import ErrorStates, size_prior_of, track_data
 from jeat_graph.tracking.smoothing.sizes import SizeWindow
 
 # Longer than this without any detection of any track, and the sensors are taken to be blind.
@@ -64,7 +64,7 @@ def fragment_ends(histories: Sequence[TrackHistory], config: Config) -> Fragment
     tracks = [track_data(rows, errors) for rows in wholes]
     states = smooth_ends(tracks)
     sizes = [_smooth_sizes(rows, config.size.rate_density) for rows in wholes]
-    seen_t, seen_s = seeing_time(np.concatenate([rows[:, 0] for rows in wholes]), _LONGEST_PAUSE_S)
+    seen_t, seen_s = seeing_time(np.concatenate([rows["t"] for rows in wholes]), _LONGEST_PAUSE_S)
     start_mean = states.start_mean[..., :MOTION]
     start_size = np.stack([size.mean[0, :, 0] for size in sizes])
     return FragmentEnds(
@@ -90,13 +90,13 @@ def _typical_jerk(track: TrackData) -> float:
     return float(np.median(track.q[1:][-20:])) if len(track) > 1 else 1.0
 
 
-def _smooth_sizes(rows: FloatArray, density: float) -> SmoothedSize:
-    window = SizeWindow(*size_prior_of(rows[0]), density)
-    window.append(*sizes_of(rows[1:]))
+def _smooth_sizes(rows: RecordArray, density: float) -> SmoothedSize:
+    window = SizeWindow(size_prior_of(rows[0]), density)
+    window.append(rows[1:])
     return window.smooth()
 
 
-def _birth_log_density(wholes: Sequence[FloatArray], mean: FloatArray, config: Config) -> FloatArray:
+def _birth_log_density(wholes: Sequence[RecordArray], mean: FloatArray, config: Config) -> FloatArray:
     """Density (N,) with which a new vehicle appears in the states `mean` (N, 2, 3).
 
     Anywhere in the picture and of any size, with the prior of a new track's velocity and acceleration.
@@ -104,9 +104,9 @@ def _birth_log_density(wholes: Sequence[FloatArray], mean: FloatArray, config: C
     births = np.stack([rows[0] for rows in wholes])
     volume = config.image.width * config.image.height * config.association.log_size_range**2
     out = np.full(len(wholes), -np.log(volume))
-    for axis, name in enumerate("xy"):
-        for order, quantity in ((1, "v"), (2, "a")):
-            var = births[:, COLUMN[f"var_{quantity}_{name}"]]
+    for axis in range(2):
+        for order, quantity in ((1, "velocity_var"), (2, "acceleration_var")):
+            var = births[quantity][:, axis]
             out -= 0.5 * (mean[:, axis, order] ** 2 / var + np.log(2.0 * np.pi * var))
     return out
 
@@ -115,7 +115,7 @@ def _join(parts: Sequence[TrackHistory], scan_t: FloatArray, config: Config) -> 
     """One history of several in order of time, with rows at all steps in between."""
     whole = TrackHistory(parts[0].track_id, config, ErrorStates.of(config), keep=True)
     looks: list[Looks] = []
-    births = [float(part.measurements[0][0, 0]) for part in parts]
+    births = [float(part.measurements[0]["t"][0]) for part in parts]
     for k, part in enumerate(parts):
         for rows in part.measurements:
             whole.take(rows)

@@ -11,8 +11,8 @@ from jeat_graph.association.births import choose_births
 from jeat_graph.association.boxes import track_boxes
 from jeat_graph.config.kernel_form import Model, SensorArrays
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.filters.coloured_noise import MOTION
 from jeat_graph.filters.noise import base_variance
+from jeat_graph.filters.prior import write_prior, write_size_prior
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.ending import confirm
@@ -109,28 +109,17 @@ def start_track(
     side = math.sqrt(batch.boxes[j, 2] * batch.boxes[j, 3])
     velocity_std = motion.velocity_std_px + motion.velocity_std_per_size * side
     acceleration_std = motion.acceleration_std_px + motion.acceleration_std_per_size * side
-    tracks.mean[i] = 0.0
-    tracks.cov[i] = 0.0
-    tracks.size_mean[i] = 0.0
-    tracks.size_cov[i] = 0.0
+    velocity_var, acceleration_var = np.full(2, velocity_std**2), np.full(2, acceleration_std**2)
+    rate_var = model.settings.size.rate_std**2
     noise = own_noise(batch, j, sensors)
-    R = noise.white + noise.coloured_std * noise.coloured_std
+    white, coloured_std, error = noise.white, noise.coloured_std, sensors.error[s]
+    mean, cov = tracks.mean[i], tracks.cov[i]
+    write_prior(batch.z[j], white, coloured_std, error, velocity_var, acceleration_var, mean, cov)
+    size_mean, size_cov = tracks.size_mean[i], tracks.size_cov[i]
+    write_size_prior(batch.log_size[j], sensors.size_var[s], rate_var, size_mean, size_cov)
     for axis in range(2):
-        tracks.mean[i, axis, 0] = batch.z[j, axis]
         tracks.rest_point[i, axis] = batch.z[j, axis]
-        tracks.rest_var[i, axis] = R[axis]
-        tracks.cov[i, axis, 0, 0] = R[axis]
-        tracks.cov[i, axis, 1, 1] = velocity_std**2
-        tracks.cov[i, axis, 2, 2] = acceleration_std**2
-        for e in range(MOTION, tracks.mean.shape[2]):
-            tracks.cov[i, axis, e, e] = 1.0
-        if sensors.error[s] >= 0:
-            # p = z − h e − w: what the detection is off by, the position is off by the other way.
-            e = MOTION + sensors.error[s]
-            tracks.cov[i, axis, 0, e] = tracks.cov[i, axis, e, 0] = -noise.coloured_std[axis]
-        tracks.size_mean[i, axis, 0] = batch.log_size[j, axis]
-        tracks.size_cov[i, axis, 0, 0] = sensors.size_var[s, axis]
-        tracks.size_cov[i, axis, 1, 1] = model.settings.size.rate_std**2
+        tracks.rest_var[i, axis] = white[axis] + coloured_std[axis] * coloured_std[axis]
     tracks.rest_since[i] = t
     tracks.standing_log_odds[i] = 0.0
     tracks.standing[i] = False
@@ -143,15 +132,5 @@ def start_track(
     tracks.used[i] = 1 << s
     if len(log.rows) > 0:
         jerk = jerk_of(tracks, i, model.settings)
-        log_update(
-            log,
-            track_id,
-            s,
-            batch.z[j],
-            noise.white,
-            noise.coloured_std,
-            jerk,
-            batch.log_size[j],
-            sensors.size_var[s],
-        )
-        log_birth(log, tracks.cov[i], tracks.size_cov[i])
+        log_update(log, track_id, j, batch, white, coloured_std, jerk, sensors)
+        log_birth(log, velocity_var, acceleration_var, rate_var)

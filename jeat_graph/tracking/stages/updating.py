@@ -25,7 +25,7 @@ from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.predicting import Expectation, expect_detections, jerk_of
 from jeat_graph.tracking.state import TrackArrays
-from jeat_graph.tracking.update_log import UpdateLog, log_surprise, log_update
+from jeat_graph.tracking.update_log import UpdateLog, log_innovation, log_update
 
 
 class Noise(NamedTuple):
@@ -79,22 +79,12 @@ def update_track(
     s = batch.sensor[j]
     if len(log.rows) > 0:
         jerk = jerk_of(tracks, i, settings)
-        log_update(
-            log,
-            tracks.track_id[i],
-            s,
-            batch.z[j],
-            R,
-            coloured_std,
-            jerk,
-            batch.log_size[j],
-            sensors.size_var[s],
-        )
+        log_update(log, tracks.track_id[i], j, batch, R, coloured_std, jerk, sensors)
     if settings.standing.enabled:
         # Both models take the coloured noise for white, so that they are compared on equal terms.
         judge_standing(tracks, i, batch.t, batch.z[j], R + coloured_std * coloured_std, settings)
     nis = update_centre(tracks.mean[i], tracks.cov[i], batch.z[j], R, coloured_std, sensors.error[s])
-    log_surprise(log, nis, tracks.scale[i, s])
+    log_innovation(log, nis, tracks.scale[i, s])
     tracks.scale[i, s] = adapt_scale(
         tracks.scale[i, s],
         nis,
