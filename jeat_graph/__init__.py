@@ -7,12 +7,36 @@ from typing import TYPE_CHECKING, Any
 from jeat_graph.version import __version__
 
 if TYPE_CHECKING:
+    from jeat_graph.api.functions import calibrate, compare, evaluate, read_run, simulate, track
     from jeat_graph.config.reading import load_config
     from jeat_graph.config.schema import Config
     from jeat_graph.data.detections import Detections, Scan
     from jeat_graph.data.errors import JeatGraphError
     from jeat_graph.data.trajectories import GroundTruth, Trajectories
+    from jeat_graph.io.config_io import save_config
+    from jeat_graph.io.detections_io import read_detections
+    from jeat_graph.io.truth_io import read_truth
     from jeat_graph.tracking.tracker import Tracker
+
+_HOMES = {
+    "Config": "config.schema",
+    "Detections": "data.detections",
+    "GroundTruth": "data.trajectories",
+    "JeatGraphError": "data.errors",
+    "Scan": "data.detections",
+    "Tracker": "tracking.tracker",
+    "Trajectories": "data.trajectories",
+    "calibrate": "api.functions",
+    "compare": "api.functions",
+    "evaluate": "api.functions",
+    "load_config": "config.reading",
+    "read_detections": "io.detections_io",
+    "read_run": "api.functions",
+    "read_truth": "io.truth_io",
+    "save_config": "io.config_io",
+    "simulate": "api.functions",
+    "track": "api.functions",
+}
 
 __all__ = [
     "Config",
@@ -23,19 +47,17 @@ __all__ = [
     "Tracker",
     "Trajectories",
     "__version__",
+    "calibrate",
+    "compare",
+    "evaluate",
     "load_config",
+    "read_detections",
+    "read_run",
+    "read_truth",
+    "save_config",
+    "simulate",
+    "track",
 ]
-
-_HOMES = {
-    "Config": "config.schema",
-    "load_config": "config.reading",
-    "Detections": "data.detections",
-    "Scan": "data.detections",
-    "JeatGraphError": "data.errors",
-    "Tracker": "tracking.tracker",
-    "GroundTruth": "data.trajectories",
-    "Trajectories": "data.trajectories",
-}
 
 
 def __getattr__(name: str) -> Any:
@@ -45,3 +67,7 @@ def __getattr__(name: str) -> Any:
 
         return getattr(import_module(f"jeat_graph.{_HOMES[name]}"), name)
     raise AttributeError(f"module 'jeat_graph' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(set(globals()) | set(__all__))

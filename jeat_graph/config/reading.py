@@ -30,15 +30,33 @@ def load_config(name_or_path: str | Path = "default", overrides: Iterable[str] =
 
     Args:
         name_or_path: a preset (`default`, `paper`, …) or the path of a YAML file.
-        overrides: texts such as `motion.jerk_per_size=4` or `sensors.rgb.rate_hz=30`.
+        overrides: texts such as `motion.jerk_per_size=4` or `sensors.rgb.rate_hz=30`, or one such text.
 
     Raises:
         ConfigError: no such preset or file, YAML that cannot be read, unknown key, bad value.
     """
     tree = read_tree(str(name_or_path), preset_names(), _preset_text, "preset")
-    for text in overrides:
+    for text in [overrides] if isinstance(overrides, str) else overrides:
         _apply_override(tree, text)
     return config_from_dict(tree)
+
+
+def as_config(config: Config | str | Path, image: tuple[float, float] | None = None) -> Config:
+    """Return a configuration, loaded if it is named, with another size of the picture if one is given.
+
+    Args:
+        config: a configuration, the name of a preset, or the path of a YAML file.
+        image: width and height of the picture (px).
+
+    Raises:
+        ConfigError: as `load_config`; or a size that is not positive.
+    """
+    found = config if isinstance(config, Config) else load_config(config)
+    if image is None:
+        return found
+    width, height = image
+    size = dataclasses.replace(found.image, width=float(width), height=float(height))
+    return dataclasses.replace(found, image=size)
 
 
 def config_from_dict(tree: Mapping[str, Any]) -> Config:

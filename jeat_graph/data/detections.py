@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, TextArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.interop import from_xyxy
 
 
 def check_boxes(boxes: npt.ArrayLike, scores: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -101,6 +102,11 @@ class Scan:
 
     def __len__(self) -> int:
         return len(self.scores)
+
+    @staticmethod
+    def from_xyxy(t: float, sensor: str, corners: npt.ArrayLike, scores: npt.ArrayLike) -> Scan:
+        """Make a scan of boxes (M, 4) that are given as left, top, right, bottom (px)."""
+        return Scan(t, sensor, from_xyxy(corners), np.asarray(scores, dtype=np.float64))
 
 
 @dataclass(frozen=True, eq=False)

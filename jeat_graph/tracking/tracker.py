@@ -5,16 +5,19 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.config.kernel_form import kernel_model
+from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.diagnostics import Diagnostics
 from jeat_graph.data.errors import JeatGraphError, TimeOrderError, UnknownSensorError
+from jeat_graph.data.interop import boxes_of
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.batch import Arrivals
 from jeat_graph.tracking.reporting import report
@@ -38,18 +41,26 @@ class Tracker:
     does not grow with time (smoothed rows that nobody fetches go to a temporary file, see `drain_smoothed`).
 
     Args:
-        config: sensors and settings, from `load_config`.
+        config: sensors and settings, from `load_config`; or the name of a preset, or of a YAML file.
+        image: width and height of the picture (px), if not those of the configuration.
         diagnostics: take down how well each detection fitted its track, for `last_updates`.
 
     Example:
-        >>> from jeat_graph import Tracker, load_config
-        >>> tracker = Tracker(load_config("default"))
+        >>> from jeat_graph import Tracker
+        >>> tracker = Tracker(image=(1920, 1080))
         >>> table = tracker.step((0.0, "rgb", [[100, 100, 40, 30]], [0.9]))
         >>> tracker.num_tracks
         1
     """
 
-    def __init__(self, config: Config, *, diagnostics: bool = False) -> None:
+    def __init__(
+        self,
+        config: Config | str | Path = "default",
+        *,
+        image: tuple[float, float] | None = None,
+        diagnostics: bool = False,
+    ) -> None:
+        config = as_config(config, image)
         self.config = config
         self._diagnostics = diagnostics
         self.sensor_names = config.sensor_names
@@ -146,6 +157,23 @@ class Tracker:
             births = self._next_id - first_id
             self._smoothers.record(t, self._tracks, self._num_tracks, births, self._log, table.track_id)
         return table
+
+    def update(
+        self, source: Any, *, t: float, sensor: str, scores: npt.ArrayLike | None = None
+    ) -> Trajectories:
+        """Take in what a detector returned for one picture.
+
+        Args:
+            source: `supervision.Detections`, a result of `ultralytics`, or boxes (M, 4) left, top, width,
+                height in px; none (M = 0) if the sensor looked and found nothing.
+            t: time (s).
+            sensor: name of the sensor.
+            scores: (M,) confidence in [0, 1], for boxes that come without.
+
+        Returns and raises as `step`; also a DataError where it cannot be told what `source` is.
+        """
+        found = boxes_of(source, scores)
+        return self.step(Scan(t, sensor, found.boxes, found.scores))
 
     def causal(self) -> Trajectories:
         """Return the tracks that are reported now, as the last step did."""

@@ -1,0 +1,239 @@
+"""One call each for what the commands do: track, evaluate, compare, calibrate, simulate, read a run."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+
+from jeat_graph.config.reading import as_config
+from jeat_graph.config.schema import Config
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.trajectories import GroundTruth, Trajectories
+
+if TYPE_CHECKING:
+    from jeat_graph.eval.compare import Comparison
+
+PathLike: TypeAlias = str | Path
+
+
+class Tracks(NamedTuple):
+    """What tracking a recording gives.
+
+    Attributes:
+        causal: the online estimates, each from what had arrived by its time.
+        smoothed: the smoothed trajectories; None without a smoother.
+    """
+
+    causal: Trajectories
+    smoothed: Trajectories | None
+
+
+class Run(NamedTuple):
+    """A run directory, read.
+
+    Attributes:
+        causal: the causal table, or None.
+        smoothed: the smoothed table, or None.
+        record: content of `run.json`; empty where there is none.
+    """
+
+    causal: Trajectories | None
+    smoothed: Trajectories | None
+    record: dict[str, Any]
+
+
+def track(
+    detections: Detections | PathLike,
+    config: Config | PathLike = "default",
+    *,
+    image: tuple[float, float] | None = None,
+) -> Tracks:
+    """Track a recording from beginning to end.
+
+    Args:
+        detections: the recording, or a file that `read_detections` knows.
+        config: a configuration, the name of a preset, or a YAML file.
+        image: width and height of the picture (px), if not those of the configuration.
+
+    Returns:
+        The causal table, and the smoothed one unless the configuration asks for no smoother.
+
+    Raises:
+        JeatGraphError: what the file or the configuration has wrong.
+    """
+    from jeat_graph.tracking.tracker import Tracker
+
+    recording = detections if isinstance(detections, Detections) else _read_detections(detections)
+    tracker = Tracker(as_config(config, image))
+    causal = Trajectories.concatenate(list(tracker.run(recording)) or [Trajectories.empty()])
+    wanted = tracker.config.smoother.engine != "none"
+    return Tracks(causal, tracker.finish() if wanted else None)
+
+
+def evaluate(
+    tracks: Trajectories | Tracks | PathLike,
+    truth: GroundTruth | PathLike,
+    *,
+    kind: str = "causal",
+    classes: Sequence[str] | None = None,
+) -> dict[str, dict[str, float | int]]:
+    """Judge tracks against truth.
+
+    Args:
+        tracks: a table, both tables of `track`, or a path that `jeat-graph eval` takes.
+        truth: the truth, or a file that `read_truth` knows.
+        kind: what a table alone is: `causal` or `smoothed`.
+        classes: classes of objects to be found; others are ignored. All by default.
+
+    Returns:
+        By kind of table, MOTA, HOTA, IDF1 and so on by name, as `eval --json` writes them.
+
+    Raises:
+        DataError: a file is not valid, or tracks and truth do not fit together.
+    """
+    from jeat_graph.eval.judge import judge_runs
+    from jeat_graph.eval.load import JudgedRun, load_run, restrict_classes
+
+    if isinstance(tracks, (str, Path)):
+        if isinstance(truth, GroundTruth):
+            raise DataError("a run that is given as a path needs its truth as a path too")
+        run = load_run(tracks, truth, classes=classes)
+    else:
+        objects = truth if isinstance(truth, GroundTruth) else read_truth(truth)
+        if classes is not None:
+            objects = restrict_classes(objects, classes)
+        if isinstance(tracks, Trajectories):
+            if kind not in ("causal", "smoothed"):
+                raise DataError(f"kind {kind!r}: must be causal or smoothed")
+            tables = {kind: tracks}
+        else:
+            tables = {name: table for name, table in tracks._asdict().items() if table is not None}
+        run = JudgedRun("tracks", objects, tables.get("causal"), tables.get("smoothed"))
+    return {name: one.as_dict() for name, one in judge_runs([run]).items()}
+
+
+def compare(
+    detections: Detections | PathLike,
+    config: Config | PathLike = "default",
+    truth: GroundTruth | PathLike | None = None,
+    *,
+    lags_s: Sequence[float] | None = None,
+) -> Comparison:
+    """Compare the filter with smoothers of several lags on one recording.
+
+    Args:
+        detections: the recording, or a file that `read_detections` knows.
+        config: a configuration, the name of a preset, or a YAML file.
+        truth: truth with motion, or its file; without it only consistency is judged.
+        lags_s: lags (s); 0 is the filter.
+
+    Returns:
+        Tables to read (`.tables`) and all figures by name (`.values`).
+
+    Raises:
+        JeatGraphError: what a file or the configuration has wrong.
+    """
+    from jeat_graph.eval.compare import LAGS_S
+    from jeat_graph.eval.compare import compare as compared
+    from jeat_graph.tracking.records import record_tracks
+
+    recording = detections if isinstance(detections, Detections) else _read_detections(detections)
+    objects = truth if isinstance(truth, GroundTruth) or truth is None else read_truth(truth)
+    settings = as_config(config)
+    records, smoothed = record_tracks(settings, recording)
+    names = settings.sensor_names
+    return compared(records, names, truth=objects, smoothed=smoothed, lags_s=lags_s or LAGS_S)
+
+
+def calibrate(
+    detections: Detections | PathLike | Sequence[Detections | PathLike],
+    truth: GroundTruth | PathLike | Sequence[GroundTruth | PathLike] | None = None,
+    base: Config | PathLike = "default",
+    *,
+    image: tuple[float, float] | None = None,
+) -> Config:
+    """Estimate a configuration from recordings.
+
+    Args:
+        detections: one recording or several, or their files.
+        truth: the truth of each; without it confirmed tracks take its place.
+        base: where all that is not estimated comes from.
+        image: width and height of the picture (px), if not those of `base`.
+
+    Returns:
+        The configuration; `save_config` writes it.
+
+    Raises:
+        JeatGraphError: what a file or the data have wrong.
+    """
+    recordings = [d if isinstance(d, Detections) else _read_detections(d) for d in _as_list(detections)]
+    start = as_config(base, image)
+    if truth is None:
+        from jeat_graph.calibration.blind import calibrate_blind
+
+        return calibrate_blind(recordings, start)
+    from jeat_graph.calibration.supervised import calibrate as fit
+    from jeat_graph.calibration.tune import tune
+
+    truths = [t if isinstance(t, GroundTruth) else read_truth(t) for t in _as_list(truth)]
+    if len(truths) != len(recordings):
+        raise DataError(f"{len(recordings)} recordings and {len(truths)} truths given; give one for each")
+    pairs = list(zip(recordings, truths, strict=True))
+    config, _ = tune(fit(pairs, start), pairs)
+    return config
+
+
+def simulate(
+    scenario: str = "night-nolight", *, duration_s: float = 30.0, seed: int = 0
+) -> tuple[Detections, GroundTruth]:
+    """Simulate the detections of a highway's sensors, with their truth.
+
+    Args:
+        scenario: a name (`day`, `night`, `night-nolight`, …) or a YAML file.
+        duration_s: length (s).
+        seed: another seed, other traffic.
+
+    Raises:
+        ConfigError: no such scenario, or values that are not valid.
+    """
+    from jeat_graph.simulation.scenario import load_scenario
+    from jeat_graph.simulation.simulate import simulate as simulated
+
+    return simulated(load_scenario(scenario), seed, duration_s)
+
+
+def read_run(path: PathLike) -> Run:
+    """Read a run directory, or a single table of one.
+
+    Raises:
+        DataError: there is no run, or a file of it is not valid.
+    """
+    from jeat_graph.eval.load import tables_of
+    from jeat_graph.io.trajectories_io import read_trajectories
+
+    folder = Path(path)
+    tables = {kind: read_trajectories(file) for kind, file in tables_of(folder).items()}
+    file = folder / "run.json"
+    record = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
+    return Run(tables.get("causal"), tables.get("smoothed"), record)
+
+
+def read_truth(path: PathLike, *, rate_hz: float | None = None) -> GroundTruth:
+    """Read ground truth in any format of the documentation (CSV, Parquet, MOTChallenge, KITTI)."""
+    from jeat_graph.io.truth_io import read_truth as read
+
+    return read(path, rate_hz=rate_hz)
+
+
+def _read_detections(path: PathLike) -> Detections:
+    from jeat_graph.io.detections_io import read_detections
+
+    return read_detections(path)
+
+
+def _as_list(values: Any) -> list[Any]:
+    one = isinstance(values, (str, Path, Detections, GroundTruth))
+    return [values] if one else list(values)
