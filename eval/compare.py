@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.measured_track import MeasuredTrack
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.breakdown import DISTANCE_BINS_M
 from jeat_graph.eval.frames import build_frames
 from jeat_graph.eval.kinematics import matched_errors
 from jeat_graph.eval.lagged import Innovations, States, states_at
 from jeat_graph.eval.tables import Cell, Table
-from jeat_graph.smoothers.track_data import TrackData
 
 #: Lags of the curve (s).
 LAGS_S = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0)
@@ -25,23 +25,6 @@ RECENT_S = 0.1
 #: Autocorrelations of the innovations are taken up to this many steps.
 WHITENESS_STEPS = 5
 _PARTS = {"position": slice(0, 1), "velocity": slice(1, 2), "acceleration": slice(2, 3)}
-
-
-@dataclass(frozen=True, eq=False)
-class ComparedTrack:
-    """One confirmed track with all that it took in.
-
-    Attributes:
-        track_id: identity.
-        data: prior and measurements; its first key is the birth.
-        sensor: (M,) index of the sensor of each measurement of `data`.
-        birth_sensor: index of the sensor whose detection started the track.
-    """
-
-    track_id: int
-    data: TrackData
-    sensor: IntArray
-    birth_sensor: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +69,7 @@ class Comparison:
 
 
 def compare(
-    tracks: Sequence[ComparedTrack],
+    tracks: Sequence[MeasuredTrack],
     sensors: Sequence[str],
     *,
     truth: GroundTruth | None = None,
@@ -133,7 +116,7 @@ def lag_name(lag_s: float) -> str:
 
 
 def collect_samples(
-    tracks: Sequence[ComparedTrack],
+    tracks: Sequence[MeasuredTrack],
     truth: GroundTruth,
     smoothed: Trajectories,
     lags_s: Sequence[float],
@@ -178,7 +161,7 @@ def collect_samples(
     )
 
 
-def _available(track: ComparedTrack, t: FloatArray) -> IntArray:
+def _available(track: MeasuredTrack, t: FloatArray) -> IntArray:
     """Bits (T,) of the sensors that gave the track a detection within `RECENT_S` before each time."""
     out = np.zeros(len(t), dtype=np.int64)
     measured = np.concatenate([track.data.t[:1], track.data.t[track.data.key]])
@@ -283,7 +266,7 @@ def _group_table(groups: Sequence[dict[str, Any]], title: str) -> Table:
     return Table.from_records(records, title=title + " (RMSE in px, px/s)")
 
 
-def _consistency(tracks: Sequence[ComparedTrack]) -> tuple[dict[str, Any], Table]:
+def _consistency(tracks: Sequence[MeasuredTrack]) -> tuple[dict[str, Any], Table]:
     """What can be judged without truth: the innovations, and the smoother against the filter."""
     innovations: list[Innovations] = []
     ratio: list[FloatArray] = []

@@ -16,12 +16,12 @@ from dataclasses import asdict, dataclass
 import numpy as np
 import numpy.typing as npt
 
+from jeat_graph.association.overlap import pairwise_covered, pairwise_iou
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.eval.frames import IGNORE_COVERED
-from jeat_graph.eval.overlap import pairwise_covered, pairwise_iou
 
 THRESHOLDS: FloatArray = np.linspace(0.5, 0.95, 10)
 RECALLS: FloatArray = np.linspace(0.0, 1.0, 101)

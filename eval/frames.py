@@ -17,13 +17,20 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from jeat_graph.association.overlap import pairwise_covered, pairwise_iou
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.matching import match as match
-from jeat_graph.eval.overlap import pairwise_covered, pairwise_iou
 from jeat_graph.eval.pairing import check_pair, check_truth
-from jeat_graph.eval.resampling import TIME_TOLERANCE_S, Resampled, check_unique, interpolate_to, predict_to
+from jeat_graph.eval.resampling import (
+    MAX_AGE_S,
+    TIME_TOLERANCE_S,
+    Resampled,
+    check_unique,
+    interpolate_to,
+    predict_to,
+)
 
 Kind = Literal["causal", "smoothed"]
 IGNORE_IOU = 0.5
@@ -71,7 +78,7 @@ def build_frames(
     table: Trajectories,
     *,
     kind: Kind = "causal",
-    max_age_s: float = 0.15,
+    max_age_s: float = MAX_AGE_S,
     max_gap_s: float | None = None,
     instants: FloatArray | None = None,
 ) -> Frames:

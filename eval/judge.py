@@ -10,6 +10,7 @@ from jeat_graph.eval.frames import Frames, Kind, build_frames
 from jeat_graph.eval.kinematics import KinematicErrors, kinematic_errors
 from jeat_graph.eval.load import JudgedRun
 from jeat_graph.eval.metrics import SHARES, Scores, score_frames
+from jeat_graph.eval.resampling import MAX_AGE_S
 from jeat_graph.eval.tables import Cell, Table
 
 COUNTS = ("FP", "FN", "IDSW", "MT", "PT", "ML", "Frag")
@@ -42,7 +43,7 @@ def judge_runs(
     runs: Sequence[JudgedRun],
     *,
     iou: float = 0.5,
-    max_age_s: float = 0.15,
+    max_age_s: float = MAX_AGE_S,
     max_gap_s: float | None = None,
 ) -> dict[str, Judgement]:
     """Judge runs against their truth, pooled.

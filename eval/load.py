@@ -11,13 +11,12 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.rates import ANY_RATE_HZ, median_rate_hz
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.pairing import check_lives, check_pair, check_truth
-from jeat_graph.runs.directory import read_instants
+from jeat_graph.io.scans_io import read_instants
 
 BY_FRAME = ("motchallenge", "kitti")
-# Where truth and result both count frames, and no rate is known, any rate is as good as another.
-ANY_RATE_HZ = 25.0
 SUFFIXES = (".csv", ".parquet")
 
 
@@ -71,8 +70,7 @@ def load_run(
         rate_hz = _motchallenge_rate(truth_path, form == "motchallenge")
     objects = _read_truth(truth_path, rate_hz, classes)
     if rate_hz is None and form in BY_FRAME:
-        frames = objects.frame_times()
-        rate_hz = 1.0 / float(np.median(np.diff(frames))) if len(frames) > 1 else ANY_RATE_HZ
+        rate_hz = median_rate_hz(objects.frame_times()) or ANY_RATE_HZ
     instants = objects.frame_times() if form in BY_FRAME else read_instants(path)
     read = {kind: _read_table(file, objects, rate_hz, instants is None) for kind, file in tables.items()}
     return JudgedRun(str(run), objects, read.get("causal"), read.get("smoothed"), instants)

@@ -17,6 +17,7 @@ from jeat_graph.eval.frames import Frames, Kind, build_frames
 from jeat_graph.eval.hota import hota_counts, pooled_hota
 from jeat_graph.eval.identity import identity_counts, pooled_identity
 from jeat_graph.eval.overlapping import overlapping_pairs
+from jeat_graph.eval.resampling import MAX_AGE_S
 
 # Scores in per cent; the others are counts.
 SHARES = ("MOTA", "MOTP", "HOTA", "DetA", "AssA", "LocA", "IDF1", "IDP", "IDR")
@@ -87,7 +88,7 @@ def evaluate(
     *,
     kind: Kind = "causal",
     iou: float = 0.5,
-    max_age_s: float = 0.15,
+    max_age_s: float = MAX_AGE_S,
     max_gap_s: float | None = None,
     instants: Sequence[FloatArray | None] | None = None,
 ) -> Scores:

@@ -7,6 +7,7 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
+from jeat_graph.eval.resampling import MAX_AGE_S
 
 # In other units, step and duration of a clock both differ: by one factor if both record at one rate, else by
 # factors that are at least both large. Frames against seconds is a factor of the frame rate, 10 or more.
@@ -45,7 +46,7 @@ def check_truth(truth: GroundTruth) -> None:
     raise DataError(f"the truth has object {truth.object_id[row]} twice at t = {truth.t[row]:g} s")
 
 
-def check_pair(truth: GroundTruth, table: Trajectories, *, max_age_s: float = 0.15) -> None:
+def check_pair(truth: GroundTruth, table: Trajectories, *, max_age_s: float = MAX_AGE_S) -> None:
     """Refuse a table that cannot be about the same scene and clock as the truth. An empty table is fine.
 
     Args:
@@ -73,7 +74,7 @@ def check_pair(truth: GroundTruth, table: Trajectories, *, max_age_s: float = 0.
         _check_pixels("truth", truth.boxes, "tracks", table.boxes)
 
 
-def check_lives(truth: GroundTruth, table: Trajectories, *, max_age_s: float = 0.15) -> None:
+def check_lives(truth: GroundTruth, table: Trajectories, *, max_age_s: float = MAX_AGE_S) -> None:
     """Refuse a table without a track at any frame of the truth, where it is not known when the tracker ran.
 
     Tracks and truth may cover the same hour and still have no moment in common. Where it is known that the

@@ -12,6 +12,9 @@ from jeat_graph.data.trajectories import Trajectories
 
 # Two clocks that agree to a microsecond are one: times are often written with few digits.
 TIME_TOLERANCE_S = 1e-6
+#: How far causal estimates are carried forward (s): to the next picture of a camera that skipped two of 20 a
+#: second. A tracker that has been silent for longer is taken to say that there is no track.
+MAX_AGE_S = 0.15
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +27,7 @@ class Resampled:
         boxes: (M, 4) left, top, width, height (px).
         mean: (M, 6) x, y, vx, vy, ax, ay of the centre (px, px/s, px/s²).
         var: (M, 6) variances; NaN where the table has none.
+        row: (M,) the table's row that was predicted from, or the latest one that a smoothed estimate follows.
         age_s: (M,) time from the table's row to the frame: since the row a causal estimate was predicted
             from, or to the nearer of the two rows that a smoothed one lies between.
     """
@@ -33,6 +37,7 @@ class Resampled:
     boxes: FloatArray
     mean: FloatArray
     var: FloatArray
+    row: IntArray
     age_s: FloatArray
 
 
@@ -68,7 +73,7 @@ def predict_to(
     table: Trajectories,
     times: FloatArray,
     *,
-    max_age_s: float = 0.15,
+    max_age_s: float = MAX_AGE_S,
     instants: FloatArray | None = None,
 ) -> Resampled:
     """Causal estimates at given times, from nothing that came later.
@@ -113,7 +118,9 @@ def _gather(table: Trajectories, row: IntArray, frame: IntArray, age: FloatArray
     var = table.var[row].copy()
     var[:, 0:2] += var[:, 2:4] * dt**2 + var[:, 4:6] * (0.25 * dt**4)
     var[:, 2:4] += var[:, 4:6] * dt**2
-    return Resampled(frame=frame, track_id=table.track_id[row], boxes=boxes, mean=mean, var=var, age_s=age)
+    return Resampled(
+        frame=frame, track_id=table.track_id[row], boxes=boxes, mean=mean, var=var, row=row, age_s=age
+    )
 
 
 def interpolate_to(table: Trajectories, times: FloatArray, *, max_gap_s: float | None = None) -> Resampled:
@@ -185,6 +192,7 @@ def _between(
         boxes=np.concatenate((centre - 0.5 * size, size), axis=1),
         mean=mean,
         var=var,
+        row=a,
         age_s=np.minimum(into, step - into),
     )
 

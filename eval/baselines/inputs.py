@@ -11,11 +11,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from jeat_graph.association.overlap import pairwise_iou
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError, UnknownSensorError
+from jeat_graph.data.rates import ANY_RATE_HZ, median_rate_hz
 from jeat_graph.eval.baselines.frames import BaselineFrame
-from jeat_graph.eval.overlap import pairwise_iou
 from jeat_graph.eval.resampling import TIME_TOLERANCE_S
 
 
@@ -37,9 +38,10 @@ def suppress_overlapping(boxes: FloatArray, scores: FloatArray, iou: float) -> I
 
 
 def sensor_rate(detections: Detections, sensor: str) -> float:
-    """Rate of a sensor (Hz), from the median interval of its scans; 30 where there are less than two."""
-    t = detections.scan_t[detections.scan_sensor == _index(detections, sensor)]
-    return 1.0 / float(np.median(np.diff(t))) if len(t) > 1 else 30.0
+    """Rate of a sensor (Hz), from the median interval of its scans; `ANY_RATE_HZ` where there are too few."""
+    _index(detections, sensor)
+    times = detections.sensor_times(sensor)
+    return median_rate_hz(times) or ANY_RATE_HZ
 
 
 def baseline_frames(

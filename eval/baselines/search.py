@@ -20,6 +20,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.eval.baselines.running import run_baseline
 from jeat_graph.eval.metrics import Scores, evaluate
+from jeat_graph.eval.resampling import MAX_AGE_S
 
 SEARCH_GRIDS: dict[str, dict[str, tuple[float | int | bool, ...]]] = {
     "sort": {
@@ -83,7 +84,7 @@ def judge_baseline(
     sensors: Sequence[str],
     *,
     iou: float = 0.5,
-    max_age_s: float = 0.15,
+    max_age_s: float = MAX_AGE_S,
     **parameters: Any,
 ) -> BaselineResult:
     """Run a baseline over sequences and score it, pooled.
@@ -125,7 +126,7 @@ def best_baseline(
     *,
     by: str = "MOTA",
     iou: float = 0.5,
-    max_age_s: float = 0.15,
+    max_age_s: float = MAX_AGE_S,
 ) -> BaselineResult:
     """Find a baseline's best parameters: its defaults, or the best of its grid, if that is better.
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.association.boxes import occluded_fraction
+from jeat_graph.association.overlap import pairwise_covered, pairwise_iou
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.eval.frames import IGNORE_COVERED, match
-from jeat_graph.eval.overlap import pairwise_covered, pairwise_iou
 
 # A detection is of a vehicle if it overlaps its true box by at least this IoU.
 MATCH_IOU = 0.5

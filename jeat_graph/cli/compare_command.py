@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Track again, compare, print the tables, write `compare.json` and the pictures."""
     from jeat_graph.drawing.comparison import write_plots
-    from jeat_graph.eval.compare import LAGS_S, ComparedTrack, compare
+    from jeat_graph.eval.compare import LAGS_S, compare
     from jeat_graph.eval.tables import to_json
     from jeat_graph.io.atomic import open_atomic
     from jeat_graph.io.truth_io import read_truth
@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     config, detections = recorded_inputs(folder, args.detections)
     records, smoothed = record_tracks(config, detections, progress=sys.stderr.isatty())
     comparison = compare(
-        [ComparedTrack(*record) for record in records],
+        records,
         config.sensor_names,
         truth=truth,
         smoothed=smoothed,

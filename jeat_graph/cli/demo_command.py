@@ -140,8 +140,8 @@ def _errors(
     """True boxes (M, 4) at a time of the truth that no track lies on, and tracks that lie on no true box."""
     import numpy as np
 
+    from jeat_graph.association.overlap import pairwise_iou
     from jeat_graph.eval.matching import match
-    from jeat_graph.eval.overlap import pairwise_iou
 
     truth = recording.truth
     now = truth.t == t

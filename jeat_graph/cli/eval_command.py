@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--iou", type=share, default=0.5, help="smallest IoU of a match (0.5)")
     add("--class", **_MANY, dest="classes", metavar="NAME", help="classes to be found; others are ignored")
     add("--rate", type=positive, metavar="HZ", help="frame rate of files that count frames")
-    add("--max-age", type=positive, default=0.15, metavar="S", help="how far to predict causal rows (0.15)")
+    add("--max-age", type=positive, metavar="S", help="how far to predict causal rows (0.15)")
     add("--max-gap", type=positive, metavar="S", help="join no smoothed rows further apart than this")
     add("--breakdown", action="store_true", help="also by motion and distance, and waiting times")
     add("--detections", **_MANY, metavar="FILE", help="also AP of the detections of each RUN")
@@ -40,6 +40,7 @@ def run(args: argparse.Namespace) -> int:
     """Judge, and print or write the result."""
     from jeat_graph.eval.judge import breakdown_tables, judge_runs, summary_table
     from jeat_graph.eval.load import load_run
+    from jeat_graph.eval.resampling import MAX_AGE_S
     from jeat_graph.eval.tables import to_json
 
     if len(args.runs) != len(args.gt):
@@ -48,7 +49,8 @@ def run(args: argparse.Namespace) -> int:
         load_run(path, truth, rate_hz=args.rate, classes=args.classes)
         for path, truth in zip(args.runs, args.gt, strict=True)
     ]
-    judged = judge_runs(runs, iou=args.iou, max_age_s=args.max_age, max_gap_s=args.max_gap)
+    max_age_s = MAX_AGE_S if args.max_age is None else args.max_age
+    judged = judge_runs(runs, iou=args.iou, max_age_s=max_age_s, max_gap_s=args.max_gap)
     result: dict[str, object] = {kind: one.as_dict() for kind, one in judged.items()}
     tables = [summary_table(judged)]
     if args.breakdown:

@@ -64,7 +64,7 @@ def _compare(args: argparse.Namespace) -> tuple[ComparedRun | None, str | None]:
     from jeat_graph.cli.compare_command import recorded_inputs
     from jeat_graph.data.errors import DataError
     from jeat_graph.drawing.page.figures import compared_run
-    from jeat_graph.eval.compare import ComparedTrack, compare
+    from jeat_graph.eval.compare import compare
     from jeat_graph.io.truth_io import read_truth
     from jeat_graph.tracking.records import record_tracks
 
@@ -79,7 +79,5 @@ def _compare(args: argparse.Namespace) -> tuple[ComparedRun | None, str | None]:
         return None, f"Filter against smoother is not shown: {error}."
     truth = None if args.gt is None else read_truth(args.gt, rate_hz=args.rate)
     records, smoothed = record_tracks(config, detections, progress=sys.stderr.isatty())
-    comparison = compare(
-        [ComparedTrack(*one) for one in records], config.sensor_names, truth=truth, smoothed=smoothed
-    )
+    comparison = compare(records, config.sensor_names, truth=truth, smoothed=smoothed)
     return compared_run(comparison), None

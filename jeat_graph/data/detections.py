@@ -260,6 +260,10 @@ class Detections:
             float(self.scan_t[k]), self.sensors[self.scan_sensor[k]], self.boxes[rows], self.scores[rows]
         )
 
+    def sensor_times(self, sensor: str) -> FloatArray:
+        """Times of one sensor's scans (s), not decreasing."""
+        return self.scan_t[self.scan_sensor == self.sensors.index(sensor)]
+
     def scans(self) -> Iterator[Scan]:
         """Iterate over the scans in time order."""
         return (self.scan(k) for k in range(self.num_scans))

@@ -7,16 +7,12 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
-import numpy as np
-
-from jeat_graph.data.arrays import FloatArray
-from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
+from jeat_graph.io.scans_io import SCANS
 
 RUN_JSON = "run.json"
-SCANS = "scans.csv"
 DIAGNOSTICS = "diagnostics.csv"
 TABLES = ("causal", "smoothed")
 SUFFIXES = {"csv": ".csv", "parquet": ".parquet", "motchallenge": ".mot.txt", "kitti": ".kitti.txt"}
@@ -99,33 +95,3 @@ class RunDirectory:
                 folder.rmdir()
             except OSError:
                 return
-
-
-def write_scans(detections: Detections, path: str | Path) -> None:
-    """Write the scans that a run was made from: `t, sensor, detections`, one row a scan, empty ones included.
-
-    A trajectory table cannot say that there was no track at a time; this list says that the tracker ran then.
-    """
-    from jeat_graph.io.table_writer import write_columns
-
-    names = np.asarray(detections.sensors, dtype=np.str_)
-    columns: dict[str, Any] = {
-        "t": detections.scan_t + 0.0,
-        "sensor": names[detections.scan_sensor] if detections.num_scans else np.zeros(0, dtype=np.str_),
-        "detections": np.diff(detections.scan_start),
-    }
-    write_columns(columns, path)
-
-
-def read_instants(folder: str | Path) -> FloatArray | None:
-    """Times at which the tracker of a run gave output, ascending (I,), or None if the run does not say.
-
-    Raises:
-        DataError: `scans.csv` is there but not valid.
-    """
-    from jeat_graph.io.tables import read_table
-
-    path = Path(folder) / SCANS
-    if not path.is_file():
-        return None
-    return np.unique(read_table(path, ("t", "sensor", "detections")).number("t"))

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import difflib
 
-import numpy as np
-
 from jeat_graph.config.reading import load_config, preset_names
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError, UnknownSensorError
+from jeat_graph.data.rates import median_rate_hz
 
 # A box at the edge may have its centre outside; a recording of another picture size has far more of them.
 MOST_OUTSIDE = 0.05
 # A clock that differs this much from the declared one is worth a word: rates decide about clutter and misses.
 RATE_FACTOR = 1.5
+LEAST_SCANS = 3
 
 
 def check_detections(detections: Detections, config: Config, names: str = "the detections") -> list[str]:
@@ -47,7 +47,7 @@ def _check_sensors(detections: Detections, config: Config, names: str) -> None:
         return
     name = unknown[0]
     near = difflib.get_close_matches(name, config.sensor_names, 1)
-    rate = _rate_hz(detections, detections.sensors.index(name))
+    rate = _rate_hz(detections, name)
     fitting = [p for p in preset_names() if set(detections.sensors) <= load_config(p).sensors.keys()]
     setting = "rate_hz: 20" if rate is None else f"rate_hz: {rate:.3g}"
     raise UnknownSensorError(
@@ -80,8 +80,8 @@ def _check_picture(detections: Detections, config: Config, names: str) -> list[s
 
 def _check_rates(detections: Detections, config: Config, names: str) -> list[str]:
     warnings = []
-    for k, name in enumerate(detections.sensors):
-        rate, declared = _rate_hz(detections, k), config.sensors[name].rate_hz
+    for name in detections.sensors:
+        rate, declared = _rate_hz(detections, name), config.sensors[name].rate_hz
         if rate is not None and not 1.0 / RATE_FACTOR < rate / declared < RATE_FACTOR:
             warnings.append(
                 f"{names}: sensor {name!r} scans at {rate:.3g} Hz, but is declared with {declared:g} Hz "
@@ -90,8 +90,7 @@ def _check_rates(detections: Detections, config: Config, names: str) -> list[str
     return warnings
 
 
-def _rate_hz(detections: Detections, sensor: int) -> float | None:
-    """Rate (Hz) by the median step of a sensor's clock, or None if it has fewer than three scans."""
-    times = detections.scan_t[detections.scan_sensor == sensor]
-    step = float(np.median(np.diff(times))) if len(times) > 2 else 0.0
-    return 1.0 / step if step > 0.0 else None
+def _rate_hz(detections: Detections, sensor: str) -> float | None:
+    """Rate (Hz) of a sensor's clock, or None if its scans are too few to judge it by."""
+    times = detections.sensor_times(sensor)
+    return median_rate_hz(times) if len(times) >= LEAST_SCANS else None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from contextlib import nullcontext
+from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,10 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError
-from jeat_graph.runs.directory import DIAGNOSTICS, RUN_JSON, SCANS, SUFFIXES, RunDirectory, write_scans
+from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.eval.frames import Kind
+from jeat_graph.io.scans_io import SCANS, write_scans
+from jeat_graph.runs.directory import DIAGNOSTICS, RUN_JSON, SUFFIXES, RunDirectory
 from jeat_graph.tracking.tracker import Tracker
 from jeat_graph.version import __version__
 
@@ -90,9 +93,9 @@ def write_run(
     instants = _track(detections, config, run, record, options)
     write_scans(detections, run.path(SCANS))
     rate_hz = _frame_rate(detections, config, options)
-    _write_formats(run, "causal", instants, rate_hz, options.formats)
+    _write_at_frames(run, "causal", instants, rate_hz, options.formats)
     if config.smoother.engine != "none":
-        _write_formats(run, "smoothed", instants, rate_hz, options.formats)
+        _write_at_frames(run, "smoothed", instants, rate_hz, options.formats)
     _write_record(detections, config, run, record)
 
 
@@ -103,7 +106,6 @@ def _track(
     from tqdm import tqdm
 
     from jeat_graph.io.diagnostics_io import DiagnosticsWriter
-    from jeat_graph.io.trajectories_io import TrajectoryWriter
 
     tracker = Tracker(config, diagnostics=options.diagnostics)
     hidden = not options.progress
@@ -114,8 +116,8 @@ def _track(
     smooths = config.smoother.engine != "none"
     begin = time.perf_counter()
     with (
-        TrajectoryWriter(run.path("causal.csv")) as writer,
-        TrajectoryWriter(run.path("smoothed.csv")) if smooths else nullcontext() as smoothed,
+        _TableFiles(run, "causal", options.formats) as writer,
+        _TableFiles(run, "smoothed", options.formats) if smooths else nullcontext() as smoothed,
         DiagnosticsWriter(run.path(DIAGNOSTICS)) if options.diagnostics else nullcontext() as diagnostics,
         tqdm(total=detections.num_scans, desc="track", unit="scan", disable=hidden, leave=False) as bar,
     ):
@@ -147,29 +149,37 @@ def _track(
     return instants
 
 
-def _write_formats(
-    run: RunDirectory, table_name: str, instants: FloatArray, rate_hz: float, formats: Sequence[str]
-) -> None:
-    """Write a table, which stands as CSV already, in further formats."""
-    if not formats:
-        return
-    from jeat_graph.io.trajectories_io import (
-        read_trajectories,
-        write_kitti,
-        write_motchallenge,
-        write_trajectories,
-    )
-    from jeat_graph.runs.frame_export import causal_at_frames, smoothed_at_frames
+class _TableFiles(ExitStack):
+    """The files of one table that are written while it is made: CSV, and Parquet where it is wanted."""
 
-    table = read_trajectories(run.path(table_name + ".csv"))
-    for name in formats:
-        path = run.path(table_name + SUFFIXES[name])
-        if name == "parquet":
-            write_trajectories(table, path)
-            continue
+    def __init__(self, run: RunDirectory, kind: Kind, formats: Sequence[str]) -> None:
+        from jeat_graph.io.trajectories_io import TrajectoryWriter
+
+        super().__init__()
+        names = ("csv", *(name for name in formats if name not in FRAME_FORMATS))
+        self._writers = [
+            self.enter_context(TrajectoryWriter(run.path(kind + SUFFIXES[name]))) for name in names
+        ]
+
+    def append(self, table: Trajectories) -> None:
+        for writer in self._writers:
+            writer.append(table)
+
+
+def _write_at_frames(
+    run: RunDirectory, kind: Kind, instants: FloatArray, rate_hz: float, formats: Sequence[str]
+) -> None:
+    """Write a table at the frames of formats that count them: from its CSV, as anybody would later."""
+    from jeat_graph.io.trajectories_io import read_trajectories, write_kitti, write_motchallenge
+    from jeat_graph.runs.frame_export import at_frames
+
+    wanted = [name for name in formats if name in FRAME_FORMATS]
+    if not wanted:
+        return
+    table = at_frames(read_trajectories(run.path(kind + SUFFIXES["csv"])), kind, instants, rate_hz)
+    for name in wanted:
         write = write_motchallenge if name == "motchallenge" else write_kitti
-        at_frames = causal_at_frames if table_name == "causal" else smoothed_at_frames
-        write(at_frames(table, instants, rate_hz), path, rate_hz)
+        write(table, run.path(kind + SUFFIXES[name]), rate_hz)
 
 
 def _frame_rate(detections: Detections, config: Config, options: RunOptions) -> float:

@@ -3,36 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
 
 from jeat_graph.config.schema import Config
-from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.detections import Detections
+from jeat_graph.data.measured_track import MeasuredTrack
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.smoothers.track_data import TrackData
 from jeat_graph.tracking.smoothing.priors import ErrorStates, track_data
 from jeat_graph.tracking.tracker import Tracker
 
 
-class TrackRecord(NamedTuple):
-    """One confirmed track.
-
-    Attributes:
-        track_id: identity, as in the causal table.
-        data: its prior and measurements.
-        sensor: (M,) index of the sensor of each measurement.
-        birth_sensor: index of the sensor whose detection started it.
-    """
-
-    track_id: int
-    data: TrackData
-    sensor: IntArray
-    birth_sensor: int
-
-
 def record_tracks(
     config: Config, detections: Detections, *, progress: bool = False
-) -> tuple[list[TrackRecord], Trajectories]:
+) -> tuple[list[MeasuredTrack], Trajectories]:
     """Track a recording and return the confirmed tracks with their measurements, and the smoothed table.
 
     Fragments of one vehicle stay apart here: each is compared for itself.
@@ -60,5 +42,5 @@ def record_tracks(
     for history in tracker.confirmed_histories():
         rows = history.whole()
         sensor = rows["sensor"].copy()
-        records.append(TrackRecord(history.track_id, track_data(rows, errors), sensor[1:], int(sensor[0])))
+        records.append(MeasuredTrack(history.track_id, track_data(rows, errors), sensor[1:], int(sensor[0])))
     return records, tracker.finish()

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from jeat_graph.association.overlap import pairwise_iou
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import ConfigError, UnknownSensorError
 from jeat_graph.eval.baselines import (
@@ -20,7 +21,6 @@ from jeat_graph.eval.baselines import (
 from jeat_graph.eval.baselines.inputs import suppress_overlapping
 from jeat_graph.eval.baselines.roboflow import ROBOFLOW
 from jeat_graph.eval.baselines.search import grid
-from jeat_graph.eval.overlap import pairwise_iou
 
 from .data import KITTI, kitti, make_truth
 

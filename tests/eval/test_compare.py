@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from jeat_graph.data.measured_track import MeasuredTrack
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
-from jeat_graph.eval.compare import ComparedTrack, chi2_bounds, compare, lag_name, whiteness
+from jeat_graph.eval.compare import chi2_bounds, compare, lag_name, whiteness
 from jeat_graph.eval.lagged import states_at, with_times
 from jeat_graph.smoothers.measurements import measurements
 from jeat_graph.smoothers.rts import filter_track, smooth_rts
@@ -105,12 +106,12 @@ def many(count=30, seed=4):
     tracks, truths, tables = [], [], []
     for identity in range(1, count + 1):
         data, t, x = track(rng)
-        tracks.append(ComparedTrack(identity, data, np.arange(len(data.z)) % 2, 1))
+        tracks.append(MeasuredTrack(identity, data, np.arange(len(data.z)) % 2, 1))
         centre = np.stack([x[:, 0, 0] + 40.0 * identity * 100, x[:, 1, 0]], axis=1)
         moved = np.zeros((2, 3))
         moved[0, 0] = 4000.0 * identity
         shifted = replace(data, prior_mean=data.prior_mean + moved, z=data.z + moved[:, 0])
-        tracks[-1] = ComparedTrack(identity, shifted, tracks[-1].sensor, 1)
+        tracks[-1] = MeasuredTrack(identity, shifted, tracks[-1].sensor, 1)
         motion = x.transpose(0, 2, 1).reshape(-1, 6).copy()
         motion[:, :2] = centre
         truths.append((t, np.full(len(t), identity), centre, motion))
@@ -169,7 +170,7 @@ def test_measurements_noisier_than_claimed_show_in_nis_and_nees():
     for k, one in enumerate(tracks):
         d = one.data
         shy = replace(d, r=d.r / 9.0)
-        tracks[k] = ComparedTrack(one.track_id, shy, one.sensor, one.birth_sensor)
+        tracks[k] = MeasuredTrack(one.track_id, shy, one.sensor, one.birth_sensor)
     values = compare(tracks, ("a", "b"), truth=truth, smoothed=table, lags_s=(0.0,)).values
     assert values["consistency"]["nis"] > 2.0
     assert values["errors"]["full"]["anees_position"] > 2.0

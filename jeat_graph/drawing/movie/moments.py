@@ -12,7 +12,6 @@ from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.resampling import Resampled, interpolate_to, predict_to
 
 TRAIL_S = 1.0
-_MAX_AGE_S = 0.15
 _TRUTH_REACH = 0.6  # of the truth's frame period
 _TOLERANCE_S = 1e-6
 
@@ -51,7 +50,7 @@ class TracksAt:
     ) -> None:
         self._times = times
         if kind == "causal":
-            self._found: Resampled = predict_to(table, times, max_age_s=_MAX_AGE_S, instants=instants)
+            self._found: Resampled = predict_to(table, times, instants=instants)
         else:
             self._found = interpolate_to(table, times)
         self._start = np.searchsorted(self._found.frame, np.arange(len(times) + 1))

@@ -11,6 +11,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.rates import median_rate_hz
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.drawing.movie.backgrounds import (
     Background,
@@ -73,9 +74,9 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
         DataError: a file is missing or not valid, or nothing lies in the asked times.
     """
     from jeat_graph.io.events_dsec import EventFile
+    from jeat_graph.io.scans_io import read_instants
     from jeat_graph.io.truth_io import read_truth
     from jeat_graph.io.video import open_frames
-    from jeat_graph.runs.directory import read_instants
 
     tables, request = _resolve(request)
     frames = events = None
@@ -144,9 +145,7 @@ def _has_frames(folder: Path) -> bool:
 
 
 def _rate_of(frames: VideoBackground | None) -> float | None:
-    if frames is None or len(frames.times_s) < 2:
-        return None
-    return 1.0 / float(np.median(np.diff(frames.times_s)))
+    return None if frames is None else median_rate_hz(frames.times_s)
 
 
 def _span(

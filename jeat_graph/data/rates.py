@@ -1,0 +1,20 @@
+"""The rate of a clock, from the times that it gave."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jeat_graph.data.arrays import FloatArray
+
+#: Where frames are only counted and no rate is known, any rate is as good as another; 25 Hz is a usual one.
+ANY_RATE_HZ = 25.0
+
+
+def median_rate_hz(times: FloatArray) -> float | None:
+    """One over the median step of a clock (Hz), or None where it cannot be told.
+
+    Args:
+        times: (N,) ascending (s). Of fewer than two, or where most are equal, nothing can be told.
+    """
+    step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    return 1.0 / step if step > 0.0 else None
