@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -71,13 +71,15 @@ class OverlappingPairs:
     def at_least(self, iou: FloatArray | float) -> OverlappingPairs:
         """Keep the pairs that overlap by `iou` or more."""
         keep = self.iou >= iou
-        columns = {name: getattr(self, name)[keep] for name in _PER_PAIR}
-        counts = (self.truth_count, self.track_count, self.truth_boxes_of, self.track_boxes_of)
-        return OverlappingPairs(**columns, **dict(zip(_COUNTS, counts, strict=True)))
-
-
-_PER_PAIR = ("frame", "row", "column", "truth", "track", "iou")
-_COUNTS = ("truth_count", "track_count", "truth_boxes_of", "track_boxes_of")
+        return replace(
+            self,
+            frame=self.frame[keep],
+            row=self.row[keep],
+            column=self.column[keep],
+            truth=self.truth[keep],
+            track=self.track[keep],
+            iou=self.iou[keep],
+        )
 
 
 def overlapping_pairs(frames: Frames) -> OverlappingPairs:

@@ -262,7 +262,7 @@ class Detections:
 
     def sensor_times(self, sensor: str) -> FloatArray:
         """Times of one sensor's scans (s), not decreasing."""
-        return self.scan_t[self.scan_sensor == self.sensors.index(sensor)]
+        return np.asarray(self.scan_t[self.scan_sensor == self.sensors.index(sensor)])
 
     def scans(self) -> Iterator[Scan]:
         """Iterate over the scans in time order."""
