@@ -12,6 +12,7 @@ from jeat_graph.data.errors import ConfigError
 from jeat_graph.filters.measurement import MEASUREMENT
 from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
 from jeat_graph.smoothers.gtsam.full import smooth_full
+from jeat_graph.smoothers.gtsam.linear_graph import load_gtsam
 from jeat_graph.smoothers.measurements import COINCIDENT_S, check_measurements
 from jeat_graph.smoothers.robust import robust_weights
 from jeat_graph.smoothers.rts import smooth_rts
@@ -37,14 +38,17 @@ class TrackSmoother(Protocol):
     def feed(self, measured: RecordArray) -> None:
         """Take in measurements z = p + h e + w: (M,) records, see `measurements.measurements`."""
 
-    def departed(self) -> SmoothedTrack:
-        """Return the states that have become final since the last call, and forget them."""
+    def departed(self) -> list[SmoothedTrack]:
+        """Return the states that have become final since the last call, and forget them.
+
+        Each piece comes from one solve; its last state is not final, and begins the next piece.
+        """
 
     def current(self) -> SmoothedTrack:
         """Return the states that are not final yet, given all measurements so far."""
 
-    def finish(self) -> SmoothedTrack:
-        """Return all states not yet returned by `departed`, and close."""
+    def finish(self) -> list[SmoothedTrack]:
+        """Return all states not yet returned by `departed`, in such pieces, and close."""
 
     def close(self) -> None:
         """Free everything; the smoother takes no more measurements."""
@@ -98,9 +102,9 @@ class WholeTrackSmoother:
         measured = np.concatenate([np.zeros(0, dtype=MEASUREMENT), *self._parts])
         return TrackData.from_measurements(self._prior, measured, self._memory)
 
-    def departed(self) -> SmoothedTrack:
+    def departed(self) -> list[SmoothedTrack]:
         """Return nothing: no state is final before the track ends."""
-        return SmoothedTrack.empty()
+        return []
 
     def current(self) -> SmoothedTrack:
         """Return the whole track, smoothed with all measurements so far."""
@@ -114,11 +118,11 @@ class WholeTrackSmoother:
                 self.fallbacks += 1
         return smooth_rts(data, weights)
 
-    def finish(self) -> SmoothedTrack:
-        """Return the whole track, and close."""
+    def finish(self) -> list[SmoothedTrack]:
+        """Return the whole track in one piece, and close."""
         result = self.current()
         self.close()
-        return result
+        return [result]
 
     def close(self) -> None:
         """Forget the measurements."""
@@ -128,7 +132,7 @@ class WholeTrackSmoother:
 def load_engine(engine: str) -> None:
     """Load what an engine needs, now rather than in the middle of a live run: GTSAM takes a while."""
     if engine in ("fixed-lag", "full"):
-        import gtsam  # noqa: F401
+        load_gtsam()
 
 
 def make_smoother(

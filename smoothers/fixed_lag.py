@@ -96,10 +96,16 @@ class FixedLagSmoother:
         if self._waiting >= self.chunk:
             self._absorb()
 
-    def departed(self) -> SmoothedTrack:
-        """Return the states that have become final since the last call, and forget them."""
+    def departed(self) -> list[SmoothedTrack]:
+        """Return the states that have become final since the last call, and forget them.
+
+        Returns:
+            Pieces, each of one solve. The last state of a piece is not final: it is there for what lies
+            between it and the one before, and the next piece begins with it, solved anew. Two states of
+            different solves say nothing about the time between them: they differ by what the solves knew.
+        """
         parts, self._departed = self._departed, []
-        return SmoothedTrack.concatenate(parts)
+        return parts
 
     def current(self) -> SmoothedTrack:
         """Return the states inside the window, given all measurements so far; the last is the filter's."""
@@ -107,10 +113,10 @@ class FixedLagSmoother:
         keys = self._live().key_rows()
         return self._smoothed(keys, len(keys))
 
-    def finish(self) -> SmoothedTrack:
-        """Return all states not yet returned by `departed`, and close."""
+    def finish(self) -> list[SmoothedTrack]:
+        """Return all states not yet returned by `departed`, in pieces as there, and close."""
         last = self.current()
-        result = SmoothedTrack.concatenate([self.departed(), last])
+        result = [*self.departed(), last]
         self.close()
         return result
 
@@ -259,5 +265,5 @@ class FixedLagSmoother:
         count = min(old, len(keys) - self.chunk)
         if count <= 0:
             return
-        self._departed.append(self._smoothed(keys, count))
+        self._departed.append(self._smoothed(keys, count + 1))
         window.drop_before(int(keys[count]))

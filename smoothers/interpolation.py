@@ -22,6 +22,11 @@ from jeat_graph.smoothers.transitions import motion_matrices
 _WHOLE = transition.py_func(1.0)
 _WHOLE_INVERSE = np.array([[720.0, -360.0, 60.0], [-360.0, 192.0, -36.0], [60.0, -36.0, 9.0]])
 
+#: Between states closer than this (s) the bridge of the prior is not asked: what jerk does in a
+#: millisecond is nothing beside what is known of a state, while the bridge's factors, of order 1 / T², make
+#: thousands of px/s² of the last digits of a position.
+SHORT_S = 1e-3
+
 
 @njit(cache=True)
 def bridge(since: float, span: float, q: float) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -105,6 +110,9 @@ def _between(
             out_cov[i] = cov[k1, :, :3, :3]
             continue
         k0 = k1 - 1
+        if t[k1] - t[k0] < SHORT_S:
+            _blend(t, mean, cov, k0, query[i], out_mean[i], out_cov[i])
+            continue
         L, S, noise = bridge(query[i] - t[k0], t[k1] - t[k0], q[k1])
         for a in range(2):
             # [Λ Ψ] times the joint covariance of both ends, whose mixed block is the gain's.
@@ -119,6 +127,37 @@ def _between(
                     out_cov[i, a, r, c] = 0.5 * (whole[r, c] + whole[c, r])
                 out_mean[i, a, r] = m
     return out_mean, out_cov
+
+
+@njit(cache=True)
+def _blend(
+    t: FloatArray, mean: FloatArray, cov: FloatArray, k: int, query: float, out: FloatArray, var: FloatArray
+) -> None:
+    """Write the state between the close neighbours k and k + 1: each moved there, weighed by nearness.
+
+    A mixture of two covariances F P Fᵀ has no differences in it, so that no rounding makes it indefinite.
+    """
+    share = (query - t[k]) / (t[k + 1] - t[k])
+    out[:] = 0.0
+    var[:] = 0.0
+    for side in range(2):
+        weight = share if side else 1.0 - share
+        dt = query - t[k + side]
+        half = 0.5 * dt * dt
+        for a in range(2):
+            m, P = mean[k + side, a], cov[k + side, a]
+            out[a, 0] += weight * (m[0] + dt * m[1] + half * m[2])
+            out[a, 1] += weight * (m[1] + dt * m[2])
+            out[a, 2] += weight * m[2]
+            moved = np.empty((3, 3))
+            for c in range(3):
+                moved[0, c] = P[0, c] + dt * P[1, c] + half * P[2, c]
+                moved[1, c] = P[1, c] + dt * P[2, c]
+                moved[2, c] = P[2, c]
+            for r in range(3):
+                var[a, r, 0] += weight * (moved[r, 0] + dt * moved[r, 1] + half * moved[r, 2])
+                var[a, r, 1] += weight * (moved[r, 1] + dt * moved[r, 2])
+                var[a, r, 2] += weight * moved[r, 2]
 
 
 def _extrapolate(track: SmoothedTrack, key: int, ahead: FloatArray) -> tuple[FloatArray, FloatArray]:

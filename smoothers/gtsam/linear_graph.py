@@ -10,6 +10,11 @@ from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.smoothers.gtsam.scaling import axis_blocks
 
 
+def load_gtsam() -> None:
+    """Import GTSAM now; otherwise it is imported when the first graph is made."""
+    import gtsam  # noqa: F401
+
+
 class LinearGraph:
     """A GTSAM linear factor graph on numbered states, filled from arrays of rows.
 

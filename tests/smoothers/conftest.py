@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
 
 from jeat_graph.smoothers.measurements import measurements
-from jeat_graph.smoothers.track_data import Prior, TrackData
+from jeat_graph.smoothers.track_data import Prior, SmoothedTrack, TrackData
 
 SCALE = np.array([1.0, 0.05, 0.0025])
 
@@ -170,6 +170,11 @@ def blocks(joint: np.ndarray, lag: int = 0, size: int = 3) -> np.ndarray:
     K = joint.shape[1] // size
     grid = joint.reshape(2, K, size, K, size)
     return np.stack([grid[:, k, :, k + lag] for k in range(K - lag)])
+
+
+def joined(pieces: Sequence[SmoothedTrack]) -> SmoothedTrack:
+    """One trajectory of the pieces that a smoother gives: the last state of each begins the next."""
+    return SmoothedTrack.concatenate([*(piece.select(slice(None, -1)) for piece in pieces[:-1]), pieces[-1]])
 
 
 def relative(a: np.ndarray, b: np.ndarray) -> float:

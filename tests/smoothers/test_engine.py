@@ -6,7 +6,8 @@ import pytest
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.smoothers.engine import ENGINES, make_smoother
 from jeat_graph.smoothers.rts import smooth_rts
-from jeat_graph.smoothers.track_data import SmoothedTrack
+
+from .conftest import joined
 
 #: White errors, and two sensors with a memory (s).
 COLOURS = [(), (0.3, 0.08)]
@@ -18,8 +19,8 @@ def life(engine, track, step=10, **options):
     measured, parts = track.measurements(), []
     for i in range(0, len(measured), step):
         smoother.feed(measured[i : i + step])
-        parts.append(smoother.departed())
-    return SmoothedTrack.concatenate([*parts, smoother.finish()])
+        parts += smoother.departed()
+    return joined([*parts, *smoother.finish()])
 
 
 @pytest.mark.parametrize("memory", COLOURS)
@@ -37,7 +38,7 @@ def test_every_engine_gives_the_whole_life_of_a_track(sampled, engine, memory):
 def test_a_track_that_ends_at_once_is_its_prior(sampled, engine, memory):
     track, _ = sampled(0, seconds=1.0, memory=memory)
     smoother = make_smoother(engine, track.prior._replace(t=3.0), memory=track.memory)
-    result = smoother.finish()
+    [result] = smoother.finish()
     assert result.t.tolist() == [3.0]
     assert np.allclose(result.mean[0], track.prior_mean)
     assert np.allclose(result.cov[0], track.prior_cov)
@@ -58,7 +59,7 @@ def test_whole_track_engines_take_measurements_in_any_order(sampled, memory):
     order = np.random.default_rng(0).permutation(len(track.z))
     smoother = make_smoother("rts", track.prior, memory=track.memory)
     smoother.feed(track.measurements()[order])
-    assert np.allclose(smoother.finish().mean, smooth_rts(track).mean, rtol=1e-12)
+    assert np.allclose(joined(smoother.finish()).mean, smooth_rts(track).mean, rtol=1e-12)
 
 
 def test_robust_re_weighting_is_an_option_of_the_whole_track(sampled):

@@ -45,13 +45,15 @@ class SmoothingHere:
     """Smoothing in the tracker's own process, a few tracks after each step.
 
     Done at once for all tracks, the work of a packet would make one step in fifty a hundred times as long as
-    the others. It is done by the time the next packet is half full.
+    the others. So each step does the same share of what waits, counted in measurements to be solved for: with
+    full packets all is done when the next one comes. Counted, not timed: what is done when depends on the
+    steps alone.
     """
 
     def __init__(self, config: Config) -> None:
         self._recorder = StepRecorder(config)
         self._smoothers = TrackSmoothers(config)
-        self._steps = max(config.smoother.chunk // 2, 1)
+        self._steps = max(config.smoother.chunk - 1, 1)
         self._per_step = 0
 
     def record(
@@ -88,4 +90,4 @@ class SmoothingHere:
 
     def _consume(self) -> None:
         self._smoothers.consume(self._recorder.take())
-        self._per_step = -(-self._smoothers.waiting // self._steps)
+        self._per_step = -(-self._smoothers.backlog // self._steps)

@@ -47,7 +47,7 @@ class TrackHistory:
         self._keep = keep
         self._sizes: SizeWindow | None = None
         self._fed = 0  # pieces of `measurements` that the smoother has had
-        self._tail = SmoothedTrack.empty()  # the last state handed out: rows may lie between it and the next
+        self._waiting = 0  # measurements that the smoother has set aside
         self._last = -np.inf  # time of the last measurement
 
     @property
@@ -73,6 +73,14 @@ class TrackHistory:
             self._looks.append(looks)
         self.confirmed = self.confirmed or confirmed
 
+    def to_solve(self, more: int) -> int:
+        """How many measurements the smoother will solve for when it is given so many more."""
+        if not self.confirmed:
+            return 0
+        held = self._waiting if self.smoother is not None else sum(len(rows) for rows in self.measurements)
+        waiting = more + held
+        return waiting if waiting >= self._config.smoother.chunk else 0
+
     def feed(self) -> None:
         """Give the smoother what waits, if the track is confirmed."""
         if not self.confirmed or self._fed == len(self.measurements):
@@ -97,38 +105,33 @@ class TrackHistory:
             self.measurements = []
         if len(rows):
             self.smoother.feed(rows)
+            self._waiting += len(rows)
+            if self._waiting >= self._config.smoother.chunk:
+                self._waiting = 0
             self._sizes.append(rows)
 
-    def departed(self) -> Trajectories | None:
-        """Return the rows that have become final since the last call, or None."""
+    def departed(self) -> list[Trajectories]:
+        """Return the rows that have become final since the last call."""
         if self.smoother is None:
-            return None
-        piece = self.smoother.departed()
-        if not len(piece):
-            return None
-        assert self._sizes is not None
-        end = float(piece.t[-1])
-        rows = self._rows(piece, end)
-        self._sizes.advance(end)
-        self._tail = piece.select(slice(-1, None))
-        looks = self.looks
-        self._looks = [looks.take(slice(int(np.searchsorted(looks.t, end, side="right")), None))]
-        return rows
+            return []
+        return [rows for piece in self.smoother.departed() for rows in self._final_rows(piece)]
 
-    def current(self) -> tuple[Trajectories | None, Trajectories | None]:
+    def current(self) -> tuple[list[Trajectories], list[Trajectories]]:
         """Take in all that waits; return the rows that are final then, as `departed`, and all others."""
         self.feed()
         if self.smoother is None:
-            return None, None
+            return [], []
         piece = self.smoother.current()
         final = self.departed()
         return final, self._rows(piece, np.inf)
 
-    def finish(self) -> Trajectories | None:
-        """Return all rows not returned yet, and free the smoother; None for a tentative track."""
+    def finish(self) -> list[Trajectories]:
+        """Return all rows not returned yet, and free the smoother; none for a tentative track."""
         if self.smoother is None:
-            return None
-        return self._rows(self.smoother.finish(), np.inf)
+            return []
+        *pieces, last = self.smoother.finish()
+        final = [rows for piece in pieces for rows in self._final_rows(piece)]
+        return final + self._rows(last, np.inf)
 
     def whole(self) -> RecordArray:
         """Return all measurements (M,), the birth first; needs `keep`."""
@@ -140,15 +143,26 @@ class TrackHistory:
             self.smoother.close()
         self.measurements = []
 
-    def _rows(self, piece: SmoothedTrack, end: float) -> Trajectories | None:
-        """Rows of the steps up to time `end` (s); after the last measurement only where the track is held."""
+    def _final_rows(self, piece: SmoothedTrack) -> list[Trajectories]:
+        """Rows of the steps before the last state of a piece, with which the next one begins."""
         assert self._sizes is not None
-        path = SmoothedTrack.concatenate([self._tail, piece]) if len(self._tail) else piece
+        rows, end = self._rows(piece, float(piece.t[-1])), float(piece.t[-2])
+        self._sizes.advance(end)
         looks = self.looks
-        chosen = (looks.t <= end) & ((looks.t <= self._last + COINCIDENT_S) | looks.held)
+        self._looks = [looks.take(slice(int(np.searchsorted(looks.t, piece.t[-1])), None))]
+        return rows
+
+    def _rows(self, piece: SmoothedTrack, end: float) -> list[Trajectories]:
+        """Rows of the steps before time `end` (s), those after the last measurement only where it is held."""
+        assert self._sizes is not None
+        looks = self.looks
+        chosen = (looks.t < end) & ((looks.t <= self._last + COINCIDENT_S) | looks.held)
         # Of two steps at one time the later one counts.
         chosen[:-1] &= looks.t[1:] > looks.t[:-1]
-        if not len(path) or not chosen.any():
-            return None
+        if not chosen.any():
+            return []
         existence = looks.hindsight()[chosen]
-        return rows_of(self.track_id, path, self._sizes.smooth(), looks.take(chosen), existence, self._config)
+        rows = rows_of(
+            self.track_id, piece, self._sizes.smooth(), looks.take(chosen), existence, self._config
+        )
+        return [rows]

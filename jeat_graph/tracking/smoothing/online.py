@@ -1,15 +1,15 @@
-"""The smoothers of all tracks of a running tracker: one a track, made with it and gone with it."""
+"""Smoothing of all tracks of a running tracker, each by a smoother of its own."""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from jeat_graph.config.schema import Config
-from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, RecordArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.smoothers.engine import load_engine
 from jeat_graph.tracking.smoothing.history import TrackHistory
@@ -23,32 +23,67 @@ from jeat_graph.tracking.smoothing.waiting import WaitingRows
 WHOLE = ("full", "rts")
 
 
-class _Share(NamedTuple):
-    """What a packet holds of one track.
+_SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
+
+#: What handing a share of a packet to a track costs, in measurements solved for.
+_HANDING = 4
+
+
+class _Sorted(NamedTuple):
+    """A packet's steps and measurements, those of each track together and in order of time.
 
     Attributes:
-        looks: its steps that the table has rows at.
-        confirmed: whether the track was confirmed in any of them.
-        rows: (M,) measurements, or None.
+        looks: (L,) steps that the table has rows at.
+        confirmed: (L',) whether the track was confirmed, in all steps.
+        updates: (M,) measurements.
     """
 
     looks: Looks
-    confirmed: bool
-    rows: RecordArray | None
+    confirmed: BoolArray
+    updates: RecordArray
+
+
+class _Share(NamedTuple):
+    """What a packet holds of one track; cut out of it only when its turn comes.
+
+    Attributes:
+        packet: the packet.
+        looks: its part of `packet.looks`.
+        steps: its part of `packet.confirmed`.
+        updates: its part of `packet.updates`.
+        last: whether the track ended in the packet.
+    """
+
+    packet: _Sorted
+    looks: slice
+    steps: slice
+    updates: slice
+    last: bool
+
+    @property
+    def count(self) -> int:
+        """How many measurements it holds."""
+        return int(self.updates.stop - self.updates.start)
+
+    @property
+    def oldest(self) -> float:
+        """Time of its first row (s), or infinity."""
+        part = self.looks
+        return float(self.packet.looks.t[part.start]) if part.stop > part.start else np.inf
 
     def give_to(self, history: TrackHistory) -> None:
         """Hand it to the track's history."""
-        history.watch(self.looks, self.confirmed)
-        if self.rows is not None:
-            history.take(self.rows)
+        history.watch(self.packet.looks.take(self.looks), bool(self.packet.confirmed[self.steps].any()))
+        if self.count:
+            history.take(self.packet.updates[self.updates])
 
 
 class TrackSmoothers:
     """Turns the steps of a tracker into smoothed trajectories behind it.
 
     Of tentative tracks the measurements are only kept; confirmed ones have a smoother, which takes the
-    tentative start first. A track that ends frees all it held. Of merged tracks the survivor keeps its own
-    measurements only: a confirmed one in fifty ends so.
+    tentative start first. A track that ends frees all it held when its last share has been worked on. Of
+    merged tracks the survivor keeps its own measurements only: a confirmed one in fifty ends so.
 
     The filter measures the velocity of standing tracks as zero; the smoothers do not. What they share is the
     lower jerk of a standing track.
@@ -88,72 +123,65 @@ class TrackSmoothers:
         self._scan_t: list[FloatArray] = []
 
     def consume(self, packet: Packet | None) -> None:
-        """Set the steps of a packet before the tracks, for `work` to do, and end the tracks that are over."""
+        """Set the steps of a packet before the tracks, for `work` to do."""
         if packet is None:
             return
         if self._stitch:
             self._scan_t.append(packet.t[packet.wanted])
-        rows = dict(_split_updates(packet))
-        for track_id, looks, confirmed in self._split_looks(packet):
+        ended = set(packet.ended)
+        for track_id, share in self._split(packet, ended):
             if track_id not in self._histories:
                 history = TrackHistory(track_id, self._config, self._errors, keep=self._stitch)
                 self._histories[track_id] = history
-            share = _Share(looks, confirmed, rows.get(track_id))
             self._shares.setdefault(track_id, deque()).append(share)
             self._to_do.append(track_id)
-        for track_id in packet.ended:
-            self._end_track(track_id)
         if self._whole:
             self.work()
 
     @property
-    def waiting(self) -> int:
-        """How many shares of packets wait to be worked on."""
-        return sum(len(shares) for shares in self._shares.values())
+    def backlog(self) -> int:
+        """What the shares that wait will cost, in measurements to be solved for."""
+        return sum(
+            _HANDING * len(shares) + self._histories[track_id].to_solve(sum(share.count for share in shares))
+            for track_id, shares in self._shares.items()
+        )
 
     def work(self, most: int | None = None) -> None:
-        """Work on at most so many shares, all if not given: feed the smoothers, collect final rows.
+        """Work on shares of about so much cost (`backlog`), on all if not given.
 
         Each track's shares are worked on one by one and in their order, so that it does not matter when.
         """
-        while self._to_do and most != 0:
+        while self._to_do and (most is None or most > 0):
             track_id = self._to_do.popleft()
-            if track_id not in self._shares:
-                continue  # it has ended, and all it had waiting was done then
-            self._work_on(track_id)
-            most = None if most is None else most - 1
+            cost = self._work_on(track_id)
+            most = None if most is None else most - cost
 
-    def _work_on(self, track_id: int) -> None:
-        """Work on the oldest share of a track."""
+    def _work_on(self, track_id: int) -> int:
+        """Work on the oldest share of a track: its smoother takes it in, and what is final is collected.
+
+        Returns:
+            What it cost.
+        """
         shares, history = self._shares[track_id], self._histories[track_id]
-        shares.popleft().give_to(history)
+        share = shares.popleft()
         if not shares:
             del self._shares[track_id]
-        if not self._whole:
+        cost = _HANDING + history.to_solve(share.count)
+        share.give_to(history)
+        if share.last:
+            del self._histories[track_id]
+            if self._stitch and history.confirmed:
+                self._done.append(history)
+            else:
+                self._end(history)
+        elif not self._whole:
             history.feed()
             self._collect(history.departed())
-
-    def _end_track(self, track_id: int) -> None:
-        """End a track: all its shares at once, of the last only what its smoother takes with the end."""
-        shares = self._shares.get(track_id, deque())
-        while len(shares) > 1:
-            self._work_on(track_id)
-        history = self._histories.pop(track_id)
-        for last in self._shares.pop(track_id, deque()):
-            last.give_to(history)
-        if self._stitch and history.confirmed:
-            self._done.append(history)
-        else:
-            self._end(history)
+        return cost
 
     def drain(self) -> Trajectories:
         """Return, and forget, the final rows that no later ones can precede, by time and identity."""
-        waiting = [
-            float(share.looks.t[0])
-            for shares in self._shares.values()
-            for share in shares
-            if len(share.looks)
-        ]
+        waiting = [share.oldest for shares in self._shares.values() for share in shares]
         oldest = [history.oldest for history in (*self._histories.values(), *self._done)]
         horizon = min(oldest + waiting, default=np.inf)
         table = self._gathered([])
@@ -170,7 +198,7 @@ class TrackSmoothers:
             if history.confirmed:
                 final, rows = history.current()
                 self._collect(final)
-                now += [rows] if rows is not None else []
+                now += rows
         return self._gathered(now)
 
     def finish(self) -> Trajectories:
@@ -208,8 +236,8 @@ class TrackSmoothers:
             self.too_late += history.smoother.too_late
         history.close()
 
-    def _collect(self, rows: Trajectories | None) -> None:
-        if rows is not None:
+    def _collect(self, tables: list[Trajectories]) -> None:
+        for rows in tables:
             self._ready.append(rows)
 
     def _gathered(self, more: list[Trajectories]) -> Trajectories:
@@ -220,36 +248,23 @@ class TrackSmoothers:
         table = Trajectories.concatenate(parts)
         return table.take(np.lexsort((table.track_id, table.t)))
 
-    def _split_looks(self, packet: Packet) -> Iterator[tuple[int, Looks, bool]]:
-        """The steps of a packet, track by track, and whether the track was confirmed in any."""
+    def _split(self, packet: Packet, ended: set[int]) -> Iterator[tuple[int, _Share]]:
+        """The share of each track in a packet, by identity."""
         order = np.argsort(packet.ids, kind="stable")
+        rows = order if self._rate_hz <= 0.0 else order[np.repeat(packet.wanted, packet.counts)[order]]
         looks = Looks(
-            np.repeat(packet.t, packet.counts)[order],
-            packet.existence[order],
-            packet.used[order],
-            packet.held[order],
+            np.repeat(packet.t, packet.counts)[rows],
+            packet.existence[rows],
+            packet.used[rows],
+            packet.held[rows],
         )
-        confirmed, wanted = packet.confirmed[order], np.repeat(packet.wanted, packet.counts)[order]
-        for track_id, part in _groups(packet.ids[order]):
-            piece = looks.take(part)
-            rows = piece if self._rate_hz <= 0.0 else piece.take(wanted[part])
-            yield track_id, rows, bool(confirmed[part].any())
-
-
-def _split_updates(packet: Packet) -> Iterator[tuple[int, RecordArray]]:
-    """The measurements of a packet, track by track."""
-    owner = packet.updates["track_id"]
-    order = np.argsort(owner, kind="stable")
-    table = packet.updates[order]
-    for track_id, part in _groups(owner[order]):
-        yield track_id, table[part]
-
-
-def _groups(owner: IntArray) -> Iterator[tuple[int, slice]]:
-    """Runs of equal values in an ascending array (N,), with the value of each."""
-    if not len(owner):
-        return
-    start = np.flatnonzero(np.diff(owner, prepend=-1))
-    end = np.append(start[1:], len(owner))
-    for a, b in zip(start.tolist(), end.tolist(), strict=True):
-        yield int(owner[a]), slice(a, b)
+        updates = packet.updates[np.argsort(packet.updates["track_id"], kind="stable")]
+        whole = _Sorted(looks, packet.confirmed[order], updates)
+        # A track that ended between two packets has no step in this one.
+        ids = np.union1d(packet.ids, np.array(packet.ended, dtype=np.int64))
+        owners = packet.ids[rows], packet.ids[order], updates["track_id"]
+        parts = [
+            zip(*(np.searchsorted(o, ids, side).tolist() for side in _SIDES), strict=True) for o in owners
+        ]
+        for track_id, *bounds in zip(ids.tolist(), *parts, strict=True):
+            yield track_id, _Share(whole, *(slice(*one) for one in bounds), last=track_id in ended)

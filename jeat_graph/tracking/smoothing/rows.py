@@ -10,7 +10,7 @@ from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.smoothers.interpolation import interpolate
 from jeat_graph.smoothers.size import SmoothedSize
-from jeat_graph.smoothers.track_data import SmoothedTrack
+from jeat_graph.smoothers.track_data import COINCIDENT_S, SmoothedTrack
 from jeat_graph.tracking.smoothing.looks import Looks
 
 
@@ -38,7 +38,8 @@ def rows_of(
     """
     t = np.minimum(looks.t, path.t[-1])
     mean, cov = interpolate(path, t)
-    held = looks.t > path.t[-1]
+    # Within a microsecond of the last state a detection shares it: the track is seen there, not held.
+    held = looks.t - path.t[-1] > COINCIDENT_S
     mean[held, :, 1:] = 0.0
     size = sizes.at(np.minimum(t, sizes.t[-1]))
     boxes, visible = _boxes(mean, size, config.image.width, config.image.height, config.output.clip)
