@@ -1,0 +1,96 @@
+"""What README and documentation promise: blocks of code run, commands are understood, links lead somewhere."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from jeat_graph.cli.main import COMMANDS, build_parser, main
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", *sorted(p for p in (ROOT / "docs").rglob("*.md") if "_build" not in p.parts)]
+GENERATED = {"commands.md", "configuration.md"}
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    """Blocks of code of one language in a page, in their order."""
+    return re.findall(rf"```{language}\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+
+
+def commands(page: Path, languages: tuple[str, ...] = ("sh", "text")) -> list[list[str]]:
+    """Words of the `jeat-graph` commands in a page's blocks, comments, pipes and brackets left out."""
+    found = []
+    for language in languages:
+        for block in blocks(page, language):
+            for line in block.replace("\\\n", " ").splitlines():
+                words = (
+                    shlex.split(line.split(" | ")[-1], comments=True)
+                    if line.startswith("jeat-graph ")
+                    else []
+                )
+                found += [words[1:]] if words else []
+    return found
+
+
+def name(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+PYTHON = [
+    pytest.param(block, id=f"{name(page)}-{k}")
+    for page in PAGES
+    for k, block in enumerate(blocks(page, "python"))
+]
+SHELL = [
+    pytest.param(words, id=f"{name(page)}: {' '.join(words)}"[:90])
+    for page in PAGES
+    if page.name not in GENERATED
+    for words in commands(page)
+]
+
+
+@pytest.mark.parametrize("block", PYTHON)
+def test_blocks_of_python_run(block, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    exec(compile(block, "block", "exec"), {"__name__": "block"})
+
+
+def test_the_readme_tracks_a_vehicle_in_a_few_lines(capsys):
+    exec(compile(blocks(ROOT / "README.md", "python")[0], "README", "exec"), {})
+    shown = capsys.readouterr().out
+    assert shown.startswith("Trajectories: 1 rows, 1 track, 1.95 to 1.95 s")
+    assert "track 1 at [717.0 300.0 80.0 60.0] px" in shown
+
+
+@pytest.mark.parametrize("words", SHELL)
+def test_commands_are_understood(words):
+    if words[0].startswith("-") or words[0].isupper():
+        pytest.skip("shows the command itself")
+    assert words[0] in COMMANDS
+    args = build_parser(words[0]).parse_args([word for word in words if word != "…"])
+    assert args.command == words[0]
+
+
+def test_the_tutorial_runs_from_beginning_to_end(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    steps = commands(ROOT / "docs" / "tutorial.md", ("sh",))
+    assert [words[0] for words in steps] == ["simulate", "track", "eval", "compare", "report", "render"]
+    for words in steps:
+        assert main(words) == 0, " ".join(words)
+    assert (tmp_path / "run.mp4").stat().st_size > 0
+    assert (tmp_path / "run.html").stat().st_size > 0
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_links_lead_to_files(page):
+    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    targets = re.findall(r"\]\((?!http|#)([^)#]+)(?:#[^)]*)?\)", text)
+    missing = [t for t in targets if not (page.parent / t).is_file() and Path(t).name not in GENERATED]
+    assert missing == []
+
+
+def test_the_readme_is_short():
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 150
