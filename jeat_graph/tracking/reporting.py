@@ -6,14 +6,19 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.association.boxes import track_boxes, visible_fraction
-from jeat_graph.config.kernel_form import Settings
+from jeat_graph.config.schema import ImageConfig, OutputConfig
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.tracking.state import TrackArrays
 
 
 @njit(cache=True)
 def report(
-    tracks: TrackArrays, num_tracks: int, t: float, settings: Settings
+    tracks: TrackArrays,
+    num_tracks: int,
+    t: float,
+    image: ImageConfig,
+    output: OutputConfig,
+    by_existence: bool,
 ) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray, FloatArray, IntArray]:
     """Collect the confirmed tracks that are alive now.
 
@@ -21,14 +26,15 @@ def report(
         tracks: state of all tracks.
         num_tracks: number of living ones.
         t: time of the state (s).
-        settings: numbers and flags of the configuration.
+        image: the kernels' form of that section; two sections are handed over faster than all.
+        output: the same.
+        by_existence: whether tracks live by their probability of existence.
 
     Returns:
         Columns of `Trajectories`: t (R,), track_id (R,), boxes (R, 4), existence (R,), mean (R, 6),
         var (R, 6), used (R,).
     """
     boxes = track_boxes(tracks.mean[:num_tracks], tracks.size_mean[:num_tracks])
-    image, output = settings.image, settings.output
     width, height = image.width, image.height
     rows = np.empty(num_tracks, dtype=np.int64)
     count = 0
@@ -38,7 +44,7 @@ def report(
         gap = t - tracks.t_update[i]
         if gap > output.max_gap_s and not tracks.standing[i]:
             continue
-        if settings.lifecycle.by_existence and tracks.existence[i] < output.min_existence:
+        if by_existence and tracks.existence[i] < output.min_existence:
             continue
         if output.clip:
             visible = visible_fraction(boxes[i], width, height)

@@ -178,7 +178,9 @@ class Tracker:
     def causal(self) -> Trajectories:
         """Return the tracks that are reported now, as the last step did."""
         t = 0.0 if self._t is None else self._t
-        columns = report(self._tracks, self._num_tracks, t, self._model.settings)
+        settings = self._model.settings
+        by_existence = settings.lifecycle.by_existence
+        columns = report(self._tracks, self._num_tracks, t, settings.image, settings.output, by_existence)
         return Trajectories(*columns, sensors=self.sensor_names)
 
     def last_updates(self) -> Diagnostics:
