@@ -1,4 +1,4 @@
-"""What README and documentation promise: blocks of code run, commands are understood, links lead somewhere."""
+"""What README and documentation promise: code runs, commands are understood, links lead somewhere."""
 
 from __future__ import annotations
 
