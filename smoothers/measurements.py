@@ -88,14 +88,14 @@ def _all_valid(measured: RecordArray, errors: int) -> bool:
     """Whether all is finite and in range; compiled, as live callers feed one row at a time."""
     for i in range(len(measured)):
         one = measured[i]
-        if not (np.isfinite(one.t) and np.isfinite(one.jerk) and one.jerk > 0.0):
+        if not (np.isfinite(one["t"]) and np.isfinite(one["jerk"]) and one["jerk"] > 0.0):
             return False
-        if one.error < -1 or one.error >= errors:
+        if one["error"] < -1 or one["error"] >= errors:
             return False
         for axis in range(2):
-            if not (np.isfinite(one.z[axis]) and np.isfinite(one.r[axis]) and one.r[axis] > 0.0):
+            if not (np.isfinite(one["z"][axis]) and np.isfinite(one["r"][axis]) and one["r"][axis] > 0.0):
                 return False
-            if not np.isfinite(one.lever[axis]):
+            if not np.isfinite(one["lever"][axis]):
                 return False
     return True
 

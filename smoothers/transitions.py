@@ -20,7 +20,7 @@ from jeat_graph.data.arrays import FloatArray
 from jeat_graph.filters.motion import process_noise, transition
 
 # Process noise of white jerk is q² Δ u_i u_j times this, with u = (Δ², Δ, 1) (paper eq. 2).
-_UNIT_NOISE = process_noise.py_func(1.0, 1.0)
+_UNIT_NOISE = np.array([[1 / 20, 1 / 8, 1 / 6], [1 / 8, 1 / 3, 1 / 2], [1 / 6, 1 / 2, 1.0]])
 
 
 @njit(cache=True)

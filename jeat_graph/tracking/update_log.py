@@ -65,23 +65,23 @@ def log_update(
     if k >= len(log.rows):
         return
     row, s = log.rows[k], batch.sensor[j]
-    row.t = batch.t
-    row.track_id = track_id
-    row.sensor = s
-    row.birth = 0
-    row.error = sensors.error[s]
-    row.jerk = max(jerk, _LEAST_JERK)
-    row.rate_var = 0.0
-    row.nis = math.nan
-    row.scale = 1.0
+    row["t"] = batch.t
+    row["track_id"] = track_id
+    row["sensor"] = s
+    row["birth"] = 0
+    row["error"] = sensors.error[s]
+    row["jerk"] = max(jerk, _LEAST_JERK)
+    row["rate_var"] = 0.0
+    row["nis"] = math.nan
+    row["scale"] = 1.0
     for axis in range(2):
-        row.z[axis] = batch.z[j, axis]
-        row.r[axis] = R[axis]
-        row.lever[axis] = coloured_std[axis]
-        row.log_size[axis] = batch.log_size[j, axis]
-        row.size_var[axis] = sensors.size_var[s, axis]
-        row.velocity_var[axis] = 0.0
-        row.acceleration_var[axis] = 0.0
+        row["z"][axis] = batch.z[j, axis]
+        row["r"][axis] = R[axis]
+        row["lever"][axis] = coloured_std[axis]
+        row["log_size"][axis] = batch.log_size[j, axis]
+        row["size_var"][axis] = sensors.size_var[s, axis]
+        row["velocity_var"][axis] = 0.0
+        row["acceleration_var"][axis] = 0.0
     log.count[0] = k + 1
 
 
@@ -97,8 +97,8 @@ def log_innovation(log: UpdateLog, nis: float, scale: float) -> None:
     k = log.count[0] - 1
     if k < 0:
         return
-    log.rows[k].nis = nis
-    log.rows[k].scale = scale
+    log.rows[k]["nis"] = nis
+    log.rows[k]["scale"] = scale
 
 
 @njit(cache=True)
@@ -117,8 +117,8 @@ def log_birth(
     if k < 0:
         return
     row = log.rows[k]
-    row.birth = 1
-    row.rate_var = rate_var
+    row["birth"] = 1
+    row["rate_var"] = rate_var
     for axis in range(2):
-        row.velocity_var[axis] = velocity_var[axis]
-        row.acceleration_var[axis] = acceleration_var[axis]
+        row["velocity_var"][axis] = velocity_var[axis]
+        row["acceleration_var"][axis] = acceleration_var[axis]

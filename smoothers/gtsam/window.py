@@ -14,7 +14,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.smoothers.gtsam.linear_graph import LinearGraph, zero_values
-from jeat_graph.smoothers.gtsam.scaling import axis_blocks, unscale_cov, unscale_mean
+from jeat_graph.smoothers.gtsam.scaling import unscale_mean
 
 #: Timestamps as GTSAM sees them: with a lag of one, a state at -2 is out of the window.
 _STAYS, _LEAVES, _LAG = 0.0, -2.0, 1.0
@@ -62,13 +62,6 @@ class GtsamWindow:
         if not np.isfinite(vectors).all():
             raise RuntimeError("GTSAM gave a mean that is not finite")
         return unscale_mean(vectors, reference)
-
-    def cov(self, key: int) -> FloatArray:
-        """Return the marginal covariance (2, n, n) of one state of the window."""
-        blocks = axis_blocks(self._smoother.marginalCovariance(key))
-        if not np.isfinite(blocks).all():
-            raise RuntimeError("GTSAM gave a covariance that is not finite")
-        return unscale_cov(blocks)
 
     def factor_slots(self) -> int:
         """Return how many factor slots GTSAM holds; it must not grow with the length of the track."""

@@ -41,19 +41,23 @@ class Smoothing(Protocol):
         """Return what the confirmed tracks took in so far."""
 
 
+#: A step in process does one part in so many packets of steps of all that waits.
+_LEVELLING = 2
+
+
 class SmoothingHere:
     """Smoothing in the tracker's own process, a few tracks after each step.
 
     Done at once for all tracks, the work of a packet would make one step in fifty a hundred times as long as
-    the others. So each step does the same share of what waits, counted in measurements to be solved for: with
-    full packets all is done when the next one comes. Counted, not timed: what is done when depends on the
-    steps alone.
+    the others. So each step does the same share of what waits, counted in measurements to be solved for, and
+    such a share that the waves of tracks that were born together are levelled. Counted, not timed: what is
+    done when depends on the steps alone.
     """
 
     def __init__(self, config: Config) -> None:
         self._recorder = StepRecorder(config)
         self._smoothers = TrackSmoothers(config)
-        self._steps = max(config.smoother.chunk - 1, 1)
+        self._steps = _LEVELLING * max(config.smoother.chunk, 1)
         self._per_step = 0
 
     def record(
