@@ -61,7 +61,7 @@ class _Share(NamedTuple):
     last: bool
 
     @property
-    def count(self) -> int:
+    def taken(self) -> int:
         """How many measurements it holds."""
         return int(self.updates.stop - self.updates.start)
 
@@ -74,7 +74,7 @@ class _Share(NamedTuple):
     def give_to(self, history: TrackHistory) -> None:
         """Hand it to the track's history."""
         history.watch(self.packet.looks.take(self.looks), bool(self.packet.confirmed[self.steps].any()))
-        if self.count:
+        if self.taken:
             history.take(self.packet.updates[self.updates])
 
 
@@ -142,7 +142,7 @@ class TrackSmoothers:
     def backlog(self) -> int:
         """What the shares that wait will cost, in measurements to be solved for."""
         return sum(
-            _HANDING * len(shares) + self._histories[track_id].to_solve(sum(share.count for share in shares))
+            _HANDING * len(shares) + self._histories[track_id].to_solve(sum(share.taken for share in shares))
             for track_id, shares in self._shares.items()
         )
 
@@ -166,7 +166,7 @@ class TrackSmoothers:
         share = shares.popleft()
         if not shares:
             del self._shares[track_id]
-        cost = _HANDING + history.to_solve(share.count)
+        cost = _HANDING + history.to_solve(share.taken)
         share.give_to(history)
         if share.last:
             del self._histories[track_id]
@@ -266,5 +266,6 @@ class TrackSmoothers:
         parts = [
             zip(*(np.searchsorted(o, ids, side).tolist() for side in _SIDES), strict=True) for o in owners
         ]
-        for track_id, *bounds in zip(ids.tolist(), *parts, strict=True):
-            yield track_id, _Share(whole, *(slice(*one) for one in bounds), last=track_id in ended)
+        for track_id, looked, stepped, updated in zip(ids.tolist(), *parts, strict=True):
+            bounds = slice(*looked), slice(*stepped), slice(*updated)
+            yield track_id, _Share(whole, *bounds, track_id in ended)
