@@ -154,6 +154,7 @@ def calibrate(
     base: Config | PathLike = "default",
     *,
     image: tuple[float, float] | None = None,
+    tuned: bool = True,
 ) -> Config:
     """Estimate a configuration from recordings.
 
@@ -162,6 +163,8 @@ def calibrate(
         truth: the truth of each; without it confirmed tracks take its place.
         base: where all that is not estimated comes from.
         image: width and height of the picture (px), if not those of `base`.
+        tuned: with truth, also choose by tracking the recordings what matched detections cannot tell; takes
+            minutes where all else takes seconds.
 
     Returns:
         The configuration; `save_config` writes it.
@@ -182,8 +185,8 @@ def calibrate(
     if len(truths) != len(recordings):
         raise DataError(f"{len(recordings)} recordings and {len(truths)} truths given; give one for each")
     pairs = list(zip(recordings, truths, strict=True))
-    config, _ = tune(fit(pairs, start), pairs)
-    return config
+    config = fit(pairs, start)
+    return tune(config, pairs)[0] if tuned else config
 
 
 def simulate(

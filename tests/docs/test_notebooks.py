@@ -1,0 +1,39 @@
+"""The notebooks of the documentation run from beginning to end."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+NOTEBOOKS = sorted((Path(__file__).parents[2] / "docs" / "notebooks").glob("*.ipynb"))
+LARGEST_BYTES = 60_000
+
+
+def test_there_are_three():
+    assert [path.stem for path in NOTEBOOKS] == [
+        "calibrate-your-sensors",
+        "filter-and-smoother",
+        "first-steps",
+    ]
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_every_cell_runs(path, tmp_path, monkeypatch):
+    pytest.importorskip("supervision")
+    mpl = pytest.importorskip("matplotlib")
+    mpl.use("Agg")
+    monkeypatch.chdir(tmp_path)
+    space: dict[str, object] = {"__name__": "notebook"}
+    for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
+        if cell["cell_type"] == "code":
+            exec(compile("".join(cell["source"]), path.name, "exec"), space)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_outputs_are_kept_and_small(path):
+    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+    assert any(cell.get("outputs") for cell in cells)
+    assert not any(output["output_type"] == "error" for cell in cells for output in cell.get("outputs", []))
+    assert path.stat().st_size < LARGEST_BYTES
