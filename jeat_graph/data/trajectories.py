@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.data.arrays import FloatArray, IntArray, TextArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, TextArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.views import TrajectoryViews
 
@@ -114,7 +114,7 @@ class GroundTruth:
     object_id: IntArray
     boxes: FloatArray
     motion: FloatArray | None
-    ignore: npt.NDArray[np.bool_]
+    ignore: BoolArray
     classes: TextArray | None = None
     distance: FloatArray | None = None
     frames: FloatArray | None = None
