@@ -22,6 +22,8 @@ COMMANDS = (
     "eval",
     "compare",
     "count",
+    "export",
+    "view",
     "render",
     "report",
     "calibrate",

@@ -150,7 +150,7 @@ def write_motchallenge(table: Trajectories, path: str | Path, rate_hz: float) ->
     Raises:
         DataError: the rate is not positive, or a time lies before frame 1.
     """
-    frame, kept = _by_frame(table, path, rate_hz)
+    frame, kept = by_frame(table, path, rate_hz)
     boxes = round_decimals(kept.boxes, _PX_DECIMALS)
     columns: dict[str, Any] = {"frame": frame + motchallenge.FIRST_FRAME, "id": kept.track_id}
     columns |= {name: boxes[:, k] for k, name in enumerate(BOX)}
@@ -171,7 +171,7 @@ def write_kitti(
     """
     if object_type.split() != [object_type]:
         raise DataError(f"a KITTI object type is one word, not {object_type!r}", path)
-    frame, kept = _by_frame(table, path, rate_hz)
+    frame, kept = by_frame(table, path, rate_hz)
     n = len(kept)
     edges = np.concatenate([kept.boxes[:, :2], kept.boxes[:, :2] + kept.boxes[:, 2:]], axis=1)
     edges = round_decimals(edges, _PX_DECIMALS)
@@ -186,7 +186,7 @@ def write_kitti(
     write_columns(columns, path, header=False, delimiter=" ")
 
 
-def _by_frame(table: Trajectories, path: str | Path, rate_hz: float) -> tuple[IntArray, Trajectories]:
+def by_frame(table: Trajectories, path: str | Path, rate_hz: float) -> tuple[IntArray, Trajectories]:
     """Return frames (from 0) and rows, sorted by frame and id, the last row of each pair only."""
     frame = np.rint(table.t * check_rate(rate_hz, path)).astype(np.int64)
     if (frame < 0).any():

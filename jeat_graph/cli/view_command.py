@@ -1,0 +1,26 @@
+"""`jeat-graph view`: open a run in the viewer rerun."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+HELP = "open a run in the viewer rerun (extra `rerun`): boxes, uncertainty and sensors on timelines"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument("source", metavar="RUN", help="run directory or trajectory table")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Open the viewer; returns when all is sent."""
+    from jeat_graph.drawing.rerun_log import log_run, rerun_module
+    from jeat_graph.eval.load import tables_of
+    from jeat_graph.io.trajectories_io import read_trajectories
+
+    rerun_module()
+    files = tables_of(Path(args.source))
+    tables = {kind: read_trajectories(file) for kind, file in files.items()}
+    log_run(tables, Path(args.source).resolve().name)
+    return 0

@@ -1,0 +1,85 @@
+"""`jeat-graph export` and `view`."""
+
+from __future__ import annotations
+
+import zipfile
+
+import numpy as np
+import pytest
+
+from jeat_graph.cli.main import main
+from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.io.trajectories_io import write_trajectories
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Two vehicles over five frames at 10 Hz, one with a gap."""
+    t, ids = np.tile(np.arange(5) * 0.1, 2), np.repeat([3, 8], 5)
+    keep = ~((ids == 8) & (np.arange(10) == 7))
+    t, ids = t[keep], ids[keep]
+    mean = np.zeros((9, 6))
+    mean[:, 0], mean[:, 1], mean[:, 2] = 100.0 + 50.0 * t, 10.0 * ids, 50.0
+    boxes = np.column_stack([mean[:, :2] - 5.0, np.full((9, 2), 10.0)])
+    table = Trajectories(
+        t, ids, boxes, np.full(9, 0.9), mean, np.full((9, 6), 0.25), np.ones(9, dtype=np.int64), ("rgb",)
+    )
+    order = np.lexsort((ids, t))
+    folder = tmp_path / "run"
+    folder.mkdir()
+    write_trajectories(table.take(order), folder / "causal.csv")
+    return folder
+
+
+def test_cvat_gets_frames_counted_from_one_and_its_labels(run, tmp_path):
+    out = tmp_path / "tracks.zip"
+    assert main(["export", str(run), "--to", "cvat", "--frames-per-second", "10", "--out", str(out)]) == 0
+    with zipfile.ZipFile(out) as archive:
+        assert sorted(archive.namelist()) == ["gt/gt.txt", "gt/labels.txt"]
+        rows = [line.split(",") for line in archive.read("gt/gt.txt").decode().splitlines()]
+        assert archive.read("gt/labels.txt") == b"vehicle\n"
+    assert [row[:2] for row in rows] == [
+        [str(k), track] for k in range(1, 6) for track in ("3", "8") if (k, track) != (3, "8")
+    ]
+    assert rows[0][2:] == ["95.000", "25.000", "10.000", "10.000", "1", "1", "0.900"]
+    first = out.read_bytes()
+    assert main(["export", str(run), "--to", "cvat", "--frames-per-second", "10", "--out", str(out)]) == 0
+    assert out.read_bytes() == first
+
+
+def test_a_trajectory_of_the_tum_format_has_unit_quaternions(run, tmp_path):
+    out = tmp_path / "track.txt"
+    assert main(["export", str(run), "--to", "tum", "--track", "8", "--out", str(out)]) == 0
+    poses = np.loadtxt(out)
+    assert poses.shape == (4, 8)
+    assert poses[:, 0] == pytest.approx([0.0, 0.1, 0.3, 0.4])
+    assert np.linalg.norm(poses[:, 4:], axis=1) == pytest.approx(1.0)
+    assert poses[:, 1] == pytest.approx(100.0 + 50.0 * poses[:, 0])
+
+
+def test_rerun_gets_boxes_and_plots(run, tmp_path):
+    pytest.importorskip("rerun", reason="the extra rerun is not installed")
+    out = tmp_path / "run.rrd"
+    assert main(["export", str(run), "--to", "rerun", "--out", str(out)]) == 0
+    content = out.read_bytes()
+    assert content[:4] in (b"RRF2", b"RRIO", b"RRF3")
+    for name in (b"picture/causal/boxes", b"plots/causal"):
+        assert name in content
+
+
+@pytest.mark.parametrize(
+    ("more", "what"),
+    [
+        (["--to", "tum"], "--track"),
+        (["--to", "tum", "--track", "99"], "no track 99"),
+        (["--to", "cvat"], "--frames-per-second"),
+        (["--to", "tum", "--track", "3", "--only", "smoothed"], "no smoothed"),
+    ],
+)
+def test_what_is_missing_is_one_clear_line(run, tmp_path, capsys, more, what):
+    out = tmp_path / "out.x"
+    assert main(["export", str(run), *more, "--out", str(out)]) == 2
+    error = capsys.readouterr().err
+    assert what in error
+    assert error.count("\n") == 1
+    assert not out.exists()
