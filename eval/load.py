@@ -18,6 +18,7 @@ from jeat_graph.io.scans_io import read_instants
 
 BY_FRAME = ("motchallenge", "kitti")
 SUFFIXES = (".csv", ".parquet")
+_SAME_RATE = 0.02  # relative: 29.97 Hz and 30 are one rate, 25 and 30 are two
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +70,8 @@ def load_run(
     if rate_hz is None and truth_form == "motchallenge":
         rate_hz = _motchallenge_rate(truth_path, form == "motchallenge")
     objects = _read_truth(truth_path, rate_hz, classes)
+    if rate_hz is not None and form in BY_FRAME and truth_form not in BY_FRAME:
+        _check_rate(rate_hz, objects, truth_path)
     if rate_hz is None and form in BY_FRAME:
         rate_hz = median_rate_hz(objects.frame_times()) or ANY_RATE_HZ
     instants = objects.frame_times() if form in BY_FRAME else read_instants(path)
@@ -109,6 +112,20 @@ def tables_of(path: Path) -> dict[str, Path]:
     if not found:
         raise DataError("this directory has neither causal.csv nor smoothed.csv, so it is no run", path)
     return found
+
+
+def _check_rate(rate_hz: float, truth: GroundTruth, path: Path) -> None:
+    """Refuse to place frames at times that the truth, which has times of its own, never had."""
+    declared = median_rate_hz(truth.frame_times())
+    if declared is None:
+        return
+    # Truth of every n-th frame is as good as any.
+    every = max(round(rate_hz / declared), 1)
+    if abs(rate_hz / (every * declared) - 1.0) > _SAME_RATE:
+        raise DataError(
+            f"--rate {rate_hz:g} does not fit the truth, whose rate is {declared:.6g} Hz; leave it out",
+            path,
+        )
 
 
 def _motchallenge_rate(truth: Path, any_will_do: bool) -> float:

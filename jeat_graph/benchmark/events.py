@@ -14,7 +14,7 @@ from jeat_graph.benchmark.event_noise import BASELINE, measure_noise
 from jeat_graph.benchmark.event_rates import SPEEDS, measure_rates
 from jeat_graph.benchmark.judging import in_processes
 from jeat_graph.benchmark.provenance import provenance
-from jeat_graph.config.argument_types import counting, natural, positive
+from jeat_graph.config.argument_types import counting, drawn_size, natural, positive
 from jeat_graph.config.section_tree import plain
 from jeat_graph.simulation.imaging.config import load_imaging
 
@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--seeds", nargs="+", type=natural, default=[0], metavar="N", help="of the segments (0)")
     add("--scenarios", nargs="+", default=_SCENARIOS, metavar="NAME", help=f"({' '.join(_SCENARIOS)})")
     add("--frames", type=counting, default=30, metavar="N", help="of each segment, 20 a second (30)")
-    add("--size", nargs=2, type=counting, default=[640, 384], metavar=("W", "H"), help="picture (640 384)")
+    add("--size", type=drawn_size, default=(640, 384), metavar="WxH", help="picture (640x384)")
     add("--tick", type=positive, default=100.0, metavar="HZ", help="rate of CARLA's ticks (100)")
     add("--sigma", type=positive, default=0.1, metavar="S", help="σ_C that the first measure sets to 0 (0.1)")
     add("--grain", type=positive, default=0.5, metavar="DN", help="flicker of CARLA's picture, std (0.5)")

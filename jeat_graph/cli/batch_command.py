@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
+from jeat_graph.cli.options import add_config, add_formats, add_image, add_smoother, extra_formats, overrides
 from jeat_graph.config.argument_types import counting, natural
 
 HELP = "track many recordings in parallel, each once; failures are collected in a table"
@@ -12,8 +13,6 @@ HELP = "track many recordings in parallel, each once; failures are collected in 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    from jeat_graph.cli.track_command import ENGINES, OUTPUT_FORMATS
-
     add = parser.add_argument
     add(
         "manifest",
@@ -31,22 +30,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--workers", type=counting, metavar="N", help="recordings at once (default: one a core)")
     add("--retries", type=natural, default=1, metavar="N", help="tries again when a worker dies (default: 1)")
     add("--address", metavar="ADDRESS", help="ray: a running cluster, say auto (default: one started here)")
-    add("--config", default="default", metavar="NAME|FILE", help="preset or YAML file (default: default)")
-    add(
-        "--set", dest="overrides", action="append", default=[], metavar="KEY=VALUE", help="change one setting"
-    )
-    add("--smoother", choices=ENGINES, help="engine of smoothed.csv, as in `track`")
-    add(
-        "--format",
-        dest="formats",
-        nargs="+",
-        action="extend",
-        default=[],
-        choices=OUTPUT_FORMATS,
-        metavar="NAME",
-        help="also write the tables as parquet, motchallenge, kitti",
-    )
-    add("--diagnostics", action="store_true", help="also write diagnostics.csv of each run")
+    add_config(parser)
+    add_image(parser)
+    add_smoother(parser)
+    add_formats(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -57,14 +44,11 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.runs.tracking_run import RunOptions
 
     recordings = read_manifest(args.manifest)
-    overrides = list(args.overrides)
-    if args.smoother is not None:
-        overrides.append(f"smoother.engine={args.smoother}")
     options = BatchOptions(
         config=args.config,
-        overrides=tuple(overrides),
+        overrides=tuple(overrides(args)),
         options=RunOptions(
-            formats=tuple(dict.fromkeys(name for name in args.formats if name != "csv")),
+            formats=extra_formats(args),
             diagnostics=args.diagnostics,
         ),
         engine=args.engine,

@@ -6,6 +6,8 @@ import argparse
 from importlib import import_module
 from typing import Any
 
+from jeat_graph.cli.options import Parser
+
 HELP = "Reproduce the README's tables: accuracy, ablation, smoothing, speed or events."
 _KINDS = {
     "accuracy": "our tracker and others' on simulated and real data",
@@ -16,7 +18,7 @@ _KINDS = {
 }
 
 
-class _LateParser(argparse.ArgumentParser):
+class _LateParser(Parser):
     """Imports its benchmark only when it is asked for: the others' libraries need not be there."""
 
     module_name: str | None = None

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from jeat_graph.cli.options import add_config, add_image, add_reading, reading
 from jeat_graph.data.errors import ConfigError, DataError
 
 if TYPE_CHECKING:
@@ -25,8 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("detections", nargs="+", metavar="DETECTIONS", help="one file a recording; all are pooled")
     add("--gt", nargs="+", action="extend", metavar="FILE", help="truth of each recording, in the same order")
     add("--out", required=True, metavar="CONFIG.yaml", help="the configuration to write")
-    add("--config", default="default", metavar="NAME|FILE", help="where all else comes from (default)")
-    add("--image", type=_image_size, metavar="WxH", help="size of the picture in px, say 1280x720")
+    add_config(parser, settings=False)
+    add_image(parser)
+    add_reading(parser)
     add("--no-tune", action="store_true", help="do not choose the rest by tracking the recordings")
 
 
@@ -44,11 +46,12 @@ def run(args: argparse.Namespace) -> int:
     if Path(args.out).suffix not in (".yaml", ".yml"):
         raise ConfigError(f"--out {args.out}: the name of a configuration must end in .yaml")
     base = load_config(args.config)
-    recordings = [read_detections(path) for path in args.detections]
-    base = with_image(base, recordings, args.image)
+    recordings = [read_detections(path, **reading(args)) for path in args.detections]
+    beside = None if args.image else _size_beside(args.detections)
+    base = with_image(base, recordings, args.image or beside)
     choices: tuple[Choice, ...] = ()
     if args.gt:
-        truths = [read_truth(path) for path in args.gt]
+        truths = [read_truth(path, rate_hz=args.rate) for path in args.gt]
         config, choices = _with_truth(list(zip(recordings, truths, strict=True)), base, not args.no_tune)
     else:
         config = _without_truth(recordings, base)
@@ -58,7 +61,17 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def with_image(base: Config, recordings: list[Detections], size: tuple[float, float] | None) -> Config:
+def _size_beside(paths: list[str]) -> tuple[int, int] | None:
+    from jeat_graph.runs.beside import facts_beside
+
+    facts = facts_beside(paths)
+    if facts is None or facts.size_px is None:
+        return None
+    print(f"picture of {facts.size_px[0]} x {facts.size_px[1]} px, as {facts.origin} says", file=sys.stderr)
+    return facts.size_px
+
+
+def with_image(base: Config, recordings: list[Detections], size: tuple[int, int] | None) -> Config:
     """Set the size of the picture, or check that the base configuration's fits the boxes.
 
     Args:
@@ -72,7 +85,7 @@ def with_image(base: Config, recordings: list[Detections], size: tuple[float, fl
     from dataclasses import replace
 
     if size is not None:
-        return replace(base, image=replace(base.image, width=size[0], height=size[1]))
+        return replace(base, image=replace(base.image, width=float(size[0]), height=float(size[1])))
     right = max((float((d.boxes[:, 0] + d.boxes[:, 2]).max()) for d in recordings if len(d)), default=0.0)
     bottom = max((float((d.boxes[:, 1] + d.boxes[:, 3]).max()) for d in recordings if len(d)), default=0.0)
     width, height = base.image.width, base.image.height
@@ -125,6 +138,7 @@ def _without_truth(recordings: list[Detections], base: Config) -> Config:
 
 def describe(args: argparse.Namespace, config: Config, choices: tuple[Choice, ...]) -> str:
     """Comment at the head of the file: where each part comes from."""
+    from jeat_graph.config.reading import load_config
     from jeat_graph.version import __version__
 
     names = ", ".join(Path(p).parent.name + "/" + Path(p).name for p in args.detections)
@@ -141,7 +155,9 @@ def describe(args: argparse.Namespace, config: Config, choices: tuple[Choice, ..
             "sensors (but tempering), motion, size: without truth, from innovations of confirmed tracks.",
             "bias is unknown without truth and set to zero; p_detect and precision are upper bounds.",
         ]
-    picture = "--image" if args.image else f"the base configuration {Path(args.config).name}"
+    picture = f"the base configuration {Path(args.config).name}"
+    if args.image or config.image != load_config(args.config).image:
+        picture = "--image" if args.image else "seqinfo.ini"
     lines += [f"image: from {picture}; all else from the base configuration {Path(args.config).name}."]
     return "\n".join(lines)
 
@@ -189,13 +205,3 @@ def summary(config: Config, choices: tuple[Choice, ...]) -> list[Table]:
         ]
         tables.append(Table.from_records(rows, title="Chosen by tracking", digits={"value": 3}))
     return tables
-
-
-def _image_size(text: str) -> tuple[float, float]:
-    try:
-        width, height = (float(part) for part in text.lower().split("x"))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} must read WIDTHxHEIGHT, say 1280x720") from None
-    if not (0.0 < width < 1e6 and 0.0 < height < 1e6):
-        raise argparse.ArgumentTypeError(f"{text!r}: width and height must be positive")
-    return width, height

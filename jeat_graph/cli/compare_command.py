@@ -8,6 +8,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from jeat_graph.cli.options import add_rate
+
 if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
     from jeat_graph.data.detections import Detections
@@ -37,6 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--lags", nargs="+", type=_lag, metavar="S", help="lags of the curve in seconds; 0 is the filter"
     )
+    add_rate(parser)
     parser.add_argument("--no-plots", action="store_true", help="write no pictures")
 
 
@@ -47,10 +50,13 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.eval.tables import to_json
     from jeat_graph.io.atomic import open_atomic
     from jeat_graph.io.truth_io import read_truth
+    from jeat_graph.runs.beside import rate_of_truth
     from jeat_graph.tracking.records import record_tracks
 
     folder = Path(args.run_directory)
-    truth = None if args.gt is None else read_truth(args.gt)
+    truth = (
+        None if args.gt is None else read_truth(args.gt, rate_hz=rate_of_truth(folder, args.gt, args.rate))
+    )
     if truth is not None and truth.motion is None:
         print(
             f"jeat-graph compare: warning: {args.gt} has no motion (x, y, vx, vy, ax, ay): "

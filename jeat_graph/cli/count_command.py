@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from jeat_graph.cli.options import add_rate
 from jeat_graph.config.argument_types import positive
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.eval.counting import Line
 
@@ -31,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--interval", type=positive, metavar="S", help="length of one interval (default: all)"
     )
+    add_rate(parser)
     parser.add_argument("--out", metavar="FILE", help="write the counts as CSV (default: print a table)")
     parser.add_argument("--crossings", metavar="FILE", help="also write every crossing as CSV")
 
@@ -39,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     """Count."""
     from jeat_graph.eval import counting
     from jeat_graph.eval.load import tables_of
-    from jeat_graph.eval.tables import Table
+    from jeat_graph.eval.tables import Cell, Table
     from jeat_graph.io.table_writer import write_columns
     from jeat_graph.io.trajectories_io import read_trajectories
 
@@ -49,11 +52,12 @@ def run(args: argparse.Namespace) -> int:
         raise DataError(f"--line: {max(names, key=names.count)} is the name of two lines")
     tables = tables_of(Path(args.source))
     kind = "smoothed" if "smoothed" in tables else "causal"
-    table = read_trajectories(tables[kind])
+    table = read_trajectories(tables[kind], rate_hz=args.rate)
     found = [c for line in lines for c in counting.crossings(table, line)]
     first, last = (float(table.t.min()), float(table.t.max())) if len(table) else (0.0, 0.0)
     step = args.interval or max(last - first, 1e-9) * (1.0 + 1e-9)
-    edges = first + step * np.arange(int(np.ceil((last - first) / step + 1e-12)) + 1)
+    number = int(np.ceil((last - first) / step + 1e-12))
+    edges: FloatArray = np.asarray(first + step * np.arange(number + 1), dtype=np.float64)
     edges[-1] = max(edges[-1], np.nextafter(last, np.inf))
     counts = counting.count(found, edges)
     if args.crossings:
@@ -62,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
         write_columns(_columns(counts, counting.Count), args.out)
         print(f"wrote {args.out}: {len(found)} crossings ({kind} tracks)", file=sys.stderr)
     else:
-        records = [
+        records: list[dict[str, Cell]] = [
             {
                 "line": c.line,
                 "direction": c.direction,

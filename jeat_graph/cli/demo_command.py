@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from jeat_graph.cli.options import add_config
+
 if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
     from jeat_graph.data.arrays import FloatArray
@@ -30,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--out", default="demo", metavar="DIR", help="folder to write into (default demo)")
     add("--duration", type=float, default=DURATION_S, metavar="S", help=f"length (default {DURATION_S:g})")
     add("--seed", type=int, default=SEED, metavar="N", help=f"seed of the simulation (default {SEED})")
-    add("--config", default="default", metavar="NAME|FILE", help="preset or YAML file (default: default)")
+    add_config(parser, settings=False)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from jeat_graph.cli.options import add_rate
 from jeat_graph.config.argument_types import positive, share
 from jeat_graph.data.errors import DataError
 
@@ -29,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--format", choices=FORMATS, default="text", help="form of the table on stdout")
     add("--iou", type=share, default=0.5, help="smallest IoU of a match (0.5)")
     add("--class", **_MANY, dest="classes", metavar="NAME", help="classes to be found; others are ignored")
-    add("--rate", type=positive, metavar="HZ", help="frame rate of files that count frames")
+    add_rate(parser)
     add("--max-age", type=positive, metavar="S", help="how far to predict causal rows (0.15)")
     add("--max-gap", type=positive, metavar="S", help="join no smoothed rows further apart than this")
     add("--breakdown", action="store_true", help="also by motion and distance, and waiting times")
@@ -42,11 +43,12 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.eval.load import load_run
     from jeat_graph.eval.resampling import MAX_AGE_S
     from jeat_graph.eval.tables import to_json
+    from jeat_graph.runs.beside import rate_of_truth
 
     if len(args.runs) != len(args.gt):
         raise DataError(f"{len(args.runs)} RUN and {len(args.gt)} --gt given; give one truth for each run")
     runs = [
-        load_run(path, truth, rate_hz=args.rate, classes=args.classes)
+        load_run(path, truth, rate_hz=rate_of_truth(path, truth, args.rate), classes=args.classes)
         for path, truth in zip(args.runs, args.gt, strict=True)
     ]
     max_age_s = MAX_AGE_S if args.max_age is None else args.max_age
@@ -79,7 +81,7 @@ def _detections(
 
     if len(args.detections) != len(truths):
         raise DataError(f"{len(truths)} RUN and {len(args.detections)} --detections given; give one for each")
-    detections = [read_detections(path) for path in args.detections]
+    detections = [read_detections(path, rate_hz=args.rate) for path in args.detections]
     found = detection_ap(list(zip(truths, detections, strict=True)))
     values = {sensor: one.as_dict() for sensor, one in found.items()}
     records: list[dict[str, Cell]] = [{"sensor": sensor, **one} for sensor, one in values.items()]

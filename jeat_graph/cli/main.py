@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
+from jeat_graph.cli.options import Parser
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.version import __version__
 
@@ -33,12 +34,12 @@ COMMANDS = (
 
 def build_parser(command: str | None = None) -> argparse.ArgumentParser:
     """Build the parser; only `command`, if given, gets its full set of arguments."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="jeat-graph",
         description="Track vehicles from asynchronous event and RGB detections, causally and smoothed.",
     )
     parser.add_argument("--version", action="version", version=f"jeat-graph {__version__}")
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
     for name in COMMANDS:
         if command is not None and name != command:
             commands.add_parser(name, add_help=False)

@@ -8,14 +8,14 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jeat_graph.config.argument_types import positive
+from jeat_graph.cli.options import add_output_rate, add_rate
+from jeat_graph.config.argument_types import drawn_size, positive
 from jeat_graph.data.errors import DataError
 
 if TYPE_CHECKING:
     from jeat_graph.drawing.movie.panels import Movie
 
 HELP = "draw a run over video, frames or events, or a simulated segment, as an MP4 video or one PNG picture"
-_LARGEST_PX = 8192
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,25 +36,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--start", type=float, metavar="S", help="first time (s)")
     add("--end", type=float, metavar="S", help="last time (s)")
     add("--only", choices=("causal", "smoothed"), help="draw only these tracks")
-    add("--rate", type=positive, metavar="HZ", help="pictures per second (default: each frame; else 25)")
-    add("--size", type=size, metavar="WxH", help="size of each picture (default: that of the recording)")
-    add(
-        "--frame-rate",
-        type=positive,
-        metavar="HZ",
-        help="frames per second of pictures without times, and of results that count frames",
-    )
-    add("--window", type=positive, metavar="S", help="how long events are shown (default: 1 / rate)")
-
-
-def size(text: str) -> tuple[int, int]:
-    """Read a size such as 1280x720."""
-    width, _, height = text.lower().partition("x")
-    if not (width.isdigit() and height.isdigit()) or not (
-        16 <= int(width) <= _LARGEST_PX and 16 <= int(height) <= _LARGEST_PX
-    ):
-        raise argparse.ArgumentTypeError(f"must be WIDTHxHEIGHT, each from 16 to {_LARGEST_PX}")
-    return int(width), int(height)
+    add_output_rate(parser, "pictures per second of the film (default: each frame; else 25)")
+    add("--size", type=drawn_size, metavar="WxH", help="size of each picture (default: the recording's)")
+    add_rate(parser)
+    add("--frame-rate", dest="rate", type=positive, help=argparse.SUPPRESS)
+    add("--window", type=positive, metavar="S", help="how long events are shown (default: 1 / output rate)")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -70,12 +56,12 @@ def run(args: argparse.Namespace) -> int:
         events=_path(args.events),
         truth=_path(args.gt),
         only=args.only,
-        rate_hz=args.rate,
+        rate_hz=args.output_rate,
         size_px=args.size,
         start_s=args.start,
         end_s=args.end,
         at_s=args.at,
-        frame_rate_hz=args.frame_rate,
+        frame_rate_hz=args.rate,
         window_s=args.window,
     )
     inputs = [path for path in (request.frames, request.events, request.truth) if path is not None]

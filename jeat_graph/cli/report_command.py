@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jeat_graph.config.argument_types import positive
+from jeat_graph.cli.options import add_rate
 
 if TYPE_CHECKING:
     from jeat_graph.drawing.page.figures import ComparedRun
@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("run_directory", metavar="RUN", help="run directory, or a table or result of tracks")
     add("--gt", metavar="FILE", help="truth; without it there are no scores")
     add("--out", required=True, metavar="FILE.html", help="the page")
-    add("--rate", type=positive, metavar="HZ", help="frame rate of files that count frames")
+    add_rate(parser)
     add(
         "--detections",
         nargs="+",
@@ -41,11 +41,14 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.data.errors import DataError
     from jeat_graph.drawing.page.document import render_page
     from jeat_graph.io.atomic import open_atomic
+    from jeat_graph.runs.beside import rate_of_truth
     from jeat_graph.runs.recorded import load_run_data
 
     out = Path(args.out)
     if out.is_dir():
         raise DataError("is a folder; --out must name a file, such as report.html", out)
+    if args.gt is not None:
+        args.rate = rate_of_truth(args.run_directory, args.gt, args.rate)
     data = load_run_data(args.run_directory, args.gt, args.rate)
     compared, reason = _compare(args)
     page = render_page(data, compared, reason)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import re
 import sys
 from argparse import ArgumentTypeError
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jeat_graph.config.argument_types import counting
+from jeat_graph.config.argument_types import counting, drawn_size
 from jeat_graph.data.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -220,12 +219,9 @@ def _read_yaml(path: Path) -> dict[str, Any]:
 
 
 def _size(text: str) -> tuple[int, int]:
-    match = re.fullmatch(r"(\d+)[x×](\d+)", text.strip())
-    if match is None:
-        raise ArgumentTypeError(f"must read like 640x384, not {text!r}")
-    width, height = int(match[1]), int(match[2])
-    if not (16 <= width <= 8192 and 16 <= height <= 8192 and width % 2 == height % 2 == 0):
-        raise ArgumentTypeError(f"must be even numbers from 16 to 8192, not {text!r}")
+    width, height = drawn_size(text)
+    if width % 2 or height % 2:
+        raise ArgumentTypeError(f"must be even numbers, not {text!r}")
     return width, height
 
 

@@ -11,6 +11,8 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Self
 
+from jeat_graph.cli.options import add_config, add_image, overrides
+
 if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
     from jeat_graph.data.trajectories import Trajectories
@@ -32,15 +34,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "arrives."
     )
     add = parser.add_argument
-    add("--config", default="default", metavar="NAME|FILE", help="preset or YAML file (default: default)")
-    add(
-        "--set",
-        dest="overrides",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="change one setting; may be given many times",
-    )
+    add_config(parser)
+    add_image(parser)
     add(
         "--format",
         choices=("json", "csv"),
@@ -89,7 +84,7 @@ def _config(args: argparse.Namespace) -> Config:
     from jeat_graph.config.reading import load_config
     from jeat_graph.data.errors import ConfigError
 
-    config = load_config(args.config, args.overrides)
+    config = load_config(args.config, overrides(args))
     if args.smoothed is None:
         return replace(config, smoother=replace(config.smoother, engine="none"))
     if config.smoother.engine == "none":

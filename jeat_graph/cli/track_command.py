@@ -6,12 +6,18 @@ import argparse
 import sys
 from pathlib import Path
 
-from jeat_graph.config.argument_types import positive
+from jeat_graph.cli.options import (
+    add_config,
+    add_formats,
+    add_image,
+    add_output_rate,
+    add_reading,
+    add_smoother,
+    extra_formats,
+    overrides,
+)
 
 HELP = "track the vehicles in files of detections and write a run directory"
-INPUT_FORMATS = ("csv", "parquet", "motchallenge", "kitti", "prophesee", "coco")
-ENGINES = ("fixed-lag", "full", "rts", "fixed-lag-rts", "none")
-OUTPUT_FORMATS = ("csv", "parquet", "motchallenge", "kitti")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,51 +36,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="run directory; files of an earlier run there are replaced, other files left alone",
     )
-    add("--config", default="default", metavar="NAME|FILE", help="preset or YAML file (default: default)")
+    add_config(parser)
+    add_image(parser)
+    add_smoother(parser)
+    add_formats(parser)
+    add_output_rate(parser, "frames per second of output that counts frames", "--frame-rate")
+    add_reading(parser)
     add(
-        "--set",
-        dest="overrides",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="change one setting, say image.width=1920; may be given many times",
+        "--frames",
+        metavar="VIDEO|DIR",
+        help="pictures that the detections were made from: tell the picture's size and the frame rate",
     )
-    add(
-        "--smoother",
-        choices=ENGINES,
-        help="engine of smoothed.csv: fixed-lag (live, with a delay), full (whole tracks, fragments "
-        "stitched), rts (the same, fast), fixed-lag-rts, none; default: as the configuration says",
-    )
-    add(
-        "--format",
-        dest="formats",
-        nargs="+",
-        action="extend",
-        default=[],
-        choices=OUTPUT_FORMATS,
-        metavar="NAME",
-        help="also write the tables as parquet, motchallenge, kitti (csv is always written)",
-    )
-    add(
-        "--frame-rate",
-        type=positive,
-        metavar="HZ",
-        help="frames per second of such output files",
-    )
-    add(
-        "--diagnostics",
-        action="store_true",
-        help="also write diagnostics.csv: NIS and noise scale of every update, for the pages of `report`",
-    )
-    add("--rate", type=positive, metavar="HZ", help="frames per second of input files that count frames")
-    add("--input-format", choices=INPUT_FORMATS, help="format of the input, if it is not recognised")
-    add(
-        "--score-scale",
-        choices=("unit", "percent", "logistic"),
-        default="unit",
-        help="scores are in [0, 1] (unit), percent, or raw scores of any size (logistic)",
-    )
-    add("--images", metavar="FILE", help="COCO data set with the images and times of COCO results")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -82,29 +54,32 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.runs.track_files import TrackRequest, track_files
     from jeat_graph.runs.tracking_run import RunOptions
 
-    overrides = list(args.overrides)
-    if args.smoother is not None:
-        overrides.append(f"smoother.engine={args.smoother}")
     request = TrackRequest(
         detections=tuple(str(item) for item in args.detections),
         out=args.out,
         config=args.config,
-        overrides=tuple(overrides),
+        overrides=tuple(overrides(args)),
         rate_hz=args.rate,
         input_format=args.input_format,
         score_scale=args.score_scale,
         images=args.images,
+        time_unit=args.time_unit,
+        frames=args.frames,
         options=RunOptions(
-            formats=tuple(dict.fromkeys(name for name in args.formats if name != "csv")),
-            frame_rate_hz=args.frame_rate if args.frame_rate is not None else args.rate,
+            formats=extra_formats(args),
+            frame_rate_hz=args.output_rate if args.output_rate is not None else args.rate,
             progress=sys.stderr.isatty(),
             diagnostics=args.diagnostics,
         ),
     )
-    counts = track_files(request, _warn).counts
+    counts = track_files(request, _warn, _say).counts
     print(f"{counts['scans']} scans, {counts['detections']} detections: {counts['tracks_reported']} tracks")
     print(f"wrote {Path(args.out)}")
     return 0
+
+
+def _say(text: str) -> None:
+    print(f"jeat-graph track: {text}", file=sys.stderr)
 
 
 def _warn(text: str) -> None:

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from argparse import ArgumentTypeError
+
+#: Bounds of a picture's width and height (px): below, nothing is seen; above, no camera is known.
+SMALLEST_PX, LARGEST_PX = 16, 65_536
+#: Largest width or height (px) of a picture that is drawn: that of most video decoders.
+LARGEST_DRAWN_PX = 8192
 
 
 def natural(text: str) -> int:
@@ -35,3 +41,22 @@ def share(text: str) -> float:
     if not 0.0 < value <= 1.0:
         raise ArgumentTypeError("must be more than 0 and at most 1")
     return value
+
+
+def picture_size(text: str) -> tuple[int, int]:
+    """Read the size of a picture, such as 1280x720: width and height in px."""
+    match = re.fullmatch(r"(\d{1,9})[xX×](\d{1,9})", text.strip())
+    if match is None:
+        raise ArgumentTypeError(f"must read WIDTHxHEIGHT in px, say 1280x720, not {text!r}")
+    width, height = int(match[1]), int(match[2])
+    if not (SMALLEST_PX <= width <= LARGEST_PX and SMALLEST_PX <= height <= LARGEST_PX):
+        raise ArgumentTypeError(f"must be from {SMALLEST_PX} to {LARGEST_PX} px each, not {text!r}")
+    return width, height
+
+
+def drawn_size(text: str) -> tuple[int, int]:
+    """Read the size of pictures that are to be drawn, such as 1280x720, within what video can hold."""
+    width, height = picture_size(text)
+    if max(width, height) > LARGEST_DRAWN_PX:
+        raise ArgumentTypeError(f"width and height must be at most {LARGEST_DRAWN_PX} px, not {text!r}")
+    return width, height

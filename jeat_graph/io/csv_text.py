@@ -9,8 +9,9 @@ from __future__ import annotations
 import csv
 import io
 import re
+import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,18 @@ from jeat_graph.data.errors import DataError
 
 _BOM = b"\xef\xbb\xbf"
 _WIDE_BOMS = (b"\xff\xfe", b"\xfe\xff")
+_GZIP = b"\x1f\x8b"
+#: First bytes of what is no text, and what to do about it.
+_OTHERS = {
+    _GZIP: "is compressed with gzip; give it a name that ends in .gz, or unpack it",
+    b"PK\x03\x04": "is a zip archive or an Excel workbook; unpack it, or save it as CSV",
+    b"BZh": "is compressed with bzip2; unpack it",
+    b"\xfd7zXZ": "is compressed with xz; unpack it",
+    b"\x28\xb5\x2f\xfd": "is compressed with zstd; unpack it",
+    b"\x89HDF": "is an HDF5 file, not text",
+}
+#: Bytes that a compressed file may unpack to: beyond, it is a mistake or an attack.
+LARGEST_UNPACKED = 2**33
 
 
 def read_bytes(path: str | Path) -> bytes:
@@ -45,6 +58,11 @@ def read_text(path: str | Path) -> bytes:
         DataError: as `read_bytes`; the file is empty, not UTF-8, or holds NUL bytes.
     """
     data = read_bytes(path)
+    if Path(path).suffix.lower() == ".gz" and data.startswith(_GZIP):
+        data = _unpacked(data, path)
+    for magic, text in _OTHERS.items():
+        if data.startswith(magic):
+            raise DataError(text, path)
     if data.startswith(_WIDE_BOMS):
         raise DataError("is UTF-16; save it as UTF-8", path)
     data = data.removeprefix(_BOM)
@@ -53,6 +71,40 @@ def read_text(path: str | Path) -> bytes:
     if b"\0" in data:
         raise DataError("is not text (NUL byte)", path, line_at(data, data.index(b"\0")))
     return data
+
+
+def _unpacked(data: bytes, path: str | Path, most: int | None = None) -> bytes:
+    """Unpack gzip, in one or several members; with `most`, only the first bytes."""
+    out: list[bytes] = []
+    size, limit = 0, LARGEST_UNPACKED if most is None else most
+    complete = False
+    try:
+        while not complete:
+            member = zlib.decompressobj(wbits=zlib.MAX_WBITS | 16)
+            out.append(member.decompress(data, max(limit - size, 1)))
+            size += len(out[-1])
+            if not member.eof:
+                break
+            data = member.unused_data.lstrip(b"\0")
+            complete = not data
+    except zlib.error as error:
+        raise DataError(f"cannot be unpacked: {error}", path) from None
+    if most is None and not complete:
+        raise DataError(f"unpacks to more than {limit} bytes" if size >= limit else "is cut off (gzip)", path)
+    return b"".join(out)
+
+
+def first_bytes(path: str | Path, count: int) -> bytes:
+    """Return the first bytes of a file, unpacked where its name ends in `.gz`.
+
+    Raises:
+        OSError: it cannot be read.
+        DataError: it cannot be unpacked.
+    """
+    with Path(path).open("rb") as file:
+        head = file.read(count)
+    packed = Path(path).suffix.lower() == ".gz" and head.startswith(_GZIP)
+    return _unpacked(head, path, count) if packed else head
 
 
 def line_at(data: bytes, offset: int) -> int:
@@ -68,11 +120,12 @@ class CsvBody:
 
     Attributes:
         path: the file, for messages.
-        data: the lines, UTF-8, comma-separated.
+        data: the lines, UTF-8.
         first_line: number of the first of these lines in the file, from 1.
         width: fields that each line must have.
         wanted: where `width` comes from, such as "the header names", for messages.
         short: a line may also stop after this many fields, the others then being blank; 0 for never.
+        delimiter: what stands between two fields, one character.
     """
 
     path: Path
@@ -81,6 +134,7 @@ class CsvBody:
     width: int
     wanted: str
     short: int = 0
+    delimiter: str = ","
 
     def parse(self) -> tuple[CsvBody, list[Any]]:
         """Split into columns of text.
@@ -118,7 +172,9 @@ class CsvBody:
         table = arrow_csv.read_csv(
             pa.BufferReader(self.data),
             read_options=arrow_csv.ReadOptions(column_names=names),
-            parse_options=arrow_csv.ParseOptions(newlines_in_values=b'"' in self.data),
+            parse_options=arrow_csv.ParseOptions(
+                delimiter=self.delimiter, newlines_in_values=b'"' in self.data
+            ),
             convert_options=arrow_csv.ConvertOptions(
                 column_types=dict.fromkeys(names, pa.string()), null_values=[""], strings_can_be_null=True
             ),
@@ -127,17 +183,19 @@ class CsvBody:
 
     def _filled_up(self) -> CsvBody:
         """Empty the lines of white space only, and give short lines their commas; line numbers stay."""
-        data = re.sub(rb"(?m)^[ \t]+(?=\r?$)", b"", self.data)
+        blank = rb"(?m)^ +(?=\r?$)" if self.delimiter == "\t" else rb"(?m)^[ \t]+(?=\r?$)"
+        data = re.sub(blank, b"", self.data)
         if 0 < self.short < self.width:
-            field = rb'[^,"\r\n]+'
-            line = rb"(?m)^(" + rb",".join([field] * self.short) + rb")(?=\r?$)"
-            data = re.sub(line, rb"\g<1>" + b"," * (self.width - self.short), data)
-        return CsvBody(self.path, data, self.first_line, self.width, self.wanted, 0)
+            mark = self.delimiter.encode()
+            field = rb"[^" + mark + rb'"\r\n]+'
+            line = rb"(?m)^(" + mark.join([field] * self.short) + rb")(?=\r?$)"
+            data = re.sub(line, rb"\g<1>" + mark * (self.width - self.short), data)
+        return replace(self, data=data, short=0)
 
     def _records(self) -> Iterator[tuple[int, list[str]]]:
         """Yield (line number, fields) of each row, by Python's own reader."""
         text = io.StringIO(self.data.decode("utf-8", errors="replace"), newline="")
-        reader = csv.reader(text)
+        reader = csv.reader(text, delimiter=self.delimiter)
         line = self.first_line
         while True:
             try:

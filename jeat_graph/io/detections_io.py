@@ -13,6 +13,7 @@ from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.detections import Detections, find_bad_row
 from jeat_graph.data.errors import DataError
 from jeat_graph.io import coco, kitti, motchallenge, prophesee
+from jeat_graph.io.column_names import boxes_of, standing_in, times_of
 from jeat_graph.io.formats import recognise
 from jeat_graph.io.frames import check_rate, fill_frames, gap_times, scale_scores, score_hint
 from jeat_graph.io.plain_text import frames_of
@@ -33,12 +34,14 @@ def read_detections(
     score_scale: str = "unit",
     fill_empty: bool = True,
     images: str | Path | None = None,
+    time_unit: str = "s",
 ) -> Detections:
     """Read detections from a file of any known format.
 
     ============  ==========================================================================================
     csv, parquet  `t, sensor, left, top, width, height, score[, class]`, rows in any order; a row with only
-                  `t` and `sensor` is an empty scan. Other columns are passed over.
+                  `t` and `sensor` is an empty scan. Usual other names are understood, see `column_names`;
+                  other columns are passed over. `;` or tabs between fields, `.csv.gz`.
     motchallenge  `frame, id, left, top, width, height, conf, …`, frames from 1; rate from `rate_hz` or
                   `seqinfo.ini`.
     kitti         tracking labels with a score (18 columns), frames from 0; 10 Hz unless `rate_hz` says else.
@@ -59,13 +62,14 @@ def read_detections(
         score_scale: `unit` if scores are in [0, 1], `percent`, or `logistic` for raw scores of any size.
         fill_empty: whether frames without boxes are empty scans rather than no scans.
         images: COCO data set JSON with the list of images.
+        time_unit: unit of the column `t`: `s`, `ms`, `us` or `ns`.
 
     Raises:
         DataError: names the file, the line or row, and what is wrong.
     """
     kind = recognise(path, fmt)
     if kind in ("csv", "parquet"):
-        return _read_contract(path, sensor, score_scale)
+        return _read_contract(path, sensor, score_scale, rate_hz, time_unit)
     name = DEFAULT_SENSOR if sensor is None else sensor
     if kind == "coco":
         return _read_coco(path, name, rate_hz, score_scale, fill_empty, images)
@@ -149,17 +153,28 @@ def write_detections(detections: Detections, path: str | Path, decimals: int | N
     write_columns(columns, path)
 
 
-def _read_contract(path: str | Path, sensor: str | None, score_scale: str) -> Detections:
+def _read_contract(
+    path: str | Path, sensor: str | None, score_scale: str, rate_hz: float | None, time_unit: str
+) -> Detections:
     required = _COLUMNS if sensor is None else tuple(name for name in _COLUMNS if name != "sensor")
-    table = read_table(path, required, ("class", "sensor"), short=("t", "sensor"))
-    t = table.number("t")
+    try:
+        table = read_table(path, required, ("class", "sensor"), short=("t", "sensor"), aliases=True)
+    except DataError as error:
+        if error.message.startswith("column 'sensor' is missing;"):
+            raise DataError(
+                "column 'sensor' is missing; name the sensor with NAME=path (in Python sensor=)",
+                error.path,
+                error.line,
+            ) from None
+        raise
+    t = times_of(table, time_unit, rate_hz)
     names = table.text("sensor", blank_ok=sensor is not None) if "sensor" in table else np.zeros(len(t), "U1")
     if sensor is not None:
         several = np.unique(names)
         if len(several) > 1:
             raise DataError(f"holds the sensors {', '.join(several)}; none can be renamed to {sensor}", path)
         names = np.full(len(t), sensor)
-    values = [*_BOX, "score"]
+    values = [*standing_in(table.names, _BOX), "score"]
     blanks = np.stack([table.blank(name) for name in values], axis=1)
     empty: BoolArray = np.asarray(blanks.all(axis=1))
     torn = blanks.any(axis=1) & ~empty
@@ -167,8 +182,8 @@ def _read_contract(path: str | Path, sensor: str | None, score_scale: str) -> De
         row = int(np.argmax(torn))
         which = values[int(np.argmax(blanks[row]))]
         raise table.error(row, f"{which} is missing; a scan that found nothing has only t and sensor")
-    columns = [table.number(name, blank_ok=True) for name in values]
-    boxes, scores = np.stack(columns[:4], axis=1), scale_scores(columns[4], score_scale, path)
+    boxes, scores = boxes_of(table), table.number("score", blank_ok=True)
+    scores = scale_scores(scores, score_scale, path)
     classes = table.text("class", blank_ok=True) if "class" in table else None
     if classes is not None and not (classes != "").any():
         classes = None

@@ -7,10 +7,18 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.io.csv_text import first_bytes
 
 FORMATS = ("csv", "parquet", "motchallenge", "kitti", "prophesee", "coco")
 _MAGIC = {b"PAR1": "parquet", b"\x93NUMPY": "prophesee"}
-_SUFFIX = {".csv": "csv", ".parquet": "parquet", ".pq": "parquet", ".npy": "prophesee", ".json": "coco"}
+_SUFFIX = {
+    ".csv": "csv",
+    ".tsv": "csv",
+    ".parquet": "parquet",
+    ".pq": "parquet",
+    ".npy": "prophesee",
+    ".json": "coco",
+}
 _HEAD_BYTES = 4096
 _KITTI_FIELDS = 17
 _MOT_FIELDS = 6
@@ -42,8 +50,7 @@ def recognise(path: str | Path, fmt: str | None = None, allowed: Sequence[str] =
 
 def _guess(path: Path) -> str:
     try:
-        with path.open("rb") as file:
-            head = file.read(_HEAD_BYTES)
+        head = first_bytes(path, _HEAD_BYTES)
     except FileNotFoundError:
         raise DataError("no such file", path) from None
     except IsADirectoryError:
@@ -53,7 +60,7 @@ def _guess(path: Path) -> str:
     for magic, name in _MAGIC.items():
         if head.startswith(magic):
             return name
-    suffix = path.suffix.lower()
+    suffix = Path(path.stem).suffix.lower() if path.suffix.lower() == ".gz" else path.suffix.lower()
     if suffix in _SUFFIX:
         return _SUFFIX[suffix]
     text = head.removeprefix(b"\xef\xbb\xbf").lstrip().decode("utf-8", errors="replace")

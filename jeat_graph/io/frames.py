@@ -112,6 +112,6 @@ def scale_scores(scores: FloatArray, how: str, path: str | Path) -> FloatArray:
 def score_hint(score: float) -> str:
     """Say what to do about a score outside [0, 1]."""
     return (
-        f"score must be in [0, 1], got {score:g}; give score_scale='percent' for 0 to 100, "
-        "or 'logistic' for raw scores of any size"
+        f"score must be in [0, 1], got {score:g}; for 0 to 100 give --score-scale percent, for raw scores of "
+        "any size --score-scale logistic (in Python score_scale=)"
     )

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import configparser
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -77,6 +78,45 @@ def class_names(table: Table) -> np.typing.NDArray[np.str_] | None:
     return np.asarray(names, dtype=np.str_)[index.reshape(-1)]
 
 
+class SequenceInfo(NamedTuple):
+    """What `seqinfo.ini` says of a sequence; None where it says nothing.
+
+    Attributes:
+        rate_hz: frames per second.
+        length: number of frames.
+        size_px: width and height of the picture.
+        origin: the file.
+    """
+
+    rate_hz: float | None = None
+    length: int | None = None
+    size_px: tuple[int, int] | None = None
+    origin: Path | None = None
+
+
+def sequence_info(path: str | Path) -> SequenceInfo:
+    """Read the `seqinfo.ini` in the folder of a text file or the one above.
+
+    Raises:
+        DataError: there is one that cannot be read.
+    """
+    folder = Path(path).resolve().parent
+    info = next((p for p in (folder / "seqinfo.ini", folder.parent / "seqinfo.ini") if p.is_file()), None)
+    if info is None:
+        return SequenceInfo()
+    parser = configparser.ConfigParser(interpolation=None)
+    try:
+        parser.read(info, encoding="utf-8-sig")
+        rate = parser.getfloat("Sequence", "frameRate", fallback=None)
+        length = parser.getint("Sequence", "seqLength", fallback=None)
+        width = parser.getint("Sequence", "imWidth", fallback=None)
+        height = parser.getint("Sequence", "imHeight", fallback=None)
+    except (configparser.Error, ValueError, OSError) as error:
+        raise DataError(f"cannot be read: {' '.join(str(error).split())}", info) from None
+    size_px = (width, height) if width and height and min(width, height) > 0 else None
+    return SequenceInfo(rate, length, size_px, info)
+
+
 def sequence_rate(path: str | Path, rate_hz: float | None) -> tuple[float, int | None]:
     """Return the frame rate (Hz) and the number of frames, if that is known.
 
@@ -87,18 +127,11 @@ def sequence_rate(path: str | Path, rate_hz: float | None) -> tuple[float, int |
     Raises:
         DataError: no rate is known, or it is not a positive number.
     """
-    folder = Path(path).resolve().parent
-    info = next((p for p in (folder / "seqinfo.ini", folder.parent / "seqinfo.ini") if p.is_file()), None)
-    rate, length = None, None
-    if info is not None:
-        parser = configparser.ConfigParser(interpolation=None)
-        try:
-            parser.read(info, encoding="utf-8")
-            rate = parser.getfloat("Sequence", "frameRate", fallback=None)
-            length = parser.getint("Sequence", "seqLength", fallback=None)
-        except (configparser.Error, ValueError, OSError) as error:
-            raise DataError(f"cannot be read: {' '.join(str(error).split())}", info) from None
-    rate = rate if rate_hz is None else rate_hz
+    info = sequence_info(path)
+    rate = info.rate_hz if rate_hz is None else rate_hz
     if rate is None:
-        raise DataError("MOTChallenge text has frame numbers only; give the frame rate (rate_hz)", path)
-    return check_rate(rate, path), length
+        raise DataError(
+            "MOTChallenge text has frame numbers only; give the frame rate with --rate (in Python rate_hz)",
+            path,
+        )
+    return check_rate(rate, path), info.length

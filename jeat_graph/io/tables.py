@@ -6,9 +6,6 @@ one place which columns it needs, of which kind, and what may be blank.
 
 from __future__ import annotations
 
-import csv
-import difflib
-import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,7 +15,9 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.io.column_names import standing_in, usual_names
 from jeat_graph.io.csv_text import CsvBody, read_bytes, read_text
+from jeat_graph.io.headers import check_names, split_header
 
 PARQUET_SUFFIXES = (".parquet", ".pq")
 _LARGEST_EXACT = 2.0**53  # beyond it a float cannot tell neighbouring whole numbers apart
@@ -31,14 +30,21 @@ class Table:
         path: the file, for messages.
         columns: Arrow arrays of equal length by name; null where a field is blank.
         line_of: gives the file's line number of a row, or None where a file has rows but no lines.
+        decimal_comma: whether numbers may be written `1,5`, as they are where `;` stands between fields.
     """
 
     def __init__(
-        self, path: Path, columns: dict[str, Any], line_of: Callable[[int], int] | None = None
+        self,
+        path: Path,
+        columns: dict[str, Any],
+        line_of: Callable[[int], int] | None = None,
+        *,
+        decimal_comma: bool = False,
     ) -> None:
         self.path = path
         self._columns = columns
         self._line_of = line_of
+        self._decimal_comma = decimal_comma
 
     def __len__(self) -> int:
         return min((len(column) for column in self._columns.values()), default=0)
@@ -151,7 +157,7 @@ class Table:
                 column = column.cast(column.type.value_type)
             if pa.types.is_boolean(column.type):
                 column = column.cast(pa.int8())
-            numbers = _cast(column)
+            numbers = _cast(column, self._decimal_comma)
         except (pa.ArrowException, UnicodeDecodeError):
             raise self._not_a_number(name, column) from None
         return np.array(numbers.to_numpy(), dtype=np.float64), is_null
@@ -166,18 +172,20 @@ class Table:
         while bad - good > 1:
             middle = (good + bad) // 2
             try:
-                _cast(column.slice(good, middle - good))
+                _cast(column.slice(good, middle - good), self._decimal_comma)
                 good = middle
             except pa.ArrowException:
                 bad = middle
         return self.error(good, f"{name} must be a number, got {column[good].as_py()[:40]!r}")
 
 
-def _cast(column: Any) -> Any:
+def _cast(column: Any, decimal_comma: bool = False) -> Any:
     """Convert Arrow text or numbers to float64, passing over white space around a number."""
     import pyarrow as pa
     from pyarrow import compute
 
+    if decimal_comma:
+        column = compute.replace_substring(column, ",", ".")
     try:
         return column.cast(pa.float64())
     except pa.ArrowInvalid:
@@ -185,9 +193,16 @@ def _cast(column: Any) -> Any:
 
 
 def read_table(
-    path: str | Path, required: Sequence[str], optional: Sequence[str] = (), *, short: Sequence[str] = ()
+    path: str | Path,
+    required: Sequence[str],
+    optional: Sequence[str] = (),
+    *,
+    short: Sequence[str] = (),
+    aliases: bool = False,
 ) -> Table:
     """Read a CSV file with a header, or a Parquet file, by its suffix.
+
+    Fields of CSV stand between commas, tabs, or semicolons; numbers may then have a decimal comma.
 
     Columns that are neither required nor optional are passed over, unless they look like a slip of the pen
     for a known column that is not there.
@@ -197,19 +212,25 @@ def read_table(
         required: columns that must be there.
         optional: columns that may be there.
         short: a CSV line may stop after these columns, if they are the file's first ones.
+        aliases: whether columns may go by other usual names, in upper or lower case (`column_names`), and
+            whether others may stand for them: `right` for `width`, `frame` for `t`.
 
     Raises:
         DataError: the file cannot be read, or a column is missing, misspelt or there twice.
     """
     file = Path(path)
     if file.suffix.lower() in PARQUET_SUFFIXES:
-        return _read_parquet(file, required, optional)
-    data = read_text(file)
-    header, body, line = _split_header(data, file)
-    _check_names(header, required, optional, file, line)
+        return _read_parquet(file, required, optional, aliases)
+    names, body, line, delimiter = split_header(read_text(file), file)
+    header = names
+    if aliases:
+        header = usual_names(names, (*required, *optional))
+        required, short = standing_in(header, required), standing_in(header, short)
+    check_names(header, required, optional, file, line)
     leading = {name for name in short if name in header}
     stop = len(leading) if set(header[: len(leading)]) == leading else 0
-    parsed, columns = CsvBody(file, body, line + 1, len(header), "the header names", stop).parse()
+    lines = CsvBody(file, body, line + 1, len(header), "the header names", stop, delimiter)
+    parsed, columns = lines.parse()
     return table_of(parsed, header, columns)
 
 
@@ -226,65 +247,15 @@ def table_of(body: CsvBody, names: Sequence[str], columns: Sequence[Any]) -> Tab
         if nothing.any():
             rows = np.flatnonzero(~nothing)
             named = {name: column.take(rows) for name, column in named.items()}
-    return Table(body.path, named, lambda row: body.line_of_row(row if rows is None else int(rows[row])))
+    return Table(
+        body.path,
+        named,
+        lambda row: body.line_of_row(row if rows is None else int(rows[row])),
+        decimal_comma=body.delimiter != ",",
+    )
 
 
-def _split_header(data: bytes, path: Path) -> tuple[list[str], bytes, int]:
-    """Return the column names, the bytes below the header, and the header's line number."""
-    line = 1
-    while True:
-        end = re.search(rb"\r\n|\n|\r", data)
-        head, data = (data[: end.start()], data[end.end() :]) if end else (data, b"")
-        if head.strip():
-            break
-        line += 1
-    try:
-        fields = next(csv.reader([head.decode("utf-8")], strict=False))
-    except UnicodeDecodeError:
-        raise DataError("is not UTF-8; save the file as UTF-8", path, line) from None
-    except csv.Error as error:
-        raise DataError(f"cannot be read: {error}", path, line) from None
-    return [field.strip() for field in fields], data, line
-
-
-def _check_names(
-    names: Sequence[str], required: Sequence[str], optional: Sequence[str], path: Path, line: int | None
-) -> None:
-    if line is not None and any(_is_number(name) for name in names):
-        raise DataError(f"the first line must name the columns: {','.join(required)}", path, line)
-    if len(names) == 1 and re.search(r"[;\t]", names[0]):
-        raise DataError("the columns must be separated by commas", path, line)
-    twice = next((name for k, name in enumerate(names) if name in names[:k]), None)
-    if twice is not None:
-        raise DataError(f"column {twice!r} is there twice", path, line)
-    absent = [name for name in (*required, *optional) if name not in names]
-    unknown = [name for name in names if name not in required and name not in optional]
-    for name in required:
-        if name not in names:
-            near = _nearest(name, unknown, cutoff=0.5)
-            hint = f"; is {near!r} meant?" if near else f"; there are {', '.join(names)[:200]}"
-            raise DataError(f"column {name!r} is missing{hint}", path, line)
-    for name in unknown:
-        near = _nearest(name, absent, cutoff=0.75)
-        if near:
-            raise DataError(f"unknown column {name!r}; did you mean {near!r}?", path, line)
-
-
-def _nearest(name: str, options: Sequence[str], cutoff: float) -> str | None:
-    lower = {option.lower(): option for option in options}
-    near = difflib.get_close_matches(name.lower(), lower, 1, cutoff)
-    return lower[near[0]] if near else None
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _read_parquet(path: Path, required: Sequence[str], optional: Sequence[str]) -> Table:
+def _read_parquet(path: Path, required: Sequence[str], optional: Sequence[str], aliases: bool) -> Table:
     import pyarrow as pa
     from pyarrow import compute, parquet
 
@@ -293,12 +264,17 @@ def _read_parquet(path: Path, required: Sequence[str], optional: Sequence[str]) 
         raise DataError("is empty", path)
     try:
         file = parquet.ParquetFile(pa.BufferReader(data))
-        names = file.schema_arrow.names
-        _check_names(names, required, optional, path, None)
-        table = file.read([name for name in (*required, *optional) if name in names])
+        own = file.schema_arrow.names
+        names = own
+        if aliases:
+            names = usual_names(own, (*required, *optional))
+            required = standing_in(names, required)
+        check_names(names, required, optional, path, None)
+        chosen = {name: own[names.index(name)] for name in (*required, *optional) if name in names}
+        table = file.read(list(chosen.values()))
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise DataError(f"cannot be read as Parquet: {str(error).splitlines()[0][:200]}", path) from None
-    columns = {name: table.column(name) for name in table.column_names}
+    columns = {name: table.column(there) for name, there in chosen.items()}
     for name, column in columns.items():
         if pa.types.is_floating(column.type):
             # Tables made from arrays have NaN where tables made from rows have null.

@@ -11,6 +11,7 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.io import kitti, motchallenge, prophesee
+from jeat_graph.io.column_names import boxes_of, standing_in, times_of
 from jeat_graph.io.formats import recognise
 from jeat_graph.io.frames import check_rate, fill_frames, gap_times
 from jeat_graph.io.plain_text import check_sizes, frames_of
@@ -24,13 +25,16 @@ _OPTIONAL = (*_MOTION, "class", "ignore", "distance")
 _TRUTH_WORDS = {"": False, "0": False, "1": True, "false": False, "true": True}
 
 
-def read_truth(path: str | Path, *, rate_hz: float | None = None, fmt: str | None = None) -> GroundTruth:
+def read_truth(
+    path: str | Path, *, rate_hz: float | None = None, fmt: str | None = None, time_unit: str = "s"
+) -> GroundTruth:
     """Read ground truth from a file of any known format.
 
     ============  ==========================================================================================
     csv, parquet  `t, object_id, left, top, width, height`, optional `x, y, vx, vy, ax, ay, class, ignore,
                   distance`; a row with only `t` is a recorded frame without objects. With any motion column
                   there is motion: a column that is absent is NaN, except x and y, then the box's centre.
+                  Usual other names are understood, see `column_names`; `time_unit` is the unit of `t`.
     motchallenge  column 7 = 0 means ignore. With 9 columns the 8th is the class; with 10, columns 8 to 10 are
                   world coordinates and are passed over. Rate from `rate_hz` or `seqinfo.ini`.
     kitti         tracking labels (17 columns); type is the class, `DontCare` is ignored, `distance` is that
@@ -47,7 +51,7 @@ def read_truth(path: str | Path, *, rate_hz: float | None = None, fmt: str | Non
     """
     kind = recognise(path, fmt, ("csv", "parquet", "motchallenge", "kitti", "prophesee"))
     if kind in ("csv", "parquet"):
-        return _read_contract(path)
+        return _read_contract(path, rate_hz, time_unit)
     distance: FloatArray | None = None
     if kind == "motchallenge":
         table = motchallenge.read_lines(path)
@@ -119,18 +123,19 @@ def write_truth(truth: GroundTruth, path: str | Path) -> None:
     write_columns(columns, path)
 
 
-def _read_contract(path: str | Path) -> GroundTruth:
-    table = read_table(path, _REQUIRED, _OPTIONAL, short=("t",))
-    all_t = table.number("t")
-    blanks = np.stack([table.blank(name) for name in _REQUIRED[1:]], axis=1)
+def _read_contract(path: str | Path, rate_hz: float | None, time_unit: str) -> GroundTruth:
+    table = read_table(path, _REQUIRED, _OPTIONAL, short=("t",), aliases=True)
+    all_t = times_of(table, time_unit, rate_hz)
+    values = standing_in(table.names, _REQUIRED[1:])
+    blanks = np.stack([table.blank(name) for name in values], axis=1)
     bare: BoolArray = np.asarray(blanks.all(axis=1))
     torn = blanks.any(axis=1) & ~bare
     if torn.any():
         row = int(np.argmax(torn))
-        which = _REQUIRED[1:][int(np.argmax(blanks[row]))]
+        which = values[int(np.argmax(blanks[row]))]
         raise table.error(row, f"{which} is missing; a frame without objects has only t")
     rows = np.flatnonzero(~bare)
-    boxes = np.stack([table.number(name, blank_ok=True) for name in _BOX], axis=1)
+    boxes = boxes_of(table)
     check_sizes(table, np.where(bare[:, None], 1.0, boxes))
     ids, ignore = table.whole("object_id", blank_ok=True), _ignore_flags(table)
     _check_unique(table, all_t, ids, ignore | bare)

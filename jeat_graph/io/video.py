@@ -24,6 +24,7 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.rates import median_rate_hz
 
 RgbImage = npt.NDArray[np.uint8]
 
@@ -107,14 +108,12 @@ def open_frames(path: str | Path, rate_hz: float | None = None) -> FrameSource:
         if inner is not None:
             return open_frames(inner, rate_hz)
         decode: _Decoder = _Pictures(place)
-        known = [place / FRAME_TIMES, place.parent / FRAME_TIMES]
     elif place.is_file():
         decode = _Video(place)
-        known = [place.parent / FRAME_TIMES]
     else:
         raise DataError("no such video or folder of pictures", place)
     try:
-        table = next((file for file in known if file.is_file()), None)
+        table = _times_beside(place)
         count = decode.count()
         if table is not None and rate_hz is None:
             times = read_frame_times(table) / _US_PER_S
@@ -130,6 +129,35 @@ def open_frames(path: str | Path, rate_hz: float | None = None) -> FrameSource:
     except BaseException:
         decode.close()
         raise
+
+
+def peek(path: str | Path) -> tuple[tuple[int, int], float | None]:
+    """Return the size (width and height, px) of a video or a folder of pictures, and its rate (Hz) if known.
+
+    Raises:
+        DataError: nothing there, or nothing that can be read.
+    """
+    place = Path(path)
+    if place.is_dir():
+        inner = next((place / name for name in VIDEO_FILES.values() if (place / name).exists()), None)
+        if inner is not None:
+            return peek(inner)
+    elif not place.is_file():
+        raise DataError("no such video or folder of pictures", place)
+    decode: _Decoder = _Pictures(place) if place.is_dir() else _Video(place)
+    try:
+        height, width = decode.bgr(0).shape[:2]
+        table = _times_beside(place)
+        rate = decode.rate_hz() if table is None else median_rate_hz(read_frame_times(table) / _US_PER_S)
+        return (width, height), rate
+    finally:
+        decode.close()
+
+
+def _times_beside(place: Path) -> Path | None:
+    """Find `frames.csv` of a video or a folder of pictures."""
+    known = [place / FRAME_TIMES, place.parent / FRAME_TIMES]
+    return next((file for file in known if file.is_file()), None)
 
 
 def read_frame_times(path: str | Path) -> IntArray:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import difflib
 
+import numpy as np
+
 from jeat_graph.config.reading import load_config, preset_names
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError, UnknownSensorError
 from jeat_graph.data.rates import median_rate_hz
+from jeat_graph.io.time_units import unit_question
 
 # A box at the edge may have its centre outside; a recording of another picture size has far more of them.
 MOST_OUTSIDE = 0.05
@@ -29,13 +32,15 @@ def check_detections(detections: Detections, config: Config, names: str = "the d
         Warnings, each one line.
 
     Raises:
-        DataError: there is no scan at all, or the boxes do not belong to a picture of this size.
+        DataError: there is no scan at all, the times are not in seconds, or the boxes do not belong to a
+            picture of this size.
         UnknownSensorError: a sensor that the configuration does not declare.
     """
     if not detections.num_scans:
         raise DataError(
             "no scans: a recording needs at least one row, with t and sensor if nothing was found", names
         )
+    _check_units(detections, config, names)
     _check_sensors(detections, config, names)
     warnings = [] if len(detections) else [f"{names}: all scans are empty, so there is nothing to track"]
     return warnings + _check_picture(detections, config, names) + _check_rates(detections, config, names)
@@ -59,6 +64,21 @@ def _check_sensors(detections: Detections, config: Config, names: str) -> None:
     )
 
 
+def _check_units(detections: Detections, config: Config, names: str) -> None:
+    """Refuse times that cannot be seconds, unless the sensor is declared to be as slow as that."""
+    for name in detections.sensors:
+        times = np.unique(detections.sensor_times(name))
+        step = float(np.median(np.diff(times))) if len(times) >= LEAST_SCANS else 0.0
+        question = unit_question(step)
+        slow = name in config.sensors and config.sensors[name].rate_hz * step < RATE_FACTOR
+        if question and not slow:
+            raise DataError(
+                f"sensor {name!r} has a {question}; or, if it is so slow, "
+                f"--set sensors.{name}.rate_hz={1.0 / step:.3g}",
+                names,
+            )
+
+
 def _check_picture(detections: Detections, config: Config, names: str) -> list[str]:
     boxes, width, height = detections.boxes, config.image.width, config.image.height
     if not len(boxes):
@@ -74,7 +94,7 @@ def _check_picture(detections: Detections, config: Config, names: str) -> list[s
         f"(they reach from {low[0]:.0f}, {low[1]:.0f} to {high[0]:.0f}, {high[1]:.0f})"
     )
     if count > MOST_OUTSIDE * total:
-        raise DataError(f"{found}; give the picture's size: --set image.width=W --set image.height=H")
+        raise DataError(f"{found}; give the picture's size: --image WIDTHxHEIGHT")
     return [found]
 
 

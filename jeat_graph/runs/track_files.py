@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from jeat_graph.runs.beside import Facts, facts_beside, facts_of_frames, with_picture
 from jeat_graph.runs.tracking_run import RunOptions, RunRecord, describe_inputs, write_run
 
 if TYPE_CHECKING:
@@ -26,6 +27,8 @@ class TrackRequest:
         input_format: format of the files if it shall not be recognised.
         score_scale: how their scores are to be read, see `read_detections`.
         images: COCO data set with the times of COCO results, or None.
+        time_unit: unit of the column `t`, of `io.time_units`.
+        frames: pictures that tell the picture's size and the frame rate, or None.
         options: how the run is written.
     """
 
@@ -37,6 +40,8 @@ class TrackRequest:
     input_format: str | None = None
     score_scale: str = "unit"
     images: str | None = None
+    time_unit: str = "s"
+    frames: str | None = None
     options: RunOptions = field(default_factory=RunOptions)
 
     @property
@@ -45,6 +50,20 @@ class TrackRequest:
         from jeat_graph.io.detections_io import split_name
 
         return [str(split_name(item)[1]) for item in self.detections]
+
+    def with_facts(self) -> tuple[TrackRequest, Facts | None]:
+        """Complete the frame rate by what files beside the detections say, and return what they say.
+
+        Raises:
+            DataError: a file cannot be read.
+        """
+        if self.frames is None:
+            return self, facts_beside(self.files)
+        facts = facts_of_frames(self.frames)
+        beside = facts_beside(self.files)
+        if self.rate_hz is not None or (beside is not None and beside.rate_hz is not None):
+            return self, facts
+        return replace(self, rate_hz=facts.rate_hz), facts
 
     def load_config(self) -> Config:
         """Load the configuration.
@@ -75,15 +94,21 @@ class TrackRequest:
             "fmt": self.input_format,
             "score_scale": self.score_scale,
             "images": self.images,
+            "time_unit": self.time_unit,
         }
 
 
-def track_files(request: TrackRequest, warn: Callable[[str], object] = lambda _: None) -> RunRecord:
+def track_files(
+    request: TrackRequest,
+    warn: Callable[[str], object] = lambda _: None,
+    say: Callable[[str], object] = lambda _: None,
+) -> RunRecord:
     """Read, check, track, and write the run directory; the folder is as it was if that fails.
 
     Args:
         request: what to do.
         warn: called with each warning about the input before the tracking begins.
+        say: called with each thing that was found out, such as the picture's size.
 
     Returns:
         What `run.json` says of the run.
@@ -99,6 +124,10 @@ def track_files(request: TrackRequest, warn: Callable[[str], object] = lambda _:
     begin = time.perf_counter()
     config = request.load_config()
     directory = RunDirectory(request.out, inputs=request.files)
+    request, facts = request.with_facts()
+    config, notes = with_picture(config, request.overrides, facts)
+    for note in notes:
+        say(note)
     detections = read_many(request.detections, **request._reading())
     record = RunRecord(
         source=request.source(), warnings=check_detections(detections, config, " + ".join(request.files))

@@ -55,7 +55,7 @@ def test_each_measure_alone_changes_one_setting_and_all_change_three() -> None:
 
 
 def test_the_command_writes_and_shows_both_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ["--frames", "3", "--size", "128", "80", "--scenarios", "night-nolight", "--jobs", "1"]
+    arguments = ["--frames", "3", "--size", "128x80", "--scenarios", "night-nolight", "--jobs", "1"]
     assert main(["benchmark", "events", *arguments, "--out", str(tmp_path)]) == 0
     shown = capsys.readouterr().out
     assert "all three" in shown

@@ -149,7 +149,7 @@ def test_boxes_of_another_picture_are_refused_with_their_extent(write, tmp_path,
     message = fails("track", write(*lines), "--out", tmp_path / "run")
     assert "20 of 20 box centres lie outside the picture of 1280 x 720 px" in message
     assert "1520, 815 to 1539, 815" in message
-    assert "image.width" in message
+    assert "--image WIDTHxHEIGHT" in message
     assert not (tmp_path / "run").exists()
 
 

@@ -73,7 +73,10 @@ class TestMotChallenge:
         [
             ("0,-1,10,20,30,40,0.9,-1,-1,-1", "frames count from 1, got 0"),
             ("1.5,-1,10,20,30,40,0.9,-1,-1,-1", "frame must be a whole number"),
-            ("2,-1,10,20,30,40,12.5,-1,-1,-1", "score must be in [0, 1], got 12.5; give score_scale="),
+            (
+                "2,-1,10,20,30,40,12.5,-1,-1,-1",
+                "score must be in [0, 1], got 12.5; for 0 to 100 give",
+            ),
             ("2,-1,10,20,30,x,0.9,-1,-1,-1", "height must be a number, got 'x'"),
             ("2,-1,10,20,30,0,0.9,-1,-1,-1", "width and height must be positive"),
             ("2,-1,10,20,30,40,0.9", "7 fields, but the first line has 10"),

@@ -111,7 +111,7 @@ def test_the_order_of_rows_does_not_matter_but_for_boxes_of_one_scan(write):
         ("0.5,rgb,1,inf,3,4,0.9", "top must be a finite number, got inf"),
         ("0.5,rgb,1,2,0,4,0.9", "width and height must be positive"),
         ("0.5,rgb,1,2,3,-4,0.9", "width and height must be positive"),
-        ("0.5,rgb,1,2,3,4,1.5", "score must be in [0, 1], got 1.5; give score_scale="),
+        ("0.5,rgb,1,2,3,4,1.5", "score must be in [0, 1], got 1.5; for 0 to 100 give --score-scale percent"),
         ("0.5,rgb,1,2,3,4,-1", "score must be in [0, 1], got -1"),
         ("0.5,rgb,1,2,3,4,nan", "score must be a finite number"),
         ("0.5,rgb,1,2,3,4", "6 fields, but the header names 7"),

@@ -46,11 +46,13 @@ def failure(path) -> DataError:
         "a , b,name\n 1,2 , x\n3,4,y\n",
         "name,b,a\nx,2,1\ny,4,3\n",
         "a,b,name,other\n1,2,x,?\n3,4,y,?\n",
+        "a;b;name\r\n1,0;2;x\r\n3;4,00;y\r\n",
+        "a\tb\tname\n1\t2\tx\n3\t4\ty\n",
     ],
     ids=[
         *("plain", "crlf", "cr", "bom", "blank lines at the end", "no newline at the end"),
         *("blank lines at the start", "white space between", "commas only", "quoted", "spaces"),
-        *("other order", "other column"),
+        *("other order", "other column", "semicolons", "tabs"),
     ],
 )
 def test_a_table_is_read_whatever_the_line_ends_quotes_and_blanks(write, content):
@@ -72,7 +74,9 @@ def test_a_table_is_read_whatever_the_line_ends_quotes_and_blanks(write, content
         ("a,b,nam\n", 1, "column 'name' is missing; is 'nam' meant?"),
         ("a,b,name,extr\n", 1, "unknown column 'extr'; did you mean 'extra'?"),
         ("a,b,name,a\n1,2,x,3\n", 1, "column 'a' is there twice"),
-        ("a;b;name\n1;2;x\n", 1, "separated by commas"),
+        ("a;b;name\n1;2,5;x\n1;2,5,1;x\n", 3, "b must be a number, got '2,5,1'"),
+        (b"\x1f\x8b\x08\x00", None, "compressed with gzip; give it a name that ends in .gz"),
+        (b"PK\x03\x04....", None, "Excel workbook"),
         ("a,b,name\n1,2,x\n3,4,y,5\n", 3, "4 fields, but the header names 3"),
         ("a,b,name\n1,2,x\n3\n", 3, "1 field, but the header names 3"),
         ("a,b,name\r\n1,2,x\r\n\r\n\r\n3,4,y,5\r\n", 5, "4 fields"),

@@ -1,0 +1,150 @@
+"""Options that several commands share, declared once: the same name means the same everywhere.
+
+========================  ================================================================================
+`--rate HZ`               frame rate of input files that count frames
+`--output-rate HZ`        frames or pictures per second of what is written
+`--image WxH`             size of the camera's picture, which boxes are given in
+`--size WxH`              size of pictures that are drawn
+`--config`, `--set`       the configuration and changes to it
+========================  ================================================================================
+"""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from jeat_graph.config.argument_types import picture_size, positive
+from jeat_graph.io.time_units import TIME_UNITS
+
+INPUT_FORMATS = ("csv", "parquet", "motchallenge", "kitti", "prophesee", "coco")
+OUTPUT_FORMATS = ("csv", "parquet", "motchallenge", "kitti")
+ENGINES = ("fixed-lag", "full", "rts", "fixed-lag-rts", "none")
+SCORE_SCALES = ("unit", "percent", "logistic")
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that takes options by their whole names only: `--image` is never taken for `--images`."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        options.setdefault("allow_abbrev", False)
+        super().__init__(*args, **options)
+
+
+def add_config(parser: argparse.ArgumentParser, default: str = "default", *, settings: bool = True) -> None:
+    """Declare `--config` and, if `settings`, `--set` (`overrides`)."""
+    add = parser.add_argument
+    add("--config", default=default, metavar="NAME|FILE", help=f"preset or YAML file (default: {default})")
+    if settings:
+        add(
+            "--set",
+            dest="overrides",
+            action="append",
+            default=[],
+            metavar="KEY=VALUE",
+            help="change one setting, say lifecycle.confirm_existence=0.9; may be given many times",
+        )
+
+
+def add_image(parser: argparse.ArgumentParser) -> None:
+    """Declare `--image`."""
+    parser.add_argument(
+        "--image",
+        type=picture_size,
+        metavar="WxH",
+        help="size of the camera's picture in px, say 1920x1080 (default: as seqinfo.ini beside the input "
+        "says, else the configuration)",
+    )
+
+
+def image_overrides(size: tuple[int, int] | None) -> list[str]:
+    """Return the settings that `--image` stands for."""
+    return [] if size is None else [f"image.width={size[0]}", f"image.height={size[1]}"]
+
+
+def add_rate(parser: argparse.ArgumentParser) -> None:
+    """Declare `--rate`, the frame rate of what is read."""
+    parser.add_argument(
+        "--rate", type=positive, metavar="HZ", help="frames per second of input files that count frames"
+    )
+
+
+def add_output_rate(parser: argparse.ArgumentParser, text: str, *old_names: str) -> None:
+    """Declare `--output-rate`, the frame rate of what is written.
+
+    Args:
+        parser: of the command.
+        text: help.
+        old_names: further names, understood but not shown.
+    """
+    parser.add_argument("--output-rate", type=positive, metavar="HZ", help=text)
+    for name in old_names:
+        parser.add_argument(name, dest="output_rate", type=positive, help=argparse.SUPPRESS)
+
+
+def add_reading(parser: argparse.ArgumentParser) -> None:
+    """Declare how files of detections are read: `reading` takes them from the parsed arguments."""
+    add = parser.add_argument
+    add_rate(parser)
+    add("--input-format", choices=INPUT_FORMATS, help="format of the input, if it is not recognised")
+    add(
+        "--score-scale",
+        choices=SCORE_SCALES,
+        default="unit",
+        help="scores are in [0, 1] (unit), percent, or raw scores of any size (logistic)",
+    )
+    add("--images", metavar="FILE", help="COCO data set with the images and times of COCO results")
+    add("--time-unit", choices=tuple(TIME_UNITS), default="s", help="unit of the column t (default: s)")
+
+
+def reading(args: argparse.Namespace) -> dict[str, Any]:
+    """Return what `add_reading` declared, as `read_detections` takes it."""
+    return {
+        "rate_hz": args.rate,
+        "fmt": args.input_format,
+        "score_scale": args.score_scale,
+        "images": args.images,
+        "time_unit": args.time_unit,
+    }
+
+
+def add_smoother(parser: argparse.ArgumentParser) -> None:
+    """Declare `--smoother`."""
+    parser.add_argument(
+        "--smoother",
+        choices=ENGINES,
+        help="engine of smoothed.csv: fixed-lag (live, with a delay), full (whole tracks, fragments "
+        "stitched), rts (the same, fast), fixed-lag-rts, none; default: as the configuration says",
+    )
+
+
+def add_formats(parser: argparse.ArgumentParser) -> None:
+    """Declare `--format` of a run's tables and `--diagnostics`."""
+    add = parser.add_argument
+    add(
+        "--format",
+        dest="formats",
+        nargs="+",
+        action="extend",
+        default=[],
+        choices=OUTPUT_FORMATS,
+        metavar="NAME",
+        help="also write the tables as parquet, motchallenge, kitti (csv is always written)",
+    )
+    add(
+        "--diagnostics",
+        action="store_true",
+        help="also write diagnostics.csv: NIS and noise scale of every update, for the pages of `report`",
+    )
+
+
+def extra_formats(args: argparse.Namespace) -> tuple[str, ...]:
+    """Return the formats asked for beside CSV, each once."""
+    return tuple(dict.fromkeys(name for name in args.formats if name != "csv"))
+
+
+def overrides(args: argparse.Namespace) -> list[str]:
+    """Return all changed settings: of `--set`, `--image` and `--smoother`, where the command has them."""
+    found = [*args.overrides, *image_overrides(getattr(args, "image", None))]
+    engine = getattr(args, "smoother", None)
+    return found if engine is None else [*found, f"smoother.engine={engine}"]

@@ -1,0 +1,31 @@
+"""Times that are not in seconds are refused, with the unit that they seem to be in."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from jeat_graph.config.reading import load_config
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.errors import DataError
+from jeat_graph.runs.input_checks import check_detections
+
+
+def recording(step: float) -> Detections:
+    """Ten scans of one box."""
+    n = 10
+    boxes = np.tile([100.0, 200.0, 40.0, 30.0], (n, 1))
+    return Detections.from_rows(
+        np.arange(n) * step, np.full(n, "rgb"), boxes, np.full(n, 0.9), np.zeros(n, dtype=bool), None
+    )
+
+
+@pytest.mark.parametrize(("step", "unit"), [(40.0, "ms"), (50_000.0, "us"), (5e7, "ns")])
+def test_times_in_other_units_are_refused_with_a_question(step, unit):
+    with pytest.raises(DataError, match=rf"det: sensor 'rgb' has a median step .* in {unit}\? \(--time-unit"):
+        check_detections(recording(step), load_config("default"), "det")
+
+
+def test_a_sensor_that_is_declared_to_be_so_slow_is_believed():
+    config = load_config("default", ["sensors.rgb.rate_hz=0.025"])
+    assert check_detections(recording(40.0), config, "det") == []
