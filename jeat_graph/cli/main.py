@@ -28,6 +28,8 @@ COMMANDS = (
     "render",
     "report",
     "calibrate",
+    "camera",
+    "road",
     "benchmark",
 )
 

@@ -1,0 +1,97 @@
+"""`jeat-graph camera`: calibrate a fixed camera over a road, and show what a calibration says."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from jeat_graph.data.errors import DataError
+
+HELP = "calibrate a camera over a road from lengths, points and the vehicles' tracks, or show one"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
+    add = actions.add_parser(
+        "calibrate", help="find the camera that all the evidence agrees with"
+    ).add_argument
+    add(
+        "--run",
+        dest="tracks",
+        metavar="RUN",
+        help="run directory, trajectory table, or table of t, track_id, x, y",
+    )
+    add("--lengths", metavar="FILE", help="measured lengths: x1, y1, x2, y2 (px), metres, along or across")
+    add("--points", metavar="FILE", help="surveyed points: x, y (px), east, north (m)")
+    add("--zone", default="", metavar="UTM", help="UTM zone of the points, such as 33N, for maps")
+    add("--image", required=True, type=image_size, metavar="WxH", help="size of the picture in px")
+    add("--out", required=True, metavar="CAMERA.yaml", help="the calibrated camera")
+    show = actions.add_parser("show", help="say in words what a camera's file says").add_argument
+    show("camera", metavar="CAMERA.yaml", help="the camera")
+    show("--picture", metavar="FILE.png", help="draw the road's grid as the camera sees it")
+    show("--frame", metavar="FILE", help="picture of the camera to draw it over")
+
+
+def image_size(text: str) -> tuple[int, int]:
+    """Read `1280x720`."""
+    try:
+        width, height = (int(part) for part in text.lower().split("x"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be like 1280x720, got {text!r}") from None
+    if width < 1 or height < 1:
+        raise argparse.ArgumentTypeError("must be positive")
+    return width, height
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do what was asked for."""
+    return _show(args) if args.action == "show" else _calibrate(args)
+
+
+def _calibrate(args: argparse.Namespace) -> int:
+    from jeat_graph.road.calibrate import calibrate
+    from jeat_graph.road.camera_file import write_camera
+    from jeat_graph.road.evidence import CalibrationConfig, thin
+    from jeat_graph.road.inputs import read_lengths, read_surveyed_points
+    from jeat_graph.road.report import calibration_lines
+    from jeat_graph.road.residuals import Problem
+    from jeat_graph.road.sources import contact_pixels
+
+    if Path(args.out).suffix not in (".yaml", ".yml"):
+        raise DataError("the name of a camera's file must end in .yaml", args.out)
+    if args.lengths is None and args.points is None:
+        raise DataError("nothing tells the scale: give --lengths or --points")
+    config = CalibrationConfig()
+    lengths = None if args.lengths is None else read_lengths(args.lengths)
+    points = None if args.points is None else read_surveyed_points(args.points)
+    tracks = None
+    if args.tracks is not None:
+        table = contact_pixels(args.tracks)
+        tracks = thin(table.t, table.track_id, table.pixels, config, args.image)
+        if not len(tracks):
+            print(f"jeat-graph camera: {args.tracks}: no track is long enough to help", file=sys.stderr)
+            tracks = None
+    calibration = calibrate(Problem(*args.image, lengths, points, tracks, config), args.zone)
+    lines = calibration_lines(calibration)
+    write_camera(calibration.camera, args.out, lines)
+    print("\n".join(lines))
+    print(f"written: {args.out}", file=sys.stderr)
+    return 0
+
+
+def _show(args: argparse.Namespace) -> int:
+    from jeat_graph.road.camera_file import read_camera
+    from jeat_graph.road.report import camera_lines
+
+    camera = read_camera(args.camera)
+    print("\n".join(camera_lines(camera)))
+    if args.frame is not None and args.picture is None:
+        raise DataError("--frame is what to draw over: give --picture, too")
+    if args.picture is not None:
+        from jeat_graph.road.grid_picture import draw_grid
+
+        draw_grid(camera, args.picture, args.frame)
+        print(f"written: {args.picture}", file=sys.stderr)
+    return 0

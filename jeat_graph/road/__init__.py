@@ -1,0 +1,1 @@
+"""The road room: from pixels to metres, km/h and lanes, each with its uncertainty."""

@@ -1,0 +1,72 @@
+"""From points of vehicles in the picture to their speeds, lanes and crossings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from jeat_graph.road.camera import RoadCamera
+from jeat_graph.road.crossings import crossing, road_line
+from jeat_graph.road.inputs import PointTable, RoadMarks
+from jeat_graph.road.lanes import LaneConfig, find_lanes, given_lanes
+from jeat_graph.road.motion_fit import MotionFitConfig
+from jeat_graph.road.results import NO_SIZE, RoadResult
+from jeat_graph.road.speeds import ContactConfig, Vehicle, fit_vehicle
+
+
+def follow_points(
+    points: PointTable,
+    camera: RoadCamera,
+    motion: MotionFitConfig,
+    contact: ContactConfig,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Vehicle]:
+    """Fit every track that stays long enough on the road; `progress` hears how many of how many are done."""
+    tracks = points.tracks()
+    vehicles = []
+    for k, rows in enumerate(tracks):
+        one = fit_vehicle(
+            int(points.track_id[rows.start]), points.t[rows], points.pixels[rows], camera, motion, contact
+        )
+        if one is not None:
+            vehicles.append(one)
+        if progress is not None:
+            progress(k + 1, len(tracks))
+    return vehicles
+
+
+def summarise(
+    vehicles: list[Vehicle],
+    camera: RoadCamera,
+    marks: RoadMarks,
+    contact: ContactConfig,
+    lane_config: LaneConfig,
+) -> RoadResult:
+    """Speeds, lanes and crossings of fitted vehicles.
+
+    A vehicle's speed is its mean between the first and the last line that it crosses, where lines are given
+    and it crosses two; otherwise over all of its track that the fit believes.
+    """
+    middle = np.array([v.fit.at(np.array(np.mean(v.fit.window())))[0] for v in vehicles], dtype=np.float64)
+    lanes = given_lanes(marks.lanes) if marks.lanes else find_lanes(middle, lane_config)
+    ends = {name: road_line(camera, line, contact.height_m) for name, line in marks.lines.items()}
+    crossings, speeds = [], []
+    for k, vehicle in enumerate(vehicles):
+        own = [(name, crossing(vehicle, line)) for name, line in ends.items() if line is not None]
+        found = [(name, k, one) for name, one in own if one is not None]
+        crossings += found
+        start, end = vehicle.fit.window()
+        times = sorted(one.t for _, _, one in found)
+        if len(times) > 1 and times[-1] > times[0]:
+            start, end = times[0], times[-1]
+        speeds.append(vehicle.mean_speed(start, end))
+    return RoadResult(
+        vehicles=vehicles,
+        sizes=[NO_SIZE] * len(vehicles),
+        classes=[""] * len(vehicles),
+        speeds=speeds,
+        lane_names=[str(name) for name in lanes.of(middle)] if len(middle) else [],
+        lanes=lanes,
+        crossings=crossings,
+    )

@@ -1,0 +1,139 @@
+"""The one least-squares problem of a calibration: every kind of evidence as residuals in sigmas."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.road.camera import RoadCamera
+from jeat_graph.road.evidence import CalibrationConfig, Lengths, Points, TrackNodes
+from jeat_graph.road.track_fit import fit_tracks
+
+_UNSEEN = 1e3  # residual of a length that the trial camera sees in the sky
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """All the evidence about one camera.
+
+    Attributes:
+        width: width of the picture (px).
+        height: height of the picture (px).
+        lengths: measured lengths, or None.
+        points: surveyed points, or None.
+        tracks: the vehicles' tracks, or None.
+        config: noise of the evidence and prior beliefs.
+    """
+
+    width: int
+    height: int
+    lengths: Lengths | None
+    points: Points | None
+    tracks: TrackNodes | None
+    config: CalibrationConfig
+
+
+@dataclass(frozen=True, eq=False)
+class Weighting:
+    """How much the evidence counts, found in turn with the camera.
+
+    Attributes:
+        length_spread: (L, 2) error of each length and of its direction (m).
+        point_scale: factor on the expected error of points.
+        track_px: error of a track's node (px).
+        track_share: how many independent tracks' worth one track is (design effect's inverse).
+        node_weight: (K, M) robust weights.
+    """
+
+    length_spread: FloatArray
+    point_scale: float
+    track_px: float
+    track_share: float
+    node_weight: FloatArray
+
+
+def prior_residuals(camera: RoadCamera, problem: Problem, common_acceleration: float) -> FloatArray:
+    """What speaks against this camera before any evidence (10,)."""
+    c = problem.config
+    corner = math.hypot(problem.width, problem.height) / 2.0 / camera.fx
+    centre = c.centre_share * problem.width
+    return np.array(
+        [
+            (math.log(camera.fx / problem.width) - math.log(c.focal_ratio)) / c.focal_log_sd,
+            math.log(camera.fy / camera.fx) / c.aspect_sd,
+            (camera.cx - problem.width / 2.0) / centre,
+            (camera.cy - problem.height / 2.0) / centre,
+            camera.k1 * corner**2 / c.corner_distortion,
+            camera.k2 * corner**4 / c.corner_distortion * 4.0,
+            camera.angles()[2] / math.radians(c.roll_sd_deg),
+            math.log(camera.position[2] / c.height_m) / c.height_log_sd,
+            common_acceleration / c.common_acceleration_sd,
+        ]
+    )
+
+
+def length_spread(camera: RoadCamera, lengths: Lengths, config: CalibrationConfig) -> FloatArray:
+    """Expected error of each length through this camera (L, 2) in m: of its size and of its direction."""
+    spread = []
+    vector = camera.to_road(lengths.end) - camera.to_road(lengths.start)
+    size = np.linalg.norm(vector, axis=1)
+    unit = vector / size[:, None]
+    normal = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
+    ends = [camera.to_road_jacobian(camera.to_road(one)) for one in (lengths.start, lengths.end)]
+    turn = np.where(lengths.along, config.along_sd_rad, config.across_sd_rad)
+    for axis, own in ((unit, np.full(len(size), config.length_sd_m)), (normal, turn * size)):
+        clicks = sum((np.einsum("li,lij->lj", axis, J) ** 2).sum(axis=1) for J in ends)
+        spread.append(np.sqrt(config.click_px**2 * clicks + own**2))
+    return np.stack(spread, axis=1)
+
+
+def length_errors(camera: RoadCamera, lengths: Lengths) -> FloatArray:
+    """How much longer each length looks than it is, and how far its end lies beside its direction.
+
+    Returns:
+        (L, 2) in m.
+    """
+    vector = camera.to_road(lengths.end) - camera.to_road(lengths.start)
+    beside = np.where(lengths.along, vector[:, 0], vector[:, 1])
+    return np.stack([np.linalg.norm(vector, axis=1) - lengths.metres, beside], axis=1)
+
+
+def length_residuals(camera: RoadCamera, problem: Problem, spread: FloatArray) -> FloatArray:
+    """Residuals of the lengths (2 L,) in their spreads (L, 2)."""
+    assert problem.lengths is not None
+    return np.nan_to_num(length_errors(camera, problem.lengths) / spread, nan=_UNSEEN).ravel()
+
+
+def point_residuals(camera: RoadCamera, problem: Problem, scale: float) -> FloatArray:
+    """Residuals of the surveyed points (2 P,): in the picture, where the error of the survey is added."""
+    assert problem.points is not None
+    c = problem.config
+    place = np.concatenate([problem.points.places, np.zeros((len(problem.points), 1))], axis=1)
+    pixels, depth = camera.project(place)
+    J = camera.jacobian(place)[..., :2]
+    cov = c.click_px**2 * np.eye(2) + c.point_sd_m**2 * J @ np.swapaxes(J, -1, -2)
+    with np.errstate(invalid="ignore"):
+        white = np.linalg.solve(np.linalg.cholesky(cov), (pixels - problem.points.pixels)[..., None])[..., 0]
+    return np.where(depth[:, None] > 0, white / scale, _UNSEEN).ravel()
+
+
+def track_residuals(
+    camera: RoadCamera, problem: Problem, weighting: Weighting, common_acceleration: float
+) -> FloatArray:
+    """Residuals of the tracks (K (2 M + 2),): nodes, then what their accelerations and turns cost."""
+    assert problem.tracks is not None
+    c, w = problem.config, weighting.node_weight
+    fit = fit_tracks(camera, problem.tracks, c, weighting.track_px, common_acceleration, w)
+    used = np.sqrt(w.max(axis=1))
+    parts = np.concatenate(
+        [
+            (fit.residual * np.sqrt(w)[..., None]).reshape(len(w), -1),
+            (fit.motion[:, 1] / c.lateral_sd * used)[:, None],
+            ((fit.motion[:, 4] - common_acceleration) / c.acceleration_sd * used)[:, None],
+        ],
+        axis=1,
+    )
+    return np.asarray(parts.ravel() * math.sqrt(weighting.track_share), dtype=np.float64)

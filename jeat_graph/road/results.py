@@ -1,0 +1,160 @@
+"""What people take home: the tables of the road, the vehicles' speeds and their crossings of lines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.io.table_writer import round_decimals, round_significant
+from jeat_graph.road.crossings import Crossing
+from jeat_graph.road.lanes import Lanes
+from jeat_graph.road.speeds import KMH, Speed, Vehicle
+
+_DECIMALS = 3
+_DIGITS = 6
+_DEGREES = 180.0 / np.pi
+
+
+class Size(NamedTuple):
+    """Size of a vehicle (m) with variances (m²).
+
+    Attributes:
+        mean: length, width, height; NaN where nothing tells.
+        var: their variances.
+    """
+
+    mean: tuple[float, float, float]
+    var: tuple[float, float, float]
+
+
+NO_SIZE = Size((np.nan,) * 3, (np.nan,) * 3)
+
+
+@dataclass(frozen=True, eq=False)
+class RoadResult:
+    """Everything that was found out about the vehicles of a recording.
+
+    Attributes:
+        vehicles: the vehicles.
+        sizes: their sizes, in the same order.
+        classes: their classes by length, empty where nothing tells.
+        speeds: their mean speeds.
+        lane_names: the lanes that they were in most.
+        lanes: the lanes.
+        crossings: line, place of the vehicle in `vehicles`, and the crossing.
+    """
+
+    vehicles: Sequence[Vehicle]
+    sizes: Sequence[Size]
+    classes: Sequence[str]
+    speeds: Sequence[Speed]
+    lane_names: Sequence[str]
+    lanes: Lanes
+    crossings: Sequence[tuple[str, int, Crossing]]
+
+
+def road_columns(vehicle: Vehicle, size: Size) -> dict[str, npt.NDArray[Any]]:
+    """Rows of one vehicle in `road.csv`: its state on the road at each time, with noise and calibration."""
+    t = vehicle.t
+    total = vehicle.fit.covariance + vehicle.by_calibration
+    C = total.shape[0] // 2
+    rows = [vehicle.fit.basis(t, k) for k in range(3)]
+    place, velocity, acceleration = (row @ vehicle.fit.coefficients.T for row in rows)
+
+    def covariance(row: FloatArray) -> FloatArray:
+        blocks = total.reshape(2, C, 2, C)
+        return np.asarray(np.einsum("na,iajb,nb->nij", row, blocks, row), dtype=np.float64)
+
+    var_place, var_velocity, var_acceleration = (covariance(row) for row in rows)
+    speed = np.linalg.norm(velocity, axis=1)
+    unit = velocity / np.maximum(speed, 1e-9)[:, None]
+    side = np.stack([unit[:, 1], -unit[:, 0]], axis=1)
+    var_speed = np.einsum("ni,nij,nj->n", unit, var_velocity, unit)
+    var_turn = np.einsum("ni,nij,nj->n", side, var_velocity, side) / np.maximum(speed, 1e-3) ** 2
+    columns: dict[str, npt.NDArray[Any]] = {
+        "t": t + 0.0,
+        "track_id": np.full(len(t), vehicle.track_id, dtype=np.int64),
+        "x": round_decimals(place[:, 0], _DECIMALS),
+        "y": round_decimals(place[:, 1], _DECIMALS),
+        "speed_kmh": round_decimals(speed * KMH, _DECIMALS),
+        "heading_deg": round_decimals(np.arctan2(velocity[:, 0], velocity[:, 1]) * _DEGREES, _DECIMALS),
+        "acceleration": round_decimals((acceleration * unit).sum(axis=1), _DECIMALS),
+    }
+    for name, mean in zip(("length", "width", "height"), size.mean, strict=True):
+        columns[name] = round_decimals(np.full(len(t), mean), _DECIMALS)
+    variances = {
+        "var_x": var_place[:, 0, 0],
+        "var_y": var_place[:, 1, 1],
+        "var_speed_kmh": var_speed * KMH**2,
+        "var_heading_deg": np.minimum(var_turn * _DEGREES**2, 180.0**2),
+        "var_acceleration": np.einsum("ni,nij,nj->n", unit, var_acceleration, unit),
+        **{
+            f"var_{name}": np.full(len(t), value)
+            for name, value in zip(("length", "width", "height"), size.var, strict=True)
+        },
+    }
+    return columns | {name: round_significant(values, _DIGITS) for name, values in variances.items()}
+
+
+def speed_columns(result: RoadResult) -> dict[str, npt.NDArray[Any]]:
+    """Rows of `speeds.csv`, one a vehicle."""
+    numbers = {
+        "length": [size.mean[0] for size in result.sizes],
+        "speed_kmh": [s.kmh for s in result.speeds],
+        "low_kmh": [s.low_kmh for s in result.speeds],
+        "high_kmh": [s.high_kmh for s in result.speeds],
+        "sigma_noise_kmh": [s.noise_kmh for s in result.speeds],
+        "sigma_calibration_kmh": [s.calibration_kmh for s in result.speeds],
+    }
+    rounded = {name: round_decimals(np.array(v, dtype=np.float64), _DECIMALS) for name, v in numbers.items()}
+    return {
+        "track_id": np.array([v.track_id for v in result.vehicles], dtype=np.int64),
+        "t_first": np.array([v.t[0] for v in result.vehicles], dtype=np.float64),
+        "t_last": np.array([v.t[-1] for v in result.vehicles], dtype=np.float64),
+        "lane": np.array(result.lane_names, dtype=np.str_),
+        "class": np.array(result.classes, dtype=np.str_),
+        **rounded,
+    }
+
+
+def crossing_columns(result: RoadResult) -> dict[str, npt.NDArray[Any]]:
+    """Rows of `crossings.csv`, one a vehicle and line, by time."""
+    rows = sorted(result.crossings, key=lambda row: (row[2].t, row[0], row[1]))
+    at = np.array([row[2].x for row in rows], dtype=np.float64)
+    columns: dict[str, npt.NDArray[Any]] = {
+        "track_id": np.array([result.vehicles[row[1]].track_id for row in rows], dtype=np.int64),
+        "line": np.array([row[0] for row in rows], dtype=np.str_),
+        "t": round_decimals(np.array([row[2].t for row in rows], dtype=np.float64), 4),
+        "lane": result.lanes.of(at) if len(at) else np.zeros(0, dtype=np.str_),
+    }
+    for name, field in (("speed_kmh", "kmh"), ("low_kmh", "low_kmh"), ("high_kmh", "high_kmh")):
+        values = np.array([getattr(row[2].speed, field) for row in rows], dtype=np.float64)
+        columns[name] = round_decimals(values, _DECIMALS)
+    return columns
+
+
+def write_result(result: RoadResult, folder: str | Path) -> None:
+    """Write `road.csv`, `speeds.csv` and `crossings.csv` into a folder, each whole or not at all."""
+    from jeat_graph.io.table_writer import TableWriter, write_columns
+
+    with TableWriter(Path(folder) / "road.csv") as writer:
+        if not result.vehicles:
+            writer.append(empty_road_columns())
+        for vehicle, size in zip(result.vehicles, result.sizes, strict=True):
+            writer.append(road_columns(vehicle, size))
+    write_columns(speed_columns(result), Path(folder) / "speeds.csv")
+    write_columns(crossing_columns(result), Path(folder) / "crossings.csv")
+
+
+def empty_road_columns() -> dict[str, npt.NDArray[Any]]:
+    """The columns of `road.csv` without rows."""
+    names = ("x", "y", "speed_kmh", "heading_deg", "acceleration", "length", "width", "height")
+    spread = ("x", "y", "speed_kmh", "heading_deg", "acceleration", "length", "width", "height")
+    none: dict[str, npt.NDArray[Any]] = {"t": np.zeros(0), "track_id": np.zeros(0, dtype=np.int64)}
+    return none | {name: np.zeros(0) for name in (*names, *(f"var_{s}" for s in spread))}

@@ -1,0 +1,62 @@
+"""Where the vehicles' points come from: a table of points, or the boxes of a run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from jeat_graph.data.errors import DataError
+from jeat_graph.io.trajectories_io import read_trajectories
+from jeat_graph.road.inputs import PointTable, read_points_table
+
+_RUN_TABLES = ("smoothed.csv", "smoothed.parquet", "causal.csv", "causal.parquet")
+
+
+def contact_pixels(source: str | Path, contact: str | None = None) -> PointTable:
+    """Points where vehicles touch the road, as nearly as boxes or points alone tell.
+
+    Args:
+        source: a run directory (its smoothed table, else its causal one), a trajectory table or result,
+            or a table of `t, track_id, x, y`.
+        contact: `center` takes x, y as they are; `bottom` takes the middle of the box's lower edge; None
+            takes `center` for tables without boxes and `bottom` otherwise.
+
+    Raises:
+        DataError: the source cannot be read, or has no boxes where `bottom` needs them.
+    """
+    path = Path(source)
+    if path.is_dir():
+        found = next((path / name for name in _RUN_TABLES if (path / name).is_file()), None)
+        if found is None:
+            raise DataError(f"holds no table of a run ({', '.join(_RUN_TABLES)})", path)
+        path = found
+    if _only_points(path):
+        if contact not in (None, "center"):
+            raise DataError(f"has points only, no boxes: --contact {contact} needs boxes, use center", path)
+        return read_points_table(path)
+    table = read_trajectories(path)
+    order = np.lexsort((table.t, table.track_id))
+    table = table.take(order)
+    left, top, width, height = table.boxes.T
+    if contact == "center":
+        pixels = table.mean[:, :2]
+    else:
+        pixels = np.stack([left + width / 2.0, top + height], axis=1)
+    return PointTable(table.t, table.track_id, pixels)
+
+
+def _only_points(path: Path) -> bool:
+    """Tell whether a table has `x, y` but no boxes, by its header."""
+    if path.suffix.lower() in (".parquet", ".pq"):
+        from pyarrow import ArrowException, parquet
+
+        try:
+            return "left" not in parquet.read_schema(path).names
+        except (ArrowException, OSError):
+            return False
+    from jeat_graph.io.csv_text import read_text
+
+    head = read_text(path).lstrip()[:4096].splitlines()[0].decode("utf-8", errors="replace")
+    names = [name.strip() for name in head.split(",")]
+    return "track_id" in names and "x" in names and "left" not in names

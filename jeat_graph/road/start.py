@@ -1,0 +1,142 @@
+"""A first guess of a camera, good enough for least squares to find the best one from."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.errors import DataError
+from jeat_graph.road.camera import RoadCamera, mounted
+from jeat_graph.road.residuals import Problem, length_errors, length_residuals, length_spread, prior_residuals
+from jeat_graph.road.track_fit import fit_tracks
+from jeat_graph.road.vanishing import vanishing_point
+
+_FOCAL_RATIOS = np.geomspace(0.35, 4.0, 18)
+_ROLLS_DEG = (-6.0, -3.0, 0.0, 3.0, 6.0)
+_PITCHES_DEG = np.arange(2.0, 66.0, 3.0)
+_YAWS_DEG = np.arange(-60.0, 61.0, 5.0)
+_LEAST_PITCH = 0.01
+_COARSE_PX = 3.0
+
+
+def first_guess(problem: Problem) -> RoadCamera:
+    """Try a grid of cameras and return the one that the evidence likes best.
+
+    Raises:
+        DataError: the evidence cannot belong to a camera over a road.
+    """
+    if problem.points is not None and len(problem.points) >= 4:
+        return _from_points(problem)
+    poses = _poses(problem)
+    best: tuple[float, RoadCamera] | None = None
+    for ratio, rotation in poses:
+        camera = _scaled(problem, _plain(problem, ratio, rotation, problem.config.height_m))
+        if camera is None:
+            continue
+        cost = _cost(camera, problem)
+        if best is None or cost < best[0]:
+            best = cost, camera
+    if best is None:
+        raise DataError(
+            "no camera above a road can have seen this: check the pixels of the lengths and the image size"
+        )
+    return best[1]
+
+
+def _plain(problem: Problem, ratio: float, rotation: FloatArray, height: float) -> RoadCamera:
+    f = ratio * problem.width
+    return RoadCamera(
+        problem.width,
+        problem.height,
+        f,
+        f,
+        problem.width / 2.0,
+        problem.height / 2.0,
+        0.0,
+        0.0,
+        rotation,
+        np.array([0.0, 0.0, height]),
+    )
+
+
+def _poses(problem: Problem) -> list[tuple[float, FloatArray]]:
+    """Focal lengths and rotations to try: those that agree with the tracks' vanishing point, if any."""
+    point = None if problem.tracks is None else vanishing_point(problem.tracks.pixels)
+    if point is None:
+        grid = [(p, y) for p in np.radians(_PITCHES_DEG) for y in np.radians(_YAWS_DEG)]
+        return [(float(r), mounted(p, y, 0.0)) for r in _FOCAL_RATIOS for p, y in grid]
+    poses = []
+    for ratio in _FOCAL_RATIOS:
+        x, y = (point - [problem.width / 2.0, problem.height / 2.0]) / (ratio * problem.width)
+        for roll in np.radians(_ROLLS_DEG):
+            c, s = math.cos(roll), math.sin(roll)
+            pitch = math.atan(-(s * x + c * y))
+            yaw = math.atan(-(c * x - s * y) * math.cos(pitch))
+            if pitch > _LEAST_PITCH:
+                poses.append((float(ratio), mounted(pitch, yaw, float(roll))))
+    return poses
+
+
+def _scaled(problem: Problem, camera: RoadCamera) -> RoadCamera | None:
+    """Give the camera the height at which the lengths fit; None where it sees one of them in the sky."""
+    if problem.lengths is None:
+        return camera
+    size = length_errors(camera, problem.lengths)[:, 0] + problem.lengths.metres
+    if not np.isfinite(size).all() or (size <= 0).any():
+        return None
+    factor = float(np.exp(np.median(np.log(problem.lengths.metres / size))))
+    change = np.zeros(12)
+    change[11] = camera.position[2] * (factor - 1.0)
+    return camera.moved(change)
+
+
+def _cost(camera: RoadCamera, problem: Problem) -> float:
+    cost = float((prior_residuals(camera, problem, 0.0) ** 2).sum())
+    if problem.lengths is not None:
+        spread = length_spread(camera, problem.lengths, problem.config)
+        if not np.isfinite(spread).all():
+            return math.inf
+        # Soft: one wrong length of many must not send the search astray.
+        cost += float(np.log1p(length_residuals(camera, problem, 2.0 * spread) ** 2).sum())
+    if problem.tracks is not None and len(problem.tracks):
+        fit = fit_tracks(camera, problem.tracks, problem.config, _COARSE_PX)
+        each = np.log1p((fit.residual**2).sum(axis=-1)).mean(axis=1)
+        cost += float(np.median(each)) * 2.0 * problem.config.nodes
+    return cost
+
+
+def _from_points(problem: Problem) -> RoadCamera:
+    """Solve for the pose at each of many focal lengths (OpenCV's planar pose) and keep the best."""
+    import cv2
+
+    assert problem.points is not None
+    centre = problem.points.places.mean(axis=0)
+    places = np.concatenate([problem.points.places - centre, np.zeros((len(problem.points), 1))], axis=1)
+    # OpenCV's planar solver wants a right-handed plane seen from in front: any is, with z up, from above.
+    best: tuple[float, RoadCamera] | None = None
+    for ratio in _FOCAL_RATIOS:
+        f = ratio * problem.width
+        K = np.array([[f, 0, problem.width / 2.0], [0, f, problem.height / 2.0], [0, 0, 1.0]])
+        found, turns, shifts, _ = cv2.solvePnPGeneric(
+            places, problem.points.pixels, K, None, flags=cv2.SOLVEPNP_IPPE
+        )
+        for vector, shift in zip(turns, shifts, strict=True) if found else ():
+            rotation = np.asarray(cv2.Rodrigues(vector)[0], dtype=np.float64)
+            position = -rotation.T @ np.asarray(shift, dtype=np.float64).ravel()
+            if not position[2] > 0:
+                continue
+            position = position + np.array([*centre, 0.0])
+            camera = RoadCamera(
+                problem.width, problem.height, f, f, K[0, 2], K[1, 2], 0.0, 0.0, rotation, position
+            )
+            pixels, depth = camera.project(np.c_[problem.points.places, np.zeros(len(places))])
+            cost = float(((pixels - problem.points.pixels) ** 2).sum()) if (depth > 0).all() else math.inf
+            if best is None or cost < best[0]:
+                best = cost, camera
+    if best is None or not math.isfinite(best[0]):
+        raise DataError(
+            "no camera above the road can have seen these points: check that x, y belong to east, north"
+        )
+    return best[1]

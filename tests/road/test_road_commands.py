@@ -1,0 +1,169 @@
+"""`camera` and `road` on the command line: files in, files out, and one line where the input is wrong."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+from pathlib import Path
+
+import numpy as np
+import pytest
+from road_scenes import HEIGHT, WIDTH, camera, drives, lengths, see
+
+from jeat_graph.cli.main import main
+
+BRNO = Path(__file__).parents[3] / "shared" / "data" / "brno"
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, np.ndarray]:
+    folder, rng, cam = tmp_path_factory.mktemp("road"), np.random.default_rng(5), camera()
+    t, track, pixels, true = drives(cam, rng, 40, 0.5)
+    rows = [
+        "t,track_id,x,y",
+        *(f"{a:.4f},{b},{x:.2f},{y:.2f}" for a, b, (x, y) in zip(t, track, pixels, strict=True)),
+    ]
+    with gzip.open(folder / "points.csv.gz", "wt") as file:
+        file.write("\n".join(rows) + "\n")
+    measured = lengths(cam, rng, 1.0, 0.02)
+    with (folder / "lengths.csv").open("w") as file:
+        file.write("x1,y1,x2,y2,metres,direction\n")
+        for a, b, m, along in zip(measured.start, measured.end, measured.metres, measured.along, strict=True):
+            file.write(f"{a[0]},{a[1]},{b[0]},{b[1]},{m},{'along' if along else 'across'}\n")
+    near, far = (see(cam, np.array([[-1.0, y], [9.0, y]])).ravel() for y in (24.0, 38.0))
+    lines = "".join(
+        f"  {name}: [{', '.join(f'{v:.1f}' for v in line)}]\n" for name, line in (("a", near), ("b", far))
+    )
+    (folder / "lines.yaml").write_text("lines:\n" + lines)
+    return folder, true
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_from_points_to_speeds(
+    recording: tuple[Path, np.ndarray], capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, true = recording
+    out, cam = folder / "out", folder / "camera.yaml"
+    image = ["--image", f"{WIDTH}x{HEIGHT}", "--out", str(cam)]
+    assert (
+        main(
+            [
+                "camera",
+                "calibrate",
+                "--run",
+                str(folder / "points.csv.gz"),
+                "--lengths",
+                str(folder / "lengths.csv"),
+                *image,
+            ]
+        )
+        == 0
+    )
+    assert main(["camera", "show", str(cam), "--picture", str(folder / "grid.png")]) == 0
+    assert "by calibration" in capsys.readouterr().out
+    assert (folder / "grid.png").read_bytes().startswith(b"\x89PNG")
+    args = [
+        "road",
+        str(folder / "points.csv.gz"),
+        "--camera",
+        str(cam),
+        "--contact-height",
+        "0",
+        "0",
+        "--lines",
+        str(folder / "lines.yaml"),
+    ]
+    assert main([*args, "--out", str(out)]) == 0
+    speeds = _rows(out / "speeds.csv")
+    assert list(speeds[0]) == [
+        *("track_id", "t_first", "t_last", "lane", "class", "length"),
+        *("speed_kmh", "low_kmh", "high_kmh", "sigma_noise_kmh", "sigma_calibration_kmh"),
+    ]
+    errors = [float(row["speed_kmh"]) - 3.6 * true[int(row["track_id"])] for row in speeds]
+    assert np.abs(errors).mean() < 0.9
+    held = [float(r["low_kmh"]) <= 3.6 * true[int(r["track_id"])] <= float(r["high_kmh"]) for r in speeds]
+    assert np.mean(held) > 0.85
+    assert {row["lane"] for row in speeds} == {"1", "2"}
+    crossings = _rows(out / "crossings.csv")
+    assert {row["line"] for row in crossings} == {"a", "b"}
+    states = _rows(out / "road.csv")
+    assert all(float(row["var_x"]) > 0 and float(row["var_speed_kmh"]) > 0 for row in states[::50])
+    main([*args, "--out", str(folder / "again")])
+    for name in ("speeds.csv", "crossings.csv", "road.csv"):
+        assert (out / name).read_bytes() == (folder / "again" / name).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "says"),
+    [
+        (
+            "lengths.csv",
+            "x1,y1,x2,y2,metres,direction\n1,2,3,4,5,sideways\n",
+            ":2: direction must be along or across",
+        ),
+        ("lengths.csv", "x1,y1,x2,y2,metres,direction\n1,2,3,4,-5,along\n", ":2: metres must be positive"),
+        ("lengths.csv", "x1,y1,x2,y2,metres,direction\n1,2,1,2,5,along\n", ":2: both ends are the same"),
+    ],
+)
+def test_a_bad_length_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, text: str, says: str
+) -> None:
+    (tmp_path / name).write_text(text)
+    out = tmp_path / "camera.yaml"
+    assert (
+        main(
+            [
+                "camera",
+                "calibrate",
+                "--lengths",
+                str(tmp_path / name),
+                "--image",
+                "1920x1080",
+                "--out",
+                str(out),
+            ]
+        )
+        == 2
+    )
+    message = capsys.readouterr().err
+    assert f"{tmp_path / name}{says}" in message
+    assert message.count("\n") == 1
+    assert not out.exists()
+
+
+@pytest.mark.skipif(not BRNO.is_dir(), reason="needs ../shared/data/brno beside the checkout")
+def test_real_vehicles_within_their_intervals(tmp_path: Path) -> None:
+    """Two minutes of a real highway against laser gates: error, and how many intervals hold the truth."""
+    source = BRNO / "session2_right"
+    with gzip.open(source / "points.csv.gz", "rt") as file:
+        head = next(file)
+        few = [line for line in file if float(line.split(",", 1)[0]) < 480.0]
+    points, cam = tmp_path / "points.csv", tmp_path / "camera.yaml"
+    points.write_text(head + "".join(few))
+    known = ["--lengths", str(source / "lengths.csv"), "--image", "1920x1080", "--out", str(cam)]
+    assert main(["camera", "calibrate", "--run", str(points), *known]) == 0
+    assert main(["road", str(points), "--camera", str(cam), "--out", str(tmp_path / "out")]) == 0
+    errors, held = [], []
+    vehicles = [
+        row
+        for row in _rows(tmp_path / "out" / "speeds.csv")
+        if float(row["t_last"]) - float(row["t_first"]) > 0.8
+    ]
+    for truth in _rows(source / "speeds.csv"):
+        start, end = sorted((float(truth["t_first_line"]), float(truth["t_last_line"])))
+        near = [
+            v
+            for v in vehicles
+            if abs(float(v["t_first"]) - start) < 0.25 and abs(float(v["t_last"]) - end) < 0.6
+        ]
+        if len(near) == 1:
+            true = float(truth["speed_kmh"])
+            errors.append(abs(float(near[0]["speed_kmh"]) - true))
+            held.append(float(near[0]["low_kmh"]) <= true <= float(near[0]["high_kmh"]))
+    assert len(errors) >= 20
+    assert np.median(errors) < 0.9
+    assert np.mean(held) >= 0.85

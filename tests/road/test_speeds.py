@@ -1,0 +1,159 @@
+"""Speeds of vehicles: unbiased, with intervals that hold what they promise, bad ends of tracks included."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from road_scenes import camera, drives, see
+
+from jeat_graph.road.crossings import crossing, road_line
+from jeat_graph.road.lanes import LaneConfig, find_lanes
+from jeat_graph.road.motion_fit import MotionFitConfig, error_covariance, fit_motion, thinned
+from jeat_graph.road.speeds import ContactConfig, Vehicle, fit_vehicle
+
+MOTION = MotionFitConfig()
+ON_ROAD = ContactConfig(height_m=0.0, height_sd_m=0.0, spread_m=0.0)
+
+
+def _one(t: np.ndarray, pixels: np.ndarray, cam=None, contact: ContactConfig = ON_ROAD) -> Vehicle:
+    vehicle = fit_vehicle(1, t, pixels, camera() if cam is None else cam, MOTION, contact)
+    assert vehicle is not None
+    return vehicle
+
+
+def test_exact_points_give_the_exact_speed() -> None:
+    t = np.arange(0.0, 1.0, 0.02)
+    y = 42.0 - 20.0 * t
+    vehicle = _one(t, see(camera(), np.c_[np.full(50, 4.0), y]))
+    assert vehicle.mean_speed(*vehicle.fit.window()).kmh == pytest.approx(
+        72.0, abs=0.03
+    )  # means of neighbours: the picture bends
+
+
+def test_fit_is_the_dense_bayesian_solution() -> None:
+    """The coefficients' covariance is that of the joint Gaussian of prior and errors, worked out by Schur."""
+    rng = np.random.default_rng(1)
+    t = np.sort(rng.uniform(0, 1.4, 15))
+    xy = np.c_[np.full(15, 3.0), 40.0 - 20.0 * t] + 0.002 * rng.standard_normal((15, 2))
+    J = np.broadcast_to(np.array([[0.02, 0.003], [0.001, 0.05]]), (15, 2, 2))
+    config = replace(MOTION, soft=1e9)
+    fit = fit_motion(t, xy, J, config, np.ones(15))
+    B, n, C = fit.basis(t), 15, fit.coefficients.shape[1]
+    span = t[-1] - t[0]
+    own = np.r_[1e6, 60.0**2, 0.4**2, np.full(C - 3, 0.2**2 * span / (C - 2))]
+    prior = np.diag(np.r_[own * np.r_[1.0, np.full(C - 1, 0.09)], own])
+    H = np.zeros((n, 2, 2 * C))
+    H[:, 0, :C] = H[:, 1, C:] = B
+    H = H.reshape(2 * n, -1)
+    pixels = np.kron(error_covariance(t, config, np.ones(n)), np.eye(2))
+    wide = np.kron(np.eye(n), J[0])
+    S = H @ prior @ H.T + wide @ pixels @ wide.T
+    posterior = prior - prior @ H.T @ np.linalg.solve(S, H @ prior)
+    row = np.r_[np.zeros(C), fit.basis(np.array(1.0), 1)]
+    assert row @ fit.covariance @ row == pytest.approx(row @ posterior @ row, rel=1e-4)
+
+
+def test_coverage_by_noise_of_stated_size() -> None:
+    """Errors drawn from the model that is assumed: 95 % of the intervals hold the truth (240 draws)."""
+    rng = np.random.default_rng(2)
+    cam, hits, number_of = camera(), 0, 240
+    t = np.arange(0.0, 1.2, 0.04)
+    root = np.linalg.cholesky(error_covariance(t, MOTION, np.ones(len(t))))
+    for _ in range(number_of):
+        v, a = 22.0 + 3 * rng.standard_normal(), 0.3 * rng.standard_normal()
+        y = 44.0 - v * t + 0.5 * a * t**2
+        pixels = see(cam, np.c_[np.full(len(t), 4.0), y]) + root @ rng.standard_normal((len(t), 2))
+        vehicle = _one(t, pixels)
+        start, end = vehicle.fit.window()
+        speed = vehicle.mean_speed(start, end)
+        true = 3.6 * (v - 0.5 * a * (start + end))
+        hits += speed.low_kmh <= true <= speed.high_kmh
+    assert 0.90 <= hits / number_of <= 0.99  # three sigmas of 240 draws below .95, .99 above
+
+
+def test_a_point_that_stays_behind_does_not_slow_the_vehicle() -> None:
+    t = np.arange(0.0, 1.3, 0.02)
+    pixels = see(camera(), np.c_[np.full(len(t), 4.0), 44.0 - 20.0 * t])
+    pixels[-12:] = pixels[-13]
+    vehicle = _one(t, pixels)
+    assert vehicle.mean_speed(*vehicle.fit.window()).kmh == pytest.approx(72.0, abs=0.5)
+    assert vehicle.fit.window()[1] < t[-10]
+
+
+def test_a_standing_vehicle_stands() -> None:
+    rng = np.random.default_rng(4)
+    t = np.arange(0.0, 20.0, 0.05)
+    pixels = see(camera(), np.tile([4.0, 35.0], (len(t), 1))) + 0.5 * rng.standard_normal((len(t), 2))
+    speed = _one(t, pixels).mean_speed(0.0, 19.95)
+    assert speed.kmh < 0.5
+    assert speed.low_kmh == 0.0
+
+
+def test_height_of_the_point_is_taken_off_and_counted() -> None:
+    t = np.arange(0.0, 1.0, 0.02)
+    pixels = see(camera(), np.c_[np.full(50, 4.0), 42.0 - 20.0 * t], 0.3)
+    known = _one(t, pixels, contact=ContactConfig(0.3, 0.0, 0.0)).mean_speed(0.0, 0.9)
+    assert known.kmh == pytest.approx(72.0, abs=0.02)
+    doubt = _one(t, pixels, contact=ContactConfig(0.3, 0.08, 0.0)).mean_speed(0.0, 0.9)
+    assert doubt.calibration_kmh == pytest.approx(72.0 * 0.08 / 7.7, rel=0.02)
+
+
+def test_calibration_share_is_what_a_moved_camera_does() -> None:
+    cam = camera()
+    t = np.arange(0.0, 1.0, 0.02)
+    pixels = see(cam, np.c_[np.full(50, 4.0), 42.0 - 20.0 * t])
+    sure = np.zeros((12, 12))
+    sure[11, 11] = 0.04**2
+    speed = _one(t, pixels, replace(cam, covariance=sure)).mean_speed(0.0, 0.9)
+    lifted = cam.moved(np.r_[np.zeros(11), 0.04])
+    assert speed.calibration_kmh == pytest.approx(
+        _one(t, pixels, lifted).mean_speed(0.0, 0.9).kmh - speed.kmh, rel=0.02
+    )
+
+
+def test_thinning_keeps_the_mean() -> None:
+    rng = np.random.default_rng(5)
+    t, pixels = np.sort(rng.uniform(0, 3, 400)), rng.uniform(0, 100, (400, 2))
+    nodes, places, counts = thinned(t, pixels, MOTION)
+    assert counts.sum() == 400
+    np.testing.assert_allclose(counts @ places / 400, pixels.mean(axis=0))
+    np.testing.assert_allclose(counts @ nodes / 400, t.mean())
+
+
+def test_a_line_is_crossed_when_the_vehicle_is_there() -> None:
+    cam = camera()
+    t = np.arange(0.0, 1.0, 0.02)
+    vehicle = _one(t, see(cam, np.c_[np.full(50, 4.0), 42.0 - 20.0 * t]))
+    line = see(cam, np.array([[0.0, 30.0], [8.0, 30.0]])).ravel()
+    ends = road_line(cam, tuple(line), 0.0)
+    assert ends is not None
+    found = crossing(vehicle, ends)
+    assert found is not None
+    assert found.t == pytest.approx(0.6, abs=1e-3)
+    assert found.speed.kmh == pytest.approx(72.0, abs=0.05)
+    beside = road_line(cam, tuple(see(cam, np.array([[5.0, 30.0], [8.0, 30.0]])).ravel()), 0.0)
+    assert beside is not None
+    assert crossing(vehicle, beside) is None
+
+
+def test_lanes_are_where_vehicles_drive() -> None:
+    rng = np.random.default_rng(6)
+    x = np.concatenate([-1.8 + 0.3 * rng.standard_normal(200), 1.9 + 0.3 * rng.standard_normal(90)])
+    lanes = find_lanes(x, LaneConfig())
+    assert lanes.names == ("1", "2")
+    np.testing.assert_allclose(lanes.middle, [-1.8, 1.9], atol=0.15)
+    assert list(lanes.of(np.array([-2.0, 1.5, 9.0]))) == ["1", "2", ""]
+
+
+def test_all_of_many_vehicles_are_unbiased() -> None:
+    rng, cam = np.random.default_rng(7), camera()
+    t, track, pixels, true = drives(cam, rng, 30, 0.5)
+    errors = []
+    for k in range(30):
+        rows = track == k
+        if rows.sum() > 20:
+            vehicle = _one(t[rows], pixels[rows])
+            errors.append(vehicle.mean_speed(*vehicle.fit.window()).kmh - 3.6 * true[k])
+    assert abs(np.mean(errors)) < 0.15
