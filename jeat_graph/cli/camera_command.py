@@ -66,6 +66,7 @@ def _calibrate(args: argparse.Namespace) -> int:
     config = CalibrationConfig()
     lengths = None if args.lengths is None else read_lengths(args.lengths)
     points = None if args.points is None else read_surveyed_points(args.points)
+    width, height = args.image
     tracks = None
     if args.tracks is not None:
         table = contact_pixels(args.tracks)
@@ -73,7 +74,7 @@ def _calibrate(args: argparse.Namespace) -> int:
         if not len(tracks):
             print(f"jeat-graph camera: {args.tracks}: no track is long enough to help", file=sys.stderr)
             tracks = None
-    calibration = calibrate(Problem(*args.image, lengths, points, tracks, config), args.zone)
+    calibration = calibrate(Problem(width, height, lengths, points, tracks, config), args.zone)
     lines = calibration_lines(calibration)
     write_camera(calibration.camera, args.out, lines)
     print("\n".join(lines))

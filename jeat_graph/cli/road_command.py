@@ -59,9 +59,11 @@ def run(args: argparse.Namespace) -> int:
     if args.contact_height is not None:
         contact = ContactConfig(height_m=args.contact_height[0], height_sd_m=args.contact_height[1])
     with tqdm(total=len(points.tracks()), unit="vehicle", disable=not sys.stderr.isatty()) as bar:
-        vehicles = follow_points(
-            points, camera, MotionFitConfig(), contact, lambda done, _: bar.update(done - bar.n)
-        )
+
+        def advance(done: int, _total: int) -> None:
+            bar.update(done - bar.n)
+
+        vehicles = follow_points(points, camera, MotionFitConfig(), contact, advance)
     result = summarise(vehicles, camera, marks, contact, LaneConfig())
     write_result(result, out)
     left_out = len(points.tracks()) - len(vehicles)

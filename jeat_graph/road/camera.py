@@ -214,6 +214,6 @@ def turn(vector: FloatArray) -> FloatArray:
     x, y, z = vector
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     if angle < 1e-9:
-        return np.eye(3) + cross
+        return np.asarray(np.eye(3) + cross, dtype=np.float64)
     a, b = math.sin(angle) / angle, (1.0 - math.cos(angle)) / angle**2
     return np.asarray(np.eye(3) + a * cross + b * cross @ cross, dtype=np.float64)
