@@ -7,7 +7,6 @@ and only when something is wrong it is walked through once more, slowly, to find
 from __future__ import annotations
 
 import csv
-import gzip
 import io
 import re
 import zlib
@@ -19,7 +18,6 @@ from typing import Any
 
 from jeat_graph.data.errors import DataError
 
-_GZIP = b"\x1f\x8b"
 _BOM = b"\xef\xbb\xbf"
 _WIDE_BOMS = (b"\xff\xfe", b"\xfe\xff")
 _GZIP = b"\x1f\x8b"
@@ -54,10 +52,10 @@ def read_bytes(path: str | Path) -> bytes:
 
 
 def read_text(path: str | Path) -> bytes:
-    """Return a text file's bytes as UTF-8 without a byte order mark; a gzipped file is unpacked.
+    """Return a text file's bytes as UTF-8 without a byte order mark.
 
     Raises:
-        DataError: as `read_bytes`; the file is empty, not UTF-8, holds NUL bytes, or is damaged gzip.
+        DataError: as `read_bytes`; the file is empty, not UTF-8, or holds NUL bytes.
     """
     data = read_bytes(path)
     if Path(path).suffix.lower() == ".gz" and data.startswith(_GZIP):
@@ -65,11 +63,6 @@ def read_text(path: str | Path) -> bytes:
     for magic, text in _OTHERS.items():
         if data.startswith(magic):
             raise DataError(text, path)
-    if data.startswith(_GZIP):
-        try:
-            data = gzip.decompress(data)
-        except (OSError, EOFError, zlib.error) as error:
-            raise DataError(f"cannot be unpacked: {error}", path) from None
     if data.startswith(_WIDE_BOMS):
         raise DataError("is UTF-16; save it as UTF-8", path)
     data = data.removeprefix(_BOM)
