@@ -90,6 +90,20 @@ def _json_batch(text: str, name: str, number: int) -> Batch:
     except (ValueError, RecursionError) as error:
         what = error.msg if isinstance(error, json.JSONDecodeError) else str(error)
         raise DataError(f"is not JSON: {what}", name, number) from None
+    return batch_of(content, name, number)
+
+
+def batch_of(content: Any, name: str, number: int) -> Batch:
+    """Make a batch of a scan, or a list of scans of one time, that was read from JSON or the like.
+
+    Args:
+        content: a mapping with `t`, `sensor`, `boxes`, `scores`, or a list of such.
+        name: name of the stream, for messages.
+        number: number of the line or message.
+
+    Raises:
+        DataError: names the stream, the line, and what is wrong.
+    """
     items = content if isinstance(content, list) else [content]
     if not items:
         raise DataError("a list of scans must hold at least one", name, number)

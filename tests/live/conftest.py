@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import os
+import sys
+import types
 from pathlib import Path
 
 import pytest
 
 from jeat_graph.cli.main import main
+
+# The helpers beside this file, as `live_tests.brokers` and so on: tests are no package to be imported.
+_package = types.ModuleType("live_tests")
+_package.__path__ = [str(Path(__file__).parent)]
+sys.modules["live_tests"] = _package
 
 
 @pytest.fixture(scope="session")

@@ -1,0 +1,151 @@
+"""Messages between a detector, the tracker and whoever wants the tracks: version 1, in two encodings.
+
+A message of scans is `{"v": 1, "source": "gantry7", "seq": 41, "scans": [scan, …]}`, each scan as in a line
+of `stream` (`io/scan_lines`), all of one time; `source` and `seq`, a whole number that rises by source, are
+what duplicates are told by. A scan, or a list of scans, alone is taken too. A message of tracks is
+`{"v": 1, "seq": 7, "source": …, "of": 41, "t": …, "tracks": […]}`, where `source` and `of` say which message
+it answers. Both are JSON, or MessagePack of the same structure, which may hold boxes (M, 4) and scores (M,)
+as bytes: 64-bit floats, the lowest byte first.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jeat_graph.data.errors import DataError, JeatGraphError
+from jeat_graph.io.scan_lines import Batch, batch_of
+
+VERSION = 1
+ENCODINGS = ("json", "msgpack")
+_KEYS = ("v", "source", "seq", "scans")
+_FIRST_OF_TEXT = b" \t\r\n{[\xef"
+
+
+class ScanMessage(NamedTuple):
+    """Scans of one time and where they come from.
+
+    Attributes:
+        batch: the scans.
+        source: who sent them, empty if the message does not say.
+        seq: its number among the messages of that source, or None.
+    """
+
+    batch: Batch
+    source: str
+    seq: int | None
+
+
+def decode_scans(payload: bytes, name: str, number: int) -> ScanMessage:
+    """Read a message of scans, of either encoding.
+
+    Args:
+        payload: the message.
+        name: where it came from, for messages.
+        number: its number there, from 1.
+
+    Raises:
+        DataError: what is wrong.
+    """
+    content = _load(payload, name, number)
+    source, seq = "", None
+    if isinstance(content, dict) and "scans" in content:
+        strange = next((key for key in content if key not in _KEYS), None)
+        if strange is not None:
+            raise DataError(f"unknown key {strange!r}; a message has {', '.join(_KEYS)}", name, number)
+        version = content.get("v")
+        if version != VERSION:
+            raise DataError(f"is a message of version {version!r}; known here: {VERSION}", name, number)
+        source, seq = content.get("source", ""), content.get("seq")
+        if not isinstance(source, str):
+            raise DataError(f"source must be a text, got {source!r}", name, number)
+        if seq is not None and (isinstance(seq, bool) or not isinstance(seq, int) or seq < 0):
+            raise DataError(f"seq must be a whole number that is not negative, got {seq!r}", name, number)
+        content = content["scans"]
+        if not isinstance(content, list):
+            raise DataError("scans must be a list", name, number)
+    return ScanMessage(batch_of(content, name, number), source, seq)
+
+
+def encode_tracks(line: str, seq: int, answered: ScanMessage | None, encoding: str = "json") -> bytes:
+    """Make a message of tracks.
+
+    Args:
+        line: the tracks as a line of JSON (`io/track_lines.json_line`).
+        seq: number of this message among those that go out.
+        answered: the message that it answers, if it does.
+        encoding: one of `ENCODINGS`.
+    """
+    head: dict[str, Any] = {"v": VERSION, "seq": seq}
+    if answered is not None and answered.seq is not None:
+        head |= {"source": answered.source, "of": answered.seq}
+    if encoding == "json":
+        text = json.dumps(head, ensure_ascii=False, separators=(",", ":"))
+        return (text[:-1] + "," + line.strip()[1:]).encode()
+    return bytes(_msgpack().packb(head | json.loads(line)))
+
+
+def _load(payload: bytes, name: str, number: int) -> Any:
+    if payload[:1] in [bytes([c]) for c in _FIRST_OF_TEXT]:
+        try:
+            return json.loads(payload)
+        except (ValueError, RecursionError) as error:
+            what = error.msg if isinstance(error, json.JSONDecodeError) else str(error)
+            raise DataError(f"is not JSON: {what}", name, number) from None
+    try:
+        content = _msgpack().unpackb(payload, strict_map_key=True)
+    except (ValueError, RecursionError) as error:
+        raise DataError(f"is neither JSON nor MessagePack: {error}", name, number) from None
+    scans = content.get("scans", [content]) if isinstance(content, dict) else content
+    for scan in scans if isinstance(scans, list) else []:
+        if isinstance(scan, dict):
+            _unpack(scan, name, number)
+    return content
+
+
+def _unpack(scan: dict[Any, Any], name: str, number: int) -> None:
+    """Turn bytes into arrays."""
+    for key in ("boxes", "scores"):
+        value = scan.get(key)
+        if isinstance(value, bytes):
+            if len(value) % (32 if key == "boxes" else 8):
+                raise DataError(f"{key}: {len(value)} bytes are no whole number of rows", name, number)
+            flat = np.frombuffer(value, dtype="<f8")
+            scan[key] = flat.reshape(-1, 4) if key == "boxes" else flat
+
+
+def _msgpack() -> Any:
+    try:
+        import msgpack
+    except ImportError:
+        raise JeatGraphError("MessagePack needs a package more: pip install 'jeat-graph[msgpack]'") from None
+    return msgpack
+
+
+class Duplicates:
+    """Tells which messages have been taken already, in bounded memory.
+
+    Of each source the greatest number is kept, and which of the `WINDOW` numbers below it have come: one that
+    is older still counts as a duplicate.
+    """
+
+    WINDOW = 1024
+
+    def __init__(self) -> None:
+        self.seen: dict[str, tuple[int, set[int]]] = {}
+
+    def is_new(self, message: ScanMessage) -> bool:
+        """Tell whether a message is new, and take note of it; one without a number always is."""
+        if message.seq is None:
+            return True
+        top, recent = self.seen.get(message.source, (-1, set()))
+        if message.seq in recent or message.seq <= top - self.WINDOW:
+            return False
+        top = max(top, message.seq)
+        recent.add(message.seq)
+        if len(recent) > 2 * self.WINDOW:
+            recent = {seq for seq in recent if seq > top - self.WINDOW}
+        self.seen[message.source] = (top, recent)
+        return True

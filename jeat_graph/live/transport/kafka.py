@@ -1,0 +1,149 @@
+"""Kafka by way of librdkafka: a consumer group whose place is committed by hand, an idempotent producer."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from confluent_kafka import Consumer, KafkaError, KafkaException, Producer, TopicPartition
+
+from jeat_graph.data.errors import JeatGraphError
+from jeat_graph.live.transport.address import Address
+
+#: Kafka itself sets no bound to what is received and not committed; the stream commits at least so often.
+MOST_OPEN = 4096
+_CONNECT_S = 10.0
+#: Errors that do not pass by themselves.
+_FOR_GOOD = (KafkaError.TOPIC_AUTHORIZATION_FAILED, KafkaError.GROUP_AUTHORIZATION_FAILED)
+#: How soon a topic that is made later is seen (ms).
+_REFRESH_MS = 2000
+
+
+def _settings(address: Address) -> dict[str, Any]:
+    settings: dict[str, Any] = {
+        "bootstrap.servers": f"{address.host}:{address.port}",
+        "log_level": 0,
+        "error_cb": lambda _: None,  # it mends connections by itself; what is for good stands in the messages
+    }
+    if address.user is not None:
+        settings |= {
+            "security.protocol": "sasl_plaintext",
+            "sasl.mechanism": "PLAIN",
+            "sasl.username": address.user,
+            "sasl.password": address.password or "",
+        }
+    return settings
+
+
+def _reach(client: Any, address: Address) -> None:
+    try:
+        client.list_topics(timeout=_CONNECT_S)
+    except KafkaException as error:
+        raise JeatGraphError(f"{address}: {error.args[0].str()}") from None
+
+
+class KafkaSource:
+    """Messages of a topic, as a member of a group (see `ends.Source`); order holds within a partition.
+
+    Args:
+        address: option `group` (default `jeat-graph`).
+
+    Raises:
+        JeatGraphError: nobody answers.
+    """
+
+    def __init__(self, address: Address) -> None:
+        self.most_open = MOST_OPEN
+        self._address = address
+        self._next: dict[tuple[str, int], int] = {}
+        self._consumer = Consumer(
+            _settings(address)
+            | {
+                "group.id": address.option("group", "jeat-graph"),
+                "enable.auto.commit": False,
+                "auto.offset.reset": "earliest",
+                "allow.auto.create.topics": True,
+                "topic.metadata.refresh.interval.ms": _REFRESH_MS,
+            }
+        )
+        _reach(self._consumer, address)
+        self._consumer.subscribe([address.topic])
+
+    def receive(self, timeout_s: float) -> bytes | None:
+        """Wait for the next message.
+
+        Raises:
+            JeatGraphError: an error that will not pass by itself.
+        """
+        end = time.monotonic() + timeout_s
+        while True:
+            message = self._consumer.poll(max(end - time.monotonic(), 0.0))
+            if message is None:
+                return None
+            error = message.error()
+            if error is None:
+                break
+            if error.fatal() or error.code() in _FOR_GOOD:
+                raise JeatGraphError(f"{self._address}: {error.str()}")
+        self._next[message.topic(), message.partition()] = message.offset() + 1
+        return bytes(message.value() or b"")
+
+    def commit(self) -> None:
+        """Move the group's place behind all that was received."""
+        if not self._next:
+            return
+        places = [TopicPartition(topic, part, offset) for (topic, part), offset in self._next.items()]
+        try:
+            self._consumer.commit(offsets=places, asynchronous=False)
+        except KafkaException:
+            return  # the group is being shared out anew: the next commit counts
+        self._next = {}
+
+    def close(self) -> None:
+        """Leave the group."""
+        self._consumer.close()
+
+
+class KafkaSink:
+    """Produces to a topic, each message once and in order (see `ends.Sink`).
+
+    Args:
+        address: option `most` (messages on their way at a time).
+
+    Raises:
+        JeatGraphError: nobody answers.
+    """
+
+    def __init__(self, address: Address) -> None:
+        self._address = address
+        self._most = address.number("most", MOST_OPEN, low=1)
+        self._refused = ""
+        self._producer = Producer(_settings(address) | {"enable.idempotence": True, "linger.ms": 2})
+        _reach(self._producer, address)
+
+    def send(self, message: bytes) -> None:
+        """Produce; waits while too many are on their way."""
+        while len(self._producer) >= self._most:
+            self._producer.poll(0.1)
+            self._check()
+        self._producer.produce(self._address.topic, message, on_delivery=self._delivered)
+        self._producer.poll(0)
+        self._check()
+
+    def flush(self) -> None:
+        """Wait until all are confirmed."""
+        while self._producer.flush(1.0):
+            self._check()
+        self._check()
+
+    def _delivered(self, error: Any, _: Any) -> None:
+        if error is not None:
+            self._refused = error.str()
+
+    def _check(self) -> None:
+        if self._refused:
+            raise JeatGraphError(f"{self._address}: tracks were refused: {self._refused}")
+
+    def close(self) -> None:
+        """Flush; the producer ends with this object."""
+        self.flush()

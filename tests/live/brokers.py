@@ -1,0 +1,82 @@
+"""Real brokers for the tests, each on a free port: Mosquitto, nats-server, that of librdkafka."""
+
+from __future__ import annotations
+
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def program(name: str) -> str | None:
+    """Path of a server's program, beside this Python, on the path, or where Debian puts it."""
+    beside = Path(sys.executable).with_name(name)
+    if beside.exists():
+        return str(beside)
+    return shutil.which(name) or shutil.which(name, path="/usr/sbin:/usr/local/sbin")
+
+
+class Server:
+    """A server that can be stopped and started again with what it has stored."""
+
+    def __init__(self, command: list[str], port: int) -> None:
+        self.port = port
+        self._command = command
+        self.start()
+
+    def start(self) -> None:
+        self._process = subprocess.Popen(
+            self._command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, stdin=subprocess.DEVNULL
+        )
+        for _ in range(500):
+            with socket.socket() as probe:
+                if probe.connect_ex(("127.0.0.1", self.port)) == 0:
+                    return
+            time.sleep(0.02)
+        raise AssertionError(f"{self._command[0]} does not answer")
+
+    def stop(self) -> None:
+        self._process.terminate()
+        self._process.wait()
+
+
+def mosquitto(folder: Path) -> Server | None:
+    path = program("mosquitto")
+    if path is None:
+        return None
+    port = free_port()
+    (folder / "mosquitto.conf").write_text(
+        f"listener {port} 127.0.0.1\nallow_anonymous true\npersistence true\n"
+        f"persistence_location {folder}/\nmax_queued_messages 100000\nuser root\n"
+    )
+    return Server([path, "-c", str(folder / "mosquitto.conf")], port)
+
+
+def nats_server(folder: Path) -> Server | None:
+    path = program("nats-server")
+    if path is None:
+        return None
+    port = free_port()
+    return Server([path, "-a", "127.0.0.1", "-p", str(port), "-js", "-sd", str(folder)], port)
+
+
+class MockKafka:
+    """The cluster that librdkafka brings for tests; it lives as long as the client that made it."""
+
+    def __init__(self) -> None:
+        from confluent_kafka import Producer
+
+        self._owner = Producer({"test.mock.num.brokers": 1, "bootstrap.servers": "unused", "log_level": 0})
+        (broker,) = self._owner.list_topics(timeout=10).brokers.values()
+        self.port = broker.port
+
+    def stop(self) -> None:
+        del self._owner
