@@ -8,7 +8,7 @@ from jeat_graph.data.errors import ConfigError, JeatGraphError
 from jeat_graph.live.transport.address import parse_address
 
 SOURCE_OPTIONS = {"mqtt": ("client", "most"), "nats": ("stream", "durable", "most"), "kafka": ("group",)}
-SINK_OPTIONS = {"mqtt": ("client", "most"), "nats": ("stream", "most"), "kafka": ("most",)}
+SINK_OPTIONS = {"mqtt": ("client", "most"), "nats": ("stream", "most"), "kafka": ("key", "most")}
 
 
 class Source(Protocol):

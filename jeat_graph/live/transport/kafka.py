@@ -46,7 +46,7 @@ class KafkaSource:
     """Messages of a topic, as a member of a group (see `ends.Source`); order holds within a partition.
 
     Args:
-        address: option `group` (default `jeat-graph`).
+        address: option `group` (default `jeat-graph.TOPIC`).
 
     Raises:
         JeatGraphError: nobody answers.
@@ -59,7 +59,7 @@ class KafkaSource:
         self._consumer = Consumer(
             _settings(address)
             | {
-                "group.id": address.option("group", "jeat-graph"),
+                "group.id": address.option("group", f"jeat-graph.{address.topic}"),
                 "enable.auto.commit": False,
                 "auto.offset.reset": "earliest",
                 "allow.auto.create.topics": True,
@@ -107,8 +107,10 @@ class KafkaSource:
 class KafkaSink:
     """Produces to a topic, each message once and in order (see `ends.Sink`).
 
+    All messages have one key and so come to one partition: only within a partition does order hold.
+
     Args:
-        address: option `most` (messages on their way at a time).
+        address: options `key`, `most` (messages on their way at a time).
 
     Raises:
         JeatGraphError: nobody answers.
@@ -117,6 +119,7 @@ class KafkaSink:
     def __init__(self, address: Address) -> None:
         self._address = address
         self._most = address.number("most", MOST_OPEN, low=1)
+        self._key = address.option("key", "tracks")
         self._refused = ""
         self._producer = Producer(_settings(address) | {"enable.idempotence": True, "linger.ms": 2})
         _reach(self._producer, address)
@@ -126,7 +129,7 @@ class KafkaSink:
         while len(self._producer) >= self._most:
             self._producer.poll(0.1)
             self._check()
-        self._producer.produce(self._address.topic, message, on_delivery=self._delivered)
+        self._producer.produce(self._address.topic, message, self._key, on_delivery=self._delivered)
         self._producer.poll(0)
         self._check()
 
