@@ -18,6 +18,7 @@ from jeat_graph.config.lifecycle import (
     MergeConfig,
     OutputConfig,
 )
+from jeat_graph.config.live import LiveConfig
 from jeat_graph.config.sensors import SensorConfig
 from jeat_graph.config.smoothing import SmootherConfig
 from jeat_graph.data.errors import ConfigError
@@ -28,6 +29,7 @@ __all__ = [
     "Config",
     "ImageConfig",
     "LifecycleConfig",
+    "LiveConfig",
     "MergeConfig",
     "MotionConfig",
     "NoiseConfig",
@@ -55,6 +57,7 @@ class Config:
     merge: MergeConfig = field(default_factory=MergeConfig)
     output: OutputConfig = field(default_factory=OutputConfig)
     smoother: SmootherConfig = field(default_factory=SmootherConfig, metadata={"kernels": False})
+    live: LiveConfig = field(default_factory=LiveConfig, metadata={"kernels": False})
 
     def __post_init__(self) -> None:
         if not self.sensors:

@@ -46,6 +46,13 @@ class SensorConfig(Section):
         0.0, "px/s", "image speed below which the sensor sees nothing (events); 0: it sees what stands still"
     )
 
+    latency_s: float = number(
+        0.0, "s", "known constant delay of its times: so much is taken off the time of every scan"
+    )
+    late_s: float | None = number(
+        None, "s", "how late its scans may come in live use, if not as live.late_s says"
+    )
+
     def __post_init__(self) -> None:
         super().__post_init__()
         knots = self.score_precision

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,25 +15,23 @@ from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.diagnostics import Diagnostics
-from jeat_graph.data.errors import JeatGraphError, TimeOrderError, UnknownSensorError
+from jeat_graph.data.errors import JeatGraphError, TimeOrderError
 from jeat_graph.data.interop import boxes_of
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.tracking.batch import Arrivals
+from jeat_graph.tracking.prediction import Prediction, predict_reported
 from jeat_graph.tracking.reporting import report
+from jeat_graph.tracking.scans import ScanLike, arrivals_of, as_scans
+from jeat_graph.tracking.smoothing.access import SmoothedTracks
+from jeat_graph.tracking.snapshot import Snapshot
 from jeat_graph.tracking.state import Scene, allocate, grow
 from jeat_graph.tracking.step import step
+from jeat_graph.tracking.step_record import StepRecord, record_step
 from jeat_graph.tracking.update_log import allocate_log
-
-if TYPE_CHECKING:
-    from jeat_graph.tracking.smoothing.behind import Smoothing
-    from jeat_graph.tracking.smoothing.history import TrackHistory
-
-ScanLike: TypeAlias = Scan | tuple[float, str, npt.ArrayLike, npt.ArrayLike]
 
 _FIRST_CAPACITY = 64
 
 
-class Tracker:
+class Tracker(SmoothedTracks):
     """Joint tracker of all vehicles over any number of asynchronous sensors (paper algorithm 1).
 
     Feed it scans in time order. Each step sees only what has arrived: the table it returns is causal. Memory
@@ -61,10 +58,9 @@ class Tracker:
         diagnostics: bool = False,
     ) -> None:
         config = as_config(config, image)
+        super().__init__(config)
         self.config = config
         self._diagnostics = diagnostics
-        self.sensor_names = config.sensor_names
-        self._index = {name: k for k, name in enumerate(self.sensor_names)}
         self._model = kernel_model(config)
         sensors = self._model.sensors
         self._tracks = allocate(_FIRST_CAPACITY, len(self.sensor_names), len(sensors.correlation_time_s))
@@ -77,10 +73,6 @@ class Tracker:
         self._next_id = 1
         self._t: float | None = None
         self._log = allocate_log(0)
-        self._finished = False
-        self._smoothers: Smoothing | None = None
-        if config.smoother.engine != "none":
-            self._smoothers = _smoothing(config)
 
     @property
     def num_tracks(self) -> int:
@@ -115,48 +107,77 @@ class Tracker:
         """
         if self._finished:
             raise JeatGraphError("this tracker has been finished; make another one for another recording")
-        batch = _as_scans(scans)
-        t = batch[0].t
-        if any(scan.t != t for scan in batch):
-            raise TimeOrderError("the scans of one step must have one and the same time")
+        table, taken = self.take_in(as_scans(scans))
+        self.hand_over(taken)
+        return table
+
+    def take_in(self, batch: Sequence[Scan]) -> tuple[Trajectories, StepRecord | None]:
+        """Do a step without handing what it took in to the smoothers, which is left to the caller.
+
+        For those who may have to take a step back (`snapshot`, `restore`) because an older scan comes late.
+
+        Args:
+            batch: scans of one and the same time.
+
+        Returns:
+            The tracks that are reported now, and what `hand_over` takes; None without a smoother.
+
+        Raises:
+            UnknownSensorError, TimeOrderError: as `step`.
+        """
+        arrivals = arrivals_of(batch, self.sensor_names)
+        t, count = arrivals.t, len(arrivals.scores)
         if self._t is not None and t < self._t:
             raise TimeOrderError(f"scan at t = {t} s is older than the last one at {self._t} s")
-        codes = [self._sensor_index(scan.sensor) for scan in batch]
-        if len(batch) == 1:
-            boxes, scores = batch[0].boxes, batch[0].scores
-            sensor = np.full(len(scores), codes[0], dtype=np.int64)
-        else:
-            boxes = np.concatenate([scan.boxes for scan in batch])
-            scores = np.concatenate([scan.scores for scan in batch])
-            sensor = np.repeat(np.array(codes, dtype=np.int64), [len(scan) for scan in batch])
-        present = np.zeros(len(self.sensor_names), dtype=np.bool_)
-        present[codes] = True
-
         longest = self.config.lifecycle.max_silence_s
         dt = 0.0 if self._t is None else min(t - self._t, longest)
         if dt == longest:
             self._num_tracks = 0
-        self._tracks = grow(self._tracks, self._num_tracks, self._num_tracks + len(scores))
+        self._tracks = grow(self._tracks, self._num_tracks, self._num_tracks + count)
         logs = self._diagnostics or self._smoothers is not None
-        if logs and len(scores) > len(self._log.rows):
-            self._log = allocate_log(2 * len(scores))
+        if logs and count > len(self._log.rows):
+            self._log = allocate_log(2 * count)
         first_id = self._next_id
         self._num_tracks, self._next_id = step(
-            self._tracks,
-            self._num_tracks,
-            self._next_id,
-            dt,
-            Arrivals(t, boxes, scores, sensor, present),
-            self._scene,
-            self._model,
-            self._log,
+            self._tracks, self._num_tracks, self._next_id, dt, arrivals, self._scene, self._model, self._log
         )
         self._t = t
         table = self.causal()
-        if self._smoothers is not None:
-            births = self._next_id - first_id
-            self._smoothers.record(t, self._tracks, self._num_tracks, births, self._log, table.track_id)
-        return table
+        if self._smoothers is None:
+            return table, None
+        births = self._next_id - first_id
+        return table, record_step(t, self._tracks, self._num_tracks, births, self._log, table.track_id)
+
+    def hand_over(self, taken: StepRecord | None) -> None:
+        """Give the smoothers what a step took in; in order of time, and once."""
+        if self._smoothers is not None and taken is not None:
+            self._smoothers.record(taken)
+
+    def snapshot(self) -> Snapshot:
+        """Copy all that the next step depends on; the smoothers are not part of it."""
+        return Snapshot.of(self._t, self._next_id, self._tracks, self._num_tracks, self._scene)
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back to a snapshot of this tracker."""
+        self._t, self._next_id, self._num_tracks = snapshot.t, snapshot.next_id, snapshot.num_tracks
+        self._tracks = grow(self._tracks, 0, self._num_tracks)
+        snapshot.copy_to(self._tracks, self._scene)
+
+    def predict(self, t: float) -> Prediction:
+        """Say where the tracks that are reported now will be at a time, and how surely.
+
+        The tracker stays as it is: for a caller who needs an answer more often than the sensors give one, or
+        for the moment at which his own answer will arrive.
+
+        Args:
+            t: time (s), not before that of the last step.
+
+        Raises:
+            TimeOrderError: a time before that of the last step.
+        """
+        if self._t is not None and t < self._t:
+            raise TimeOrderError(f"t = {t} s is before the last scan at {self._t} s: that is past")
+        return predict_reported(self.snapshot(), t, self._model, self.sensor_names)
 
     def update(
         self, source: Any, *, t: float, sensor: str, scores: npt.ArrayLike | None = None
@@ -197,72 +218,10 @@ class Tracker:
         living = (self._tracks.track_id[:n], self._tracks.existence[:n])
         return Diagnostics.from_log(t, rows, *living, self.sensor_names)
 
-    def smoothed(self) -> Trajectories:
-        """Return the smoothed trajectories of the confirmed tracks so far, without what was drained.
-
-        Their whole life: the time before confirmation and gaps included, up to the last detection. With a
-        fixed lag the rows older than that are final; all others may still change. (The call makes the
-        smoothers take in what they had set aside: with a fixed lag some states become final a part of a chunk
-        earlier than in a run without it, and differ from there by what that part would have told.)
-
-        Raises:
-            JeatGraphError: the configuration asks for no smoother.
-        """
-        return self._wanted_smoothers().smoothed()
-
-    def drain_smoothed(self) -> Trajectories:
-        """Return the smoothed rows that are final and forget them, in order of time over all calls.
-
-        A live caller that keeps a smoother calls this now and then: rows that nobody fetches are kept for
-        `finish`, some 200 bytes each, the first 100,000 in memory and the rest in a temporary file. The
-        engines over whole tracks give a track's rows when it has ended, and all at `finish` if fragments are
-        to be stitched.
-
-        Raises:
-            JeatGraphError: the configuration asks for no smoother.
-        """
-        return self._wanted_smoothers().drain()
-
-    def finish(self) -> Trajectories:
-        """End all tracks and return their smoothed trajectories, without what was drained before.
-
-        The tracker takes no more scans. Called again, or without a smoother, it returns an empty table.
-        """
-        self._finished = True
-        if self._smoothers is None:
-            return Trajectories.empty(self.sensor_names)
-        return self._smoothers.finish()
-
-    @property
-    def smoother_counts(self) -> dict[str, int]:
-        """How the smoothers fared: tracks, rebuilds, fallbacks, late measurements, joints; {} without one."""
-        return self._smoothers.counts() if self._smoothers is not None else {}
-
-    def confirmed_histories(self) -> list[TrackHistory]:
-        """Return what the confirmed tracks took in so far; only engines that stitch (full, rts) keep it.
-
-        Raises:
-            JeatGraphError: the configuration asks for no smoother.
-        """
-        return self._wanted_smoothers().confirmed_histories()
-
-    def _wanted_smoothers(self) -> Smoothing:
-        if self._smoothers is None:
-            raise JeatGraphError("the configuration asks for no smoother: smoother.engine is none")
-        return self._smoothers
-
     def run(self, detections: Detections) -> Iterator[Trajectories]:
         """Step through a recording and yield the table of each time; scans of one time are taken jointly."""
         for batch in detections.batches():
             yield self.step(batch)
-
-    def _sensor_index(self, name: str) -> int:
-        index = self._index.get(name)
-        if index is None:
-            near = difflib.get_close_matches(name, self.sensor_names, 1)
-            hint = f"did you mean {near[0]!r}?" if near else f"declared: {', '.join(self.sensor_names)}"
-            raise UnknownSensorError(f"sensor {name!r} is not declared in the configuration; {hint}")
-        return index
 
 
 def track(config: Config, detections: Detections) -> Trajectories:
@@ -274,26 +233,3 @@ def track(config: Config, detections: Detections) -> Trajectories:
     """
     causal_only = replace(config, smoother=replace(config.smoother, engine="none"))
     return Trajectories.concatenate(list(Tracker(causal_only).run(detections)) or [Trajectories.empty()])
-
-
-def _as_scans(scans: Any) -> list[Scan]:
-    if isinstance(scans, Scan):
-        return [scans]
-    if isinstance(scans, tuple) and len(scans) == 4 and isinstance(scans[1], str):
-        return [Scan(*scans)]
-    if isinstance(scans, Iterable):
-        out = [scan if isinstance(scan, Scan) else Scan(*scan) for scan in scans]
-        if out:
-            return out
-    raise TypeError("step takes a Scan, a tuple (t, sensor, boxes, scores), or a sequence of these")
-
-
-def _smoothing(config: Config) -> Smoothing:
-    """Smoothing here, or in a process of its own; imported only where it is wanted."""
-    if config.smoother.worker:
-        from jeat_graph.tracking.smoothing.worker import SmoothingWorker
-
-        return SmoothingWorker(config)
-    from jeat_graph.tracking.smoothing.behind import SmoothingHere
-
-    return SmoothingHere(config)

@@ -15,6 +15,8 @@ MOST_OPEN = 4096
 _CONNECT_S = 10.0
 #: Errors that do not pass by themselves.
 _FOR_GOOD = (KafkaError.TOPIC_AUTHORIZATION_FAILED, KafkaError.GROUP_AUTHORIZATION_FAILED)
+#: How soon the group takes a member for dead that does not answer (ms): a restart should not wait longer.
+_SESSION_MS = 6000
 #: How soon a topic that is made later is seen (ms).
 _REFRESH_MS = 2000
 
@@ -61,6 +63,7 @@ class KafkaSource:
             | {
                 "group.id": address.option("group", f"jeat-graph.{address.topic}"),
                 "enable.auto.commit": False,
+                "session.timeout.ms": _SESSION_MS,
                 "auto.offset.reset": "earliest",
                 "allow.auto.create.topics": True,
                 "topic.metadata.refresh.interval.ms": _REFRESH_MS,

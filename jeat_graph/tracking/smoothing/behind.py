@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import Protocol
 
 from jeat_graph.config.schema import Config
-from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.smoothing.history import TrackHistory
 from jeat_graph.tracking.smoothing.online import TrackSmoothers
 from jeat_graph.tracking.smoothing.recorder import StepRecorder
-from jeat_graph.tracking.state import TrackArrays
-from jeat_graph.tracking.update_log import UpdateLog
+from jeat_graph.tracking.step_record import StepRecord
 
 #: What is counted of the smoothers (attributes of `TrackSmoothers`).
 COUNTS = ("tracks", "rebuilds", "fallbacks", "too_late", "stitched")
@@ -20,10 +18,8 @@ COUNTS = ("tracks", "rebuilds", "fallbacks", "too_late", "stitched")
 class Smoothing(Protocol):
     """Takes down the steps of one tracker and gives smoothed trajectories."""
 
-    def record(
-        self, t: float, tracks: TrackArrays, n: int, births: int, log: UpdateLog, reported: IntArray
-    ) -> None:
-        """Take down one step; arguments as of `StepRecorder.record`."""
+    def record(self, step: StepRecord) -> None:
+        """Take down one step."""
 
     def drain(self) -> Trajectories:
         """Return, and forget, final rows, in order of time over all calls."""
@@ -60,11 +56,9 @@ class SmoothingHere:
         self._steps = _LEVELLING * max(config.smoother.chunk, 1)
         self._per_step = 0
 
-    def record(
-        self, t: float, tracks: TrackArrays, n: int, births: int, log: UpdateLog, reported: IntArray
-    ) -> None:
+    def record(self, step: StepRecord) -> None:
         """Take down one step and do a part of the work."""
-        if self._recorder.record(t, tracks, n, births, log, reported):
+        if self._recorder.record(step):
             self._consume()
         else:
             self._smoothers.work(self._per_step)

@@ -9,8 +9,7 @@ import numpy as np
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, RecordArray
 from jeat_graph.filters.measurement import MEASUREMENT
-from jeat_graph.tracking.state import TrackArrays
-from jeat_graph.tracking.update_log import UpdateLog
+from jeat_graph.tracking.step_record import StepRecord
 
 
 class Packet(NamedTuple):
@@ -59,64 +58,35 @@ class StepRecorder:
         self._confirmed: BoolArray = np.zeros(0, dtype=np.bool_)
         self._ended: list[int] = []
         self._updates: list[RecordArray] = []
-        self._looks: list[tuple[float, bool, IntArray, FloatArray, IntArray, BoolArray, BoolArray]] = []
+        self._looks: list[tuple[StepRecord, bool]] = []
 
-    def record(
-        self, t: float, tracks: TrackArrays, n: int, births: int, log: UpdateLog, reported: IntArray
-    ) -> bool:
-        """Take down one step.
-
-        Args:
-            t: time of the step (s).
-            tracks: state after it.
-            n: living tracks.
-            births: how many of these were born in it.
-            log: what the tracks took in.
-            reported: identities in the causal table of the step, ascending.
-
-        Returns:
-            Whether the packet is full.
-        """
-        count = int(log.count[0])
-        if count:
-            self._updates.append(log.rows[:count].copy())
-        ids, confirmed = tracks.track_id[:n].copy(), tracks.confirmed[:n].copy()
-        held = np.zeros(n, dtype=np.bool_)
-        held[np.searchsorted(ids, reported)] = True
-        held &= tracks.standing[:n]
-        self._looks.append(
-            (
-                t,
-                self._row_wanted(t),
-                ids,
-                tracks.existence[:n].copy(),
-                tracks.used[:n].copy(),
-                confirmed,
-                held,
-            )
-        )
+    def record(self, step: StepRecord) -> bool:
+        """Take down one step; whether the packet is full then."""
+        if len(step.updates):
+            self._updates.append(step.updates)
+        self._looks.append((step, self._row_wanted(step.t)))
         over = False
-        if n - births != len(self._ids):
-            gone = ~np.isin(self._ids, ids)
+        if len(step.ids) - step.births != len(self._ids):
+            gone = ~np.isin(self._ids, step.ids)
             self._ended.extend(self._ids[gone].tolist())
             over = bool(self._confirmed[gone].any())
-        self._ids, self._confirmed = ids, confirmed
+        self._ids, self._confirmed = step.ids, step.confirmed
         return over or len(self._looks) >= self._steps
 
     def take(self) -> Packet | None:
         """Return the steps taken down since the last call, or None if there are none."""
         if not self._looks:
             return None
-        t, wanted, ids, existence, used, confirmed, held = zip(*self._looks, strict=True)
+        steps, wanted = zip(*self._looks, strict=True)
         packet = Packet(
-            np.array(t),
+            np.array([step.t for step in steps]),
             np.array(wanted, dtype=np.bool_),
-            np.array([len(part) for part in ids], dtype=np.int64),
-            np.concatenate(ids),
-            np.concatenate(existence),
-            np.concatenate(used),
-            np.concatenate(confirmed),
-            np.concatenate(held),
+            np.array([len(step.ids) for step in steps], dtype=np.int64),
+            np.concatenate([step.ids for step in steps]),
+            np.concatenate([step.existence for step in steps]),
+            np.concatenate([step.used for step in steps]),
+            np.concatenate([step.confirmed for step in steps]),
+            np.concatenate([step.held for step in steps]),
             np.concatenate([np.zeros(0, dtype=MEASUREMENT), *self._updates]),
             self._ended,
         )

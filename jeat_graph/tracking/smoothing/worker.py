@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.config.schema import Config
-from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.smoothing.behind import COUNTS
@@ -29,8 +28,7 @@ from jeat_graph.tracking.smoothing.online import TrackSmoothers
 from jeat_graph.tracking.smoothing.outbox import Outbox
 from jeat_graph.tracking.smoothing.recorder import StepRecorder
 from jeat_graph.tracking.smoothing.waiting import WaitingRows
-from jeat_graph.tracking.state import TrackArrays
-from jeat_graph.tracking.update_log import UpdateLog
+from jeat_graph.tracking.step_record import StepRecord
 
 #: Packets that may wait for the worker: about half a minute of two sensors at 100 and 20 Hz.
 MOST_WAITING = 64
@@ -73,11 +71,9 @@ class SmoothingWorker:
         self._orders = Outbox(mine, most_waiting)
         self._stop = weakref.finalize(self, _stop, self._process, self._orders)
 
-    def record(
-        self, t: float, tracks: TrackArrays, n: int, births: int, log: UpdateLog, reported: IntArray
-    ) -> None:
+    def record(self, step: StepRecord) -> None:
         """Take down one step, and send a packet when it is full."""
-        if self._recorder.record(t, tracks, n, births, log, reported):
+        if self._recorder.record(step):
             self._send("consume", self._recorder.take())
             self._receive()
 

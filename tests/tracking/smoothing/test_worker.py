@@ -18,6 +18,7 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.smoothing.behind import SmoothingHere
 from jeat_graph.tracking.smoothing.recorder import StepRecorder
 from jeat_graph.tracking.smoothing.worker import SmoothingWorker, _portable
+from jeat_graph.tracking.step_record import record_step
 
 from .conftest import make_tracker, recording, run
 
@@ -233,7 +234,7 @@ def test_packets_depend_on_the_steps_alone():
     sizes = []
     for table in tracker.run(recording(duration=0.5)):
         state = (tracker._tracks, tracker.num_tracks, 0, tracker._log, table.track_id)
-        if recorder.record(tracker.time, *state):
+        if recorder.record(record_step(tracker.time, *state)):
             packet = recorder.take()
             sizes.append(len(packet.t))
             assert packet.counts.sum() == len(packet.ids)

@@ -1,0 +1,205 @@
+"""Scans in order of arrival, tracked as if they had come in order of time.
+
+A tracker keeps a snapshot of its arrays before each of its latest steps. A scan that comes late goes to the
+place where it belongs: the state before that place is restored and the scans since are taken again. Scans of
+one time are taken jointly, whenever they came. So the state is that of tracking in order of time, to the last
+bit, and so are the smoothed trajectories: the smoothers are told of a step only when nothing can come before.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+from jeat_graph.config.schema import Config
+from jeat_graph.data.detections import Scan
+from jeat_graph.data.errors import ConfigError, TimeOrderError
+from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.live.lateness import LatenessCounter
+from jeat_graph.tracking.prediction import Prediction
+from jeat_graph.tracking.scans import ScanLike, arrivals_of, as_scans
+from jeat_graph.tracking.snapshot import Snapshot
+from jeat_graph.tracking.step_record import StepRecord
+from jeat_graph.tracking.tracker import Tracker
+
+REWIND, SKIP, REFUSE = "rewind", "skip", "refuse"
+POLICIES = (REWIND, SKIP, REFUSE)
+
+
+@dataclass
+class Step:
+    """A step that may still be taken again.
+
+    Attributes:
+        t: its time (s).
+        scans: its scans, sensors in alphabetical order.
+        before: the tracker's state before it.
+        taken: what the smoothers are to be told of it.
+    """
+
+    t: float
+    scans: list[Scan]
+    before: Snapshot
+    taken: StepRecord | None
+
+
+class Arrival(NamedTuple):
+    """What became of scans that arrived.
+
+    Attributes:
+        table: the tracks that are reported now.
+        t: time of the newest step (s): that of the table.
+        late_s: how much older the scans were than the newest before them (s), 0 for scans in order.
+        dropped: those that were passed over: too late, or of a sensor that has given one of that time.
+    """
+
+    table: Trajectories
+    t: float
+    late_s: float
+    dropped: list[Scan]
+
+
+class LiveTracker:
+    """A tracker that takes scans in the order in which they arrive.
+
+    Args:
+        tracker: a tracker, new or loaded; from now on it is stepped by this object alone.
+        policy: what is done with a scan that is older than the newest: `rewind` puts it where it belongs, if
+            it is not later than `live.late_s` (or its sensor's `late_s`) allows; `skip` passes it over;
+            `refuse` raises.
+
+    Attributes:
+        tracker: the tracker.
+        lateness: how late scans came, by sensor.
+        steps: the steps that may still be taken again, by time.
+        replayed: how many steps have been taken again so far.
+    """
+
+    def __init__(self, tracker: Tracker, policy: str = REWIND) -> None:
+        if policy not in POLICIES:
+            raise ConfigError(f"{policy!r} is not one of {', '.join(POLICIES)}")
+        config = tracker.config
+        self.tracker = tracker
+        self.policy = policy
+        self.lateness = LatenessCounter(tracker.sensor_names)
+        self.steps: list[Step] = []
+        self.replayed = 0
+        self._settled = -math.inf  # time of the last step that the smoothers have been told of
+        self._latency = {name: sensor.latency_s for name, sensor in config.sensors.items()}
+        self._late_s = {name: _late_s(config, name) for name in config.sensors}
+        self._keep_s = max(self._late_s.values()) if policy == REWIND else 0.0
+
+    @property
+    def time(self) -> float | None:
+        """Time of the newest scan (s), or None before the first."""
+        return self.tracker.time
+
+    def step(self, scans: ScanLike | Sequence[ScanLike]) -> Arrival:
+        """Take in one scan, or several of one time, which have just arrived.
+
+        Args:
+            scans: as `Tracker.step`; their times are the measurement's own, but for the sensor's `latency_s`.
+
+        Raises:
+            DataError, UnknownSensorError: as `Tracker.step`; the state is as before.
+            TimeOrderError: a scan comes late, and late scans are refused.
+        """
+        batch = [self._corrected(scan) for scan in as_scans(scans)]
+        arrivals_of(batch, self.tracker.sensor_names)  # unknown sensors are refused before anything is done
+        now = self.tracker.time
+        late_s = 0.0
+        dropped: list[Scan] = []
+        for t in sorted({scan.t for scan in batch}):
+            here = [scan for scan in batch if scan.t == t]
+            late_s = max(late_s, 0.0 if now is None else now - t)
+            dropped += self._take(here)
+        assert self.tracker.time is not None or dropped
+        table = self.tracker.causal()
+        return Arrival(table, self.tracker.time or 0.0, late_s, dropped)
+
+    def predict(self, t: float) -> Prediction:
+        """Say where the tracks will be at a time not before the newest scan's (see `Tracker.predict`)."""
+        return self.tracker.predict(t)
+
+    def drain_smoothed(self) -> Trajectories:
+        """Return the smoothed rows that are final and forget them (see `Tracker.drain_smoothed`)."""
+        return self.tracker.drain_smoothed()
+
+    def finish(self) -> Trajectories:
+        """End all tracks and return the smoothed rows not drained yet (see `Tracker.finish`)."""
+        self._settle(float("inf"))
+        return self.tracker.finish()
+
+    def _corrected(self, scan: Scan) -> Scan:
+        latency = self._latency.get(scan.sensor, 0.0)
+        return replace(scan, t=scan.t - latency) if latency else scan
+
+    def _take(self, batch: list[Scan]) -> list[Scan]:
+        """Take in scans of one time; return those that were passed over."""
+        t, now = batch[0].t, self.tracker.time
+        late_s = 0.0 if now is None else max(now - t, 0.0)
+        if late_s > 0.0 and self.policy == REFUSE:
+            raise TimeOrderError(
+                f"scan at t = {t} s is older than the last one at {now} s, and late scans are refused"
+            )
+        good = [scan for scan in batch if self._may_come(scan, late_s)]
+        for scan in batch:
+            self.lateness.add(scan.sensor, late_s, scan not in good)
+        if good:
+            self._insert(good)
+        return [scan for scan in batch if scan not in good]
+
+    def _may_come(self, scan: Scan, late_s: float) -> bool:
+        if self.policy != REWIND:
+            return late_s == 0.0
+        if late_s > self._late_s[scan.sensor] or scan.t <= self._settled:
+            return False
+        k = self._place(scan.t)
+        known = self.steps[k].scans if k < len(self.steps) and self.steps[k].t == scan.t else []
+        return all(other.sensor != scan.sensor for other in known)
+
+    def _place(self, t: float) -> int:
+        return bisect_left(self.steps, t, key=lambda step: step.t)
+
+    def _insert(self, scans: list[Scan]) -> None:
+        """Put scans of one time where they belong, and take all steps from there on again."""
+        if self.policy != REWIND:
+            _, taken = self.tracker.take_in(scans)
+            self.tracker.hand_over(taken)
+            return
+        t = scans[0].t
+        k = self._place(t)
+        if k < len(self.steps):
+            before = self.steps[k].before
+            self.tracker.restore(before)
+        else:
+            before = self.tracker.snapshot()
+        if k < len(self.steps) and self.steps[k].t == t:
+            scans = self.steps[k].scans + scans
+            del self.steps[k]
+        # As files are read: the order of arrival must not show.
+        self.steps.insert(k, Step(t, sorted(scans, key=lambda scan: scan.sensor), before, None))
+        for step in self.steps[k:]:
+            if step is not self.steps[k]:
+                step.before = self.tracker.snapshot()
+            _, step.taken = self.tracker.take_in(step.scans)
+        self.replayed += len(self.steps) - k - 1
+        newest = self.tracker.time
+        assert newest is not None
+        self._settle(newest - self._keep_s)
+
+    def _settle(self, t: float) -> None:
+        """Tell the smoothers of the steps before a time: nothing can come before them any more."""
+        count = self._place(t)
+        for step in self.steps[:count]:
+            self.tracker.hand_over(step.taken)
+            self._settled = step.t
+        del self.steps[:count]
+
+
+def _late_s(config: Config, sensor: str) -> float:
+    own = config.sensors[sensor].late_s
+    return config.live.late_s if own is None else own

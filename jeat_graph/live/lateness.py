@@ -1,0 +1,74 @@
+"""How late the scans of each sensor came: counted in milliseconds, so that memory does not grow with time."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jeat_graph.data.arrays import IntArray
+
+#: Width of a bin (s), and how many there are; what is later counts in the last one.
+BIN_S, BINS = 0.001, 10_000
+
+
+class Lateness(NamedTuple):
+    """Summary of one sensor.
+
+    Attributes:
+        scans: how many came.
+        late: how many of them were older than one that had come before, of any sensor.
+        dropped: how many of these came too late, or twice, and were passed over.
+        median_s: median of how much older each was than the newest before (s), 0 for one that was newer.
+        p99_s: its 99th percentile (s).
+        max_s: the most (s).
+    """
+
+    scans: int
+    late: int
+    dropped: int
+    median_s: float
+    p99_s: float
+    max_s: float
+
+
+class LatenessCounter:
+    """Counts by sensor.
+
+    Args:
+        sensor_names: names of the S sensors.
+
+    Attributes:
+        counts: (S, BINS) scans by how late they were.
+        late: (S,) scans that were late at all.
+        dropped: (S,) scans that were passed over.
+        worst_s: (S,) the latest (s).
+    """
+
+    def __init__(self, sensor_names: tuple[str, ...]) -> None:
+        self._names = sensor_names
+        self.counts: IntArray = np.zeros((len(sensor_names), BINS), dtype=np.int64)
+        self.late: IntArray = np.zeros(len(sensor_names), dtype=np.int64)
+        self.dropped: IntArray = np.zeros(len(sensor_names), dtype=np.int64)
+        self.worst_s = np.zeros(len(sensor_names))
+
+    def add(self, sensor: str, late_s: float, dropped: bool) -> None:
+        """Count a scan that is so much older than the newest (s); 0 if it is not."""
+        s = self._names.index(sensor)
+        self.counts[s, min(round(late_s / BIN_S), BINS - 1)] += 1
+        self.late[s] += late_s > 0.0
+        self.dropped[s] += dropped
+        self.worst_s[s] = max(self.worst_s[s], late_s)
+
+    def summary(self) -> dict[str, Lateness]:
+        """Return the summary of each sensor that gave a scan."""
+        out = {}
+        for s, name in enumerate(self._names):
+            below = np.cumsum(self.counts[s])
+            if not below[-1]:
+                continue
+            median, p99 = (float(np.searchsorted(below, share * below[-1])) * BIN_S for share in (0.5, 0.99))
+            out[name] = Lateness(
+                int(below[-1]), int(self.late[s]), int(self.dropped[s]), median, p99, float(self.worst_s[s])
+            )
+        return out

@@ -1,0 +1,72 @@
+"""Scans as callers give them, checked and turned into what a step takes."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.data.detections import Scan
+from jeat_graph.data.errors import TimeOrderError, UnknownSensorError
+from jeat_graph.tracking.batch import Arrivals
+
+ScanLike: TypeAlias = Scan | tuple[float, str, npt.ArrayLike, npt.ArrayLike]
+
+
+def as_scans(scans: Any) -> list[Scan]:
+    """Return one or more scans of one and the same time as a list.
+
+    Raises:
+        DataError: boxes or scores that are not valid.
+        TimeOrderError: scans of several times.
+    """
+    batch = _listed(scans)
+    if any(scan.t != batch[0].t for scan in batch):
+        raise TimeOrderError("the scans of one step must have one and the same time")
+    return batch
+
+
+def _listed(scans: Any) -> list[Scan]:
+    if isinstance(scans, Scan):
+        return [scans]
+    if isinstance(scans, tuple) and len(scans) == 4 and isinstance(scans[1], str):
+        return [Scan(*scans)]
+    if isinstance(scans, Iterable):
+        out = [scan if isinstance(scan, Scan) else Scan(*scan) for scan in scans]
+        if out:
+            return out
+    raise TypeError("step takes a Scan, a tuple (t, sensor, boxes, scores), or a sequence of these")
+
+
+def arrivals_of(batch: Sequence[Scan], sensor_names: Sequence[str]) -> Arrivals:
+    """Join the scans of one time.
+
+    Args:
+        batch: scans, at least one.
+        sensor_names: names of all sensors, in the order of per-sensor arrays.
+
+    Raises:
+        UnknownSensorError: a sensor that is not among them.
+    """
+    codes = [_sensor_index(scan.sensor, sensor_names) for scan in batch]
+    if len(batch) == 1:
+        boxes, scores = batch[0].boxes, batch[0].scores
+        sensor = np.full(len(scores), codes[0], dtype=np.int64)
+    else:
+        boxes = np.concatenate([scan.boxes for scan in batch])
+        scores = np.concatenate([scan.scores for scan in batch])
+        sensor = np.repeat(np.array(codes, dtype=np.int64), [len(scan) for scan in batch])
+    present = np.zeros(len(sensor_names), dtype=np.bool_)
+    present[codes] = True
+    return Arrivals(batch[0].t, boxes, scores, sensor, present)
+
+
+def _sensor_index(name: str, names: Sequence[str]) -> int:
+    if name in names:
+        return names.index(name)
+    near = difflib.get_close_matches(name, names, 1)
+    hint = f"did you mean {near[0]!r}?" if near else f"declared: {', '.join(names)}"
+    raise UnknownSensorError(f"sensor {name!r} is not declared in the configuration; {hint}")

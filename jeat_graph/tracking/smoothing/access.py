@@ -1,0 +1,96 @@
+"""What a tracker says of its smoothed tracks: the part of it that has to do with the smoothers alone."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from jeat_graph.config.schema import Config
+from jeat_graph.data.errors import JeatGraphError
+from jeat_graph.data.trajectories import Trajectories
+
+if TYPE_CHECKING:
+    from jeat_graph.tracking.smoothing.behind import Smoothing
+    from jeat_graph.tracking.smoothing.history import TrackHistory
+
+
+class SmoothedTracks:
+    """The smoothers behind a tracker, here or in a process of their own, or none.
+
+    Args:
+        config: settings of the smoother, the sizes and the output.
+
+    Attributes:
+        sensor_names: names of the sensors, in alphabetical order.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self.sensor_names = config.sensor_names
+        self._finished = False
+        self._smoothers: Smoothing | None = None
+        if config.smoother.engine != "none":
+            self._smoothers = _smoothing(config)
+
+    def smoothed(self) -> Trajectories:
+        """Return the smoothed trajectories of the confirmed tracks so far, without what was drained.
+
+        Their whole life: the time before confirmation and gaps included, up to the last detection. With a
+        fixed lag the rows older than that are final; all others may still change. (The call makes the
+        smoothers take in what they had set aside: with a fixed lag some states become final a part of a chunk
+        earlier than in a run without it, and differ from there by what that part would have told.)
+
+        Raises:
+            JeatGraphError: the configuration asks for no smoother.
+        """
+        return self._wanted_smoothers().smoothed()
+
+    def drain_smoothed(self) -> Trajectories:
+        """Return the smoothed rows that are final and forget them, in order of time over all calls.
+
+        A live caller that keeps a smoother calls this now and then: rows that nobody fetches are kept for
+        `finish`, some 200 bytes each, the first 100,000 in memory and the rest in a temporary file. The
+        engines over whole tracks give a track's rows when it has ended, and all at `finish` if fragments are
+        to be stitched.
+
+        Raises:
+            JeatGraphError: the configuration asks for no smoother.
+        """
+        return self._wanted_smoothers().drain()
+
+    def finish(self) -> Trajectories:
+        """End all tracks and return their smoothed trajectories, without what was drained before.
+
+        The tracker takes no more scans. Called again, or without a smoother, it returns an empty table.
+        """
+        self._finished = True
+        if self._smoothers is None:
+            return Trajectories.empty(self.sensor_names)
+        return self._smoothers.finish()
+
+    @property
+    def smoother_counts(self) -> dict[str, int]:
+        """How the smoothers fared: tracks, rebuilds, fallbacks, late measurements, joints; {} without one."""
+        return self._smoothers.counts() if self._smoothers is not None else {}
+
+    def confirmed_histories(self) -> list[TrackHistory]:
+        """Return what the confirmed tracks took in so far; only engines that stitch (full, rts) keep it.
+
+        Raises:
+            JeatGraphError: the configuration asks for no smoother.
+        """
+        return self._wanted_smoothers().confirmed_histories()
+
+    def _wanted_smoothers(self) -> Smoothing:
+        if self._smoothers is None:
+            raise JeatGraphError("the configuration asks for no smoother: smoother.engine is none")
+        return self._smoothers
+
+
+def _smoothing(config: Config) -> Smoothing:
+    """Smoothing here, or in a process of its own; imported only where it is wanted."""
+    if config.smoother.worker:
+        from jeat_graph.tracking.smoothing.worker import SmoothingWorker
+
+        return SmoothingWorker(config)
+    from jeat_graph.tracking.smoothing.behind import SmoothingHere
+
+    return SmoothingHere(config)

@@ -1,0 +1,45 @@
+"""A copy of all that a tracker's next step depends on, so that it can go back there."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from jeat_graph.tracking.state import Scene, TrackArrays
+
+
+class Snapshot(NamedTuple):
+    """The causal state of a tracker at one moment: its own arrays, N rows.
+
+    Attributes:
+        t: time of the last step (s), or None before the first.
+        next_id: identity of the next track to be born.
+        tracks: the N living tracks.
+        scene: what is learnt of the scene.
+    """
+
+    t: float | None
+    next_id: int
+    tracks: TrackArrays
+    scene: Scene
+
+    @staticmethod
+    def of(t: float | None, next_id: int, tracks: TrackArrays, num_tracks: int, scene: Scene) -> Snapshot:
+        """Copy the first `num_tracks` rows, and the scene."""
+        return Snapshot(
+            t,
+            next_id,
+            TrackArrays(*[array[:num_tracks].copy() for array in tracks]),
+            Scene(*[array.copy() for array in scene]),
+        )
+
+    @property
+    def num_tracks(self) -> int:
+        """Number of living tracks N."""
+        return len(self.tracks.track_id)
+
+    def copy_to(self, tracks: TrackArrays, scene: Scene) -> None:
+        """Write the copy into arrays of at least N rows, and into a scene."""
+        for source, target in zip(self.tracks, tracks, strict=True):
+            target[: len(source)] = source
+        for source, target in zip(self.scene, scene, strict=True):
+            target[:] = source

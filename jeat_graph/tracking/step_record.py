@@ -1,0 +1,64 @@
+"""What the smoothers are told of one step of the tracker: copies, so that they can be told later."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, RecordArray
+from jeat_graph.tracking.state import TrackArrays
+from jeat_graph.tracking.update_log import UpdateLog
+
+
+class StepRecord(NamedTuple):
+    """One step, N living tracks after it.
+
+    Attributes:
+        t: time of the step (s).
+        births: how many of the tracks were born in it; they are the last ones.
+        ids: (N,) identities, ascending.
+        existence: (N,) probability of existence.
+        used: (N,) bit k is set where a detection of sensor k was taken.
+        confirmed: (N,) whether the track is confirmed.
+        held: (N,) whether it is reported as standing still.
+        updates: (M,) records of the update log.
+    """
+
+    t: float
+    births: int
+    ids: IntArray
+    existence: FloatArray
+    used: IntArray
+    confirmed: BoolArray
+    held: BoolArray
+    updates: RecordArray
+
+
+def record_step(
+    t: float, tracks: TrackArrays, n: int, births: int, log: UpdateLog, reported: IntArray
+) -> StepRecord:
+    """Take down one step.
+
+    Args:
+        t: time of the step (s).
+        tracks: state after it.
+        n: living tracks.
+        births: how many of these were born in it.
+        log: what the tracks took in.
+        reported: identities in the causal table of the step, ascending.
+    """
+    ids = tracks.track_id[:n].copy()
+    held = np.zeros(n, dtype=np.bool_)
+    held[np.searchsorted(ids, reported)] = True
+    held &= tracks.standing[:n]
+    return StepRecord(
+        t,
+        births,
+        ids,
+        tracks.existence[:n].copy(),
+        tracks.used[:n].copy(),
+        tracks.confirmed[:n].copy(),
+        held,
+        log.rows[: int(log.count[0])].copy(),
+    )

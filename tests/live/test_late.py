@@ -1,0 +1,250 @@
+"""Late scans: whatever the order of arrival, the outcome is that of tracking in order of time."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from jeat_graph.config.reading import load_config
+from jeat_graph.data.detections import Scan
+from jeat_graph.data.errors import TimeOrderError, UnknownSensorError
+from jeat_graph.io.trajectories_io import write_trajectories
+from jeat_graph.live.late import LiveTracker
+from jeat_graph.simulation.scenario import load_scenario
+from jeat_graph.simulation.simulate import record
+from jeat_graph.tracking.tracker import Tracker
+
+CONFIG = load_config("default", ["smoother.lag_s=0.4", "smoother.chunk=8"])
+CAUSAL = load_config("default", ["smoother.engine=none"])
+MOST_LATE_S = 0.3
+
+
+@pytest.fixture(scope="module")
+def detections():
+    return record(load_scenario("night"), 5, 2.0).detections
+
+
+@pytest.fixture(scope="module")
+def in_order(detections):
+    """The tracker after the recording in order of time, and its smoothed rows."""
+    return outcome(detections)
+
+
+def outcome(detections, config=CONFIG):
+    tracker = Tracker(config)
+    for batch in detections.batches():
+        tracker.step(batch)
+    return tracker.snapshot(), tracker.finish()
+
+
+def arrivals(detections, delay_s):
+    """Scans by arrival, each delayed by (K,) seconds; those at one time in any order."""
+    order = np.argsort(detections.scan_t + delay_s, kind="stable")
+    return [detections.scan(int(k)) for k in order]
+
+
+def assert_same_state(one, other):
+    assert (one.t, one.next_id) == (other.t, other.next_id)
+    for name, a, b in zip(one.tracks._fields, one.tracks, other.tracks, strict=True):
+        np.testing.assert_array_equal(a, b, err_msg=name)
+    for a, b in zip(one.scene, other.scene, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def smoothed_bytes(table, folder):
+    write_trajectories(table, folder / "s.csv")
+    return (folder / "s.csv").read_bytes()
+
+
+def test_random_delays_change_nothing_in_the_end(detections, in_order, tmp_path_factory, full):
+    folder = tmp_path_factory.mktemp("late")
+    state, smoothed = in_order
+    expected = smoothed_bytes(smoothed, folder)
+
+    @settings(max_examples=200 if full else 4, deadline=None)
+    @given(st.integers(0, 2**32 - 1), st.sampled_from(("each scan", "each sensor")))
+    def holds(seed, kind):
+        rng = np.random.default_rng(seed)
+        if kind == "each scan":
+            delay = rng.uniform(0.0, MOST_LATE_S, detections.num_scans)
+        else:
+            delay = rng.uniform(0.0, MOST_LATE_S, len(detections.sensors))[detections.scan_sensor]
+        live = LiveTracker(Tracker(CONFIG))
+        drained = []
+        for k, scan in enumerate(arrivals(detections, delay)):
+            assert not live.step(scan).dropped
+            if k % 50 == 0:
+                drained.append(live.drain_smoothed())
+        assert_same_state(live.tracker.snapshot(), state)
+        rows = [*drained, live.finish()]
+        assert smoothed_bytes(type(rows[0]).concatenate(rows), folder) == expected
+
+    holds()
+
+
+def test_rows_given_out_are_made_from_what_had_arrived_and_never_revised(detections):
+    """What a live caller got at each arrival is what a tracker in order makes of the scans so far."""
+    delay = np.where(detections.scan_sensor == 0, 0.005, 0.08)
+    came = arrivals(detections, delay)
+    live = LiveTracker(Tracker(CAUSAL))
+    given_out = [live.step(scan).table for scan in came]
+    for count in (40, 41, 90, 173):
+        by_time = sorted(came[:count], key=lambda scan: (scan.t, scan.sensor))
+        tracker = Tracker(CAUSAL)
+        for t in sorted({scan.t for scan in by_time}):
+            table = tracker.step([scan for scan in by_time if scan.t == t])
+        for name in ("t", "track_id", "boxes", "existence", "mean", "var", "used"):
+            np.testing.assert_array_equal(getattr(given_out[count - 1], name), getattr(table, name))
+
+
+def test_scans_of_one_time_are_joint_whenever_they_come(detections):
+    """The order of sensors at one time does not show either."""
+    forth, back = LiveTracker(Tracker(CAUSAL)), LiveTracker(Tracker(CAUSAL))
+    for batch in list(detections.batches())[:60]:
+        for scan in batch:
+            forth.step(scan)
+        for scan in reversed(batch):
+            back.step(scan)
+    assert_same_state(forth.tracker.snapshot(), back.tracker.snapshot())
+
+
+def scan(t, sensor="rgb"):
+    return Scan(t, sensor, [[100.0, 100.0, 40.0, 30.0]], [0.9])
+
+
+def test_what_comes_too_late_or_twice_is_passed_over_and_counted():
+    config = load_config("default", ["live.late_s=0.2", "sensors.evt.late_s=0.05", "smoother.engine=none"])
+    live = LiveTracker(Tracker(config))
+    live.step(scan(1.0))
+    assert not live.step(scan(0.8)).dropped
+    assert [one.t for one in live.step(scan(0.79)).dropped] == [0.79]
+    assert not live.step(scan(0.95, "evt")).dropped
+    assert live.step(scan(0.94, "evt")).dropped
+    assert live.step(scan(0.95, "evt")).dropped
+    summary = live.lateness.summary()
+    assert (summary["rgb"].scans, summary["rgb"].late, summary["rgb"].dropped) == (3, 2, 1)
+    assert (summary["evt"].scans, summary["evt"].late, summary["evt"].dropped) == (3, 3, 2)
+    assert summary["rgb"].max_s == pytest.approx(0.21)
+
+
+def test_lateness_is_summed_up_by_sensor():
+    live = LiveTracker(Tracker(CAUSAL))
+    for k in range(100):
+        live.step(scan(0.1 + 0.01 * k, "evt"))
+        live.step(scan(0.02 + 0.01 * k, "rgb"))
+    summary = live.lateness.summary()
+    assert summary["evt"].median_s == summary["evt"].p99_s == 0.0
+    assert summary["rgb"].median_s == pytest.approx(0.08, abs=0.001)
+    assert summary["rgb"].p99_s == pytest.approx(0.08, abs=0.001)
+
+
+def test_the_other_policies_pass_over_or_refuse():
+    skipping = LiveTracker(Tracker(CAUSAL), "skip")
+    skipping.step(scan(1.0))
+    assert len(skipping.step(scan(0.9)).dropped) == 1
+    refusing = LiveTracker(Tracker(CAUSAL), "refuse")
+    refusing.step(scan(1.0))
+    with pytest.raises(TimeOrderError, match="late scans are refused"):
+        refusing.step(scan(0.9))
+
+
+def test_a_known_latency_is_taken_off_the_time():
+    config = load_config("default", ["sensors.rgb.latency_s=0.08", "smoother.engine=none"])
+    live, plain = LiveTracker(Tracker(config)), Tracker(config)
+    for k in range(30):
+        live.step(scan(0.02 * k, "evt"))
+        live.step(scan(0.02 * k, "rgb"))
+    times = sorted({0.02 * k for k in range(30)} | {0.02 * k - 0.08 for k in range(30)})
+    for t in times:
+        batch = [scan(t, "evt")] if any(t == 0.02 * k for k in range(30)) else []
+        batch += [scan(t, "rgb")] if any(t == 0.02 * k - 0.08 for k in range(30)) else []
+        plain.step(batch)
+    assert_same_state(live.tracker.snapshot(), plain.snapshot())
+
+
+def test_a_scan_that_is_refused_leaves_everything_as_it_was():
+    live = LiveTracker(Tracker(CAUSAL))
+    for k in range(20):
+        live.step(scan(0.05 * k))
+    before = live.tracker.snapshot()
+    with pytest.raises(UnknownSensorError):
+        live.step([scan(0.5), replace(scan(0.5), sensor="lidar")])
+    assert_same_state(live.tracker.snapshot(), before)
+    assert live.lateness.summary()["rgb"].scans == 20
+
+
+def busy_scans(count, seconds):
+    """Pictures at 20 Hz and events at 100 Hz of so many vehicles that stay in the picture, by time."""
+    rng = np.random.default_rng(3)
+    start = rng.uniform((50, 50), (1100, 600), (count, 2))
+    speed = rng.uniform(-30, 30, (count, 2))
+    scans = []
+    for sensor, rate in (("evt", 100.0), ("rgb", 20.0)):
+        for k in range(int(seconds * rate)):
+            t = (k + 0.3) / rate
+            centre = start + speed * t + rng.normal(0.0, 1.0, (count, 2))
+            boxes = np.column_stack([centre, np.full((count, 2), 30.0)])
+            scans.append(Scan(t, sensor, boxes, np.full(count, 0.9)))
+    return sorted(scans, key=lambda one: one.t)
+
+
+def test_a_late_picture_costs_no_more_than_the_steps_it_makes_anew(full, capsys):
+    """Pictures 80 ms late, events 5 ms late: the cost of an arrival against that of a step in order."""
+    for count in (20, 100) if full else (20,):
+        scans = busy_scans(count, 20.0 if full else 2.0)
+        plain = Tracker(CAUSAL)
+        steps = timed(plain.step, scans)
+        live = LiveTracker(Tracker(CAUSAL))
+        came = sorted(scans, key=lambda one: one.t + (0.08 if one.sensor == "rgb" else 0.005))
+        took = timed(live.step, came)
+        assert_same_state(live.tracker.snapshot(), plain.snapshot())
+        # 80 ms hold eight or nine steps of the events; each is made again with a snapshot before it.
+        assert live.replayed <= 9 * len(scans) / 6
+        assert np.median(took) < 20.0 * np.median(steps)
+        with capsys.disabled():
+            if full:
+                ms = 1e3 * np.quantile(took, (0.5, 0.99))
+                print(f"\n{count} vehicles: {ms[0]:.2f} ms median, {ms[1]:.2f} ms p99 an arrival")
+
+
+def timed(call, items):
+    out = []
+    for item in items:
+        begin = time.perf_counter()
+        call(item)
+        out.append(time.perf_counter() - begin)
+    return np.array(out)
+
+
+def test_predict_is_pure_and_is_the_next_prediction_of_the_filter():
+    tracker = Tracker(CAUSAL)
+    for k in range(30):
+        boxes = [[100.0 + 4.0 * k, 100.0, 40.0, 30.0]]
+        now = tracker.step((0.05 * k, "rgb", boxes, [0.9]))
+    before = tracker.snapshot()
+    ahead = tracker.predict(now.t[0] + 0.1)
+    assert_same_state(tracker.snapshot(), before)
+    np.testing.assert_array_equal(ahead.track_id, now.track_id)
+    np.testing.assert_allclose(np.diagonal(ahead.cov, axis1=1, axis2=2), ahead.var)
+    # An empty scan of a sensor at that time makes the filter predict, and nothing else of motion.
+    later = tracker.step((now.t[0] + 0.1, "rgb", np.zeros((0, 4)), np.zeros(0)))
+    np.testing.assert_array_equal(ahead.mean, later.mean)
+    np.testing.assert_array_equal(ahead.var, later.var)
+    x, v, a = ahead.mean[0, 0], now.mean[0, 2], now.mean[0, 4]
+    assert x == pytest.approx(now.mean[0, 0] + 0.1 * v + 0.005 * a)
+    with pytest.raises(TimeOrderError):
+        tracker.predict(0.0)
+
+
+def test_predict_at_the_present_is_what_was_reported():
+    tracker = Tracker(CAUSAL)
+    for k in range(30):
+        now = tracker.step((0.05 * k, "rgb", [[100.0, 100.0, 40.0, 30.0]], [0.9]))
+    same = tracker.predict(now.t[0])
+    for name in ("track_id", "boxes", "mean", "var", "existence"):
+        np.testing.assert_array_equal(getattr(same, name), getattr(now, name))
