@@ -125,6 +125,10 @@ class FixedLagSmoother:
         self._window = self._gtsam = None
         self._pending, self._departed = [], []
 
+    def forget_gtsam(self) -> None:
+        """Have GTSAM's window built anew from our arrays when it is next needed."""
+        self._gtsam, self._outdated = None, self._use_gtsam
+
     def _live(self) -> Window:
         """Return the window, or refuse if the smoother is closed."""
         if self._window is None:

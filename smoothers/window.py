@@ -10,6 +10,8 @@ behind, and only when the end of an array is reached everything moves, so that a
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
@@ -81,6 +83,34 @@ class Window:
     def newest(self) -> float:
         """Time of the last row (s)."""
         return float(self.t[self.end - 1])
+
+    def saved(self) -> dict[str, Any]:
+        """Return all from which `from_saved` makes this window again, without what filtering gives anew."""
+        rows, taken = slice(self.first, self.end), slice(self.taken, self.taken_end)
+        out: dict[str, Any] = {name: getattr(self, name)[rows] for name in ("t", "q", "is_key")}
+        out |= {name: getattr(self, name)[taken] for name in ("z", "info", "lever", "error")}
+        out |= {"row": self.row[taken] - self.first, "late": self.late, "memory": self.memory}
+        out |= {"base_mean": self.base_mean, "base_cov": self.base_cov}
+        same = np.array_equal(self.reference[rows], self.mean[rows])
+        return out | {"reference": None if same else self.reference[rows]}
+
+    @staticmethod
+    def from_saved(saved: dict[str, Any]) -> Window:
+        """Make a window of what `saved` returned: the same to the last bit, but for GTSAM's numbers."""
+        prior = Prior(float(saved["t"][0]), saved["base_mean"], saved["base_cov"])
+        window = Window(prior, saved["memory"])
+        rows, taken = len(saved["t"]), len(saved["row"])
+        window._make_room(rows, taken)
+        window.end, window.taken_end, window.late = rows, taken, saved["late"]
+        window.anchor[:rows] = -1
+        for name in ("t", "q", "is_key"):
+            getattr(window, name)[:rows] = saved[name]
+        for name in ("row", "z", "info", "lever", "error"):
+            getattr(window, name)[:taken] = saved[name]
+        window._filter(0, 0)
+        reference = saved["reference"]
+        window.reference[:rows] = window.mean[:rows] if reference is None else reference
+        return window
 
     def key_rows(self) -> IntArray:
         """Return the rows that are keys (K,)."""

@@ -1,28 +1,34 @@
-"""`jeat-graph stream`: scans from stdin, tracks to stdout, as they come."""
+"""`jeat-graph stream`: scans in as they come, from stdin or a broker, tracks out at once."""
 
 from __future__ import annotations
 
 import argparse
 import contextlib
-import signal
+import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from types import FrameType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any
 
 from jeat_graph.cli.options import add_config, add_image, overrides
+from jeat_graph.config.argument_types import positive
 
 if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
+    from jeat_graph.data.errors import DataError
     from jeat_graph.data.trajectories import Trajectories
-    from jeat_graph.io.scan_lines import Batch
-    from jeat_graph.io.trajectories_io import TrajectoryWriter
-    from jeat_graph.tracking.tracker import Tracker
+    from jeat_graph.live.health import Event
+    from jeat_graph.live.inputs import Interrupts
+    from jeat_graph.live.late import LiveTracker
+    from jeat_graph.live.messages import ScanMessage
+    from jeat_graph.live.session import Session
+    from jeat_graph.live.transport.ends import Sink, Source
 
-HELP = "track scans that arrive on stdin, as JSON lines or CSV, and write the tracks of each moment to stdout"
+HELP = "track scans that arrive on stdin or from a broker, and give out the tracks of each moment at once"
 STDIN = "<stdin>"
 _WARM_STEPS = 20  # enough for a track to be confirmed and smoothed
+#: A source is told what has been taken whenever it has nothing more, and after this part of what may be open.
+_COMMIT_PART = 0.5
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,39 +48,72 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="json",
         help="output: one line of JSON a step, or the rows of causal.csv (default: json)",
     )
+    add("--source", metavar="URL", help="take scans from mqtt://, nats:// or kafka://host/topic, not stdin")
+    add("--sink", metavar="URL", help="send tracks to mqtt://, nats:// or kafka://host/topic, not stdout")
+    add("--encoding", choices=("json", "msgpack"), default="json", help="of messages to --sink")
     add(
         "--joint",
         action="store_true",
         help="hold each scan back until a later time is seen, so that scans of one time on lines of their "
-        "own are taken jointly, as `track` does",
+        "own give one answer",
     )
     add(
         "--late",
-        choices=("error", "skip"),
-        default="error",
-        help="scans older than one before: an error, or passed over with a warning (default: error)",
+        choices=("rewind", "skip", "refuse"),
+        default="rewind",
+        help="scans older than one before: put where they belong (as late as live.late_s says), passed over, "
+        "or an error (default: rewind)",
     )
-    add("--smoothed", metavar="FILE", help="write the smoothed trajectories there when the input ends")
+    add(
+        "--on-error",
+        choices=("stop", "skip"),
+        default="stop",
+        help="a line that cannot be read: the end, with what was smoothed kept, or passed over and counted",
+    )
+    add("--smoothed", metavar="FILE", help="write the smoothed trajectories there, each row when it is final")
+    add(
+        "--checkpoint",
+        metavar="FILE",
+        help="keep the state there, and go on from it where it is; what was taken already may come again",
+    )
+    add("--every", type=positive, default=10.0, metavar="S", help="time between checkpoints (default: 10)")
+    add("--record", metavar="FILE", help="at the end write counts, and how late scans came, as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Track until the input ends, the reader of the output goes away, or an interrupt."""
-    from jeat_graph.tracking.tracker import Tracker
+    """Track until the input ends, the reader of the output goes away, or a signal comes."""
+    from jeat_graph.live.inputs import Interrupts
+    from jeat_graph.live.session import Ends, Session
+    from jeat_graph.live.smoothed_file import SmoothedFile
 
-    tracker = Tracker(_config(args))
-    _warm_up(tracker.config)
-    output = _Output(tracker, args.format, args.smoothed)
-    interrupts = _Interrupts()
-    with output, interrupts:
+    config = _config(args)
+    live, more = _tracker(args, config)
+    _warm_up(config)
+    with contextlib.ExitStack() as stack:
+        interrupts = stack.enter_context(Interrupts())
+        source, sink = _ends(args, stack)
+        smoothed = None
+        if args.smoothed is not None:
+            smoothed = stack.enter_context(SmoothedFile(args.smoothed, more.get("smoothed")))
+        output = _Output(args.format, args.encoding, sink)
+        ends = Ends(
+            tracks=output.tracks,
+            event=output.event,
+            warn=_warn,
+            smoothed=smoothed,
+            flush=output.flush,
+            commit=(lambda: None) if source is None else source.commit,
+        )
+        session = Session(live, ends, args.checkpoint, args.every, more)
+        output.seq = more.get("count", 0)
         try:
-            _track(tracker, args, output, interrupts)
-        except BrokenPipeError:
-            output.close_smoothed()
-            raise
-        output.close_smoothed()
-    if interrupts.seen:
+            _take_all(session, args, interrupts, source)
+        finally:
+            # An error in a line, a signal or a reader that has gone: what is known is kept all the same.
+            _finish(session, args)
+    if interrupts.seen is not None:
         print("jeat-graph stream: interrupted", file=sys.stderr)
-        return 130
+        return 128 + interrupts.seen
     return 0
 
 
@@ -85,11 +124,38 @@ def _config(args: argparse.Namespace) -> Config:
     from jeat_graph.data.errors import ConfigError
 
     config = load_config(args.config, overrides(args))
+
+    if args.checkpoint is not None and config.smoother.worker:
+        raise ConfigError("--checkpoint does not go with smoother.worker: its state is in another process")
+    if args.sink is not None and args.format == "csv":
+        raise ConfigError("--format csv is for stdout; messages to --sink are JSON or MessagePack")
     if args.smoothed is None:
         return replace(config, smoother=replace(config.smoother, engine="none"))
     if config.smoother.engine == "none":
         raise ConfigError("--smoothed needs a smoother, but smoother.engine is none")
     return config
+
+
+def _tracker(args: argparse.Namespace, config: Config) -> tuple[LiveTracker, dict[str, Any]]:
+    """The tracker, new or from the checkpoint, and what was kept with it."""
+    from jeat_graph.live.late import LiveTracker
+    from jeat_graph.tracking.tracker import Tracker
+
+    if args.checkpoint is not None and Path(args.checkpoint).is_file():
+        return LiveTracker.load(args.checkpoint, config)
+    return LiveTracker(Tracker(config), args.late), {}
+
+
+def _ends(args: argparse.Namespace, stack: contextlib.ExitStack) -> tuple[Source | None, Sink | None]:
+    from jeat_graph.live.transport.ends import open_sink, open_source
+
+    source = None if args.source is None else open_source(args.source)
+    if source is not None:
+        stack.callback(source.close)
+    sink = None if args.sink is None else open_sink(args.sink)
+    if sink is not None:
+        stack.callback(sink.close)
+    return source, sink
 
 
 def _warm_up(config: Config) -> None:
@@ -107,131 +173,114 @@ def _warm_up(config: Config) -> None:
     spare.finish()
 
 
-def _track(tracker: Tracker, args: argparse.Namespace, output: _Output, interrupts: _Interrupts) -> None:
-    from jeat_graph.io.scan_lines import read_batches
+def _take_all(
+    session: Session, args: argparse.Namespace, interrupts: Interrupts, source: Source | None
+) -> None:
+    from jeat_graph.live.inputs import from_lines, from_source
 
-    lines = interrupts.lines(sys.stdin.buffer.readline)
-    # With `--late skip` the order of times is not the reader's business but ours, below.
-    for batch in read_batches(lines, STDIN, joint=args.joint, ordered=args.late == "error"):
-        if args.late == "skip" and tracker.time is not None and batch.t < tracker.time:
-            late = tracker.time - batch.t
-            print(
-                f"jeat-graph stream: warning: {STDIN}:{batch.lines[0]}: passed over, {late:.6g} s late",
-                file=sys.stderr,
-            )
-            continue
-        output.write(batch.t, _step(tracker, batch))
+    bad = _skip(session) if args.on_error == "skip" else None
+    if source is None:
+        for message, place in from_lines(interrupts.lines(sys.stdin.buffer.readline), STDIN, args.joint, bad):
+            _take(session, message, place, bad)
+        return
+    since = 0
+    for item in from_source(source, args.source, interrupts, bad):
+        if item is not None:
+            _take(session, *item, bad)
+            since += 1
+        if since and (item is None or since >= _COMMIT_PART * source.most_open):
+            session.save()
+            since = 0
 
 
-def _step(tracker: Tracker, batch: Batch) -> Trajectories:
+def _take(
+    session: Session, message: ScanMessage, place: str, bad: Callable[[DataError], None] | None
+) -> None:
+    """Take a message; errors get the place where it came from."""
     from jeat_graph.data.errors import DataError, TimeOrderError, UnknownSensorError
 
     try:
-        return tracker.step(batch.scans)
-    except UnknownSensorError as error:
-        names = [scan.sensor in tracker.sensor_names for scan in batch.scans]
-        raise DataError(str(error), STDIN, batch.lines[names.index(False)]) from None
-    except TimeOrderError as error:
-        raise DataError(str(error), STDIN, batch.lines[-1]) from None
+        session.take(message, place)
+    except (UnknownSensorError, TimeOrderError) as error:
+        name, _, line = place.removesuffix(": ").rpartition(":")
+        trouble = DataError(str(error), name, int(line))
+        if bad is None:
+            raise trouble from None
+        bad(trouble)
+
+
+def _skip(session: Session) -> Callable[[DataError], None]:
+    from jeat_graph.live.session import MOST_TOLD
+
+    def bad(error: DataError) -> None:
+        session.bad += 1
+        if session.bad <= MOST_TOLD:
+            _warn(f"warning: {' '.join(str(error).split())}; passed over")
+
+    return bad
+
+
+def _finish(session: Session, args: argparse.Namespace) -> None:
+    from jeat_graph.io.atomic import open_atomic
+
+    session.save()
+    with contextlib.suppress(BrokenPipeError):
+        session.finish()
+    if args.record is not None:
+        with open_atomic(args.record) as file:
+            json.dump(session.summary(), file, indent=1)
+            file.write("\n")
+
+
+def _warn(text: str) -> None:
+    print(f"jeat-graph stream: {text}", file=sys.stderr)
 
 
 class _Output:
-    """Lines to stdout, each flushed at once, and smoothed rows to a file that appears at the end."""
-
-    def __init__(self, tracker: Tracker, form: str, smoothed: str | None) -> None:
-        from jeat_graph.data.errors import DataError
-
-        if smoothed is not None and Path(smoothed).is_dir():
-            raise DataError("is a folder; --smoothed must name a file", smoothed)
-        self._tracker = tracker
-        self._path = smoothed
-        self._steps = 0
-        self._stack = contextlib.ExitStack()
-        self._writer: TrajectoryWriter | None = None
-        self._line = _as_json if form == "json" else _as_csv
-        self._header = form == "csv"
-
-    def __enter__(self) -> Self:
-        from jeat_graph.io.track_lines import csv_header
-        from jeat_graph.io.trajectories_io import TrajectoryWriter
-
-        self._stack.__enter__()
-        if self._path is not None:
-            self._writer = self._stack.enter_context(TrajectoryWriter(self._path))
-        if self._header:
-            sys.stdout.write(csv_header())
-            sys.stdout.flush()
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self._stack.__exit__(*error)  # type: ignore[arg-type]
-
-    def write(self, t: float, table: Trajectories) -> None:
-        from jeat_graph.runs.tracking_run import STEPS_PER_DRAIN
-
-        sys.stdout.write(self._line(t, table))
-        sys.stdout.flush()
-        # At the same steps as `track` does: when rows are fetched, the rest is taken in, in its last digits.
-        if self._writer is not None and self._steps % STEPS_PER_DRAIN == 0:
-            self._writer.append(self._tracker.drain_smoothed())
-        self._steps += 1
-
-    def close_smoothed(self) -> None:
-        """Finish the tracks and let the file appear; nothing where none was asked for."""
-        if self._writer is not None:
-            self._writer.append(self._tracker.finish())
-        self._stack.close()
-
-
-def _as_json(t: float, table: Trajectories) -> str:
-    from jeat_graph.io.track_lines import json_line
-
-    return json_line(t, table)
-
-
-def _as_csv(t: float, table: Trajectories) -> str:
-    from jeat_graph.io.track_lines import csv_rows
-
-    return csv_rows(table)
-
-
-class _Interrupts:
-    """Ctrl-C ends the wait for a line at once, but never a step halfway.
+    """Tracks to stdout, each line flushed at once, or as messages to a broker.
 
     Attributes:
-        seen: whether there was one.
+        seq: number of the next message to a broker.
     """
 
-    def __init__(self) -> None:
-        self.seen = False
-        self._waiting = False
-        self._before: Callable[[int, FrameType | None], object] | int | None = None
+    def __init__(self, form: str, encoding: str, sink: Sink | None) -> None:
+        from jeat_graph.io.track_lines import csv_header
 
-    def __enter__(self) -> Self:
-        # Only the main thread may set handlers; elsewhere interrupts stay what they are.
-        with contextlib.suppress(ValueError):
-            self._before = signal.signal(signal.SIGINT, self._on_signal)
-        return self
+        self.seq = 0
+        self._encoding, self._sink = encoding, sink
+        self._csv = form == "csv"
+        if self._csv:
+            self._say(csv_header())
 
-    def __exit__(self, *error: object) -> None:
-        if self._before is not None:
-            signal.signal(signal.SIGINT, self._before)
+    def tracks(self, t: float, table: Trajectories, message: ScanMessage, late_s: float) -> None:
+        """Give out the tracks after an arrival; CSV has no rows twice, so none after a late one."""
+        from jeat_graph.io.track_lines import csv_rows, json_line
+        from jeat_graph.live.messages import encode_tracks
 
-    def _on_signal(self, number: int, frame: FrameType | None) -> None:
-        self.seen = True
-        if self._waiting:
-            raise KeyboardInterrupt
+        if self._sink is not None:
+            self._sink.send(encode_tracks(json_line(t, table), self.seq, message, self._encoding))
+            self.seq += 1
+        elif not self._csv:
+            self._say(json_line(t, table))
+        elif late_s == 0.0:
+            self._say(csv_rows(table))
 
-    def lines(self, read: Callable[[], bytes]) -> Iterator[bytes]:
-        """Yield lines until the input ends or an interrupt comes."""
-        while not self.seen:
-            try:
-                self._waiting = True
-                line = read()
-            except KeyboardInterrupt:
-                return
-            finally:
-                self._waiting = False
-            if not line:
-                return
-            yield line
+    def event(self, event: Event) -> None:
+        """Say on the output, too, that a sensor fails or is well again."""
+        line = json.dumps({"t": event.t, "event": f"sensor-{event.what}", "sensor": event.sensor}) + "\n"
+        if self._sink is not None:
+            from jeat_graph.live.messages import encode_tracks
+
+            self._sink.send(encode_tracks(line, self.seq, None, self._encoding))
+            self.seq += 1
+        elif not self._csv:
+            self._say(line)
+
+    def flush(self) -> None:
+        """Wait until the broker has all."""
+        if self._sink is not None:
+            self._sink.flush()
+
+    def _say(self, text: str) -> None:
+        sys.stdout.write(text)
+        sys.stdout.flush()

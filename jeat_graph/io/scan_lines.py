@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterable, Iterator
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, NamedTuple, TypeVar
 
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError
 
 _KEYS = ("t", "sensor", "boxes", "scores")
+_Result = TypeVar("_Result")
 _COLUMNS = ("t", "sensor", "left", "top", "width", "height", "score")
 
 
@@ -32,7 +33,12 @@ class Batch(NamedTuple):
 
 
 def read_batches(
-    lines: Iterable[bytes], name: str, *, joint: bool = False, ordered: bool = True
+    lines: Iterable[bytes],
+    name: str,
+    *,
+    joint: bool = False,
+    ordered: bool = True,
+    bad: Callable[[DataError], object] | None = None,
 ) -> Iterator[Batch]:
     """Read scans as their lines arrive.
 
@@ -50,21 +56,41 @@ def read_batches(
         joint: wait for a later time.
         ordered: refuse a scan that is older than the one held back; otherwise it is given out before that
             one is.
+        bad: takes the error of a line that cannot be read, which is then passed over; None raises it.
 
     Raises:
         DataError: names the stream, the line, and what is wrong.
     """
     numbered = enumerate(lines, start=1)
+    trying = _Trying(bad)
     for number, line in numbered:
-        text = _decode(line, name, number)
+        text = trying(_decode, line, name, number)
         if not text:
             continue
         if text.startswith(("{", "[")):
-            parts = _json_batches(text, number, numbered, name)
+            parts = _json_batches(text, number, numbered, name, trying)
             yield from _joined(parts, name, ordered) if joint else parts
-        else:
-            yield from _joined(_csv_batches(text, number, numbered, name), name, ordered)
-        return
+            return
+        columns = trying(_csv_columns, text, name, number)
+        if columns is not None:
+            yield from _joined(_csv_batches(columns, numbered, name, trying), name, ordered)
+            return
+
+
+class _Trying:
+    """Calls functions that may find a line bad; None where it was, and that is somebody's to hear."""
+
+    def __init__(self, bad: Callable[[DataError], object] | None) -> None:
+        self._bad = bad
+
+    def __call__(self, read: Callable[..., _Result], *arguments: Any) -> _Result | None:
+        try:
+            return read(*arguments)
+        except DataError as error:
+            if self._bad is None:
+                raise
+            self._bad(error)
+            return None
 
 
 def _decode(line: bytes, name: str, number: int) -> str:
@@ -75,13 +101,16 @@ def _decode(line: bytes, name: str, number: int) -> str:
 
 
 def _json_batches(
-    text: str, number: int, numbered: Iterator[tuple[int, bytes]], name: str
+    text: str, number: int, numbered: Iterator[tuple[int, bytes]], name: str, trying: _Trying
 ) -> Iterator[Batch]:
-    yield _json_batch(text, name, number)
+    first = trying(_json_batch, text, name, number)
+    if first is not None:
+        yield first
     for after, line in numbered:
-        text = _decode(line, name, after)
-        if text:
-            yield _json_batch(text, name, after)
+        found = trying(_decode, line, name, after)
+        batch = trying(_json_batch, found, name, after) if found else None
+        if batch is not None:
+            yield batch
 
 
 def _json_batch(text: str, name: str, number: int) -> Batch:
@@ -143,10 +172,8 @@ class _Row(NamedTuple):
     score: float
 
 
-def _csv_batches(
-    header: str, at: int, numbered: Iterator[tuple[int, bytes]], name: str
-) -> Iterator[Batch | None]:
-    """Yield a batch of one scan for each run of rows of one sensor and time, None where a line is empty."""
+def _csv_columns(header: str, name: str, at: int) -> dict[str, int]:
+    """Place of each column, by name."""
     columns = _fields(header, name, at)
     missing = [column for column in _COLUMNS if column not in columns]
     if missing:
@@ -155,12 +182,20 @@ def _csv_batches(
             name,
             at,
         )
-    place = {column: columns.index(column) for column in _COLUMNS}
+    return {column: columns.index(column) for column in _COLUMNS}
+
+
+def _csv_batches(
+    place: dict[str, int], numbered: Iterator[tuple[int, bytes]], name: str, trying: _Trying
+) -> Iterator[Batch | None]:
+    """Yield a batch of one scan for each run of rows of one sensor and time, None where a line is empty."""
     rows: list[_Row] = []
     first = 0
     for number, line in numbered:
-        text = _decode(line, name, number)
-        row = _csv_row(text, place, name, number) if text else None
+        text = trying(_decode, line, name, number)
+        row = trying(_csv_row, text, place, name, number) if text else None
+        if row is None and text != "":
+            continue  # it was bad
         if rows and (row is None or (row.t, row.sensor) != (rows[0].t, rows[0].sensor)):
             yield _scan_of_rows(rows, first)
             rows = []

@@ -12,13 +12,15 @@ import math
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Scan
-from jeat_graph.data.errors import ConfigError, TimeOrderError
+from jeat_graph.data.errors import ConfigError, DataError, TimeOrderError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.live.lateness import LatenessCounter
+from jeat_graph.tracking.checkpoint import load_state, save_state
 from jeat_graph.tracking.prediction import Prediction
 from jeat_graph.tracking.scans import ScanLike, arrivals_of, as_scans
 from jeat_graph.tracking.snapshot import Snapshot
@@ -26,6 +28,8 @@ from jeat_graph.tracking.step_record import StepRecord
 from jeat_graph.tracking.tracker import Tracker
 
 REWIND, SKIP, REFUSE = "rewind", "skip", "refuse"
+#: A difference of two times is only so exact (s).
+_ROUNDING_S = 1e-6
 POLICIES = (REWIND, SKIP, REFUSE)
 
 
@@ -90,7 +94,7 @@ class LiveTracker:
         self._settled = -math.inf  # time of the last step that the smoothers have been told of
         self._latency = {name: sensor.latency_s for name, sensor in config.sensors.items()}
         self._late_s = {name: _late_s(config, name) for name in config.sensors}
-        self._keep_s = max(self._late_s.values()) if policy == REWIND else 0.0
+        self._keep_s = max(self._late_s.values()) + 2.0 * _ROUNDING_S if policy == REWIND else 0.0
 
     @property
     def time(self) -> float | None:
@@ -119,6 +123,52 @@ class LiveTracker:
         assert self.tracker.time is not None or dropped
         table = self.tracker.causal()
         return Arrival(table, self.tracker.time or 0.0, late_s, dropped)
+
+    def save(self, path: str | Path, more: dict[str, Any] | None = None) -> None:
+        """Write the whole state to a file, for `load` to go on from (see `Tracker.save`).
+
+        Args:
+            path: the file.
+            more: plain data to be kept with it.
+
+        Raises:
+            JeatGraphError: the smoothers are in a process of their own (`smoother.worker`).
+        """
+        # The state before the steps that may be taken again, and their scans: the rest follows from these.
+        state = self.tracker.state(self.steps[0].before if self.steps else None)
+        state |= {
+            "policy": self.policy,
+            "steps": [step.scans for step in self.steps],
+            "settled": self._settled,
+            "replayed": self.replayed,
+            "lateness": self.lateness.state(),
+            "more": more or {},
+        }
+        save_state(path, self.tracker.config, state)
+
+    @staticmethod
+    def load(path: str | Path, config: Config | None = None) -> tuple[LiveTracker, dict[str, Any]]:
+        """Return the tracker that was saved to a file, and the data kept with it.
+
+        Args:
+            path: the file.
+            config: the configuration that it must have had; None takes the file's.
+
+        Raises:
+            DataError: no such file, or one that holds no such tracker.
+            JeatGraphError: it was saved by another version, or with other settings.
+        """
+        kept, state = load_state(path, config)
+        if "policy" not in state:
+            raise DataError("holds a tracker, but not one that takes late scans", path)
+        live = LiveTracker(Tracker.from_state(kept, state), state["policy"])
+        live._settled, live.replayed = state["settled"], state["replayed"]
+        live.lateness.set_state(state["lateness"])
+        for scans in state["steps"]:
+            before = live.tracker.snapshot()
+            _, taken = live.tracker.take_in(scans)
+            live.steps.append(Step(scans[0].t, scans, before, taken))
+        return live, state["more"]
 
     def predict(self, t: float) -> Prediction:
         """Say where the tracks will be at a time not before the newest scan's (see `Tracker.predict`)."""
@@ -155,7 +205,7 @@ class LiveTracker:
     def _may_come(self, scan: Scan, late_s: float) -> bool:
         if self.policy != REWIND:
             return late_s == 0.0
-        if late_s > self._late_s[scan.sensor] or scan.t <= self._settled:
+        if late_s > self._late_s[scan.sensor] + _ROUNDING_S or scan.t <= self._settled:
             return False
         k = self._place(scan.t)
         known = self.steps[k].scans if k < len(self.steps) and self.steps[k].t == scan.t else []

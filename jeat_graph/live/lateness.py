@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -59,6 +59,22 @@ class LatenessCounter:
         self.late[s] += late_s > 0.0
         self.dropped[s] += dropped
         self.worst_s[s] = max(self.worst_s[s], late_s)
+
+    def state(self) -> dict[str, Any]:
+        """Return what `set_state` takes; of the counts only those that are not zero."""
+        where = np.nonzero(self.counts)
+        return {
+            "where": np.array(where),
+            "counts": self.counts[where],
+            "late": self.late,
+            "dropped": self.dropped,
+            "worst_s": self.worst_s,
+        }
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go on from what `state` returned."""
+        self.counts[tuple(state["where"])] = state["counts"]
+        self.late, self.dropped, self.worst_s = state["late"], state["dropped"], state["worst_s"]
 
     def summary(self) -> dict[str, Lateness]:
         """Return the summary of each sensor that gave a scan."""

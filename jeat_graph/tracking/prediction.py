@@ -38,11 +38,13 @@ def predict_reported(now: Snapshot, t: float, model: Model, sensors: tuple[str, 
     """
     here = 0.0 if now.t is None else now.t
     n = now.num_tracks
-    reported = report(now.tracks, n, here, model.settings)[1]
+    settings = model.settings
+    how = (settings.image, settings.output, settings.lifecycle.by_existence)
+    reported = report(now.tracks, n, here, *how)[1]
     predict_all(now.tracks, n, max(t - here, 0.0), model)
     # Nobody has looked in between, so nobody can have missed a track either: what counts is the gap now.
     now.tracks.t_update[:] += t - here
-    columns = Trajectories(*report(now.tracks, n, t, model.settings), sensors=sensors)
+    columns = Trajectories(*report(now.tracks, n, t, *how), sensors=sensors)
     table = columns.take(np.isin(columns.track_id, reported))
     rows = np.searchsorted(now.tracks.track_id, table.track_id)
     cov = np.zeros((len(table), 6, 6))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,7 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.prediction import Prediction, predict_reported
 from jeat_graph.tracking.reporting import report
 from jeat_graph.tracking.scans import ScanLike, arrivals_of, as_scans
+from jeat_graph.tracking.sensor_state import SensorState, sensor_states
 from jeat_graph.tracking.smoothing.access import SmoothedTracks
 from jeat_graph.tracking.snapshot import Snapshot
 from jeat_graph.tracking.state import Scene, allocate, grow
@@ -162,6 +163,52 @@ class Tracker(SmoothedTracks):
         self._t, self._next_id, self._num_tracks = snapshot.t, snapshot.next_id, snapshot.num_tracks
         self._tracks = grow(self._tracks, 0, self._num_tracks)
         snapshot.copy_to(self._tracks, self._scene)
+
+    def save(self, path: str | Path) -> None:
+        """Write the whole state to a file (`.npz`), smoothers included, for `load` to go on from.
+
+        This tracker and the loaded one give the same bytes from here on.
+
+        Raises:
+            JeatGraphError: the smoothers are in a process of their own (`smoother.worker`).
+        """
+        from jeat_graph.tracking.checkpoint import save_state
+
+        save_state(path, self.config, self.state())
+
+    @classmethod
+    def load(cls, path: str | Path, config: Config | None = None) -> Self:
+        """Return the tracker that was saved to a file.
+
+        Args:
+            path: the file.
+            config: the configuration that it must have had; None takes the file's.
+
+        Raises:
+            DataError: no such file, or one that holds no tracker.
+            JeatGraphError: it was saved by another version, or with other settings.
+        """
+        from jeat_graph.tracking.checkpoint import load_state
+
+        return cls.from_state(*load_state(path, config))
+
+    def state(self, snapshot: Snapshot | None = None) -> dict[str, Any]:
+        """Return what `from_state` takes: the state now, or at a snapshot; the smoothers' is not copied."""
+        now = self.snapshot() if snapshot is None else snapshot
+        return {"diagnostics": self._diagnostics, "now": now, "smoothing": self._smoothers}
+
+    @classmethod
+    def from_state(cls, config: Config, state: dict[str, Any]) -> Self:
+        """Make a tracker of what `state` returned."""
+        without = replace(config, smoother=replace(config.smoother, engine="none"))
+        tracker = cls(without, diagnostics=state["diagnostics"])
+        tracker.config, tracker._smoothers = config, state["smoothing"]
+        tracker.restore(state["now"])
+        return tracker
+
+    def sensor_states(self) -> dict[str, SensorState]:
+        """Return what has been learnt of each sensor: clutter, detection probability, noise."""
+        return sensor_states(self.snapshot(), self.sensor_names)
 
     def predict(self, t: float) -> Prediction:
         """Say where the tracks that are reported now will be at a time, and how surely.

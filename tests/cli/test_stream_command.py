@@ -196,7 +196,6 @@ def test_no_input_is_no_error(monkeypatch, capsys):
         ('{"t": 1, "sensor": "rgb", "boxes": [[1, 2, 3, 4]], "scores": [1.5]}', r"\[0, 1\]"),
         ('{"t": 1, "sensor": "rgb", "boxes": [[1, 2, 3, 4]], "scores": []}', "shape"),
         ('{"t": 1, "sensor": "rgb", "boxes": "x", "scores": []}', "shape"),
-        ('{"t": -1, "sensor": "rgb", "boxes": [], "scores": []}', "older than the last one"),
         (
             '[{"t": 1, "sensor": "rgb", "boxes": [], "scores": []},'
             ' {"t": 2, "sensor": "evt", "boxes": [], "scores": []}]',
@@ -223,7 +222,6 @@ def test_a_bad_line_ends_it_with_one_line_that_names_it(bad, message, monkeypatc
         ("0,rgb,1,2,3,4\n", 2, "score is missing"),
         ("0,,1,2,3,4,1\n", 2, "sensor is missing"),
         ("0,rgb,1,2,0,4,1\n", 2, "must be positive"),
-        ("0.1,rgb\n0,rgb\n", 3, "older than the last one"),
     ],
 )
 def test_a_bad_row_of_csv_is_named_too(rows, number, message, monkeypatch, capsys):
@@ -234,10 +232,71 @@ def test_a_bad_row_of_csv_is_named_too(rows, number, message, monkeypatch, capsy
     assert message in err
 
 
-def test_a_bad_line_leaves_no_smoothed_file(monkeypatch, capsys, tmp_path):
-    code, _, _ = stream(line(0.0) + "{\n", monkeypatch, capsys, "--smoothed", tmp_path / "s.csv")
+def test_a_bad_line_costs_nothing_that_was_smoothed(monkeypatch, capsys, tmp_path):
+    good = "".join(line(0.05 * k) for k in range(30))
+    code, _, _ = stream(good + "{\n", monkeypatch, capsys, "--smoothed", tmp_path / "s.csv")
     assert code == 2
-    assert list(tmp_path.iterdir()) == []
+    assert len(read_trajectories(tmp_path / "s.csv")) == 30
+
+
+def test_bad_lines_are_passed_over_and_counted_if_asked(monkeypatch, capsys, tmp_path):
+    good = [line(0.05 * k) for k in range(30)]
+    text = "".join([*good[:10], "{\n", *good[10:20], line(0.5, sensor="rgd"), "\udcff\n", *good[20:]])
+    raw = text.encode("utf-8", "surrogateescape")
+    record = tmp_path / "record.json"
+    options = ("--on-error", "skip", "--record", record)
+    code, out, err = stream(raw, monkeypatch, capsys, *options)
+    assert code == 0
+    assert [json.loads(text)["t"] for text in out.splitlines()] == [0.05 * k for k in range(30)]
+    assert json.loads(record.read_text())["unreadable"] == 3
+    assert [f"<stdin>:{k}" in err for k in (11, 22, 23)] == [True] * 3
+    assert "3 messages could not be read" in err
+
+
+def test_bad_rows_of_csv_are_passed_over_too(monkeypatch, capsys):
+    text = "nonsense\nt,sensor,left,top,width,height,score\n0,rgb,1,2,3,4,x\n0,rgb\n0.1,rgb\n"
+    code, out, err = stream(text, monkeypatch, capsys, "--on-error", "skip")
+    assert code == 0
+    assert [json.loads(text)["t"] for text in out.splitlines()] == [0.0, 0.1]
+    assert "2 messages could not be read" in err
+
+
+def test_late_scans_go_where_they_belong(monkeypatch, capsys, detections, tracked, tmp_path):
+    """Pictures that come 80 ms late: the smoothed table is that of `track`, byte for byte."""
+    delay = np.where(np.array(detections.sensors)[detections.scan_sensor] == "rgb", 0.08, 0.005)
+    order = np.argsort(detections.scan_t + delay, kind="stable")
+    lines = "".join(scan_line(detections.scan(int(k))) for k in order)
+    path, record = tmp_path / "s.csv", tmp_path / "record.json"
+    code, out, err = stream(lines, monkeypatch, capsys, "--smoothed", path, "--record", record)
+    assert code == 0
+    assert len(out.splitlines()) == detections.num_scans
+    assert path.read_bytes() == (tracked / "smoothed.csv").read_bytes()
+    lateness = json.loads(record.read_text())["lateness"]
+    assert lateness["rgb"]["dropped"] == 0
+    assert lateness["rgb"]["median_s"] > 0.05
+    assert "sensor 'rgb'" in err
+
+
+def test_late_scans_are_refused_if_asked(monkeypatch, capsys):
+    code, out, err = stream(line(1.0) + line(0.5), monkeypatch, capsys, "--late", "refuse")
+    assert code == 2
+    assert len(out.splitlines()) == 1
+    assert re.search(r"^jeat-graph stream: <stdin>:2: .*older than the last one", err), err
+
+
+def test_a_sensor_that_falls_silent_is_named_on_both_outputs(monkeypatch, capsys):
+    lines = [line(0.01 * k, "evt") for k in range(400)]
+    lines += [line(0.05 * k, "rgb") for k in range(80) if not 20 <= k < 60]
+    lines.sort(key=lambda text: json.loads(text)["t"])
+    code, out, err = stream("".join(lines), monkeypatch, capsys)
+    assert code == 0
+    events = [json.loads(text) for text in out.splitlines() if '"event"' in text]
+    assert [(one["event"], one["sensor"]) for one in events] == [
+        ("sensor-silent", "rgb"),
+        ("sensor-back", "rgb"),
+    ]
+    assert events[0]["t"] == pytest.approx(1.96, abs=0.011)
+    assert "sensor 'rgb' has given no scan since t = 0.95 s" in err
 
 
 def test_late_scans_are_passed_over_if_asked(monkeypatch, capsys):
@@ -254,15 +313,16 @@ def test_smoothed_without_a_smoother_is_refused(monkeypatch, capsys, tmp_path):
     assert "smoother" in err
 
 
-def test_ctrl_c_ends_it_cleanly_and_keeps_the_smoothed_trajectories(tmp_path):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_cleanly_and_keeps_the_smoothed_trajectories(number, tmp_path):
     path = tmp_path / "s.csv"
     with live("--smoothed", path) as process:
         for k in range(30):
             process.stdin.write(line(0.05 * k).encode())
             process.stdin.flush()
             answer(process)
-        process.send_signal(signal.SIGINT)
-        assert process.wait(PATIENCE_S) == 130
+        process.send_signal(number)
+        assert process.wait(PATIENCE_S) == 128 + number
         err = process.stderr.read().decode()
     assert "Traceback" not in err
     assert err.splitlines()[-1] == "jeat-graph stream: interrupted"

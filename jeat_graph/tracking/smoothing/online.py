@@ -29,7 +29,7 @@ _SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
 _HANDING = 4
 
 
-class _Sorted(NamedTuple):
+class SortedPacket(NamedTuple):
     """A packet's steps and measurements, those of each track together and in order of time.
 
     Attributes:
@@ -43,7 +43,7 @@ class _Sorted(NamedTuple):
     updates: RecordArray
 
 
-class _Share(NamedTuple):
+class Share(NamedTuple):
     """What a packet holds of one track; cut out of it only when its turn comes.
 
     Attributes:
@@ -54,7 +54,7 @@ class _Share(NamedTuple):
         last: whether the track ended in the packet.
     """
 
-    packet: _Sorted
+    packet: SortedPacket
     looks: slice
     steps: slice
     updates: slice
@@ -117,7 +117,7 @@ class TrackSmoothers:
         self._rate_hz = settings.output_rate_hz
         self._histories: dict[int, TrackHistory] = {}
         self._done: list[TrackHistory] = []
-        self._shares: dict[int, deque[_Share]] = {}
+        self._shares: dict[int, deque[Share]] = {}
         self._to_do: deque[int] = deque()
         self._ready = WaitingRows(config.sensor_names)
         self._scan_t: list[FloatArray] = []
@@ -248,7 +248,7 @@ class TrackSmoothers:
         table = Trajectories.concatenate(parts)
         return table.take(np.lexsort((table.track_id, table.t)))
 
-    def _split(self, packet: Packet, ended: set[int]) -> Iterator[tuple[int, _Share]]:
+    def _split(self, packet: Packet, ended: set[int]) -> Iterator[tuple[int, Share]]:
         """The share of each track in a packet, by identity."""
         order = np.argsort(packet.ids, kind="stable")
         rows = order if self._rate_hz <= 0.0 else order[np.repeat(packet.wanted, packet.counts)[order]]
@@ -259,7 +259,7 @@ class TrackSmoothers:
             packet.held[rows],
         )
         updates = packet.updates[np.argsort(packet.updates["track_id"], kind="stable")]
-        whole = _Sorted(looks, packet.confirmed[order], updates)
+        whole = SortedPacket(looks, packet.confirmed[order], updates)
         # A track that ended between two packets has no step in this one.
         ids = np.union1d(packet.ids, np.array(packet.ended, dtype=np.int64))
         owners = packet.ids[rows], packet.ids[order], updates["track_id"]
@@ -268,4 +268,4 @@ class TrackSmoothers:
         ]
         for track_id, looked, stepped, updated in zip(ids.tolist(), *parts, strict=True):
             bounds = slice(*looked), slice(*stepped), slice(*updated)
-            yield track_id, _Share(whole, *bounds, track_id in ended)
+            yield track_id, Share(whole, *bounds, track_id in ended)

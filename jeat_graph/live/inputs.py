@@ -1,0 +1,103 @@
+"""Messages of scans one after another, from lines or a broker, until the input ends or a signal comes."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+from collections.abc import Callable, Iterator
+from types import FrameType
+from typing import Self
+
+from jeat_graph.data.errors import DataError
+from jeat_graph.io.scan_lines import read_batches
+from jeat_graph.live.messages import ScanMessage, decode_scans
+from jeat_graph.live.transport.ends import Source
+
+_WAIT_S = 0.2
+
+
+class Interrupts:
+    """Ctrl-C and SIGTERM end the wait for a message at once, but never a step halfway.
+
+    Attributes:
+        seen: the signal that came, or None.
+    """
+
+    def __init__(self) -> None:
+        self.seen: int | None = None
+        self._waiting = False
+        self._before: dict[int, Callable[[int, FrameType | None], object] | int | None] = {}
+
+    def __enter__(self) -> Self:
+        # Only the main thread may set handlers; elsewhere interrupts stay what they are.
+        with contextlib.suppress(ValueError):
+            for number in (signal.SIGINT, signal.SIGTERM):
+                self._before[number] = signal.signal(number, self._on_signal)
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        self.seen = number
+        if self._waiting:
+            raise KeyboardInterrupt
+
+    def lines(self, read: Callable[[], bytes]) -> Iterator[bytes]:
+        """Yield lines until the input ends or an interrupt comes."""
+        while self.seen is None:
+            try:
+                self._waiting = True
+                line = read()
+            except KeyboardInterrupt:
+                return
+            finally:
+                self._waiting = False
+            if not line:
+                return
+            yield line
+
+
+def from_lines(
+    lines: Iterator[bytes], name: str, joint: bool, bad: Callable[[DataError], None] | None
+) -> Iterator[tuple[ScanMessage, str]]:
+    """Yield the scans of a text stream and their places.
+
+    Args:
+        lines: lines with their ends.
+        name: name of the stream, for messages.
+        joint: hold scans back until a later time is seen.
+        bad: takes the error of a line that cannot be read, which is passed over; None raises it.
+    """
+    for batch in read_batches(lines, name, joint=joint, ordered=False, bad=bad):
+        yield ScanMessage(batch, "", None), f"{name}:{batch.lines[0]}: "
+
+
+def from_source(
+    source: Source, name: str, interrupts: Interrupts, bad: Callable[[DataError], None] | None
+) -> Iterator[tuple[ScanMessage, str] | None]:
+    """Yield the messages of a broker and their places; None where none came for a while, or one was bad.
+
+    Args:
+        source: the source.
+        name: its address, for messages.
+        interrupts: ends it.
+        bad: takes the error of a message that cannot be read, which is passed over; None raises it.
+    """
+    number = 0
+    while interrupts.seen is None:
+        payload = source.receive(_WAIT_S)
+        if payload is None:
+            yield None
+            continue
+        number += 1
+        try:
+            message = decode_scans(payload, name, number)
+        except DataError as error:
+            if bad is None:
+                raise
+            bad(error)
+            yield None
+            continue
+        yield message, f"{name}:{number}: "

@@ -1,0 +1,185 @@
+"""A live run from end to end: messages in, tracks out, smoothed rows to a file, checkpoints in between."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from jeat_graph.data.detections import Scan
+from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.live.health import Event, SensorHealth
+from jeat_graph.live.late import LiveTracker
+from jeat_graph.live.messages import Duplicates, ScanMessage
+from jeat_graph.live.smoothed_file import SmoothedFile
+
+#: Smoothed rows are fetched, and the sensors judged, at one arrival in so many.
+ARRIVALS_PER_DRAIN = 32
+#: So many scans passed over are told one by one; the rest is in the summary.
+MOST_TOLD = 5
+
+
+@dataclass
+class Ends:
+    """Where a session's results go.
+
+    Attributes:
+        tracks: takes time and tracks after each arrival, the message that brought it, and how late (s).
+        event: takes a change of a sensor's health.
+        warn: takes one line for the user.
+        smoothed: the file of smoothed rows, or None.
+        flush: sees to it that all that was given out has arrived.
+        commit: tells the source of messages that all so far need not come again.
+    """
+
+    tracks: Callable[[float, Trajectories, ScanMessage, float], object]
+    event: Callable[[Event], object] = lambda _: None
+    warn: Callable[[str], object] = field(default=lambda text: print(text, file=sys.stderr))
+    smoothed: SmoothedFile | None = None
+    flush: Callable[[], object] = lambda: None
+    commit: Callable[[], object] = lambda: None
+
+
+class Session:
+    """Steps a live tracker and serves its ends.
+
+    Args:
+        live: the tracker, new or loaded.
+        ends: where results go.
+        checkpoint: file of the state, or None.
+        every_s: a checkpoint is written whenever the scans' time passes a multiple of this (s).
+        more: what `checkpoint` held beside the tracker, for a session that goes on.
+
+    Attributes:
+        count: messages taken so far, of earlier sessions too.
+        bad: messages that could not be read and were passed over.
+        duplicates: messages that had been taken before.
+    """
+
+    def __init__(
+        self,
+        live: LiveTracker,
+        ends: Ends,
+        checkpoint: str | Path | None = None,
+        every_s: float = 10.0,
+        more: dict[str, Any] | None = None,
+    ) -> None:
+        self.live, self.ends = live, ends
+        self._checkpoint, self._every_s = checkpoint, every_s
+        self._resumed_at = live.time if more else None
+        kept = more or {}
+        self.count: int = kept.get("count", 0)
+        self.bad: int = kept.get("bad", 0)
+        self.duplicates: int = kept.get("duplicates", 0)
+        self._seen = Duplicates()
+        self._seen.seen = {k: (top, set(recent)) for k, (top, recent) in kept.get("seen", {}).items()}
+        self._health = SensorHealth(live.tracker.config)
+        self._health.last = kept.get("last", {})
+        self._health.silent, self._health.rubbish = kept.get("silent", []), kept.get("rubbish", [])
+        self._told = 0
+        self._interval = None if live.time is None else live.time // every_s
+
+    def take(self, message: ScanMessage, place: str = "") -> None:
+        """Take in a message of scans.
+
+        Args:
+            message: scans of one time.
+            place: where it came from, for warnings.
+
+        Raises:
+            JeatGraphError: scans that are not valid, or late ones where those are refused.
+        """
+        if not self._seen.is_new(message):
+            self.duplicates += 1
+            return
+        before = self.live.time
+        arrival = self.live.step(message.batch.scans)
+        self.count += 1
+        self._tell_dropped(arrival.dropped, arrival.late_s, place)
+        if len(arrival.dropped) < len(message.batch.scans):
+            self.ends.tracks(arrival.t, arrival.table, message, arrival.late_s)
+            for event in self._health.saw(message.batch.scans, arrival.t):
+                self._tell(event)
+        if self.count % ARRIVALS_PER_DRAIN == 0:
+            self.drain()
+            if before is not None:
+                for event in self._health.judge(self.live.tracker.sensor_states(), arrival.t):
+                    self._tell(event)
+        self._save_in_time(arrival.t)
+
+    def drain(self) -> None:
+        """Write the smoothed rows that are final."""
+        if self.ends.smoothed is not None:
+            self.ends.smoothed.append(self.live.drain_smoothed())
+
+    def save(self) -> None:
+        """Write the checkpoint, if one is wanted, and tell the source."""
+        self.ends.flush()
+        if self._checkpoint is not None:
+            self.drain()
+            more: dict[str, Any] = {
+                "count": self.count,
+                "bad": self.bad,
+                "duplicates": self.duplicates,
+                "seen": {k: (top, sorted(recent)) for k, (top, recent) in self._seen.seen.items()},
+                "last": self._health.last,
+                "silent": self._health.silent,
+                "rubbish": self._health.rubbish,
+                "smoothed": None if self.ends.smoothed is None else self.ends.smoothed.flush(),
+            }
+            self.live.save(self._checkpoint, more)
+        self.ends.commit()
+
+    def finish(self) -> None:
+        """End all tracks, write the last smoothed rows, and sum up."""
+        last = self.live.finish()
+        if self.ends.smoothed is not None:
+            self.ends.smoothed.append(last)
+        self.ends.flush()
+        for text in self.summary_lines():
+            self.ends.warn(text)
+
+    def summary(self) -> dict[str, Any]:
+        """Counts of the session: messages, and how late each sensor's scans came."""
+        lateness = {name: one._asdict() for name, one in self.live.lateness.summary().items()}
+        return {
+            "messages": self.count,
+            "unreadable": self.bad,
+            "duplicates": self.duplicates,
+            "steps_taken_again": self.live.replayed,
+            "lateness": lateness,
+        }
+
+    def summary_lines(self) -> list[str]:
+        """What is worth a line at the end: late scans, and messages passed over."""
+        lines = [
+            f"sensor {name!r}: {one.late} of {one.scans} scans late, median {1e3 * one.median_s:.0f} ms, "
+            f"99 % within {1e3 * one.p99_s:.0f} ms, {one.dropped} passed over"
+            for name, one in self.live.lateness.summary().items()
+            if one.late
+        ]
+        if self.bad:
+            lines.append(f"{self.bad} messages could not be read and were passed over")
+        return lines
+
+    def _tell(self, event: Event) -> None:
+        self.ends.warn(f"warning: {event.text}")
+        self.ends.event(event)
+
+    def _tell_dropped(self, dropped: list[Scan], late_s: float, place: str) -> None:
+        """Tell of the first scans passed over; those of before a checkpoint are expected to come again."""
+        if not dropped or (self._resumed_at is not None and dropped[0].t <= self._resumed_at):
+            return
+        self._told += 1
+        if self._told <= MOST_TOLD:
+            why = f"{late_s:.6g} s late" if late_s > 0.0 else "the sensor's scan of that time has come before"
+            more = "; further ones are only counted" if self._told == MOST_TOLD else ""
+            self.ends.warn(f"warning: {place}passed over, {why}{more}")
+
+    def _save_in_time(self, t: float) -> None:
+        interval = t // self._every_s
+        if self._interval is not None and interval > self._interval and self._checkpoint is not None:
+            self.save()
+        self._interval = interval if self._interval is None else max(interval, self._interval)

@@ -1,0 +1,170 @@
+"""The state of a tracker, smoothers included, in one file from which it goes on as if nothing had happened.
+
+The file is an `.npz` of two arrays: a text that says what is there, and a block with all numbers. It holds
+our own arrays and nothing of GTSAM's: the windows inside GTSAM are built anew from them, in the tracker that
+was saved and in the one that is loaded alike, so that both give the same bytes from there on.
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jeat_graph.config.reading import config_from_dict, config_to_dict
+from jeat_graph.config.schema import Config
+from jeat_graph.data.detections import Scan
+from jeat_graph.data.errors import DataError, JeatGraphError
+from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.io.atomic import atomic_path
+from jeat_graph.io.packing import Codec, pack, plain_codec, unpack
+from jeat_graph.smoothers.engine import WholeTrackSmoother
+from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
+from jeat_graph.smoothers.track_data import Prior, SmoothedTrack
+from jeat_graph.smoothers.window import Window
+from jeat_graph.tracking.smoothing.behind import SmoothingHere
+from jeat_graph.tracking.smoothing.history import TrackHistory
+from jeat_graph.tracking.smoothing.looks import Looks
+from jeat_graph.tracking.smoothing.online import Share, SortedPacket, TrackSmoothers
+from jeat_graph.tracking.smoothing.priors import ErrorStates
+from jeat_graph.tracking.smoothing.recorder import StepRecorder
+from jeat_graph.tracking.smoothing.sizes import SizeWindow
+from jeat_graph.tracking.smoothing.waiting import WaitingRows
+from jeat_graph.tracking.snapshot import Snapshot
+from jeat_graph.tracking.state import Scene, TrackArrays
+from jeat_graph.tracking.step_record import StepRecord
+from jeat_graph.version import __version__
+
+#: Raised with every change of what is saved: a file of another format is refused, not guessed at.
+FORMAT = 1
+_MAGIC = "jeat-graph tracker"
+_PLAIN = (
+    Looks,
+    Prior,
+    Scan,
+    Scene,
+    Share,
+    SizeWindow,
+    SmoothedTrack,
+    SmoothingHere,
+    Snapshot,
+    SortedPacket,
+    StepRecord,
+    StepRecorder,
+    TrackArrays,
+    TrackHistory,
+    TrackSmoothers,
+    Trajectories,
+    WholeTrackSmoother,
+)
+
+
+def _codecs(config: Config) -> dict[str, Codec]:
+    """All classes that a file may name."""
+    plain = {kind.__name__: plain_codec(kind) for kind in _PLAIN}
+    lag = plain_codec(FixedLagSmoother)
+
+    def lag_apart(one: FixedLagSmoother) -> dict[str, Any]:
+        one.forget_gtsam()
+        return lag.apart(one)
+
+    return plain | {
+        "FixedLagSmoother": Codec(FixedLagSmoother, lag_apart, lag.together),
+        "Window": Codec(Window, Window.saved, Window.from_saved),
+        "WaitingRows": Codec(WaitingRows, _rows_apart, lambda saved: _rows_together(config, saved)),
+        "Config": Codec(type(config), lambda _: {}, lambda _: config),
+        "ErrorStates": Codec(ErrorStates, lambda _: {}, lambda _: ErrorStates.of(config)),
+    }
+
+
+def _rows_apart(rows: WaitingRows) -> dict[str, Any]:
+    return {"tables": rows.peek()}
+
+
+def _rows_together(config: Config, saved: dict[str, Any]) -> WaitingRows:
+    rows = WaitingRows(config.sensor_names)
+    for table in saved["tables"]:
+        rows.append(table)
+    return rows
+
+
+def save_state(path: str | Path, config: Config, state: dict[str, Any]) -> None:
+    """Write a state; the file appears when it is complete, in place of the one before.
+
+    The system writes it to the disk in its own time: it survives the death of the process at any moment, and
+    after a power cut the file is this one or the one before.
+
+    Args:
+        path: the file.
+        config: the configuration of the tracker.
+        state: what to keep, of plain data and the classes that `_codecs` names.
+
+    Raises:
+        JeatGraphError: the smoothers are in a process of their own.
+    """
+    head = {"kind": _MAGIC, "format": FORMAT, "version": __version__, "config": config_to_dict(config)}
+    if config.smoother.worker:
+        raise JeatGraphError("a smoothing worker's state cannot be saved: set smoother.worker to false")
+    text, block = pack(state, _codecs(config))
+    described = json.dumps(head).encode() + b"\n" + text.encode()
+    with atomic_path(path) as temporary, temporary.open("wb") as file:
+        np.savez(
+            file, text=np.frombuffer(described, np.uint8), block=np.frombuffer(block or bytes(1), np.uint8)
+        )
+
+
+def load_state(path: str | Path, config: Config | None = None) -> tuple[Config, dict[str, Any]]:
+    """Read what `save_state` wrote.
+
+    Args:
+        path: the file.
+        config: the configuration that it must have been made with; None takes what the file says.
+
+    Returns:
+        The configuration and the state.
+
+    Raises:
+        DataError: no such file, not a state of a tracker, or a damaged one.
+        JeatGraphError: it is of another version, or was made with other settings.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            described, block = file["text"].tobytes(), file["block"].tobytes()
+        head_text, _, text = described.decode().partition("\n")
+        head = json.loads(head_text)
+        found = (head["kind"], head["format"], head["version"], head["config"])
+    except OSError as error:
+        raise DataError(f"cannot be read: {error.strerror or error}", path) from None
+    except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        raise DataError(f"is no saved tracker ({type(error).__name__})", path) from None
+    kind, form, version, settings = found
+    if kind != _MAGIC or form != FORMAT or version != __version__:
+        raise JeatGraphError(
+            f"{path}: was saved by version {version} (format {form}), and this is {__version__} (format "
+            f"{FORMAT}): finish with that version, or begin anew without the file"
+        )
+    if config is not None:
+        wanted = json.loads(json.dumps(config_to_dict(config)))
+        if wanted != settings:
+            raise JeatGraphError(
+                f"{path}: was saved with other settings: {_difference(settings, wanted)}; give the same, or "
+                "begin anew without the file"
+            )
+    kept = config if config is not None else config_from_dict(settings)
+    try:
+        state = unpack(text, block, _codecs(kept))
+    except DataError as error:
+        raise DataError(error.message, path) from None
+    return kept, state
+
+
+def _difference(saved: Any, wanted: Any, where: str = "") -> str:
+    """The first setting that differs, with both values."""
+    if isinstance(saved, dict) and isinstance(wanted, dict):
+        for key in (*saved, *wanted):
+            if saved.get(key) != wanted.get(key):
+                return _difference(saved.get(key), wanted.get(key), f"{where}.{key}" if where else str(key))
+    return f"{where} was {saved}, not {wanted}"

@@ -1,0 +1,34 @@
+"""What the tracker has learnt of each sensor while it ran: false boxes, detection probability, noise."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from jeat_graph.tracking.snapshot import Snapshot
+
+
+class SensorState(NamedTuple):
+    """Running estimates of one sensor; they weigh what it says.
+
+    Attributes:
+        clutter: expected false boxes in a scan.
+        p_detect: mean probability that it detects a confirmed track.
+        noise_scale: mean factor on its noise variance over the confirmed tracks (paper eq. 5), 1 without any.
+    """
+
+    clutter: float
+    p_detect: float
+    noise_scale: float
+
+
+def sensor_states(now: Snapshot, sensors: tuple[str, ...]) -> dict[str, SensorState]:
+    """Return the state of each sensor, by name."""
+    scale = now.tracks.scale[now.tracks.confirmed]
+    return {
+        name: SensorState(
+            float(now.scene.clutter[s]),
+            float(now.scene.p_detect[s]),
+            float(scale[:, s].mean()) if len(scale) else 1.0,
+        )
+        for s, name in enumerate(sensors)
+    }

@@ -1,0 +1,146 @@
+"""A tracker that was saved and loaded goes on as if nothing had happened, to the last byte."""
+
+from __future__ import annotations
+
+import json
+import time
+
+import numpy as np
+import pytest
+
+from jeat_graph.config.reading import load_config
+from jeat_graph.data.errors import DataError, JeatGraphError
+from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.io.packing import pack, unpack
+from jeat_graph.live.late import LiveTracker
+from jeat_graph.simulation.scenario import load_scenario
+from jeat_graph.simulation.simulate import record
+from jeat_graph.tracking.tracker import Tracker
+
+COLUMNS = ("t", "track_id", "boxes", "existence", "mean", "var", "used")
+OVERRIDES = ["smoother.lag_s=0.3", "smoother.chunk=8"]
+ENGINES = ("fixed-lag", "fixed-lag-rts", "rts", "none")
+
+
+@pytest.fixture(scope="module")
+def batches():
+    return list(record(load_scenario("night"), 5, 1.5).detections.batches())
+
+
+def assert_equal(one, other):
+    assert len(one) == len(other)
+    for name in COLUMNS:
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+
+
+def run(batches, config, save_at=(), folder=None, resume=False):
+    """Causal and smoothed rows of a tracker that is saved at some steps, and there replaced if `resume`."""
+    tracker = Tracker(config)
+    causal, smoothed = [], []
+    for k, batch in enumerate(batches):
+        if k in save_at:
+            tracker.save(folder / "state.npz")
+            if resume:
+                tracker = Tracker.load(folder / "state.npz", config)
+        causal.append(tracker.step(batch))
+        if k % 20 == 0 and config.smoother.engine != "none":
+            smoothed.append(tracker.drain_smoothed())
+    smoothed.append(tracker.finish())
+    return Trajectories.concatenate(causal), Trajectories.concatenate(smoothed)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_loaded_tracker_goes_on_with_the_same_bytes(engine, batches, tmp_path):
+    config = load_config("default", [*OVERRIDES, f"smoother.engine={engine}"])
+    moments = (0, 1, 17, 60, 61, 100, 141)
+    causal, smoothed = run(batches, config, moments, tmp_path)
+    again_causal, again_smoothed = run(batches, config, moments, tmp_path, resume=True)
+    assert len(causal) > 500
+    assert_equal(again_causal, causal)
+    assert_equal(again_smoothed, smoothed)
+    plain_causal, plain_smoothed = run(batches, config)
+    assert_equal(causal, plain_causal)
+    # Saving has GTSAM build its windows anew: the same solution, to its last digits.
+    np.testing.assert_array_equal(smoothed.track_id, plain_smoothed.track_id)
+    np.testing.assert_allclose(smoothed.boxes, plain_smoothed.boxes, rtol=0, atol=1e-6)
+
+
+def test_a_live_tracker_is_saved_with_the_scans_that_may_be_taken_again(batches, tmp_path):
+    config = load_config("default", OVERRIDES)
+    scans = [scan for batch in batches for scan in batch]
+    rng = np.random.default_rng(2)
+    order = np.argsort([scan.t for scan in scans] + rng.uniform(0.0, 0.2, len(scans)))
+    outcomes = []
+    for resume in (False, True):
+        live = LiveTracker(Tracker(config))
+        for k, place in enumerate(order.tolist()):
+            if k % 37 == 5:
+                live.save(tmp_path / "live.npz", {"taken": k})
+                if resume:
+                    live, more = LiveTracker.load(tmp_path / "live.npz", config)
+                    assert more == {"taken": k}
+            live.step(scans[place])
+        outcomes.append((live.tracker.causal(), live.finish(), live.lateness.summary()))
+    assert_equal(outcomes[0][0], outcomes[1][0])
+    assert_equal(outcomes[0][1], outcomes[1][1])
+    assert outcomes[0][2] == outcomes[1][2]
+
+
+def test_a_file_of_other_settings_or_of_another_version_is_refused_with_a_sentence(tmp_path, monkeypatch):
+    path = tmp_path / "state.npz"
+    Tracker("default").save(path)
+    other = load_config("default", ["motion.jerk_px=7"])
+    with pytest.raises(JeatGraphError, match=r"other settings: motion\.jerk_px was .*, not 7"):
+        Tracker.load(path, other)
+    monkeypatch.setattr("jeat_graph.tracking.checkpoint.__version__", "99.0")
+    with pytest.raises(JeatGraphError, match=r"and this is 99\.0"):
+        Tracker.load(path)
+
+
+def test_a_file_that_is_none_is_refused(tmp_path):
+    path = tmp_path / "state.npz"
+    with pytest.raises(DataError, match="cannot be read"):
+        Tracker.load(path)
+    path.write_bytes(b"not a tracker")
+    with pytest.raises(DataError, match="no saved tracker"):
+        Tracker.load(path)
+    np.savez(path, text=np.array([{"a": 1}], dtype=object))
+    with pytest.raises(DataError, match="no saved tracker"):
+        Tracker.load(path)
+
+
+def test_a_damaged_file_is_refused_and_names_no_class_of_its_own(tmp_path):
+    text, block = pack({"now": {"x": [1, (2, 3)]}, "a": np.arange(3)}, {})
+    assert unpack(text, block, {})["now"] == {"x": [1, (2, 3)]}
+    with pytest.raises(DataError, match="damaged"):
+        unpack(text, block[:8], {})
+    with pytest.raises(DataError, match="damaged"):
+        unpack(json.dumps({"object": ["Popen", {"args": "ls"}]}), b"", {})
+    with pytest.raises(TypeError, match="cannot be saved"):
+        pack({"a": object()}, {})
+
+
+def crowd(tracker, steps):
+    """Twenty vehicles that stay, seen by both sensors, for so many steps at 120 Hz in all."""
+    rng = np.random.default_rng(1)
+    start = rng.uniform((50, 50), (1100, 600), (20, 2))
+    for k in range(steps):
+        sensor = "rgb" if k % 6 == 0 else "evt"
+        boxes = np.column_stack([start + 0.1 * k + rng.normal(0, 0.5, (20, 2)), np.full((20, 2), 30.0)])
+        tracker.step((k / 120.0, sensor, boxes, np.full(20, 0.9)))
+
+
+def test_a_checkpoint_of_twenty_vehicles_is_small_and_costs_little(tmp_path, full, capsys):
+    tracker = Tracker(load_config("default"))
+    crowd(tracker, 400)
+    tracker.drain_smoothed()  # as a live caller does now and then
+    took = []
+    for _ in range(20 if full else 3):
+        begin = time.perf_counter()
+        tracker.save(tmp_path / "state.npz")
+        took.append(time.perf_counter() - begin)
+    size = (tmp_path / "state.npz").stat().st_size
+    with capsys.disabled():
+        if full:
+            print(f"\n{size / 1e6:.2f} MB, {1e3 * float(np.median(took)):.1f} ms")
+    assert size <= 1_000_000
