@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Self
+from typing import BinaryIO, Self
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
@@ -36,7 +36,7 @@ class SmoothedFile:
     def __enter__(self) -> Self:
         if self._keep is None:
             self._path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = self._path.open("wb")
+            self._file: BinaryIO = self._path.open("wb")
             self._file.write(csv_header().encode())
         else:
             self._file = self._path.open("r+b")

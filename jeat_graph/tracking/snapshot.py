@@ -28,8 +28,8 @@ class Snapshot(NamedTuple):
         return Snapshot(
             t,
             next_id,
-            TrackArrays(*[array[:num_tracks].copy() for array in tracks]),
-            Scene(*[array.copy() for array in scene]),
+            TrackArrays._make(array[:num_tracks].copy() for array in tracks),
+            Scene._make(array.copy() for array in scene),
         )
 
     @property
