@@ -51,6 +51,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         import numpy as np
 
+        from jeat_graph.eval.frames import Kind
         from jeat_graph.io.cvat import write_cvat
         from jeat_graph.io.scans_io import read_instants
         from jeat_graph.runs.frame_export import at_frames
@@ -59,7 +60,8 @@ def run(args: argparse.Namespace) -> int:
             raise DataError("--to cvat counts frames: give their rate with --frames-per-second HZ")
         instants = read_instants(Path(args.source))
         instants = np.unique(table.t) if instants is None else instants
-        frames = at_frames(table, kinds[-1], instants, args.frames_per_second)
+        kind: Kind = "smoothed" if kinds[-1] == "smoothed" else "causal"
+        frames = at_frames(table, kind, instants, args.frames_per_second)
         write_cvat(frames, args.out, args.frames_per_second)
     print(f"wrote {args.out} ({', '.join(kinds)} tracks)", file=sys.stderr)
     return 0

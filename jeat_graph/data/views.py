@@ -34,8 +34,12 @@ class TrajectoryViews:
         used: IntArray
         sensors: tuple[str, ...]
 
-        def take(self, rows: npt.ArrayLike) -> Self: ...  # noqa: D102
-        def sensor_text(self) -> list[str]: ...  # noqa: D102
+        def take(self, rows: npt.ArrayLike) -> Self:
+            """Return some rows."""
+
+        def sensor_text(self) -> list[str]:
+            """Names of the sensors used in each row."""
+
         def __len__(self) -> int: ...
 
     @property
