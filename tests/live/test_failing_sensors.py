@@ -1,0 +1,101 @@
+"""Sensors that fail: identities survive a drop-out, and rubbish loses its weight."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from jeat_graph.config.reading import load_config
+from jeat_graph.data.detections import Scan
+from jeat_graph.live.health import SensorHealth
+from jeat_graph.live.late import LiveTracker
+from jeat_graph.tracking.tracker import Tracker
+
+CONFIG = load_config("default", ["smoother.engine=none"])
+START, SPEED = np.array([[200.0, 200.0], [700.0, 300.0], [400.0, 500.0]]), np.array([30.0, -30.0, 25.0])
+
+
+def cars(t, rng):
+    """Boxes of three cars that drive all the time, as a sensor sees them."""
+    centre = START + np.column_stack([SPEED * t, 0.0 * SPEED]) + rng.normal(0.0, 0.7, (3, 2))
+    return np.column_stack([centre - 20.0, np.full((3, 2), 40.0)])
+
+
+def scans_of(seconds=12.0, silent=("", 0.0, 0.0)):
+    """Pictures at 20 Hz and events at 100 Hz; one of them silent for a while."""
+    rng = np.random.default_rng(8)
+    out = []
+    for sensor, rate in (("evt", 100.0), ("rgb", 20.0)):
+        times = (np.arange(int(seconds * rate)) + 0.2) / rate
+        out += [
+            Scan(float(t), sensor, cars(t, rng), np.full(3, 0.95))
+            for t in times
+            if not (sensor == silent[0] and silent[1] <= t < silent[2])
+        ]
+    return sorted(out, key=lambda scan: scan.t)
+
+
+@pytest.mark.parametrize("sensor", ["rgb", "evt"])
+def test_identities_survive_five_seconds_without_one_sensor(sensor):
+    live, health, events = LiveTracker(Tracker(CONFIG)), SensorHealth(CONFIG), []
+    reported = {}
+    for scan in scans_of(silent=(sensor, 4.0, 9.0)):
+        arrival = live.step(scan)
+        reported[scan.t] = arrival.table.track_id.tolist()
+        events += health.saw([scan], arrival.t)
+    assert all(ids == [1, 2, 3] for t, ids in reported.items() if t > 1.0)
+    assert [(event.what, event.sensor) for event in events] == [("silent", sensor), ("back", sensor)]
+    assert 4.9 <= events[0].t <= 5.1
+    assert 9.0 <= events[1].t <= 9.1
+
+
+def test_identities_survive_when_the_silent_sensor_was_the_only_one_for_a_moment():
+    """Silence is no miss: without any scan existence only fades as vehicles leave."""
+    tracker = Tracker(CONFIG)
+    for scan in scans_of(4.0):
+        tracker.step(scan)
+    before = tracker.snapshot()
+    ahead = tracker.predict(4.5)
+    assert ahead.track_id.tolist() == [1, 2, 3]
+    faded = np.exp(-(4.5 - before.t) / CONFIG.lifecycle.lifetime_s)
+    np.testing.assert_allclose(ahead.existence, before.tracks.existence[:3] * faded)
+
+
+def test_a_sensor_whose_clutter_rises_tenfold_loses_weight_and_is_named():
+    rng = np.random.default_rng(2)
+    health, tracker = SensorHealth(CONFIG), Tracker(CONFIG)
+    ratio, events = [], []
+    for scan in scans_of(16.0):
+        if scan.sensor == "evt" and scan.t > 3.0:
+            false = np.column_stack([rng.uniform((0, 0), (1200, 680), (12, 2)), np.full((12, 2), 30.0)])
+            scan = replace(
+                scan,
+                boxes=np.concatenate([scan.boxes, false]),
+                scores=np.concatenate([scan.scores, np.full(12, 0.15)]),
+            )
+        table = tracker.step(scan)
+        health.saw([scan], scan.t)
+        events += health.judge(tracker.sensor_states(), scan.t)
+        ratio.append(tracker.sensor_states()["evt"].clutter / CONFIG.sensors["evt"].clutter_per_scan)
+    assert ratio[300] < 2.0 < 10.0 < ratio[-1]
+    assert [(event.what, event.sensor) for event in events] == [("rubbish", "evt")]
+    assert "weighs less" in events[0].text
+    assert {1, 2, 3} <= set(table.track_id.tolist())
+
+
+def test_a_sensor_whose_boxes_are_far_off_gets_a_greater_noise():
+    rng = np.random.default_rng(2)
+    tracker = Tracker(CONFIG)
+    states = []
+    for scan in scans_of(8.0):
+        if scan.sensor == "rgb" and scan.t > 3.0:
+            boxes = scan.boxes.copy()
+            boxes[:, :2] += rng.normal(0.0, 6.0, (3, 2))
+            scan = replace(scan, boxes=boxes)
+        tracker.step(scan)
+        states.append(tracker.sensor_states())
+    assert states[300]["rgb"].noise_scale < 2.0
+    assert states[-1]["rgb"].noise_scale > 3.0
+    assert states[-1]["evt"].noise_scale < 2.0

@@ -1,0 +1,96 @@
+"""`stream` killed at any moment and started again: the same answers and the same smoothed rows."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from jeat_graph.io.detections_io import read_detections
+
+COMMAND = [sys.executable, "-m", "jeat_graph.cli.main", "stream"]
+
+
+@pytest.fixture(scope="module")
+def lines(simulated):
+    """A recording as lines in order of arrival: pictures 80 ms late, events 5 ms."""
+    detections = read_detections(simulated(1, 3.0) / "detections.csv")
+    late = np.where(np.array(detections.sensors)[detections.scan_sensor] == "rgb", 0.08, 0.005)
+    order = np.argsort(detections.scan_t + late, kind="stable")
+    scans = [detections.scan(int(k)) for k in order]
+    return [
+        json.dumps(
+            {"t": s.t, "sensor": s.sensor, "boxes": s.boxes.tolist(), "scores": s.scores.tolist()}
+        ).encode()
+        + b"\n"
+        for s in scans
+    ]
+
+
+def options(folder):
+    return [
+        *("--smoothed", str(folder / "s.csv"), "--checkpoint", str(folder / "state.npz"), "--every", "0.4"),
+        *("--set", "smoother.lag_s=0.4", "--set", "smoother.chunk=8"),
+    ]
+
+
+def whole_run(lines, folder):
+    folder.mkdir()
+    done = subprocess.run(
+        [*COMMAND, *options(folder)], input=b"".join(lines), capture_output=True, check=True, timeout=300
+    )
+    return done.stdout.splitlines(), (folder / "s.csv").read_bytes()
+
+
+def killed_after(answers, lines, folder):
+    """Start it, read so many answers, kill it."""
+    folder.mkdir(exist_ok=True)
+    process = subprocess.Popen(
+        [*COMMAND, *options(folder)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        # More than is answered is on its way, so that the kill may come anywhere in a step or a checkpoint.
+        writer = os.dup(process.stdin.fileno())
+        process.stdin.close()
+        os.set_blocking(writer, False)
+        text, sent, said = b"".join(lines), 0, []
+        while len(said) < answers:
+            with contextlib.suppress(BlockingIOError):
+                sent += os.write(writer, text[sent : sent + 4096]) if sent < len(text) else 0
+            said.append(process.stdout.readline().rstrip(b"\n"))
+        process.kill()
+        said += process.stdout.read().split(b"\n")[:-1]  # whole lines that were given out before the kill
+        os.close(writer)
+    finally:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+    return said
+
+
+def test_killed_and_started_again_it_says_and_writes_the_same(lines, tmp_path, full):
+    answers, smoothed = whole_run(lines, tmp_path / "whole")
+    assert len(answers) == len(lines)
+    rng = np.random.default_rng(4)
+    moments = [len(lines) // 2, *rng.integers(1, len(lines) - 8, 50 if full else 0).tolist()]
+    for k, moment in enumerate(moments):
+        folder = tmp_path / f"killed{k}"
+        said = killed_after(moment, lines, folder)
+        assert said == answers[: len(said)]
+        # The input comes again from its beginning: what the checkpoint holds is passed over.
+        done = subprocess.run(
+            [*COMMAND, *options(folder)], input=b"".join(lines), capture_output=True, check=True, timeout=300
+        )
+        again = done.stdout.splitlines()
+        assert again == answers[len(answers) - len(again) :]
+        assert len(again) >= len(answers) - len(said)  # nothing is left out in between
+        assert (folder / "s.csv").read_bytes() == smoothed
+        assert b"warning" not in done.stderr

@@ -1,0 +1,92 @@
+"""Messages of scans and tracks: one format in two encodings; duplicates are told by source and number."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from jeat_graph.data.errors import DataError
+from jeat_graph.live.messages import Duplicates, ScanMessage, decode_scans, encode_tracks
+
+SCAN = {"t": 0.5, "sensor": "rgb", "boxes": [[1.0, 2.0, 3.0, 4.0]], "scores": [0.5]}
+
+
+def decoded(content):
+    return decode_scans(json.dumps(content).encode(), "topic", 7)
+
+
+def test_a_scan_a_list_of_scans_and_an_envelope_are_messages():
+    assert decoded(SCAN).seq is None
+    assert [scan.sensor for scan in decoded([SCAN, SCAN | {"sensor": "evt"}]).batch.scans] == ["evt", "rgb"]
+    message = decoded({"v": 1, "source": "gantry7", "seq": 41, "scans": [SCAN]})
+    assert (message.source, message.seq, message.batch.t) == ("gantry7", 41, 0.5)
+    np.testing.assert_array_equal(message.batch.scans[0].boxes, SCAN["boxes"])
+
+
+def test_msgpack_holds_the_same_and_may_hold_arrays_as_bytes():
+    msgpack = pytest.importorskip("msgpack", reason="MessagePack is not installed")
+    boxes = np.arange(8.0).reshape(2, 4) + 1.0
+    scan = SCAN | {"boxes": boxes.astype("<f8").tobytes(), "scores": np.array([0.1, 0.2]).tobytes()}
+    message = decode_scans(msgpack.packb({"v": 1, "source": "a", "seq": 0, "scans": [scan]}), "topic", 1)
+    np.testing.assert_array_equal(message.batch.scans[0].boxes, boxes)
+    np.testing.assert_array_equal(message.batch.scans[0].scores, [0.1, 0.2])
+    assert decode_scans(msgpack.packb(SCAN), "topic", 1).batch.t == 0.5
+    with pytest.raises(DataError, match="no whole number of rows"):
+        decode_scans(msgpack.packb(SCAN | {"boxes": bytes(31)}), "topic", 1)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ({"v": 2, "scans": [SCAN]}, "version 2; known here: 1"),
+        ({"scans": [SCAN]}, "version None"),
+        ({"v": 1, "scans": SCAN}, "scans must be a list"),
+        ({"v": 1, "scans": []}, "at least one"),
+        ({"v": 1, "seq": -1, "scans": [SCAN]}, "seq must be"),
+        ({"v": 1, "seq": True, "scans": [SCAN]}, "seq must be"),
+        ({"v": 1, "source": 3, "scans": [SCAN]}, "source must be a text"),
+        ({"v": 1, "number": 3, "scans": [SCAN]}, "unknown key 'number'"),
+    ],
+)
+def test_a_message_that_is_wrong_is_named(content, message):
+    with pytest.raises(DataError, match=f"topic:7: .*{message}"):
+        decoded(content)
+
+
+@given(st.binary(max_size=60))
+def test_no_payload_does_more_than_be_refused(payload):
+    pytest.importorskip("msgpack", reason="MessagePack is not installed")
+    with contextlib.suppress(DataError):
+        decode_scans(payload, "topic", 1)
+
+
+def test_tracks_say_which_message_they_answer():
+    line = '{"t":0.5,"tracks":[]}\n'
+    asked = decoded({"v": 1, "source": "gantry7", "seq": 41, "scans": [SCAN]})
+    expected = {"v": 1, "seq": 3, "source": "gantry7", "of": 41, "t": 0.5, "tracks": []}
+    assert json.loads(encode_tracks(line, 3, asked)) == expected
+    assert json.loads(encode_tracks(line, 3, None)) == {"v": 1, "seq": 3, "t": 0.5, "tracks": []}
+    msgpack = pytest.importorskip("msgpack", reason="MessagePack is not installed")
+    assert msgpack.unpackb(encode_tracks(line, 3, asked, "msgpack")) == expected
+
+
+@given(st.lists(st.tuples(st.sampled_from("ab"), st.integers(0, 40)), max_size=200))
+def test_each_number_of_a_source_is_new_once(numbers):
+    duplicates, taken = Duplicates(), set()
+    batch = decoded(SCAN).batch
+    for source, seq in numbers:
+        assert duplicates.is_new(ScanMessage(batch, source, seq)) == ((source, seq) not in taken)
+        taken.add((source, seq))
+
+
+def test_memory_of_numbers_is_bounded_and_old_ones_stay_duplicates():
+    duplicates, batch = Duplicates(), decoded(SCAN).batch
+    for seq in range(10_000):
+        assert duplicates.is_new(ScanMessage(batch, "a", seq))
+    assert len(duplicates.seen["a"][1]) <= 2 * Duplicates.WINDOW
+    assert not any(duplicates.is_new(ScanMessage(batch, "a", seq)) for seq in range(0, 10_000, 7))
