@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jeat_graph.cli.options import add_rate
+from jeat_graph.config.argument_types import not_negative
 
 if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
@@ -37,7 +38,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the run's inputs, in their order, if they have moved since",
     )
     parser.add_argument(
-        "--lags", nargs="+", type=_lag, metavar="S", help="lags of the curve in seconds; 0 is the filter"
+        "--lags",
+        nargs="+",
+        type=not_negative,
+        metavar="S",
+        help="lags of the curve in seconds; 0 is the filter",
     )
     add_rate(parser)
     parser.add_argument("--no-plots", action="store_true", help="write no pictures")
@@ -122,10 +127,3 @@ def recorded_inputs(folder: Path, moved: list[str] | None = None) -> tuple[Confi
         if sha256_of(file) != record["sha256"]:
             raise DataError("has changed since the run; track it again", file)
     return config, read_many(names, **reading)
-
-
-def _lag(text: str) -> float:
-    value = float(text)
-    if not 0.0 <= value < float("inf"):
-        raise argparse.ArgumentTypeError("must be a number of seconds, at least 0")
-    return value

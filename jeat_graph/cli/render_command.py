@@ -9,11 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jeat_graph.cli.options import add_output_rate, add_rate
-from jeat_graph.config.argument_types import drawn_size, positive
+from jeat_graph.config.argument_types import drawn_size, not_negative, positive
 from jeat_graph.data.errors import DataError
+from jeat_graph.drawing.movie.film import CODECS
+from jeat_graph.drawing.movie.moments import TRAIL_S
 
 if TYPE_CHECKING:
     from jeat_graph.drawing.movie.panels import Movie
+    from jeat_graph.drawing.movie.sources import Request
 
 HELP = "draw a run over video, frames or events, or a simulated segment, as an MP4 video or one PNG picture"
 
@@ -31,7 +34,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--frames", metavar="VIDEO|DIR", help="video or folder of pictures to draw on")
     add("--events", metavar="FILE.h5", help="events (DSEC layout) to draw on; beside the frames if both")
     add("--gt", metavar="FILE", help="truth, drawn as thin outlines")
-    add("--out", required=True, metavar="FILE", help="FILE.mp4, or FILE.png with --at")
+    add(
+        "--out",
+        required=True,
+        metavar="FILE",
+        help="FILE.mp4 or FILE.webm (written faster), or FILE.png with --at",
+    )
     add("--at", type=float, metavar="T", help="draw only this time (s), as PNG")
     add("--start", type=float, metavar="S", help="first time (s)")
     add("--end", type=float, metavar="S", help="last time (s)")
@@ -40,6 +48,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--size", type=drawn_size, metavar="WxH", help="size of each picture (default: the recording's)")
     add_rate(parser)
     add("--frame-rate", dest="rate", type=positive, help=argparse.SUPPRESS)
+    add(
+        "--labels",
+        choices=("all", "thin", "none"),
+        default="thin",
+        help="numbers of the tracks: all, none, or thin (default): where there is room, large boxes first",
+    )
+    add(
+        "--trails",
+        type=not_negative,
+        default=TRAIL_S,
+        metavar="S",
+        help="length of trails (default: 1; 0: none)",
+    )
     add("--window", type=positive, metavar="S", help="how long events are shown (default: 1 / output rate)")
 
 
@@ -63,6 +84,8 @@ def run(args: argparse.Namespace) -> int:
         at_s=args.at,
         frame_rate_hz=args.rate,
         window_s=args.window,
+        labels=args.labels,
+        trail_s=args.trails,
     )
     inputs = [path for path in (request.frames, request.events, request.truth) if path is not None]
     if any(path.resolve() == out.resolve() for path in inputs):
@@ -76,8 +99,23 @@ def run(args: argparse.Namespace) -> int:
         else:
             _write_movie(movie, rate_hz, out)
     count, (width, height) = len(movie.times), movie.size_px
+    if args.rate is not None and not _counted(request):
+        print(
+            "jeat-graph render: warning: --rate was not needed: nothing here counts frames "
+            "(pictures per second of the film: --output-rate)",
+            file=sys.stderr,
+        )
     print(f"wrote {out}: {count} picture{'s' * (count != 1)} of {width} x {height} px")
     return 0
+
+
+def _counted(request: Request) -> bool:
+    """Whether anything that is read may count frames: pictures, or a result or truth without times."""
+    from jeat_graph.eval.load import BY_FRAME
+    from jeat_graph.io.formats import recognise
+
+    files = [path for path in (request.run, request.truth) if path is not None and path.is_file()]
+    return request.frames is not None or any(recognise(path) in BY_FRAME for path in files)
 
 
 def _write_movie(movie: Movie, rate_hz: float, out: Path) -> None:
@@ -94,10 +132,10 @@ def _write_movie(movie: Movie, rate_hz: float, out: Path) -> None:
 def _check_out(out: Path, one: bool) -> None:
     if out.is_dir():
         raise DataError("is a folder; --out must name a file", out)
-    suffix = ".png" if one else ".mp4"
-    if out.suffix.lower() != suffix:
-        hint = "--at writes a PNG picture" if one else "a video is written as MP4 (one picture: --at T)"
-        raise DataError(f"must end in {suffix}: {hint}", out)
+    suffixes = (".png",) if one else tuple(CODECS)
+    if out.suffix.lower() not in suffixes:
+        hint = "--at writes a PNG picture" if one else "a film (one picture: --at T)"
+        raise DataError(f"must end in {' or '.join(suffixes)}: {hint}", out)
 
 
 def _path(text: str | None) -> Path | None:

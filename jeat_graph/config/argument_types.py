@@ -35,6 +35,14 @@ def positive(text: str) -> float:
     return value
 
 
+def not_negative(text: str) -> float:
+    """Read a finite number that is at least 0."""
+    value = float(text)
+    if not 0.0 <= value < float("inf"):
+        raise ArgumentTypeError("must be a number, at least 0")
+    return value
+
+
 def share(text: str) -> float:
     """Read a number above 0 and at most 1."""
     value = float(text)

@@ -12,25 +12,22 @@ FFV1 stands in AVI because Matroska files carry a random number and no two of th
 
 from __future__ import annotations
 
-import os
-import re
 from collections import OrderedDict
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
-import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.rates import median_rate_hz
+from jeat_graph.io.decoders import Decoder, PictureDecoder, RgbImage, VideoDecoder, quietly
 
-RgbImage = npt.NDArray[np.uint8]
+__all__ = ["FRAME_TIMES", "VIDEO_FILES", "FrameSource", "RgbImage", "open_frames", "quietly"]
 
 VIDEO_FILES = {"mp4": "frames.mp4", "lossless": "frames.avi", "png": "frames"}
 FRAME_TIMES = "frames.csv"
-_PICTURES = (".png", ".jpg", ".jpeg")
 _US_PER_S = 1e6
 _KEPT_FRAMES = 32  # decoded frames that a reader keeps, for steps backwards
 
@@ -42,9 +39,12 @@ class FrameSource:
         path: the video file or the folder.
         times_s: (F,) time of each frame (s), ascending.
         size_px: width and height.
+        missing: frames that the file announces but that cannot be decoded: it is damaged or cut off.
     """
 
-    def __init__(self, path: Path, times_s: FloatArray, size_px: tuple[int, int], decode: _Decoder) -> None:
+    missing = 0
+
+    def __init__(self, path: Path, times_s: FloatArray, size_px: tuple[int, int], decode: Decoder) -> None:
         self.path = path
         self.times_s = times_s
         self.size_px = size_px
@@ -107,9 +107,9 @@ def open_frames(path: str | Path, rate_hz: float | None = None) -> FrameSource:
         inner = next((place / name for name in VIDEO_FILES.values() if (place / name).exists()), None)
         if inner is not None:
             return open_frames(inner, rate_hz)
-        decode: _Decoder = _Pictures(place)
+        decode: Decoder = PictureDecoder(place)
     elif place.is_file():
-        decode = _Video(place)
+        decode = VideoDecoder(place)
     else:
         raise DataError("no such video or folder of pictures", place)
     try:
@@ -125,7 +125,9 @@ def open_frames(path: str | Path, rate_hz: float | None = None) -> FrameSource:
                 raise DataError(f"no {FRAME_TIMES} beside it; give the frame rate", place)
             times = np.arange(count) / rate
         first = decode.bgr(0)
-        return FrameSource(place, times, (first.shape[1], first.shape[0]), decode)
+        source = FrameSource(place, times, (first.shape[1], first.shape[0]), decode)
+        source.missing = max(decode.announced() - count, 0)
+        return source
     except BaseException:
         decode.close()
         raise
@@ -144,7 +146,7 @@ def peek(path: str | Path) -> tuple[tuple[int, int], float | None]:
             return peek(inner)
     elif not place.is_file():
         raise DataError("no such video or folder of pictures", place)
-    decode: _Decoder = _Pictures(place) if place.is_dir() else _Video(place)
+    decode: Decoder = PictureDecoder(place) if place.is_dir() else VideoDecoder(place)
     try:
         height, width = decode.bgr(0).shape[:2]
         table = _times_beside(place)
@@ -158,6 +160,20 @@ def _times_beside(place: Path) -> Path | None:
     """Find `frames.csv` of a video or a folder of pictures."""
     known = [place / FRAME_TIMES, place.parent / FRAME_TIMES]
     return next((file for file in known if file.is_file()), None)
+
+
+def count_frames(path: str | Path) -> int:
+    """Return the number of frames that can be decoded from a video; 0 where it is none."""
+    try:
+        decode = VideoDecoder(Path(path))
+    except DataError:
+        return 0
+    try:
+        return decode.count()
+    except DataError:
+        return 0
+    finally:
+        decode.close()
 
 
 def read_frame_times(path: str | Path) -> IntArray:
@@ -174,120 +190,3 @@ def read_frame_times(path: str | Path) -> IntArray:
     if bad.any():
         raise table.error(1 + int(np.argmax(bad)), "t_us must ascend")
     return t_us
-
-
-class _Decoder:
-    """Frames by number, as OpenCV gives them: blue, green, red."""
-
-    def count(self) -> int:
-        raise NotImplementedError
-
-    def rate_hz(self) -> float | None:
-        raise NotImplementedError
-
-    def bgr(self, index: int) -> RgbImage:
-        raise NotImplementedError
-
-    def close(self) -> None:
-        """Release the file."""
-
-
-class _Pictures(_Decoder):
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._files = sorted(
-            (p for p in folder.iterdir() if p.suffix.lower() in _PICTURES), key=lambda p: _natural(p.name)
-        )
-        if not self._files:
-            raise DataError(f"no pictures ({', '.join(_PICTURES)}) in this folder", folder)
-
-    def count(self) -> int:
-        return len(self._files)
-
-    def rate_hz(self) -> float | None:
-        return None
-
-    def bgr(self, index: int) -> RgbImage:
-        import cv2
-
-        file = self._files[index]
-        try:
-            data = np.frombuffer(file.read_bytes(), dtype=np.uint8)
-        except OSError as error:
-            raise DataError(f"cannot be read: {error.strerror or error}", file) from None
-        picture = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
-        if picture is None:
-            raise DataError("is not a picture that can be read", file)
-        return np.asarray(picture, dtype=np.uint8)
-
-
-class _Video(_Decoder):
-    def __init__(self, path: Path) -> None:
-        import cv2
-
-        self._path = path
-        self._capture = quietly(lambda: cv2.VideoCapture(str(path), cv2.CAP_FFMPEG))
-        if not self._capture.isOpened():
-            raise DataError("is not a video that can be read", path)
-        self._next = 0
-        self._count: int | None = None
-
-    def count(self) -> int:
-        """Number of frames, by decoding headers only; the container's own count is an estimate at times."""
-        if self._count is None:
-            self._rewind()
-            n = 0
-            while self._capture.grab():
-                n += 1
-            self._count = n
-            self._rewind()
-            if not n:
-                raise DataError("holds no frame that can be read", self._path)
-        return self._count
-
-    def rate_hz(self) -> float | None:
-        import cv2
-
-        return float(self._capture.get(cv2.CAP_PROP_FPS)) or None
-
-    def bgr(self, index: int) -> RgbImage:
-        if index < self._next:
-            self._rewind()
-        while self._next < index:
-            if not self._capture.grab():
-                raise DataError(f"frame {self._next} cannot be decoded", self._path)
-            self._next += 1
-        good, picture = self._capture.read()
-        if not good:
-            raise DataError(f"frame {index} cannot be decoded", self._path)
-        self._next += 1
-        return np.asarray(picture, dtype=np.uint8)
-
-    def close(self) -> None:
-        self._capture.release()
-
-    def _rewind(self) -> None:
-        import cv2
-
-        # Seeking by frame number is not exact in all containers; the beginning always is.
-        self._capture.release()
-        self._capture = cv2.VideoCapture(str(self._path), cv2.CAP_FFMPEG)
-        self._next = 0
-
-
-def _natural(name: str) -> tuple[tuple[int, str], ...]:
-    return tuple((int(part), "") if part.isdigit() else (0, part) for part in re.split(r"(\d+)", name))
-
-
-def quietly(call: Any) -> Any:
-    """Call OpenCV without the lines that it and FFmpeg write to stderr about files they cannot read."""
-    import cv2
-
-    # FFmpeg's own level, which OpenCV takes from here when it first opens a video; -8 is "quiet".
-    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
-    level = cv2.utils.logging.getLogLevel()
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-    try:
-        return call()
-    finally:
-        cv2.utils.logging.setLogLevel(level)

@@ -80,7 +80,7 @@ def test_the_tutorial_runs_from_beginning_to_end(tmp_path, monkeypatch):
     assert [words[0] for words in steps] == ["simulate", "track", "eval", "compare", "report", "render"]
     for words in steps:
         assert main(words) == 0, " ".join(words)
-    assert (tmp_path / "run.mp4").stat().st_size > 0
+    assert (tmp_path / "run.webm").stat().st_size > 0
     assert (tmp_path / "run.html").stat().st_size > 0
 
 

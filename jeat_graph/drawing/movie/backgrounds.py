@@ -56,6 +56,7 @@ class VideoBackground:
     def __init__(self, source: FrameSource) -> None:
         self.size_px = source.size_px
         self.times_s: FloatArray = source.times_s
+        self.path, self.missing = source.path, source.missing
         self._source = source
 
     def index(self, t: float) -> int:

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.drawing.movie.lettering import Letters, Place, letters, paint, room_for
 from jeat_graph.drawing.movie.moments import Marks
 from jeat_graph.drawing.palette import RIM, Rgb, track_rgb
 from jeat_graph.io.video import RgbImage
 
 SIGMAS = 2.0
+#: Size of a track's number, of OpenCV's font in a picture 720 px high.
+NAME_SIZE = 0.42
 _SHIFT = 4  # OpenCV takes coordinates in sixteenths of a pixel
+#: Lightness of the smoothed tracks' colours.
+PALE = 0.82
 _DASH_PX, _GAP_PX = 6.0, 4.0
 _FAR_PX = 30_000.0  # beyond it OpenCV's fixed-point coordinates would overflow
 
@@ -66,22 +73,36 @@ class Canvas:
         if len(points) > 1:
             self._polyline(np.asarray(points) * self._scale, colour, self._width(thickness), closed=False)
 
-    def name(self, box: FloatArray, text: str, colour: Rgb) -> None:
-        """Write a text above a box (4,), within the picture."""
-        left, top = np.asarray(box)[:2] * self._scale
-        self.text(text, (float(left), float(top) - 4.0 * self.unit), colour, 0.42)
+    def names(self, boxes: FloatArray, texts: Sequence[str], colours: Sequence[Rgb], *, thin: bool) -> None:
+        """Write a text above each box (K, 4), within the picture; the largest boxes first.
+
+        Args:
+            boxes: left, top, width, height.
+            texts: K texts.
+            colours: K colours.
+            thin: leave out those that would lie on one that stands already.
+        """
+        taken: list[Place] = []
+        for k in np.argsort(-boxes[:, 2] * boxes[:, 3], kind="stable").tolist():
+            left, top = boxes[k, :2] * self._scale
+            painted = self._letters(texts[k], NAME_SIZE)
+            place = room_for(painted, (float(left), float(top) - 4.0 * self.unit), self._size_px)
+            if thin and any(place.meets(other) for other in taken):
+                continue
+            taken.append(place)
+            paint(self.image, painted, place, colours[k])
 
     def text(self, text: str, place: tuple[float, float], colour: Rgb, size: float) -> None:
         """Write a text with its lower left corner at a pixel, moved so that it is within the picture."""
-        import cv2
+        painted = self._letters(text, size)
+        paint(self.image, painted, room_for(painted, place, self._size_px), colour)
 
-        font, scale = cv2.FONT_HERSHEY_SIMPLEX, size * self.unit
-        (width, height), _ = cv2.getTextSize(text, font, scale, 1)
-        x = int(min(max(place[0], 2.0), max(self.image.shape[1] - width - 2.0, 2.0)))
-        y = int(min(max(place[1], height + 2.0), self.image.shape[0] - 3.0))
-        stroke = max(round(self.unit), 1)
-        for tint, thickness in ((RIM, stroke + 2), (colour, stroke)):
-            cv2.putText(self.image, text, (x, y), font, scale, tint, thickness, cv2.LINE_AA)
+    def _letters(self, text: str, size: float) -> Letters:
+        return letters(text, size * self.unit, max(round(self.unit), 1))
+
+    @property
+    def _size_px(self) -> tuple[int, int]:
+        return self.image.shape[1], self.image.shape[0]
 
     def _width(self, thickness: float) -> int:
         return max(round(thickness * self.unit), 1)
@@ -131,22 +152,28 @@ def dashes(corners: FloatArray, dash: float, gap: float) -> FloatArray:
 
 
 def draw_causal(canvas: Canvas, marks: Marks, *, trails: bool) -> None:
-    """Draw causal tracks: unbroken boxes, ellipses, trails, names."""
+    """Draw causal tracks: unbroken boxes, ellipses and trails."""
     for k, track_id in enumerate(marks.track_id.tolist()):
         colour = track_rgb(track_id)
         if trails:
             canvas.trail(marks.trails[k], colour, 1.5)
         canvas.ellipse(marks.centre[k], marks.sigma[k], colour)
         canvas.solid_box(marks.boxes[k], colour, 1.6)
-        canvas.name(marks.boxes[k], str(track_id), colour)
 
 
-def draw_smoothed(canvas: Canvas, marks: Marks, *, names: bool) -> None:
-    """Draw smoothed tracks: broken, paler boxes, ellipses, trails, and names unless others wrote them."""
+def draw_smoothed(canvas: Canvas, marks: Marks) -> None:
+    """Draw smoothed tracks: broken, paler boxes, ellipses and trails."""
     for k, track_id in enumerate(marks.track_id.tolist()):
-        colour = track_rgb(track_id, 0.82)
+        colour = track_rgb(track_id, PALE)
         canvas.trail(marks.trails[k], colour, 1.5)
         canvas.ellipse(marks.centre[k], marks.sigma[k], colour)
         canvas.dashed_box(marks.boxes[k], colour, 1.6)
-        if names:
-            canvas.name(marks.boxes[k], str(track_id), colour)
+
+
+def draw_names(canvas: Canvas, marks: Marks, labels: str) -> None:
+    """Write the tracks' numbers: `all`, `thin` (as far as there is room) or `none`."""
+    if labels == "none" or not len(marks.track_id):
+        return
+    ids = marks.track_id.tolist()
+    colours = [track_rgb(track_id, PALE) for track_id in ids]
+    canvas.names(marks.boxes, [str(track_id) for track_id in ids], colours, thin=labels == "thin")

@@ -25,7 +25,7 @@ class Marks:
         boxes: (K, 4) left, top, width, height (px).
         centre: (K, 2) of the box, not clipped (px).
         sigma: (K, 2) its standard deviations (px); NaN where they are not known.
-        trails: of each track, the centres (L, 2) of the last second, the last one being `centre`.
+        trails: of each track, the last centres (L, 2), the last one being `centre`.
     """
 
     track_id: IntArray
@@ -43,12 +43,19 @@ class TracksAt:
         times: (T,) ascending (s).
         kind: `causal` or `smoothed`.
         instants: (I,) times at which the causal tracker ran (s), if known.
+        trail_s: how far trails go back (s).
     """
 
     def __init__(
-        self, table: Trajectories, times: FloatArray, kind: str, instants: FloatArray | None = None
+        self,
+        table: Trajectories,
+        times: FloatArray,
+        kind: str,
+        instants: FloatArray | None = None,
+        trail_s: float = TRAIL_S,
     ) -> None:
         self._times = times
+        self._trail_s = trail_s
         if kind == "causal":
             self._found: Resampled = predict_to(table, times, instants=instants)
         else:
@@ -71,7 +78,9 @@ class TracksAt:
         )
 
     def _trails(self, t: float, ids: IntArray, centre: FloatArray) -> list[FloatArray]:
-        first, last = np.searchsorted(self._row_t, [t - TRAIL_S, t + _TOLERANCE_S])
+        if self._trail_s == 0.0:
+            return [here[None] for here in centre]
+        first, last = np.searchsorted(self._row_t, [t - self._trail_s, t + _TOLERANCE_S])
         part = slice(int(first), int(last))
         # In order of tracks, then time: a stable sort keeps the order of the rows.
         order = np.argsort(self._row_id[part], kind="stable")

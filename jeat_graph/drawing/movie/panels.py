@@ -9,7 +9,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.drawing.movie.backgrounds import Background
-from jeat_graph.drawing.movie.marks import Canvas, draw_causal, draw_smoothed
+from jeat_graph.drawing.movie.marks import Canvas, draw_causal, draw_names, draw_smoothed
 from jeat_graph.drawing.movie.moments import TracksAt, TruthAt
 from jeat_graph.drawing.palette import IGNORED_BOX, TEXT, TRUE_BOX
 from jeat_graph.io.video import RgbImage
@@ -29,6 +29,8 @@ class Movie:
         causal: tracks, or None.
         smoothed: tracks, or None.
         truth: true boxes, or None.
+        labels: which tracks have their number beside them: `all`, `thin` (as far as there is room, large
+            boxes first) or `none`.
     """
 
     times: FloatArray
@@ -38,6 +40,7 @@ class Movie:
     causal: TracksAt | None = None
     smoothed: TracksAt | None = None
     truth: TruthAt | None = None
+    labels: str = "thin"
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -73,12 +76,15 @@ class Movie:
         if self.causal is not None:
             draw_causal(canvas, self.causal.at(k), trails=self.smoothed is None)
         if self.smoothed is not None:
-            draw_smoothed(canvas, self.smoothed.at(k), names=self.causal is None)
+            draw_smoothed(canvas, self.smoothed.at(k))
         if self.truth is not None:
             asked_for, ignored = self.truth.at(t)
             for boxes, colour in ((ignored, IGNORED_BOX), (asked_for, TRUE_BOX)):
                 for box in boxes:
                     canvas.thin_box(box, colour)
+        named = self.smoothed if self.causal is None else self.causal
+        if named is not None:
+            draw_names(canvas, named.at(k), self.labels)  # last, so that no line runs through them
         used = [
             text
             for shown, text in (

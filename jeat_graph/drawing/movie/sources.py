@@ -19,12 +19,14 @@ from jeat_graph.drawing.movie.backgrounds import (
     PlainBackground,
     VideoBackground,
 )
-from jeat_graph.drawing.movie.moments import TracksAt, TruthAt
+from jeat_graph.drawing.movie.moments import TRAIL_S, TracksAt, TruthAt
 from jeat_graph.drawing.movie.panels import Movie
 from jeat_graph.simulation.dataset.layout import EVENTS, SEGMENTS, TRUTH
 
 DEFAULT_RATE_HZ = 25.0
 _SAME_SHAPE = 0.01
+# A track is drawn that long after its last row, and a little before its first (s).
+_APART_S = 0.5
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,8 @@ class Request:
         at_s: one time only (s).
         frame_rate_hz: frames per second of files and folders that count frames.
         window_s: how long events are shown (s); by default the time of a picture.
+        labels: which tracks have their number beside them: `all`, `thin` or `none`.
+        trail_s: how far trails go back (s).
     """
 
     run: Path
@@ -58,6 +62,8 @@ class Request:
     at_s: float | None = None
     frame_rate_hz: float | None = None
     window_s: float | None = None
+    labels: str = "thin"
+    trail_s: float = TRAIL_S
 
 
 def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[str]]:
@@ -98,7 +104,7 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
         backgrounds.append(PlainBackground((round(field[0]), round(field[1]))))
     panel = request.size_px or (round(field[0]), round(field[1]))
     instants = read_instants(request.run) if request.run.is_dir() else None
-    shown = {kind: TracksAt(table, times, kind, instants) for kind, table in tables.items()}
+    shown = {kind: TracksAt(table, times, kind, instants, request.trail_s) for kind, table in tables.items()}
     movie = Movie(
         times=times,
         backgrounds=backgrounds,
@@ -107,7 +113,9 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
         causal=shown.get("causal"),
         smoothed=shown.get("smoothed"),
         truth=None if truth is None else TruthAt(truth),
+        labels=request.labels,
     )
+    warnings += _absent(frames, tables, truth, times)
     return movie, rate_hz, warnings
 
 
@@ -189,6 +197,41 @@ def _times(
             f"to {span[1]:g} s"
         )
     return np.asarray(times, dtype=np.float64)
+
+
+def _absent(
+    frames: VideoBackground | None,
+    tables: dict[str, Trajectories],
+    truth: GroundTruth | None,
+    times: FloatArray,
+) -> list[str]:
+    """Say what will not be seen at these times, because it was recorded at others.
+
+    Raises:
+        DataError: tracks were given, and all of them lie at other times.
+    """
+    warnings = []
+    if frames is not None and frames.missing:
+        warnings.append(
+            f"{frames.path}: damaged or cut off: {frames.missing} of {len(frames.times_s) + frames.missing} "
+            "frames cannot be decoded"
+        )
+    spans = {kind: table.t for kind, table in tables.items() if len(table)}
+    if truth is not None:
+        spans["truth"] = truth.frame_times()
+    outside = {
+        kind: t
+        for kind, t in spans.items()
+        if t.max() < times[0] - _APART_S or t.min() > times[-1] + _APART_S
+    }
+    lines = [
+        f"{kind} lasts from {t.min():.6g} s to {t.max():.6g} s, the pictures from {times[0]:.6g} s to "
+        f"{times[-1]:.6g} s"
+        for kind, t in outside.items()
+    ]
+    if outside and outside.keys() >= tables.keys() and len(times) > 1:
+        raise DataError(f"nothing would be seen: {'; '.join(lines)}; are both times of one clock?")
+    return warnings + lines
 
 
 def _configured_size(run: Path) -> tuple[float, float] | None:

@@ -1,0 +1,160 @@
+"""Decode frames by number, from a video file or a folder of pictures, by OpenCV."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.data.errors import DataError
+
+RgbImage = npt.NDArray[np.uint8]
+
+_PICTURES = (".png", ".jpg", ".jpeg")
+#: Videos whose header says how many frames there are; Matroska has only an estimate from its length.
+_COUNTED = (".mp4", ".mov", ".m4v", ".avi")
+
+
+class Decoder:
+    """Frames by number, as OpenCV gives them: blue, green, red."""
+
+    def count(self) -> int:
+        """Return the number of frames."""
+        raise NotImplementedError
+
+    def announced(self) -> int:
+        """Number of frames that the container says it holds; 0 where it does not say."""
+        return 0
+
+    def rate_hz(self) -> float | None:
+        """Return the declared rate (Hz), None where there is none."""
+        raise NotImplementedError
+
+    def bgr(self, index: int) -> RgbImage:
+        """Return a frame (H, W, 3): blue, green, red."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Release the file."""
+
+
+class PictureDecoder(Decoder):
+    """Pictures of a folder, in natural order of their names."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._files = sorted(
+            (p for p in folder.iterdir() if p.suffix.lower() in _PICTURES), key=lambda p: _natural(p.name)
+        )
+        if not self._files:
+            raise DataError(f"no pictures ({', '.join(_PICTURES)}) in this folder", folder)
+
+    def count(self) -> int:
+        """Return the number of frames."""
+        return len(self._files)
+
+    def rate_hz(self) -> float | None:
+        """Return the declared rate (Hz), None where there is none."""
+        return None
+
+    def bgr(self, index: int) -> RgbImage:
+        """Return a frame (H, W, 3): blue, green, red."""
+        import cv2
+
+        file = self._files[index]
+        try:
+            data = np.frombuffer(file.read_bytes(), dtype=np.uint8)
+        except OSError as error:
+            raise DataError(f"cannot be read: {error.strerror or error}", file) from None
+        picture = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
+        if picture is None:
+            raise DataError("is not a picture that can be read", file)
+        return np.asarray(picture, dtype=np.uint8)
+
+
+class VideoDecoder(Decoder):
+    """Frames of a video file."""
+
+    def __init__(self, path: Path) -> None:
+        import cv2
+
+        self._path = path
+        self._capture = quietly(lambda: cv2.VideoCapture(str(path), cv2.CAP_FFMPEG))
+        if not self._capture.isOpened():
+            raise DataError("is not a video that can be read", path)
+        self._next = 0
+        self._count: int | None = None
+
+    def count(self) -> int:
+        """Number of frames, by decoding headers only; the container's own count is an estimate at times."""
+        if self._count is None:
+            self._rewind()
+            n = 0
+            while self._capture.grab():
+                n += 1
+            self._count = n
+            self._rewind()
+            if not n:
+                raise DataError("holds no frame that can be read", self._path)
+        return self._count
+
+    def announced(self) -> int:
+        """Return the number of frames that the header announces, 0 where it has none."""
+        import cv2
+
+        exact = self._path.suffix.lower() in _COUNTED
+        return int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT)) if exact else 0
+
+    def rate_hz(self) -> float | None:
+        """Return the declared rate (Hz), None where there is none."""
+        import cv2
+
+        return float(self._capture.get(cv2.CAP_PROP_FPS)) or None
+
+    def bgr(self, index: int) -> RgbImage:
+        """Return a frame (H, W, 3): blue, green, red."""
+        if index < self._next:
+            self._rewind()
+        while self._next < index:
+            if not self._capture.grab():
+                raise DataError(f"frame {self._next} cannot be decoded", self._path)
+            self._next += 1
+        good, picture = self._capture.read()
+        if not good:
+            raise DataError(f"frame {index} cannot be decoded", self._path)
+        self._next += 1
+        return np.asarray(picture, dtype=np.uint8)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._capture.release()
+
+    def _rewind(self) -> None:
+        import cv2
+
+        # Seeking by frame number is not exact in all containers; the beginning always is.
+        self._capture.release()
+        self._capture = cv2.VideoCapture(str(self._path), cv2.CAP_FFMPEG)
+        self._next = 0
+
+
+def _natural(name: str) -> tuple[tuple[int, str], ...]:
+    return tuple((int(part), "") if part.isdigit() else (0, part) for part in re.split(r"(\d+)", name))
+
+
+def quietly(call: Any) -> Any:
+    """Call OpenCV without the lines that it and FFmpeg write to stderr about files they cannot read."""
+    import cv2
+
+    # FFmpeg's own level, which OpenCV takes from here when it first opens a video; -8 is "quiet".
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    level = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        return call()
+    finally:
+        cv2.utils.logging.setLogLevel(level)
