@@ -10,6 +10,8 @@ window of a second at 120 Hz).
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -124,6 +126,10 @@ class FixedLagSmoother:
         """Free everything; the smoother takes no more measurements."""
         self._window = self._gtsam = None
         self._pending, self._departed = [], []
+
+    def saved(self) -> dict[str, Any]:
+        """Return the attributes of a smoother like this one that has yet to build GTSAM's window."""
+        return vars(self) | {"_gtsam": None, "_outdated": self._use_gtsam}
 
     def forget_gtsam(self) -> None:
         """Have GTSAM's window built anew from our arrays when it is next needed."""

@@ -14,6 +14,7 @@ _KINDS = {
     "ablation": "from the paper's tracker to the default, one change a row",
     "smoothing": "what smoothing gains over the causal estimates",
     "speed": "time per step, against others",
+    "endurance": "a day of input through the live path: memory, latency and counts, hour by hour",
     "events": "noise of the event cameras, what tames it, and what vehicles give",
 }
 

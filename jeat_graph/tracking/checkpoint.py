@@ -62,14 +62,26 @@ _PLAIN = (
 )
 
 
-def _codecs(config: Config) -> dict[str, Codec]:
-    """All classes that a file may name."""
+def pack_smoothers(config: Config, smoothers: TrackSmoothers) -> tuple[str, bytes]:
+    """Return the state of smoothers as plain text and bytes; they themselves stay as they are."""
+    return pack(smoothers, _codecs(config, forget=False))
+
+
+def unpack_smoothers(config: Config, state: tuple[str, bytes]) -> TrackSmoothers:
+    """Make smoothers of what `pack_smoothers` returned."""
+    made: TrackSmoothers = unpack(*state, _codecs(config))
+    return made
+
+
+def _codecs(config: Config, forget: bool = True) -> dict[str, Codec]:
+    """All classes that a file may name; `forget` has the saved smoothers build GTSAM's windows anew too."""
     plain = {kind.__name__: plain_codec(kind) for kind in _PLAIN}
     lag = plain_codec(FixedLagSmoother)
 
     def lag_apart(one: FixedLagSmoother) -> dict[str, Any]:
-        one.forget_gtsam()
-        return lag.apart(one)
+        if forget:
+            one.forget_gtsam()
+        return one.saved()
 
     return plain | {
         "FixedLagSmoother": Codec(FixedLagSmoother, lag_apart, lag.together),
