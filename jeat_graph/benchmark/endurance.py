@@ -1,8 +1,8 @@
 """Hours of synthetic input through the live path as fast as they go, and what they cost hour by hour.
 
 Vehicles drive in circles that never end, so that there are as many in the last hour as in the first; both
-sensors see them with noise, misses and false boxes, and their scans arrive late and out of order. Everything is
-on: late scans are put where they belong, a smoother with a fixed lag runs behind, rows are fetched, checkpoints
+sensors see them with noise, misses and false boxes, and their scans arrive late and out of order. All is on:
+late scans are put where they belong, a smoother with a fixed lag runs behind, rows are fetched, checkpoints
 are written.
 """
 
