@@ -101,6 +101,7 @@ def recorded_inputs(folder: Path, moved: list[str] | None = None) -> tuple[Confi
     from jeat_graph.data.errors import DataError
     from jeat_graph.io.detections_io import read_many, split_name
     from jeat_graph.io.hashing import sha256_of
+    from jeat_graph.runs.inputs import find_input
 
     path = folder / "run.json"
     try:
@@ -120,10 +121,13 @@ def recorded_inputs(folder: Path, moved: list[str] | None = None) -> tuple[Confi
             file if prefix is None else f"{prefix}={file}"
             for prefix, file in zip(prefixes, moved, strict=True)
         ]
+    found = []
     for name, record in zip(names, inputs, strict=True):
-        file = split_name(name)[1]
-        if not Path(file).is_file():
+        prefix, file = split_name(name)
+        place = find_input(file, record, folder) if moved is None else Path(file)
+        if place is None or not place.is_file():
             raise DataError("input of the run is not there; say where it is with --detections", file)
-        if sha256_of(file) != record["sha256"]:
+        if sha256_of(place) != record["sha256"]:
             raise DataError("has changed since the run; track it again", file)
-    return config, read_many(names, **reading)
+        found.append(str(place) if prefix is None else f"{prefix}={place}")
+    return config, read_many(found, **reading)

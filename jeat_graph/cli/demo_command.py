@@ -43,7 +43,8 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.io.truth_io import write_truth
     from jeat_graph.runs.directory import RunDirectory
     from jeat_graph.runs.input_checks import check_detections
-    from jeat_graph.runs.tracking_run import RunOptions, RunRecord, describe_inputs, write_run
+    from jeat_graph.runs.inputs import describe_inputs
+    from jeat_graph.runs.tracking_run import RunOptions, RunRecord, write_run
     from jeat_graph.simulation.scenario import load_scenario
     from jeat_graph.simulation.simulate import record
     from jeat_graph.tracking.warm_up import notice_if_cold

@@ -5,7 +5,9 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+import warnings
 from collections.abc import Sequence
+from functools import partial
 from importlib import import_module
 
 from jeat_graph.cli.options import Parser
@@ -63,7 +65,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     command = next((a for a in arguments if a in COMMANDS), None)
     args = build_parser(command).parse_args(arguments)
     try:
-        return int(args.run(args) or 0)
+        with warnings.catch_warnings():
+            warnings.showwarning = partial(_show_warning, args.command)
+            return int(args.run(args) or 0)
     except JeatGraphError as error:
         print(f"jeat-graph {args.command}: {_one_line(error)}", file=sys.stderr)
         return 2
@@ -78,6 +82,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(f"jeat-graph {args.command}: interrupted", file=sys.stderr)
         return 130
+
+
+def _show_warning(command: str, message: Warning | str, *_: object, **__: object) -> None:
+    """Show a warning as the commands' own are shown, without the place in the code that it came from."""
+    print(f"jeat-graph {command}: warning: {' '.join(str(message).split())}", file=sys.stderr)
 
 
 def _one_line(error: Exception) -> str:

@@ -21,6 +21,10 @@ class TimeOrderError(JeatGraphError):
     """A scan older than one that has been processed already."""
 
 
+class InputWarning(UserWarning):
+    """Input that is valid but most likely not what was meant, such as times in ms."""
+
+
 class DataError(JeatGraphError):
     """A file, or an array, whose content is not valid.
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from jeat_graph.runs.beside import Facts, facts_beside, facts_of_frames, with_picture
-from jeat_graph.runs.tracking_run import RunOptions, RunRecord, describe_inputs, write_run
+from jeat_graph.runs.inputs import describe_inputs
+from jeat_graph.runs.tracking_run import RunOptions, RunRecord, write_run
 
 if TYPE_CHECKING:
     from jeat_graph.config.schema import Config

@@ -6,7 +6,6 @@ import time
 from collections.abc import Sequence
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -217,14 +216,3 @@ def _write_record(detections: Detections, config: Config, run: RunDirectory, rec
     }
     with open_atomic(run.path(RUN_JSON)) as file:
         file.write(to_json(content))
-
-
-def describe_inputs(paths: Sequence[str | Path]) -> list[dict[str, Any]]:
-    """Path as given, size in bytes and SHA-256 of each input file.
-
-    Raises:
-        DataError: a file cannot be read.
-    """
-    from jeat_graph.io.hashing import sha256_of
-
-    return [{"path": str(p), "bytes": Path(p).stat().st_size, "sha256": sha256_of(p)} for p in paths]

@@ -18,6 +18,7 @@ from jeat_graph.data.diagnostics import Diagnostics
 from jeat_graph.data.errors import JeatGraphError, TimeOrderError
 from jeat_graph.data.interop import boxes_of
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.prediction import Prediction, predict_reported
 from jeat_graph.tracking.reporting import report
 from jeat_graph.tracking.scans import ScanLike, arrivals_of, as_scans
@@ -74,6 +75,7 @@ class Tracker(SmoothedTracks):
         self._next_id = 1
         self._t: float | None = None
         self._log = allocate_log(0)
+        self._watch = InputWatch(config)
 
     @property
     def num_tracks(self) -> int:
@@ -108,7 +110,9 @@ class Tracker(SmoothedTracks):
         """
         if self._finished:
             raise JeatGraphError("this tracker has been finished; make another one for another recording")
-        table, taken = self.take_in(as_scans(scans))
+        batch = as_scans(scans)
+        table, taken = self.take_in(batch)
+        self._watch.look(batch)
         self.hand_over(taken)
         return table
 

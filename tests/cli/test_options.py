@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import warnings
 
 import pytest
 
@@ -88,3 +89,18 @@ def test_a_size_that_no_picture_has_is_refused(text):
         picture_size(text)
     with pytest.raises(argparse.ArgumentTypeError, match="8192"):
         drawn_size("9000x720")
+
+
+def test_a_warning_of_the_library_is_one_line_that_names_the_command(capsys, monkeypatch):
+    from jeat_graph.cli import count_command
+    from jeat_graph.cli.main import main
+
+    def run(_: argparse.Namespace) -> int:
+        warnings.warn("first\nsecond", UserWarning, stacklevel=1)
+        return 0
+
+    monkeypatch.setattr(count_command, "run", run)
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        assert main(["count", *NEEDED["count"]]) == 0
+    assert capsys.readouterr().err == "jeat-graph count: warning: first second\n"

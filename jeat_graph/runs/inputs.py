@@ -1,0 +1,60 @@
+"""The input files of a run: written down when it is made, found again when it is looked at from elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+# So far up from the run, and so many folders of the input's path, an input that was moved along is looked for.
+_MOST_UP, _MOST_PARTS = 4, 4
+
+
+def describe_inputs(paths: Sequence[str | Path]) -> list[dict[str, Any]]:
+    """Return path as given, absolute path, size in bytes and SHA-256 of each input file.
+
+    Raises:
+        DataError: a file cannot be read.
+    """
+    from jeat_graph.io.hashing import sha256_of
+
+    return [
+        {
+            "path": str(p),
+            "absolute": str(Path(p).resolve()),
+            "bytes": Path(p).stat().st_size,
+            "sha256": sha256_of(p),
+        }
+        for p in paths
+    ]
+
+
+def find_input(given: str | Path, record: Mapping[str, Any], folder: Path) -> Path | None:
+    """Find an input of a run where it was, or where it lies now beside the run, by its SHA-256.
+
+    Args:
+        given: the path as it was given.
+        record: what `describe_inputs` said of the file.
+        folder: of the run.
+
+    Returns:
+        The first file that is the input; else one at its place that has changed since; None without either.
+    """
+    from jeat_graph.io.hashing import sha256_of
+
+    there = [place for place in dict.fromkeys(_places(Path(given), record, folder)) if place.is_file()]
+    same = (place for place in there if place.stat().st_size == record.get("bytes", place.stat().st_size))
+    return next(
+        (place for place in same if sha256_of(place) == record["sha256"]), there[0] if there else None
+    )
+
+
+def _places(given: Path, record: Mapping[str, Any], folder: Path) -> Iterator[Path]:
+    yield given
+    absolute = Path(record.get("absolute", given))
+    yield absolute
+    parts = absolute.parts
+    above = [folder.resolve(), *folder.resolve().parents][: _MOST_UP + 1]
+    for count in range(min(len(parts), _MOST_PARTS), 0, -1):
+        for place in above:
+            yield place.joinpath(*parts[-count:])

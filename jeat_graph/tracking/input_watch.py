@@ -1,0 +1,95 @@
+"""Looks at the first scans for slips that no single scan shows: other units, other corners, another picture."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+
+import numpy as np
+
+from jeat_graph.config.schema import Config
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.detections import Scan
+from jeat_graph.data.errors import InputWarning
+from jeat_graph.io.time_units import LONGEST_STEP_S, likely_unit
+
+#: Boxes after which a first opinion is formed, and after which the watch ends.
+FIRST_BOXES, LAST_BOXES = 20, 200
+#: Scans of one sensor by which its step is judged.
+STEP_SCANS = 6
+# Share of box centres outside the picture above which its size must be another.
+_MOST_OUTSIDE = 0.05
+# Detectors let boxes reach over the edge by a little.
+_OVER_EDGE = 1.1
+
+
+class InputWatch:
+    """Warns, once for each kind of slip, with an `InputWarning`; then costs nothing any more.
+
+    Args:
+        config: what the scans should fit.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self._config = config
+        self._boxes: list[FloatArray] = []
+        self._count = 0
+        self._opinion_at = FIRST_BOXES
+        self._times: dict[str, list[float]] = {}
+        self._said: set[str] = set()
+
+    def look(self, batch: Sequence[Scan]) -> None:
+        """Take notice of the scans of one time."""
+        for scan in batch:
+            times = self._times.setdefault(scan.sensor, [])
+            if len(times) < STEP_SCANS:
+                times.append(scan.t)
+                if len(times) == STEP_SCANS:
+                    self._judge_step(scan.sensor, np.array(times))
+            if self._count < LAST_BOXES and len(scan.boxes):
+                self._boxes.append(np.array(scan.boxes))
+                self._count += len(scan.boxes)
+        if self._count >= self._opinion_at and self._boxes:
+            self._judge_boxes(np.concatenate(self._boxes))
+            if self._opinion_at == LAST_BOXES:
+                self._boxes = []
+            self._opinion_at = LAST_BOXES
+
+    def _judge_step(self, sensor: str, times: FloatArray) -> None:
+        step = float(np.median(np.diff(times)))
+        declared = self._config.sensors.get(sensor)
+        if step < LONGEST_STEP_S or declared is None or declared.rate_hz * step < 2.0:
+            return
+        unit = likely_unit(step)
+        guess = f"are the times in {unit}? They must be in s" if unit else "are the times in s?"
+        self._say("step", f"sensor {sensor!r} has a median step of {step:.6g} s: {guess}")
+
+    def _judge_boxes(self, boxes: FloatArray) -> None:
+        width, height = self._config.image.width, self._config.image.height
+        far = boxes[:, :2] + boxes[:, 2:]
+        over = bool((far[:, 0].max() > _OVER_EDGE * width) or (far[:, 1].max() > _OVER_EDGE * height))
+        if far.max() <= 1.5:
+            self._say(
+                "shares", "all boxes lie within [0, 1]: they must be in px, not in shares of the picture"
+            )
+        elif over and (boxes[:, 2:] > boxes[:, :2]).all():
+            self._say(
+                "corners",
+                "boxes look like x1, y1, x2, y2, taken for left, top, width, height: convert them (in Python "
+                "Scan.from_xyxy)",
+            )
+        else:
+            centre = boxes[:, :2] + 0.5 * boxes[:, 2:]
+            outside = int(((centre < 0.0) | (centre > (width, height))).any(axis=1).sum())
+            if outside > _MOST_OUTSIDE * len(boxes):
+                self._say(
+                    "outside",
+                    f"{outside} of the first {len(boxes)} box centres lie outside the picture of {width:g} x "
+                    f"{height:g} px; give its size: --image WIDTHxHEIGHT (in Python image=(width, height))",
+                )
+
+    def _say(self, kind: str, text: str) -> None:
+        if kind not in self._said:
+            self._said.add(kind)
+            # Four frames up is the caller of the tracker's step.
+            warnings.warn(text, InputWarning, stacklevel=5)

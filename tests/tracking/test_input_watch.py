@@ -1,0 +1,67 @@
+"""Slips that no single scan shows are warned of once: units, corners, another picture."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+from jeat_graph.config.reading import load_config
+from jeat_graph.data.detections import Scan
+from jeat_graph.data.errors import InputWarning
+from jeat_graph.tracking.input_watch import STEP_SCANS, InputWatch
+
+BOX = (300.0, 200.0, 60.0, 40.0)
+
+
+def seen(box: tuple[float, ...], step: float = 0.05, scans: int = 100, **settings: float) -> list[str]:
+    """Warnings about a recording with three boxes a scan."""
+    overrides = [f"sensors.rgb.{key}={value}" for key, value in settings.items()]
+    watch = InputWatch(load_config("default", overrides))
+    rng = np.random.default_rng(3)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for k in range(scans):
+            boxes = np.array([box] * 3) * (1.0 + 0.01 * rng.random((3, 1)))
+            watch.look([Scan(step * k, "rgb", boxes, np.full(3, 0.9))])
+    assert all(issubclass(one.category, InputWarning) for one in caught)
+    return [str(one.message) for one in caught]
+
+
+def test_what_is_right_passes_in_silence():
+    assert seen(BOX) == []
+
+
+def test_boxes_in_shares_of_the_picture_are_named():
+    (text,) = seen((0.3, 0.2, 0.1, 0.05))
+    assert "must be in px, not in shares" in text
+
+
+def test_corners_taken_for_sizes_are_named():
+    (text,) = seen((900.0, 500.0, 960.0, 540.0))
+    assert "x1, y1, x2, y2" in text
+
+
+def test_a_large_vehicle_in_the_corner_is_no_slip():
+    assert seen((10.0, 20.0, 400.0, 300.0)) == []
+
+
+def test_boxes_of_another_picture_are_named():
+    (text,) = seen((1700.0, 900.0, 60.0, 40.0))
+    assert "box centres lie outside the picture of 1280 x 720 px" in text
+    assert "image=(width, height)" in text
+
+
+@pytest.mark.parametrize(("step", "unit"), [(50.0, "ms"), (5e7, "ns")])
+def test_times_in_other_units_are_named(step, unit):
+    (text,) = seen(BOX, step)
+    assert f"are the times in {unit}?" in text
+
+
+def test_a_sensor_declared_as_slow_is_believed():
+    assert seen(BOX, 50.0, rate_hz=0.02) == []
+
+
+def test_a_few_scans_are_no_ground_for_a_word():
+    assert seen(BOX, 50.0, scans=STEP_SCANS - 1) == []
