@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-# So far up from the run, and so many folders of the input's path, an input that was moved along is looked for.
+# An input that was moved along is looked for so far up from the run, by so many last parts of its path.
 _MOST_UP, _MOST_PARTS = 4, 4
 
 

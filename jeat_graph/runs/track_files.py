@@ -66,15 +66,23 @@ class TrackRequest:
             return self, facts
         return replace(self, rate_hz=facts.rate_hz), facts
 
-    def load_config(self) -> Config:
-        """Load the configuration.
+    def configured(self) -> tuple[Config, list[str]]:
+        """Load the configuration, with the picture's size from files beside the detections.
+
+        Returns:
+            The configuration, and a line for each thing that was found out.
 
         Raises:
             ConfigError: it is not valid.
+            DataError: a file cannot be read.
         """
         from jeat_graph.config.reading import load_config
 
-        return load_config(self.config, self.overrides)
+        return with_picture(load_config(self.config, self.overrides), self.overrides, self.with_facts()[1])
+
+    def load_config(self) -> Config:
+        """Return the configuration as `configured` does, alone."""
+        return self.configured()[0]
 
     def source(self) -> dict[str, Any]:
         """Describe the inputs as `run.json` has them.
@@ -123,10 +131,9 @@ def track_files(
     from jeat_graph.tracking.warm_up import notice_if_cold
 
     begin = time.perf_counter()
-    config = request.load_config()
+    config, notes = request.configured()
     directory = RunDirectory(request.out, inputs=request.files)
-    request, facts = request.with_facts()
-    config, notes = with_picture(config, request.overrides, facts)
+    request = request.with_facts()[0]
     for note in notes:
         say(note)
     detections = read_many(request.detections, **request._reading())

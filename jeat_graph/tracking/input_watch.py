@@ -1,4 +1,4 @@
-"""Looks at the first scans for slips that no single scan shows: other units, other corners, another picture."""
+"""Looks at the first scans for slips that no single scan shows: units, corners, another picture."""
 
 from __future__ import annotations
 
@@ -69,9 +69,7 @@ class InputWatch:
         far = boxes[:, :2] + boxes[:, 2:]
         over = bool((far[:, 0].max() > _OVER_EDGE * width) or (far[:, 1].max() > _OVER_EDGE * height))
         if far.max() <= 1.5:
-            self._say(
-                "shares", "all boxes lie within [0, 1]: they must be in px, not in shares of the picture"
-            )
+            self._say("shares", "all boxes lie in [0, 1]: they must be in px, not in shares of the picture")
         elif over and (boxes[:, 2:] > boxes[:, :2]).all():
             self._say(
                 "corners",

@@ -110,9 +110,7 @@ class Tracker(SmoothedTracks):
         """
         if self._finished:
             raise JeatGraphError("this tracker has been finished; make another one for another recording")
-        batch = as_scans(scans)
-        table, taken = self.take_in(batch)
-        self._watch.look(batch)
+        table, taken = self.take_in(as_scans(scans))
         self.hand_over(taken)
         return table
 
@@ -147,6 +145,7 @@ class Tracker(SmoothedTracks):
             self._tracks, self._num_tracks, self._next_id, dt, arrivals, self._scene, self._model, self._log
         )
         self._t = t
+        self._watch.look(batch)
         table = self.causal()
         if self._smoothers is None:
             return table, None
