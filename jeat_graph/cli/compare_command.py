@@ -111,7 +111,7 @@ def recorded_inputs(folder: Path, moved: list[str] | None = None) -> tuple[Confi
         config = config_from_dict(content["config"])
     except OSError as error:
         raise DataError(f"cannot be read: {error.strerror or error}; is {folder} a run?", path) from None
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise DataError("is not the record of a run by this version of `jeat-graph track`", path) from None
     if moved is not None:
         if len(moved) != len(inputs):

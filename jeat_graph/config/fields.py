@@ -8,9 +8,13 @@ from typing import Any
 
 from jeat_graph.data.errors import ConfigError
 
+#: Bounds of every setting that has none of its own: their fourth powers can still be told from 0 and infinity.
+LARGEST = 1e16
+SMALLEST = 1e-12
+
 
 def number(
-    default: Any, unit: str, doc: str, low: float = 0.0, high: float = math.inf, open_low: bool = False
+    default: Any, unit: str, doc: str, low: float = 0.0, high: float = LARGEST, open_low: bool = False
 ) -> Any:
     """Declare a numeric field with unit, meaning and closed bounds (open at `low` if `open_low`)."""
     meta = {"unit": unit, "doc": doc, "low": low, "high": high, "open_low": open_low}
@@ -47,6 +51,8 @@ def check(section: Any) -> None:
                     bracket = "(" if meta["open_low"] else "["
                     bounds = f"{bracket}{meta['low']}, {meta['high']}]"
                     raise ConfigError(f"{f.name}: {v} is not in {bounds} ({meta['unit']})")
+                if 0.0 < abs(v) < SMALLEST:
+                    raise ConfigError(f"{f.name}: {v} is closer to 0 than {SMALLEST} ({meta['unit']})")
 
 
 @dataclass(frozen=True)

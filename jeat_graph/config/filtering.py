@@ -59,6 +59,13 @@ class SizeConfig(Section):
     rate_density: float = number(0.5, "1/s^1.5", "root spectral density of the rate's white driving noise")
     rate_std: float = number(0.5, "1/s", "std of a new track's rate of ln size")
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.rate_density == self.rate_std == 0.0:
+            raise ConfigError(
+                "rate_std: must not be 0 where rate_density is 0: sizes could not change at all"
+            )
+
 
 @dataclass(frozen=True)
 class NoiseConfig(Section):

@@ -14,6 +14,7 @@ import yaml
 
 from jeat_graph.config.schema import Config, SensorConfig
 from jeat_graph.config.section_tree import build, check_keys, plain, read_tree
+from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.data.errors import ConfigError
 
 
@@ -96,7 +97,7 @@ def _apply_override(tree: dict[str, Any], text: str) -> None:
     if not equals or not key.strip():
         raise ConfigError(f"--set {text!r}: must read key=value")
     try:
-        value = yaml.safe_load(raw)
+        value = load_yaml(raw)
     except yaml.YAMLError:
         raise ConfigError(f"--set {text!r}: the value cannot be read") from None
     *path, last = key.strip().split(".")

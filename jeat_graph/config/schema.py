@@ -65,9 +65,9 @@ class Config:
         if len(self.sensors) > 63:
             raise ConfigError(f"sensors: at most 63, not {len(self.sensors)}")
         for name in self.sensors:
-            if not name or any(c in name for c in '|,\n\r"') or name != name.strip():
+            if not name or any(c in name for c in '|,"') or name != name.strip() or not name.isprintable():
                 raise ConfigError(
-                    f"sensors: {name!r} cannot be a name (empty, or holds | , quote or newline)"
+                    f"sensors: {name!r} cannot be a name (empty, or holds | , quote or what cannot be printed)"
                 )
         unknown = [name for name in self.association.priority if name not in self.sensors]
         if unknown:

@@ -13,6 +13,7 @@ from typing import Any
 
 import yaml
 
+from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.data.errors import ConfigError
 
 
@@ -33,6 +34,8 @@ def read_tree(
     """
     if source in seen:
         raise ConfigError(f"{source}: `base` leads back to itself")
+    if len(seen) > _MOST_BASES:
+        raise ConfigError(f"{source}: more than {_MOST_BASES} files, each the `base` of the one before")
     if source in names:
         text = text_of(source)
     else:
@@ -46,17 +49,19 @@ def read_tree(
         except (OSError, UnicodeDecodeError) as error:
             raise ConfigError(f"{source}: cannot be read: {error}") from None
     try:
-        tree = yaml.safe_load(text)
+        tree = load_yaml(text)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         place = f"{source}:{mark.line + 1}" if mark is not None else source
-        raise ConfigError(f"{place}: not valid YAML: {getattr(error, 'problem', error)}") from None
+        raise ConfigError(f"{place}: not valid YAML: {getattr(error, 'problem', None) or error}") from None
     if not isinstance(tree, dict):
         raise ConfigError(f"{source}: must hold `key: value` lines")
     base = tree.pop("base", None)
     if base is None:
         return tree
-    return merge(read_tree(str(base), names, text_of, kind, (*seen, source)), tree)
+    if not isinstance(base, str):
+        raise ConfigError(f"{source}: `base` must be the name of a {kind} or file")
+    return merge(read_tree(base, names, text_of, kind, (*seen, source)), tree)
 
 
 def merge(low: Mapping[str, Any], high: Mapping[str, Any]) -> dict[str, Any]:
@@ -95,7 +100,7 @@ def build(kind: type[Any], tree: Any, where: str) -> Any:
     if tree is None:
         tree = {}
     if not isinstance(tree, Mapping):
-        raise ConfigError(f"{where[:-1]}: must hold `key: value` lines, not {tree!r}")
+        raise ConfigError(f"{where[:-1]}: must hold `key: value` lines, not {_short(tree)}")
     hints = typing.get_type_hints(kind)
     check_keys(tree, list(hints), where)
     values = {key: convert(hints[key], value, where + str(key)) for key, value in tree.items()}
@@ -121,7 +126,7 @@ def convert(hint: Any, value: Any, where: str) -> Any:
         return convert(next(a for a in typing.get_args(hint) if a is not type(None)), value, where)
     if origin is tuple:
         if not isinstance(value, list | tuple):
-            raise ConfigError(f"{where}: must be a list, not {value!r}")
+            raise ConfigError(f"{where}: must be a list, not {_short(value)}")
         args = typing.get_args(hint)
         if args[-1] is Ellipsis:
             return tuple(convert(args[0], v, where) for v in value)
@@ -136,8 +141,13 @@ def convert(hint: Any, value: Any, where: str) -> Any:
         else isinstance(value, int | float if hint is float else hint) and not isinstance(value, bool)
     )
     if not good:
-        raise ConfigError(f"{where}: must be {_WORDS[hint]}, not {value!r}")
+        raise ConfigError(f"{where}: must be {_WORDS[hint]}, not {_short(value)}")
     return float(value) if hint is float else value
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= _MOST_SHOWN else text[:_MOST_SHOWN] + "…"
 
 
 def plain(value: Any) -> Any:
@@ -149,5 +159,7 @@ def plain(value: Any) -> Any:
     return value
 
 
+_MOST_BASES = 50
+_MOST_SHOWN = 80  # characters of a value in a message
 _EXPONENT = r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+"
 _WORDS = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}

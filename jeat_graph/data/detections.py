@@ -16,12 +16,18 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, TextArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.interop import from_xyxy
 
+#: Farthest place and largest size of a box (px): no picture is that large, and fourth powers are far from infinity.
+LARGEST_PX = 1e9
+#: Smallest side of a box (px), far below boxes in fractions of the picture.
+SMALLEST_PX = 1e-9
+
 
 def check_boxes(boxes: npt.ArrayLike, scores: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Convert and check boxes and scores.
 
     Args:
-        boxes: (M, 4) left, top, width, height in px; all finite, width and height > 0.
+        boxes: (M, 4) left, top, width, height in px; all finite and within what a picture can hold
+            (`SMALLEST_PX`, `LARGEST_PX`), width and height > 0.
         scores: (M,) detector confidence in [0, 1].
 
     Returns:
@@ -59,8 +65,9 @@ def find_bad_row(boxes: FloatArray, scores: FloatArray) -> tuple[int, str] | Non
     finite: BoolArray = np.all(np.isfinite(boxes), axis=1)
     # NaN compares false everywhere, so each test is written for what is good.
     size = (boxes[:, 2] > 0.0) & (boxes[:, 3] > 0.0)
+    fits = (np.abs(boxes) <= LARGEST_PX).all(axis=1) & (boxes[:, 2:] >= SMALLEST_PX).all(axis=1)
     score = (scores >= 0.0) & (scores <= 1.0)
-    good = finite & size & score
+    good = finite & size & fits & score
     if good.all():
         return None
     row = int(np.argmin(good))
@@ -69,6 +76,11 @@ def find_bad_row(boxes: FloatArray, scores: FloatArray) -> tuple[int, str] | Non
         return row, f"left, top, width, height must be finite, got {left}, {top}, {width}, {height}"
     if not size[row]:
         return row, f"width and height must be positive, got {width} x {height}"
+    if not fits[row]:
+        return row, (
+            f"no picture holds a box at {left:g}, {top:g} of {width:g} x {height:g} px "
+            f"(places to {LARGEST_PX:g} px, sizes from {SMALLEST_PX:g} to {LARGEST_PX:g} px)"
+        )
     return row, f"score must be in [0, 1], got {scores[row]}"
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.io.limits import check_file, free_memory
 
 _BOM = b"\xef\xbb\xbf"
 _WIDE_BOMS = (b"\xff\xfe", b"\xfe\xff")
@@ -32,21 +33,19 @@ _OTHERS = {
 }
 #: Bytes that a compressed file may unpack to: beyond, it is a mistake or an attack.
 LARGEST_UNPACKED = 2**33
+#: Share of the free memory that it may fill, for columns are made of it.
+_SHARE_UNPACKED = 0.3
 
 
 def read_bytes(path: str | Path) -> bytes:
     """Return a file's bytes.
 
     Raises:
-        DataError: there is no such file, it is a folder, or it cannot be read.
+        DataError: there is no such file, it is no file (`limits.check_file`), or it cannot be read.
     """
-    file = Path(path)
+    check_file(path)
     try:
-        return file.read_bytes()
-    except FileNotFoundError:
-        raise DataError("no such file", path) from None
-    except IsADirectoryError:
-        raise DataError("is a folder; give a file", path) from None
+        return Path(path).read_bytes()
     except (OSError, ValueError) as error:
         raise DataError(f"cannot be read: {error}", path) from None
 
@@ -76,7 +75,9 @@ def read_text(path: str | Path) -> bytes:
 def _unpacked(data: bytes, path: str | Path, most: int | None = None) -> bytes:
     """Unpack gzip, in one or several members; with `most`, only the first bytes."""
     out: list[bytes] = []
-    size, limit = 0, LARGEST_UNPACKED if most is None else most
+    free = free_memory()
+    room = LARGEST_UNPACKED if free is None else min(LARGEST_UNPACKED, int(free * _SHARE_UNPACKED))
+    size, limit = 0, room if most is None else most
     complete = False
     try:
         while not complete:
@@ -194,7 +195,8 @@ class CsvBody:
 
     def _records(self) -> Iterator[tuple[int, list[str]]]:
         """Yield (line number, fields) of each row, by Python's own reader."""
-        text = io.StringIO(self.data.decode("utf-8", errors="replace"), newline="")
+        # Decoded piece by piece: a line without an end does not become four bytes a character.
+        text = io.TextIOWrapper(io.BytesIO(self.data), "utf-8", errors="replace", newline="")
         reader = csv.reader(text, delimiter=self.delimiter)
         line = self.first_line
         while True:

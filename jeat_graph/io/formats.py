@@ -8,6 +8,7 @@ from pathlib import Path
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.csv_text import first_bytes
+from jeat_graph.io.limits import check_file
 
 FORMATS = ("csv", "parquet", "motchallenge", "kitti", "prophesee", "coco")
 _MAGIC = {b"PAR1": "parquet", b"\x93NUMPY": "prophesee"}
@@ -49,12 +50,9 @@ def recognise(path: str | Path, fmt: str | None = None, allowed: Sequence[str] =
 
 
 def _guess(path: Path) -> str:
+    check_file(path)
     try:
         head = first_bytes(path, _HEAD_BYTES)
-    except FileNotFoundError:
-        raise DataError("no such file", path) from None
-    except IsADirectoryError:
-        raise DataError("is a folder; give a file", path) from None
     except (OSError, ValueError) as error:
         raise DataError(f"cannot be read: {error}", path) from None
     for magic, name in _MAGIC.items():

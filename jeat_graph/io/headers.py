@@ -5,11 +5,14 @@ from __future__ import annotations
 import csv
 import difflib
 import re
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from jeat_graph.data.errors import DataError
+
+_MOST_COLUMNS = 10_000
 
 
 class Header(NamedTuple):
@@ -32,7 +35,7 @@ def split_header(data: bytes, path: Path) -> Header:
     """Take the header off a CSV file's text.
 
     Raises:
-        DataError: it is not UTF-8, or its quotes are torn.
+        DataError: it is not UTF-8, its quotes are torn, or it names more columns than any table has.
     """
     line = 1
     while True:
@@ -49,6 +52,8 @@ def split_header(data: bytes, path: Path) -> Header:
         raise DataError("is not UTF-8; save the file as UTF-8", path, line) from None
     except csv.Error as error:
         raise DataError(f"cannot be read: {error}", path, line) from None
+    if len(fields) > _MOST_COLUMNS:
+        raise DataError(f"has {len(fields)} columns; at most {_MOST_COLUMNS} are read", path, line)
     return Header([field.strip() for field in fields], data, line, delimiter)
 
 
@@ -74,7 +79,7 @@ def check_names(
     """
     if line is not None and any(_is_number(name) for name in names):
         raise DataError(f"the first line must name the columns: {','.join(required)}", path, line)
-    twice = next((name for k, name in enumerate(names) if name in names[:k]), None)
+    twice = next((name for name, count in Counter(names).items() if count > 1), None)
     if twice is not None:
         raise DataError(f"column {twice!r} is there twice", path, line)
     absent = [name for name in (*required, *optional) if name not in names]

@@ -44,7 +44,10 @@ def read_array(path: str | Path) -> Table:
     for name in names:
         field = array[name]
         if field.ndim == 1 and field.dtype.kind in "iufb":
-            native = field.astype(field.dtype.newbyteorder("="))
+            # Arrow knows no floats of more than 64 bits.
+            wide = field.dtype.kind == "f" and field.dtype.itemsize > np.dtype(np.float64).itemsize
+            with np.errstate(over="ignore"):  # what does not fit becomes infinite, which is refused
+                native = field.astype(np.float64 if wide else field.dtype.newbyteorder("="))
             columns.setdefault(_ALIASES.get(name, name), pa.chunked_array([pa.array(native)]))
     for name in ("t", "x", "y", "w", "h"):
         if name not in columns:

@@ -16,8 +16,9 @@ import numpy.typing as npt
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.column_names import standing_in, usual_names
-from jeat_graph.io.csv_text import CsvBody, read_bytes, read_text
+from jeat_graph.io.csv_text import CsvBody, read_text
 from jeat_graph.io.headers import check_names, split_header
+from jeat_graph.io.parquet_columns import read_columns
 
 PARQUET_SUFFIXES = (".parquet", ".pq")
 _LARGEST_EXACT = 2.0**53  # beyond it a float cannot tell neighbouring whole numbers apart
@@ -220,7 +221,7 @@ def read_table(
     """
     file = Path(path)
     if file.suffix.lower() in PARQUET_SUFFIXES:
-        return _read_parquet(file, required, optional, aliases)
+        return Table(file, read_columns(file, required, optional, aliases))
     names, body, line, delimiter = split_header(read_text(file), file)
     header = names
     if aliases:
@@ -253,30 +254,3 @@ def table_of(body: CsvBody, names: Sequence[str], columns: Sequence[Any]) -> Tab
         lambda row: body.line_of_row(row if rows is None else int(rows[row])),
         decimal_comma=body.delimiter != ",",
     )
-
-
-def _read_parquet(path: Path, required: Sequence[str], optional: Sequence[str], aliases: bool) -> Table:
-    import pyarrow as pa
-    from pyarrow import compute, parquet
-
-    data = read_bytes(path)
-    if not data:
-        raise DataError("is empty", path)
-    try:
-        file = parquet.ParquetFile(pa.BufferReader(data))
-        own = file.schema_arrow.names
-        names = own
-        if aliases:
-            names = usual_names(own, (*required, *optional))
-            required = standing_in(names, required)
-        check_names(names, required, optional, path, None)
-        chosen = {name: own[names.index(name)] for name in (*required, *optional) if name in names}
-        table = file.read(list(chosen.values()))
-    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
-        raise DataError(f"cannot be read as Parquet: {str(error).splitlines()[0][:200]}", path) from None
-    columns = {name: table.column(there) for name, there in chosen.items()}
-    for name, column in columns.items():
-        if pa.types.is_floating(column.type):
-            # Tables made from arrays have NaN where tables made from rows have null.
-            columns[name] = compute.if_else(compute.is_nan(column), pa.scalar(None, column.type), column)
-    return Table(path, columns)

@@ -6,7 +6,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from jeat_graph import Tracker, load_config
-from jeat_graph.data.detections import Detections, Scan
+from jeat_graph.data.detections import LARGEST_PX, SMALLEST_PX, Detections, Scan
 from jeat_graph.data.errors import DataError, TimeOrderError, UnknownSensorError
 from jeat_graph.tracking.tracker import track
 
@@ -151,9 +151,9 @@ def test_scans_a_microsecond_apart_reach_the_smoother_at_any_epoch(epoch):
 @pytest.mark.parametrize("preset", PRESETS)
 def test_one_batch_of_the_largest_and_smallest_numbers_does_no_harm(preset, state):
     tracker = Tracker(CONFIGS[preset])
-    big = 1e150
+    big, small = LARGEST_PX, SMALLEST_PX
     for t in (-1e308, 0.0, 0.05, 0.1, 1e9, 1e60, 1e120, 1e300, 1.7e308):
-        wild = [[-big, 0, 1, 1], [0, 0, big, big], [0, 0, 1e-150, 1e-150], [5, 5, 20, 20]]
+        wild = [[-big, 0, 1, 1], [0, 0, big, big], [0, 0, small, small], [5, 5, 20, 20]]
         table = tracker.step((t, "rgb", wild, [1.0, 0.5, 0.2, 0.9]))
         assert np.isfinite(table.mean).all()
         assert np.isfinite(table.var).all()

@@ -10,6 +10,7 @@ from typing import Any
 
 import yaml
 
+from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.io.atomic import open_atomic
 from jeat_graph.simulation.dataset.disk import check_room, segment_bound
@@ -136,7 +137,7 @@ def _check_folder(root: Path, settings: dict[str, Any], segments: int) -> None:
             raise ConfigError(f"{root}: holds other files; give a new folder")
         return
     try:
-        there = yaml.safe_load(path.read_text(encoding="utf-8"))
+        there = load_yaml(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         raise ConfigError(f"{path}: cannot be read: {error}") from None
     wanted = yaml.safe_load(_yaml(settings))

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.io.detections_io import read_detections
@@ -188,7 +189,7 @@ def _check_detections(root: Path, manifest: dict[str, Any]) -> Iterator[str]:
     import yaml
 
     try:
-        camera = yaml.safe_load((root / CAMERA).read_text(encoding="utf-8"))
+        camera = load_yaml((root / CAMERA).read_text(encoding="utf-8"))
         size = int(camera["width"]), int(camera["height"])
     except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError):
         yield f"{root / CAMERA}: has no width and height"

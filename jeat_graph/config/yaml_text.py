@@ -1,0 +1,56 @@
+"""YAML from anybody, read so that no text can take more time or memory than its length deserves.
+
+Only plain values are made (`safe` loading: no tag runs anything). A text may name a part of itself (`&a`) and
+repeat it (`*a`); lists of such repetitions double with every line, so what they stand for is counted before
+anything is made of it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import yaml
+
+#: Values that a text may stand for once its repetitions are written out; the largest preset has some hundreds.
+MOST_VALUES = 20_000
+
+
+def load_yaml(text: str) -> Any:
+    """Read one YAML document as nested mappings, lists, texts and numbers.
+
+    Raises:
+        yaml.YAMLError: not valid YAML, nested too deeply, or more than `MOST_VALUES` by repetition.
+    """
+    loader = yaml.SafeLoader(text)
+    try:
+        node = loader.get_single_node()
+        if node is None:
+            return None
+        _count(node, {})
+        return loader.construct_document(node)
+    except RecursionError:
+        raise yaml.YAMLError("is nested too deeply") from None
+    except (ValueError, OverflowError) as error:
+        # A date such as 2026-99-99, or a number of too many digits.
+        raise yaml.YAMLError(str(error)) from None
+    finally:
+        loader.dispose()  # type: ignore[no-untyped-call]
+
+
+def _count(node: yaml.Node, known: dict[int, int]) -> int:
+    """Count the values a node stands for; `known` has those of the nodes counted before, 0 while at it."""
+    if not isinstance(node, yaml.CollectionNode):
+        return 1
+    if id(node) in known:
+        if not known[id(node)]:
+            raise yaml.YAMLError("holds itself (an alias within what it names)")
+        return known[id(node)]
+    known[id(node)] = 0
+    parts = node.value
+    if isinstance(node, yaml.MappingNode):
+        parts = [part for pair in node.value for part in pair]
+    total = 1 + sum(_count(part, known) for part in parts)
+    if total > MOST_VALUES:
+        raise yaml.YAMLError(f"stands for more than {MOST_VALUES} values; its aliases repeat too much")
+    known[id(node)] = total
+    return total
