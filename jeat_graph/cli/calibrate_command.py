@@ -35,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Calibrate, write the configuration, and print what was estimated."""
     from jeat_graph.config.reading import load_config
+    from jeat_graph.io.atomic import check_writable
     from jeat_graph.io.config_io import save_config
     from jeat_graph.io.detections_io import read_detections
     from jeat_graph.io.truth_io import read_truth
@@ -45,6 +46,7 @@ def run(args: argparse.Namespace) -> int:
         )
     if Path(args.out).suffix not in (".yaml", ".yml"):
         raise ConfigError(f"--out {args.out}: the name of a configuration must end in .yaml")
+    check_writable(args.out)
     base = load_config(args.config)
     recordings = [read_detections(path, **reading(args)) for path in args.detections]
     beside = None if args.image else _size_beside(args.detections)

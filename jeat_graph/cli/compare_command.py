@@ -53,12 +53,14 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.drawing.comparison import write_plots
     from jeat_graph.eval.compare import LAGS_S, compare
     from jeat_graph.eval.tables import to_json
-    from jeat_graph.io.atomic import open_atomic
+    from jeat_graph.io.atomic import check_writable, open_atomic
     from jeat_graph.io.truth_io import read_truth
     from jeat_graph.runs.beside import rate_of_truth
     from jeat_graph.tracking.records import record_tracks
 
     folder = Path(args.run_directory)
+    out = folder if args.out is None else Path(args.out)
+    check_writable(out / "compare.json")
     truth = (
         None if args.gt is None else read_truth(args.gt, rate_hz=rate_of_truth(folder, args.gt, args.rate))
     )
@@ -78,7 +80,6 @@ def run(args: argparse.Namespace) -> int:
         lags_s=args.lags or LAGS_S,
     )
     print("\n".join(table.render() for table in comparison.tables), end="")
-    out = folder if args.out is None else Path(args.out)
     with open_atomic(out / "compare.json") as file:
         file.write(to_json(comparison.values))
     if not args.no_plots:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
-import warnings
 from collections.abc import Sequence
-from functools import partial
 from importlib import import_module
 
 from jeat_graph.cli.options import Parser
+from jeat_graph.cli.terminal import Terminated, describe, in_good_order, write_anything
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.version import __version__
 
@@ -59,38 +59,32 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command.
 
     Returns:
-        0 on success, 1 where a check did not hold, 2 on bad input or usage, 130 when interrupted.
+        0 on success, 1 where a check did not hold, 2 on bad input or usage, 130 when interrupted, 128 + N
+        when ended by signal N.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
+    write_anything()
     command = next((a for a in arguments if a in COMMANDS), None)
     args = build_parser(command).parse_args(arguments)
     try:
-        with warnings.catch_warnings():
-            warnings.showwarning = partial(_show_warning, args.command)
-            return int(args.run(args) or 0)
-    except JeatGraphError as error:
-        print(f"jeat-graph {args.command}: {_one_line(error)}", file=sys.stderr)
+        with in_good_order(args.command):
+            code = int(args.run(args) or 0)
+            sys.stdout.flush()  # what cannot be written is noticed here, not at exit
+            return code
+    except BrokenPipeError:
+        # The reader of our output went away (`| head`): not an error. Python would complain once more
+        # when it flushes at exit, so its stdout is pointed elsewhere.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except (JeatGraphError, OSError, MemoryError) as error:
+        print(f"jeat-graph {args.command}: {describe(error)}", file=sys.stderr)
         return 2
-    except OSError as error:
-        if isinstance(error, BrokenPipeError):
-            # The reader of our output went away (`| head`): not an error. Python would complain once more
-            # when it flushes at exit, so its stdout is pointed elsewhere.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            return 0
-        print(f"jeat-graph {args.command}: {_one_line(error)}", file=sys.stderr)
-        return 2
+    except Terminated as end:
+        print(f"jeat-graph {args.command}: ended by {signal.Signals(end.number).name}", file=sys.stderr)
+        return 128 + end.number
     except KeyboardInterrupt:
         print(f"jeat-graph {args.command}: interrupted", file=sys.stderr)
         return 130
-
-
-def _show_warning(command: str, message: Warning | str, *_: object, **__: object) -> None:
-    """Show a warning as the commands' own are shown, without the place in the code that it came from."""
-    print(f"jeat-graph {command}: warning: {' '.join(str(message).split())}", file=sys.stderr)
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jeat_graph.cli.options import add_output_rate, add_rate
+from jeat_graph.cli.terminal import one_line
 from jeat_graph.config.argument_types import drawn_size, not_negative, positive
 from jeat_graph.data.errors import DataError
 from jeat_graph.drawing.movie.film import CODECS
@@ -93,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
     with ExitStack() as stack:
         movie, rate_hz, warnings = open_movie(request, stack)
         for warning in warnings:
-            print(f"jeat-graph render: warning: {warning}", file=sys.stderr)
+            print(f"jeat-graph render: warning: {one_line(warning)}", file=sys.stderr)
         if args.at is not None:
             write_png(out, movie.picture(0))
         else:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jeat_graph.cli.options import add_rate
+from jeat_graph.cli.terminal import one_line
 
 if TYPE_CHECKING:
     from jeat_graph.drawing.page.figures import ComparedRun
@@ -40,13 +41,14 @@ def run(args: argparse.Namespace) -> int:
     """Read the run, compare if its inputs are there, write the page."""
     from jeat_graph.data.errors import DataError
     from jeat_graph.drawing.page.document import render_page
-    from jeat_graph.io.atomic import open_atomic
+    from jeat_graph.io.atomic import check_writable, open_atomic
     from jeat_graph.runs.beside import rate_of_truth
     from jeat_graph.runs.recorded import load_run_data
 
     out = Path(args.out)
     if out.is_dir():
         raise DataError("is a folder; --out must name a file, such as report.html", out)
+    check_writable(out)
     if args.gt is not None:
         args.rate = rate_of_truth(args.run_directory, args.gt, args.rate)
     data = load_run_data(args.run_directory, args.gt, args.rate)
@@ -55,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
     with open_atomic(out) as file:
         file.write(page)
     for note in (*data.notes, *([] if reason is None else [reason])):
-        print(f"jeat-graph report: {note}", file=sys.stderr)
+        print(f"jeat-graph report: {one_line(note)}", file=sys.stderr)
     print(f"wrote {out}: {len(data.track_ids())} tracks, {out.stat().st_size / 1e6:.1f} MB")
     return 0
 

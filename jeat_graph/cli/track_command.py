@@ -16,6 +16,7 @@ from jeat_graph.cli.options import (
     extra_formats,
     overrides,
 )
+from jeat_graph.cli.terminal import one_line
 
 HELP = "track the vehicles in files of detections and write a run directory"
 
@@ -83,4 +84,4 @@ def _say(text: str) -> None:
 
 
 def _warn(text: str) -> None:
-    print(f"jeat-graph track: warning: {text}", file=sys.stderr)
+    print(f"jeat-graph track: warning: {one_line(text)}", file=sys.stderr)

@@ -8,7 +8,7 @@ from typing import Any
 
 from jeat_graph.data.errors import ConfigError
 
-#: Bounds of every setting that has none of its own: their fourth powers can still be told from 0 and infinity.
+#: Bounds of every setting without some of its own: their fourth powers are neither 0 nor infinite.
 LARGEST = 1e16
 SMALLEST = 1e-12
 

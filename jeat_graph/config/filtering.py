@@ -62,9 +62,7 @@ class SizeConfig(Section):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.rate_density == self.rate_std == 0.0:
-            raise ConfigError(
-                "rate_std: must not be 0 where rate_density is 0: sizes could not change at all"
-            )
+            raise ConfigError("rate_std: must not be 0 where rate_density is: sizes could not change")
 
 
 @dataclass(frozen=True)

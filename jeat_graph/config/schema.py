@@ -67,7 +67,7 @@ class Config:
         for name in self.sensors:
             if not name or any(c in name for c in '|,"') or name != name.strip() or not name.isprintable():
                 raise ConfigError(
-                    f"sensors: {name!r} cannot be a name (empty, or holds | , quote or what cannot be printed)"
+                    f"sensors: {name!r} cannot be a name (empty, or holds | , quote or what has no sign)"
                 )
         unknown = [name for name in self.association.priority if name not in self.sensors]
         if unknown:

@@ -11,7 +11,7 @@ from typing import Any
 
 import yaml
 
-#: Values that a text may stand for once its repetitions are written out; the largest preset has some hundreds.
+#: Values that a text may stand for, its repetitions written out; the largest preset has some hundreds.
 MOST_VALUES = 20_000
 
 

@@ -16,7 +16,7 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, TextArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.interop import from_xyxy
 
-#: Farthest place and largest size of a box (px): no picture is that large, and fourth powers are far from infinity.
+#: Farthest place and largest size of a box (px): no picture is that large.
 LARGEST_PX = 1e9
 #: Smallest side of a box (px), far below boxes in fractions of the picture.
 SMALLEST_PX = 1e-9

@@ -26,11 +26,15 @@ import numpy.typing as npt
 from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
+from jeat_graph.io.hdf5_items import check_storage, find_item, single_item
 
 US_PER_MS = 1000
 LABEL = "by_motion"
 _COLUMNS = ("x", "y", "p", "t")
 _PIECE_ROWS = 1 << 20
+_MOST_MS = 24 * 3600 * 1000
+_MOST_PX = 1 << 16  # columns and rows have 16 bits
+_LATEST = 1 << 53  # µs; whole numbers up to here are exact as floats
 
 
 class EventFile:
@@ -55,19 +59,24 @@ class EventFile:
         self._file = _open(self.path)
         try:
             self._events = self._columns()
-            self._index: npt.NDArray[np.int64] = np.asarray(
-                self._read(self._dataset("ms_to_idx", "ui"), slice(None)), dtype=np.int64
-            )
-            if len(self._index) and (self._index[-1] > len(self) or (np.diff(self._index) < 0).any()):
+            index = self._dataset("ms_to_idx", "ui")
+            if index.shape[0] > _MOST_MS:
+                raise DataError(
+                    f"ms_to_idx has {index.shape[0]} entries, but at most a day is read", self.path
+                )
+            self._index: npt.NDArray[np.int64] = np.asarray(self._read(index, slice(None)), dtype=np.int64)
+            if len(self._index) and (
+                self._index[0] < 0 or self._index[-1] > len(self) or (np.diff(self._index) < 0).any()
+            ):
                 raise DataError("ms_to_idx does not belong to these events", self.path)
-            offset = self._file.get("t_offset")
-            self.t_offset_us = 0 if offset is None else int(np.asarray(offset[()]).reshape(-1)[0])
-            width, height = self._file.attrs.get("width"), self._file.attrs.get("height")
-            self.size_px = None if width is None or height is None else (int(width), int(height))
+            offset = single_item(self._file, "t_offset", self.path)
+            self.t_offset_us = 0 if offset is None else self._whole("t_offset", offset, -_LATEST, _LATEST)
+            sides = [self._attribute(name, 1, _MOST_PX) for name in ("width", "height")]
+            self.size_px = None if sides[0] is None or sides[1] is None else (sides[0], sides[1])
             self.labelled = LABEL in self._events
-            stored = self._file.attrs.get("duration_us")
+            stored = self._attribute("duration_us", 0, _LATEST)
             last = int(self._read(self._events["t"], slice(len(self) - 1, None))[0]) + 1 if len(self) else 0
-            self.duration_us = last if stored is None else max(int(stored), last)
+            self.duration_us = last if stored is None else max(stored, last)
         except BaseException:
             self.close()
             raise
@@ -138,7 +147,7 @@ class EventFile:
 
     def _columns(self) -> dict[str, Any]:
         columns = {name: self._dataset(f"events/{name}", "uib") for name in _COLUMNS}
-        if f"events/{LABEL}" in self._file:
+        if find_item(self._file, f"events/{LABEL}", self.path) is not None:
             columns[LABEL] = self._dataset(f"events/{LABEL}", "uib")
         lengths = {name: data.shape[0] for name, data in columns.items()}
         if len(set(lengths.values())) > 1:
@@ -147,21 +156,40 @@ class EventFile:
         return columns
 
     def _dataset(self, name: str, kinds: str) -> Any:
-        data = self._file.get(name)
+        data = find_item(self._file, name, self.path)
         if data is None or not hasattr(data, "shape"):
             raise DataError(
                 f"data set {name!r} is missing; an event file has events/x, y, p, t and ms_to_idx", self.path
             )
-        if data.dtype.kind not in kinds or len(data.shape) != 1:
+        if data.shape is None or data.dtype.kind not in kinds or len(data.shape) != 1:
             raise DataError(
-                f"{name} must be a column of whole numbers, not {data.dtype} {tuple(data.shape)}", self.path
+                f"{name} must be a column of whole numbers, not {data.dtype} {data.shape}", self.path
             )
+        check_storage(data, name, self.path)
         return data
+
+    def _attribute(self, name: str, low: int, high: int) -> int | None:
+        try:
+            value = self._file.attrs.get(name)
+        except (OSError, KeyError, RuntimeError, ValueError, TypeError):
+            raise DataError(f"the attribute {name} cannot be read", self.path) from None
+        return None if value is None else self._whole(f"the attribute {name}", value, low, high)
+
+    def _whole(self, name: str, value: Any, low: int, high: int) -> int:
+        try:
+            number = float(np.asarray(value).reshape(-1)[0])
+            good = low <= number <= high and number == round(number)
+        except (ValueError, TypeError, IndexError, OverflowError):
+            good = False
+        if not good:
+            shown = " ".join(repr(value).split())[:40]
+            raise DataError(f"{name} must be a whole number from {low} to {high}, not {shown}", self.path)
+        return int(np.asarray(value).reshape(-1)[0])
 
     def _read(self, data: Any, rows: slice) -> npt.NDArray[Any]:
         try:
             return np.asarray(data[rows])
-        except OSError as error:
+        except (OSError, RuntimeError, ValueError, MemoryError) as error:
             reason = " ".join(str(error).split())[:200]
             hint = "; pip install 'jeat-graph[hdf5]' has filters such as blosc" if "filter" in reason else ""
             raise DataError(f"cannot be read: {reason}{hint}", self.path) from None

@@ -5,14 +5,17 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Iterable
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.io.locking import hold_folder, remove_folders
 from jeat_graph.io.scans_io import SCANS
 
 RUN_JSON = "run.json"
+_UNFINISHED = ".unfinished-"
 DIAGNOSTICS = "diagnostics.csv"
 TABLES = ("causal", "smoothed")
 SUFFIXES = {"csv": ".csv", "parquet": ".parquet", "motchallenge": ".mot.txt", "kitti": ".kitti.txt"}
@@ -33,7 +36,8 @@ class RunDirectory:
         inputs: files the run is made from, which it must not replace.
 
     Raises:
-        DataError: `folder` is a file, or an input is one of the files that would be replaced.
+        DataError: `folder` is a file, or an input is one of the files that would be replaced; on entering,
+            if another process is writing a run there.
     """
 
     def __init__(self, folder: str | Path, inputs: Iterable[str | Path] = ()) -> None:
@@ -47,6 +51,7 @@ class RunDirectory:
                     f"would be replaced by a file of the run; choose another --out than {folder}", path
                 )
         self._staging: Path | None = None
+        self._hold = ExitStack()
         self._made: list[Path] = []
 
     def path(self, name: str) -> Path:
@@ -61,7 +66,14 @@ class RunDirectory:
             self._made.append(missing)
             missing = missing.parent
         self.folder.mkdir(parents=True, exist_ok=True)
-        self._staging = Path(tempfile.mkdtemp(dir=self.folder, prefix=".unfinished-"))
+        try:
+            if self._hold.enter_context(hold_folder(self.folder)):
+                remove_folders(self.folder, _UNFINISHED + "*")  # of runs that were killed
+            self._staging = Path(tempfile.mkdtemp(dir=self.folder, prefix=_UNFINISHED))
+        except BaseException:
+            self._hold.close()
+            self._remove_made()
+            raise
         return self
 
     def __exit__(
@@ -76,6 +88,7 @@ class RunDirectory:
                 self._publish(self._staging)
         finally:
             shutil.rmtree(self._staging, ignore_errors=True)
+            self._hold.close()
             if error is not None:
                 self._remove_made()
 

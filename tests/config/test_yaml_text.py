@@ -89,7 +89,7 @@ def test_settings_whose_squares_no_float_holds_are_refused(override, words):
 
 
 def test_sizes_that_could_not_change_at_all_are_refused():
-    with pytest.raises(ConfigError, match="size.rate_std"):
+    with pytest.raises(ConfigError, match=r"size\.rate_std"):
         load_config("default", ["size.rate_std=0", "size.rate_density=0"])
     load_config("default", ["size.rate_std=0"])
     load_config("default", ["size.rate_density=0"])

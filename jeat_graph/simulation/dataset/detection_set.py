@@ -13,10 +13,11 @@ import yaml
 from jeat_graph.io.atomic import open_atomic
 from jeat_graph.io.detections_io import write_detections
 from jeat_graph.io.hashing import sha256_of
+from jeat_graph.io.locking import hold_folder
 from jeat_graph.io.truth_io import write_truth
 from jeat_graph.simulation.dataset.layout import CAMERA, DETECTIONS, MANIFEST, SCENARIO, TRUTH
 from jeat_graph.simulation.scenario import Scenario, scenario_to_yaml
-from jeat_graph.simulation.simulate import record
+from jeat_graph.simulation.simulate import SimulatedRecording, record
 from jeat_graph.version import __version__
 
 STEPS = 3  # calls of `on_step`
@@ -40,10 +41,19 @@ def write_detection_set(
 
     Raises:
         ConfigError: a seed or a duration that is not valid.
+        DataError: another process is writing into the folder.
     """
     recording = record(scenario, seed, duration_s)
     on_step()
-    detections, truth = recording.detections, recording.truth
+    out.mkdir(parents=True, exist_ok=True)
+    with hold_folder(out):
+        return _write(recording, name, out, {"seed": seed, "duration_s": duration_s}, on_step)
+
+
+def _write(
+    recording: SimulatedRecording, name: str, out: Path, asked: dict[str, Any], on_step: Callable[[], object]
+) -> dict[str, Any]:
+    detections, truth, scenario = recording.detections, recording.truth, recording.scenario
     write_detections(detections, out / DETECTIONS)
     on_step()
     write_truth(truth, out / TRUTH)
@@ -63,8 +73,7 @@ def write_detection_set(
     manifest: dict[str, Any] = {
         "version": __version__,
         "scenario": name,
-        "seed": seed,
-        "duration_s": duration_s,
+        **asked,
         "density": scenario.traffic.density,
         "sensors": sensors,
         "truth": {

@@ -14,6 +14,9 @@ _EVENT_BYTES = {"gzip": 3.5, "blosc": 3.5, "none": 10.0}
 _EVENTS_PER_PIXEL = 1.0  # and frame
 _MARGIN = 1.2  # over the largest segment so far
 _RESERVE = 50_000_000  # left for manifest, annotations and others
+#: Below this (bytes) a disk counts as full: libraries keep that much back and write it when they please.
+_LEAST = 16_000_000
+FULL = "the disk is full; what is done is kept, run again to go on when there is room"
 
 
 def segment_bound(size_px: tuple[int, int], frames: int, video: str, compression: str) -> int:
@@ -50,3 +53,18 @@ def check_room(root: Path, remaining: int, sizes: Sequence[int], bound: int, at_
             f"{remaining} segments need about {need / 1e9:.3g} GB, and {free / 1e9:.3g} GB are free{kept}",
             root,
         )
+
+
+def disk_is_full(place: Path) -> bool:
+    """Tell whether the disk of a folder has too little room to go on writing."""
+    return shutil.disk_usage(place).free < _LEAST
+
+
+def check_disk(place: Path) -> None:
+    """Check while writing that the disk is not full.
+
+    Raises:
+        DataError: it is.
+    """
+    if disk_is_full(place):
+        raise DataError(FULL, place)

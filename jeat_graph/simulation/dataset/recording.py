@@ -13,6 +13,7 @@ import yaml
 from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.io.atomic import open_atomic
+from jeat_graph.io.locking import hold_folder
 from jeat_graph.simulation.dataset.disk import check_room, segment_bound
 from jeat_graph.simulation.dataset.layout import (
     ANNOTATIONS,
@@ -63,7 +64,8 @@ def record_dataset(
 
     Raises:
         ConfigError: the folder holds something else, or a set with other settings or more segments.
-        DataError: not enough room on the disk, or the source gave something that cannot be stored.
+        DataError: not enough room on the disk, another process is writing into the folder, or the source
+            gave something that cannot be stored.
     """
     root = Path(out)
     source = factory()
@@ -76,20 +78,31 @@ def record_dataset(
     check_room(root, len(missing), [e["bytes"] for e in done.values()], bound, workers)
 
     root.mkdir(parents=True, exist_ok=True)
+    del source  # each worker makes its own
+    with hold_folder(root):
+        _write_frame(root, settings, calibration, scenario_yaml)
+        # Only now is it sure that nobody else adds to them.
+        done = {index: read_entry(root, index) for index in finished_segments(root)}
+        missing = [index for index in range(protocol.segments) if index not in done]
+        on_frames(sum(e["frames"] for e in done.values()))
+        with closing(make_segments(factory, root, protocol, missing, workers, on_frames)) as entries:
+            for entry in entries:
+                done[entry["index"]] = entry
+                left = protocol.segments - len(done)
+                check_room(root, left, [e["bytes"] for e in done.values()], bound, workers)
+        return write_manifest(root, [done[index] for index in range(protocol.segments)])
+
+
+def _write_frame(
+    root: Path, settings: dict[str, Any], calibration: dict[str, Any], scenario_yaml: str | None
+) -> None:
+    """Write what stands around the segments, and take away what an earlier run left of its own."""
     (root / MANIFEST).unlink(missing_ok=True)  # without it the folder holds no complete set
     _write_text(root / SETTINGS, _yaml(settings))
     _write_text(root / CAMERA, _yaml(calibration))
     if scenario_yaml is not None:
         _write_text(root / SCENARIO, scenario_yaml)
     _remove_partial(root)
-    on_frames(sum(e["frames"] for e in done.values()))
-    del source  # each worker makes its own
-    with closing(make_segments(factory, root, protocol, missing, workers, on_frames)) as entries:
-        for entry in entries:
-            done[entry["index"]] = entry
-            left = protocol.segments - len(done)
-            check_room(root, left, [e["bytes"] for e in done.values()], bound, workers)
-    return write_manifest(root, [done[index] for index in range(protocol.segments)])
 
 
 def _settings(source: SegmentSource, protocol: Protocol) -> dict[str, Any]:

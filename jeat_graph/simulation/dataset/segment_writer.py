@@ -17,6 +17,7 @@ from jeat_graph.io.atomic import open_atomic
 from jeat_graph.io.events_dsec_writer import EventWriter
 from jeat_graph.io.hashing import sha256_of
 from jeat_graph.io.video_writer import FrameWriter
+from jeat_graph.simulation.dataset.disk import FULL, check_disk, disk_is_full
 from jeat_graph.simulation.dataset.layout import (
     EVENTS,
     SEGMENT_JSON,
@@ -47,18 +48,26 @@ def write_segment(
         What `segment.json` holds.
 
     Raises:
-        DataError: the source gave no frame, or frames or events that do not follow one another.
+        DataError: the source gave no frame, or frames or events that do not follow one
+            another, or the disk is full.
     """
     folder = partial_folder(root, index)
     shutil.rmtree(folder, ignore_errors=True)  # what a killed run left
     folder.mkdir(parents=True)
     try:
         entry = _fill(source, index, folder, protocol, on_frame)
-    except DataError as error:
+        check_disk(root)
+        with open_atomic(folder / SEGMENT_JSON) as file:
+            file.write(json.dumps(entry, indent=2) + "\n")
+    except (DataError, OSError, RuntimeError) as error:
+        # Libraries give a full disk many names: say which it is while the disk is still as it was.
+        full = disk_is_full(root)
         shutil.rmtree(folder, ignore_errors=True)
-        raise DataError(f"segment {segment_name(index)}: {error}") from None
-    with open_atomic(folder / SEGMENT_JSON) as file:
-        file.write(json.dumps(entry, indent=2) + "\n")
+        if full:
+            raise DataError(FULL, root) from None
+        if isinstance(error, DataError):
+            raise DataError(f"segment {segment_name(index)}: {error}") from None
+        raise
     target = segment_folder(root, index)
     shutil.rmtree(target, ignore_errors=True)
     folder.rename(target)
@@ -81,6 +90,7 @@ def _fill(
         frames = stack.enter_context(FrameWriter(folder, protocol.video, source.size_px, rate_hz))
         events = stack.enter_context(EventWriter(folder / EVENTS, source.size_px, protocol.compression))
         for step in steps:
+            check_disk(folder)  # before HDF5 meets a full one, which it does not survive
             if len(step.events) and int(step.events.t_us[-1]) > step.t_us:
                 raise DataError(
                     f"an event at {step.events.t_us[-1]} µs came with the frame at {step.t_us} µs"

@@ -5,14 +5,17 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import threading
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from multiprocessing import connection
 from pathlib import Path
 from typing import Any
 
 from jeat_graph.data.errors import JeatGraphError
+from jeat_graph.simulation.dataset.disk import check_disk
 from jeat_graph.simulation.dataset.protocol import Protocol
 from jeat_graph.simulation.dataset.segment_writer import write_segment
 from jeat_graph.simulation.segment import SegmentSource
@@ -97,6 +100,7 @@ def _in_processes(
                 yield future.result()
         pool.shutdown()
     except BrokenProcessPool:
+        check_disk(root)
         raise JeatGraphError(
             "a worker process died (out of memory?); what is done is kept, run again to go on"
         ) from None
@@ -114,9 +118,18 @@ def _begin(factory: SourceFactory, root: Path, protocol: Protocol, counter: Any,
     import numba
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process deals with Ctrl-C
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     cv2.setNumThreads(threads)
     numba.set_num_threads(min(threads, numba.get_num_threads()))
     _worker = _Worker(factory(), root, protocol, counter)
+
+
+def _end_with_parent() -> None:
+    """End this process when the one that made it is gone, however that ended: nobody wants its work."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        connection.wait([parent.sentinel])
+        os._exit(1)
 
 
 def _make(index: int) -> dict[str, Any]:

@@ -125,6 +125,7 @@ def test_a_disk_too_small_for_the_rest_stops_after_the_first_segment(
     make(tmp_path / "small", segments=1)
     size = read_json(tmp_path / "small" / "manifest.json")["totals"]["bytes"]
     monkeypatch.setattr(disk, "_RESERVE", 0)
+    monkeypatch.setattr(disk, "_LEAST", 0)
     monkeypatch.setattr(disk, "segment_bound", lambda *a: 0)
     monkeypatch.setattr(shutil, "disk_usage", lambda path: Usage(0, 0, int(4.9 * size)))
     with pytest.raises(DataError, match="what is done is kept"):

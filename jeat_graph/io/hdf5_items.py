@@ -1,0 +1,94 @@
+"""Items of an HDF5 file that stand in this very file: whatever leads elsewhere is refused.
+
+An HDF5 file can send its reader to other files: by external links, by virtual data sets, or by columns whose
+bytes are those of any file named in it. A file from anybody must not make us read a file of its choice.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+from jeat_graph.data.errors import DataError
+from jeat_graph.io.limits import check_room
+
+#: A chunk is read whole, whatever part of it is wanted (bytes).
+_MOST_CHUNK = 1 << 28
+_MOST_LINKS = 64
+
+
+def find_item(file: Any, name: str, path: Path) -> Any:
+    """Return a group or data set by its path in the file, or None if there is none.
+
+    Args:
+        file: the open `h5py.File`.
+        name: such as `events/x`.
+        path: the file's name, for messages.
+
+    Raises:
+        DataError: it stands in another file, or cannot be read.
+    """
+    import h5py
+
+    todo, item, links = name.split("/"), file, 0
+    while todo:
+        part = todo.pop(0)
+        if not part:
+            continue
+        try:
+            link = item.get(part, getlink=True) if isinstance(item, h5py.Group) else None
+            if isinstance(link, h5py.SoftLink):
+                links += 1
+                if links > _MOST_LINKS:
+                    raise DataError(f"{name}: its links lead in a circle", path)
+                item = file if link.path.startswith("/") else item
+                todo = link.path.split("/") + todo
+                continue
+            if link is not None and not isinstance(link, h5py.HardLink):
+                raise DataError(f"{name} stands in another file; links to other files are not followed", path)
+            item = None if link is None else item.get(part)
+        except (OSError, KeyError, RuntimeError, ValueError, UnicodeError) as error:
+            reason = " ".join(str(error).split())[:120]
+            raise DataError(f"{name} cannot be read: {reason}", path) from None
+        if item is None:
+            return None
+    return item
+
+
+def check_storage(data: Any, name: str, path: Path) -> None:
+    """Refuse a data set whose bytes stand elsewhere, or whose chunks alone would fill the memory.
+
+    Args:
+        data: the `h5py.Dataset`.
+        name: what it is called, for messages.
+        path: the file's name, for messages.
+
+    Raises:
+        DataError: says which of these it is.
+    """
+    if data.external or data.is_virtual:
+        raise DataError(f"{name} takes its bytes from other files, which is not followed", path)
+    width = data.dtype.itemsize
+    if data.chunks is not None and math.prod(data.chunks) * width > _MOST_CHUNK:
+        raise DataError(f"{name} has chunks of {math.prod(data.chunks)} values, too many to read", path)
+    if data.chunks is None:
+        check_room(0.0 if not data.id.get_storage_size() else data.size * width, path)
+
+
+def single_item(file: Any, name: str, path: Path) -> Any:
+    """Return the value of a data set that holds one number, or None if there is no such data set.
+
+    Raises:
+        DataError: it holds none, or more than a few, or stands in another file.
+    """
+    data = find_item(file, name, path)
+    if data is None:
+        return None
+    if getattr(data, "size", None) != 1:
+        raise DataError(f"{name} must hold one number", path)
+    check_storage(data, name, path)
+    try:
+        return data[()]
+    except (OSError, RuntimeError, ValueError, TypeError):
+        raise DataError(f"{name} cannot be read", path) from None
