@@ -16,18 +16,15 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, TextArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.interop import from_xyxy
 
-#: Farthest place and largest size of a box (px): no picture is that large.
-LARGEST_PX = 1e9
-#: Smallest side of a box (px), far below boxes in fractions of the picture.
-SMALLEST_PX = 1e-9
+#: Smallest side, and farthest place or largest side, of a box (px): beyond what any picture can hold.
+SMALLEST_PX, LARGEST_PX = 1e-9, 1e9
 
 
 def check_boxes(boxes: npt.ArrayLike, scores: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Convert and check boxes and scores.
 
     Args:
-        boxes: (M, 4) left, top, width, height in px; all finite and within what a picture can hold
-            (`SMALLEST_PX`, `LARGEST_PX`), width and height > 0.
+        boxes: (M, 4) left, top, width, height in px: finite, within `SMALLEST_PX` and `LARGEST_PX`.
         scores: (M,) detector confidence in [0, 1].
 
     Returns:
@@ -77,10 +74,8 @@ def find_bad_row(boxes: FloatArray, scores: FloatArray) -> tuple[int, str] | Non
     if not size[row]:
         return row, f"width and height must be positive, got {width} x {height}"
     if not fits[row]:
-        return row, (
-            f"no picture holds a box at {left:g}, {top:g} of {width:g} x {height:g} px "
-            f"(places to {LARGEST_PX:g} px, sizes from {SMALLEST_PX:g} to {LARGEST_PX:g} px)"
-        )
+        bounds = f"places to {LARGEST_PX:g}, sizes from {SMALLEST_PX:g} to {LARGEST_PX:g}"
+        return row, f"no picture holds a box at {left:g}, {top:g} of {width:g} x {height:g} px ({bounds})"
     return row, f"score must be in [0, 1], got {scores[row]}"
 
 
