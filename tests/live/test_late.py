@@ -215,9 +215,10 @@ def test_a_late_picture_costs_no_more_than_the_steps_it_makes_anew(full, capsys)
 def timed(call, items):
     out = []
     for item in items:
-        begin = time.perf_counter()
+        # Processor time: what others do on the machine is not what is judged.
+        begin = time.thread_time()
         call(item)
-        out.append(time.perf_counter() - begin)
+        out.append(time.thread_time() - begin)
     return np.array(out)
 
 

@@ -158,6 +158,8 @@ class NatsSource:
                 )
         except (NatsError, TimeoutError):
             return None
+        if not self._waiting:
+            return None
         message = self._waiting.popleft()
         self._last, self._open = message.metadata.sequence.stream, message
         return bytes(message.data)
