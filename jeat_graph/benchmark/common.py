@@ -15,7 +15,7 @@ from jeat_graph.benchmark.recordings import DURATION_S, KITTI_SEQUENCES, SCENARI
 from jeat_graph.config.argument_types import counting, natural, positive
 from jeat_graph.config.reading import config_from_dict
 from jeat_graph.config.schema import Config
-from jeat_graph.data.errors import DataError
+from jeat_graph.data.errors import ConfigError, DataError
 
 if TYPE_CHECKING:
     from jeat_graph.eval.tables import Table
@@ -43,10 +43,16 @@ def settings(args: argparse.Namespace) -> dict[str, Any]:
     """Seeds, scenarios and duration, with the defaults filled in.
 
     Raises:
-        ConfigError: unknown scenario.
+        ConfigError: unknown scenario; or less than the published tables hold would take their places.
     """
     from jeat_graph.simulation.scenario import load_scenario
 
+    less = [f"--{name}" for name in ("quick", "seeds", "scenarios", "duration") if getattr(args, name)]
+    if args.readme and less:
+        raise ConfigError(
+            f"--readme replaces published tables, which hold {len(SEEDS)} seeds of {DURATION_S:g} s of all "
+            f"scenarios; leave out {' '.join(less)}, or write to --out"
+        )
     scenarios = tuple(args.scenarios or SCENARIOS)
     for name in scenarios:
         load_scenario(name)
@@ -60,6 +66,7 @@ def settings(args: argparse.Namespace) -> dict[str, Any]:
 def kitti_folds(args: argparse.Namespace) -> tuple[Path, dict[str, Config]] | None:
     """Leave-one-out configurations of KITTI; None, with a line on stderr, where the data are missing."""
     if args.quick:
+        print("--quick: the table on real data is left out", file=sys.stderr)
         return None
     folder = find_kitti(args.data)
     if folder is None:

@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     """Measure, print the tables, write the files."""
     if args.quick:
         args.objects, args.frames, args.warm_up, args.repeats = args.objects[:2], 20, 15, 1
-    from jeat_graph.tracking.warm_up import notice_if_cold
+    from jeat_graph.tracking.notice import notice_if_cold
 
     notice_if_cold()
     # The first child may have to compile; its time counts nowhere.

@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import Any
 
 from jeat_graph.cli.options import Parser
+from jeat_graph.data.errors import ConfigError
 
 HELP = "Reproduce the README's tables: accuracy, ablation, smoothing, speed or events."
 _KINDS = {
@@ -44,5 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the benchmark that was asked for."""
+    if getattr(args, "quick", False) and getattr(args, "readme", None):
+        raise ConfigError("--quick is to see that it runs: leave out --readme, which holds full ones")
     module = import_module(f"jeat_graph.benchmark.{args.kind}")
     return int(module.run(args) or 0)

@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.runs.tracking_run import RunOptions, RunRecord, write_run
     from jeat_graph.simulation.scenario import load_scenario
     from jeat_graph.simulation.simulate import record
-    from jeat_graph.tracking.warm_up import notice_if_cold
+    from jeat_graph.tracking.notice import notice_if_cold
 
     config = load_config(args.config)
     scenario = load_scenario(args.scenario)

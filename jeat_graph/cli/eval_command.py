@@ -69,6 +69,8 @@ def run(args: argparse.Namespace) -> int:
         _write(args.json, to_json(result))
     if args.json != "-":
         sys.stdout.write("\n".join(table.render(args.format) for table in tables))
+        if args.format == "text" and "nees" in tables[0].columns:
+            print("nees: of the position, 2 where the covariances are right (ANEES of `compare`: 1)")
     return 0
 
 

@@ -162,8 +162,8 @@ def _warm_up(config: Config) -> None:
     """Load the compiled code before the first scan arrives, which should not wait for it."""
     from dataclasses import replace
 
+    from jeat_graph.tracking.notice import notice_if_cold
     from jeat_graph.tracking.tracker import Tracker
-    from jeat_graph.tracking.warm_up import notice_if_cold
 
     notice_if_cold()
     spare = Tracker(replace(config, smoother=replace(config.smoother, worker=False)))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.drawing.palette import AXES, FILTER, FULL, GRID, LAGGED, TRUTH
 from jeat_graph.eval.compare import Comparison, Samples, lag_name
 
@@ -75,9 +75,8 @@ def write_plots(comparison: Comparison, folder: str | Path) -> list[Path]:
 
 
 def _trajectories(plt: Any, samples: Samples) -> Figure:
-    """Position error and velocity of the best-observed tracks, with 2σ bands."""
-    ids, count = np.unique(samples.track_id, return_counts=True)
-    chosen = ids[np.argsort(-count, kind="stable")[:MOST_TRACKS]]
+    """Position error and velocity of well-observed tracks that go far, with 2σ bands."""
+    chosen = telling_tracks(samples)
     figure, axes = plt.subplots(
         len(chosen), 2, figsize=(11.0, 2.7 * len(chosen) + 0.8), squeeze=False, layout="constrained"
     )
@@ -107,6 +106,18 @@ def _trajectories(plt: Any, samples: Samples) -> Figure:
         axis.set_xlabel("time (s)")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure  # type: ignore[no-any-return]
+
+
+def telling_tracks(samples: Samples) -> IntArray:
+    """Choose the tracks that are drawn: of the better-observed half those that go furthest in the picture.
+
+    The longest tracks of all are parked cars, which show nothing of motion.
+    """
+    ids, index, count = np.unique(samples.track_id, return_inverse=True, return_counts=True)
+    place = samples.truth[:, :, 0]
+    way = np.array([np.hypot(*np.ptp(place[index == k], axis=0)) for k in range(len(ids))])
+    way[count < np.median(count)] = -1.0
+    return np.asarray(ids[np.argsort(-way, kind="stable")[:MOST_TRACKS]], dtype=np.int64)
 
 
 def _limit(axis: Any, samples: Samples, mine: Any, order: int) -> None:

@@ -128,7 +128,7 @@ def track_files(
     from jeat_graph.io.detections_io import read_many
     from jeat_graph.runs.directory import RunDirectory
     from jeat_graph.runs.input_checks import check_detections
-    from jeat_graph.tracking.warm_up import notice_if_cold
+    from jeat_graph.tracking.notice import notice_if_cold
 
     begin = time.perf_counter()
     config, notes = request.configured()

@@ -89,5 +89,5 @@ class InputWatch:
     def _say(self, kind: str, text: str) -> None:
         if kind not in self._said:
             self._said.add(kind)
-            # Four frames up is the caller of the tracker's step.
-            warnings.warn(text, InputWarning, stacklevel=5)
+            # Up from here: a judgement, `look`, the tracker's `take_in` and `step`, and whoever called that.
+            warnings.warn(text, InputWarning, stacklevel=6)

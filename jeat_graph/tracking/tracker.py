@@ -19,6 +19,7 @@ from jeat_graph.data.errors import JeatGraphError, TimeOrderError
 from jeat_graph.data.interop import boxes_of
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.input_watch import InputWatch
+from jeat_graph.tracking.notice import notice_if_cold
 from jeat_graph.tracking.prediction import Prediction, predict_reported
 from jeat_graph.tracking.reporting import report
 from jeat_graph.tracking.scans import ScanLike, arrivals_of, as_scans
@@ -76,6 +77,7 @@ class Tracker(SmoothedTracks):
         self._t: float | None = None
         self._log = allocate_log(0)
         self._watch = InputWatch(config)
+        notice_if_cold()
 
     @property
     def num_tracks(self) -> int:

@@ -5,25 +5,7 @@ Run `python -m jeat_graph.tracking.warm_up` after an installation or an update, 
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
-NOTICE = "compiling the tracker for this machine, once (about half a minute) …"
-
-
-def is_compiled() -> bool:
-    """Tell whether machine code of the tracker's step is there for this version of Python."""
-    from jeat_graph.tracking.step import step
-
-    version = f"py{sys.version_info.major}{sys.version_info.minor}"
-    folder = Path(str(step.stats.cache_path))
-    return any(folder.glob(f"step.step-*.{version}.nbi"))
-
-
-def notice_if_cold() -> None:
-    """Say on stderr that the first step will take a while, if it will."""
-    if not is_compiled():
-        print(f"jeat-graph: {NOTICE}", file=sys.stderr, flush=True)
+from jeat_graph.tracking.notice import notice_if_cold
 
 
 def warm_up() -> None:

@@ -12,7 +12,9 @@ from typing import Any
 from jeat_graph.drawing.page.figures import ComparedRun
 from jeat_graph.drawing.page.plane import map_svg
 from jeat_graph.drawing.page.summary import (
+    ERRORS_TITLE,
     count_table,
+    most_telling,
     nis_interval,
     score_tables,
     sensor_table,
@@ -78,7 +80,8 @@ def _header(data: RunData, name: str) -> str:
         facts.append(f"smoother {smoother.get('engine')}")
     if "version" in record:
         facts.append(f"jeat-graph {record['version']}")
-    return f'<header><h1>Run {escape(name)}</h1><p class="quiet">{escape(" · ".join(facts))}</p></header>'
+    heading = name if name.lower().startswith("run") else f"Run {name}"
+    return f'<header><h1>{escape(heading)}</h1><p class="quiet">{escape(" · ".join(facts))}</p></header>'
 
 
 def _notes(data: RunData, not_compared: str | None) -> str:
@@ -96,8 +99,14 @@ def _numbers(data: RunData) -> str:
     if scores:
         out.append("<h2>Scores</h2>")
         out.append(f'<p class="quiet">Against {escape(str(data.truth_name))}, as jeat-graph eval judges.</p>')
-        out.append(table_html(scores[0]))
-        more = "".join(table_html(table) for table in scores[1:])
+        main = [table for table in scores if not table.title or table.title == ERRORS_TITLE]
+        out += [table_html(table) for table in main]
+        if len(main) > 1:
+            out.append(
+                '<p class="quiet">RMSE in px, px/s and px/s². nees is that of the position, a sum of two: '
+                "2 where the covariances tell the truth, more where they are too small.</p>"
+            )
+        more = "".join(table_html(table) for table in scores if table not in main)
         out.append(f"<details><summary>By group of objects, and waiting times</summary>{more}</details>")
     out.append("<h2>Counts and consistency</h2>")
     out.append(table_html(count_table(data)))
@@ -153,13 +162,12 @@ def _tracks(data: RunData) -> str:
 
 
 def _json(data: RunData, tracks: Sequence[dict[str, Any]]) -> str:
-    longest = max(tracks, key=lambda one: (one["to"] - one["from"], -one["id"]))
     content = {
         "sensors": list(data.sensors),
         "start_ms": round(1e3 * data.span_s()[0]),
         "width": data.size_px()[0],
         "nis_bounds": list(nis_interval()),
-        "first": longest["id"],
+        "first": most_telling(data, [one["id"] for one in tracks]),
         "tracks": list(tracks),
     }
     text = json.dumps(content, ensure_ascii=True, separators=(",", ":"), allow_nan=False)

@@ -58,8 +58,8 @@ def _address(path: Path) -> str:
 
 _TEXTS = {
     "trajectories": (
-        "Error of x and velocity in x of the best-observed tracks, filter and smoothed, with 2σ bands",
-        "The best-observed tracks against the truth. An honest band holds the truth 95 % of the time; the "
+        "Error of x and velocity in x of tracks that go far, filter and smoothed, with 2σ bands",
+        "Tracks that go far, against the truth. An honest band holds the truth 95 % of the time; the "
         "smoother's is narrower.",
     ),
     "error-over-time": (

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.diagnostics import NIS_FREEDOM
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.eval.compare import chi2_bounds
-from jeat_graph.eval.judge import breakdown_tables, summary_table
+from jeat_graph.eval.judge import ERRORS, breakdown_tables, summary_table
 from jeat_graph.eval.tables import Cell, Table
 from jeat_graph.runs.recorded import RunData, rows_of_tracks
+
+ERRORS_TITLE = "Errors of matched tracks"
 
 
 def nis_interval() -> tuple[float, float]:
@@ -22,7 +27,38 @@ def score_tables(data: RunData) -> list[Table]:
     """Scores of both tables as `eval` prints them, then by groups; empty without truth."""
     if not data.judged:
         return []
-    return [summary_table(data.judged), *breakdown_tables(data.judged)]
+    whole = summary_table(data.judged)
+    errors = [name for name in whole.columns if name in ERRORS]
+    others = [name for name in whole.columns if name not in ERRORS]
+    tables = [_columns(whole, others)]
+    if errors:
+        # In two tables, so that neither is wider than a page.
+        tables.append(replace(_columns(whole, ["table", *errors]), title=ERRORS_TITLE))
+    return [*tables, *breakdown_tables(data.judged)]
+
+
+def _columns(table: Table, names: Sequence[str]) -> Table:
+    places = [table.columns.index(name) for name in names]
+    rows = tuple(tuple(row[k] for k in places) for row in table.rows)
+    return Table(tuple(names), rows, table.title, table.digits)
+
+
+def most_telling(data: RunData, among: Sequence[int]) -> int:
+    """Choose the track to be shown first: the one that goes furthest in the picture, not a parked car.
+
+    Args:
+        data: the run.
+        among: identities to choose from, at least one.
+    """
+    table = data.causal if data.causal is not None else data.smoothed
+    assert table is not None
+    wanted = set(among)
+    way = {
+        track_id: float(np.hypot(*np.ptp(table.mean[rows, :2], axis=0)))
+        for track_id, rows in rows_of_tracks(table.track_id, table.t).items()
+        if track_id in wanted
+    }
+    return max(way or dict.fromkeys(among, 0.0), key=lambda track_id: (way.get(track_id, 0.0), -track_id))
 
 
 def count_table(data: RunData) -> Table:

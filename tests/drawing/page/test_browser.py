@@ -62,7 +62,7 @@ def test_the_readout_says_what_the_data_say(full_run, tmp_path):
     assert f"existence {chosen['existence']['v'][k]:.2f}" in said
 
 
-def test_without_a_choice_the_longest_track_is_drawn_and_none_is_dimmed(full_run, tmp_path):
+def test_without_a_choice_the_most_telling_track_is_drawn_and_none_is_dimmed(full_run, tmp_path):
     dom, console = dump(full_run.page.as_uri(), tmp_path / "profile", width=500)
     assert console == []
     assert f'aria-label="Curves of track {full_run.html.data["first"]} ' in dom

@@ -56,9 +56,12 @@ def test_scores_are_those_of_eval(full_run, tmp_path):
     wanted = json.loads(scores.read_text())
     shown = {row["table"]: row for row in full_run.html.tables[""]}
     assert set(shown) == {"causal", "smoothed"}
+    errors = {row["table"]: row for row in full_run.html.tables["Errors of matched tracks"]}
     for kind, values in wanted.items():
-        for name in ("MOTA", "IDF1", "HOTA", "position_rmse"):
+        for name in ("MOTA", "IDF1", "HOTA"):
             assert shown[kind][name] == f"{values[name]:.2f}"
+        for name in ("position_rmse", "nees"):
+            assert errors[kind][name] == f"{values[name]:.2f}"
         assert shown[kind]["FN"] == str(values["FN"])
 
 
@@ -217,6 +220,7 @@ def test_inputs_that_are_gone_leave_out_the_comparison_with_the_reason(copy_of, 
     run = copy_of()
     record = json.loads((run / "run.json").read_text())
     record["reading"]["detections"] = [str(tmp_path / "gone.csv")]
+    record["inputs"][0]["absolute"] = str(tmp_path / "gone.csv")
     (run / "run.json").write_text(json.dumps(record))
     out = tmp_path / "page.html"
     assert main(["report", str(run), "--out", str(out)]) == 0
@@ -297,7 +301,7 @@ def test_hostile_names_of_sensors_and_files_stay_text(tmp_path, report):
     assert html.tables["Inputs"][0]["file"] == HOSTILE
     assert html.tables["Timings"][0]["what"] == HOSTILE
     assert f"Warning of the run: {HOSTILE}" in html.said
-    assert "Run run<b>&amp;" in html.said
+    assert "run<b>&amp; 1 tracks" in html.said
 
 
 def test_many_long_tracks_stay_below_five_megabytes(tmp_path, report):
