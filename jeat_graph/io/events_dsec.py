@@ -191,7 +191,9 @@ class EventFile:
             return np.asarray(data[rows])
         except (OSError, RuntimeError, ValueError, MemoryError) as error:
             reason = " ".join(str(error).split())[:200]
-            hint = "; pip install 'jeat-graph[hdf5]' has filters such as blosc" if "filter" in reason else ""
+            # HDF5 speaks of the filter, or only of the folder where it looked for a plugin.
+            lacking = "filter" in reason or "plugin" in reason
+            hint = "; pip install 'jeat-graph[hdf5]' has filters such as blosc" if lacking else ""
             raise DataError(f"cannot be read: {reason}{hint}", self.path) from None
 
 

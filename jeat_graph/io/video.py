@@ -28,6 +28,8 @@ __all__ = ["FRAME_TIMES", "VIDEO_FILES", "FrameSource", "RgbImage", "open_frames
 
 VIDEO_FILES = {"mp4": "frames.mp4", "lossless": "frames.avi", "png": "frames"}
 FRAME_TIMES = "frames.csv"
+#: Files in which DSEC lists the times of a folder of pictures (µs).
+DSEC_TIMES = ("timestamps.txt", "image_timestamps.txt")
 _US_PER_S = 1e6
 _KEPT_FRAMES = 32  # decoded frames that a reader keeps, for steps backwards
 
@@ -92,8 +94,9 @@ class FrameSource:
 def open_frames(path: str | Path, rate_hz: float | None = None) -> FrameSource:
     """Open a video file, a folder of pictures, or a folder that holds one of them under its name above.
 
-    Times come from `frames.csv`, in the folder or beside it or beside the video; without it they are
-    index / rate, by `rate_hz` or by what the video declares.
+    Times come from `frames.csv`, in the folder or beside it or beside the video, or from DSEC's
+    `timestamps.txt` in or above the folder; without them they are index / rate, by `rate_hz` or by
+    what the video declares.
 
     Args:
         path: the video or folder. Pictures are `.png` or `.jpg`, in natural order (2 before 10).
@@ -122,7 +125,7 @@ def open_frames(path: str | Path, rate_hz: float | None = None) -> FrameSource:
         else:
             rate = rate_hz or decode.rate_hz()
             if rate is None or not 0.0 < rate < float("inf"):
-                raise DataError(f"no {FRAME_TIMES} beside it; give the frame rate", place)
+                raise DataError(f"no {FRAME_TIMES} beside it; give the frame rate with --rate", place)
             times = np.arange(count) / rate
         first = decode.bgr(0)
         source = FrameSource(place, times, (first.shape[1], first.shape[0]), decode)
@@ -157,8 +160,12 @@ def peek(path: str | Path) -> tuple[tuple[int, int], float | None]:
 
 
 def _times_beside(place: Path) -> Path | None:
-    """Find `frames.csv` of a video or a folder of pictures."""
-    known = [place / FRAME_TIMES, place.parent / FRAME_TIMES]
+    """Find `frames.csv`, or DSEC's list of times, in a folder of pictures, or beside it or a video."""
+    folders = (place, place.parent)
+    known = [folder / FRAME_TIMES for folder in folders]
+    if place.is_dir():
+        # DSEC has its pictures in images/left/rectified and their times in images.
+        known += [folder / name for folder in (*folders, place.parent.parent) for name in DSEC_TIMES]
     return next((file for file in known if file.is_file()), None)
 
 
@@ -177,13 +184,21 @@ def count_frames(path: str | Path) -> int:
 
 
 def read_frame_times(path: str | Path) -> IntArray:
-    """Read the times (F,) of `frames.csv` (µs).
+    """Read the times (F,) of `frames.csv`, or of DSEC's `timestamps.txt` with one a line (µs).
 
     Raises:
         DataError: not such a table, or times that do not ascend.
     """
+    from jeat_graph.io.plain_text import read_plain
     from jeat_graph.io.tables import read_table
 
+    if Path(path).suffix == ".txt":
+        lines = read_plain(path, {1: ("t_us",)}, "timestamps.txt")
+        t_us = lines.whole("t_us")
+        bad = np.diff(t_us) <= 0
+        if bad.any():
+            raise lines.error(1 + int(np.argmax(bad)), "times must ascend")
+        return t_us
     table = read_table(path, ("index", "t_us"))
     t_us = table.whole("t_us")
     bad = np.diff(t_us) <= 0
