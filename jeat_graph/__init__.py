@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from jeat_graph.config.kernel_cache import choose_cache
 from jeat_graph.version import __version__
 
 if TYPE_CHECKING:
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     from jeat_graph.io.detections_io import read_detections
     from jeat_graph.io.truth_io import read_truth
     from jeat_graph.tracking.tracker import Tracker
+
+choose_cache()
 
 _HOMES = {
     "Config": "config.schema",

@@ -11,6 +11,7 @@ from importlib import import_module
 
 from jeat_graph.cli.options import Parser
 from jeat_graph.cli.terminal import Terminated, describe, in_good_order, write_anything
+from jeat_graph.config import kernel_cache
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.version import __version__
 
@@ -66,6 +67,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     write_anything()
     command = next((a for a in arguments if a in COMMANDS), None)
     args = build_parser(command).parse_args(arguments)
+    if kernel_cache.notice:
+        print(f"jeat-graph: {kernel_cache.notice}", file=sys.stderr)
     try:
         with in_good_order(args.command):
             code = int(args.run(args) or 0)
