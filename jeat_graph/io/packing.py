@@ -60,7 +60,10 @@ def pack(tree: Any, codecs: Mapping[str, Codec]) -> tuple[str, bytes]:
         TypeError: something else.
     """
     packer = _Packer(codecs)
-    text = json.dumps(packer.node(tree), separators=(",", ":"))
+    node = packer.node(tree)
+    # Each kind of array is described once: of records there are many, and their fields are many words.
+    kinds = [kind.descr if kind.names else kind.str for kind in packer.kinds]
+    text = json.dumps({"kinds": kinds, "tree": node}, separators=(",", ":"))
     return text, b"".join(packer.blocks)
 
 
@@ -71,7 +74,8 @@ def unpack(text: str, block: bytes, codecs: Mapping[str, Codec]) -> Any:
         DataError: the text or the bytes are damaged.
     """
     try:
-        return _Unpacker(block, codecs).tree(json.loads(text))
+        content = json.loads(text)
+        return _Unpacker(block, codecs, content["kinds"]).tree(content["tree"])
     except (ValueError, TypeError, KeyError, IndexError, AttributeError) as error:
         raise DataError(f"is damaged: {type(error).__name__}: {error}") from None
 
@@ -82,6 +86,7 @@ class _Packer:
     def __init__(self, codecs: Mapping[str, Codec]) -> None:
         self._codecs = {codec.kind: (name, codec) for name, codec in codecs.items()}
         self.blocks: list[bytes] = []
+        self.kinds: dict[np.dtype[Any], int] = {}
         self._at = 0
         self._known: dict[int, int] = {}
         self._held: list[Any] = []  # no other object gets the number of one that is known
@@ -118,16 +123,16 @@ class _Packer:
         padding = -len(content) % _ALIGN
         self.blocks.append(content + bytes(padding))
         self._at += len(content) + padding
-        described = value.dtype.descr if value.dtype.names else value.dtype.str
-        return [described, list(value.shape), at]
+        return [self.kinds.setdefault(value.dtype, len(self.kinds)), value.shape, at]
 
 
 class _Unpacker:
     """Makes a tree of a text that was read, in the order in which it was written."""
 
-    def __init__(self, block: bytes, codecs: Mapping[str, Codec]) -> None:
+    def __init__(self, block: bytes, codecs: Mapping[str, Codec], kinds: list[Any]) -> None:
         self._block = block
         self._codecs = codecs
+        self._kinds = [_dtype(kind) for kind in kinds]
         self._held: list[Any] = []
 
     def tree(self, node: Any) -> Any:
@@ -151,10 +156,17 @@ class _Unpacker:
         self._held[place] = one
         return one
 
-    def _array(self, described: Any, shape: list[int], at: int) -> npt.NDArray[Any]:
-        fields = [tuple(tuple(p) if isinstance(p, list) else p for p in f) for f in described]
-        dtype = np.dtype(described if isinstance(described, str) else fields)
-        if dtype.hasobject:
-            raise ValueError("an array of objects")
+    def _array(self, kind: int, shape: list[int], at: int) -> npt.NDArray[Any]:
         count = int(np.prod(shape))
-        return np.frombuffer(self._block, dtype, count, at).reshape(shape).copy()
+        return np.frombuffer(self._block, self._kinds[kind], count, at).reshape(shape).copy()
+
+
+def _dtype(described: Any) -> np.dtype[Any]:
+    """Kind of array from its description: a name, or the names, kinds and shapes of a record's fields."""
+    if isinstance(described, str):
+        dtype = np.dtype(described)
+    else:
+        dtype = np.dtype([tuple(tuple(p) if isinstance(p, list) else p for p in f) for f in described])
+    if dtype.hasobject:
+        raise ValueError("an array of objects")
+    return dtype

@@ -115,7 +115,7 @@ def test_a_damaged_file_is_refused_and_names_no_class_of_its_own(tmp_path):
     with pytest.raises(DataError, match="damaged"):
         unpack(text, block[:8], {})
     with pytest.raises(DataError, match="damaged"):
-        unpack(json.dumps({"object": ["Popen", {"args": "ls"}]}), b"", {})
+        unpack(json.dumps({"kinds": [], "tree": {"object": ["Popen", {"args": "ls"}]}}), b"", {})
     with pytest.raises(TypeError, match="cannot be saved"):
         pack({"a": object()}, {})
 
