@@ -228,3 +228,21 @@ def test_eval_knows_from_scans_csv_that_there_was_no_track(write, tmp_path, caps
     with_scans = misses()
     (tmp_path / "run" / "scans.csv").unlink()
     assert with_scans == misses() + 3
+
+
+def test_a_known_latency_is_taken_off_the_times_of_a_sensor(tmp_path, write):
+    """As if the file had the times of the measurements."""
+    times = [0.05 * k for k in range(40)]
+    rows = {late: [] for late in (0.0, 0.08)}
+    for late, lines in rows.items():
+        for t in times:
+            lines.append(f"{t + late},rgb,{100 + 40 * t},200,40,30,0.95")
+            lines.append(f"{t + 0.02},evt,{100 + 40 * t},200,40,30,0.95")
+    true, stamped = (write(*lines, name=f"d{late}.csv") for late, lines in rows.items())
+    assert main(["track", true, "--out", str(tmp_path / "a")]) == 0
+    late = ["--set", "sensors.rgb.latency_s=0.08"]
+    assert main(["track", stamped, "--out", str(tmp_path / "b"), *late]) == 0
+    one, other = (read_trajectories(tmp_path / name / "causal.csv") for name in "ab")
+    np.testing.assert_allclose(other.t, one.t, atol=1e-12)
+    np.testing.assert_array_equal(other.track_id, one.track_id)
+    np.testing.assert_allclose(other.boxes, one.boxes, atol=2e-3)
