@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jeat_graph.cli.options import add_config, add_image, add_reading, reading
+from jeat_graph.cli.progress import stages
 from jeat_graph.data.errors import ConfigError, DataError
 
 if TYPE_CHECKING:
@@ -114,7 +115,9 @@ def _with_truth(
     from jeat_graph.calibration.tune import knobs, tune
 
     print("estimating sensors and motion from matched detections", file=sys.stderr)
-    config = calibrate(recordings, base)
+    with stages("calibrate", 1) as stage:
+        stage("estimating")
+        config = calibrate(recordings, base)
     if not tuned:
         return rounded(config), ()
     passes = 2
@@ -135,7 +138,9 @@ def _without_truth(recordings: list[Detections], base: Config) -> Config:
     from jeat_graph.calibration.rounding import rounded
 
     print("no --gt: what confirmed tracks take in is believed to be true", file=sys.stderr)
-    return rounded(calibrate_blind(recordings, base))
+    with stages("calibrate", 1) as stage:
+        stage("estimating")
+        return rounded(calibrate_blind(recordings, base))
 
 
 def describe(args: argparse.Namespace, config: Config, choices: tuple[Choice, ...]) -> str:

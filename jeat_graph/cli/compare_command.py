@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jeat_graph.cli.options import add_rate
+from jeat_graph.cli.progress import stages
 from jeat_graph.config.argument_types import not_negative
 
 if TYPE_CHECKING:
@@ -72,18 +73,22 @@ def run(args: argparse.Namespace) -> int:
         )
     config, detections = recorded_inputs(folder, args.detections)
     records, smoothed = record_tracks(config, detections, progress=sys.stderr.isatty())
-    comparison = compare(
-        records,
-        config.sensor_names,
-        truth=truth,
-        smoothed=smoothed,
-        lags_s=args.lags or LAGS_S,
-    )
+    with stages("compare", 1) as stage:
+        stage("smoothing at all lags")
+        comparison = compare(
+            records,
+            config.sensor_names,
+            truth=truth,
+            smoothed=smoothed,
+            lags_s=args.lags or LAGS_S,
+        )
     print("\n".join(table.render() for table in comparison.tables), end="")
     with open_atomic(out / "compare.json") as file:
         file.write(to_json(comparison.values))
     if not args.no_plots:
-        write_plots(comparison, out)
+        with stages("compare", 1) as stage:
+            stage("drawing")
+            write_plots(comparison, out)
     print(f"wrote {out}")
     return 0
 

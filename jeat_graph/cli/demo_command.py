@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jeat_graph.cli.options import add_config
+from jeat_graph.cli.progress import stages
 
 if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
@@ -52,7 +53,9 @@ def run(args: argparse.Namespace) -> int:
     config = load_config(args.config)
     scenario = load_scenario(args.scenario)
     out = Path(args.out)
-    recording = record(scenario, args.seed, args.duration)
+    with stages("demo", 1) as stage:
+        stage(f"simulating {args.duration:g} s")
+        recording = record(scenario, args.seed, args.duration)
     directory = RunDirectory(out / "run")
     warnings = check_detections(recording.detections, config, args.scenario)
     source = out / "detections.csv"
@@ -71,7 +74,9 @@ def run(args: argparse.Namespace) -> int:
     scores = _compare(recording, config, table, out / "run" / "smoothed.csv")
     _write_text(scores.render("markdown"), out / "scores.md")
     _say("drawing")
-    pictures = _draw(recording, table, out / "tracks", args.scenario)
+    with stages("demo", 1) as stage:
+        stage("drawing")
+        pictures = _draw(recording, table, out / "tracks", args.scenario)
 
     print(scores.render())
     print(f"picture   {pictures[0]} (and {pictures[1].name})")
@@ -97,9 +102,11 @@ def _compare(recording: SimulatedRecording, config: Config, causal: Trajectories
     rows = {names: _causal_scores(recording, detections, causal)}
     if smoothed.is_file():
         rows[f"{names}, smoothed"] = evaluate([(truth, read_trajectories(smoothed))], kind="smoothed")
-    for name in detections.sensors:
-        alone = detections.select([name])
-        rows[f"{name} alone"] = _causal_scores(recording, alone, track(config, alone))
+    with stages("demo", len(detections.sensors)) as stage:
+        for name in detections.sensors:
+            stage(f"tracking with {name} alone")
+            alone = detections.select([name])
+            rows[f"{name} alone"] = _causal_scores(recording, alone, track(config, alone))
     records: list[dict[str, Cell]] = [{"sensors": name, **one.as_dict()} for name, one in rows.items()]
     return Table.from_records(records, COLUMNS)
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jeat_graph.cli.options import add_rate
+from jeat_graph.cli.progress import stages
 from jeat_graph.config.argument_types import positive, share
 from jeat_graph.data.errors import DataError
 
@@ -47,24 +48,29 @@ def run(args: argparse.Namespace) -> int:
 
     if len(args.runs) != len(args.gt):
         raise DataError(f"{len(args.runs)} RUN and {len(args.gt)} --gt given; give one truth for each run")
-    runs = [
-        load_run(path, truth, rate_hz=rate_of_truth(path, truth, args.rate), classes=args.classes)
-        for path, truth in zip(args.runs, args.gt, strict=True)
-    ]
-    max_age_s = MAX_AGE_S if args.max_age is None else args.max_age
-    judged = judge_runs(runs, iou=args.iou, max_age_s=max_age_s, max_gap_s=args.max_gap)
-    result: dict[str, object] = {kind: one.as_dict() for kind, one in judged.items()}
-    tables = [summary_table(judged)]
-    if args.breakdown:
-        extra = breakdown_tables(judged, iou=args.iou)
-        tables += extra
-        result["breakdown"] = [
-            dict(zip(table.columns, row, strict=True)) for table in extra for row in table.rows
+    with stages("eval", 2 + args.breakdown + bool(args.detections)) as stage:
+        stage("reading")
+        runs = [
+            load_run(path, truth, rate_hz=rate_of_truth(path, truth, args.rate), classes=args.classes)
+            for path, truth in zip(args.runs, args.gt, strict=True)
         ]
-    if args.detections:
-        table, values = _detections(args, [one.truth for one in runs])
-        tables.append(table)
-        result["detections"] = values
+        stage("judging")
+        max_age_s = MAX_AGE_S if args.max_age is None else args.max_age
+        judged = judge_runs(runs, iou=args.iou, max_age_s=max_age_s, max_gap_s=args.max_gap)
+        result: dict[str, object] = {kind: one.as_dict() for kind, one in judged.items()}
+        tables = [summary_table(judged)]
+        if args.breakdown:
+            stage("breakdown")
+            extra = breakdown_tables(judged, iou=args.iou)
+            tables += extra
+            result["breakdown"] = [
+                dict(zip(table.columns, row, strict=True)) for table in extra for row in table.rows
+            ]
+        if args.detections:
+            stage("detections")
+            table, values = _detections(args, [one.truth for one in runs])
+            tables.append(table)
+            result["detections"] = values
     if args.json is not None:
         _write(args.json, to_json(result))
     if args.json != "-":

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jeat_graph.cli.options import add_rate
+from jeat_graph.cli.progress import stages
 from jeat_graph.cli.terminal import one_line
 
 if TYPE_CHECKING:
@@ -51,9 +52,13 @@ def run(args: argparse.Namespace) -> int:
     check_writable(out)
     if args.gt is not None:
         args.rate = rate_of_truth(args.run_directory, args.gt, args.rate)
-    data = load_run_data(args.run_directory, args.gt, args.rate)
-    compared, reason = _compare(args)
-    page = render_page(data, compared, reason)
+    with stages("report", 3) as stage:
+        stage("reading and judging")
+        data = load_run_data(args.run_directory, args.gt, args.rate)
+        stage("filter against smoother")
+        compared, reason = _compare(args)
+        stage("drawing")
+        page = render_page(data, compared, reason)
     with open_atomic(out) as file:
         file.write(page)
     for note in (*data.notes, *([] if reason is None else [reason])):
