@@ -21,7 +21,7 @@ from jeat_graph.benchmark.judging import (
 )
 from jeat_graph.benchmark.peer_search import peers_here, recorded_best, search_parameters, search_table
 from jeat_graph.benchmark.provenance import provenance
-from jeat_graph.benchmark.recordings import Recording, find_kitti, kitti, simulated
+from jeat_graph.benchmark.recordings import JudgedRecording, find_kitti, kitti, simulated
 from jeat_graph.benchmark.steps import start
 from jeat_graph.config.reading import load_config
 from jeat_graph.config.schema import Config
@@ -210,5 +210,5 @@ def _parameters(found: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, A
     return {name: dict(one["parameters"]) for name, one in found.items()}
 
 
-def _pairs(recordings: Sequence[Recording]) -> list[tuple[Any, Any]]:
+def _pairs(recordings: Sequence[JudgedRecording]) -> list[tuple[Any, Any]]:
     return [(r.truth, r.detections) for r in recordings]

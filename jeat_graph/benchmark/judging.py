@@ -11,7 +11,7 @@ from pathlib import Path
 from statistics import mean, stdev
 from typing import Any, TypeVar
 
-from jeat_graph.benchmark.recordings import KITTI_IMAGE, Recording, kitti, simulated
+from jeat_graph.benchmark.recordings import KITTI_IMAGE, JudgedRecording, kitti, simulated
 from jeat_graph.config.reading import load_config
 from jeat_graph.config.schema import Config
 
@@ -73,7 +73,9 @@ def judge_baseline_job(job: BaselineJob) -> dict[str, Any]:
 
 
 def judge_recordings(
-    config: Config | Sequence[Config], recordings: Sequence[Recording], sensors: Sequence[str] | None = None
+    config: Config | Sequence[Config],
+    recordings: Sequence[JudgedRecording],
+    sensors: Sequence[str] | None = None,
 ) -> dict[str, float | int]:
     """Scores of our tracker, pooled over recordings.
 

@@ -23,7 +23,7 @@ KITTI_IMAGE = (1242.0, 375.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class JudgedRecording:
     """Detections with their truth.
 
     Attributes:
@@ -46,13 +46,13 @@ class Recording:
 
 
 @lru_cache(maxsize=8)
-def simulated(scenario: str, seed: int, duration_s: float = DURATION_S) -> Recording:
+def simulated(scenario: str, seed: int, duration_s: float = DURATION_S) -> JudgedRecording:
     """Simulate a recording; the last few are kept."""
     from jeat_graph.simulation.scenario import load_scenario
     from jeat_graph.simulation.simulate import simulate
 
     detections, truth = simulate(load_scenario(scenario), seed=seed, duration_s=duration_s)
-    return Recording(f"{scenario}/{seed}", detections, truth)
+    return JudgedRecording(f"{scenario}/{seed}", detections, truth)
 
 
 def find_kitti(data: str | Path | None = None) -> Path | None:
@@ -67,7 +67,7 @@ def find_kitti(data: str | Path | None = None) -> Path | None:
 
 
 @lru_cache(maxsize=1)
-def kitti(folder: Path) -> tuple[Recording, ...]:
+def kitti(folder: Path) -> tuple[JudgedRecording, ...]:
     """Read the KITTI sequences, in order."""
     from jeat_graph.io.detections_io import read_detections
     from jeat_graph.io.truth_io import read_truth
@@ -78,5 +78,5 @@ def kitti(folder: Path) -> tuple[Recording, ...]:
         truth = read_truth(folder / name / "gt.csv")
         # Frames without any vehicle are frames too: a track there is false.
         frames = np.unique(np.concatenate([truth.frame_times(), detections.scan_t]))
-        out.append(Recording(name, detections, replace(truth, frames=frames)))
+        out.append(JudgedRecording(name, detections, replace(truth, frames=frames)))
     return tuple(out)

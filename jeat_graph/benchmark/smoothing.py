@@ -15,7 +15,7 @@ from jeat_graph.benchmark import common
 from jeat_graph.benchmark.drawn import DrawnTrack, from_model, from_paths
 from jeat_graph.benchmark.judging import in_processes, spread
 from jeat_graph.benchmark.provenance import provenance
-from jeat_graph.benchmark.recordings import Recording, kitti, simulated
+from jeat_graph.benchmark.recordings import JudgedRecording, kitti, simulated
 from jeat_graph.config.reading import load_config
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray
@@ -126,7 +126,7 @@ def judge(job: Job) -> list[dict[str, Any]]:
     ]
 
 
-def _recording(job: Job) -> Recording:
+def _recording(job: Job) -> JudgedRecording:
     if job.folder is not None:
         return next(one for one in kitti(job.folder) if one.name == job.where[1])
     assert job.duration_s is not None
@@ -138,7 +138,7 @@ def drawn(tracks: Sequence[DrawnTrack]) -> list[dict[str, Any]]:
 
     The ANEES is of one instant in each half second; its bounds take those for independent.
     """
-    from jeat_graph.eval.compare import chi2_bounds
+    from jeat_graph.eval.consistency import chi2_bounds
     from jeat_graph.eval.lagged import states_at
 
     names = ["filter", *(f"lag {lag:g} s" for lag in _LAGS_S), "whole tracks"]

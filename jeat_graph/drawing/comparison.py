@@ -10,7 +10,8 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.drawing.palette import AXES, FILTER, FULL, GRID, LAGGED, TRUTH
-from jeat_graph.eval.compare import Comparison, Samples, lag_name
+from jeat_graph.eval.compare import Comparison
+from jeat_graph.eval.samples import Samples, lag_name
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -13,7 +13,7 @@ from jeat_graph.io.frames import check_rate
 from jeat_graph.io.time_units import in_seconds
 
 if TYPE_CHECKING:
-    from jeat_graph.io.tables import Table
+    from jeat_graph.io.file_table import FileTable
 
 BOX = ("left", "top", "width", "height")
 #: Usual names of each column, in lower case; not `x` and `y`, which may be a corner or the centre.
@@ -76,7 +76,7 @@ def standing_in(names: Sequence[str], wanted: Sequence[str]) -> list[str]:
     return out
 
 
-def times_of(table: Table, unit: str, rate_hz: float | None) -> FloatArray:
+def times_of(table: FileTable, unit: str, rate_hz: float | None) -> FloatArray:
     """Return the times (R,) of a table's rows (s): from `t`, `t_ms` and so on, or frames by their rate.
 
     Args:
@@ -97,7 +97,7 @@ def times_of(table: Table, unit: str, rate_hz: float | None) -> FloatArray:
     return np.asarray(table.whole("frame") / check_rate(rate_hz, table.path))
 
 
-def boxes_of(table: Table) -> FloatArray:
+def boxes_of(table: FileTable) -> FloatArray:
     """Return the boxes (R, 4) left, top, width, height (px) of a table's rows, NaN where a field is blank.
 
     Raises:

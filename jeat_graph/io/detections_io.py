@@ -14,11 +14,12 @@ from jeat_graph.data.detections import Detections, find_bad_row
 from jeat_graph.data.errors import DataError
 from jeat_graph.io import coco, kitti, motchallenge, prophesee
 from jeat_graph.io.column_names import boxes_of, standing_in, times_of
+from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.formats import recognise
 from jeat_graph.io.frames import check_rate, fill_frames, gap_times, scale_scores, score_hint
 from jeat_graph.io.plain_text import frames_of
 from jeat_graph.io.table_writer import round_decimals, write_columns
-from jeat_graph.io.tables import Table, read_table
+from jeat_graph.io.tables import read_table
 
 DEFAULT_SENSOR = "rgb"
 _BOX = ("left", "top", "width", "height")
@@ -213,7 +214,7 @@ def _read_coco(
     return _assemble(found.t, sensor, found.boxes, scores, found.classes, missing, error)
 
 
-def _scores(table: Table, name: str, spoken: str) -> FloatArray:
+def _scores(table: FileTable, name: str, spoken: str) -> FloatArray:
     if name not in table:
         raise DataError(f"{spoken} is missing; detections need a score", table.path)
     return table.number(name)

@@ -53,12 +53,6 @@ class DiagnosticsWriter(PiecewiseWriter):
         self._pending, self._rows = [], 0
 
 
-def write_diagnostics(table: Diagnostics, path: str | Path) -> None:
-    """Write a table in one go."""
-    with DiagnosticsWriter(path) as writer:
-        writer.append(table)
-
-
 def read_diagnostics(path: str | Path) -> Diagnostics:
     """Read the table of a run.
 

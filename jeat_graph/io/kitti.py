@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.plain_text import read_plain
-from jeat_graph.io.tables import Table
 
 FIRST_FRAME = 0
 RATE_HZ = 10.0
@@ -25,7 +25,7 @@ _LABEL = (
 _COLUMNS = {17: _LABEL, 18: (*_LABEL, "score")}
 
 
-def read_lines(path: str | Path) -> Table:
+def read_lines(path: str | Path) -> FileTable:
     """Read the columns of the format, `score` only if it is there.
 
     Raises:
@@ -34,7 +34,7 @@ def read_lines(path: str | Path) -> Table:
     return read_plain(path, _COLUMNS, "KITTI tracking")
 
 
-def boxes_of(table: Table) -> FloatArray:
+def boxes_of(table: FileTable) -> FloatArray:
     """Return left, top, width, height (R, 4) in px.
 
     Raises:
@@ -44,7 +44,7 @@ def boxes_of(table: Table) -> FloatArray:
     return np.stack([left, top, right - left, bottom - top], axis=1)
 
 
-def distances_of(table: Table) -> FloatArray:
+def distances_of(table: FileTable) -> FloatArray:
     """Return the distance from the camera (R,) in m, NaN where the location is not known."""
     location = np.stack([table.number(name) for name in ("loc_x", "loc_y", "loc_z")], axis=1)
     known = (location > _UNKNOWN_LOCATION).all(axis=1)

@@ -19,9 +19,9 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.frames import check_rate
 from jeat_graph.io.plain_text import read_plain
-from jeat_graph.io.tables import Table
 
 FIRST_FRAME = 1
 _BASE = ("frame", "id", "left", "top", "width", "height")
@@ -50,7 +50,7 @@ _CLASSES = (
 )
 
 
-def read_lines(path: str | Path) -> Table:
+def read_lines(path: str | Path) -> FileTable:
     """Read the columns `frame, id, left, top, width, height` and, if there, `conf` and `class`.
 
     Raises:
@@ -59,7 +59,7 @@ def read_lines(path: str | Path) -> Table:
     return read_plain(path, _COLUMNS, "MOTChallenge")
 
 
-def boxes_of(table: Table) -> FloatArray:
+def boxes_of(table: FileTable) -> FloatArray:
     """Return left, top, width, height (R, 4) in px.
 
     Raises:
@@ -68,7 +68,7 @@ def boxes_of(table: Table) -> FloatArray:
     return np.stack([table.number(name) for name in _BASE[2:]], axis=1)
 
 
-def class_names(table: Table) -> np.typing.NDArray[np.str_] | None:
+def class_names(table: FileTable) -> np.typing.NDArray[np.str_] | None:
     """Return the class of each line (R,) by name (a number without a name as such), or None without one."""
     if "class" not in table:
         return None

@@ -11,10 +11,11 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.csv_text import CsvBody, read_text
-from jeat_graph.io.tables import Table, table_of
+from jeat_graph.io.file_table import FileTable
+from jeat_graph.io.tables import table_of
 
 
-def read_plain(path: str | Path, names: Mapping[int, Sequence[str]], kind: str) -> Table:
+def read_plain(path: str | Path, names: Mapping[int, Sequence[str]], kind: str) -> FileTable:
     """Read lines of fields separated by commas or white space.
 
     Args:
@@ -40,7 +41,7 @@ def read_plain(path: str | Path, names: Mapping[int, Sequence[str]], kind: str) 
     return table_of(body, names[width], columns)
 
 
-def frames_of(table: Table, first: int) -> IntArray:
+def frames_of(table: FileTable, first: int) -> IntArray:
     """Return the column `frame` (R,).
 
     Args:
@@ -57,7 +58,7 @@ def frames_of(table: Table, first: int) -> IntArray:
     return frame
 
 
-def check_sizes(table: Table, boxes: FloatArray) -> None:
+def check_sizes(table: FileTable, boxes: FloatArray) -> None:
     """Check that widths and heights are positive.
 
     Args:

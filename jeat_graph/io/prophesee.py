@@ -16,13 +16,13 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.csv_text import read_bytes
-from jeat_graph.io.tables import Table
+from jeat_graph.io.file_table import FileTable
 
 _ALIASES = {"ts": "t", "confidence": "class_confidence"}
 _US_PER_S = 1e6
 
 
-def read_array(path: str | Path) -> Table:
+def read_array(path: str | Path) -> FileTable:
     """Read the array as a table of numbers, fields under their newer names.
 
     Raises:
@@ -52,15 +52,15 @@ def read_array(path: str | Path) -> Table:
     for name in ("t", "x", "y", "w", "h"):
         if name not in columns:
             raise DataError(f"field {name!r} is missing or no number; there are {', '.join(names)}", path)
-    return Table(Path(path), columns)
+    return FileTable(Path(path), columns)
 
 
-def times_of(table: Table) -> FloatArray:
+def times_of(table: FileTable) -> FloatArray:
     """Return the times (R,) in s."""
     return table.number("t") / _US_PER_S
 
 
-def boxes_of(table: Table) -> FloatArray:
+def boxes_of(table: FileTable) -> FloatArray:
     """Return left, top, width, height (R, 4) in px.
 
     Raises:
@@ -69,6 +69,6 @@ def boxes_of(table: Table) -> FloatArray:
     return np.stack([table.number(name) for name in ("x", "y", "w", "h")], axis=1)
 
 
-def class_names(table: Table) -> np.typing.NDArray[np.str_] | None:
+def class_names(table: FileTable) -> np.typing.NDArray[np.str_] | None:
     """Return the class numbers (R,) as text, or None if there are none."""
     return table.whole("class_id").astype(np.str_) if "class_id" in table else None

@@ -17,12 +17,13 @@ from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io import kitti, motchallenge
+from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.formats import recognise
 from jeat_graph.io.frames import check_rate
 from jeat_graph.io.piecewise import PiecewiseWriter
 from jeat_graph.io.plain_text import frames_of
 from jeat_graph.io.table_writer import TableWriter, round_decimals, round_significant, write_columns
-from jeat_graph.io.tables import Table, read_table
+from jeat_graph.io.tables import read_table
 
 BOX = ("left", "top", "width", "height")
 MEAN = ("x", "y", "vx", "vy", "ax", "ay")
@@ -198,7 +199,7 @@ def by_frame(table: Trajectories, path: str | Path, rate_hz: float) -> tuple[Int
     return frame[rows], table.take(rows)
 
 
-def _read_contract(table: Table) -> Trajectories:
+def _read_contract(table: FileTable) -> Trajectories:
     text = table.text("sensors", blank_ok=True)
     distinct, index = np.unique(text, return_inverse=True)
     sensors = _sensor_order(distinct.tolist())
@@ -232,7 +233,7 @@ def _sensor_order(texts: Iterable[str]) -> tuple[str, ...]:
         return tuple(ordered)
 
 
-def _without_motion(table: Table, t: FloatArray, boxes: FloatArray, score: str) -> Trajectories:
+def _without_motion(table: FileTable, t: FloatArray, boxes: FloatArray, score: str) -> Trajectories:
     n = len(t)
     existence = table.number(score) if score in table else np.ones(n)
     mean = np.zeros((n, 6))
@@ -248,11 +249,11 @@ def _without_motion(table: Table, t: FloatArray, boxes: FloatArray, score: str) 
     )
 
 
-def _stack(table: Table, names: Iterable[str]) -> FloatArray:
+def _stack(table: FileTable, names: Iterable[str]) -> FloatArray:
     return np.stack([table.number(name) for name in names], axis=1)
 
 
-def _check(table: Table, found: Trajectories) -> None:
+def _check(table: FileTable, found: Trajectories) -> None:
     negative = (found.boxes[:, 2:] < 0).any(axis=1)
     if negative.any():
         row = int(np.argmax(negative))

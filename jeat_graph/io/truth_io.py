@@ -12,11 +12,12 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.io import kitti, motchallenge, prophesee
 from jeat_graph.io.column_names import boxes_of, standing_in, times_of
+from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.formats import recognise
 from jeat_graph.io.frames import check_rate, fill_frames, gap_times
 from jeat_graph.io.plain_text import check_sizes, frames_of
 from jeat_graph.io.table_writer import write_columns
-from jeat_graph.io.tables import Table, read_table
+from jeat_graph.io.tables import read_table
 
 _BOX = ("left", "top", "width", "height")
 _REQUIRED = ("t", "object_id", *_BOX)
@@ -159,7 +160,7 @@ def _read_contract(path: str | Path, rate_hz: float | None, time_unit: str) -> G
     )
 
 
-def _ignore_flags(table: Table) -> BoolArray:
+def _ignore_flags(table: FileTable) -> BoolArray:
     """Read `ignore` (R,): 1 or true, 0 or false or blank."""
     if "ignore" not in table:
         return np.zeros(len(table), dtype=bool)
@@ -172,7 +173,7 @@ def _ignore_flags(table: Table) -> BoolArray:
     return np.asarray(flags, dtype=bool)[index.reshape(-1)]
 
 
-def _check_unique(table: Table, t: FloatArray, ids: IntArray, exempt: BoolArray) -> None:
+def _check_unique(table: FileTable, t: FloatArray, ids: IntArray, exempt: BoolArray) -> None:
     """Refuse an object that is there twice at one time, unless it is one that is not judged."""
     rows = np.flatnonzero(~exempt)
     order = rows[np.lexsort((rows, ids[rows], t[rows]))]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.live.engines import ENGINES, run_local, run_on_ray
-from jeat_graph.live.manifest import Recording
+from jeat_graph.live.manifest import ManifestRow
 from jeat_graph.live.recording_job import FAILED, Job, Outcome, run_job
 from jeat_graph.runs.track_files import TrackRequest
 from jeat_graph.runs.tracking_run import RunOptions
@@ -66,7 +66,7 @@ class BatchResult:
         return [one for one in self.outcomes if one.status == FAILED]
 
 
-def run_batch(recordings: Sequence[Recording], out: str | Path, options: BatchOptions) -> BatchResult:
+def run_batch(recordings: Sequence[ManifestRow], out: str | Path, options: BatchOptions) -> BatchResult:
     """Track all recordings into `out/runs/NAME`, and write the tables of the batch.
 
     `out/recordings.csv` has a row for each with its status, counts and, where truth is given, scores;
@@ -96,7 +96,7 @@ def run_batch(recordings: Sequence[Recording], out: str | Path, options: BatchOp
     return BatchResult(outcomes, judged)
 
 
-def _job(recording: Recording, folder: Path, options: BatchOptions) -> Job:
+def _job(recording: ManifestRow, folder: Path, options: BatchOptions) -> Job:
     # Absolute paths: a worker of a cluster stands in another folder.
     detections = tuple(_absolute(item) for item in recording.detections)
     config = recording.config if recording.config is not None else options.config
@@ -153,7 +153,7 @@ def _cores() -> int:
 
 
 def _with_truth(
-    recordings: Sequence[Recording], outcomes: list[Outcome], folder: Path
+    recordings: Sequence[ManifestRow], outcomes: list[Outcome], folder: Path
 ) -> tuple[dict[str, JudgedRun], list[Outcome]]:
     """Read the runs that have truth; one whose truth does not fit becomes a failure."""
     from jeat_graph.eval.load import load_run

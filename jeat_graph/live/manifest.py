@@ -15,7 +15,7 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
 @dataclass(frozen=True)
-class Recording:
+class ManifestRow:
     """One row of a manifest.
 
     Attributes:
@@ -35,7 +35,7 @@ class Recording:
     rate_hz: float | None = None
 
 
-def read_manifest(path: str | Path) -> list[Recording]:
+def read_manifest(path: str | Path) -> list[ManifestRow]:
     """Read a manifest, CSV or Parquet.
 
     Columns: `detections` (files of the recording, joined by `;`), and, all optional, `name` (default: the
@@ -60,7 +60,7 @@ def read_manifest(path: str | Path) -> list[Recording]:
         for name in COLUMNS
         if name in table and name != "rate"
     }
-    recordings: list[Recording] = []
+    recordings: list[ManifestRow] = []
     taken: set[str] = set()
     for row in range(len(table)):
         field = {name: values[row] for name, values in text.items()}
@@ -77,7 +77,7 @@ def read_manifest(path: str | Path) -> list[Recording]:
         if hz is not None and hz <= 0.0:
             raise table.error(row, f"rate must be positive, got {hz:g}")
         recordings.append(
-            Recording(
+            ManifestRow(
                 name=name,
                 detections=files,
                 config=_config(field.get("config", ""), folder),

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.trajectories import GroundTruth
@@ -36,10 +35,6 @@ class SimulatedRecording:
     scene: Scene
     detections: Detections
     truth: GroundTruth
-
-    def truth_at(self, times: FloatArray) -> GroundTruth:
-        """Truth at any ascending times (T,) within the recording (s), say those of another sensor."""
-        return look(self.scene, times, self.scenario.truth).to_truth()
 
 
 def record(scenario: Scenario, seed: int = 0, duration_s: float = DEFAULT_DURATION_S) -> SimulatedRecording:

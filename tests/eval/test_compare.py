@@ -9,8 +9,10 @@ import pytest
 
 from jeat_graph.data.measured_track import MeasuredTrack
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
-from jeat_graph.eval.compare import chi2_bounds, compare, lag_name, whiteness
+from jeat_graph.eval.compare import compare
+from jeat_graph.eval.consistency import chi2_bounds, whiteness
 from jeat_graph.eval.lagged import states_at, with_times
+from jeat_graph.eval.samples import lag_name
 from jeat_graph.smoothers.measurements import measurements
 from jeat_graph.smoothers.rts import filter_track, smooth_rts
 from jeat_graph.smoothers.track_data import Prior, TrackData

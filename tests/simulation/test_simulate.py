@@ -16,6 +16,7 @@ from jeat_graph.io.detections_io import read_detections
 from jeat_graph.io.truth_io import read_truth
 from jeat_graph.simulation.scenario import load_scenario, scenario_names
 from jeat_graph.simulation.simulate import record, simulate
+from jeat_graph.simulation.world.truth import look
 
 from .sensors.ap import average_precision
 
@@ -59,7 +60,7 @@ def test_average_precision_matches_the_detector_table_of_the_paper() -> None:
             recording = record(load_scenario(name), seed, 8.0)
             for sensor in ("rgb", "evt"):
                 scans = recording.detections.select([sensor])
-                pair = (scans, recording.truth_at(scans.scan_t))
+                pair = (scans, look(recording.scene, scans.scan_t, recording.scenario.truth).to_truth())
                 for column in (name, "all"):
                     pairs.setdefault((sensor, column), []).append(pair)
     ap = {key: 100.0 * average_precision(value) for key, value in pairs.items()}

@@ -10,7 +10,7 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.diagnostics import NIS_FREEDOM
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.eval.compare import chi2_bounds
+from jeat_graph.eval.consistency import chi2_bounds
 from jeat_graph.eval.judge import ERRORS, breakdown_tables, summary_table
 from jeat_graph.eval.tables import Cell, Table
 from jeat_graph.runs.recorded import RunData, rows_of_tracks

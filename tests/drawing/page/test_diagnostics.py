@@ -13,7 +13,7 @@ from jeat_graph.data.diagnostics import Diagnostics
 from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.eval.lagged import states_at
 from jeat_graph.io.detections_io import write_detections
-from jeat_graph.io.diagnostics_io import COLUMNS, read_diagnostics, write_diagnostics
+from jeat_graph.io.diagnostics_io import COLUMNS, DiagnosticsWriter, read_diagnostics
 from jeat_graph.io.trajectories_io import read_trajectories
 from jeat_graph.simulation.scenario import load_scenario
 from jeat_graph.simulation.simulate import record
@@ -121,7 +121,8 @@ def test_what_is_written_is_read_again(tmp_path: Path):
         existence=np.array([0.75, np.nan]),
         sensors=("evt", "rgb"),
     )
-    write_diagnostics(table, tmp_path / "d.csv")
+    with DiagnosticsWriter(tmp_path / "d.csv") as writer:
+        writer.append(table)
     back = read_diagnostics(tmp_path / "d.csv")
     for name in COLUMNS:
         np.testing.assert_array_equal(getattr(back, name), getattr(table, name))

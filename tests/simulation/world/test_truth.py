@@ -83,6 +83,6 @@ def test_the_truth_is_sampled_at_every_capture_of_the_rgb_camera_even_of_dropped
 
 def test_truth_at_other_times_agrees_with_the_truth_of_the_recording() -> None:
     recording = record(SCENARIO, 2, 3.0)
-    again = recording.truth_at(recording.truth.frame_times())
+    again = look(recording.scene, recording.truth.frame_times(), SCENARIO.truth).to_truth()
     assert again.boxes == pytest.approx(recording.truth.boxes, abs=1e-6)
     assert np.array_equal(again.object_id, recording.truth.object_id)

@@ -1,0 +1,146 @@
+"""The errors of several estimators at the same instants, taken where a track is matched to a true object."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.measured_track import MeasuredTrack
+from jeat_graph.data.trajectories import GroundTruth, Trajectories
+from jeat_graph.eval.breakdown import DISTANCE_BINS_M
+from jeat_graph.eval.consistency import PARTS, chi2_bounds
+from jeat_graph.eval.frames import build_frames
+from jeat_graph.eval.kinematics import matched_errors
+from jeat_graph.eval.lagged import States, states_at
+
+#: A sensor counts as available to a track if it gave it a detection within this time before (s).
+RECENT_S = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Errors of every estimator at the same N instants, at which a track is matched to a true object.
+
+    Attributes:
+        t: (N,) time (s).
+        track_id: (N,) identity.
+        truth: (N, 2, 3) true [p, v, a] per axis.
+        states: estimates (N) by estimator.
+        available: (N,) bit k is set where sensor k had lately given the track a detection.
+        distance: (N,) from the camera (m), or None.
+    """
+
+    t: FloatArray
+    track_id: IntArray
+    truth: FloatArray
+    states: dict[str, States]
+    available: IntArray
+    distance: FloatArray | None
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+
+def lag_name(lag_s: float) -> str:
+    """Name of the estimator with that lag (s)."""
+    return f"lag {lag_s:g} s"
+
+
+def collect_samples(
+    tracks: Sequence[MeasuredTrack],
+    truth: GroundTruth,
+    smoothed: Trajectories,
+    lags_s: Sequence[float],
+    iou: float = 0.5,
+) -> Samples:
+    """Estimate each matched track at the times of the truth, by every estimator.
+
+    Objects cut off by the picture's edge are left out: a detector sees the centre of what is left of them.
+    """
+    frames = build_frames(truth, smoothed, kind="smoothed")
+    matched = matched_errors(frames, iou=iou)
+    assert matched is not None
+    assert truth.motion is not None
+    entry, row = matched.track_entry, frames.truth_row[matched.truth_entry]
+    whole = ~matched.truncated
+    identity, row = frames.tracks.track_id[entry][whole], row[whole]
+    t = truth.t[row]
+    names = ["filter", *(lag_name(lag) for lag in lags_s), "full"]
+    parts: list[tuple[IntArray, IntArray, list[States]]] = []
+    for track in tracks:
+        mine = np.flatnonzero(identity == track.track_id)
+        mine = mine[(t[mine] >= track.data.t[0]) & (t[mine] <= track.data.t[-1])]
+        if len(mine):
+            filtered, lagged, full, _ = states_at(track.data, t[mine], lags_s)
+            parts.append((mine, _available(track, t[mine]), [filtered, *lagged, full]))
+    order = np.concatenate([mine for mine, _, _ in parts]) if parts else np.zeros(0, dtype=np.int64)
+    states = {
+        name: States(
+            np.concatenate([part[2][k].mean for part in parts]) if parts else np.zeros((0, 2, 3)),
+            np.concatenate([part[2][k].cov for part in parts]) if parts else np.zeros((0, 2, 3, 3)),
+        )
+        for k, name in enumerate(names)
+    }
+    rows = row[order]
+    return Samples(
+        t=truth.t[rows],
+        track_id=identity[order],
+        truth=truth.motion[rows].reshape(-1, 3, 2).transpose(0, 2, 1),
+        states=states,
+        available=np.concatenate([part[1] for part in parts]) if parts else order,
+        distance=None if truth.distance is None else truth.distance[rows],
+    )
+
+
+def _available(track: MeasuredTrack, t: FloatArray) -> IntArray:
+    """Bits (T,) of the sensors that gave the track a detection within `RECENT_S` before each time."""
+    out = np.zeros(len(t), dtype=np.int64)
+    measured = np.concatenate([track.data.t[:1], track.data.t[track.data.key]])
+    sensor = np.concatenate([[track.birth_sensor], track.sensor])
+    for s in np.unique(sensor).tolist():
+        times = np.sort(measured[sensor == s])
+        last = np.searchsorted(times, t + 1e-6, side="right") - 1
+        recent = (last >= 0) & (t - times[np.maximum(last, 0)] <= RECENT_S)
+        out |= recent.astype(np.int64) << int(s)
+    return out
+
+
+def errors_of(samples: Samples, name: str, rows: BoolArray | None = None) -> dict[str, float]:
+    """RMSE of each part, and NEES per degree of freedom: of the position, and of the whole state."""
+    chosen = np.ones(len(samples), dtype=np.bool_) if rows is None else rows
+    state, truth = samples.states[name], samples.truth[chosen]
+    error, cov = state.mean[chosen] - truth, state.cov[chosen]
+    count = len(error)
+    out: dict[str, float] = {"count": count}
+    for part, columns in PARTS.items():
+        out[f"{part}_rmse"] = float(np.sqrt((error[:, :, columns] ** 2).sum() / count)) if count else np.nan
+    position = error[:, :, 0] ** 2 / cov[:, :, 0, 0]
+    whole = (error * np.linalg.solve(cov, error[..., None])[..., 0]).sum(axis=2)
+    out["anees_position"] = float(position.mean()) if count else np.nan
+    out["anees_state"] = float(whole.mean() / 3.0) if count else np.nan
+    out["anees_low"], out["anees_high"] = chi2_bounds(count, 2)
+    return out
+
+
+def by_availability(samples: Samples, sensors: Sequence[str]) -> dict[str, BoolArray]:
+    """Samples (N,) by the sensors that had lately given the track a detection, most sensors first."""
+    masks = sorted(np.unique(samples.available).tolist(), key=lambda m: (-int(m).bit_count(), m))
+    groups = {}
+    for mask in masks:
+        names = [name for k, name in enumerate(sensors) if int(mask) >> k & 1]
+        label = "none" if not names else f"{names[0]} only" if len(names) == 1 else " + ".join(names)
+        groups[label] = samples.available == mask
+    return groups
+
+
+def by_distance(distance: FloatArray) -> dict[str, BoolArray]:
+    """Samples (N,) by their distance from the camera (m)."""
+    groups = {}
+    for low, high in pairwise(DISTANCE_BINS_M):
+        label = f"{low:g}–{high:g} m" if np.isfinite(high) else f"over {low:g} m"
+        groups[label] = (distance >= low) & (distance < high)
+    return groups

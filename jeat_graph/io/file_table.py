@@ -1,0 +1,188 @@
+"""Columns of a file by name, with errors that name the line or the row.
+
+A `FileTable` keeps its columns as they came and converts one when it is asked for, so that each reader says
+in one place which columns it needs, of which kind, and what may be blank.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.errors import DataError
+
+_LARGEST_EXACT = 2.0**53  # beyond it a float cannot tell neighbouring whole numbers apart
+
+
+class FileTable:
+    """Columns of one file by name.
+
+    Args:
+        path: the file, for messages.
+        columns: Arrow arrays of equal length by name; null where a field is blank.
+        line_of: gives the file's line number of a row, or None where a file has rows but no lines.
+        decimal_comma: whether numbers may be written `1,5`, as they are where `;` stands between fields.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        columns: dict[str, Any],
+        line_of: Callable[[int], int] | None = None,
+        *,
+        decimal_comma: bool = False,
+    ) -> None:
+        self.path = path
+        self._columns = columns
+        self._line_of = line_of
+        self._decimal_comma = decimal_comma
+
+    def __len__(self) -> int:
+        return min((len(column) for column in self._columns.values()), default=0)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._columns
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the columns, in the file's order."""
+        return list(self._columns)
+
+    def error(self, row: int, message: str) -> DataError:
+        """Make an error that points at a row (from 0): by line number (CSV), else as `row N` from 1."""
+        if self._line_of is None:
+            return DataError(f"row {row + 1}: {message}", self.path)
+        return DataError(message, self.path, self._line_of(int(row)))
+
+    def blank(self, name: str) -> BoolArray:
+        """Tell where a column has no value (R,)."""
+        return np.asarray(self._columns[name].is_null().to_numpy(), dtype=bool)
+
+    def number(self, name: str, *, blank_ok: bool = False, nan_ok: bool = False) -> FloatArray:
+        """Convert a column to numbers.
+
+        Args:
+            name: the column.
+            blank_ok: a blank field is NaN instead of an error.
+            nan_ok: a field that says `nan` is NaN instead of an error. Infinity is always an error.
+
+        Returns:
+            Numbers (R,).
+
+        Raises:
+            DataError: names the first line or row that is blank, not a number, or not finite.
+        """
+        values, is_null = self._floats(name)
+        if is_null.any() and not blank_ok:
+            raise self.error(int(np.argmax(is_null)), f"{name} is missing")
+        good = np.isfinite(values) | is_null
+        if nan_ok:
+            good |= np.isnan(values)
+        if not good.all():
+            row = int(np.argmin(good))
+            raise self.error(row, f"{name} must be a finite number, got {values[row]}")
+        return values
+
+    def whole(self, name: str, *, blank_ok: bool = False) -> IntArray:
+        """Convert a column to whole numbers (R,), 0 where blank if that is allowed.
+
+        Raises:
+            DataError: names the first line or row that is blank or not a whole number.
+        """
+        import pyarrow as pa
+
+        column = self._columns[name]
+        is_null = self.blank(name)
+        if is_null.any() and not blank_ok:
+            raise self.error(int(np.argmax(is_null)), f"{name} is missing")
+        if not pa.types.is_floating(column.type):
+            # Not by way of floats, so that ids above 2^53 keep their last digits.
+            try:
+                return np.asarray(column.cast(pa.int64()).fill_null(0).to_numpy(), dtype=np.int64)
+            except pa.ArrowException:
+                pass
+        values = self.number(name, blank_ok=blank_ok)
+        values = np.where(is_null, 0.0, values)
+        good = (values == np.rint(values)) & (np.abs(values) <= _LARGEST_EXACT)
+        if not good.all():
+            row = int(np.argmin(good))
+            raise self.error(row, f"{name} must be a whole number, got {values[row]:g}")
+        return values.astype(np.int64)
+
+    def text(self, name: str, *, blank_ok: bool = False) -> npt.NDArray[np.str_]:
+        """Convert a column to text (R,) without surrounding white space, empty where blank.
+
+        Raises:
+            DataError: names the first line or row that is blank, unless that is allowed.
+        """
+        import pyarrow as pa
+        from pyarrow import compute
+
+        column = self._columns[name]
+        try:
+            if pa.types.is_dictionary(column.type):
+                column = column.cast(column.type.value_type)
+            # Few distinct texts, many rows: work on the distinct ones.
+            coded = pa.chunked_array([column.cast(pa.string()).combine_chunks()]).combine_chunks()
+            coded = coded.dictionary_encode()
+            distinct = compute.utf8_trim_whitespace(coded.dictionary).to_pylist()
+        except (pa.ArrowException, UnicodeDecodeError):
+            raise DataError(f"column {name} must hold text", self.path) from None
+        index = np.asarray(
+            coded.indices.fill_null(len(distinct)).to_numpy(zero_copy_only=False), dtype=np.int64
+        )
+        values = np.asarray([*distinct, ""], dtype=np.str_)[index]
+        if not blank_ok and (values == "").any():
+            raise self.error(int(np.argmax(values == "")), f"{name} is missing")
+        return values
+
+    def _floats(self, name: str) -> tuple[FloatArray, BoolArray]:
+        import pyarrow as pa
+
+        column = self._columns[name]
+        is_null = self.blank(name)
+        if pa.types.is_temporal(column.type):
+            raise DataError(f"column {name} must hold numbers, not {column.type}", self.path)
+        try:
+            if pa.types.is_dictionary(column.type):
+                column = column.cast(column.type.value_type)
+            if pa.types.is_boolean(column.type):
+                column = column.cast(pa.int8())
+            numbers = _cast(column, self._decimal_comma)
+        except (pa.ArrowException, UnicodeDecodeError):
+            raise self._not_a_number(name, column) from None
+        return np.array(numbers.to_numpy(), dtype=np.float64), is_null
+
+    def _not_a_number(self, name: str, column: Any) -> DataError:
+        """Find the first field of a column that is no number, by halving."""
+        import pyarrow as pa
+
+        if not (pa.types.is_string(column.type) or pa.types.is_large_string(column.type)):
+            return DataError(f"column {name} must hold numbers, not {column.type}", self.path)
+        good, bad = 0, len(column)  # the rows before `good` are numbers, those before `bad` are not all
+        while bad - good > 1:
+            middle = (good + bad) // 2
+            try:
+                _cast(column.slice(good, middle - good), self._decimal_comma)
+                good = middle
+            except pa.ArrowException:
+                bad = middle
+        return self.error(good, f"{name} must be a number, got {column[good].as_py()[:40]!r}")
+
+
+def _cast(column: Any, decimal_comma: bool = False) -> Any:
+    """Convert Arrow text or numbers to float64, passing over white space around a number."""
+    import pyarrow as pa
+    from pyarrow import compute
+
+    if decimal_comma:
+        column = compute.replace_substring(column, ",", ".")
+    try:
+        return column.cast(pa.float64())
+    except pa.ArrowInvalid:
+        return compute.utf8_trim_whitespace(column).cast(pa.float64())
