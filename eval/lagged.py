@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.smoothers.backward import backward_between
-from jeat_graph.smoothers.rts import Filtered, run_filter, smooth_rts
+from jeat_graph.smoothers.backward import smooth_until
+from jeat_graph.smoothers.passes import Filtered
+from jeat_graph.smoothers.rts import observations, run_filter, smooth_rts, steps
 from jeat_graph.smoothers.track_data import COINCIDENT_S, MOTION, TrackData
 
 
@@ -70,10 +71,10 @@ def with_times(track: TrackData, t: FloatArray) -> tuple[TrackData, IntArray]:
     more = more[np.diff(more, prepend=-np.inf) > COINCIDENT_S]
     keys = np.sort(np.concatenate([track.t, more]))
     # An interval that is cut keeps its jerk on both sides; beyond the end the last one holds.
-    q = track.q[np.minimum(np.searchsorted(track.t, keys), len(track) - 1)]
-    q = np.where(q > 0.0, q, 1.0)
+    jerk = track.jerk[np.minimum(np.searchsorted(track.t, keys), len(track) - 1)]
+    jerk = np.where(jerk > 0.0, jerk, 1.0)
     old_to_new = np.searchsorted(keys, track.t)
-    longer = replace(track, t=keys, q=q, key=old_to_new[track.key])
+    longer = replace(track, t=keys, jerk=jerk, key=old_to_new[track.key])
     at = np.searchsorted(keys, times - COINCIDENT_S)
     at = np.where(here, old_to_new[near], np.minimum(at, len(keys) - 1))
     return longer, at.astype(np.int64)
@@ -115,8 +116,7 @@ def _smoothed_until(
     track: TrackData, filtered: Filtered, at: IntArray, until: IntArray
 ) -> tuple[FloatArray, FloatArray]:
     """Smooth the states `at` (T,) with all up to the keys `until` (T,)."""
-    model = (track.t, track.memory, track.key, track.lever, track.error)
-    return backward_between((0,) * track.size, *model, *filtered.passes(), at, until)
+    return smooth_until((0,) * track.size, steps(track), observations(track), filtered, at, until)
 
 
 def _innovations(track: TrackData, filtered: Filtered) -> Innovations:

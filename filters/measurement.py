@@ -8,7 +8,7 @@ import numpy as np
 #:
 #: - `t` time (s); `track_id` the track; `sensor` index of the sensor; `birth` whether it started the track.
 #: - `z` (2,) centre (px); `r` (2,) variances of its white noise (px²), noise scale and score included.
-#: - `error` the sensor's error state, or -1; `lever` (2,) standard deviations of that error (px).
+#: - `error` the sensor's error state, or -1; `coloured_std` (2,) standard deviations of that error (px).
 #: - `jerk` root spectral density of the track's jerk at the time (px/s^2.5), > 0.
 #: - `log_size` (2,) ln width and ln height (ln px); `size_var` (2,) their variances.
 #: - `velocity_var` (2,), `acceleration_var` (2,), `rate_var`: where it started the track, the variances of
@@ -23,7 +23,7 @@ MEASUREMENT = np.dtype(
         ("z", np.float64, (2,)),
         ("r", np.float64, (2,)),
         ("error", np.int64),
-        ("lever", np.float64, (2,)),
+        ("coloured_std", np.float64, (2,)),
         ("jerk", np.float64),
         ("log_size", np.float64, (2,)),
         ("size_var", np.float64, (2,)),

@@ -15,7 +15,7 @@ from jeat_graph.filters.coloured_noise import MOTION
 def write_prior(
     z: FloatArray,
     white: FloatArray,
-    lever: FloatArray,
+    coloured_std: FloatArray,
     error: int,
     velocity_var: FloatArray,
     acceleration_var: FloatArray,
@@ -27,7 +27,7 @@ def write_prior(
     Args:
         z: (2,) centre of the first detection (px).
         white: (2,) variances of its white noise (px²).
-        lever: (2,) standard deviations of the error with memory (px).
+        coloured_std: (2,) standard deviations of the coloured error (px).
         error: the sensor's error state, counted from 0, or -1.
         velocity_var: (2,) variances of the velocity, which is zero on average (px²/s²).
         acceleration_var: (2,) variances of the acceleration, likewise (px²/s⁴).
@@ -38,14 +38,14 @@ def write_prior(
     cov[:] = 0.0
     for axis in range(2):
         mean[axis, 0] = z[axis]
-        cov[axis, 0, 0] = white[axis] + lever[axis] * lever[axis]
+        cov[axis, 0, 0] = white[axis] + coloured_std[axis] * coloured_std[axis]
         cov[axis, 1, 1] = velocity_var[axis]
         cov[axis, 2, 2] = acceleration_var[axis]
         for e in range(MOTION, mean.shape[1]):
             cov[axis, e, e] = 1.0
         if error >= 0:
             # p = z − h e − w: what the detection is off by, the position is off by the other way.
-            cov[axis, 0, MOTION + error] = cov[axis, MOTION + error, 0] = -lever[axis]
+            cov[axis, 0, MOTION + error] = cov[axis, MOTION + error, 0] = -coloured_std[axis]
 
 
 @njit(cache=True)

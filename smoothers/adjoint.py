@@ -7,7 +7,8 @@ its matrix Λ goes
     back over a step:         λ ← Fᵀ λ,              Λ ← Fᵀ Λ F
 
 and a smoothed state is x - P λ with covariance P - P Λ P, given the filtered x and P. Where only few of many
-states are wanted it is much cheaper: H and F have few entries, so λ and Λ cost O(n²) a key.
+states are wanted it is much cheaper: H and F have few entries, so λ and Λ cost O(n²) a key. Neither needs the
+other: who wants the covariances alone goes back with Λ alone.
 
 The price: a prior κ times as vague as what the first measurements leave of it costs κ² roundings in the
 covariances. At 1000 px/s against a few px/s that is 1e-9, at 100,000 px/s nothing is left.
@@ -23,36 +24,37 @@ from jeat_graph.data.arrays import FloatArray
 
 
 @njit(cache=True)
-def back_over_measurement(
-    dims: tuple[int, ...],
-    h: float,
-    e: int,
-    K: FloatArray,
-    y: float,
-    S: float,
-    lam: FloatArray,
-    Lam: FloatArray,
-    u: FloatArray,
+def mean_over_measurement(
+    dims: tuple[int, ...], h: float, e: int, K: FloatArray, scaled: float, lam: FloatArray
 ) -> None:
-    """Take λ (n,) and Λ (n, n) back over a measurement p + h x_e, in place; e < 3 for white errors."""
+    """Take λ (n,) back over a measurement p + h x_e, y / S = `scaled`, in place; e < 3 for white errors."""
+    s = scaled
+    for i in range(len(dims)):
+        s += K[i] * lam[i]
+    lam[0] -= s
+    if e >= 3:
+        lam[e] -= h * s
+
+
+@njit(cache=True)
+def cov_over_measurement(
+    dims: tuple[int, ...], h: float, e: int, K: FloatArray, S: float, Lam: FloatArray, u: FloatArray
+) -> None:
+    """Take Λ (n, n) back over a measurement p + h x_e, in place; e < 3 for white errors."""
     n = len(dims)
-    s = y / S
     c = 1.0 / S
     for i in range(n):
-        s += K[i] * lam[i]
         t = 0.0
         for j in range(n):
             t += Lam[i, j] * K[j]
         u[i] = t
         c += K[i] * t
-    lam[0] -= s
     # Cᵀ Λ C + Hᵀ H / S = Λ - Hᵀ uᵀ - u H + c Hᵀ H with u = Λ K.
     for j in range(n):
         Lam[0, j] -= u[j]
         Lam[j, 0] -= u[j]
     Lam[0, 0] += c
     if e >= 3:
-        lam[e] -= h * s
         for j in range(n):
             Lam[e, j] -= h * u[j]
             Lam[j, e] -= h * u[j]
@@ -62,16 +64,19 @@ def back_over_measurement(
 
 
 @njit(cache=True)
-def back_over_step(
-    dims: tuple[int, ...], dt: float, phi: FloatArray, lam: FloatArray, Lam: FloatArray
-) -> None:
-    """Take λ (n,) to Fᵀ λ and Λ (n, n) to Fᵀ Λ F, in place."""
+def mean_over_step(dims: tuple[int, ...], dt: float, phi: FloatArray, lam: FloatArray) -> None:
+    """Take λ (n,) to Fᵀ λ, in place."""
+    lam[2] += dt * lam[1] + 0.5 * dt * dt * lam[0]
+    lam[1] += dt * lam[0]
+    for i in range(3, len(dims)):
+        lam[i] *= phi[i - 3]
+
+
+@njit(cache=True)
+def cov_over_step(dims: tuple[int, ...], dt: float, phi: FloatArray, Lam: FloatArray) -> None:
+    """Take Λ (n, n) to Fᵀ Λ F, in place."""
     n = len(dims)
     half = 0.5 * dt * dt
-    lam[2] += dt * lam[1] + half * lam[0]
-    lam[1] += dt * lam[0]
-    for i in range(3, n):
-        lam[i] *= phi[i - 3]
     for j in range(n):
         Lam[2, j] += dt * Lam[1, j] + half * Lam[0, j]
         Lam[1, j] += dt * Lam[0, j]
@@ -89,25 +94,25 @@ def back_over_step(
 
 
 @njit(cache=True)
-def smooth_one(
-    dims: tuple[int, ...],
-    m: FloatArray,
-    P: FloatArray,
-    lam: FloatArray,
-    Lam: FloatArray,
-    part: FloatArray,
-    sum_: FloatArray,
-    out_mean: FloatArray,
-    out_cov: FloatArray,
-) -> None:
-    """Write m - P λ and P - P Λ P."""
+def write_mean(dims: tuple[int, ...], m: FloatArray, P: FloatArray, lam: FloatArray, out: FloatArray) -> None:
+    """Write m - P λ (n,)."""
     n = len(dims)
     for i in range(n):
         s = m[i]
         for j in range(n):
             s -= P[i, j] * lam[j]
+        out[i] = s
+
+
+@njit(cache=True)
+def write_cov(
+    dims: tuple[int, ...], P: FloatArray, Lam: FloatArray, part: FloatArray, sum_: FloatArray, out: FloatArray
+) -> None:
+    """Write P - P Λ P (n, n)."""
+    n = len(dims)
+    for i in range(n):
+        for j in range(n):
             part[i, j] = P[i, 0] * Lam[0, j]
-        out_mean[i] = s
         # The inner loops run along rows, so that the compiler can do several steps at once.
         for k in range(1, n):
             for j in range(n):
@@ -119,5 +124,5 @@ def smooth_one(
             for j in range(n):
                 sum_[j] -= part[i, k] * P[k, j]
         for j in range(i + 1):
-            out_cov[i, j] = sum_[j]
-            out_cov[j, i] = sum_[j]
+            out[i, j] = sum_[j]
+            out[j, i] = sum_[j]

@@ -1,4 +1,8 @@
-"""The compiled smoother: back over what the filter has made of a track (`forward.py`), see `adjoint.py`."""
+"""Smooth a track: the compiled pass back over what the filter has made of it (`forward.py`, `adjoint.py`).
+
+Means and covariances are two passes: GTSAM gives means of its own, and the covariances do not depend on what
+was measured.
+"""
 
 from __future__ import annotations
 
@@ -6,119 +10,131 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.smoothers.adjoint import back_over_measurement, back_over_step, smooth_one
+from jeat_graph.smoothers.adjoint import (
+    cov_over_measurement,
+    cov_over_step,
+    mean_over_measurement,
+    mean_over_step,
+    write_cov,
+    write_mean,
+)
 from jeat_graph.smoothers.gains import write_gain
+from jeat_graph.smoothers.passes import Covariances, Filtered, Observations, Span, Steps
 from jeat_graph.smoothers.transitions import error_steps, step_cov
 
 
 @njit(cache=True)
-def smooth_rows(
+def smooth_means(
     dims: tuple[int, ...],
-    first: int,
-    end: int,
-    taken: int,
-    wanted: int,
-    t: FloatArray,
-    q: FloatArray,
-    memory: FloatArray,
-    row: IntArray,
-    lever: FloatArray,
-    error: IntArray,
-    mean: FloatArray,
-    cov: FloatArray,
-    gain: FloatArray,
-    innovation: FloatArray,
-    variance: FloatArray,
-    out_mean: FloatArray,
-    out_cov: FloatArray,
-    out_gain: FloatArray,
+    span: Span,
+    steps: Steps,
+    observations: Observations,
+    filtered: Filtered,
+    out: FloatArray,
 ) -> None:
-    """Smooth some keys of one track, given what `filter_rows` has made of them.
+    """Smooth the means of the first keys of a span, given all its observations.
 
     Args:
-        dims: any tuple of n elements.
-        first: the first key.
-        end: the key after the last.
-        taken: the measurement after the last of these keys.
-        wanted: how many states are wanted, from the first on.
-        t: (N,) as for `filter_rows`.
-        q: (N,) as for `filter_rows`.
-        memory: (B,) as for `filter_rows`.
-        row: (M,) as for `filter_rows`.
-        lever: (M, 2) as for `filter_rows`.
-        error: (M,) as for `filter_rows`.
-        mean: (N, 2, n) filtered means.
-        cov: (N, 2, n, n) filtered covariances.
-        gain: (M, 2, n) gains.
-        innovation: (M, 2) innovations (px).
-        variance: (M, 2) their variances (px²).
-        out_mean: (wanted, 2, n) becomes the smoothed means.
-        out_cov: (wanted, 2, n, n) becomes their covariances.
-        out_gain: (wanted, 2, n, n) becomes the smoother gains from each key to the next, zero at the last.
+        dims: any tuple of n elements (`transitions.py`).
+        span: the keys.
+        steps: their times and how the state moves between them.
+        observations: the measurements.
+        filtered: what `filter_rows` has made of these.
+        out: (K, 2, n) becomes the smoothed means of the first K keys.
     """
     n = len(dims)
     phi, var = np.empty(n - 3), np.empty(n - 3)
-    lam, Lam = np.zeros((2, n)), np.zeros((2, n, n))
-    u, d = np.empty(n), np.empty(n)
-    predicted, part, L = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
-    i, dt = taken - 1, 0.0
-    for k in range(end - 1, first - 1, -1):
-        if k < end - 1:
-            # dt, phi and var are those of the step from k to k + 1.
+    lam = np.zeros((2, n))
+    i, dt = span.observation - 1, 0.0
+    for k in range(span.end - 1, span.first - 1, -1):
+        if k < span.end - 1:
+            # dt and phi are those of the step from k to k + 1.
             for a in range(2):
-                back_over_step(dims, dt, phi, lam[a], Lam[a])
-        if k - first < wanted:
-            o = k - first
+                mean_over_step(dims, dt, phi, lam[a])
+        o = k - span.first
+        if o < len(out):
             for a in range(2):
-                if k < end - 1:
-                    P = cov[k, a]
-                    smooth_one(dims, mean[k, a], P, lam[a], Lam[a], part, u, out_mean[o, a], out_cov[o, a])
-                    step_cov(dims, dt, q[k + 1], phi, var, P, part, predicted)
-                    write_gain(dims, predicted, part, L, d, out_gain[o, a])
-                else:
-                    out_mean[o, a] = mean[k, a]
-                    out_cov[o, a] = cov[k, a]
-                    out_gain[o, a] = 0.0
-        while i >= 0 and row[i] == k:
+                write_mean(dims, filtered.mean[k, a], filtered.cov[k, a], lam[a], out[o, a])
+        while i >= 0 and observations.key[i] == k:
+            e = observations.error[i] + 3
             for a in range(2):
-                h, y, S = lever[i, a], innovation[i, a], variance[i, a]
-                back_over_measurement(dims, h, error[i] + 3, gain[i, a], y, S, lam[a], Lam[a], u)
+                h = observations.coloured_std[i, a]
+                scaled = filtered.innovation[i, a] / filtered.variance[i, a]
+                mean_over_measurement(dims, h, e, filtered.gain[i, a], scaled, lam[a])
             i -= 1
-        if k > first:
-            dt = t[k] - t[k - 1]
-            error_steps(dt, memory, phi, var)
+        if k > span.first:
+            dt = steps.t[k] - steps.t[k - 1]
+            error_steps(dt, steps.correlation_time, phi, var)
 
 
 @njit(cache=True)
-def backward_between(
+def smooth_covs(
     dims: tuple[int, ...],
-    t: FloatArray,
-    memory: FloatArray,
-    row: IntArray,
-    lever: FloatArray,
-    error: IntArray,
-    mean: FloatArray,
-    cov: FloatArray,
-    gain: FloatArray,
-    innovation: FloatArray,
-    variance: FloatArray,
+    span: Span,
+    steps: Steps,
+    observations: Observations,
+    filtered: Filtered,
+    out: Covariances,
+) -> None:
+    """Smooth the covariances of the first keys of a span, given all its observations.
+
+    Args:
+        dims: any tuple of n elements (`transitions.py`).
+        span: the keys.
+        steps: their times and how the state moves between them.
+        observations: the measurements.
+        filtered: what `filter_rows` has made of these.
+        out: becomes the covariances of the first K keys, and the gains from each to the next.
+    """
+    n = len(dims)
+    phi, var = np.empty(n - 3), np.empty(n - 3)
+    Lam = np.zeros((2, n, n))
+    u, d = np.empty(n), np.empty(n)
+    predicted, part, L = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+    i, dt = span.observation - 1, 0.0
+    for k in range(span.end - 1, span.first - 1, -1):
+        if k < span.end - 1:
+            # dt, phi and var are those of the step from k to k + 1.
+            for a in range(2):
+                cov_over_step(dims, dt, phi, Lam[a])
+        o = k - span.first
+        if o < len(out.cov):
+            for a in range(2):
+                P = filtered.cov[k, a]
+                if k < span.end - 1:
+                    write_cov(dims, P, Lam[a], part, u, out.cov[o, a])
+                    step_cov(dims, dt, steps.jerk[k + 1], phi, var, P, part, predicted)
+                    write_gain(dims, predicted, part, L, d, out.gain[o, a])
+                else:
+                    out.cov[o, a] = P
+                    out.gain[o, a] = 0.0
+        while i >= 0 and observations.key[i] == k:
+            e = observations.error[i] + 3
+            for a in range(2):
+                h, S = observations.coloured_std[i, a], filtered.variance[i, a]
+                cov_over_measurement(dims, h, e, filtered.gain[i, a], S, Lam[a], u)
+            i -= 1
+        if k > span.first:
+            dt = steps.t[k] - steps.t[k - 1]
+            error_steps(dt, steps.correlation_time, phi, var)
+
+
+@njit(cache=True)
+def smooth_until(
+    dims: tuple[int, ...],
+    steps: Steps,
+    observations: Observations,
+    filtered: Filtered,
     at: IntArray,
     until: IntArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Smooth some keys of one track, each with the measurements up to a key of its own.
 
     Args:
-        dims: any tuple of n elements.
-        t: (N,) as for `filter_rows`.
-        memory: (B,) as for `filter_rows`.
-        row: (M,) as for `filter_rows`.
-        lever: (M, 2) as for `filter_rows`.
-        error: (M,) as for `filter_rows`.
-        mean: (N, 2, n) filtered means.
-        cov: (N, 2, n, n) filtered covariances.
-        gain: (M, 2, n) gains.
-        innovation: (M, 2) innovations (px).
-        variance: (M, 2) their variances (px²).
+        dims: any tuple of n elements (`transitions.py`).
+        steps: the times of all keys and how the state moves between them.
+        observations: the measurements.
+        filtered: what `filter_rows` has made of these.
         at: (T,) keys wanted.
         until: (T,) the last key whose measurements count, >= `at`.
 
@@ -133,18 +149,23 @@ def backward_between(
     for o in range(len(at)):
         lam[:] = 0.0
         Lam[:] = 0.0
-        i = np.searchsorted(row, until[o], side="right") - 1
+        i = np.searchsorted(observations.key, until[o], side="right") - 1
         for k in range(until[o], at[o], -1):
-            while i >= 0 and row[i] == k:
+            while i >= 0 and observations.key[i] == k:
+                e = observations.error[i] + 3
                 for a in range(2):
-                    h, y, S = lever[i, a], innovation[i, a], variance[i, a]
-                    back_over_measurement(dims, h, error[i] + 3, gain[i, a], y, S, lam[a], Lam[a], u)
+                    h, K = observations.coloured_std[i, a], filtered.gain[i, a]
+                    S = filtered.variance[i, a]
+                    mean_over_measurement(dims, h, e, K, filtered.innovation[i, a] / S, lam[a])
+                    cov_over_measurement(dims, h, e, K, S, Lam[a], u)
                 i -= 1
-            dt = t[k] - t[k - 1]
-            error_steps(dt, memory, phi, var)
+            dt = steps.t[k] - steps.t[k - 1]
+            error_steps(dt, steps.correlation_time, phi, var)
             for a in range(2):
-                back_over_step(dims, dt, phi, lam[a], Lam[a])
+                mean_over_step(dims, dt, phi, lam[a])
+                cov_over_step(dims, dt, phi, Lam[a])
         k = at[o]
         for a in range(2):
-            smooth_one(dims, mean[k, a], cov[k, a], lam[a], Lam[a], part, u, out_mean[o, a], out_cov[o, a])
+            write_mean(dims, filtered.mean[k, a], filtered.cov[k, a], lam[a], out_mean[o, a])
+            write_cov(dims, filtered.cov[k, a], Lam[a], part, u, out_cov[o, a])
     return out_mean, out_cov

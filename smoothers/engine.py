@@ -9,11 +9,14 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import RecordArray
 from jeat_graph.data.errors import ConfigError
-from jeat_graph.filters.measurement import MEASUREMENT
 from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
 from jeat_graph.smoothers.gtsam.full import smooth_full
 from jeat_graph.smoothers.gtsam.linear_graph import load_gtsam
-from jeat_graph.smoothers.measurements import COINCIDENT_S, check_measurements
+from jeat_graph.smoothers.measurements import (
+    COINCIDENT_S,
+    check_measurements,
+    concatenate_measurements,
+)
 from jeat_graph.smoothers.robust import robust_weights
 from jeat_graph.smoothers.rts import smooth_rts
 from jeat_graph.smoothers.track_data import Prior, SmoothedTrack, TrackData
@@ -29,11 +32,13 @@ class TrackSmoother(Protocol):
         rebuilds: how often GTSAM failed and the track was solved anew from our arrays.
         fallbacks: how often our own RTS pass had to stand in for GTSAM.
         too_late: measurements refused because the states they belong to were final.
+        waiting: measurements set aside until there are enough to solve for.
     """
 
     rebuilds: int
     fallbacks: int
     too_late: int
+    waiting: int
 
     def feed(self, measured: RecordArray) -> None:
         """Take in measurements z = p + h e + w: (M,) records, see `measurements.measurements`."""
@@ -61,12 +66,13 @@ class WholeTrackSmoother:
         prior: what is known of the state before the measurements.
         use_gtsam: whether GTSAM does the solving, or our own RTS pass.
         robust: kernel that weighs down outliers (`robust.KERNELS`), or "none".
-        memory: (B,) memory of the error states (s).
+        correlation_time: (B,) correlation times of the error states (s).
 
     Attributes:
         rebuilds: how often GTSAM failed.
         fallbacks: how often the RTS pass gave the result instead; the same number.
         too_late: measurements refused because they were older than the prior.
+        waiting: 0, as all of them are solved for at the end.
     """
 
     def __init__(
@@ -75,12 +81,12 @@ class WholeTrackSmoother:
         *,
         use_gtsam: bool = True,
         robust: str = "none",
-        memory: npt.ArrayLike = (),
+        correlation_time: npt.ArrayLike = (),
     ) -> None:
-        self.rebuilds = self.fallbacks = self.too_late = 0
+        self.rebuilds = self.fallbacks = self.too_late = self.waiting = 0
         self._prior = prior
         self._use_gtsam, self._robust = use_gtsam, robust
-        self._memory = np.asarray(memory, dtype=np.float64)
+        self._correlation_time = np.asarray(correlation_time, dtype=np.float64)
         self._parts: list[RecordArray] = []
 
     def feed(self, measured: RecordArray) -> None:
@@ -90,7 +96,7 @@ class WholeTrackSmoother:
             DataError: records of another kind, numbers that are not finite, variances or densities <= 0,
                 error states that do not exist.
         """
-        check_measurements(measured, len(self._memory))
+        check_measurements(measured, len(self._correlation_time))
         late = measured["t"] < self._prior.t - COINCIDENT_S
         if late.any():
             self.too_late += int(np.count_nonzero(late))
@@ -99,8 +105,8 @@ class WholeTrackSmoother:
 
     def data(self) -> TrackData:
         """Return the prior and all measurements so far."""
-        measured = np.concatenate([np.zeros(0, dtype=MEASUREMENT), *self._parts])
-        return TrackData.from_measurements(self._prior, measured, self._memory)
+        measured = concatenate_measurements(self._parts)
+        return TrackData.from_measurements(self._prior, measured, self._correlation_time)
 
     def departed(self) -> list[SmoothedTrack]:
         """Return nothing: no state is final before the track ends."""
@@ -142,7 +148,7 @@ def make_smoother(
     lag_s: float = 1.0,
     chunk: int = 24,
     robust: str = "none",
-    memory: npt.ArrayLike = (),
+    correlation_time: npt.ArrayLike = (),
 ) -> TrackSmoother:
     """Make the smoother of one track.
 
@@ -152,7 +158,7 @@ def make_smoother(
         lag_s: lag of the engines with a window (s).
         chunk: measurements per update of these.
         robust: kernel of the engines over the whole track (`robust.KERNELS`), or "none".
-        memory: (B,) memory of the error states (s): those of sensors whose errors are coloured.
+        correlation_time: (B,) correlation times of the error states (s), one a sensor with coloured errors.
 
     Returns:
         The smoother.
@@ -164,5 +170,9 @@ def make_smoother(
         raise ConfigError(f"smoother must be one of {', '.join(ENGINES)}, not {engine!r}")
     if engine.startswith("fixed-lag"):
         gtsam = engine == "fixed-lag"
-        return FixedLagSmoother(prior, lag_s=lag_s, chunk=chunk, use_gtsam=gtsam, memory=memory)
-    return WholeTrackSmoother(prior, use_gtsam=engine == "full", robust=robust, memory=memory)
+        return FixedLagSmoother(
+            prior, lag_s=lag_s, chunk=chunk, use_gtsam=gtsam, correlation_time=correlation_time
+        )
+    return WholeTrackSmoother(
+        prior, use_gtsam=engine == "full", robust=robust, correlation_time=correlation_time
+    )

@@ -1,8 +1,8 @@
 """Fixed-lag smoothing of one live track: each state is final once a lag's worth of data has followed.
 
 The values come from GTSAM's incremental fixed-lag smoother (or, with `use_gtsam=False`, from our own
-pass over the window). GTSAM solves for every `STRIDE`-th state, its *anchors*; those in between are
-eliminated before (`whitened.py`) and follow from the anchor after them, exactly. The covariances do not
+pass over the window). GTSAM solves for every `STRIDE`-th state; those in between are eliminated
+before (`whitened.py`) and follow from the solved state after them, exactly. The covariances do not
 depend on the measured values, and come from the pass over our own arrays in both cases: the same numbers
 as GTSAM's marginals (tested), at a twentieth of the cost (about 1 ms for one marginal at the far end of a
 window of a second at 120 Hz).
@@ -21,12 +21,18 @@ from jeat_graph.smoothers.gains import fill_back
 from jeat_graph.smoothers.gtsam.linear_graph import LinearGraph
 from jeat_graph.smoothers.gtsam.whitened import prior_rows, segment_rows
 from jeat_graph.smoothers.gtsam.window import GtsamWindow
-from jeat_graph.smoothers.measurements import COINCIDENT_S, by_time, check_measurements, group_times
+from jeat_graph.smoothers.measurements import (
+    COINCIDENT_S,
+    by_time,
+    check_measurements,
+    concatenate_measurements,
+    group_times,
+)
 from jeat_graph.smoothers.track_data import Prior, SmoothedTrack
 from jeat_graph.smoothers.window import Window
 
 #: GTSAM solves for one state in so many. More would hardly be faster: what is left is the cost of a chunk.
-STRIDE = 8
+STRIDE = 24
 
 #: What GTSAM's C++ exceptions become in Python.
 _GTSAM_ERRORS = (RuntimeError, IndexError, ValueError)
@@ -44,12 +50,13 @@ class FixedLagSmoother:
         chunk: measurements per update. More make an update cheaper per measurement, and a state leave
             later.
         use_gtsam: whether GTSAM does the solving, or our own pass.
-        memory: (B,) memory of the error states (s).
+        correlation_time: (B,) correlation times of the error states (s).
 
     Attributes:
         rebuilds: how often GTSAM failed and the window was built anew from our arrays.
         fallbacks: how often our own pass gave the values, because that failed as well or came too late.
         too_late: measurements refused because they were older than the window.
+        waiting: measurements set aside until there is a chunk of them.
     """
 
     def __init__(
@@ -59,18 +66,17 @@ class FixedLagSmoother:
         lag_s: float = 1.0,
         chunk: int = 24,
         use_gtsam: bool = True,
-        memory: npt.ArrayLike = (),
+        correlation_time: npt.ArrayLike = (),
     ) -> None:
         self.lag_s, self.chunk = lag_s, chunk
-        self.rebuilds = self.fallbacks = self.too_late = 0
-        self._memory = np.asarray(memory, dtype=np.float64)
-        self._window: Window | None = Window(prior, self._memory)
+        self.rebuilds = self.fallbacks = self.too_late = self.waiting = 0
+        self._correlation_time = np.asarray(correlation_time, dtype=np.float64)
+        self._window: Window | None = Window(prior, self._correlation_time)
         self._use_gtsam = use_gtsam
         self._gtsam: GtsamWindow | None = None
         self._outdated = use_gtsam  # whether GTSAM's window has to be built from ours
         self._oldest = self._next = 0  # number of the oldest state inside GTSAM, and of the next one
         self._pending: list[RecordArray] = []
-        self._waiting = 0
         self._departed: list[SmoothedTrack] = []
 
     def feed(self, measured: RecordArray) -> None:
@@ -87,15 +93,15 @@ class FixedLagSmoother:
                 error states that do not exist.
         """
         window = self._live()
-        check_measurements(measured, len(self._memory))
+        check_measurements(measured, len(self._correlation_time))
         late = measured["t"] <= window.newest + COINCIDENT_S
         if late.any():
-            self._take_late(measured[late])
+            self._insert_late(measured[late])
             measured = measured[~late]
         if len(measured):
             self._pending.append(measured)
-            self._waiting += len(measured)
-        if self._waiting >= self.chunk:
+            self.waiting += len(measured)
+        if self.waiting >= self.chunk:
             self._absorb()
 
     def departed(self) -> list[SmoothedTrack]:
@@ -146,19 +152,19 @@ class FixedLagSmoother:
         window = self._live()
         if not self._pending:
             return
-        taken = by_time(np.concatenate(self._pending))
-        self._pending, self._waiting = [], 0
-        key, opens = group_times(taken["t"], window.newest)
-        window.append(key - 1, taken, opens)
+        measured = by_time(concatenate_measurements(self._pending))
+        self._pending, self.waiting = [], 0
+        key, opens = group_times(measured["t"], window.newest)
+        window.append(key - 1, measured, opens)
         if self._gtsam is not None:
-            # The newest row is an anchor always, so that GTSAM knows all measurements.
+            # GTSAM always solves for the newest row, so that it knows all measurements.
             last = window.end - 1
             self._extend(self._gtsam, np.append(np.arange(last - len(opens), last, STRIDE), last))
         elif self._use_gtsam:
             self._rebuild()
         self._depart()
 
-    def _take_late(self, late: RecordArray) -> None:
+    def _insert_late(self, late: RecordArray) -> None:
         """Add late measurements to the window; GTSAM's is to be built anew."""
         window = self._live()
         for one in late:
@@ -169,24 +175,22 @@ class FixedLagSmoother:
             self._gtsam, self._outdated = None, self._use_gtsam
 
     def _segments(self, graph: LinearGraph, ends: IntArray) -> None:
-        """Add all steps and measurements after the row `ends`[0], an anchor, and make the others anchors."""
+        """Add all steps and measurements after the row `ends`[0], which GTSAM has, up to the other `ends`."""
         w = self._live()
         count = len(ends) - 1
-        steps = ((0,) * w.size, ends, w.t, w.q, w.memory)
-        taken = slice(w.taken, w.taken_end)
-        measured = (w.z[taken], w.info[taken], w.lever[taken], w.error[taken])
-        rows = segment_rows(*steps, w.row[taken], *measured, w.reference)
-        graph.add_segments(int(w.anchor[ends[0]]), *rows)
-        w.anchor[ends[1:]] = np.arange(self._next, self._next + count)
+        measured = w.observations().select(slice(w.first_observation, w.end_observation))
+        rows = segment_rows((0,) * w.size, ends, w.steps(), measured, w.reference)
+        graph.add_segments(int(w.gtsam_key[ends[0]]), *rows)
+        w.gtsam_key[ends[1:]] = np.arange(self._next, self._next + count)
         self._next += count
 
     def _extend(self, gtsam: GtsamWindow, ends: IntArray) -> None:
-        """Tell GTSAM of the rows after its newest anchor; if that fails, build its window anew."""
+        """Tell GTSAM of the rows after the newest it has; if that fails, build its window anew."""
         window, first = self._live(), self._next
         graph = LinearGraph(window.size)
         self._segments(graph, ends)
-        anchors = window.anchor[window.first : window.end]
-        oldest = int(anchors[np.argmax(anchors >= 0)])
+        numbers = window.gtsam_key[window.first : window.end]
+        oldest = int(numbers[np.argmax(numbers >= 0)])
         try:
             gtsam.update(graph, first, self._next - first, range(self._oldest, oldest))
             self._oldest = oldest
@@ -198,22 +202,16 @@ class FixedLagSmoother:
         """Build GTSAM's window from our arrays; without GTSAM until the next chunk if that fails."""
         window = self._live()
         self._gtsam, self._outdated = None, False
-        window.anchor[window.first : window.end] = -1
-        window.anchor[window.first] = self._oldest = self._next
+        window.gtsam_key[window.first : window.end] = -1
+        window.gtsam_key[window.first] = self._oldest = self._next
         self._next += 1
         graph = LinearGraph(window.size)
         try:
-            held = window.row[window.taken : window.taken_end]
-            here = slice(window.taken, window.taken + int(np.searchsorted(held, window.first, side="right")))
-            prior = prior_rows(
-                window.base_mean,
-                window.base_cov,
-                window.reference[window.first],
-                window.z[here],
-                window.info[here],
-                window.lever[here],
-                window.error[here],
-            )
+            held = window.row[window.first_observation : window.end_observation]
+            count = int(np.searchsorted(held, window.first, side="right"))
+            here = slice(window.first_observation, window.first_observation + count)
+            observed = window.observations().select(here)
+            prior = prior_rows(window.base_mean, window.base_cov, window.reference[window.first], observed)
             rows = window.key_rows()
             if len(rows) > 1:
                 self._segments(graph, np.append(rows[:-1:STRIDE], rows[-1]))
@@ -231,37 +229,37 @@ class FixedLagSmoother:
         if self._outdated:
             self._rebuild()
         if self._gtsam is None:
-            means, cov, gain = window.smooth(end - window.first)
+            means = window.smooth_means(end - window.first)
+            cov, gain = window.smooth_covs(end - window.first)
         else:
-            anchors = window.first + np.flatnonzero(window.anchor[window.first : window.end] >= 0)
-            anchors = anchors[: int(np.searchsorted(anchors, end - 1)) + 1]
-            means, cov, gain = window.smooth(int(anchors[-1]) + 1 - window.first)
-            means = self._gtsam_means(self._gtsam, anchors, means, gain)
+            solved = window.first + np.flatnonzero(window.gtsam_key[window.first : window.end] >= 0)
+            solved = solved[: int(np.searchsorted(solved, end - 1)) + 1]
+            cov, gain = window.smooth_covs(int(solved[-1]) + 1 - window.first)
+            means = self._gtsam_means(self._gtsam, solved, gain)
         chosen = keys[:count]
-        t, q = window.t[chosen], window.q[chosen]
+        t, jerk = window.t[chosen], window.jerk[chosen]
         if not window.late:
-            return SmoothedTrack(t, q, means[:count], cov[:count], gain[:count])
+            return SmoothedTrack(t, jerk, means[:count], cov[:count], gain[:count])
         # States are a Markov chain, so the gain over several steps is the product of theirs.
         for row in np.flatnonzero(~window.is_key[window.first : end])[::-1]:
             gain[row - 1] = gain[row - 1] @ gain[row]
         chosen = chosen - window.first
-        return SmoothedTrack(t, q, means[chosen], cov[chosen], gain[chosen])
+        return SmoothedTrack(t, jerk, means[chosen], cov[chosen], gain[chosen])
 
-    def _gtsam_means(
-        self, gtsam: GtsamWindow, anchors: IntArray, own: FloatArray, gain: FloatArray
-    ) -> FloatArray:
-        """Return GTSAM's means (N, 2, n) of the rows up to the last of `anchors`, or `own` if it fails."""
+    def _gtsam_means(self, gtsam: GtsamWindow, solved: IntArray, gain: FloatArray) -> FloatArray:
+        """Return GTSAM's means (N, 2, n) of the rows up to the last of `solved`, or our own if it fails."""
         window = self._live()
         try:
-            known = gtsam.means(window.anchor[anchors].tolist(), window.reference[anchors])
+            known = gtsam.means(window.gtsam_key[solved].tolist(), window.reference[solved])
         except _GTSAM_ERRORS:
             self.rebuilds += 1
             self.fallbacks += 1
             self._rebuild()
-            return own
-        out, rows, here = np.empty_like(own), anchors - window.first, slice(window.first, window.end)
+            return window.smooth_means(len(gain))
+        rows, here = solved - window.first, slice(window.first, window.end)
+        out = np.empty((len(gain), 2, window.size))
         out[rows] = known
-        model = ((0,) * window.size, window.t[here], window.memory)
+        model = ((0,) * window.size, window.t[here], window.correlation_time)
         fill_back(*model, rows, window.mean[here], gain, out)
         return out
 

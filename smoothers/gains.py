@@ -54,7 +54,7 @@ def write_gain(
 def fill_back(
     dims: tuple[int, ...],
     t: FloatArray,
-    memory: FloatArray,
+    correlation_time: FloatArray,
     known: IntArray,
     filtered: FloatArray,
     gain: FloatArray,
@@ -65,7 +65,7 @@ def fill_back(
     Args:
         dims: any tuple of n elements.
         t: (N,) times of the keys (s).
-        memory: (B,) memory of the error states (s).
+        correlation_time: (B,) correlation times of the error states (s).
         known: (A,) keys whose means are known, ascending; the last is the last of all, N - 1.
         filtered: (N, 2, n) filtered means.
         gain: (N, 2, n, n) smoother gains.
@@ -80,7 +80,7 @@ def fill_back(
             i -= 1
             continue
         dt = t[k + 1] - t[k]
-        error_steps(dt, memory, phi, var)
+        error_steps(dt, correlation_time, phi, var)
         for a in range(2):
             step_mean(dims, dt, phi, filtered[k, a], jump)
             for j in range(n):

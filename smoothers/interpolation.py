@@ -29,7 +29,7 @@ SHORT_S = 1e-3
 
 
 @njit(cache=True)
-def bridge(since: float, span: float, q: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def bridge(since: float, span: float, jerk: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Conditional distribution of a state given the states before and after it.
 
     With Ψ = Q(τ) F(T - τ)ᵀ Q(T)⁻¹ and Λ = F(τ) - Ψ F(T), the state is Λ x₀ + Ψ x₁ plus noise of
@@ -38,7 +38,7 @@ def bridge(since: float, span: float, q: float) -> tuple[FloatArray, FloatArray,
     Args:
         since: time τ since the state before (s).
         span: time T between the two states (s), >= τ, > 0.
-        q: root spectral density of the jerk in that interval (px/s^2.5).
+        jerk: root spectral density of the jerk in that interval (px/s^2.5).
 
     Returns:
         Λ (3, 3), Ψ (3, 3) and Σ (3, 3), for states [p, v, a] of one axis in px and s.
@@ -50,7 +50,7 @@ def bridge(since: float, span: float, q: float) -> tuple[FloatArray, FloatArray,
     Lambda = transition(s) - _product(Psi, _WHOLE)
     Sigma = Q - _product(Psi, across.T)
     units = (1.0, 1.0 / span, 1.0 / (span * span))
-    density = q * q * span**5
+    density = jerk * jerk * span**5
     for i in range(3):
         for j in range(3):
             Lambda[i, j] *= units[i] / units[j]
@@ -83,7 +83,7 @@ def interpolate(track: SmoothedTrack, t: FloatArray) -> tuple[FloatArray, FloatA
         (N, 2, 3) means (px, px/s, px/s²) and (N, 2, 3, 3) covariances.
     """
     query = np.asarray(t, dtype=np.float64).reshape(-1)
-    mean, cov = _between(track.t, track.q, track.mean, track.cov, track.gain, query)
+    mean, cov = _between(track.t, track.jerk, track.mean, track.cov, track.gain, query)
     late = query > track.t[-1]
     if late.any():
         mean[late], cov[late] = _extrapolate(track, len(track) - 1, query[late] - track.t[-1])
@@ -95,7 +95,7 @@ def interpolate(track: SmoothedTrack, t: FloatArray) -> tuple[FloatArray, FloatA
 
 @njit(cache=True)
 def _between(
-    t: FloatArray, q: FloatArray, mean: FloatArray, cov: FloatArray, gain: FloatArray, query: FloatArray
+    t: FloatArray, jerk: FloatArray, mean: FloatArray, cov: FloatArray, gain: FloatArray, query: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Fill in `interpolate`'s result (N, 2, 3), (N, 2, 3, 3) where a time is not beyond the ends."""
     out_mean, out_cov = np.empty((len(query), 2, 3)), np.empty((len(query), 2, 3, 3))
@@ -113,7 +113,7 @@ def _between(
         if t[k1] - t[k0] < SHORT_S:
             _blend(t, mean, cov, k0, query[i], out_mean[i], out_cov[i])
             continue
-        L, S, noise = bridge(query[i] - t[k0], t[k1] - t[k0], q[k1])
+        L, S, noise = bridge(query[i] - t[k0], t[k1] - t[k0], jerk[k1])
         for a in range(2):
             # [Λ Ψ] times the joint covariance of both ends, whose mixed block is the gain's.
             cross = _product(gain[k0, a, :3], cov[k1, a, :, :3])
@@ -163,7 +163,7 @@ def _blend(
 def _extrapolate(track: SmoothedTrack, key: int, ahead: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Predict from one end by `ahead` (N,) seconds, all > 0 after the last key or < 0 before the first."""
     neighbour = min(max(key, 1), len(track) - 1)
-    F, Q = motion_matrices(np.abs(ahead), np.full(len(ahead), track.q[neighbour]))
+    F, Q = motion_matrices(np.abs(ahead), np.full(len(ahead), track.jerk[neighbour]))
     means, covs = track.motion()
     cov = covs[key][None]
     if ahead[0] < 0:

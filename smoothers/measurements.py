@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 from numba import njit
@@ -14,18 +16,20 @@ from jeat_graph.filters.measurement import MEASUREMENT
 #: while the process noise of such a step, of order Δ⁵, would only spoil the arithmetic.
 COINCIDENT_S = 1e-6
 
+_BYTES = np.dtype((np.void, MEASUREMENT.itemsize))
+
 
 def measurements(
     t: npt.ArrayLike,
     z: npt.ArrayLike,
     r: npt.ArrayLike,
     jerk: npt.ArrayLike,
-    lever: npt.ArrayLike | None = None,
+    coloured_std: npt.ArrayLike | None = None,
     error: npt.ArrayLike | None = None,
 ) -> RecordArray:
     """Make records of measurements z = p + h e + w of one track, where no filter has written them down.
 
-    The error of a sensor has a memory if it is said to be coloured: e is an error state of unit variance
+    A coloured error has an error state: e is an error state of unit variance
     (`track_data.TrackData`), h its standard deviation in the measurement, and w white.
 
     Args:
@@ -33,7 +37,7 @@ def measurements(
         z: (M, 2) centres (px).
         r: (M, 2) variances of the white part w (px²).
         jerk: (M,) root spectral densities of the jerk since the measurement before (px/s^2.5).
-        lever: (M, 2) standard deviations h of the part with a memory (px); None for none at all.
+        coloured_std: (M, 2) standard deviations h of the coloured part (px); None for none at all.
         error: (M,) index of its error state e, or -1; None for -1.
 
     Returns:
@@ -44,13 +48,13 @@ def measurements(
     """
     times = np.asarray(t, dtype=np.float64)
     out = np.zeros(times.size, dtype=MEASUREMENT)
-    none = lever is None or error is None
+    none = coloured_std is None or error is None
     columns = {
         "t": times,
         "z": z,
         "r": r,
         "jerk": jerk,
-        "lever": np.zeros((times.size, 2)) if none else lever,
+        "coloured_std": np.zeros((times.size, 2)) if none else coloured_std,
         "error": np.full(times.size, -1) if none else error,
     }
     for name, column in columns.items():
@@ -59,6 +63,15 @@ def measurements(
             raise DataError(f"{name} must have shape {out[name].shape}, not {values.shape}")
         out[name] = values
     return out
+
+
+def concatenate_measurements(parts: Sequence[RecordArray]) -> RecordArray:
+    """Join records (`MEASUREMENT`), as bytes, since NumPy would compare all fields."""
+    if len(parts) == 1:
+        return parts[0]
+    if not parts:
+        return np.zeros(0, dtype=MEASUREMENT)
+    return np.concatenate([part.view(_BYTES) for part in parts]).view(MEASUREMENT)
 
 
 def by_time(measured: RecordArray) -> RecordArray:
@@ -95,7 +108,7 @@ def _all_valid(measured: RecordArray, errors: int) -> bool:
         for axis in range(2):
             if not (np.isfinite(one["z"][axis]) and np.isfinite(one["r"][axis]) and one["r"][axis] > 0.0):
                 return False
-            if not np.isfinite(one["lever"][axis]):
+            if not np.isfinite(one["coloured_std"][axis]):
                 return False
     return True
 

@@ -93,7 +93,7 @@ def left_out_distances(track: TrackData, smoothed: SmoothedTrack, weights: Float
     H = np.zeros((len(track.z), 2, track.size))
     H[:, :, 0] = 1.0
     coloured = np.flatnonzero(track.error >= 0)
-    H[coloured, :, MOTION + track.error[coloured]] = track.lever[coloured]
+    H[coloured, :, MOTION + track.error[coloured]] = track.coloured_std[coloured]
     P = np.einsum("mai,maij,maj->ma", H, smoothed.cov[track.key], H)
     residual = track.z - np.einsum("mai,mai->ma", H, smoothed.mean[track.key])
     # A measurement that alone determines its state has leverage 1 and says nothing about itself.

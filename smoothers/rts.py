@@ -6,72 +6,34 @@ It is the Rauch-Tung-Striebel smoother (AIAA Journal 3(8), 1965), computed as `a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.smoothers.backward import smooth_rows
+from jeat_graph.smoothers.backward import smooth_covs, smooth_means
 from jeat_graph.smoothers.forward import filter_rows
+from jeat_graph.smoothers.passes import Covariances, Filtered, Observations, Span, Steps
 from jeat_graph.smoothers.track_data import SmoothedTrack, TrackData
 
 
-@dataclass(frozen=True, eq=False)
-class Filtered:
-    """What the filter leaves for the way back over one track.
-
-    Attributes:
-        mean: (N, 2, n) filtered means at all keys.
-        cov: (N, 2, n, n) filtered covariances.
-        gain: (M, 2, n) gain of each measurement.
-        innovation: (M, 2) its innovation (px).
-        variance: (M, 2) the variance of that (px²).
-    """
-
-    mean: FloatArray
-    cov: FloatArray
-    gain: FloatArray
-    innovation: FloatArray
-    variance: FloatArray
-
-    def passes(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Return all of it in the order in which `backward.py` wants it."""
-        return self.mean, self.cov, self.gain, self.innovation, self.variance
+def steps(track: TrackData) -> Steps:
+    """Return the keys of a track and how its state moves between them."""
+    return Steps(track.t, track.jerk, track.correlation_time)
 
 
-def information(track: TrackData, weights: FloatArray | None = None) -> FloatArray:
-    """Return the information (M, 2) of the white part of each measurement (1/px²), weighted by (M,)."""
-    return 1.0 / track.r if weights is None else weights[:, None] / track.r
+def observations(track: TrackData, weights: FloatArray | None = None) -> Observations:
+    """Return the measurements of a track, the information of their white parts weighted by (M,)."""
+    information = 1.0 / track.r if weights is None else weights[:, None] / track.r
+    return Observations(track.key, track.z, information, track.coloured_std, track.error)
 
 
 def run_filter(track: TrackData, weights: FloatArray | None = None) -> Filtered:
     """Filter one track; see `filter_track`."""
-    keys, rows, n = len(track), len(track.z), track.size
-    out = Filtered(
-        np.empty((keys, 2, n)),
-        np.empty((keys, 2, n, n)),
-        np.empty((rows, 2, n)),
-        np.empty((rows, 2)),
-        np.empty((rows, 2)),
-    )
+    out = Filtered.allocate(len(track), len(track.z), track.size)
     out.mean[0], out.cov[0] = track.prior_mean, track.prior_cov
-    filter_rows(
-        (0,) * n,
-        0,
-        keys,
-        0,
-        True,
-        track.t,
-        track.q,
-        track.memory,
-        track.key,
-        track.z,
-        information(track, weights),
-        track.lever,
-        track.error,
-        *out.passes(),
-    )
+    span = Span(0, len(track), 0)
+    filter_rows((0,) * track.size, span, True, steps(track), observations(track, weights), out)
     return out
 
 
@@ -99,10 +61,7 @@ def smooth_rts(track: TrackData, weights: FloatArray | None = None) -> SmoothedT
     Returns:
         The smoothed states at all keys, with covariances and gains.
     """
-    keys, n = len(track), track.size
-    out = (np.empty((keys, 2, n)), np.empty((keys, 2, n, n)), np.empty((keys, 2, n, n)))
-    _smooth_first(track, run_filter(track, weights), keys, *out)
-    return SmoothedTrack(track.t, track.q, *out)
+    return SmoothedTrack(track.t, track.jerk, *_smooth_first(track, run_filter(track, weights), len(track)))
 
 
 class TrackEnds(NamedTuple):
@@ -132,32 +91,20 @@ def smooth_ends(tracks: Sequence[TrackData]) -> TrackEnds:
     """
     shape = (len(tracks), 2, tracks[0].size)
     ends = TrackEnds(*(np.empty((*shape, *more)) for more in ((), shape[2:], (), shape[2:])))
-    gain = np.empty((1, *shape[1:], *shape[2:]))
     for i, track in enumerate(tracks):
         filtered = run_filter(track)
         ends.end_mean[i], ends.end_cov[i] = filtered.mean[-1], filtered.cov[-1]
-        _smooth_first(track, filtered, 1, ends.start_mean[i : i + 1], ends.start_cov[i : i + 1], gain)
+        mean, cov, _ = _smooth_first(track, filtered, 1)
+        ends.start_mean[i], ends.start_cov[i] = mean[0], cov[0]
     return ends
 
 
 def _smooth_first(
-    track: TrackData, filtered: Filtered, wanted: int, mean: FloatArray, cov: FloatArray, gain: FloatArray
-) -> None:
-    """Write the states of the first `wanted` keys, smoothed with all measurements; see `smooth_rows`."""
-    smooth_rows(
-        (0,) * track.size,
-        0,
-        len(track),
-        len(track.z),
-        wanted,
-        track.t,
-        track.q,
-        track.memory,
-        track.key,
-        track.lever,
-        track.error,
-        *filtered.passes(),
-        mean,
-        cov,
-        gain,
-    )
+    track: TrackData, filtered: Filtered, wanted: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Means, covariances and gains of the first `wanted` keys, smoothed with all measurements."""
+    mean, out = np.empty((wanted, 2, track.size)), Covariances.allocate(wanted, track.size)
+    model = (0,) * track.size, Span(0, len(track), len(track.z)), steps(track), observations(track), filtered
+    smooth_means(*model, mean)
+    smooth_covs(*model, out)
+    return mean, out.cov, out.gain

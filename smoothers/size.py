@@ -18,13 +18,13 @@ class SmoothedSize:
 
     Attributes:
         t: (K,) times (s), ascending.
-        q: (K,) root spectral density of the rate over the interval that ends there (1/s^1.5).
+        rate_density: (K,) root spectral density of the rate over the interval that ends there (1/s^1.5).
         mean: (K, 2, 2) for width and height, [ln size, rate] (ln px, 1/s).
         cov: (K, 2, 2, 2) covariances.
     """
 
     t: FloatArray
-    q: FloatArray
+    rate_density: FloatArray
     mean: FloatArray
     cov: FloatArray
 
@@ -75,12 +75,12 @@ def _smooth(
     drift: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Filter and smooth [ln size, rate]; see `smooth_size`, whose measurements are in order of time here."""
-    t, q = np.empty(len(times) + 1), np.empty(len(times) + 1)
+    t, rate_density = np.empty(len(times) + 1), np.empty(len(times) + 1)
     key = np.empty(len(times), dtype=np.int64)
-    t[0], q[0], keys = prior_t, 0.0, 1
+    t[0], rate_density[0], keys = prior_t, 0.0, 1
     for i in range(len(times)):
         if times[i] - t[keys - 1] > COINCIDENT_S:
-            t[keys], q[keys] = times[i], drift[i]
+            t[keys], rate_density[keys] = times[i], drift[i]
             keys += 1
         key[i] = keys - 1
     mean, cov = np.empty((keys, 2, 2)), np.empty((keys, 2, 2, 2))
@@ -92,7 +92,7 @@ def _smooth(
                 m, v = prior_mean[axis, 0], prior_mean[axis, 1]
                 a, b, c = prior_cov[axis, 0, 0], prior_cov[axis, 0, 1], prior_cov[axis, 1, 1]
             else:
-                d, s = t[k] - t[k - 1], q[k] * q[k]
+                d, s = t[k] - t[k - 1], rate_density[k] * rate_density[k]
                 m += d * v
                 a += d * (2.0 * b + d * c) + s * d * d * d / 3.0
                 b += d * c + 0.5 * s * d * d
@@ -129,7 +129,7 @@ def _smooth(
             P[0, 1] += g10 * (g00 * D0 + g01 * D1) + g11 * (g00 * D1 + g01 * D2)
             P[1, 0] = P[0, 1]
             P[1, 1] += g10 * (g10 * D0 + g11 * D1) + g11 * (g10 * D1 + g11 * D2)
-    return t[:keys], q[:keys], mean, cov
+    return t[:keys], rate_density[:keys], mean, cov
 
 
 def smooth_size(
@@ -139,7 +139,7 @@ def smooth_size(
     t: FloatArray,
     log_size: FloatArray,
     r: FloatArray,
-    q: FloatArray,
+    rate_density: FloatArray,
 ) -> SmoothedSize:
     """Smooth the sizes of one whole track (Rauch-Tung-Striebel, nearly constant rate).
 
@@ -152,7 +152,7 @@ def smooth_size(
         t: (M,) times of the measurements (s), in any order, none before the prior.
         log_size: (M, 2) measured ln w and ln h (ln px).
         r: (M, 2) their variances.
-        q: (M,) root spectral density of the rate since the measurement before (1/s^1.5).
+        rate_density: (M,) root spectral density of the rate since the measurement before (1/s^1.5).
 
     Returns:
         The smoothed sizes, at the keys that `TrackData` would give to the same times.
@@ -160,7 +160,7 @@ def smooth_size(
     Raises:
         DataError: if a measurement is older than the prior.
     """
-    times, z, var, drift = t, log_size, r, q
+    times, z, var, drift = t, log_size, r, rate_density
     if np.any(times[1:] < times[:-1]):
         order = np.argsort(times, kind="stable")
         times, z, var, drift = times[order], z[order], var[order], drift[order]

@@ -54,30 +54,30 @@ class TrackData:
         prior_mean: (2, 3 + B) mean of [p, v, a, e_1, …, e_B] at key 0, per axis (px, px/s, px/s², 1).
         prior_cov: (2, 3 + B, 3 + B) its covariance.
         t: (K,) times of the keys (s), strictly ascending.
-        q: (K,) root spectral density of the jerk over the interval that ends at the key (px/s^2.5);
+        jerk: (K,) root spectral density of the jerk over the interval that ends at the key (px/s^2.5);
             q[0] has no meaning.
         key: (M,) the key that each measurement belongs to, ascending.
-        z: (M, 2) measured centres z = p + lever · e + w (px).
+        z: (M, 2) measured centres z = p + coloured_std · e + w (px).
         r: (M, 2) variances of the white part w (px²), just as the filter used them.
-        lever: (M, 2) standard deviation of the part with a memory (px), 0 for white errors.
+        coloured_std: (M, 2) standard deviation of the coloured part (px), 0 for white errors.
         error: (M,) index of the error state e of each measurement, or -1.
-        memory: (B,) time over which each error state is correlated (s).
+        correlation_time: (B,) correlation time of each error state (s).
 
     Raises:
-        DataError: if a shape is wrong, a number is not finite, a variance, density or memory not positive,
-            or an error state does not exist.
+        DataError: if a shape is wrong, a number is not finite, a variance, density or correlation time not
+            positive, or an error state does not exist.
     """
 
     prior_mean: FloatArray
     prior_cov: FloatArray
     t: FloatArray
-    q: FloatArray
+    jerk: FloatArray
     key: IntArray
     z: FloatArray
     r: FloatArray
-    lever: FloatArray
+    coloured_std: FloatArray
     error: IntArray
-    memory: FloatArray
+    correlation_time: FloatArray
 
     def __post_init__(self) -> None:
         keys, rows, size = len(self.t), len(self.z), self.size
@@ -85,13 +85,13 @@ class TrackData:
             "prior_mean": (2, size),
             "prior_cov": (2, size, size),
             "t": (keys,),
-            "q": (keys,),
+            "jerk": (keys,),
             "key": (rows,),
             "z": (rows, 2),
             "r": (rows, 2),
-            "lever": (rows, 2),
+            "coloured_std": (rows, 2),
             "error": (rows,),
-            "memory": (size - MOTION,),
+            "correlation_time": (size - MOTION,),
         }
         for name, shape in shapes.items():
             value = getattr(self, name)
@@ -101,12 +101,14 @@ class TrackData:
                 raise DataError(f"{name} must be finite")
         if keys == 0:
             raise DataError("a track needs at least the time of its prior")
-        if np.any(self.q[1:] <= 0) or np.any(self.r <= 0) or np.any(self.memory <= 0):
-            raise DataError("spectral densities, variances and memories must be positive")
+        if np.any(self.jerk[1:] <= 0) or np.any(self.r <= 0) or np.any(self.correlation_time <= 0):
+            raise DataError("spectral densities, variances and correlation times must be positive")
         if np.any(np.diff(self.t) <= 0):
             raise DataError("the times of the keys must ascend")
-        if np.any(self.error < -1) or np.any(self.error >= len(self.memory)):
-            raise DataError(f"error states are numbered from 0 to {len(self.memory) - 1}, or -1 for none")
+        if np.any(self.error < -1) or np.any(self.error >= len(self.correlation_time)):
+            raise DataError(
+                f"error states are numbered from 0 to {len(self.correlation_time) - 1}, or -1 for none"
+            )
 
     def __len__(self) -> int:
         return len(self.t)
@@ -114,17 +116,19 @@ class TrackData:
     @property
     def size(self) -> int:
         """Components of a state, per axis: 3 + B."""
-        return MOTION + len(self.memory)
+        return MOTION + len(self.correlation_time)
 
     @staticmethod
-    def from_measurements(prior: Prior, measured: RecordArray, memory: npt.ArrayLike = ()) -> TrackData:
+    def from_measurements(
+        prior: Prior, measured: RecordArray, correlation_time: npt.ArrayLike = ()
+    ) -> TrackData:
         """Sort measurements by time and give coincident ones a common key.
 
         Args:
             prior: what is known before; no measurement may be older. If the track was born from a detection
                 that the prior already contains, that detection must not be among the measurements again.
             measured: (M,) records (`measurements.measurements`), in any order.
-            memory: (B,) memory of the error states (s).
+            correlation_time: (B,) correlation times of the error states (s).
 
         Returns:
             The data of the track.
@@ -132,8 +136,8 @@ class TrackData:
         Raises:
             DataError: if a measurement is older than the prior, or an array is not valid.
         """
-        memories = np.asarray(memory, dtype=np.float64).reshape(-1)
-        check_measurements(measured, len(memories))
+        times = np.asarray(correlation_time, dtype=np.float64).reshape(-1)
+        check_measurements(measured, len(times))
         rows = by_time(measured)
         if len(rows) and rows["t"][0] < prior.t - COINCIDENT_S:
             raise DataError(
@@ -144,13 +148,13 @@ class TrackData:
             prior_mean=np.asarray(prior.mean, dtype=np.float64),
             prior_cov=np.asarray(prior.cov, dtype=np.float64),
             t=np.concatenate([[prior.t], rows["t"][first]]),
-            q=np.concatenate([[0.0], rows["jerk"][first]]),
+            jerk=np.concatenate([[0.0], rows["jerk"][first]]),
             key=key,
             z=rows["z"].copy(),
             r=rows["r"].copy(),
-            lever=rows["lever"].copy(),
+            coloured_std=rows["coloured_std"].copy(),
             error=rows["error"].copy(),
-            memory=memories,
+            correlation_time=times,
         )
 
     @property
@@ -161,7 +165,7 @@ class TrackData:
     def measurements(self) -> RecordArray:
         """Return the measurements alone (M,), each with the time and the jerk of its key."""
         key = self.key
-        return measurements(self.t[key], self.z, self.r, self.q[key], self.lever, self.error)
+        return measurements(self.t[key], self.z, self.r, self.jerk[key], self.coloured_std, self.error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +174,7 @@ class SmoothedTrack:
 
     Attributes:
         t: (K,) times (s), ascending.
-        q: (K,) root spectral density of the jerk over the interval that ends at the key (px/s^2.5).
+        jerk: (K,) root spectral density of the jerk over the interval that ends at the key (px/s^2.5).
         mean: (K, 2, 3 + B) means of [p, v, a, e_1, …, e_B] per axis (px, px/s, px/s², 1).
         cov: (K, 2, 3 + B, 3 + B) covariances.
         gain: (K, 2, 3 + B, 3 + B) smoother gains G_k = P_k Fᵀ (F P_k Fᵀ + Q)⁻¹ from a key to the next,
@@ -179,7 +183,7 @@ class SmoothedTrack:
     """
 
     t: FloatArray
-    q: FloatArray
+    jerk: FloatArray
     mean: FloatArray
     cov: FloatArray
     gain: FloatArray
@@ -201,7 +205,7 @@ class SmoothedTrack:
 
     def select(self, part: slice) -> SmoothedTrack:
         """Return the keys of a slice."""
-        return SmoothedTrack(self.t[part], self.q[part], self.mean[part], self.cov[part], self.gain[part])
+        return SmoothedTrack(self.t[part], self.jerk[part], self.mean[part], self.cov[part], self.gain[part])
 
     @staticmethod
     def empty(size: int = MOTION) -> SmoothedTrack:
@@ -217,7 +221,7 @@ class SmoothedTrack:
             return full[0] if full else SmoothedTrack.empty()
         return SmoothedTrack(
             np.concatenate([part.t for part in full]),
-            np.concatenate([part.q for part in full]),
+            np.concatenate([part.jerk for part in full]),
             np.concatenate([part.mean for part in full]),
             np.concatenate([part.cov for part in full]),
             np.concatenate([part.gain for part in full]),

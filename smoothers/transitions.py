@@ -2,7 +2,7 @@
 
 A track's state is, per axis, [p, v, a, e_1, …, e_B]: white-jerk motion, and the errors of the coloured
 sensors. An error state is a stationary Ornstein-Uhlenbeck process of unit variance that is correlated
-over its memory τ: e(t + Δ) = exp(-Δ/τ) e(t) + noise of variance 1 - exp(-2Δ/τ).
+over its correlation time τ: e(t + Δ) = exp(-Δ/τ) e(t) + noise of variance 1 - exp(-2Δ/τ).
 
 Source: Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001,
 ch. 8 (autocorrelated noise as states of its own).
@@ -24,12 +24,12 @@ _UNIT_NOISE = np.array([[1 / 20, 1 / 8, 1 / 6], [1 / 8, 1 / 3, 1 / 2], [1 / 6, 1
 
 
 @njit(cache=True)
-def motion_matrices(dt: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+def motion_matrices(dt: FloatArray, jerk: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Transition matrices and process noise of white-jerk motion (paper eq. 2) for many steps.
 
     Args:
         dt: (N,) time steps (s), >= 0; a step of 0 gives identity and zero.
-        q: (N,) root spectral densities of the jerk (px/s^2.5).
+        jerk: (N,) root spectral densities of the jerk (px/s^2.5).
 
     Returns:
         (N, 3, 3) transition matrices and (N, 3, 3) covariances.
@@ -38,15 +38,15 @@ def motion_matrices(dt: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArr
     Q = np.empty((len(dt), 3, 3))
     for i in range(len(dt)):
         F[i] = transition(dt[i])
-        Q[i] = process_noise(dt[i], q[i])
+        Q[i] = process_noise(dt[i], jerk[i])
     return F, Q
 
 
 @njit(cache=True)
-def error_steps(dt: float, memory: FloatArray, phi: FloatArray, var: FloatArray) -> None:
+def error_steps(dt: float, correlation_time: FloatArray, phi: FloatArray, var: FloatArray) -> None:
     """Fill transition factors `phi` (B,) and noise variances `var` (B,) of the error states."""
-    for b in range(len(memory)):
-        less = np.expm1(-dt / memory[b])
+    for b in range(len(correlation_time)):
+        less = np.expm1(-dt / correlation_time[b])
         phi[b] = 1.0 + less
         var[b] = -less * (2.0 + less)
 
@@ -66,7 +66,7 @@ def step_mean(dims: tuple[int, ...], dt: float, phi: FloatArray, old: FloatArray
 def step_cov(
     dims: tuple[int, ...],
     dt: float,
-    q: float,
+    jerk: float,
     phi: FloatArray,
     var: FloatArray,
     old: FloatArray,
@@ -82,7 +82,7 @@ def step_cov(
         moved[2, j] = old[2, j]
         for i in range(3, n):
             moved[i, j] = phi[i - 3] * old[i, j]
-    unit = q * q * dt
+    unit = jerk * jerk * dt
     d2 = dt * dt
     new[0, 0] = moved[0, 0] + dt * moved[0, 1] + half * moved[0, 2] + unit * d2 * d2 * _UNIT_NOISE[0, 0]
     new[1, 0] = moved[1, 0] + dt * moved[1, 1] + half * moved[1, 2] + unit * d2 * dt * _UNIT_NOISE[1, 0]

@@ -40,14 +40,7 @@ MAX_PARAMETERS = 8
 KNOWN_UPWARD: set[tuple[str, str]] = set()
 KNOWN_CIRCLES: set[str] = set()
 KNOWN_GTSAM: set[str] = set()
-KNOWN_WIDE_FUNCTIONS = {
-    "smoothers.adjoint.back_over_measurement": 9,
-    "smoothers.adjoint.smooth_one": 9,
-    "smoothers.backward.smooth_rows": 19,
-    "smoothers.backward.backward_between": 13,
-    "smoothers.forward.filter_rows": 18,
-    "smoothers.gtsam.whitened.segment_rows": 11,
-}
+KNOWN_WIDE_FUNCTIONS: dict[str, int] = {}
 
 
 class Import(NamedTuple):

@@ -114,15 +114,17 @@ def _measured(
                 phi = np.exp(-(t[k] - t[before]) / tau[s])
                 lasting = phi * lasting + np.sqrt(1.0 - phi**2) * rng.normal(size=2)
             error[k] = lasting
-    lever = (np.sqrt(share) * std)[:, None].repeat(2, axis=1)
+    coloured_std = (np.sqrt(share) * std)[:, None].repeat(2, axis=1)
     white = ((1.0 - share) * std**2)[:, None].repeat(2, axis=1)
-    z = p + lever * error + np.sqrt(white) * rng.normal(size=p.shape)
+    z = p + coloured_std * error + np.sqrt(white) * rng.normal(size=p.shape)
     D = 5 if memory else 3
     mean, cov = np.empty((2, D)), np.empty((2, D, D))
     spread = np.full(2, _VELOCITY_STD**2), np.full(2, _ACCELERATION_STD**2)
     if memory:
-        write_prior(z[0], white[0], lever[0], int(sensor[0]), *spread, mean, cov)
-        coloured = measurements(t[1:], z[1:], white[1:], np.full(len(t) - 1, jerk), lever[1:], sensor[1:])
+        write_prior(z[0], white[0], coloured_std[0], int(sensor[0]), *spread, mean, cov)
+        coloured = measurements(
+            t[1:], z[1:], white[1:], np.full(len(t) - 1, jerk), coloured_std[1:], sensor[1:]
+        )
         return TrackData.from_measurements(Prior(float(t[0]), mean, cov), coloured, tau)
     write_prior(z[0], std[[0, 0]] ** 2, np.zeros(2), -1, *spread, mean, cov)
     plain = measurements(t[1:], z[1:], white[1:], np.full(len(t) - 1, jerk))

@@ -25,12 +25,13 @@ from jeat_graph.smoothers.engine import WholeTrackSmoother
 from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
 from jeat_graph.smoothers.track_data import Prior, SmoothedTrack
 from jeat_graph.smoothers.window import Window
-from jeat_graph.tracking.smoothing.behind import SmoothingHere
+from jeat_graph.tracking.smoothing.behind import InProcessSmoothing
 from jeat_graph.tracking.smoothing.history import TrackHistory
-from jeat_graph.tracking.smoothing.looks import Looks
-from jeat_graph.tracking.smoothing.online import Share, SortedPacket, TrackSmoothers
+from jeat_graph.tracking.smoothing.observation_times import ObservationTimes
+from jeat_graph.tracking.smoothing.online import TrackSmoothers
 from jeat_graph.tracking.smoothing.priors import ErrorStates
 from jeat_graph.tracking.smoothing.recorder import StepRecorder
+from jeat_graph.tracking.smoothing.shares import Share, SortedPacket
 from jeat_graph.tracking.smoothing.sizes import SizeWindow
 from jeat_graph.tracking.smoothing.waiting import WaitingRows
 from jeat_graph.tracking.snapshot import Snapshot
@@ -39,17 +40,17 @@ from jeat_graph.tracking.step_record import StepRecord
 from jeat_graph.version import __version__
 
 #: Raised with every change of what is saved: a file of another format is refused, not guessed at.
-FORMAT = 1
+FORMAT = 2
 _MAGIC = "jeat-graph tracker"
 _PLAIN = (
-    Looks,
+    InProcessSmoothing,
+    ObservationTimes,
     Prior,
     Scan,
     Scene,
     Share,
     SizeWindow,
     SmoothedTrack,
-    SmoothingHere,
     Snapshot,
     SortedPacket,
     StepRecord,

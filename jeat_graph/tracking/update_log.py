@@ -77,7 +77,7 @@ def log_update(
     for axis in range(2):
         row["z"][axis] = batch.z[j, axis]
         row["r"][axis] = R[axis]
-        row["lever"][axis] = coloured_std[axis]
+        row["coloured_std"][axis] = coloured_std[axis]
         row["log_size"][axis] = batch.log_size[j, axis]
         row["size_var"][axis] = sensors.size_var[s, axis]
         row["velocity_var"][axis] = 0.0

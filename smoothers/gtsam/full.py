@@ -14,7 +14,7 @@ from jeat_graph.data.arrays import FloatArray
 from jeat_graph.smoothers.gtsam.linear_graph import LinearGraph
 from jeat_graph.smoothers.gtsam.scaling import unscale_cov, unscale_gain, unscale_mean
 from jeat_graph.smoothers.gtsam.whitened import prior_rows, segment_rows
-from jeat_graph.smoothers.rts import filter_track, information
+from jeat_graph.smoothers.rts import filter_track, observations, steps
 from jeat_graph.smoothers.track_data import SmoothedTrack, TrackData
 
 
@@ -39,35 +39,15 @@ def smooth_full(track: TrackData, weights: FloatArray | None = None) -> Smoothed
     Raises:
         RuntimeError: GTSAM's, if the system is indeterminate; `engine.py` meets it.
     """
-    info = information(track, weights)
+    measured, size = observations(track, weights), track.size
     reference, _ = filter_track(track, weights)
-    graph = LinearGraph(track.size)
-    first = int(np.searchsorted(track.key, 0, side="right"))
-    prior = prior_rows(
-        track.prior_mean,
-        track.prior_cov,
-        reference[0],
-        track.z[:first],
-        info[:first],
-        track.lever[:first],
-        track.error[:first],
-    )
-    segments = segment_rows(
-        (0,) * track.size,
-        np.arange(len(track)),
-        track.t,
-        track.q,
-        track.memory,
-        track.key,
-        track.z,
-        info,
-        track.lever,
-        track.error,
-        reference,
-    )
+    graph = LinearGraph(size)
+    of_prior = measured.select(slice(int(np.searchsorted(track.key, 0, side="right"))))
+    prior = prior_rows(track.prior_mean, track.prior_cov, reference[0], of_prior)
+    segments = segment_rows((0,) * size, np.arange(len(track)), steps(track), measured, reference)
     graph.add_segments(0, *segments)
     graph.add_prior(0, *prior)
     vectors, conditional, gain = graph.solve(len(track))
     cov, gain = unscale_cov(conditional), unscale_gain(gain)
     _marginals(cov, gain)
-    return SmoothedTrack(track.t, track.q, unscale_mean(vectors, reference), cov, gain)
+    return SmoothedTrack(track.t, track.jerk, unscale_mean(vectors, reference), cov, gain)

@@ -19,6 +19,7 @@ from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.smoothers.gtsam.scaling import TAU_S, scale
+from jeat_graph.smoothers.passes import Observations, Steps
 from jeat_graph.smoothers.transitions import error_steps, step_cov
 
 
@@ -26,14 +27,8 @@ from jeat_graph.smoothers.transitions import error_steps, step_cov
 def segment_rows(
     dims: tuple[int, ...],
     ends: IntArray,
-    t: FloatArray,
-    q: FloatArray,
-    memory: FloatArray,
-    row: IntArray,
-    z: FloatArray,
-    info: FloatArray,
-    lever: FloatArray,
-    error: IntArray,
+    steps: Steps,
+    observations: Observations,
     reference: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
     """Rows of the steps between some states, and of the measurements after each up to the next.
@@ -46,14 +41,8 @@ def segment_rows(
     Args:
         dims: any tuple of n elements (`transitions.py`).
         ends: (S + 1,) the states that GTSAM knows, ascending; those in between are eliminated.
-        t: (N,) times of all states (s), ascending.
-        q: (N,) root spectral density of the jerk over the step that ends at each (px/s^2.5), > 0.
-        memory: (B,) memory of the error states (s).
-        row: (M,) state of each measurement, ascending.
-        z: (M, 2) measurements (px).
-        info: (M, 2) their information (1/px²): of the white part alone.
-        lever: (M, 2) factor of the error state in each (px).
-        error: (M,) its index, or -1.
+        steps: times of all states and how they follow each other.
+        observations: the measurements; `key` is the state of each.
         reference: (N, 2, n) references of all states.
 
     Returns:
@@ -61,6 +50,7 @@ def segment_rows(
         and A0 y0 + A1 y1 - b is white for the scaled states y at the ends of a segment.
     """
     n = len(dims)
+    row, error = observations.key, observations.error
     segments = len(ends) - 1
     first = np.searchsorted(row, ends + 1)
     most = 0
@@ -84,17 +74,17 @@ def segment_rows(
             old[:] = 0.0
             c[:] = 0.0
             for k in range(ends[s] + 1, last + 1):
-                dt = t[k] - t[k - 1]
-                error_steps(dt, memory, phi, var)
-                step_cov(dims, dt, q[k], phi, var, old, moved, P)
+                dt = steps.t[k] - steps.t[k - 1]
+                error_steps(dt, steps.correlation_time, phi, var)
+                step_cov(dims, dt, steps.jerk[k], phi, var, old, moved, P)
                 _step_rows(dims, dt, phi, reference[k - 1, a], reference[k, a], A, c)
                 while i < len(row) and row[i] == k:
                     e = error[i] + 3
-                    h = lever[i, a] if e >= 3 else 0.0
+                    h = observations.coloured_std[i, a] if e >= 3 else 0.0
                     e = max(e, 3) if n > 3 else 0
-                    d = z[i, a] - reference[k, a, 0] - h * reference[k, a, e]
+                    d = observations.z[i, a] - reference[k, a, 0] - h * reference[k, a, e]
                     if k == last:
-                        root = np.sqrt(info[i, a])
+                        root = np.sqrt(observations.information[i, a])
                         A1[s, place, a * n] = root
                         A1[s, place, a * n + e] += root * h
                         b[s, place] = root * d
@@ -103,7 +93,7 @@ def segment_rows(
                         for j in range(n):
                             seen[j] = P[0, j] + h * P[e, j]
                             B[j] = A[0, j] + h * A[e, j]
-                        S = seen[0] + h * seen[e] + 1.0 / info[i, a]
+                        S = seen[0] + h * seen[e] + 1.0 / observations.information[i, a]
                         root = 1.0 / np.sqrt(S)
                         for j in range(n):
                             A0[s, place, a * n + j] = root * scales[j] * B[j]
@@ -183,33 +173,27 @@ def _whiten(dims: tuple[int, ...], P: FloatArray, A: FloatArray, c: FloatArray, 
 
 
 def prior_rows(
-    mean: FloatArray,
-    cov: FloatArray,
-    reference: FloatArray,
-    z: FloatArray,
-    info: FloatArray,
-    lever: FloatArray,
-    error: IntArray,
+    mean: FloatArray, cov: FloatArray, reference: FloatArray, observations: Observations
 ) -> tuple[FloatArray, FloatArray]:
-    """Rows of a prior (2, n), (2, n, n), and of the measurements z (J, 2) and so on, on one state.
+    """Rows of a prior (2, n), (2, n, n), and of J observations, all of them of one state.
 
     Returns:
         A (R, 2 n) and b (R,) with A y - b white, R = 2 (n + J).
     """
-    n, count = mean.shape[1], len(z)
+    n, count = mean.shape[1], len(observations.z)
     D = scale(n)
     A, b = np.zeros((2 * (n + count), 2 * n)), np.zeros(2 * (n + count))
     for axis in range(2):
         block, rows = slice(axis * n, (axis + 1) * n), 2 * n + axis * count + np.arange(count)
         A[block, block] = np.linalg.inv(np.linalg.cholesky(cov[axis] * (D[:, None] * D)))
         b[block] = A[block, block] @ ((mean[axis] - reference[axis]) * D)
-        root = np.sqrt(info[:, axis])
+        root = np.sqrt(observations.information[:, axis])
         A[rows, axis * n] = root
-        coloured = error >= 0
-        column = 3 + np.where(coloured, error, 0)
-        h = np.where(coloured, lever[:, axis], 0.0)
+        coloured = observations.error >= 0
+        column = 3 + np.where(coloured, observations.error, 0)
+        h = np.where(coloured, observations.coloured_std[:, axis], 0.0)
         if n > 3:
             A[rows, axis * n + column] += root * h
             h = h * reference[axis, column]
-        b[rows] = root * (z[:, axis] - reference[axis, 0] - h)
+        b[rows] = root * (observations.z[:, axis] - reference[axis, 0] - h)
     return A, b

@@ -1,4 +1,4 @@
-"""States at any lag where the sensors' errors have a memory."""
+"""States at any lag where the sensors' errors are coloured."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from jeat_graph.smoothers.measurements import measurements
 from jeat_graph.smoothers.rts import smooth_rts
 from jeat_graph.smoothers.track_data import Prior, TrackData
 
-MEMORY = np.array([0.25, 0.1])
+CORRELATION_TIMES = np.array([0.25, 0.1])
 PRIOR = np.tile(np.diag([4.0, 900.0, 400.0, 1.0, 1.0]), (2, 1, 1))
 
 
 def coloured(seed, n=400, jerk=60.0):
-    """A track drawn from the model: two sensors by turns, each with a white error and one with a memory."""
+    """A track drawn from the model: two sensors by turns, each with a white and a coloured error."""
     rng = np.random.default_rng(seed)
     t = np.cumsum(rng.uniform(0.005, 0.03, n))
     x, z = rng.normal(size=(2, 5)) * np.sqrt(np.diag(PRIOR[0])), []
-    error, lever = np.arange(n) % 2, np.full((n, 2), 3.0)
+    error, coloured_std = np.arange(n) % 2, np.full((n, 2), 3.0)
     for row, dt in enumerate(np.diff(t, prepend=0.0)):
-        phi = np.exp(-dt / MEMORY)
+        phi = np.exp(-dt / CORRELATION_TIMES)
         F = np.diag([1.0, 1.0, 1.0, *phi])
         F[:3, :3] = [[1.0, dt, dt**2 / 2], [0.0, 1.0, dt], [0.0, 0.0, 1.0]]
         unit = jerk * np.sqrt(dt) * np.array([dt**2, dt, 1.0])
@@ -36,17 +36,17 @@ def coloured(seed, n=400, jerk=60.0):
             axis=1,
         )
         x = x @ F.T + noise
-        z.append(x[:, 0] + lever[row] * x[:, 3 + error[row]] + rng.normal(size=2))
+        z.append(x[:, 0] + coloured_std[row] * x[:, 3 + error[row]] + rng.normal(size=2))
     r, q = np.ones((n, 2)), np.full(n, jerk)
     return TrackData.from_measurements(
-        Prior(0.0, np.zeros((2, 5)), PRIOR), measurements(t, z, r, q, lever, error), MEMORY
+        Prior(0.0, np.zeros((2, 5)), PRIOR), measurements(t, z, r, q, coloured_std, error), CORRELATION_TIMES
     )
 
 
 def until(data, t):
     """The same track, without the measurements after `t`."""
     kept = data.measurements()[data.t[data.key] <= t + 1e-9]
-    return TrackData.from_measurements(data.prior, kept, data.memory)
+    return TrackData.from_measurements(data.prior, kept, data.correlation_time)
 
 
 @pytest.mark.parametrize("lag", [0.0, 0.05, 0.3])
@@ -77,15 +77,15 @@ def test_innovations_are_white_and_as_large_as_they_say():
     assert abs(pairs.mean()) < 1.96 / np.sqrt(pairs.size)
 
 
-def test_without_its_memory_the_errors_show_in_the_innovations():
+def test_without_its_colour_the_errors_show_in_the_innovations():
     data = coloured(3)
     white = replace(
         data,
         prior_mean=data.prior_mean[:, :3],
         prior_cov=data.prior_cov[:, :3, :3],
-        r=data.r + data.lever**2,
+        r=data.r + data.coloured_std**2,
         error=np.full(len(data.z), -1),
-        memory=np.zeros(0),
+        correlation_time=np.zeros(0),
     )
     values = states_at(white, data.t[:1], [])[3].normalised()
     assert abs((values[2:] * values[:-2]).mean()) > 0.1

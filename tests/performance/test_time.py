@@ -76,7 +76,7 @@ def test_rts_is_at_least_five_times_cheaper_than_fixed_lag(best):
     measured = track.measurements()
 
     def life(engine):
-        smoother = make_smoother(engine, track.prior, memory=track.memory)
+        smoother = make_smoother(engine, track.prior, correlation_time=track.correlation_time)
         for i in range(0, len(track.z), 48):  # as many at a time as the tracker hands over
             smoother.feed(measured[i : i + 48])
             smoother.departed()
@@ -88,7 +88,10 @@ def test_rts_is_at_least_five_times_cheaper_than_fixed_lag(best):
 
 def test_a_window_costs_no_more_after_a_minute(best):
     track = sampled(90.0)
-    smoother, measured = FixedLagSmoother(track.prior, memory=track.memory), track.measurements()
+    smoother, measured = (
+        FixedLagSmoother(track.prior, correlation_time=track.correlation_time),
+        track.measurements(),
+    )
     position, slots = 0, []
 
     def five_seconds():

@@ -34,16 +34,16 @@ def noise(dt, q):
 PRIOR_COV = np.tile(np.diag([9.0, 50.0**2, 30.0**2]), (2, 1, 1))
 
 
-def joint_transition(dt, memory):
+def joint_transition(dt, correlation_time):
     """Transition of [p, v, a, e_1, …]."""
-    F = np.diag(np.concatenate([np.ones(3), np.exp(-dt / np.asarray(memory))]))
+    F = np.diag(np.concatenate([np.ones(3), np.exp(-dt / np.asarray(correlation_time))]))
     F[:3, :3] = transition(dt)
     return F
 
 
-def joint_noise(dt, q, memory):
+def joint_noise(dt, q, correlation_time):
     """Process noise of [p, v, a, e_1, …]."""
-    Q = np.diag(np.concatenate([np.ones(3), 1.0 - np.exp(-2.0 * dt / np.asarray(memory))]))
+    Q = np.diag(np.concatenate([np.ones(3), 1.0 - np.exp(-2.0 * dt / np.asarray(correlation_time))]))
     Q[:3, :3] = noise(dt, q)
     return Q
 
@@ -54,7 +54,7 @@ def rows_of_measurements(track, axis):
     for row, (key, error) in enumerate(zip(track.key, track.error, strict=True)):
         H[row, n * key] = 1.0
         if error >= 0:
-            H[row, n * key + 3 + error] = track.lever[row, axis]
+            H[row, n * key + 3 + error] = track.coloured_std[row, axis]
     return H
 
 
@@ -68,13 +68,13 @@ def coloured_prior(mean, cov, count):
 PRIOR_MEAN = np.array([[600.0, 10.0, 0.0], [300.0, -5.0, 0.0]])
 
 
-MEMORY = (0.3, 0.08)
+CORRELATION_TIMES = (0.3, 0.08)
 
 
-def harsh(seed: int = 0, n: int = 60, q: float = 40.0, memory: tuple[float, ...] = ()) -> TrackData:
+def harsh(seed: int = 0, n: int = 60, q: float = 40.0, correlation_time: tuple[float, ...] = ()) -> TrackData:
     """Two sensors, steps of 0.1 ms to 2 s, coincident stamps, gaps, noise scales at both clamps.
 
-    With `memory` of two, each sensor has an error state, and one measurement in ten is white.
+    With two correlation times, each sensor has an error state, and one measurement in ten is white.
     """
     rng = np.random.default_rng(seed)
     dt = np.exp(rng.uniform(np.log(1e-4), np.log(0.2), n))
@@ -87,16 +87,16 @@ def harsh(seed: int = 0, n: int = 60, q: float = 40.0, memory: tuple[float, ...]
     r = (base * rng.choice([0.5, 5.0], n))[:, None] * np.array([1.0, 0.7])
     z = truth + rng.normal(size=(n, 2)) * np.sqrt(r)
     density = q * rng.uniform(0.5, 1.5, n)
-    prior = coloured_prior(PRIOR_MEAN, PRIOR_COV, len(memory))
-    error = np.where(rng.random(n) < 0.1, -1, np.where(slow, 0, 1)) if memory else np.full(n, -1)
-    lever = np.where(error[:, None] >= 0, rng.uniform(1.0, 6.0, (n, 2)), 0.0)
+    prior = coloured_prior(PRIOR_MEAN, PRIOR_COV, len(correlation_time))
+    error = np.where(rng.random(n) < 0.1, -1, np.where(slow, 0, 1)) if correlation_time else np.full(n, -1)
+    coloured_std = np.where(error[:, None] >= 0, rng.uniform(1.0, 6.0, (n, 2)), 0.0)
     return TrackData.from_measurements(
-        Prior(0.0, *prior), measurements(t, z, r, density, lever, error), memory
+        Prior(0.0, *prior), measurements(t, z, r, density, coloured_std, error), correlation_time
     )
 
 
 def sampled(
-    seed: int = 0, seconds: float = 10.0, q: float = 100.0, memory: tuple[float, ...] = ()
+    seed: int = 0, seconds: float = 10.0, q: float = 100.0, correlation_time: tuple[float, ...] = ()
 ) -> tuple[TrackData, np.ndarray]:
     """A track drawn from the model itself, 20 and 100 Hz, and its true states (K, 2, 3 + B)."""
     rng = np.random.default_rng(seed)
@@ -106,22 +106,22 @@ def sampled(
     t, sensor = t[order], np.repeat([0, 1], [len(slow), len(fast)])[order]
     n = len(t)
     r = rng.choice([4.5, 9.0, 45.0], (n, 1)) * np.ones(2)
-    prior = coloured_prior(PRIOR_MEAN, PRIOR_COV, len(memory))
+    prior = coloured_prior(PRIOR_MEAN, PRIOR_COV, len(correlation_time))
     size = prior[0].shape[1]
     x = prior[0] + rng.normal(size=(2, size)) * np.sqrt(np.diag(prior[1][0]))
-    error = sensor if memory else np.full(n, -1)
-    lever = np.where(error >= 0, np.where(sensor == 0, 3.0, 5.0), 0.0)[:, None] * np.ones(2)
+    error = sensor if correlation_time else np.full(n, -1)
+    coloured_std = np.where(error >= 0, np.where(sensor == 0, 3.0, 5.0), 0.0)[:, None] * np.ones(2)
     states, z = [x], []
     for row, step in enumerate(np.diff(t, prepend=0.0)):
-        unit = np.concatenate([[step**2.5, step**1.5, step**0.5], np.ones(len(memory))])
-        scaled_noise = joint_noise(step, q, memory) / np.outer(unit, unit)
-        x = x @ joint_transition(step, memory).T
+        unit = np.concatenate([[step**2.5, step**1.5, step**0.5], np.ones(len(correlation_time))])
+        scaled_noise = joint_noise(step, q, correlation_time) / np.outer(unit, unit)
+        x = x @ joint_transition(step, correlation_time).T
         x = x + rng.normal(size=(2, size)) @ (np.linalg.cholesky(scaled_noise) * unit[:, None]).T
         states.append(x)
-        z.append(x[:, 0] + (lever[row] * x[:, 3 + error[row]] if memory else 0.0))
+        z.append(x[:, 0] + (coloured_std[row] * x[:, 3 + error[row]] if correlation_time else 0.0))
     z = np.array(z) + rng.normal(size=(n, 2)) * np.sqrt(r)
     track = TrackData.from_measurements(
-        Prior(0.0, *prior), measurements(t, z, r, np.full(n, q), lever, error), memory
+        Prior(0.0, *prior), measurements(t, z, r, np.full(n, q), coloured_std, error), correlation_time
     )
     return track, np.array(states)
 
@@ -132,7 +132,7 @@ def dense(track: TrackData, extra_t: float | None = None, extra_q: float = 1.0):
     Returns means (K, 2, n) and the joint covariances (2, n K, n K). With `extra_t`, a state without a
     measurement is put in at that time, as the last of the K.
     """
-    t, q, n = list(track.t), list(track.q), track.size
+    t, q, n = list(track.t), list(track.jerk), track.size
     order = list(range(len(t)))
     if extra_t is not None:
         place = int(np.searchsorted(t, extra_t))
@@ -146,12 +146,14 @@ def dense(track: TrackData, extra_t: float | None = None, extra_q: float = 1.0):
         S = np.zeros((K, n, K, n))
         m[0], S[0, :, 0] = track.prior_mean[axis], track.prior_cov[axis]
         for k in range(1, K):
-            step = joint_transition(t[k] - t[k - 1], track.memory)
+            step = joint_transition(t[k] - t[k - 1], track.correlation_time)
             m[k] = step @ m[k - 1]
             for j in range(k):
                 S[k, :, j] = step @ S[k - 1, :, j]
                 S[j, :, k] = S[k, :, j].T
-            S[k, :, k] = step @ S[k - 1, :, k - 1] @ step.T + joint_noise(t[k] - t[k - 1], q[k], track.memory)
+            S[k, :, k] = step @ S[k - 1, :, k - 1] @ step.T + joint_noise(
+                t[k] - t[k - 1], q[k], track.correlation_time
+            )
         m, S = m[order], S[order][:, :, order]
         S = S.reshape(n * K, n * K)
         H = np.zeros((len(track.z), n * K))

@@ -16,7 +16,7 @@ from jeat_graph.smoothers.track_data import Prior, SmoothedTrack, TrackData
 
 from .conftest import joined
 
-#: White errors, and two sensors with a memory (s).
+#: White errors, and two sensors with coloured errors (s).
 COLOURS = [(), (0.3, 0.08)]
 
 
@@ -26,12 +26,12 @@ def some(track, rows=slice(None)):
 
 
 def start(track, **options):
-    return FixedLagSmoother(track.prior, memory=track.memory, **options)
+    return FixedLagSmoother(track.prior, correlation_time=track.correlation_time, **options)
 
 
 def until(track, rows):
     """The same track with its first measurements only."""
-    return TrackData.from_measurements(track.prior, some(track, slice(0, rows)), track.memory)
+    return TrackData.from_measurements(track.prior, some(track, slice(0, rows)), track.correlation_time)
 
 
 def final(pieces):
@@ -47,10 +47,10 @@ def run(track, smoother, step=5):
     return final(smoother.departed()), left
 
 
-@pytest.mark.parametrize("memory", COLOURS)
+@pytest.mark.parametrize("correlation_time", COLOURS)
 @pytest.mark.parametrize("seed", range(4))
-def test_newest_state_equals_the_filter_on_harsh_timing(harsh, scaled, relative, seed, memory):
-    track = harsh(seed, 200, memory=memory)
+def test_newest_state_equals_the_filter_on_harsh_timing(harsh, scaled, relative, seed, correlation_time):
+    track = harsh(seed, 200, correlation_time=correlation_time)
     _, left = run(track, start(track, chunk=12))
     mean, cov = filter_track(track)
     assert np.abs(left.mean[-1, :, 0] - mean[-1, :, 0]).max() < 1e-6
@@ -59,13 +59,13 @@ def test_newest_state_equals_the_filter_on_harsh_timing(harsh, scaled, relative,
 
 
 @pytest.mark.parametrize("chunk", [1, 20])
-@pytest.mark.parametrize("memory", COLOURS)
+@pytest.mark.parametrize("correlation_time", COLOURS)
 @pytest.mark.parametrize("use_gtsam", [True, False])
 @pytest.mark.parametrize("seed", range(4))
 def test_departing_states_are_exact_given_what_was_known_by_then(
-    harsh, scaled, relative, seed, use_gtsam, memory, chunk
+    harsh, scaled, relative, seed, use_gtsam, correlation_time, chunk
 ):
-    track = harsh(seed, 200, memory=memory)
+    track = harsh(seed, 200, correlation_time=correlation_time)
     smoother, count = start(track, lag_s=1.0, chunk=chunk, use_gtsam=use_gtsam), 0
     for row in range(len(track.z)):
         smoother.feed(some(track, [row]))
@@ -80,12 +80,14 @@ def test_departing_states_are_exact_given_what_was_known_by_then(
     assert count > 50
 
 
-@pytest.mark.parametrize("memory", COLOURS)
+@pytest.mark.parametrize("correlation_time", COLOURS)
 @pytest.mark.parametrize("seed", range(4))
-def test_departing_states_equal_rts_of_the_whole_track_on_harsh_timing(harsh, relative, seed, memory):
+def test_departing_states_equal_rts_of_the_whole_track_on_harsh_timing(
+    harsh, relative, seed, correlation_time
+):
     # What comes later than the lag is forgotten by the model only if there was enough before it: where
     # measurements are half a second apart, a second is not enough.
-    track = harsh(seed, 400, q=4000.0, memory=memory)
+    track = harsh(seed, 400, q=4000.0, correlation_time=correlation_time)
     departed, _ = run(track, start(track, lag_s=4.0, chunk=12))
     exact = smooth_rts(track).select(slice(0, len(departed)))
     assert len(departed) > 100
@@ -93,45 +95,47 @@ def test_departing_states_equal_rts_of_the_whole_track_on_harsh_timing(harsh, re
     assert relative(departed.cov, exact.cov) < 1e-4
 
 
-@pytest.mark.parametrize("memory", COLOURS)
+@pytest.mark.parametrize("correlation_time", COLOURS)
 @pytest.mark.parametrize("use_gtsam", [True, False])
 def test_departing_states_equal_rts_of_the_whole_track_at_a_lag_of_a_second(
-    sampled, relative, use_gtsam, memory
+    sampled, relative, use_gtsam, correlation_time
 ):
-    track, _ = sampled(0, seconds=6.0, q=3000.0, memory=memory)
-    # Errors with a memory are told from motion by a longer look only.
-    lag = 2.5 if memory else 1.0
+    track, _ = sampled(0, seconds=6.0, q=3000.0, correlation_time=correlation_time)
+    # Coloured errors are told from motion by a longer look only.
+    lag = 2.5 if correlation_time else 1.0
     departed, _ = run(track, start(track, lag_s=lag, chunk=24, use_gtsam=use_gtsam))
     exact = smooth_rts(track).select(slice(0, len(departed)))
     assert np.abs(departed.mean[:, :, 0] - exact.mean[:, :, 0]).max() < 1e-2
     assert relative(departed.cov, exact.cov) < 1e-4
 
 
-@pytest.mark.parametrize("memory", COLOURS)
-def test_states_inside_the_window_equal_rts_of_all_measurements_so_far(sampled, scaled, relative, memory):
-    track, _ = sampled(1, seconds=4.0, q=30.0, memory=memory)
+@pytest.mark.parametrize("correlation_time", COLOURS)
+def test_states_inside_the_window_equal_rts_of_all_measurements_so_far(
+    sampled, scaled, relative, correlation_time
+):
+    track, _ = sampled(1, seconds=4.0, q=30.0, correlation_time=correlation_time)
     _, left = run(track, start(track))
     exact = smooth_rts(track).select(slice(len(track) - len(left), None))
     assert scaled(left.mean, exact.mean) < 1e-5
     assert relative(left.cov, exact.cov) < 1e-9
 
 
-@pytest.mark.parametrize("memory", COLOURS)
-def test_covariances_are_gtsams_marginals(sampled, relative, memory):
-    track, _ = sampled(2, seconds=2.5, memory=memory)
+@pytest.mark.parametrize("correlation_time", COLOURS)
+def test_covariances_are_gtsams_marginals(sampled, relative, correlation_time):
+    track, _ = sampled(2, seconds=2.5, correlation_time=correlation_time)
     smoother = start(track)
     _, left = run(track, smoother)
-    numbers = smoother._window.anchor[smoother._window.first : smoother._window.end]
-    anchors = np.flatnonzero(numbers >= 0)
-    for i in (anchors[0], anchors[len(anchors) // 2], len(left) - 1):
+    numbers = smoother._window.gtsam_key[smoother._window.first : smoother._window.end]
+    solved = np.flatnonzero(numbers >= 0)
+    for i in (solved[0], solved[len(solved) // 2], len(left) - 1):
         number = int(numbers[i])
         marginal = smoother._gtsam._smoother.marginalCovariance(number)
         assert relative(unscale_cov(axis_blocks(marginal)), left.cov[i]) < 1e-6
 
 
-@pytest.mark.parametrize("memory", COLOURS)
-def test_finish_returns_the_whole_life_with_its_neighbour_covariances(sampled, memory):
-    track, _ = sampled(3, seconds=4.0, memory=memory)
+@pytest.mark.parametrize("correlation_time", COLOURS)
+def test_finish_returns_the_whole_life_with_its_neighbour_covariances(sampled, correlation_time):
+    track, _ = sampled(3, seconds=4.0, correlation_time=correlation_time)
     smoother = start(track)
     smoother.feed(some(track))
     whole, exact = joined(smoother.finish()), smooth_rts(track)
@@ -143,16 +147,16 @@ def test_a_gap_longer_than_the_lag_is_survived(sampled):
     whole, _ = sampled(4, seconds=12.0, q=3000.0)
     t = whole.t[whole.key]
     seen = some(whole, (t < 3.0) | (t > 9.0))
-    track = TrackData.from_measurements(whole.prior, seen, whole.memory)
+    track = TrackData.from_measurements(whole.prior, seen, whole.correlation_time)
     smoother = start(track)
     joined, exact = SmoothedTrack.concatenate(run(track, smoother)), smooth_rts(track)
     assert smoother.rebuilds == smoother.fallbacks == 0
     assert np.abs(joined.mean[:, :, 0] - exact.mean[:, :, 0]).max() < 1e-2
 
 
-@pytest.mark.parametrize("memory", COLOURS)
-def test_a_late_measurement_counts_as_if_it_had_come_in_time(sampled, scaled, relative, memory):
-    track, _ = sampled(5, seconds=2.0, q=300.0, memory=memory)
+@pytest.mark.parametrize("correlation_time", COLOURS)
+def test_a_late_measurement_counts_as_if_it_had_come_in_time(sampled, scaled, relative, correlation_time):
+    track, _ = sampled(5, seconds=2.0, q=300.0, correlation_time=correlation_time)
     late = np.array([200, 180, 150])
     smoother = start(track)
     smoother.feed(some(track, np.setdiff1d(np.arange(len(track.z)), late)))
@@ -168,9 +172,9 @@ def test_a_late_measurement_counts_as_if_it_had_come_in_time(sampled, scaled, re
     assert np.allclose(left.gain[-5:], smooth_rts(track).gain[-5:], atol=1e-9)
 
 
-@pytest.mark.parametrize("memory", COLOURS)
-def test_a_late_measurement_at_the_time_of_a_key_is_exact(sampled, scaled, relative, memory):
-    track, _ = sampled(6, seconds=1.5, memory=memory)
+@pytest.mark.parametrize("correlation_time", COLOURS)
+def test_a_late_measurement_at_the_time_of_a_key_is_exact(sampled, scaled, relative, correlation_time):
+    track, _ = sampled(6, seconds=1.5, correlation_time=correlation_time)
     smoother = start(track)
     smoother.feed(some(track))
     smoother.current()
@@ -180,7 +184,7 @@ def test_a_late_measurement_at_the_time_of_a_key_is_exact(sampled, scaled, relat
     smoother.feed(again)
     left = smoother.current()
     both = np.concatenate([track.measurements(), again])
-    twice = TrackData.from_measurements(track.prior, both, track.memory)
+    twice = TrackData.from_measurements(track.prior, both, track.correlation_time)
     exact = smooth_rts(twice).select(slice(len(twice) - len(left), None))
     assert scaled(left.mean, exact.mean) < 1e-5
     assert relative(left.cov, exact.cov) < 1e-9
@@ -196,12 +200,12 @@ def test_a_measurement_older_than_the_window_is_refused_and_counted(sampled):
     assert np.array_equal(smoother.current().mean, before.mean)
 
 
-@pytest.mark.parametrize("memory", COLOURS)
-def test_an_indeterminate_system_is_met_by_a_rebuild(sampled, scaled, monkeypatch, memory):
+@pytest.mark.parametrize("correlation_time", COLOURS)
+def test_an_indeterminate_system_is_met_by_a_rebuild(sampled, scaled, monkeypatch, correlation_time):
     """Factors that go missing leave a state free, at which GTSAM throws; the track does not notice."""
     from jeat_graph.smoothers.gtsam.linear_graph import LinearGraph
 
-    track, _ = sampled(8, seconds=4.0, q=1000.0, memory=memory)
+    track, _ = sampled(8, seconds=4.0, q=1000.0, correlation_time=correlation_time)
     smoother = start(track)
     half = len(track.z) // 2
     smoother.feed(some(track, slice(0, half)))
@@ -222,9 +226,9 @@ def test_an_indeterminate_system_is_met_by_a_rebuild(sampled, scaled, monkeypatc
     assert scaled(left.mean, exact.mean[-len(left) :]) < 1e-4
 
 
-@pytest.mark.parametrize("memory", COLOURS)
-def test_a_rebuild_keeps_late_measurements(sampled, scaled, memory):
-    track, _ = sampled(9, seconds=2.5, memory=memory)
+@pytest.mark.parametrize("correlation_time", COLOURS)
+def test_a_rebuild_keeps_late_measurements(sampled, scaled, correlation_time):
+    track, _ = sampled(9, seconds=2.5, correlation_time=correlation_time)
     late = np.array([250, 270])
     smoother = start(track)
     smoother.feed(some(track, np.setdiff1d(np.arange(len(track.z)), late)))
@@ -268,14 +272,16 @@ def test_bad_numbers_are_refused(sampled):
             smoother.feed(measurements([1.0], z, r, q))
 
 
-@pytest.mark.parametrize("memory", COLOURS)
-def test_a_measurement_at_the_time_of_the_prior_belongs_to_its_state(sampled, scaled, relative, memory):
-    track, _ = sampled(13, seconds=0.5, memory=memory)
+@pytest.mark.parametrize("correlation_time", COLOURS)
+def test_a_measurement_at_the_time_of_the_prior_belongs_to_its_state(
+    sampled, scaled, relative, correlation_time
+):
+    track, _ = sampled(13, seconds=0.5, correlation_time=correlation_time)
     first = some(track, [0])
     first["t"] = 0.0
     first["z"] += 5
     rows = np.concatenate([first, track.measurements()])
-    exact = smooth_rts(TrackData.from_measurements(track.prior, rows, track.memory))
+    exact = smooth_rts(TrackData.from_measurements(track.prior, rows, track.correlation_time))
     smoother = start(track)
     smoother.feed(rows)
     [left] = smoother.finish()
@@ -302,10 +308,12 @@ def test_a_measurement_at_the_time_of_the_prior_belongs_to_its_state(sampled, sc
 )
 def test_any_order_of_arrival_gives_finite_valid_states(feeds, chunk):
     prior = Prior(0.0, np.zeros((2, 5)), np.tile(np.diag([9.0, 2500.0, 900.0, 1.0, 1.0]), (2, 1, 1)))
-    smoother, now, parts = FixedLagSmoother(prior, chunk=chunk, memory=(0.3, 0.08)), 0.0, []
-    for step, z, r, q, lever, error in feeds:
+    smoother, now, parts = FixedLagSmoother(prior, chunk=chunk, correlation_time=(0.3, 0.08)), 0.0, []
+    for step, z, r, q, coloured_std, error in feeds:
         smoother.feed(
-            measurements([max(now + step, 0.0)], [[z, -z]], [[r, r]], [q], [[lever, lever]], [error])
+            measurements(
+                [max(now + step, 0.0)], [[z, -z]], [[r, r]], [q], [[coloured_std, coloured_std]], [error]
+            )
         )
         now = max(now, now + step)
         parts += smoother.departed()

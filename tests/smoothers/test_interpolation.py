@@ -8,11 +8,13 @@ from jeat_graph.smoothers.interpolation import bridge, interpolate
 from jeat_graph.smoothers.rts import smooth_rts
 
 
-@pytest.mark.parametrize("memory", [(), (0.3, 0.08)])
+@pytest.mark.parametrize("correlation_time", [(), (0.3, 0.08)])
 @pytest.mark.parametrize("smooth", [smooth_rts, smooth_full])
 @pytest.mark.parametrize("seed", range(3))
-def test_between_keys_the_motion_is_exact(harsh, dense, blocks, scaled, relative, seed, smooth, memory):
-    track = harsh(seed, 25, memory=memory)
+def test_between_keys_the_motion_is_exact(
+    harsh, dense, blocks, scaled, relative, seed, smooth, correlation_time
+):
+    track = harsh(seed, 25, correlation_time=correlation_time)
     smoothed = smooth(track)
     rng = np.random.default_rng(seed)
     for t in rng.uniform(track.t[0], track.t[-1], 8):
@@ -24,7 +26,7 @@ def test_between_keys_the_motion_is_exact(harsh, dense, blocks, scaled, relative
 
 def test_after_the_end_it_is_the_prediction(harsh, dense, blocks, scaled, relative):
     track = harsh(3, 25)
-    mean, joint = dense(track, extra_t=track.t[-1] + 0.7, extra_q=track.q[-1])
+    mean, joint = dense(track, extra_t=track.t[-1] + 0.7, extra_q=track.jerk[-1])
     m, P = interpolate(smooth_rts(track), np.array([track.t[-1] + 0.7]))
     assert scaled(m[0], mean[-1]) < 1e-6
     assert relative(P[0], blocks(joint)[-1]) < 1e-6

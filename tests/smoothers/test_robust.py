@@ -54,9 +54,9 @@ def test_cauchy_weighs_down_gross_outliers_and_only_those(sampled):
     assert weights[~bad].mean() > 0.99
 
 
-@pytest.mark.parametrize("memory", [(), (0.3, 0.08)])
-def test_left_out_distance_equals_leaving_the_measurement_out(harsh, memory):
-    track = harsh(0, 30, memory=memory)
+@pytest.mark.parametrize("correlation_time", [(), (0.3, 0.08)])
+def test_left_out_distance_equals_leaving_the_measurement_out(harsh, correlation_time):
+    track = harsh(0, 30, correlation_time=correlation_time)
     ones = np.ones(len(track.z))
     closed = left_out_distances(track, smooth_rts(track), ones)
     for i in range(0, len(track.z), 4):
@@ -67,7 +67,7 @@ def test_left_out_distance_equals_leaving_the_measurement_out(harsh, memory):
         H = np.zeros((2, track.size))
         H[:, 0] = 1.0
         if track.error[i] >= 0:
-            H[:, 3 + track.error[i]] = track.lever[i]
+            H[:, 3 + track.error[i]] = track.coloured_std[i]
         e = track.z[i] - (H * rest.mean[k]).sum(axis=1)
         P = np.einsum("ai,aij,aj->a", H, rest.cov[k], H)
         assert closed[i] == pytest.approx(np.sum(e**2 / (track.r[i] + P)), rel=1e-4)

@@ -12,23 +12,25 @@ from jeat_graph.smoothers.measurements import measurements
 from jeat_graph.smoothers.rts import filter_track, smooth_ends, smooth_rts
 from jeat_graph.smoothers.track_data import Prior, TrackData
 
-#: White errors, and two sensors with a memory (s).
+#: White errors, and two sensors with coloured errors (s).
 COLOURS = [(), (0.3, 0.08)]
 
 
-@pytest.mark.parametrize("memory", COLOURS)
+@pytest.mark.parametrize("correlation_time", COLOURS)
 @pytest.mark.parametrize("seed", range(4))
-def test_equals_the_dense_solution_on_harsh_timing(harsh, dense, blocks, scaled, relative, seed, memory):
-    track = harsh(seed, memory=memory)
+def test_equals_the_dense_solution_on_harsh_timing(
+    harsh, dense, blocks, scaled, relative, seed, correlation_time
+):
+    track = harsh(seed, correlation_time=correlation_time)
     smoothed = smooth_rts(track)
     mean, joint = dense(track)
     assert scaled(smoothed.mean, mean) < 1e-7
     assert relative(smoothed.cov, blocks(joint, size=track.size)) < 1e-7
 
 
-@pytest.mark.parametrize("memory", COLOURS)
-def test_carries_the_covariance_between_neighbours(harsh, dense, blocks, memory):
-    track = harsh(1, memory=memory)
+@pytest.mark.parametrize("correlation_time", COLOURS)
+def test_carries_the_covariance_between_neighbours(harsh, dense, blocks, correlation_time):
+    track = harsh(1, correlation_time=correlation_time)
     cross, exact = smooth_rts(track).cross(), blocks(dense(track)[1], lag=1, size=track.size)
     assert np.allclose(cross, exact, rtol=1e-6, atol=1e-6)
 
@@ -47,7 +49,7 @@ def test_filter_equals_two_updates_in_turn_at_coincident_stamps(harsh):
         m, P, at = track.prior_mean[axis], track.prior_cov[axis], 0
         for row, key in enumerate(track.key):
             if key != at:
-                dt, q = track.t[key] - track.t[key - 1], track.q[key]
+                dt, q = track.t[key] - track.t[key - 1], track.jerk[key]
                 F = np.array([[1, dt, dt**2 / 2], [0, 1, dt], [0, 0, 1]])
                 g = [[dt**5 / 20, dt**4 / 8, dt**3 / 6], [dt**4 / 8, dt**3 / 3, dt**2 / 2]]
                 Q = q**2 * np.array([*g, [dt**3 / 6, dt**2 / 2, dt]])
@@ -57,9 +59,9 @@ def test_filter_equals_two_updates_in_turn_at_coincident_stamps(harsh):
         assert np.allclose(filter_track(track)[0][-1, axis], m, rtol=1e-9, atol=1e-7)
 
 
-@pytest.mark.parametrize("memory", COLOURS)
-def test_both_ends_alone_are_those_of_the_whole(harsh, memory):
-    tracks = [harsh(seed, 20 + seed, memory=memory) for seed in range(3)]
+@pytest.mark.parametrize("correlation_time", COLOURS)
+def test_both_ends_alone_are_those_of_the_whole(harsh, correlation_time):
+    tracks = [harsh(seed, 20 + seed, correlation_time=correlation_time) for seed in range(3)]
     ends = smooth_ends(tracks)
     for i, track in enumerate(tracks):
         whole = smooth_rts(track)

@@ -91,6 +91,6 @@ def _smoothing(config: Config) -> Smoothing:
         from jeat_graph.tracking.smoothing.worker import SmoothingWorker
 
         return SmoothingWorker(config)
-    from jeat_graph.tracking.smoothing.behind import SmoothingHere
+    from jeat_graph.tracking.smoothing.behind import InProcessSmoothing
 
-    return SmoothingHere(config)
+    return InProcessSmoothing(config)

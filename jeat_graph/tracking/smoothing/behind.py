@@ -1,4 +1,4 @@
-"""Smoothing behind a tracker: what the tracker talks to, be the work done here or in another process."""
+"""Smoothing as the tracker sees it: one interface, whether the work is done in its process or in another."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.smoothing.history import TrackHistory
 from jeat_graph.tracking.smoothing.online import TrackSmoothers
 from jeat_graph.tracking.smoothing.recorder import StepRecorder
+from jeat_graph.tracking.smoothing.shares import packet_cost
 from jeat_graph.tracking.step_record import StepRecord
 
 #: What is counted of the smoothers (attributes of `TrackSmoothers`).
@@ -16,10 +17,10 @@ COUNTS = ("tracks", "rebuilds", "fallbacks", "too_late", "stitched")
 
 
 class Smoothing(Protocol):
-    """Takes down the steps of one tracker and gives smoothed trajectories."""
+    """Takes the steps of one tracker and gives smoothed trajectories."""
 
     def record(self, step: StepRecord) -> None:
-        """Take down one step."""
+        """Record one step."""
 
     def drain(self) -> Trajectories:
         """Return, and forget, final rows, in order of time over all calls."""
@@ -37,31 +38,35 @@ class Smoothing(Protocol):
         """Return what the confirmed tracks took in so far."""
 
 
-#: A step in process does one part in so many packets of steps of all that waits.
+#: What waits is worked off within so many packets of steps, should it ever be more than comes in.
 _LEVELLING = 2
 
 
-class SmoothingHere:
+class InProcessSmoothing:
     """Smoothing in the tracker's own process, a few tracks after each step.
 
     Done at once for all tracks, the work of a packet would make one step in fifty a hundred times as long as
-    the others. So each step does the same share of what waits, counted in measurements to be solved for, and
-    such a share that the waves of tracks that were born together are levelled. Counted, not timed: what is
-    done when depends on the steps alone.
+    the others, and tracks that were born together are due together. So each step does as much as comes in
+    with a step on average, counted in measurements to be solved for; a track that takes more than what is
+    left of a step's share takes it from the next ones. Counted, not timed: what is done when depends on the
+    steps alone.
     """
 
     def __init__(self, config: Config) -> None:
         self._recorder = StepRecorder(config)
         self._smoothers = TrackSmoothers(config)
-        self._steps = _LEVELLING * max(config.smoother.chunk, 1)
-        self._per_step = 0
+        self._steps = max(config.smoother.chunk, 1)
+        self._incoming = self._share = self._left = 0.0
 
     def record(self, step: StepRecord) -> None:
-        """Take down one step and do a part of the work."""
+        """Record one step and do a part of the work."""
         if self._recorder.record(step):
             self._consume()
         else:
-            self._smoothers.work(self._per_step)
+            self._left += self._share
+            self._left -= self._smoothers.work(self._left)
+            # What a step did not need is not kept for a later one.
+            self._left = min(self._left, 0.0)
 
     def drain(self) -> Trajectories:
         """Return, and forget, final rows, in order of time over all calls."""
@@ -87,5 +92,10 @@ class SmoothingHere:
         return self._smoothers.confirmed_histories()
 
     def _consume(self) -> None:
-        self._smoothers.consume(self._recorder.take())
-        self._per_step = -(-self._smoothers.backlog // self._steps)
+        packet = self._recorder.drain()
+        self._smoothers.consume(packet)
+        if packet is not None:
+            steps = len(packet.t)
+            cost = packet_cost(packet, self._steps) / steps
+            self._incoming += min(steps / self._steps, 1.0) * (cost - self._incoming)
+        self._share = max(self._incoming, self._smoothers.backlog / (_LEVELLING * self._steps))

@@ -1,4 +1,4 @@
-"""One track's past: what it took in, its smoother, and the rows not handed out yet."""
+"""What is kept of one track for smoothing: its measurements, its smoother, the times that have no row yet."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ import numpy as np
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import RecordArray
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.filters.measurement import MEASUREMENT
 from jeat_graph.smoothers.engine import TrackSmoother, make_smoother
+from jeat_graph.smoothers.measurements import concatenate_measurements
 from jeat_graph.smoothers.track_data import COINCIDENT_S, SmoothedTrack
-from jeat_graph.tracking.smoothing.looks import Looks
+from jeat_graph.tracking.smoothing.observation_times import ObservationTimes
 from jeat_graph.tracking.smoothing.priors import ErrorStates, prior_of, size_prior_of
 from jeat_graph.tracking.smoothing.rows import rows_of
 from jeat_graph.tracking.smoothing.sizes import SizeWindow
@@ -25,7 +25,7 @@ class TrackHistory:
     Args:
         track_id: identity.
         config: settings of the smoother, the sizes and the output.
-        errors: the sensors' errors with memory.
+        errors: the error states of the sensors.
         keep: keep all measurements until the end, which stitching needs.
 
     Attributes:
@@ -40,52 +40,52 @@ class TrackHistory:
         self.track_id = track_id
         self.confirmed = False
         self.measurements: list[RecordArray] = []
-        self._looks: list[Looks] = []
+        self._observed: list[ObservationTimes] = []
         self.smoother: TrackSmoother | None = None
         self._config = config
         self._errors = errors
         self._keep = keep
         self._sizes: SizeWindow | None = None
-        self._fed = 0  # pieces of `measurements` that the smoother has had
-        self._waiting = 0  # measurements that the smoother has set aside
+        self._waiting = -1  # measurements that the smoother has not had; the birth does not count
+        self._fed = 0  # pieces of `measurements` that it has had
         self._last = -np.inf  # time of the last measurement
 
     @property
-    def looks(self) -> Looks:
+    def observed(self) -> ObservationTimes:
         """Steps of its life that have no row yet."""
-        if len(self._looks) != 1:
-            self._looks = [Looks.concatenate(self._looks)]
-        return self._looks[0]
+        if len(self._observed) != 1:
+            self._observed = [ObservationTimes.concatenate(self._observed)]
+        return self._observed[0]
 
     @property
     def oldest(self) -> float:
         """Time of the first step without a row (s), or infinity."""
-        return next((float(looks.t[0]) for looks in self._looks if len(looks)), np.inf)
+        return next((float(observed.t[0]) for observed in self._observed if len(observed)), np.inf)
 
-    def take(self, rows: RecordArray) -> None:
+    def add_measurements(self, rows: RecordArray) -> None:
         """Add measurements (M,) in order of time."""
         self.measurements.append(rows)
+        self._waiting += len(rows)
         self._last = float(rows["t"][-1])
 
-    def watch(self, looks: Looks, confirmed: bool) -> None:
+    def add_steps(self, observed: ObservationTimes, confirmed: bool) -> None:
         """Add steps that the track has lived through, and whether it was confirmed in one of them."""
-        if len(looks):
-            self._looks.append(looks)
+        if len(observed):
+            self._observed.append(observed)
         self.confirmed = self.confirmed or confirmed
 
-    def to_solve(self, more: int) -> int:
-        """How many measurements the smoother will solve for when it is given so many more."""
+    def to_solve(self, more: int = 0) -> int:
+        """How many measurements are solved for when so many more have come; 0 while they only wait."""
         if not self.confirmed:
             return 0
-        held = self._waiting if self.smoother is not None else sum(len(rows) for rows in self.measurements)
-        waiting = more + held
+        waiting = self._waiting + more + (0 if self.smoother is None else self.smoother.waiting)
         return waiting if waiting >= self._config.smoother.chunk else 0
 
     def feed(self) -> None:
         """Give the smoother what waits, if the track is confirmed."""
         if not self.confirmed or self._fed == len(self.measurements):
             return
-        rows = np.concatenate(self.measurements[self._fed :])
+        rows = concatenate_measurements(self.measurements[self._fed :])
         if self.smoother is None:
             settings = self._config.smoother
             self.smoother = make_smoother(
@@ -94,7 +94,7 @@ class TrackHistory:
                 lag_s=settings.lag_s,
                 chunk=settings.chunk,
                 robust=settings.robust,
-                memory=self._errors.memory,
+                correlation_time=self._errors.correlation_time,
             )
             self._sizes = SizeWindow(size_prior_of(rows[0]), self._config.size.rate_density)
             rows = rows[1:]
@@ -103,11 +103,9 @@ class TrackHistory:
             self._fed = len(self.measurements)
         else:
             self.measurements = []
+        self._waiting = 0
         if len(rows):
             self.smoother.feed(rows)
-            self._waiting += len(rows)
-            if self._waiting >= self._config.smoother.chunk:
-                self._waiting = 0
             self._sizes.append(rows)
 
     def departed(self) -> list[Trajectories]:
@@ -135,7 +133,7 @@ class TrackHistory:
 
     def whole(self) -> RecordArray:
         """Return all measurements (M,), the birth first; needs `keep`."""
-        return np.concatenate([np.zeros(0, dtype=MEASUREMENT), *self.measurements])
+        return concatenate_measurements(self.measurements)
 
     def close(self) -> None:
         """Free the smoother and all that waits."""
@@ -148,21 +146,21 @@ class TrackHistory:
         assert self._sizes is not None
         rows, end = self._rows(piece, float(piece.t[-1])), float(piece.t[-2])
         self._sizes.advance(end)
-        looks = self.looks
-        self._looks = [looks.take(slice(int(np.searchsorted(looks.t, piece.t[-1])), None))]
+        observed = self.observed
+        self._observed = [observed.select(slice(int(np.searchsorted(observed.t, piece.t[-1])), None))]
         return rows
 
     def _rows(self, piece: SmoothedTrack, end: float) -> list[Trajectories]:
         """Rows of the steps before time `end` (s), those after the last measurement only where it is held."""
         assert self._sizes is not None
-        looks = self.looks
-        chosen = (looks.t < end) & ((looks.t <= self._last + COINCIDENT_S) | looks.held)
+        observed = self.observed
+        chosen = (observed.t < end) & ((observed.t <= self._last + COINCIDENT_S) | observed.held)
         # Of two steps at one time the later one counts.
-        chosen[:-1] &= looks.t[1:] > looks.t[:-1]
+        chosen[:-1] &= observed.t[1:] > observed.t[:-1]
         if not chosen.any():
             return []
-        existence = looks.hindsight()[chosen]
+        existence = observed.hindsight()[chosen]
         rows = rows_of(
-            self.track_id, piece, self._sizes.smooth(), looks.take(chosen), existence, self._config
+            self.track_id, piece, self._sizes.smooth(), observed.select(chosen), existence, self._config
         )
         return [rows]

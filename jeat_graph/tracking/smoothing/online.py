@@ -4,78 +4,22 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
-from typing import Literal, NamedTuple
 
 import numpy as np
 
 from jeat_graph.config.schema import Config
-from jeat_graph.data.arrays import BoolArray, FloatArray, RecordArray
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.smoothers.engine import load_engine
 from jeat_graph.tracking.smoothing.history import TrackHistory
-from jeat_graph.tracking.smoothing.looks import Looks
 from jeat_graph.tracking.smoothing.priors import ErrorStates
 from jeat_graph.tracking.smoothing.recorder import Packet
+from jeat_graph.tracking.smoothing.shares import HANDING, Share, cost_of_solving, split
 from jeat_graph.tracking.smoothing.stitched import stitch_histories
 from jeat_graph.tracking.smoothing.waiting import WaitingRows
 
 #: Engines that solve for a track once it has ended; only with these can fragments be stitched.
 WHOLE = ("full", "rts")
-
-
-_SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
-
-#: What handing a share of a packet to a track costs, in measurements solved for.
-_HANDING = 4
-
-
-class SortedPacket(NamedTuple):
-    """A packet's steps and measurements, those of each track together and in order of time.
-
-    Attributes:
-        looks: (L,) steps that the table has rows at.
-        confirmed: (L',) whether the track was confirmed, in all steps.
-        updates: (M,) measurements.
-    """
-
-    looks: Looks
-    confirmed: BoolArray
-    updates: RecordArray
-
-
-class Share(NamedTuple):
-    """What a packet holds of one track; cut out of it only when its turn comes.
-
-    Attributes:
-        packet: the packet.
-        looks: its part of `packet.looks`.
-        steps: its part of `packet.confirmed`.
-        updates: its part of `packet.updates`.
-        last: whether the track ended in the packet.
-    """
-
-    packet: SortedPacket
-    looks: slice
-    steps: slice
-    updates: slice
-    last: bool
-
-    @property
-    def taken(self) -> int:
-        """How many measurements it holds."""
-        return int(self.updates.stop - self.updates.start)
-
-    @property
-    def oldest(self) -> float:
-        """Time of its first row (s), or infinity."""
-        part = self.looks
-        return float(self.packet.looks.t[part.start]) if part.stop > part.start else np.inf
-
-    def give_to(self, history: TrackHistory) -> None:
-        """Hand it to the track's history."""
-        history.watch(self.packet.looks.take(self.looks), bool(self.packet.confirmed[self.steps].any()))
-        if self.taken:
-            history.take(self.packet.updates[self.updates])
 
 
 class TrackSmoothers:
@@ -128,8 +72,7 @@ class TrackSmoothers:
             return
         if self._stitch:
             self._scan_t.append(packet.t[packet.wanted])
-        ended = set(packet.ended)
-        for track_id, share in self._split(packet, ended):
+        for track_id, share in split(packet, self._rate_hz):
             if track_id not in self._histories:
                 history = TrackHistory(track_id, self._config, self._errors, keep=self._stitch)
                 self._histories[track_id] = history
@@ -142,19 +85,23 @@ class TrackSmoothers:
     def backlog(self) -> int:
         """What the shares that wait will cost, in measurements to be solved for."""
         return sum(
-            _HANDING * len(shares) + self._histories[track_id].to_solve(sum(share.taken for share in shares))
+            HANDING * len(shares)
+            + cost_of_solving(self._histories[track_id].to_solve(sum(share.measured for share in shares)))
             for track_id, shares in self._shares.items()
         )
 
-    def work(self, most: int | None = None) -> None:
+    def work(self, most: float = np.inf) -> int:
         """Work on shares of about so much cost (`backlog`), on all if not given.
 
         Each track's shares are worked on one by one and in their order, so that it does not matter when.
+
+        Returns:
+            What it cost; the last share worked on may have made it more than `most`.
         """
-        while self._to_do and (most is None or most > 0):
-            track_id = self._to_do.popleft()
-            cost = self._work_on(track_id)
-            most = None if most is None else most - cost
+        spent = 0
+        while self._to_do and spent < most:
+            spent += self._work_on(self._to_do.popleft())
+        return spent
 
     def _work_on(self, track_id: int) -> int:
         """Work on the oldest share of a track: its smoother takes it in, and what is final is collected.
@@ -166,29 +113,41 @@ class TrackSmoothers:
         share = shares.popleft()
         if not shares:
             del self._shares[track_id]
-        cost = _HANDING + history.to_solve(share.taken)
         share.give_to(history)
+        to_solve = history.to_solve()
         if share.last:
             del self._histories[track_id]
             if self._stitch and history.confirmed:
                 self._done.append(history)
             else:
                 self._end(history)
-        elif not self._whole:
+        elif to_solve and not self._whole:
             history.feed()
             self._collect(history.departed())
-        return cost
+        return HANDING + cost_of_solving(to_solve)
 
     def drain(self) -> Trajectories:
         """Return, and forget, the final rows that no later ones can precede, by time and identity."""
-        waiting = [share.oldest for shares in self._shares.values() for share in shares]
-        oldest = [history.oldest for history in (*self._histories.values(), *self._done)]
-        horizon = min(oldest + waiting, default=np.inf)
-        table = self._gathered([])
+        horizon = min(self._without_rows(), default=np.inf)
+        table = self._joined(self._ready.drain())
         early = table.t < horizon
-        self._ready.take()
         self._ready.append(table.take(~early))
-        return table.take(early)
+        rows = np.flatnonzero(early)
+        return table.take(rows[np.lexsort((table.track_id[rows], table.t[rows]))])
+
+    def _without_rows(self) -> Iterator[float]:
+        """The time of the first step without a row of each track that has such (s)."""
+        for history in self._done:
+            yield history.oldest
+        for track_id, history in self._histories.items():
+            oldest = history.oldest
+            if oldest < np.inf:
+                yield oldest
+                continue
+            for share in self._shares.get(track_id, ()):
+                if share.oldest < np.inf:
+                    yield share.oldest
+                    break
 
     def smoothed(self) -> Trajectories:
         """Return all rows not drained yet: final ones and, of living tracks, those that may still change."""
@@ -216,7 +175,7 @@ class TrackSmoothers:
         for history in histories:
             self._end(history)
         table = self._gathered([])
-        self._ready.take()
+        self._ready.drain()
         return table
 
     def confirmed_histories(self) -> list[TrackHistory]:
@@ -242,30 +201,11 @@ class TrackSmoothers:
 
     def _gathered(self, more: list[Trajectories]) -> Trajectories:
         """All rows that are ready, and more, in order of time and identity."""
-        parts = self._ready.peek() + more
-        if not parts:
-            return Trajectories.empty(self._config.sensor_names)
-        table = Trajectories.concatenate(parts)
+        table = self._joined(self._ready.peek() + more)
         return table.take(np.lexsort((table.track_id, table.t)))
 
-    def _split(self, packet: Packet, ended: set[int]) -> Iterator[tuple[int, Share]]:
-        """The share of each track in a packet, by identity."""
-        order = np.argsort(packet.ids, kind="stable")
-        rows = order if self._rate_hz <= 0.0 else order[np.repeat(packet.wanted, packet.counts)[order]]
-        looks = Looks(
-            np.repeat(packet.t, packet.counts)[rows],
-            packet.existence[rows],
-            packet.used[rows],
-            packet.held[rows],
-        )
-        updates = packet.updates[np.argsort(packet.updates["track_id"], kind="stable")]
-        whole = SortedPacket(looks, packet.confirmed[order], updates)
-        # A track that ended between two packets has no step in this one.
-        ids = np.union1d(packet.ids, np.array(packet.ended, dtype=np.int64))
-        owners = packet.ids[rows], packet.ids[order], updates["track_id"]
-        parts = [
-            zip(*(np.searchsorted(o, ids, side).tolist() for side in _SIDES), strict=True) for o in owners
-        ]
-        for track_id, looked, stepped, updated in zip(ids.tolist(), *parts, strict=True):
-            bounds = slice(*looked), slice(*stepped), slice(*updated)
-            yield track_id, Share(whole, *bounds, track_id in ended)
+    def _joined(self, parts: list[Trajectories]) -> Trajectories:
+        """One table of many."""
+        if len(parts) == 1:
+            return parts[0]
+        return Trajectories.concatenate([Trajectories.empty(self._config.sensor_names), *parts])

@@ -18,11 +18,11 @@ class ErrorStates(NamedTuple):
 
     Attributes:
         of_sensor: (S,) the sensor's error state, or -1.
-        memory: (B,) correlation time of each (s).
+        correlation_time: (B,) correlation time of each (s).
     """
 
     of_sensor: IntArray
-    memory: FloatArray
+    correlation_time: FloatArray
 
     @staticmethod
     def of(config: Config) -> ErrorStates:
@@ -33,10 +33,10 @@ class ErrorStates(NamedTuple):
 
 def prior_of(birth: np.void, errors: ErrorStates) -> Prior:
     """Return the prior of a track's state, as the filter began with it, from the record of its birth."""
-    size = MOTION + len(errors.memory)
+    size = MOTION + len(errors.correlation_time)
     prior = Prior(float(birth["t"]), np.empty((2, size)), np.empty((2, size, size)))
     spread = birth["velocity_var"], birth["acceleration_var"]
-    noise = birth["r"], birth["lever"], birth["error"]
+    noise = birth["r"], birth["coloured_std"], birth["error"]
     write_prior(birth["z"], *noise, *spread, prior.mean, prior.cov)
     return prior
 
@@ -50,4 +50,4 @@ def size_prior_of(birth: np.void) -> Prior:
 
 def track_data(rows: RecordArray, errors: ErrorStates) -> TrackData:
     """Prior and measurements of a whole track from its records (M,), the birth first."""
-    return TrackData.from_measurements(prior_of(rows[0], errors), rows[1:], errors.memory)
+    return TrackData.from_measurements(prior_of(rows[0], errors), rows[1:], errors.correlation_time)

@@ -1,4 +1,4 @@
-"""Taking down what a tracker does, some steps at a time, for those who work behind it."""
+"""Records the steps of a tracker and hands them to the smoothers in packets of some steps."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Packet(NamedTuple):
 
 
 class StepRecorder:
-    """Takes down each step of a tracker at the least cost, and hands out packets of steps.
+    """Copies what the smoothers need of each step of a tracker, and hands out packets of steps.
 
     A packet is full after so many steps as a smoother takes measurements at once, or when a confirmed track
     has ended, so that its smoother is freed at once. When that is depends on the steps alone.
@@ -58,26 +58,26 @@ class StepRecorder:
         self._confirmed: BoolArray = np.zeros(0, dtype=np.bool_)
         self._ended: list[int] = []
         self._updates: list[RecordArray] = []
-        self._looks: list[tuple[StepRecord, bool]] = []
+        self._recorded: list[tuple[StepRecord, bool]] = []
 
     def record(self, step: StepRecord) -> bool:
-        """Take down one step; whether the packet is full then."""
+        """Record one step; whether the packet is full then."""
         if len(step.updates):
             self._updates.append(step.updates)
-        self._looks.append((step, self._row_wanted(step.t)))
+        self._recorded.append((step, self._row_wanted(step.t)))
         over = False
         if len(step.ids) - step.births != len(self._ids):
             gone = ~np.isin(self._ids, step.ids)
             self._ended.extend(self._ids[gone].tolist())
             over = bool(self._confirmed[gone].any())
         self._ids, self._confirmed = step.ids, step.confirmed
-        return over or len(self._looks) >= self._steps
+        return over or len(self._recorded) >= self._steps
 
-    def take(self) -> Packet | None:
-        """Return the steps taken down since the last call, or None if there are none."""
-        if not self._looks:
+    def drain(self) -> Packet | None:
+        """Return, and forget, the steps recorded since the last call; None if there are none."""
+        if not self._recorded:
             return None
-        steps, wanted = zip(*self._looks, strict=True)
+        steps, wanted = zip(*self._recorded, strict=True)
         packet = Packet(
             np.array([step.t for step in steps]),
             np.array(wanted, dtype=np.bool_),
@@ -90,7 +90,7 @@ class StepRecorder:
             np.concatenate([np.zeros(0, dtype=MEASUREMENT), *self._updates]),
             self._ended,
         )
-        self._looks, self._updates, self._ended = [], [], []
+        self._recorded, self._updates, self._ended = [], [], []
         return packet
 
     def _row_wanted(self, t: float) -> bool:

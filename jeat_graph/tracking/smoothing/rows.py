@@ -11,18 +11,18 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.smoothers.interpolation import interpolate
 from jeat_graph.smoothers.size import SmoothedSize
 from jeat_graph.smoothers.track_data import COINCIDENT_S, SmoothedTrack
-from jeat_graph.tracking.smoothing.looks import Looks
+from jeat_graph.tracking.smoothing.observation_times import ObservationTimes
 
 
 def rows_of(
     track_id: int,
     path: SmoothedTrack,
     sizes: SmoothedSize,
-    looks: Looks,
+    observed: ObservationTimes,
     existence: FloatArray,
     config: Config,
 ) -> Trajectories:
-    """Make the rows of one track, one at each of `looks`.
+    """Make the rows of one track, one at each of `observed`.
 
     Between its states the track follows the motion model's own interpolation; after the last one it is held
     in place (only standing tracks have rows there). Boxes are clipped to the picture, and rows with too
@@ -32,14 +32,14 @@ def rows_of(
         track_id: identity.
         path: smoothed states, at least one, none later than those needed.
         sizes: smoothed sizes.
-        looks: (K,) times of the rows and the sensors used.
+        observed: (K,) times of the rows and the sensors used.
         existence: (K,) probability that the track is a vehicle.
         config: picture, output and sensors.
     """
-    t = np.minimum(looks.t, path.t[-1])
+    t = np.minimum(observed.t, path.t[-1])
     mean, cov = interpolate(path, t)
     # Within a microsecond of the last state a detection shares it: the track is seen there, not held.
-    held = looks.t - path.t[-1] > COINCIDENT_S
+    held = observed.t - path.t[-1] > COINCIDENT_S
     mean[held, :, 1:] = 0.0
     size = sizes.at(np.minimum(t, sizes.t[-1]))
     boxes, visible = _boxes(mean, size, config.image.width, config.image.height, config.output.clip)
@@ -50,13 +50,13 @@ def rows_of(
             keep = slice(None)
     var = np.diagonal(cov, axis1=2, axis2=3)
     return Trajectories(
-        t=looks.t[keep],
+        t=observed.t[keep],
         track_id=np.full(len(t), track_id, dtype=np.int64)[keep],
         boxes=boxes[keep],
         existence=existence[keep],
         mean=mean.transpose(0, 2, 1).reshape(-1, 6)[keep],
         var=var.transpose(0, 2, 1).reshape(-1, 6)[keep],
-        used=looks.used[keep],
+        used=observed.used[keep],
         sensors=config.sensor_names,
     )
 

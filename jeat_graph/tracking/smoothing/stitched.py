@@ -14,7 +14,7 @@ from jeat_graph.smoothers.rts import smooth_ends
 from jeat_graph.smoothers.size import SmoothedSize
 from jeat_graph.smoothers.track_data import TrackData
 from jeat_graph.tracking.smoothing.history import TrackHistory
-from jeat_graph.tracking.smoothing.looks import Looks
+from jeat_graph.tracking.smoothing.observation_times import ObservationTimes
 from jeat_graph.tracking.smoothing.priors import ErrorStates, size_prior_of, track_data
 from jeat_graph.tracking.smoothing.sizes import SizeWindow
 
@@ -87,7 +87,7 @@ def fragment_ends(histories: Sequence[TrackHistory], config: Config) -> Fragment
 
 def _typical_jerk(track: TrackData) -> float:
     """Root spectral density of the jerk while the track is not seen: that of its last steps."""
-    return float(np.median(track.q[1:][-20:])) if len(track) > 1 else 1.0
+    return float(np.median(track.jerk[1:][-20:])) if len(track) > 1 else 1.0
 
 
 def _smooth_sizes(rows: RecordArray, density: float) -> SmoothedSize:
@@ -114,21 +114,21 @@ def _birth_log_density(wholes: Sequence[RecordArray], mean: FloatArray, config: 
 def _join(parts: Sequence[TrackHistory], scan_t: FloatArray, config: Config) -> TrackHistory:
     """One history of several in order of time, with rows at all steps in between."""
     whole = TrackHistory(parts[0].track_id, config, ErrorStates.of(config), keep=True)
-    looks: list[Looks] = []
+    observed: list[ObservationTimes] = []
     births = [float(part.measurements[0]["t"][0]) for part in parts]
     for k, part in enumerate(parts):
         for rows in part.measurements:
-            whole.take(rows)
-        mine = part.looks
+            whole.add_measurements(rows)
+        mine = part.observed
         if k + 1 < len(parts):
             # The earlier fragment may still have coasted when the later one was born.
-            mine = mine.take(mine.t < births[k + 1])
+            mine = mine.select(mine.t < births[k + 1])
             # At a low output rate a fragment may have lived between two rows.
             since = mine.t[-1] if len(mine) else births[k]
             low = int(np.searchsorted(scan_t, since, side="right"))
             high = int(np.searchsorted(scan_t, births[k + 1], side="left"))
-            looks += [mine, Looks.unseen(scan_t[low:high])]
+            observed += [mine, ObservationTimes.unseen(scan_t[low:high])]
         else:
-            looks.append(mine)
-    whole.watch(Looks.concatenate(looks), True)
+            observed.append(mine)
+    whole.add_steps(ObservationTimes.concatenate(observed), True)
     return whole

@@ -5,18 +5,22 @@ from __future__ import annotations
 import tempfile
 import warnings
 from dataclasses import fields
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jeat_graph.data.trajectories import Trajectories
 
 #: Rows beyond this many go to the file; about 20 MB.
 MOST_IN_MEMORY = 100_000
 
+# Rows that there is room for at first.
+_ROOM = 1024
+
 
 class WaitingRows:
-    """Trajectory rows in the order in which they came, held until they are taken.
+    """Trajectory rows in the order in which they came, held until they are fetched.
 
     A live caller that never fetches its smoothed rows must not fill the memory with them, and one that
     fetches them at the end must get them all. So what is over the bound is put aside in an unnamed file,
@@ -30,32 +34,43 @@ class WaitingRows:
     def __init__(self, sensors: tuple[str, ...], most_in_memory: int = MOST_IN_MEMORY) -> None:
         self._sensors = sensors
         self._most = most_in_memory
-        self._parts: list[Trajectories] = []
+        self._columns = _allocate(_ROOM)
         self._count = 0
         self._file: IO[bytes] | None = None
         self._blocks = 0
 
     def append(self, table: Trajectories) -> None:
         """Add the rows of a table of the same sensors."""
-        if not len(table):
-            return
-        self._parts.append(table)
-        self._count += len(table)
+        start, self._count = self._count, self._count + len(table)
+        # Copied at once, while they are in the processor's cache, into arrays with room for more.
+        if self._count > len(self._columns["t"]):
+            old, self._columns = self._columns, _allocate(2 * self._count)
+            for name, column in old.items():
+                self._columns[name][:start] = column[:start]
+        for name, column in self._columns.items():
+            column[start : self._count] = getattr(table, name)
         if self._count > self._most:
             self._put_aside()
 
     def peek(self) -> list[Trajectories]:
-        """Return all tables, in order, and keep them."""
-        return [*self._read_back(), *self._parts]
+        """Return all rows, in order, and keep them."""
+        return [*self._read_back(), *([self._in_memory()] if self._count else [])]
 
-    def take(self) -> list[Trajectories]:
-        """Return all tables, in order, and forget them."""
+    def drain(self) -> list[Trajectories]:
+        """Return all rows, in order, and forget them."""
         tables = self.peek()
-        self._parts, self._count, self._blocks = [], 0, 0
+        if self._count:
+            self._columns, self._count = _allocate(len(self._columns["t"])), 0
+        self._blocks = 0
         if self._file is not None:
             self._file.close()
             self._file = None
         return tables
+
+    def _in_memory(self) -> Trajectories:
+        """The rows in memory, as views."""
+        columns = {name: column[: self._count] for name, column in self._columns.items()}
+        return Trajectories(**columns, sensors=self._sensors)
 
     def _put_aside(self) -> None:
         if self._file is None:
@@ -64,13 +79,12 @@ class WaitingRows:
                 "then, or set smoother.engine to none",
                 stacklevel=2,
             )
-            self._file = tempfile.TemporaryFile()  # noqa: SIM115 (open until the rows are taken)
+            self._file = tempfile.TemporaryFile()  # noqa: SIM115 (open until the rows are fetched)
         self._file.seek(0, 2)
-        block = Trajectories.concatenate(self._parts)
-        for name in _COLUMNS:
-            np.save(self._file, getattr(block, name), allow_pickle=False)
+        for column in self._columns.values():
+            np.save(self._file, column[: self._count], allow_pickle=False)
         self._blocks += 1
-        self._parts, self._count = [], 0
+        self._columns, self._count = _allocate(_ROOM), 0
 
     def _read_back(self) -> list[Trajectories]:
         if self._file is None:
@@ -78,10 +92,15 @@ class WaitingRows:
         self._file.seek(0)
         return [
             Trajectories(
-                **{name: np.load(self._file, allow_pickle=False) for name in _COLUMNS}, sensors=self._sensors
+                **{name: np.load(self._file, allow_pickle=False) for name in self._columns},
+                sensors=self._sensors,
             )
             for _ in range(self._blocks)
         ]
 
 
-_COLUMNS = tuple(f.name for f in fields(Trajectories) if f.name != "sensors")
+def _allocate(rows: int) -> dict[str, NDArray[Any]]:
+    """Columns of a table with room for so many rows."""
+    empty = Trajectories.empty()
+    columns = {f.name: getattr(empty, f.name) for f in fields(Trajectories) if f.name != "sensors"}
+    return {name: np.empty((rows, *none.shape[1:]), none.dtype) for name, none in columns.items()}

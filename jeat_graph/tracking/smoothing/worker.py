@@ -1,8 +1,8 @@
 """Smoothing in a process of its own, so that a step of the tracker never waits for a solve.
 
-The tracker's process only takes down its steps and sends them by packets; the worker makes of them just what
-`SmoothingHere` would. What waits between them is bounded: a worker that falls behind by more than that makes
-the tracker wait, since steps must not pile up without end.
+The tracker's process only records its steps and sends them in packets; the worker makes of them just what
+`InProcessSmoothing` would. What waits between them is bounded: a worker that falls behind by more than that
+makes the tracker wait, since steps must not pile up without end.
 """
 
 from __future__ import annotations
@@ -106,15 +106,15 @@ class SmoothingWorker:
         self._failure = None
 
     def record(self, step: StepRecord) -> None:
-        """Take down one step, and send a packet when it is full."""
+        """Record one step, and send a packet when it is full."""
         if self._recorder.record(step):
-            self._send("consume", self._recorder.take())
+            self._send("consume", self._recorder.drain())
             self._receive()
 
     def drain(self) -> Trajectories:
         """Return, and forget, the final rows that have come back so far, in order of time over all calls."""
         self._receive()
-        return Trajectories.concatenate([Trajectories.empty(self._sensors), *self._rows.take()])
+        return Trajectories.concatenate([Trajectories.empty(self._sensors), *self._rows.drain()])
 
     def smoothed(self) -> Trajectories:
         """Return all rows not drained yet, those too that may still change; waits for the worker."""
@@ -131,7 +131,7 @@ class SmoothingWorker:
         self._ended = True
         self._process.join()
         self._stop()
-        return Trajectories.concatenate([*self._rows.take(), last])
+        return Trajectories.concatenate([*self._rows.drain(), last])
 
     def counts(self) -> dict[str, int]:
         """How the smoothers fared, as far as the worker has told."""
@@ -166,7 +166,7 @@ class SmoothingWorker:
     def _ask(self, order: str) -> Trajectories:
         """Send all steps and a question, and wait for its answer, taking in the rows that come before it."""
         self._asked += 1
-        self._send("consume", self._recorder.take())
+        self._send("consume", self._recorder.drain())
         self._send(order, self._asked)
         while True:
             self._answers.poll(None)

@@ -196,7 +196,7 @@ def test_memory_does_not_grow_with_the_length_of_a_drained_run():
         if k % 240 == 239:
             tracker.drain_smoothed()
             history = tracker._smoothers._smoothers._histories[1]
-            waiting.append(len(history.looks) + sum(len(m) for m in history.measurements))
+            waiting.append(len(history.observed) + sum(len(m) for m in history.measurements))
     assert max(waiting[2:]) <= 1.3 * waiting[1]
 
 

@@ -34,12 +34,12 @@ def test_rows_beyond_the_bound_come_back_in_order() -> None:
     for k in range(3, 12):
         waiting.append(table(4 * k, 4))
     kept = Trajectories.concatenate(waiting.peek())
-    taken = Trajectories.concatenate(waiting.take())
+    taken = Trajectories.concatenate(waiting.drain())
     for rows in (kept, taken):
         np.testing.assert_array_equal(rows.t, np.arange(48))
         np.testing.assert_array_equal(rows.boxes, np.outer(np.arange(48.0), [1, 2, 3, 4]))
         assert rows.sensors == ("rgb",)
-    assert waiting.take() == []
+    assert waiting.drain() == []
 
 
 def test_few_rows_stay_in_memory_without_a_word() -> None:
@@ -48,4 +48,4 @@ def test_few_rows_stay_in_memory_without_a_word() -> None:
         warnings.simplefilter("error")
         waiting.append(table(0, 10))
     assert waiting._file is None
-    assert len(waiting.take()[0]) == 10
+    assert len(waiting.drain()[0]) == 10

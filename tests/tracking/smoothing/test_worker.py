@@ -16,7 +16,7 @@ import pytest
 from jeat_graph import load_config
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.tracking.smoothing.behind import SmoothingHere
+from jeat_graph.tracking.smoothing.behind import InProcessSmoothing
 from jeat_graph.tracking.smoothing.recorder import StepRecorder
 from jeat_graph.tracking.smoothing.worker import SmoothingWorker, _portable
 from jeat_graph.tracking.step_record import record_step
@@ -176,7 +176,7 @@ def test_an_answer_that_nobody_waited_for_is_not_taken_for_the_next():
         next(steps)
     worker = tracker._smoothers
     worker._asked += 1
-    worker._send("consume", worker._recorder.take())
+    worker._send("consume", worker._recorder.drain())
     worker._send("smoothed", worker._asked)
     here.smoothed()
     for _ in range(100):
@@ -245,7 +245,7 @@ def test_the_work_of_a_packet_is_spread_over_the_steps_that_follow():
     cars = [(0.0, 9.0, {"start": (100.0 + 90.0 * k, 100.0 + 40.0 * k)}) for k in range(8)]
     tracker = make_tracker("smoother.chunk=48")
     behind = tracker._smoothers
-    assert isinstance(behind, SmoothingHere)
+    assert isinstance(behind, InProcessSmoothing)
     backlog = []
     for _ in tracker.run(recording(duration=2.0, cars=cars)):
         backlog.append(behind._smoothers.backlog)
@@ -266,12 +266,12 @@ def test_packets_depend_on_the_steps_alone():
     for table in tracker.run(recording(duration=0.5)):
         state = (tracker._tracks, tracker.num_tracks, 0, tracker._log, table.track_id)
         if recorder.record(record_step(tracker.time, *state)):
-            packet = recorder.take()
+            packet = recorder.drain()
             sizes.append(len(packet.t))
             assert packet.counts.sum() == len(packet.ids)
     assert sizes == [5] * len(sizes)
     assert len(sizes) == 10
-    assert recorder.take() is None
+    assert recorder.drain() is None
 
 
 def test_a_track_that_ends_does_not_hurry_the_work_on_the_others():

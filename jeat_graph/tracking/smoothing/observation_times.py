@@ -1,4 +1,4 @@
-"""The times at which the sensors looked while a track was alive: the rows of the smoothed table."""
+"""The times at which the sensors looked while a track was alive: those of its rows in the smoothed table."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
-class Looks:
+class ObservationTimes:
     """What the tracker held of one track at each step of its life.
 
     Attributes:
@@ -30,30 +30,32 @@ class Looks:
     def __len__(self) -> int:
         return len(self.t)
 
-    def take(self, rows: slice | npt.NDArray[np.intp] | BoolArray) -> Looks:
+    def select(self, rows: slice | npt.NDArray[np.intp] | BoolArray) -> ObservationTimes:
         """Return some of the steps."""
-        return Looks(self.t[rows], self.existence[rows], self.used[rows], self.held[rows])
+        return ObservationTimes(self.t[rows], self.existence[rows], self.used[rows], self.held[rows])
 
     @staticmethod
-    def empty() -> Looks:
-        """Return looks without steps."""
+    def empty() -> ObservationTimes:
+        """Return none."""
         none = np.zeros(0)
-        return Looks(none, none, np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.bool_))
+        return ObservationTimes(none, none, np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.bool_))
 
     @staticmethod
-    def unseen(t: FloatArray) -> Looks:
-        """Return looks at times `t` (K,) between two fragments of one vehicle."""
+    def unseen(t: FloatArray) -> ObservationTimes:
+        """Return times `t` (K,) between two fragments of one vehicle."""
         count = len(t)
-        return Looks(t, np.zeros(count), np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.bool_))
+        return ObservationTimes(
+            t, np.zeros(count), np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.bool_)
+        )
 
     @staticmethod
-    def concatenate(parts: Sequence[Looks]) -> Looks:
+    def concatenate(parts: Sequence[ObservationTimes]) -> ObservationTimes:
         """Join consecutive stretches."""
         if len(parts) == 1:
             return parts[0]
         if not parts:
-            return Looks.empty()
-        return Looks(
+            return ObservationTimes.empty()
+        return ObservationTimes(
             np.concatenate([part.t for part in parts]),
             np.concatenate([part.existence for part in parts]),
             np.concatenate([part.used for part in parts]),
