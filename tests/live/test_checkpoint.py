@@ -143,4 +143,5 @@ def test_a_checkpoint_of_twenty_vehicles_is_small_and_costs_little(tmp_path, ful
     with capsys.disabled():
         if full:
             print(f"\n{size / 1e6:.2f} MB, {1e3 * float(np.median(took)):.1f} ms")
-    assert size <= 1_000_000
+    # Besides the windows up to a packet of steps that waits for the smoothers.
+    assert size <= 1_200_000

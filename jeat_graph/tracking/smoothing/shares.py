@@ -15,7 +15,7 @@ from jeat_graph.tracking.smoothing.recorder import Packet
 _SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
 
 #: In measurements to be solved for: what a solve costs besides these, and handing a share to a track.
-_SOLVING, HANDING = 60, 1
+SOLVING, HANDING = 60, 1
 
 
 class SortedPacket(NamedTuple):
@@ -72,12 +72,12 @@ class Share(NamedTuple):
 def packet_cost(packet: Packet, chunk: int) -> int:
     """About what a packet will cost in all, in measurements to be solved for, by chunks of so many."""
     solves = len(packet.updates) / chunk
-    return int(HANDING * packet.counts.max(initial=0) + _SOLVING * solves) + len(packet.updates)
+    return int(HANDING * packet.counts.max(initial=0) + SOLVING * solves) + len(packet.updates)
 
 
 def cost_of_solving(to_solve: int) -> int:
     """What it costs to solve for so many measurements."""
-    return _SOLVING + to_solve if to_solve else 0
+    return SOLVING + to_solve if to_solve else 0
 
 
 def split(packet: Packet, rate_hz: float) -> Iterator[tuple[int, Share]]:

@@ -18,6 +18,7 @@ from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.smoothing.behind import InProcessSmoothing
 from jeat_graph.tracking.smoothing.recorder import StepRecorder
+from jeat_graph.tracking.smoothing.shares import HANDING, SOLVING
 from jeat_graph.tracking.smoothing.worker import SmoothingWorker, _portable
 from jeat_graph.tracking.step_record import record_step
 
@@ -240,23 +241,31 @@ def test_the_histories_are_not_here():
     tracker.finish()
 
 
+#: What one track costs at most: a solve, two chunks of measurements, and the handing over of a share.
+ONE_TRACK = SOLVING + 2 * 48 + HANDING
+
+
 def test_the_work_of_a_packet_is_spread_over_the_steps_that_follow():
-    """No step solves for more than its share of the measurements, and one track's chunk at most beyond it."""
+    """Steps do no more than their shares, and one track's solve at most beyond that in all."""
     cars = [(0.0, 9.0, {"start": (100.0 + 90.0 * k, 100.0 + 40.0 * k)}) for k in range(8)]
     tracker = make_tracker("smoother.chunk=48")
     behind = tracker._smoothers
     assert isinstance(behind, InProcessSmoothing)
-    backlog = []
+    backlog, shares = [], []
     for _ in tracker.run(recording(duration=2.0, cars=cars)):
         backlog.append(behind._smoothers.backlog)
+        shares.append(behind._share)
     after = np.array(backlog)
     peaks = np.flatnonzero(np.diff(after) > 0) + 1
     assert len(peaks) >= 3
     for peak in peaks[:-1]:
-        share = -(-after[peak] // 96)
-        assert np.all(np.diff(after[peak : peak + 47]) >= -(share + 2 * 48))
+        # All that comes in with a packet is a solve for each of the eight, at most.
+        assert shares[peak] * 48 <= 8 * ONE_TRACK
+        done = after[peak] - after[peak : peak + 47]
+        assert np.all(done <= np.arange(47) * shares[peak] + ONE_TRACK)
+        assert done[-1] > 0
     # What waits is bounded: two packets of all tracks and what is on its way to the next.
-    assert after.max() <= 3 * 48 * 2 * len(cars)
+    assert after.max() <= 3 * len(cars) * ONE_TRACK
 
 
 def test_packets_depend_on_the_steps_alone():
@@ -284,7 +293,7 @@ def test_a_track_that_ends_does_not_hurry_the_work_on_the_others():
         waiting.append(tracker._smoothers._smoothers.backlog)
         ended.append(tracker.smoother_counts["tracks"])
     steps = np.diff(waiting)
-    # A chunk or two of one track are done in a step, though ten tracks wait for theirs.
+    # One track or two are solved for in a step, though ten wait for it.
     assert ended[-1] == 1
-    assert steps.min() >= -3 * 48
+    assert steps.min() >= -2 * ONE_TRACK
     assert max(waiting) > 8 * 48
