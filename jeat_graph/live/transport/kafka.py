@@ -80,7 +80,7 @@ class KafkaSource:
         """
         end = time.monotonic() + timeout_s
         while True:
-            message = self._consumer.poll(max(end - time.monotonic(), 0.0))
+            message: Any = self._consumer.poll(max(end - time.monotonic(), 0.0))
             if message is None:
                 return None
             error = message.error()

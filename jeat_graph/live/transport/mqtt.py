@@ -9,6 +9,7 @@ import time
 from typing import Any
 
 from paho.mqtt import client as paho
+from paho.mqtt.enums import CallbackAPIVersion
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 
@@ -23,7 +24,11 @@ _CONNECT_S = 10.0
 _QOS = 1
 
 
-def _connect(address: Address, client: Any, properties: Properties) -> None:
+#: paho declares no types for it.
+_properties: Any = Properties
+
+
+def _connect(address: Address, client: Any, properties: Any) -> None:
     """Connect, and keep the connection up from a thread of the client's own.
 
     Raises:
@@ -62,7 +67,7 @@ def _send_at_once(client: Any, data: Any, connection: Any) -> None:
 
 def _client(name: str, manual_ack: bool) -> Any:
     return paho.Client(
-        paho.CallbackAPIVersion.VERSION2, client_id=name, protocol=paho.MQTTv5, manual_ack=manual_ack
+        CallbackAPIVersion.VERSION2, client_id=name, protocol=paho.MQTTv5, manual_ack=manual_ack
     )
 
 
@@ -94,7 +99,7 @@ class MqttSource:
         self._client.on_disconnect = self._on_disconnect
         self._client.on_message = self._on_message
         self._client.on_subscribe = lambda *_: self._settled.set()
-        properties = Properties(PacketTypes.CONNECT)
+        properties = _properties(PacketTypes.CONNECT)
         properties.SessionExpiryInterval = SESSION_S
         properties.ReceiveMaximum = self.most_open
         _connect(address, self._client, properties)
@@ -157,7 +162,7 @@ class MqttSink:
         self._refused = ""
         self._client = _client(address.option("client", ""), manual_ack=False)
         self._client.on_publish = self._on_publish
-        _connect(address, self._client, Properties(PacketTypes.CONNECT))
+        _connect(address, self._client, _properties(PacketTypes.CONNECT))
 
     def _on_publish(self, client: Any, data: Any, number: int, reason: Any, properties: Any) -> None:
         with self._change:
