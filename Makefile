@@ -4,6 +4,7 @@
 #   make test    run all tests, those of time and memory by themselves
 #   make test-portable   run the numerical tests with other kernels, in random order (SEED=... repeats one)
 #   make licences   list the licences of everything installed with the package
+#   make fuzz    the long form of the tests that damage files, streams and processes (an hour)
 #   make live    the long form of the tests of live use: kills, brokers, late data (half an hour)
 #   make lint    style, format and docstrings
 #   make types   type-check the built package
@@ -28,7 +29,7 @@ OTHER_KERNELS = OPENBLAS_CORETYPE=$(if $(filter x86_64 AMD64,$(shell uname -m)),
 	NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python .ci/kernels.py names)" \
 	NUMBA_CPU_NAME=generic NUMBA_CACHE_DIR=$(CURDIR)/$(VENV)/numba-generic
 
-.PHONY: demo test test-portable licences live lint types bounds build docs clean
+.PHONY: demo test test-portable licences live fuzz lint types bounds build docs clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.compiled
@@ -50,6 +51,9 @@ licences: $(VENV)/.test
 
 live: $(VENV)/.test $(VENV)/.compiled
 	@JEAT_GRAPH_FULL=1 $(BIN)/python -m pytest tests/live
+
+fuzz: $(VENV)/.test $(VENV)/.compiled
+	@JEAT_GRAPH_FULL=1 $(BIN)/python -m pytest -n 2 tests/fuzz
 
 lint: $(VENV)/.lint
 	@$(BIN)/ruff check

@@ -1,0 +1,132 @@
+"""A damaged file of any format is data or one line, and nothing in it is executed."""
+
+from __future__ import annotations
+
+import os
+import pickle
+
+import h5py
+import numpy as np
+import pytest
+
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.errors import DataError
+from jeat_graph.io.detections_io import read_detections, write_detections
+from jeat_graph.io.events_dsec import EventFile
+
+FULL = bool(os.environ.get("JEAT_GRAPH_FULL"))
+MUTATIONS = 5_000 if FULL else 150
+SEED = 7
+
+
+def mutated(data: bytes, rng: np.random.Generator) -> bytes:
+    """Change a few bytes, cut out, double or cut off a stretch."""
+    out = bytearray(data)
+    for _ in range(int(rng.integers(1, 4))):
+        at = int(rng.integers(len(out))) if out else 0
+        stretch = int(rng.integers(1, 64))
+        kind = rng.integers(5)
+        if kind == 0 and out:
+            out[at] ^= 1 << int(rng.integers(8))
+        elif kind == 1:
+            out[at : at + stretch] = rng.bytes(stretch)
+        elif kind == 2:
+            del out[at : at + stretch]
+        elif kind == 3:
+            out[at:at] = out[at : at + stretch]
+        else:
+            del out[at:]
+    return bytes(out)
+
+
+def recording() -> Detections:
+    t = np.repeat(np.arange(8) * 0.05, 2)
+    boxes = np.column_stack([t * 10, t, np.full(16, 30.0), np.full(16, 20.0)])
+    return Detections.from_rows(t, ["rgb"] * 16, boxes, np.full(16, 0.5), classes=["car"] * 16)
+
+
+def csv(path):
+    write_detections(recording(), path)
+
+
+def npy(path):
+    kinds = [
+        ("t", "i8"),
+        *((n, "f4") for n in ("x", "y", "w", "h")),
+        ("class_id", "u1"),
+        ("class_confidence", "f4"),
+    ]
+    np.save(path, np.array([(k * 50_000, 1, 2, 3, 4, 0, 0.5) for k in range(16)], dtype=kinds))
+
+
+def coco(path):
+    entry = '{"image_id": %d, "bbox": [1, 2, 3, 4], "score": 0.5, "category_id": 1}'
+    path.write_text("[" + ",".join(entry % k for k in range(8)) + "]", encoding="utf-8")
+
+
+def mot(path):
+    path.write_text("".join(f"{k},-1,1,2,3,4,0.5,-1,-1,-1\n" for k in range(1, 16)), encoding="utf-8")
+
+
+def kitti(path):
+    line = "%d 1 Car 0 0 -1.5 1 2 30 40 -1 -1 -1 -1000 -1000 -1000 -10 0.5\n"
+    path.write_text("".join(line % k for k in range(15)), encoding="utf-8")
+
+
+WRITERS = {"d.csv": csv, "d.parquet": csv, "d.npy": npy, "d.json": coco, "det.txt": mot, "k.txt": kitti}
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_a_damaged_file_of_boxes_is_read_or_refused_in_one_line(tmp_path, name):
+    rng = np.random.default_rng(SEED)
+    path = tmp_path / name
+    WRITERS[name](path)
+    good = path.read_bytes()
+    assert len(read_detections(path, rate_hz=20.0)) > 0
+    said: list[str] = []
+    for _ in range(MUTATIONS):
+        path.write_bytes(mutated(good, rng))
+        try:
+            found = read_detections(path, rate_hz=20.0)
+        except DataError as error:
+            said.append(str(error))
+        else:
+            assert np.isfinite(found.boxes).all()
+    assert said
+    assert not any("\n" in text for text in said)
+
+
+def test_a_damaged_event_file_is_read_or_refused_in_one_line(tmp_path):
+    rng = np.random.default_rng(SEED)
+    path = tmp_path / "e.h5"
+    with h5py.File(path, "w", libver="earliest") as file:
+        for column, kind in (("x", "u2"), ("y", "u2"), ("p", "u1"), ("t", "u4")):
+            file.create_dataset(
+                f"events/{column}", data=np.arange(500).astype(kind), chunks=(100,), compression=4
+            )
+        file["ms_to_idx"] = np.array([0, 500], dtype=np.uint64)
+        file["t_offset"] = np.int64(0)
+    good = path.read_bytes()
+    said: list[str] = []
+    for _ in range(MUTATIONS):
+        path.write_bytes(mutated(good, rng))
+        try:
+            with EventFile(path) as events:
+                events.rows(0, min(len(events), 1000))
+        except DataError as error:
+            said.append(str(error))
+    assert said
+    assert not any("\n" in text for text in said)
+
+
+def test_a_pickle_in_an_array_is_not_executed(tmp_path):
+    class Touch:
+        def __reduce__(self):
+            return (os.mkdir, (str(tmp_path / "executed"),))
+
+    (tmp_path / "d.npy").write_bytes(pickle.dumps(Touch()))
+    np.save(tmp_path / "o.npy", np.array([Touch()], dtype=object), allow_pickle=True)
+    for name in ("d.npy", "o.npy"):
+        with pytest.raises(DataError):
+            read_detections(tmp_path / name)
+    assert not (tmp_path / "executed").exists()
