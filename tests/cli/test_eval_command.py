@@ -9,7 +9,7 @@ import pytest
 
 from jeat_graph.cli.main import main
 
-from .data import DATA, need
+from ..eval.data import DATA, need
 
 TRUTH = "t,object_id,left,top,width,height,x,y,vx,vy,ax,ay,class\n"
 TABLE = (
