@@ -201,3 +201,25 @@ def test_a_source_that_cannot_begin_leaves_no_folder(tmp_path: Path, rectangles)
     with pytest.raises(DataError, match="no server"):
         record_dataset(Absent, tmp_path / "set", Protocol(1))
     assert not (tmp_path / "set").exists()
+
+
+def test_a_disk_that_fills_up_ends_the_set_in_one_line_and_room_lets_it_go_on(
+    tmp_path: Path, make, monkeypatch
+) -> None:
+    make(tmp_path / "whole", segments=2)
+    real, looks = shutil.disk_usage, []
+
+    def filling(path: Path) -> object:
+        looks.append(path)
+        # Room at the start and for the first frames, then none.
+        return real(path) if len(looks) < 6 else Usage(0, 0, 1000)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(shutil, "disk_usage", filling)
+        with pytest.raises(DataError, match="the disk is full; what is done is kept"):
+            make(tmp_path / "set", segments=2)
+    assert not list((tmp_path / "set").glob("segments/*.partial"))
+    make(tmp_path / "set", segments=2)
+    files = {p.relative_to(tmp_path / "whole") for p in (tmp_path / "whole").rglob("*") if p.is_file()}
+    assert files == {p.relative_to(tmp_path / "set") for p in (tmp_path / "set").rglob("*") if p.is_file()}
+    assert all((tmp_path / "set" / f).read_bytes() == (tmp_path / "whole" / f).read_bytes() for f in files)
