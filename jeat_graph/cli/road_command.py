@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import Any
 
 from jeat_graph.data.errors import DataError
 
@@ -24,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--contact",
         choices=("cuboid", "bottom", "center"),
-        help="what of a vehicle is on the road (center for points)",
+        help="what of a vehicle is on the road (cuboid for boxes, center for points)",
     )
     add(
         "--contact-height",
@@ -38,15 +39,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fit the vehicles and write the tables."""
-    from tqdm import tqdm
+    import numpy as np
 
+    from jeat_graph.io.trajectories_io import read_trajectories
+    from jeat_graph.road.boxes_road import follow_boxes
     from jeat_graph.road.camera_file import read_camera
+    from jeat_graph.road.cuboid_fit import CuboidConfig
     from jeat_graph.road.inputs import RoadMarks, read_marks
     from jeat_graph.road.lanes import LaneConfig
     from jeat_graph.road.motion_fit import MotionFitConfig
     from jeat_graph.road.points_road import follow_points, summarise
     from jeat_graph.road.results import write_result
-    from jeat_graph.road.sources import contact_pixels
+    from jeat_graph.road.sources import contact_pixels, only_points, run_table
     from jeat_graph.road.speeds import ContactConfig
 
     out = Path(args.out)
@@ -54,24 +58,44 @@ def run(args: argparse.Namespace) -> int:
         raise DataError("is a file; --out must be a folder", out)
     camera = read_camera(args.camera)
     marks = RoadMarks({}, {}) if args.lines is None else read_marks(args.lines)
-    points = contact_pixels(args.source, args.contact)
     contact = ContactConfig()
     if args.contact_height is not None:
         contact = ContactConfig(height_m=args.contact_height[0], height_sd_m=args.contact_height[1])
-    with tqdm(total=len(points.tracks()), unit="vehicle", disable=not sys.stderr.isatty()) as bar:
-
-        def advance(done: int, _total: int) -> None:
-            bar.update(done - bar.n)
-
-        vehicles = follow_points(points, camera, MotionFitConfig(), contact, advance)
-    result = summarise(vehicles, camera, marks, contact, LaneConfig())
+    table = run_table(args.source)
+    if args.contact == "cuboid" or (args.contact is None and not only_points(table)):
+        if only_points(table):
+            raise DataError("has points only, no boxes: --contact cuboid needs boxes, use center", table)
+        boxes = read_trajectories(table)
+        total = len(np.unique(boxes.track_id))
+        with _bar(total) as bar:
+            sized = follow_boxes(boxes, camera, CuboidConfig(), progress=lambda done, _: _advance(bar, done))
+        contact = ContactConfig(0.0, 0.0, 0.0)
+        vehicles = [one.vehicle for one in sized]
+    else:
+        points = contact_pixels(args.source, args.contact)
+        total = len(points.tracks())
+        sized = []
+        with _bar(total) as bar:
+            vehicles = follow_points(
+                points, camera, MotionFitConfig(), contact, lambda done, _: _advance(bar, done)
+            )
+    result = summarise(vehicles, camera, marks, contact, LaneConfig(), sized)
     write_result(result, out)
-    left_out = len(points.tracks()) - len(vehicles)
-    if left_out:
+    if total > len(vehicles):
         print(
-            f"jeat-graph road: {left_out} tracks too short, or not on the road, are left out", file=sys.stderr
+            f"jeat-graph road: {total - len(vehicles)} tracks too short, or not on the road, are left out",
+            file=sys.stderr,
         )
-    print(
-        f"{len(vehicles)} vehicles, {len(result.lanes.names)} lanes, {len(result.crossings)} crossings: {out}"
-    )
+    lanes, crossings = len(result.lanes.names), len(result.crossings)
+    print(f"{len(vehicles)} vehicles, {lanes} lanes, {crossings} crossings: {out}")
     return 0
+
+
+def _bar(total: int) -> Any:
+    from tqdm import tqdm
+
+    return tqdm(total=total, unit="vehicle", disable=not sys.stderr.isatty())
+
+
+def _advance(bar: Any, done: int) -> None:
+    bar.update(done - bar.n)

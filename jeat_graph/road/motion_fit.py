@@ -21,6 +21,7 @@ from jeat_graph.road.robust import agreed_weights, kernel
 
 _ROBUST_PASSES = 5
 _STIFF_PASSES = 3
+_ANYWHERE_M = 1e3
 _BELIEVED = 0.25  # weight of a point that is as far off as the kernel is wide
 
 
@@ -80,14 +81,14 @@ class MotionFit(NamedTuple):
 
     def basis(self, t: FloatArray, derivative: int = 0) -> FloatArray:
         """Rows B (..., C) whose product with the coefficients is place, speed or acceleration at t (s)."""
-        return _basis(np.asarray(t, dtype=np.float64) - self.t0, self.knots, derivative)
+        return basis_rows(np.asarray(t, dtype=np.float64) - self.t0, self.knots, derivative)
 
     def at(self, t: FloatArray, derivative: int = 0) -> FloatArray:
         """Place (m), speed (m/s) or acceleration (m/s²), (..., 2), at times t (...)."""
         return np.asarray(self.basis(t, derivative) @ self.coefficients.T, dtype=np.float64)
 
 
-def _basis(s: FloatArray, knots: FloatArray, derivative: int) -> FloatArray:
+def basis_rows(s: FloatArray, knots: FloatArray, derivative: int) -> FloatArray:
     """Constant, linear and quadratic motion, and what a unit step of acceleration at each knot adds."""
     one = np.ones_like(s)
     after = np.maximum(s[..., None] - knots, 0.0)
@@ -98,6 +99,22 @@ def _basis(s: FloatArray, knots: FloatArray, derivative: int) -> FloatArray:
     else:
         parts, steps = [0.0 * one, 0.0 * one, one], np.asarray(s[..., None] > knots, dtype=np.float64)
     return np.concatenate([np.stack(parts, axis=-1), steps], axis=-1)
+
+
+def spaced_knots(s: FloatArray, config: MotionFitConfig) -> FloatArray:
+    """Evenly spaced times (J,) of random jerks between the first and the last of s (s)."""
+    span = float(s[-1] - s[0])
+    count = int(min(max(np.ceil(span / config.knot_s) - 1, 0), config.most_knots))
+    return np.asarray(s[0] + span * np.arange(1, count + 1) / (count + 1), dtype=np.float64)
+
+
+def motion_prior(s: FloatArray, knots: FloatArray, config: MotionFitConfig) -> FloatArray:
+    """Precision (2 C, 2 C) of the coefficients, x before y: across the road everything is calmer."""
+    step = float(s[-1] - s[0]) / (len(knots) + 1)
+    jerks = np.full(len(knots), config.jerk**2 * step)
+    along = np.r_[_ANYWHERE_M**2, config.speed_sd**2, config.acceleration_sd**2, jerks]
+    across = along * np.r_[1.0, np.full(len(along) - 1, config.lateral_factor**2)]
+    return np.diag(1.0 / np.concatenate([across, along]))
 
 
 def error_covariance(t: FloatArray, config: MotionFitConfig, counts: FloatArray) -> FloatArray:
@@ -122,16 +139,10 @@ def fit_motion(
     """
     t0 = float(t.mean())
     s = t - t0
-    span = float(s[-1] - s[0])
-    number_of = int(min(max(np.ceil(span / config.knot_s) - 1, 0), config.most_knots))
-    knots = s[0] + span * np.arange(1, number_of + 1) / (number_of + 1)
-    step = span / (number_of + 1)
-    B = _basis(s, knots, 0)
+    knots = spaced_knots(s, config)
+    B = basis_rows(s, knots, 0)
     n, C = len(t), B.shape[1]
-    # Each axis has its own prior: across the road everything is calmer.
-    own = np.r_[1e6, config.speed_sd**2, config.acceleration_sd**2, np.full(number_of, config.jerk**2 * step)]
-    lateral = own * np.r_[1.0, np.full(C - 1, config.lateral_factor**2)]
-    prior = np.diag(1.0 / np.concatenate([lateral, own]))
+    prior = motion_prior(s, knots, config)
     design = np.zeros((n, 2, 2, C))
     design[:, 0, 0] = design[:, 1, 1] = B
     centre = np.zeros(2 * C)
@@ -145,7 +156,7 @@ def fit_motion(
     size = np.sqrt(np.diag(errors))
     weight = agreed_weights(s, xy, inverse_px / size[:, None, None], config.soft)
     stiff = prior.copy()
-    if number_of:
+    if len(knots):
         # First without the jerks: a motion that can bend would follow a point that leaves the vehicle.
         bends = np.r_[3:C, C + 3 : 2 * C]
         stiff[bends, bends] *= 1e6

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from jeat_graph.road.boxes_road import SizedVehicle
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.crossings import crossing, road_line
 from jeat_graph.road.inputs import PointTable, RoadMarks
@@ -42,6 +43,7 @@ def summarise(
     marks: RoadMarks,
     contact: ContactConfig,
     lane_config: LaneConfig,
+    sized: Sequence[SizedVehicle] = (),
 ) -> RoadResult:
     """Speeds, lanes and crossings of fitted vehicles.
 
@@ -63,8 +65,8 @@ def summarise(
         speeds.append(vehicle.mean_speed(start, end))
     return RoadResult(
         vehicles=vehicles,
-        sizes=[NO_SIZE] * len(vehicles),
-        classes=[""] * len(vehicles),
+        sizes=[one.size for one in sized] if sized else [NO_SIZE] * len(vehicles),
+        classes=[one.kind for one in sized] if sized else [""] * len(vehicles),
         speeds=speeds,
         lane_names=[str(name) for name in lanes.of(middle)] if len(middle) else [],
         lanes=lanes,

@@ -25,13 +25,8 @@ def contact_pixels(source: str | Path, contact: str | None = None) -> PointTable
     Raises:
         DataError: the source cannot be read, or has no boxes where `bottom` needs them.
     """
-    path = Path(source)
-    if path.is_dir():
-        found = next((path / name for name in _RUN_TABLES if (path / name).is_file()), None)
-        if found is None:
-            raise DataError(f"holds no table of a run ({', '.join(_RUN_TABLES)})", path)
-        path = found
-    if _only_points(path):
+    path = run_table(source)
+    if only_points(path):
         if contact not in (None, "center"):
             raise DataError(f"has points only, no boxes: --contact {contact} needs boxes, use center", path)
         return read_points_table(path)
@@ -46,7 +41,7 @@ def contact_pixels(source: str | Path, contact: str | None = None) -> PointTable
     return PointTable(table.t, table.track_id, pixels)
 
 
-def _only_points(path: Path) -> bool:
+def only_points(path: Path) -> bool:
     """Tell whether a table has `x, y` but no boxes, by its header."""
     if path.suffix.lower() in (".parquet", ".pq"):
         from pyarrow import ArrowException, parquet
@@ -60,3 +55,18 @@ def _only_points(path: Path) -> bool:
     head = read_text(path).lstrip()[:4096].splitlines()[0].decode("utf-8", errors="replace")
     names = [name.strip() for name in head.split(",")]
     return "track_id" in names and "x" in names and "left" not in names
+
+
+def run_table(source: str | Path) -> Path:
+    """The table of a run directory, smoothed if there is one; a file is its own table.
+
+    Raises:
+        DataError: a folder without a table of a run.
+    """
+    path = Path(source)
+    if not path.is_dir():
+        return path
+    found = next((path / name for name in _RUN_TABLES if (path / name).is_file()), None)
+    if found is None:
+        raise DataError(f"holds no table of a run ({', '.join(_RUN_TABLES)})", path)
+    return found

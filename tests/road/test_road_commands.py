@@ -167,3 +167,25 @@ def test_real_vehicles_within_their_intervals(tmp_path: Path) -> None:
     assert len(errors) >= 20
     assert np.median(errors) < 0.9
     assert np.mean(held) >= 0.85
+
+
+def test_a_simulated_run_in_metres(tmp_path: Path) -> None:
+    """From detections to speeds with the scenario's exact camera, against the truth on the road."""
+    sim, run, out = tmp_path / "sim", tmp_path / "run", tmp_path / "road"
+    assert main(["simulate", "day-sparse", "--out", str(sim), "--duration", "6", "--seed", "2"]) == 0
+    assert main(["track", str(sim / "detections.csv"), "--out", str(run)]) == 0
+    assert main(["road", str(run), "--camera", str(sim / "camera.yaml"), "--out", str(out)]) == 0
+    truth = _rows(sim / "gt_road.csv")
+    errors = []
+    for row in _rows(out / "road.csv"):
+        x, y, t = float(row["x"]), float(row["y"]), float(row["t"])
+        if 20.0 < y < 90.0:
+            there = [g for g in truth if abs(float(g["t"]) - t) < 1e-6 and abs(float(g["x"]) - x) < 1.5]
+            near = min(there, key=lambda g: abs(float(g["y"]) - y), default=None)
+            if near is not None and abs(float(near["y"]) - y) < 6.0:
+                errors.append([float(near[k]) - float(row[k]) for k in ("x", "y", "speed_kmh")])
+    assert len(errors) > 100
+    across, along, speed = np.median(np.abs(errors), axis=0)
+    assert across < 0.2
+    assert along < 0.6
+    assert speed < 1.5

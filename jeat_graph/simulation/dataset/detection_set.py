@@ -14,8 +14,16 @@ from jeat_graph.io.atomic import open_atomic
 from jeat_graph.io.detections_io import write_detections
 from jeat_graph.io.hashing import sha256_of
 from jeat_graph.io.locking import hold_folder
+from jeat_graph.io.table_writer import round_decimals, write_columns
 from jeat_graph.io.truth_io import write_truth
-from jeat_graph.simulation.dataset.layout import CAMERA, DETECTIONS, MANIFEST, SCENARIO, TRUTH
+from jeat_graph.simulation.dataset.layout import (
+    CAMERA,
+    DETECTIONS,
+    MANIFEST,
+    SCENARIO,
+    TRUTH,
+    TRUTH_ROAD,
+)
 from jeat_graph.simulation.scenario import Scenario, scenario_to_yaml
 from jeat_graph.simulation.simulate import SimulatedRecording, record
 from jeat_graph.version import __version__
@@ -26,7 +34,7 @@ STEPS = 3  # calls of `on_step`
 def write_detection_set(
     scenario: Scenario, name: str, out: Path, seed: int, duration_s: float, on_step: Callable[[], object]
 ) -> dict[str, Any]:
-    """Simulate a recording and write `detections.csv`, `gt.csv`, the settings and the manifest.
+    """Simulate a recording and write detections, truth in the picture and on the road, settings, manifest.
 
     Args:
         scenario: the settings.
@@ -57,6 +65,7 @@ def _write(
     write_detections(detections, out / DETECTIONS)
     on_step()
     write_truth(truth, out / TRUTH)
+    write_columns(road_truth(recording), out / TRUTH_ROAD)
     on_step()
     with open_atomic(out / SCENARIO) as file:
         file.write(scenario_to_yaml(scenario))
@@ -82,8 +91,36 @@ def _write(
             "ignored": int(truth.ignore.sum()),
             "objects": len(np.unique(truth.object_id)),
         },
-        "sha256": {file: sha256_of(out / file) for file in (DETECTIONS, TRUTH, SCENARIO, CAMERA)},
+        "sha256": {file: sha256_of(out / file) for file in (DETECTIONS, TRUTH, TRUTH_ROAD, SCENARIO, CAMERA)},
     }
     with open_atomic(out / MANIFEST) as file:
         file.write(json.dumps(manifest, indent=2) + "\n")
     return manifest
+
+
+def road_truth(recording: SimulatedRecording) -> dict[str, Any]:
+    """Columns of the truth on the road: where every vehicle's middle is, how fast it is and how large.
+
+    Rows are those vehicles and times that the truth in the picture has, too. Metres along the camera's road
+    axes (x right, y along the road), km/h, degrees from y towards x.
+    """
+    truth, scene = recording.truth, recording.scene
+    states = scene.states_at(truth.frame_times(), far_m=recording.scenario.truth.horizon_m)
+    t = truth.frame_times()[states.frame]
+    asked = set(zip(truth.t.tolist(), truth.object_id.tolist(), strict=True))
+    rows = np.array(
+        [key in asked for key in zip(t.tolist(), states.object_id.tolist(), strict=True)], dtype=bool
+    )
+    vx, vy = states.velocity[rows, 0], states.velocity[rows, 1]
+    numbers = {
+        "x": states.pose[rows, 0],
+        "y": states.pose[rows, 1],
+        "speed_kmh": np.hypot(vx, vy) * 3.6,
+        "heading_deg": np.degrees(np.arctan2(vx, vy)),
+        **{name: states.size[rows, k] for k, name in enumerate(("length", "width", "height"))},
+    }
+    return {
+        "t": t[rows],
+        "object_id": states.object_id[rows],
+        **{name: round_decimals(values, 6) for name, values in numbers.items()},
+    }

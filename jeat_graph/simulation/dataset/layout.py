@@ -33,6 +33,7 @@ SEGMENT_JSON = "segment.json"
 EVENTS = "events.h5"
 TRUTH = "gt.csv"
 DETECTIONS = "detections.csv"  # of a simulation at the level of detections
+TRUTH_ROAD = "gt_road.csv"  # where the vehicles are on the road, beside the truth in the picture
 VEHICLES = "vehicles.csv"
 BOXES = "boxes.npy"
 COCO = "coco.json"
