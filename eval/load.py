@@ -82,16 +82,26 @@ def load_run(
 def restrict_classes(truth: GroundTruth, classes: Sequence[str]) -> GroundTruth:
     """Judge some classes only: objects of others are ignored, so that tracks on them are no errors.
 
+    A truth without any object of these classes is fine: in it nothing is to be found (`check_classes`).
+
     Raises:
-        DataError: the truth has no classes, or none of these.
+        DataError: the truth has no classes.
     """
     if truth.classes is None:
         raise DataError("the truth has no classes to choose from")
     wanted = np.isin(truth.classes, list(classes))
-    if not wanted.any():
-        there = ", ".join(sorted({str(name) for name in truth.classes}))
-        raise DataError(f"no object is of class {' or '.join(classes)}; the truth has: {there}")
     return dataclasses.replace(truth, ignore=truth.ignore | ~wanted)
+
+
+def check_classes(truths: Sequence[GroundTruth], classes: Sequence[str]) -> None:
+    """Refuse classes that occur in none of several truths: most likely a name is misspelt.
+
+    Raises:
+        DataError: names the classes that are there.
+    """
+    there = sorted({str(name) for one in truths if one.classes is not None for name in one.classes})
+    if not set(classes) & set(there):
+        raise DataError(f"no object is of class {' or '.join(classes)}; the truth has: {', '.join(there)}")
 
 
 def tables_of(path: Path) -> dict[str, Path]:

@@ -64,10 +64,11 @@ def track(
     Raises:
         JeatGraphError: what the file or the configuration has wrong.
     """
+    from jeat_graph.runs.declaring import fit_input
     from jeat_graph.tracking.tracker import Tracker
 
     recording = detections if isinstance(detections, Detections) else _read_detections(detections)
-    tracker = Tracker(as_config(config, image))
+    tracker = Tracker(fit_input(as_config(config, image), recording)[0])
     causal = Trajectories.concatenate(list(tracker.run(recording)) or [Trajectories.empty()])
     wanted = tracker.config.smoother.engine != "none"
     return Tracks(causal, tracker.finish() if wanted else None)
@@ -95,16 +96,19 @@ def evaluate(
         DataError: a file is not valid, or tracks and truth do not fit together.
     """
     from jeat_graph.eval.judge import judge_runs
-    from jeat_graph.eval.load import JudgedRun, load_run, restrict_classes
+    from jeat_graph.eval.load import JudgedRun, check_classes, load_run, restrict_classes
 
     if isinstance(tracks, (str, Path)):
         if isinstance(truth, GroundTruth):
             raise DataError("a run that is given as a path needs its truth as a path too")
         run = load_run(tracks, truth, classes=classes)
+        if classes is not None:
+            check_classes([run.truth], classes)
     else:
         objects = truth if isinstance(truth, GroundTruth) else read_truth(truth)
         if classes is not None:
             objects = restrict_classes(objects, classes)
+            check_classes([objects], classes)
         if isinstance(tracks, Trajectories):
             if kind not in ("causal", "smoothed"):
                 raise DataError(f"kind {kind!r}: must be causal or smoothed")
@@ -138,11 +142,12 @@ def compare(
     """
     from jeat_graph.eval.compare import LAGS_S
     from jeat_graph.eval.compare import compare as compared
+    from jeat_graph.runs.declaring import fit_input
     from jeat_graph.tracking.records import record_tracks
 
     recording = detections if isinstance(detections, Detections) else _read_detections(detections)
     objects = truth if isinstance(truth, GroundTruth) or truth is None else read_truth(truth)
-    settings = as_config(config)
+    settings = fit_input(as_config(config), recording)[0]
     records, smoothed = record_tracks(settings, recording)
     names = settings.sensor_names
     return compared(records, names, truth=objects, smoothed=smoothed, lags_s=lags_s or LAGS_S)
@@ -172,8 +177,10 @@ def calibrate(
     Raises:
         JeatGraphError: what a file or the data have wrong.
     """
+    from jeat_graph.runs.declaring import fit_input
+
     recordings = [d if isinstance(d, Detections) else _read_detections(d) for d in _as_list(detections)]
-    start = as_config(base, image)
+    start = fit_input(as_config(base, image), Detections.concatenate(recordings))[0]
     if truth is None:
         from jeat_graph.calibration.blind import calibrate_blind
 

@@ -11,7 +11,7 @@ from jeat_graph.benchmark import common
 from jeat_graph.benchmark.judging import OursJob, in_processes, judge_ours, judge_recordings, summarise
 from jeat_graph.benchmark.provenance import provenance
 from jeat_graph.benchmark.recordings import kitti
-from jeat_graph.benchmark.steps import rows
+from jeat_graph.benchmark.steps import rows, without
 from jeat_graph.config.reading import load_config
 from jeat_graph.config.schema import Config
 
@@ -36,8 +36,8 @@ def run(args: argparse.Namespace) -> int:
 def measure(args: argparse.Namespace) -> dict[str, Any]:
     """Track everything with every row's configuration."""
     setup = common.settings(args)
-    paper, default = load_config("paper"), load_config("default")
-    configs = rows(paper, default)
+    paper, default = load_config("paper"), load_config("highway")
+    configs = [*rows(paper, default), *without(default)]
     jobs = [
         OursJob(name, config, None, scenario, seed, setup["duration_s"])
         # The recording is in the outer loops: a process keeps the last few it has simulated.
@@ -57,7 +57,7 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
     folds = common.kitti_folds(args)
     if folds is not None:
         folder, targets = folds
-        by_fold = {name: rows(paper, target) for name, target in targets.items()}
+        by_fold = {name: [*rows(paper, target), *without(target)] for name, target in targets.items()}
         real = [
             (name, [one[k][1] for one in by_fold.values()], folder) for k, (name, _) in enumerate(configs)
         ]

@@ -73,10 +73,10 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
     """Track and judge everything."""
     setup = common.settings(args)
     names = [] if args.no_peers else peers_here()
-    default, paper = load_config("default"), load_config("paper")
+    default, paper = load_config("highway"), load_config("paper")
     found = search(args, names) if args.search and names else {}
     best = _parameters(found["simulated"]) if "simulated" in found else recorded_best("simulated")
-    rows = ours(default, start(paper, default), "default", _SIMULATED)
+    rows = ours(default, start(paper, default), "highway", _SIMULATED)
     records: list[dict[str, Any]] = []
     duration = setup["duration_s"]
     jobs = [

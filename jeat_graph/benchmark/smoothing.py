@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
 def measure(args: argparse.Namespace) -> dict[str, Any]:
     """Track, smooth and judge everything."""
     setup = common.settings(args)
-    default = load_config("default")
+    default = load_config("highway")
     jobs = [
         Job(default, engine, (scenario, seed), setup["duration_s"])
         for scenario in setup["scenarios"]
@@ -77,7 +77,7 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
     judged = in_processes(judge, jobs, args.jobs, "smoothing, simulated")
     result: dict[str, Any] = {
         "benchmark": "smoothing",
-        **provenance(setup, {"default": default}),
+        **provenance(setup, {"highway": default}),
         "records": [record for pair in judged for record in pair],
         "drawn": {
             "model, white noise": drawn([from_model(seed, False) for seed in range(_DRAWN_SEEDS)]),

@@ -163,7 +163,7 @@ def _write(result: dict[str, Any], args: argparse.Namespace) -> None:
     from jeat_graph.io.atomic import open_atomic
 
     settings = {key: getattr(args, key) for key in ("objects", "frames", "warm_up", "repeats", "clock")}
-    head = provenance(settings, {name: load_config(name) for name in ("default", "paper")})
+    head = provenance(settings, {name: load_config(name) for name in ("highway", "paper")})
     folder = Path(args.out)
     with open_atomic(folder / "speed.json") as file:
         json.dump({**head, **result}, file, indent=1)

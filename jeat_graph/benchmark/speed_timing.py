@@ -124,7 +124,7 @@ def real_time_factor(
             frame = scene.scan(k / 100, rng)
             batch.append(Scan(frame.t, "rgb", frame.boxes, frame.scores))
         batches.append(batch)
-    tracker = tracker_for("default", engine)
+    tracker = tracker_for("highway", engine)
     step = stepper(tracker)
     now = _CLOCKS[clock]
     before = now()

@@ -63,7 +63,7 @@ STEPS = (
         ("lifecycle", "birth", "sensors.*.tempering"),
         {"lifecycle.hidden_prior": 0.0, "lifecycle.p_detect_weight": 0.0, "lifecycle.leave_picture": False},
     ),
-    Step("+ output rules", ("output", "lifecycle.leave_picture")),
+    Step("+ output rules", ("output", "smoother", "lifecycle.leave_picture")),
     Step("+ blindness of the event camera", ("sensors.*.blind_speed",)),
     Step("+ P_D of each track, hidden vehicles", ("lifecycle.hidden_prior", "lifecycle.p_detect_weight")),
     Step("+ standing tracks", ("standing",)),
@@ -126,3 +126,16 @@ def _put(tree: dict[str, Any], path: tuple[str, ...], value: Any) -> None:
     for key in path[:-1]:
         tree = tree[key]
     tree[path[-1]] = value
+
+
+def without(target: Config) -> list[tuple[str, Config]]:
+    """The target with one of its parts switched off again: what that part is worth where all others work.
+
+    Args:
+        target: the configuration at the end of the way.
+    """
+    white = {name: replace(sensor, correlated_share=0.0) for name, sensor in target.sensors.items()}
+    return [
+        ("all, without NIS adaptation", replace(target, noise=replace(target.noise, adaptation_rate=0.0))),
+        ("all, without errors with memory", replace(target, sensors=white)),
+    ]

@@ -5,8 +5,9 @@ the rest as false. Noise and motion are then those under which the innovations o
 likely, and the tracker runs again with what was found.
 
 What this cannot know: a systematic error of a sensor (its bias is set to zero), vehicles that no track found
-(P_D comes out too high), and false boxes that repeat so often that a track was confirmed on them (precision
-too high).
+(P_D comes out too high), and how many of the boxes of a score are false: tracks are confirmed on false boxes
+that repeat too, so a poor detector would be credited with what it invents. The precision by score stays what
+the base configuration says; while the tracker runs it learns what it can of each sensor by itself.
 """
 
 from __future__ import annotations
@@ -29,10 +30,10 @@ from jeat_graph.calibration.motion import (
     size_loss,
 )
 from jeat_graph.calibration.rates import scan_rate
-from jeat_graph.calibration.sensor import fit_detection, fit_precision
+from jeat_graph.calibration.sensor import fit_detection
 from jeat_graph.calibration.tracked import TrackedDetections, follow
 from jeat_graph.config.kernel_form import error_states
-from jeat_graph.config.schema import Config, MotionConfig, SensorConfig
+from jeat_graph.config.schema import Config, InputConfig, MotionConfig, SensorConfig
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
@@ -65,7 +66,8 @@ def calibrate_blind(recordings: Sequence[Detections], base: Config, rounds: int 
     sensors = {
         name: replace(base.sensors.get(name, new), rate_hz=scan_rate(recordings, name)) for name in names
     }
-    config = replace(base, sensors=sensors, association=replace(base.association, priority=()))
+    association = replace(base.association, priority=())
+    config = replace(base, sensors=sensors, association=association, input=InputConfig())
     for _ in range(rounds):
         config = _fit(config, follow(recordings, config))
     return config
@@ -98,8 +100,6 @@ def _fit(config: Config, data: TrackedDetections) -> Config:
             bias=(0.0, 0.0, 0.0, 0.0),
             p_detect=float(np.clip(p_detect, 0.05, 0.99)),
             clutter_per_scan=float((np.sum(~taken) + 0.5) / data.scans[s]),
-            precision=float(np.clip((taken.sum() + 0.5) / (len(taken) + 1.0), 0.001, 0.999)),
-            score_precision=fit_precision(data.score[s], taken),
             blind_speed=blind,
         )
     return replace(config, sensors=sensors, motion=motion, size=size)

@@ -12,7 +12,7 @@ from jeat_graph.calibration.measured import measured_tracks
 from jeat_graph.calibration.motion import fit_motion, fit_size
 from jeat_graph.calibration.rates import scan_rate
 from jeat_graph.calibration.sensor import calibrate_sensor
-from jeat_graph.config.schema import BirthConfig, Config, SensorConfig
+from jeat_graph.config.schema import BirthConfig, Config, InputConfig, SensorConfig
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
@@ -60,6 +60,7 @@ def calibrate(recordings: Sequence[Recording], base: Config | None = None) -> Co
         motion=fit_motion(tracks, size),
         size=size,
         birth=fit_births(config, matches, recordings),
+        input=InputConfig(),
     )
 
 

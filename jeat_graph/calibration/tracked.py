@@ -59,7 +59,7 @@ def follow(recordings: Sequence[Detections], config: Config) -> TrackedDetection
     eager = replace(
         config,
         lifecycle=replace(config.lifecycle, confirm_existence=0.0),
-        output=replace(config.output, min_existence=0.0, max_gap_s=_REPORT_GAP_S),
+        output=replace(config.output, min_existence=0.0, max_gap_s=_REPORT_GAP_S, max_gap_scans=0.0),
     )
     names = config.sensor_names
     cols: dict[str, list[FloatArray]] = {name: [] for name in ("t", "track", "sensor", "box")}

@@ -4,7 +4,8 @@ How far a sensor's evidence may be believed (tempering), when a track is confirm
 without an update: these depend on how detections err *together*, over time and between sensors, so no
 statistic of single detections gives them. A coordinate search over short grids maximises (MOTA + IDF1 +
 HOTA) / 3. Each candidate is judged together with its neighbours on the grid, since the middle of a plateau
-holds on other data better than the top of a peak does.
+holds on other data better than the top of a peak does; and a change is made only if it wins on both halves of
+the recordings: what helps one half and harms the other is chance.
 """
 
 from __future__ import annotations
@@ -92,13 +93,13 @@ def tune(
     """
     if not recordings:
         raise DataError("tuning needs at least one recording with truth")
-    short = shorten(recordings, max_scans)
-    known: dict[str, float] = {}
+    parts = folds(shorten(recordings, max_scans))
+    known: dict[str, tuple[float, ...]] = {}
 
-    def judge(candidate: Config) -> float:
+    def judge(candidate: Config) -> tuple[float, ...]:
         key = repr(candidate)
         if key not in known:
-            known[key] = tracking_score(candidate, short)
+            known[key] = tuple(tracking_score(candidate, part) for part in parts)
         return known[key]
 
     chosen: dict[str, Choice] = {}
@@ -131,13 +132,12 @@ def knobs(config: Config) -> list[Knob]:
     Args:
         config: names the sensors and their rates.
     """
-    period = 1.0 / min(s.rate_hz for s in config.sensors.values())
     out = [
         Knob(
-            "output.max_gap_s",
-            # Half a period: only what was updated just now. Units of the slowest sensor's period.
-            tuple(round(f * period, 4) for f in (0.5, 1.5, 3.0)),
-            lambda c, v: replace(c, output=replace(c.output, max_gap_s=v)),
+            "output.max_gap_scans",
+            # Half a period: only what was updated just now.
+            (0.5, 1.5, 3.0),
+            lambda c, v: replace(c, output=replace(c.output, max_gap_scans=v)),
             ordered=False,
         ),
         Knob("tempering", _TEMPERING, _temper_all, optional=True),
@@ -163,7 +163,23 @@ def knobs(config: Config) -> list[Knob]:
             lambda c, v: replace(c, lifecycle=replace(c.lifecycle, p_detect_weight=v)),
         ),
     ]
+    out.append(
+        Knob(
+            "birth.max_overlap",
+            (0.3, 0.5, 0.7),
+            lambda c, v: replace(c, birth=replace(c.birth, max_overlap=v)),
+            optional=True,
+        )
+    )
     if len(config.sensors) > 1:
+        out.append(
+            Knob(
+                "lifecycle.disagreement",
+                (0.0, 2.0, 5.0, 10.0),
+                lambda c, v: replace(c, lifecycle=replace(c.lifecycle, disagreement=v)),
+                optional=True,
+            )
+        )
         out += [Knob(f"sensors.{n}.tempering", _TEMPERING, _temper_one(n)) for n in config.sensor_names]
     return out
 
@@ -178,23 +194,42 @@ def shorten(recordings: Sequence[Recording], max_scans: int) -> list[Recording]:
     for detections, truth in recordings:
         scans = max(int(share * detections.num_scans), 1)
         end = detections.scan_t[scans - 1]
-        rows = int(detections.scan_start[scans])
-        head = replace(
-            detections,
-            scan_t=detections.scan_t[:scans],
-            scan_sensor=detections.scan_sensor[:scans],
-            scan_start=detections.scan_start[: scans + 1],
-            boxes=detections.boxes[:rows],
-            scores=detections.scores[:rows],
-            classes=None if detections.classes is None else detections.classes[:rows],
-        )
-        out.append((head, cut_truth(truth, float(end))))
+        out.append((cut_scans(detections, 0, scans), cut_truth(truth, -np.inf, float(end))))
     return out
 
 
-def cut_truth(truth: GroundTruth, end: float) -> GroundTruth:
-    """Keep the truth up to the time `end` (s)."""
-    keep = truth.t <= end
+def folds(recordings: Sequence[Recording]) -> list[list[Recording]]:
+    """Split recordings into two halves: every other one, or a single one in the middle of its time."""
+    if len(recordings) > 1:
+        return [list(recordings[0::2]), list(recordings[1::2])]
+    detections, truth = recordings[0]
+    middle = detections.num_scans // 2
+    if middle == 0:
+        return [list(recordings)]
+    t = float(detections.scan_t[middle - 1])
+    first = (cut_scans(detections, 0, middle), cut_truth(truth, -np.inf, t))
+    second = (cut_scans(detections, middle, detections.num_scans), cut_truth(truth, t, np.inf))
+    return [[first], [second]] if len(first[1].t) and len(second[1].t) else [list(recordings)]
+
+
+def cut_scans(detections: Detections, first: int, end: int) -> Detections:
+    """Keep the scans from `first` up to, but without, `end`."""
+    low, high = int(detections.scan_start[first]), int(detections.scan_start[end])
+    return replace(
+        detections,
+        scan_t=detections.scan_t[first:end],
+        scan_sensor=detections.scan_sensor[first:end],
+        scan_start=detections.scan_start[first : end + 1] - low,
+        boxes=detections.boxes[low:high],
+        scores=detections.scores[low:high],
+        classes=None if detections.classes is None else detections.classes[low:high],
+    )
+
+
+def cut_truth(truth: GroundTruth, start: float, end: float) -> GroundTruth:
+    """Keep the truth after the time `start` and up to the time `end` (s)."""
+    keep = (truth.t > start) & (truth.t <= end)
+    frames = truth.frames
     return GroundTruth(
         t=truth.t[keep],
         object_id=truth.object_id[keep],
@@ -203,7 +238,7 @@ def cut_truth(truth: GroundTruth, end: float) -> GroundTruth:
         ignore=truth.ignore[keep],
         classes=None if truth.classes is None else truth.classes[keep],
         distance=None if truth.distance is None else truth.distance[keep],
-        frames=None if truth.frames is None else truth.frames[truth.frames <= end],
+        frames=None if frames is None else frames[(frames > start) & (frames <= end)],
     )
 
 
@@ -218,22 +253,32 @@ def plateau(scores: Sequence[float]) -> list[float]:
     return [float(v) for v in total / weight]
 
 
-def _turn(knob: Knob, config: Config, judge: Callable[[Config], float]) -> tuple[Config, Choice | None]:
-    """Choose the best value of one knob; the present setting stays where nothing is clearly better.
+def _turn(
+    knob: Knob, config: Config, judge: Callable[[Config], tuple[float, ...]]
+) -> tuple[Config, Choice | None]:
+    """Choose the best value of one knob; the present setting stays where nothing is better on every fold.
 
     The choice is None where the present setting, kept, is none of the knob's values.
     """
     candidates = [knob.apply(config, value) for value in knob.values]
-    scores = [judge(candidate) for candidate in candidates]
+    by_fold = [judge(candidate) for candidate in candidates]
+    scores = [float(np.mean(one)) for one in by_fold]
     merit = plateau(scores) if knob.ordered else scores
     best = int(np.argmax(merit))
     if config in candidates:
         here = candidates.index(config)
-        if merit[best] < merit[here] + _LEAST_GAIN:
+        if merit[best] < merit[here] + _LEAST_GAIN or not _wins(by_fold[best], by_fold[here]):
             best = here
-    elif knob.optional and merit[best] < judge(config) + _LEAST_GAIN:
-        return config, None
+    elif knob.optional:
+        now = judge(config)
+        if merit[best] < np.mean(now) + _LEAST_GAIN or not _wins(by_fold[best], now):
+            return config, None
     return candidates[best], Choice(knob.name, knob.values[best], scores[best])
+
+
+def _wins(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
+    """Whether scores are better on the whole and on no fold worse by more than chance."""
+    return all(a >= b - _LEAST_GAIN for a, b in zip(one, other, strict=True)) and sum(one) > sum(other)
 
 
 def _temper_all(config: Config, value: float) -> Config:

@@ -1,4 +1,4 @@
-"""`jeat-graph benchmark`: reproduce the tables of accuracy, ablation, smoothing, speed and events."""
+"""`jeat-graph benchmark`: reproduce the tables of accuracy, smoothing, real detectors, speed and more."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from typing import Any
 from jeat_graph.cli.options import Parser
 from jeat_graph.data.errors import ConfigError
 
-HELP = "Reproduce the README's tables: accuracy, ablation, smoothing, speed or events."
+HELP = "Reproduce the README's tables: accuracy, ablation, smoothing, real, speed or events."
 _KINDS = {
     "accuracy": "our tracker and others' on simulated and real data",
     "ablation": "from the paper's tracker to the default, one change a row",
     "smoothing": "what smoothing gains over the causal estimates",
+    "real": "real detectors that nothing was made for, and simulated odd ones",
     "speed": "time per step, against others",
     "endurance": "a day of input through the live path: memory, latency and counts, hour by hour",
     "events": "noise of the event cameras, what tames it, and what vehicles give",

@@ -89,6 +89,10 @@ def with_image(base: Config, recordings: list[Detections], size: tuple[int, int]
 
     if size is not None:
         return replace(base, image=replace(base.image, width=float(size[0]), height=float(size[1])))
+    if base.input.picture == "seen":
+        from jeat_graph.runs.declaring import fit_picture
+
+        return fit_picture(base, recordings)
     right = max((float((d.boxes[:, 0] + d.boxes[:, 2]).max()) for d in recordings if len(d)), default=0.0)
     bottom = max((float((d.boxes[:, 1] + d.boxes[:, 3]).max()) for d in recordings if len(d)), default=0.0)
     width, height = base.image.width, base.image.height
@@ -137,7 +141,10 @@ def _without_truth(recordings: list[Detections], base: Config) -> Config:
     from jeat_graph.calibration.blind import calibrate_blind
     from jeat_graph.calibration.rounding import rounded
 
-    print("no --gt: what confirmed tracks take in is believed to be true", file=sys.stderr)
+    print(
+        "no --gt: noise and motion from what confirmed tracks take in; precision by score cannot be known",
+        file=sys.stderr,
+    )
     with stages("calibrate", 1) as stage:
         stage("estimating")
         return rounded(calibrate_blind(recordings, base))
@@ -160,7 +167,8 @@ def describe(args: argparse.Namespace, config: Config, choices: tuple[Choice, ..
     else:
         lines += [
             "sensors (but tempering), motion, size: without truth, from innovations of confirmed tracks.",
-            "bias is unknown without truth and set to zero; p_detect and precision are upper bounds.",
+            "bias is unknown without truth and set to zero, precision by score stays as in the base;",
+            "p_detect is an upper bound.",
         ]
     picture = f"the base configuration {Path(args.config).name}"
     if args.image or config.image != load_config(args.config).image:

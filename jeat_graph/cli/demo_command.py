@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--out", default="demo", metavar="DIR", help="folder to write into (default demo)")
     add("--duration", type=float, default=DURATION_S, metavar="S", help=f"length (default {DURATION_S:g})")
     add("--seed", type=int, default=SEED, metavar="N", help=f"seed of the simulation (default {SEED})")
-    add_config(parser, settings=False)
+    add_config(parser, "highway", settings=False)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Judge, and print or write the result."""
     from jeat_graph.eval.judge import breakdown_tables, judge_runs, summary_table
-    from jeat_graph.eval.load import load_run
+    from jeat_graph.eval.load import check_classes, load_run
     from jeat_graph.eval.resampling import MAX_AGE_S
     from jeat_graph.eval.tables import to_json
     from jeat_graph.runs.beside import rate_of_truth
@@ -54,6 +54,8 @@ def run(args: argparse.Namespace) -> int:
             load_run(path, truth, rate_hz=rate_of_truth(path, truth, args.rate), classes=args.classes)
             for path, truth in zip(args.runs, args.gt, strict=True)
         ]
+        if args.classes is not None:
+            check_classes([one.truth for one in runs], args.classes)
         stage("judging")
         max_age_s = MAX_AGE_S if args.max_age is None else args.max_age
         judged = judge_runs(runs, iou=args.iou, max_age_s=max_age_s, max_gap_s=args.max_gap)

@@ -99,6 +99,15 @@ class LifecycleConfig(Section):
     scene_memory_s: float = number(
         10.0, "s", "memory of the running estimates of each sensor's clutter and P_D; 0 keeps the configured"
     )
+    disagreement: float = number(
+        0.0,
+        "1",
+        "power of the share of a sensor's lasting tracks that others see too, as factor on its evidence",
+    )
+    agreement_prior: float = number(
+        0.7, "1", "that share before anything is known, and where there is no other sensor", 0.01, 1.0
+    )
+    disagreement_memory_s: float = number(30.0, "s", "memory of that share", open_low=True)
     p_detect_weight: float = number(0.05, "1", "weight of one look in a track's own P_D per sensor", 0.0, 1.0)
     p_detect_min: float = number(0.05, "1", "least P_D of a track", 0.001, 0.999)
     p_detect_max: float = number(0.98, "1", "greatest P_D of a track", 0.001, 0.999)
@@ -118,6 +127,11 @@ class LifecycleConfig(Section):
     max_gap_tentative_s: float = number(
         0.3, "s", "a tentative track without update is deleted after this (paper .2)"
     )
+
+    @property
+    def prior_trust(self) -> float:
+        """Trust in a sensor of which nothing is known yet."""
+        return self.agreement_prior**self.disagreement
 
     @property
     def by_existence(self) -> bool:
@@ -166,6 +180,9 @@ class OutputConfig(Section):
     min_existence: float = number(0.5, "1", "reported only above this probability of existence", 0.0, 1.0)
     max_gap_s: float = number(
         0.12, "s", "reported only if updated within this time (paper: as long as it lives)"
+    )
+    max_gap_scans: float = number(
+        0.0, "scans", "the same in scans of the slowest sensor, over P_D⁴; the less counts; 0: no bound"
     )
     clip: bool = flag(True, "clip boxes to the picture; drop those outside it")
     min_visible: float = number(

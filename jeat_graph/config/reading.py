@@ -57,7 +57,8 @@ def as_config(config: Config | str | Path, image: tuple[float, float] | None = N
         return found
     width, height = image
     size = dataclasses.replace(found.image, width=float(width), height=float(height))
-    return dataclasses.replace(found, image=size)
+    given = dataclasses.replace(found.input, picture="given")
+    return dataclasses.replace(found, image=size, input=given)
 
 
 def config_from_dict(tree: Mapping[str, Any]) -> Config:
@@ -79,12 +80,19 @@ def config_from_dict(tree: Mapping[str, Any]) -> Config:
     for f in dataclasses.fields(Config):
         if f.name != "sensors" and f.name in tree:
             parts[f.name] = build(hints[f.name], tree[f.name], f.name + ".")
+    if "image" in tree and "input" in parts:
+        parts["input"] = dataclasses.replace(parts["input"], picture="given")
     return Config(**parts)
 
 
 def config_to_dict(config: Config) -> dict[str, Any]:
-    """Return the configuration as nested plain mappings, lists and numbers."""
+    """Return the configuration as nested plain mappings, lists and numbers.
+
+    A picture whose size is still to be seen has none; one that is written down counts as given.
+    """
     tree: dict[str, Any] = plain(dataclasses.asdict(config))
+    if config.input.picture == "seen":
+        del tree["image"]
     return tree
 
 

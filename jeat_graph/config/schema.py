@@ -19,7 +19,7 @@ from jeat_graph.config.lifecycle import (
     OutputConfig,
 )
 from jeat_graph.config.live import LiveConfig
-from jeat_graph.config.sensors import SensorConfig
+from jeat_graph.config.sensors import InputConfig, SensorConfig
 from jeat_graph.config.smoothing import SmootherConfig
 from jeat_graph.data.errors import ConfigError
 
@@ -28,6 +28,7 @@ __all__ = [
     "BirthConfig",
     "Config",
     "ImageConfig",
+    "InputConfig",
     "LifecycleConfig",
     "LiveConfig",
     "MergeConfig",
@@ -47,6 +48,7 @@ class Config:
 
     sensors: dict[str, SensorConfig]
     image: ImageConfig = field(default_factory=ImageConfig)
+    input: InputConfig = field(default_factory=InputConfig, metadata={"kernels": False})
     motion: MotionConfig = field(default_factory=MotionConfig)
     standing: StandingConfig = field(default_factory=StandingConfig)
     size: SizeConfig = field(default_factory=SizeConfig)

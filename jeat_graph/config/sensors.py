@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass, field
 
-from jeat_graph.config.fields import Section, number
+from jeat_graph.config.fields import Section, choice, number
 from jeat_graph.data.errors import ConfigError
 
 
@@ -40,7 +40,7 @@ class SensorConfig(Section):
         },
     )
     tempering: float = number(
-        1.0, "1", "exponent on evidence, below 1 where false boxes repeat in time", 0.01, 1.0
+        0.4, "1", "exponent on evidence, below 1 where false boxes repeat in time", 0.01, 1.0
     )
     blind_speed: float = number(
         0.0, "px/s", "image speed below which the sensor sees nothing (events); 0: it sees what stands still"
@@ -60,3 +60,21 @@ class SensorConfig(Section):
         rising = all(b[0] > a[0] and b[1] >= a[1] for a, b in itertools.pairwise(knots))
         if not (ok and rising):
             raise ConfigError("score_precision: scores must rise, precisions must not fall, all in [0, 1]")
+
+
+@dataclass(frozen=True)
+class InputConfig(Section):
+    """What is done with a recording that the configuration does not quite describe."""
+
+    undeclared: str = choice(
+        "refuse",
+        ("refuse", "declare"),
+        "a sensor that is not declared is an error, or is declared by what is seen of it; then the rates of "
+        "all sensors are those of the recording too",
+    )
+    picture: str = choice(
+        "given",
+        ("given", "seen"),
+        "the picture is as large as `image` says, or reaches as far as the boxes of the recording do; a size "
+        "that is given beside the preset always counts",
+    )

@@ -26,6 +26,9 @@ class SmootherConfig(Section):
         ("none", "cauchy", "student-t"),
         "full and rts: kernel that weighs down outlying measurements",
     )
+    min_existence: float = number(
+        0.7, "1", "rows are written where the smoothed probability of existence is at least this", 0.0, 1.0
+    )
     output_rate_hz: float = number(0.0, "Hz", "rows per second of the smoothed table; 0: one at each scan")
     worker: bool = flag(False, "smooth in a process of its own, so that no step of the tracker waits for it")
     stitch: bool = flag(True, "full and rts: join the fragments of one vehicle when the recording ends")

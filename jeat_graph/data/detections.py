@@ -7,7 +7,7 @@ the sensor looked and found nothing.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -128,6 +128,7 @@ class Detections:
         boxes: (N, 4) left, top, width, height (px).
         scores: (N,) confidence in [0, 1].
         classes: (N,) class names (empty text where unknown), or None if no class is known.
+        dropped: boxes without area that a reader has left out; their scans are there.
     """
 
     sensors: tuple[str, ...]
@@ -137,6 +138,7 @@ class Detections:
     boxes: FloatArray
     scores: FloatArray
     classes: TextArray | None = None
+    dropped: int = 0
 
     @staticmethod
     def from_rows(
@@ -219,7 +221,7 @@ class Detections:
         """
         columns = [part.to_rows() for part in parts]
         has_class = any(part.classes is not None for part in parts)
-        return Detections.from_rows(
+        whole = Detections.from_rows(
             t=np.concatenate([column[0] for column in columns]),
             sensor=np.concatenate([column[1] for column in columns]),
             boxes=np.concatenate([column[2] for column in columns]),
@@ -227,6 +229,7 @@ class Detections:
             empty=np.concatenate([column[4] for column in columns]),
             classes=np.concatenate([column[5] for column in columns]) if has_class else None,
         )
+        return replace(whole, dropped=sum(part.dropped for part in parts))
 
     def to_rows(
         self,

@@ -31,7 +31,7 @@ def plot_speed(rows: Sequence[dict[str, Any]], path: str | Path) -> None:
         mine = sorted((r for r in rows if r["tracker"] == name), key=lambda r: int(r["objects"]))
         x = [r["objects"] for r in mine]
         y = [r["median_ms"] for r in mine]
-        ours = name.startswith(("default", "paper"))
+        ours = name.startswith(("highway", "default", "paper"))
         colour = LINES[k % len(LINES)]
         # Beside each other, so that whiskers of lines close together can be told apart.
         shifted = [v * (0.94 + 0.12 * k / max(len(names) - 1, 1)) for v in x]

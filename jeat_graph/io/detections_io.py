@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -188,8 +189,10 @@ def _read_contract(
     classes = table.text("class", blank_ok=True) if "class" in table else None
     if classes is not None and not (classes != "").any():
         classes = None
-    _check(boxes, scores, ~empty, table.error)
-    return Detections.from_rows(t, names, boxes, scores, empty, classes)
+    flat = _without_area(boxes) & ~empty
+    _check(boxes, scores, ~(empty | flat), table.error)
+    found = Detections.from_rows(t, names, boxes, scores, empty | flat, classes)
+    return replace(found, dropped=int(flat.sum()))
 
 
 def _read_coco(
@@ -220,6 +223,13 @@ def _scores(table: FileTable, name: str, spoken: str) -> FloatArray:
     return table.number(name)
 
 
+def _without_area(boxes: FloatArray) -> BoolArray:
+    """Which boxes (M, 4) a detector has clipped to nothing: no side is negative and one is zero."""
+    side = boxes[:, 2:]
+    finite = np.isfinite(boxes).all(axis=1)
+    return np.asarray(finite & (side >= 0.0).all(axis=1) & (side == 0.0).any(axis=1))
+
+
 def _check(
     boxes: FloatArray, scores: FloatArray, rows: BoolArray, error: Callable[[int, str], DataError]
 ) -> None:
@@ -243,13 +253,15 @@ def _assemble(
 ) -> Detections:
     """Check boxes of one sensor and put empty scans at the `missing` times."""
     n, gaps = len(t), len(missing)
-    _check(boxes, scores, np.ones(n, dtype=bool), error)
+    flat = _without_area(boxes)
+    _check(boxes, scores, ~flat, error)
     blank = np.full(gaps, np.nan)
-    return Detections.from_rows(
+    found = Detections.from_rows(
         t=np.concatenate([t, missing]),
         sensor=np.full(n + gaps, sensor),
         boxes=np.concatenate([boxes, np.full((gaps, 4), np.nan)]),
         scores=np.concatenate([scores, blank]),
-        empty=np.arange(n + gaps) >= n,
+        empty=np.concatenate([flat, np.ones(gaps, dtype=bool)]),
         classes=None if classes is None else np.concatenate([classes, np.zeros(gaps, dtype="U1")]),
     )
+    return replace(found, dropped=int(flat.sum()))

@@ -83,7 +83,6 @@ def track_request(request: TrackRequest) -> None:
 
 def _finished(request: TrackRequest) -> dict[str, Any] | None:
     """The record of the run if it is there, whole, and what this request would make; else None."""
-    from jeat_graph.config.reading import config_to_dict
     from jeat_graph.io.hashing import sha256_of
     from jeat_graph.runs.directory import RUN_JSON
     from jeat_graph.version import __version__
@@ -95,7 +94,7 @@ def _finished(request: TrackRequest) -> dict[str, Any] | None:
     wanted = json.loads(json.dumps(request.source()))
     same = (
         record.get("version") == __version__
-        and record.get("config") == json.loads(json.dumps(config_to_dict(request.load_config())))
+        and _as_given(record.get("config"), request) == _as_given(_plain_config(request), request)
         and _hashes(record.get("inputs")) == _hashes(wanted["inputs"])
         and _settings(record.get("reading")) == _settings(wanted["reading"])
     )
@@ -106,6 +105,22 @@ def _finished(request: TrackRequest) -> dict[str, Any] | None:
         (out / name).is_file() and sha256_of(out / name) == entry["sha256"] for name, entry in files.items()
     )
     return record if whole else None
+
+
+def _plain_config(request: TrackRequest) -> Any:
+    from jeat_graph.config.reading import config_to_dict
+
+    return json.loads(json.dumps(config_to_dict(request.load_config())))
+
+
+def _as_given(config: Any, request: TrackRequest) -> Any:
+    """The parts of a configuration that do not follow from the recording itself (`runs.declaring`)."""
+    if not isinstance(config, dict):
+        return config
+    found = request.load_config().input
+    left_out = {"sensors"} if found.undeclared == "declare" else set()
+    left_out |= {"image", "input"} if found.picture == "seen" else set()
+    return {key: value for key, value in config.items() if key not in left_out}
 
 
 def _hashes(inputs: Any) -> list[str]:

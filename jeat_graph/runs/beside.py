@@ -79,10 +79,13 @@ def with_picture(config: Config, overrides: Sequence[str], facts: Facts | None) 
     if said or facts is None or facts.size_px is None:
         return config, []
     width, height = facts.size_px
-    if (width, height) == (config.image.width, config.image.height):
+    known = config.input.picture == "given"
+    if known and (width, height) == (config.image.width, config.image.height):
         return config, []
     image = replace(config.image, width=float(width), height=float(height))
-    return replace(config, image=image), [f"picture of {width} x {height} px, as {facts.origin} says"]
+    given = replace(config.input, picture="given")
+    note = f"picture of {width} x {height} px, as {facts.origin} says"
+    return replace(config, image=image, input=given), [note]
 
 
 def rate_of_truth(run: str | Path, truth: str | Path, rate_hz: float | None) -> float | None:

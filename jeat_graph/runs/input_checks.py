@@ -10,14 +10,13 @@ from jeat_graph.config.reading import load_config, preset_names
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError, UnknownSensorError
-from jeat_graph.data.rates import median_rate_hz
 from jeat_graph.io.time_units import unit_question
+from jeat_graph.runs.declaring import LEAST_SCANS, scan_rate_hz
 
 # A box at the edge may have its centre outside; a recording of another picture size has far more of them.
 MOST_OUTSIDE = 0.05
 # A clock that differs this much from the declared one is worth a word: rates decide about clutter and misses.
 RATE_FACTOR = 1.5
-LEAST_SCANS = 3
 
 
 def check_detections(detections: Detections, config: Config, names: str = "the detections") -> list[str]:
@@ -40,9 +39,11 @@ def check_detections(detections: Detections, config: Config, names: str = "the d
         raise DataError(
             "no scans: a recording needs at least one row, with t and sensor if nothing was found", names
         )
-    _check_units(detections, config, names)
+    check_units(detections, config, names)
     _check_sensors(detections, config, names)
     warnings = [] if len(detections) else [f"{names}: all scans are empty, so there is nothing to track"]
+    if detections.dropped:
+        warnings.append(f"{names}: {detections.dropped} box(es) without area left out")
     return warnings + _check_picture(detections, config, names) + _check_rates(detections, config, names)
 
 
@@ -50,21 +51,26 @@ def _check_sensors(detections: Detections, config: Config, names: str) -> None:
     unknown = [name for name in detections.sensors if name not in config.sensors]
     if not unknown:
         return
-    name = unknown[0]
-    near = difflib.get_close_matches(name, config.sensor_names, 1)
-    rate = _rate_hz(detections, name)
+    near = difflib.get_close_matches(unknown[0], config.sensor_names, 1)
     fitting = [p for p in preset_names() if set(detections.sensors) <= load_config(p).sensors.keys()]
-    setting = "rate_hz: 20" if rate is None else f"rate_hz: {rate:.3g}"
+    settings = []
+    for name in unknown:
+        rate = scan_rate_hz(detections, name)
+        setting = "rate_hz: 20" if rate is None else f"rate_hz: {rate:.3g}"
+        settings.append(f"--set 'sensors.{name}={{{setting}}}'")
+    several = (
+        f"sensors {', '.join(map(repr, unknown))} are" if len(unknown) > 1 else f"sensor {unknown[0]!r} is"
+    )
     raise UnknownSensorError(
-        f"{names}: sensor {name!r} is not declared (declared: {', '.join(config.sensor_names)})"
+        f"{names}: {several} not declared (declared: {', '.join(config.sensor_names)})"
         + (f"; did you mean {near[0]!r}?" if near else ";")
         + (f" use --config {fitting[0]}," if fitting else "")
-        + f" declare it with --set 'sensors.{name}={{{setting}}}' or in a file from `jeat-graph calibrate`,"
+        + f" declare with {' '.join(settings)} or in a file from `jeat-graph calibrate`,"
         + " or rename it with NAME=path"
     )
 
 
-def _check_units(detections: Detections, config: Config, names: str) -> None:
+def check_units(detections: Detections, config: Config, names: str) -> None:
     """Refuse times that cannot be seconds, unless the sensor is declared to be as slow as that."""
     for name in detections.sensors:
         times = np.unique(detections.sensor_times(name))
@@ -101,16 +107,10 @@ def _check_picture(detections: Detections, config: Config, names: str) -> list[s
 def _check_rates(detections: Detections, config: Config, names: str) -> list[str]:
     warnings = []
     for name in detections.sensors:
-        rate, declared = _rate_hz(detections, name), config.sensors[name].rate_hz
+        rate, declared = scan_rate_hz(detections, name), config.sensors[name].rate_hz
         if rate is not None and not 1.0 / RATE_FACTOR < rate / declared < RATE_FACTOR:
             warnings.append(
                 f"{names}: sensor {name!r} scans at {rate:.3g} Hz, but is declared with {declared:g} Hz "
                 f"(--set sensors.{name}.rate_hz={rate:.3g})"
             )
     return warnings
-
-
-def _rate_hz(detections: Detections, sensor: str) -> float | None:
-    """Rate (Hz) of a sensor's clock, or None if its scans are too few to judge it by."""
-    times = detections.sensor_times(sensor)
-    return median_rate_hz(times) if len(times) >= LEAST_SCANS else None

@@ -129,8 +129,9 @@ def track_files(
         JeatGraphError: the configuration or a file is not valid, or they do not fit together.
     """
     from jeat_graph.io.detections_io import read_many
+    from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.directory import RunDirectory
-    from jeat_graph.runs.input_checks import check_detections
+    from jeat_graph.runs.input_checks import check_detections, check_units
     from jeat_graph.tracking.notice import notice_if_cold
 
     begin = time.perf_counter()
@@ -140,9 +141,12 @@ def track_files(
     for note in notes:
         say(note)
     detections = read_many(request.detections, **request._reading())
-    record = RunRecord(
-        source=request.source(), warnings=check_detections(detections, config, " + ".join(request.files))
-    )
+    names = " + ".join(request.files)
+    check_units(detections, config, names)  # before rates are taken for what they seem
+    config, notes = fit_input(config, detections)
+    for note in notes:
+        say(note)
+    record = RunRecord(source=request.source(), warnings=check_detections(detections, config, names))
     for warning in record.warnings:
         warn(warning)
     detections = at_measurement(detections, config)

@@ -9,7 +9,7 @@ import numpy as np
 from jeat_graph.config.kernel_form import Model
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.tracking.reporting import report
+from jeat_graph.tracking.reporting import longest_gap_s, report
 from jeat_graph.tracking.snapshot import Snapshot
 from jeat_graph.tracking.stages.predicting import predict_all
 
@@ -39,9 +39,10 @@ def predict_reported(now: Snapshot, t: float, model: Model, sensors: tuple[str, 
     here = 0.0 if now.t is None else now.t
     n = now.num_tracks
     settings = model.settings
-    how = (settings.image, settings.output, settings.lifecycle.by_existence)
+    gap = longest_gap_s(now.scene, model)
+    how = (gap, settings.image, settings.output, settings.lifecycle.by_existence)
     reported = report(now.tracks, n, here, *how)[1]
-    predict_all(now.tracks, n, max(t - here, 0.0), model)
+    predict_all(now.tracks, n, max(t - here, 0.0), now.scene, model)
     # Nobody has looked in between, so nobody can have missed a track either: what counts is the gap now.
     now.tracks.t_update[:] += t - here
     columns = Trajectories(*report(now.tracks, n, t, *how), sensors=sensors)

@@ -6,9 +6,32 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.association.boxes import track_boxes, visible_fraction
+from jeat_graph.config.kernel_form import Model
 from jeat_graph.config.schema import ImageConfig, OutputConfig
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.tracking.state import TrackArrays
+from jeat_graph.tracking.state import Scene, TrackArrays
+
+# A sensor of less than this share of the greatest trust is not waited for.
+_TRUSTED = 0.5
+
+
+def longest_gap_s(scene: Scene, model: Model) -> float:
+    """Time since its last update up to which a track is reported (s).
+
+    In scans of the sensor that needs most time: one that finds one vehicle in two has to be given more of
+    them than one that finds all (P_D⁻², and as much again because the P_D of tracks that were found is larger
+    than that of vehicles). Sensors that the others do not bear out are not waited for.
+
+    Args:
+        scene: what is learnt of the sensors.
+        model: sensors and settings.
+    """
+    output = model.settings.output
+    if output.max_gap_scans == 0.0:
+        return float(output.max_gap_s)
+    needed = output.max_gap_scans * model.sensors.period_s / scene.p_detect**4
+    longest = float(needed[scene.trust >= _TRUSTED * scene.trust.max()].max())
+    return min(longest, float(output.max_gap_s))
 
 
 @njit(cache=True)
@@ -16,6 +39,7 @@ def report(
     tracks: TrackArrays,
     num_tracks: int,
     t: float,
+    max_gap_s: float,
     image: ImageConfig,
     output: OutputConfig,
     by_existence: bool,
@@ -26,6 +50,7 @@ def report(
         tracks: state of all tracks.
         num_tracks: number of living ones.
         t: time of the state (s).
+        max_gap_s: time since its last update up to which a track is reported (s).
         image: the kernels' form of that section; two sections are handed over faster than all.
         output: the same.
         by_existence: whether tracks live by their probability of existence.
@@ -42,7 +67,7 @@ def report(
         if not tracks.confirmed[i]:
             continue
         gap = t - tracks.t_update[i]
-        if gap > output.max_gap_s and not tracks.standing[i]:
+        if gap > max_gap_s and not tracks.standing[i]:
             continue
         if by_existence and tracks.existence[i] < output.min_existence:
             continue

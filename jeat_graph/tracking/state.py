@@ -34,6 +34,7 @@ class TrackArrays(NamedTuple):
         t_birth: (C,) time of the first detection (s).
         t_update: (C,) time of the last one (s).
         used: (C,) bit s is set where sensor s's detection was taken in the last step.
+        seen_by: (C,) bit s is set where sensor s's detection was ever taken.
     """
 
     mean: FloatArray
@@ -55,6 +56,7 @@ class TrackArrays(NamedTuple):
     t_birth: FloatArray
     t_update: FloatArray
     used: IntArray
+    seen_by: IntArray
 
 
 class Scene(NamedTuple):
@@ -64,11 +66,41 @@ class Scene(NamedTuple):
         clutter: (S,) expected false boxes in a scan of each sensor.
         p_detect: (S,) each sensor's mean probability of detecting a confirmed track: light and darkness.
         undetected: (1,) expected number of vehicles in the scene that have no track yet.
+        last_look: (S,) time of each sensor's last scan (s); minus infinity before the first.
+        claims: (S,) recent detections of each sensor on lasting tracks while another sensor looked too, in
+            seconds of a track.
+        agreed: (S,) those of them on tracks that another sensor has seen.
+        trust: (S,) what the ratio of the two says of the sensor: factor on its evidence, in (0, 1].
     """
 
     clutter: FloatArray
     p_detect: FloatArray
     undetected: FloatArray
+    last_look: FloatArray
+    claims: FloatArray
+    agreed: FloatArray
+    trust: FloatArray
+
+
+def start_scene(clutter: FloatArray, p_detect: FloatArray, undetected: float, trust: float) -> Scene:
+    """Return what is held of a scene before the first scan.
+
+    Args:
+        clutter: (S,) expected false boxes in a scan of each sensor.
+        p_detect: (S,) probability of detection.
+        undetected: expected number of vehicles.
+        trust: in each sensor.
+    """
+    num_sensors = len(clutter)
+    return Scene(
+        clutter=clutter.copy(),
+        p_detect=p_detect.copy(),
+        undetected=np.array([undetected]),
+        last_look=np.full(num_sensors, -np.inf),
+        claims=np.zeros(num_sensors),
+        agreed=np.zeros(num_sensors),
+        trust=np.full(num_sensors, trust),
+    )
 
 
 def allocate(capacity: int, num_sensors: int, num_errors: int = 0) -> TrackArrays:
@@ -94,6 +126,7 @@ def allocate(capacity: int, num_sensors: int, num_errors: int = 0) -> TrackArray
         t_birth=np.zeros(capacity),
         t_update=np.zeros(capacity),
         used=np.zeros(capacity, dtype=np.int64),
+        seen_by=np.zeros(capacity, dtype=np.int64),
     )
 
 

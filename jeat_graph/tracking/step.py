@@ -9,7 +9,7 @@ from jeat_graph.tracking.batch import Arrivals, prepare
 from jeat_graph.tracking.stages.associating import associate
 from jeat_graph.tracking.stages.beginning import give_birth
 from jeat_graph.tracking.stages.ending import confirm, remove_ended
-from jeat_graph.tracking.stages.learning import count_misses, learn_scene
+from jeat_graph.tracking.stages.learning import count_misses, learn_scene, learn_trust
 from jeat_graph.tracking.stages.predicting import current_p_detect, expect_detections, predict_all
 from jeat_graph.tracking.stages.updating import take_second_views, update_matched
 from jeat_graph.tracking.state import Scene, TrackArrays
@@ -44,14 +44,15 @@ def step(
     """
     n, settings = num_tracks, model.settings
     log.count[0] = 0
-    predict_all(tracks, n, dt, model)
+    predict_all(tracks, n, dt, scene, model)
     batch = prepare(arrivals, model)
     p_detect = current_p_detect(tracks, n, batch.present, model)
     expectation = expect_detections(tracks, n, model.sensors)
     association = associate(tracks, n, batch, expectation, p_detect, scene, model)
-    update_matched(tracks, n, batch, expectation, association, model, log)
+    update_matched(tracks, n, batch, expectation, association, scene, model, log)
     if settings.association.second_views:
         take_second_views(tracks, n, batch, association, model, log)
+    learn_trust(tracks, n, batch, association, scene, model)
     learn_scene(tracks, n, dt, batch, association, p_detect, scene, model)
     count_misses(tracks, n, batch, association, p_detect, settings)
     confirm(tracks, n, batch.t, settings)

@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
 
-import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.config.kernel_form import kernel_model
@@ -21,12 +20,12 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.notice import notice_if_cold
 from jeat_graph.tracking.prediction import Prediction, predict_reported
-from jeat_graph.tracking.reporting import report
+from jeat_graph.tracking.reporting import longest_gap_s, report
 from jeat_graph.tracking.scans import ScanLike, arrivals_of, as_scans
 from jeat_graph.tracking.sensor_state import SensorState, sensor_states
 from jeat_graph.tracking.smoothing.access import SmoothedTracks
 from jeat_graph.tracking.snapshot import Snapshot
-from jeat_graph.tracking.state import Scene, allocate, grow
+from jeat_graph.tracking.state import allocate, grow, start_scene
 from jeat_graph.tracking.step import step
 from jeat_graph.tracking.step_record import StepRecord, record_step
 from jeat_graph.tracking.update_log import allocate_log
@@ -67,10 +66,8 @@ class Tracker(SmoothedTracks):
         self._model = kernel_model(config)
         sensors = self._model.sensors
         self._tracks = allocate(_FIRST_CAPACITY, len(self.sensor_names), len(sensors.correlation_time_s))
-        self._scene = Scene(
-            clutter=sensors.clutter_per_scan.copy(),
-            p_detect=sensors.p_detect.copy(),
-            undetected=np.array([config.birth.initial]),
+        self._scene = start_scene(
+            sensors.clutter_per_scan, sensors.p_detect, config.birth.initial, config.lifecycle.prior_trust
         )
         self._num_tracks = 0
         self._next_id = 1
@@ -253,7 +250,10 @@ class Tracker(SmoothedTracks):
         t = 0.0 if self._t is None else self._t
         settings = self._model.settings
         by_existence = settings.lifecycle.by_existence
-        columns = report(self._tracks, self._num_tracks, t, settings.image, settings.output, by_existence)
+        gap = longest_gap_s(self._scene, self._model)
+        columns = report(
+            self._tracks, self._num_tracks, t, gap, settings.image, settings.output, by_existence
+        )
         return Trajectories(*columns, sensors=self.sensor_names)
 
     def last_updates(self) -> Diagnostics:

@@ -13,7 +13,7 @@ def warm_up() -> None:
     from jeat_graph.config.reading import load_config
     from jeat_graph.tracking.tracker import Tracker
 
-    for preset in ("default", "paper"):
+    for preset in ("default", "highway", "paper"):
         tracker = Tracker(load_config(preset))
         for k in range(20):
             box = [100.0 + 5.0 * k, 100.0, 40.0, 30.0]

@@ -46,7 +46,7 @@ def test_results_come_in_the_order_of_the_jobs(workers):
 
 
 def test_sequential_association_serves_the_slower_sensor_first():
-    default, paper = load_config("default"), load_config("paper")
+    default, paper = load_config("highway"), load_config("paper")
     rows = ours(default, paper, "default", ("rgb", "evt"))
     assert len({r.row for r in rows}) == len(rows)
     assert rows[0].config == default

@@ -6,21 +6,21 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from jeat_graph.benchmark.steps import STEPS, rows, start
+from jeat_graph.benchmark.steps import STEPS, rows, start, without
 from jeat_graph.config.reading import load_config
 from jeat_graph.simulation.scenario import load_scenario
 from jeat_graph.simulation.simulate import simulate
 from jeat_graph.tracking.tracker import track
 
 
-@pytest.mark.parametrize("target", ["default", "kitti"])
+@pytest.mark.parametrize("target", ["highway", "kitti"])
 def test_the_last_row_is_the_target_exactly(target):
     goal = load_config(target)
     assert rows(load_config("paper"), goal)[-1][1] == goal
 
 
 def test_the_first_row_is_the_paper_preset():
-    paper, default = load_config("paper"), load_config("default")
+    paper, default = load_config("paper"), load_config("highway")
     assert rows(paper, default)[0] == ("paper", start(paper, default))
     assert start(paper, default) == paper
 
@@ -33,19 +33,30 @@ def test_sensors_that_the_paper_does_not_know_get_its_rgb_constants():
 
 
 def test_every_step_changes_something():
-    configs = [config for _, config in rows(load_config("paper"), load_config("default"))]
+    configs = [config for _, config in rows(load_config("paper"), load_config("highway"))]
     assert len(configs) == len(STEPS) + 1
     assert all(a != b for a, b in pairwise(configs))
 
 
 def test_before_the_last_step_all_that_it_takes_is_still_to_come():
     # Nothing is left over for the last row to take silently: its own keys make the whole difference.
-    paper, goal = load_config("paper"), load_config("default")
+    paper, goal = load_config("paper"), load_config("highway")
     before = rows(paper, goal)[-2][1]
     assert replace(before, motion=goal.motion) == goal
 
 
 def test_all_rows_track():
     detections, _ = simulate(load_scenario("day"), seed=0, duration_s=1.0)
-    for _, config in rows(load_config("paper"), load_config("default")):
+    for _, config in rows(load_config("paper"), load_config("highway")):
         assert np.isfinite(track(config, detections).boxes).all()
+
+
+def test_each_row_without_a_part_differs_in_that_part_alone():
+    target = load_config("highway")
+    named = dict(without(target))
+    calm = named["all, without NIS adaptation"]
+    assert calm.noise.adaptation_rate == 0.0
+    assert replace(calm, noise=target.noise) == target
+    white = named["all, without errors with memory"]
+    assert {s.correlated_share for s in white.sensors.values()} == {0.0}
+    assert replace(white, sensors=target.sensors) == target

@@ -40,6 +40,11 @@ def test_detection_probability_and_clutter(found, known):
     assert found.sensors["rgb"].clutter_per_scan == pytest.approx(known.CLUTTER, rel=0.4)
 
 
+def test_precision_by_score_cannot_be_known(found, base):
+    assert found.sensors["rgb"].score_precision == base.sensors["rgb"].score_precision
+    assert found.sensors["rgb"].precision == base.sensors["rgb"].precision
+
+
 def test_steady_driving_gives_little_jerk(found):
     assert found.motion.jerk_per_size < 1.0
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.calibration.supervised import calibrate
-from jeat_graph.calibration.tune import knobs, plateau, shorten, tracking_score, tune
+from jeat_graph.calibration.tune import folds, knobs, plateau, shorten, tracking_score, tune
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.errors import DataError
 
@@ -37,7 +37,7 @@ def test_shortened_recordings_hold_the_beginning_of_each(recordings):
 def tuned(recordings):
     training = shorten(recordings, 300)
     start = calibrate(training, load_config("default"))
-    start = replace(start, output=replace(start.output, max_gap_s=5.0))
+    start = replace(start, output=replace(start.output, max_gap_scans=0.0, max_gap_s=5.0))
     return training, start, tune(start, training, passes=1)
 
 
@@ -49,9 +49,9 @@ def test_tuning_never_ends_below_its_start(tuned):
 def test_a_harmful_setting_is_repaired(tuned):
     # Vehicles that have left are reported for five seconds: that must not survive.
     training, start, (config, choices) = tuned
-    assert config.output.max_gap_s < 0.5
+    assert config.output.max_gap_scans > 0.0
     assert {c.name for c in choices} <= {k.name for k in knobs(start)}
-    assert tracking_score(config, training) > tracking_score(start, training) + 1.0
+    assert tracking_score(config, training) > tracking_score(start, training) + 0.5
 
 
 def test_tuning_is_deterministic(tuned):
@@ -63,6 +63,32 @@ def test_each_sensor_of_several_has_a_tempering_of_its_own():
     names = [k.name for k in knobs(load_config("default"))]
     assert "sensors.evt.tempering" in names
     assert "sensors.rgb.tempering" in names
+
+
+def test_a_single_recording_is_judged_in_two_halves_of_its_time(recordings):
+    detections, truth = recordings[0]
+    (first,), (second,) = folds(recordings[:1])
+    assert first[0].num_scans + second[0].num_scans == detections.num_scans
+    np.testing.assert_array_equal(np.concatenate([first[0].boxes, second[0].boxes]), detections.boxes)
+    assert len(first[1].t) + len(second[1].t) == len(truth.t)
+    assert first[1].t.max() <= first[0].scan_t[-1] < second[1].t.min()
+
+
+def test_a_setting_that_wins_on_one_half_only_is_not_chosen(recordings, monkeypatch):
+    from jeat_graph.calibration import tune as module
+
+    start = replace(load_config("highway"), output=replace(load_config("highway").output, max_gap_scans=0.5))
+    calls = {"parts": 0}
+
+    def score(config, part):
+        calls["parts"] += 1
+        first_half = part[0][0].scan_t[0] == recordings[0][0].scan_t[0]
+        return 50.0 + (10.0 if first_half else -1.0) * (config.output.max_gap_scans - 0.5)
+
+    monkeypatch.setattr(module, "tracking_score", score)
+    chosen, _ = tune(start, recordings[:1], passes=1)
+    assert calls["parts"] > 2
+    assert chosen.output.max_gap_scans == 0.5
 
 
 def test_no_recording_is_refused():

@@ -62,7 +62,7 @@ def test_a_configuration_without_its_sensors_is_refused_before_anything_is_writt
     config = tmp_path / "radar.yaml"
     config.write_text("sensors: {radar: {rate_hz: 10}}\n")
     message = fails("demo", "--config", config, "--out", tmp_path / "demo", *SHORT)
-    assert "sensor 'evt' is not declared (declared: radar)" in message
+    assert "sensors 'evt', 'rgb' are not declared (declared: radar)" in message
     assert not (tmp_path / "demo").exists()
 
 

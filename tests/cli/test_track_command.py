@@ -16,6 +16,7 @@ from jeat_graph.io.trajectories_io import read_trajectories
 from jeat_graph.tracking.tracker import track
 
 STEADY = [f"{k * 0.05:.2f},rgb,{100 + 2 * k},200,40,30,0.95" for k in range(30)]
+HIGHWAY = ("--config", "highway")
 
 
 def run_json(folder):
@@ -25,14 +26,14 @@ def run_json(folder):
 @pytest.fixture(scope="module")
 def run(recording, tmp_path_factory):
     folder = tmp_path_factory.mktemp("run") / "deep" / "er"
-    formats = ["--format", "parquet", "motchallenge", "kitti"]
+    formats = ["--config", "highway", "--format", "parquet", "motchallenge", "kitti"]
     assert main(["track", str(recording / "detections.csv"), "--out", str(folder), *formats]) == 0
     return folder
 
 
 def test_the_causal_table_is_what_the_tracker_reports_in_memory(run, recording):
     written = read_trajectories(run / "causal.csv")
-    expected = track(load_config("default"), read_detections(recording / "detections.csv"))
+    expected = track(load_config("highway"), read_detections(recording / "detections.csv"))
     np.testing.assert_array_equal(written.t, expected.t)
     np.testing.assert_array_equal(written.track_id, expected.track_id)
     np.testing.assert_allclose(written.boxes, expected.boxes, atol=5.1e-4)
@@ -53,7 +54,7 @@ def test_scans_csv_lists_every_scan_with_its_count(run, recording):
 def test_run_json_says_what_the_run_was_made_from(run, recording):
     record = run_json(run)
     assert record["inputs"][0]["sha256"] == sha256_of(recording / "detections.csv")
-    assert config_from_dict(record["config"]) == load_config("default")
+    assert config_from_dict(record["config"]) == load_config("highway")
     table = read_trajectories(run / "causal.csv")
     assert record["counts"]["causal_rows"] == len(table)
     assert record["counts"]["tracks_reported"] == len(np.unique(table.track_id))
@@ -61,7 +62,7 @@ def test_run_json_says_what_the_run_was_made_from(run, recording):
 
 
 def test_repetition_gives_the_same_bytes_in_every_table(run, recording, tmp_path):
-    formats = ["--format", "parquet", "motchallenge", "kitti"]
+    formats = ["--config", "highway", "--format", "parquet", "motchallenge", "kitti"]
     main(["track", str(recording / "detections.csv"), "--out", str(tmp_path / "again"), *formats])
     first, second = run_json(run), run_json(tmp_path / "again")
     assert first["files"] == second["files"]
@@ -82,7 +83,10 @@ def test_order_of_rows_and_split_into_files_do_not_matter(run, recording, tmp_pa
         body = [line for t in reversed(scans) for line in scans[t]]
         (tmp_path / f"{name}.csv").write_text("\n".join([lines[0], *body]) + "\n")
     out = tmp_path / "out"
-    assert main(["track", str(tmp_path / "evt.csv"), str(tmp_path / "rgb.csv"), "--out", str(out)]) == 0
+    assert (
+        main(["track", str(tmp_path / "evt.csv"), str(tmp_path / "rgb.csv"), "--out", str(out), *HIGHWAY])
+        == 0
+    )
     assert (out / "causal.csv").read_bytes() == (run / "causal.csv").read_bytes()
 
 
@@ -130,23 +134,46 @@ def test_a_file_without_rows_is_refused(write, tmp_path, fails):
     assert not (tmp_path / "run").exists()
 
 
-def test_an_undeclared_sensor_is_refused_with_the_way_to_declare_it(write, tmp_path, fails):
-    lines = [line.replace("rgb", "radar") for line in STEADY]
-    message = fails("track", write(*lines), "--out", tmp_path / "run")
-    assert "'radar' is not declared (declared: evt, rgb)" in message
-    setting = message.split("--set '")[1].split("'")[0]
-    assert setting == "sensors.radar={rate_hz: 20}"
-    assert main(["track", write(*lines), "--out", str(tmp_path / "run"), "--set", setting]) == 0
+def test_undeclared_sensors_are_refused_together_with_the_way_to_declare_them(write, tmp_path, fails):
+    lines = [line.replace("rgb", name) for line in STEADY for name in ("radar", "sonar")]
+    message = fails("track", write(*lines), "--out", tmp_path / "run", *HIGHWAY)
+    assert "sensors 'radar', 'sonar' are not declared (declared: evt, rgb)" in message
+    settings = [part.split("'")[0] for part in message.split("--set '")[1:]]
+    assert settings == ["sensors.radar={rate_hz: 20}", "sensors.sonar={rate_hz: 20}"]
+    declared = [word for setting in settings for word in ("--set", setting)]
+    assert main(["track", write(*lines), "--out", str(tmp_path / "run"), *HIGHWAY, *declared]) == 0
 
 
 def test_a_preset_that_declares_the_sensors_is_named(write, tmp_path, fails):
     lines = [line.replace("rgb", "lidar") for line in STEADY]
-    assert "use --config kitti" in fails("track", write(*lines), "--out", tmp_path / "run")
+    assert "use --config kitti" in fails("track", write(*lines), "--out", tmp_path / "run", *HIGHWAY)
+
+
+def test_the_default_declares_sensors_by_what_is_seen_of_them_and_says_so(write, tmp_path, capsys):
+    lines = [line.replace("rgb", "radar") for line in STEADY]
+    assert main(["track", write(*lines), "--out", str(tmp_path / "run")]) == 0
+    assert "'radar' is not declared: taken for a detector at 20 Hz" in capsys.readouterr().err
+    config = run_json(tmp_path / "run")["config"]
+    assert config["sensors"].keys() == {"radar"}
+    assert config["sensors"]["radar"]["rate_hz"] == pytest.approx(20.0)
+
+
+def test_the_default_takes_the_picture_to_reach_as_far_as_the_boxes(write, tmp_path, capsys):
+    lines = [f"{k * 0.05:.2f},rgb,{1500 + k},800,40,30,0.9" for k in range(20)]
+    assert main(["track", write(*lines), "--out", str(tmp_path / "run")]) == 0
+    image = run_json(tmp_path / "run")["config"]["image"]
+    assert (image["width"], image["height"]) == (1559.0, 830.0)
+    assert len(read_trajectories(tmp_path / "run" / "causal.csv")) > 0
+
+
+def test_boxes_without_area_are_counted(write, tmp_path, capsys):
+    assert main(["track", write(*STEADY, "0.0,rgb,5,5,0,9,0.9"), "--out", str(tmp_path / "run")]) == 0
+    assert "1 box(es) without area left out" in capsys.readouterr().err
 
 
 def test_boxes_of_another_picture_are_refused_with_their_extent(write, tmp_path, fails):
     lines = [f"{k * 0.05:.2f},rgb,{1500 + k},800,40,30,0.9" for k in range(20)]
-    message = fails("track", write(*lines), "--out", tmp_path / "run")
+    message = fails("track", write(*lines), "--out", tmp_path / "run", *HIGHWAY)
     assert "20 of 20 box centres lie outside the picture of 1280 x 720 px" in message
     assert "1520, 815 to 1539, 815" in message
     assert "--image WIDTHxHEIGHT" in message
@@ -155,14 +182,14 @@ def test_boxes_of_another_picture_are_refused_with_their_extent(write, tmp_path,
 
 def test_a_few_boxes_outside_the_picture_are_a_warning(write, tmp_path, capsys):
     lines = [*STEADY, "1.45,rgb,2000,100,10,10,0.5"]
-    assert main(["track", write(*lines), "--out", str(tmp_path / "run")]) == 0
+    assert main(["track", write(*lines), "--out", str(tmp_path / "run"), *HIGHWAY]) == 0
     assert "1 of 31 box centres" in capsys.readouterr().err
     assert "1 of 31 box centres" in run_json(tmp_path / "run")["warnings"][0]
 
 
 def test_a_clock_unlike_the_declared_one_is_a_warning(write, tmp_path, capsys):
     lines = [f"{k * 0.2:.2f},rgb,100,200,40,30,0.9" for k in range(10)]
-    assert main(["track", write(*lines), "--out", str(tmp_path / "run")]) == 0
+    assert main(["track", write(*lines), "--out", str(tmp_path / "run"), *HIGHWAY]) == 0
     assert "'rgb' scans at 5 Hz, but is declared with 20 Hz" in capsys.readouterr().err
 
 
@@ -178,7 +205,7 @@ def test_an_error_leaves_an_earlier_run_as_it_was(write, tmp_path, fails):
     before = {path.name: path.read_bytes() for path in out.iterdir()}
     # Frames before frame 0 cannot be written: the error comes at the very end of the run.
     early = [f"{k * 0.05 - 5:.2f},{line.split(',', 1)[1]}" for k, line in enumerate(STEADY)]
-    fails("track", write(*early, name="early.csv"), "--out", out, "--format", "kitti")
+    fails("track", write(*early, name="early.csv"), "--out", out, "--format", "kitti", *HIGHWAY)
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.eval.load import restrict_classes
+from jeat_graph.eval.load import check_classes, restrict_classes
 from jeat_graph.eval.metrics import evaluate
 from jeat_graph.eval.pairing import check_lives
 
@@ -104,4 +104,11 @@ def test_a_class_that_is_not_there_is_named_with_those_that_are():
     truth = make_truth([0.0, 0.0], [1, 2], BOX[:2], classes=np.array(["Car", "Van"]))
     assert restrict_classes(truth, ["Van"]).ignore.tolist() == [True, False]
     with pytest.raises(DataError, match="the truth has: Car, Van"):
-        restrict_classes(truth, ["car"])
+        check_classes([truth], ["car"])
+
+
+def test_a_truth_without_a_class_that_another_has_is_judged_with_nothing_to_find():
+    cars = make_truth([0.0], [1], BOX[:1], classes=np.array(["Car"]))
+    vans = make_truth([0.0], [1], BOX[:1], classes=np.array(["Van"]))
+    check_classes([cars, vans], ["Car"])
+    assert restrict_classes(vans, ["Car"]).ignore.all()

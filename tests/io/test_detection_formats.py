@@ -78,7 +78,7 @@ class TestMotChallenge:
                 "score must be in [0, 1], got 12.5; for 0 to 100 give",
             ),
             ("2,-1,10,20,30,x,0.9,-1,-1,-1", "height must be a number, got 'x'"),
-            ("2,-1,10,20,30,0,0.9,-1,-1,-1", "width and height must be positive"),
+            ("2,-1,10,20,30,-1,0.9,-1,-1,-1", "width and height must be positive"),
             ("2,-1,10,20,30,40,0.9", "7 fields, but the first line has 10"),
         ],
     )
@@ -229,7 +229,7 @@ class TestCoco:
             ('[{"image_id": 1, "bbox": [1,2,3,4]}]', "entry 1: score must be a finite number"),
             ('[{"image_id": 1, "bbox": [1,2,3,4], "score": 3}]', "entry 1: score must be in [0, 1]"),
             (
-                '[{"image_id": 1, "bbox": [1,2,0,4], "score": 1}]',
+                '[{"image_id": 1, "bbox": [1,2,-1,4], "score": 1}]',
                 "entry 1: width and height must be positive",
             ),
         ],

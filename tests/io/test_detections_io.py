@@ -109,7 +109,7 @@ def test_the_order_of_rows_does_not_matter_but_for_boxes_of_one_scan(write):
         ("0.5,rgb,1,2,3,4,", "score is missing"),
         ("0.5,rgb,nan,2,3,4,0.9", "left must be a finite number, got nan"),
         ("0.5,rgb,1,inf,3,4,0.9", "top must be a finite number, got inf"),
-        ("0.5,rgb,1,2,0,4,0.9", "width and height must be positive"),
+        ("0.5,rgb,1,2,-1,4,0.9", "width and height must be positive"),
         ("0.5,rgb,1,2,3,-4,0.9", "width and height must be positive"),
         ("0.5,rgb,1,2,3,4,1.5", "score must be in [0, 1], got 1.5; for 0 to 100 give --score-scale percent"),
         ("0.5,rgb,1,2,3,4,-1", "score must be in [0, 1], got -1"),
@@ -123,6 +123,14 @@ def test_a_bad_row_is_named_by_its_line(write, row, words):
         read_detections(path)
     assert str(caught.value).startswith(f"{path}:5: ")
     assert words in str(caught.value)
+
+
+def test_a_box_without_area_is_left_out_and_counted_and_its_scan_is_there(write):
+    found = read_detections(
+        write("d.csv", lines("0,rgb,1,2,0,4,0.9", "1,rgb,1,2,3,4,0.9", "1,rgb,1,2,3,0,0.9"))
+    )
+    assert (found.dropped, len(found), found.scan_t.tolist()) == (2, 1, [0.0, 1.0])
+    assert Detections.concatenate([found, found]).dropped == 4
 
 
 def test_scores_of_other_scales_are_brought_to_one(write):

@@ -51,7 +51,7 @@ def run(batches, config, save_at=(), folder=None, resume=False):
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_loaded_tracker_goes_on_with_the_same_bytes(engine, batches, tmp_path):
-    config = load_config("default", [*OVERRIDES, f"smoother.engine={engine}"])
+    config = load_config("highway", [*OVERRIDES, f"smoother.engine={engine}"])
     moments = (0, 1, 17, 60, 61, 100, 141)
     causal, smoothed = run(batches, config, moments, tmp_path)
     again_causal, again_smoothed = run(batches, config, moments, tmp_path, resume=True)
@@ -66,7 +66,7 @@ def test_a_loaded_tracker_goes_on_with_the_same_bytes(engine, batches, tmp_path)
 
 
 def test_a_live_tracker_is_saved_with_the_scans_that_may_be_taken_again(batches, tmp_path):
-    config = load_config("default", OVERRIDES)
+    config = load_config("highway", OVERRIDES)
     scans = [scan for batch in batches for scan in batch]
     rng = np.random.default_rng(2)
     order = np.argsort([scan.t for scan in scans] + rng.uniform(0.0, 0.2, len(scans)))
@@ -88,8 +88,8 @@ def test_a_live_tracker_is_saved_with_the_scans_that_may_be_taken_again(batches,
 
 def test_a_file_of_other_settings_or_of_another_version_is_refused_with_a_sentence(tmp_path, monkeypatch):
     path = tmp_path / "state.npz"
-    Tracker("default").save(path)
-    other = load_config("default", ["motion.jerk_px=7"])
+    Tracker("highway").save(path)
+    other = load_config("highway", ["motion.jerk_px=7"])
     with pytest.raises(JeatGraphError, match=r"other settings: motion\.jerk_px was .*, not 7"):
         Tracker.load(path, other)
     monkeypatch.setattr("jeat_graph.tracking.checkpoint.__version__", "99.0")
@@ -131,7 +131,7 @@ def crowd(tracker, steps):
 
 
 def test_a_checkpoint_of_twenty_vehicles_is_small_and_costs_little(tmp_path, full, capsys):
-    tracker = Tracker(load_config("default"))
+    tracker = Tracker(load_config("highway"))
     crowd(tracker, 400)
     tracker.drain_smoothed()  # as a live caller does now and then
     took = []

@@ -13,7 +13,7 @@ from jeat_graph.live.health import SensorHealth
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.tracking.tracker import Tracker
 
-CONFIG = load_config("default", ["smoother.engine=none"])
+CONFIG = load_config("highway", ["smoother.engine=none"])
 START, SPEED = np.array([[200.0, 200.0], [700.0, 300.0], [400.0, 500.0]]), np.array([30.0, -30.0, 25.0])
 
 

@@ -19,8 +19,8 @@ from jeat_graph.simulation.scenario import load_scenario
 from jeat_graph.simulation.simulate import record
 from jeat_graph.tracking.tracker import Tracker
 
-CONFIG = load_config("default", ["smoother.lag_s=0.4", "smoother.chunk=8"])
-CAUSAL = load_config("default", ["smoother.engine=none"])
+CONFIG = load_config("highway", ["smoother.lag_s=0.4", "smoother.chunk=8"])
+CAUSAL = load_config("highway", ["smoother.engine=none", "output.max_gap_scans=0"])
 MOST_LATE_S = 0.3
 
 
@@ -118,7 +118,7 @@ def scan(t, sensor="rgb"):
 
 
 def test_what_comes_too_late_or_twice_is_passed_over_and_counted():
-    config = load_config("default", ["live.late_s=0.2", "sensors.evt.late_s=0.05", "smoother.engine=none"])
+    config = load_config("highway", ["live.late_s=0.2", "sensors.evt.late_s=0.05", "smoother.engine=none"])
     live = LiveTracker(Tracker(config))
     live.step(scan(1.0))
     assert not live.step(scan(0.8)).dropped
@@ -154,7 +154,7 @@ def test_the_other_policies_pass_over_or_refuse():
 
 
 def test_a_known_latency_is_taken_off_the_time():
-    config = load_config("default", ["sensors.rgb.latency_s=0.08", "smoother.engine=none"])
+    config = load_config("highway", ["sensors.rgb.latency_s=0.08", "smoother.engine=none"])
     live, plain = LiveTracker(Tracker(config)), Tracker(config)
     for k in range(30):
         live.step(scan(0.02 * k, "evt"))

@@ -22,7 +22,7 @@ def test_a_killed_camera_goes_on_where_it_was(simulated, tmp_path):
     exec(compile(recipe, "recipe", "exec"), names)
     detections = read_detections(simulated(1) / "detections.csv")
     scans = [detections.scan(k) for k in range(detections.num_scans)]
-    alone = LiveTracker(Tracker("default"))
+    alone = LiveTracker(Tracker("highway"))
     expected = [alone.step(scan).table for scan in scans]
     ray.init(num_cpus=2, include_dashboard=False, logging_level="error", log_to_driver=False)
     try:

@@ -63,7 +63,7 @@ def after_confirm(settings, before, earned, *, by_existence):
 
 @pytest.mark.parametrize("patterns", [all_of_a_few, many])
 def test_a_flag_is_set_where_it_is_earned_and_stays_where_it_was(patterns):
-    settings = kernel_settings(load_config("default"))
+    settings = kernel_settings(load_config("highway"))
     for before, earned in patterns():
         n = len(before)
         found, existence, as_before = after_confirm(settings, before, earned, by_existence=True)

@@ -10,7 +10,7 @@ from jeat_graph.data.detections import LARGEST_PX, SMALLEST_PX, Detections, Scan
 from jeat_graph.data.errors import DataError, TimeOrderError, UnknownSensorError
 from jeat_graph.tracking.tracker import track
 
-PRESETS = ("default", "paper")
+PRESETS = ("default", "highway", "paper")
 # Most of this is about the filter; one test below lets the presets' smoothers run as well.
 CONFIGS = {name: load_config(name, ["smoother.engine=none"]) for name in PRESETS}
 SENSORS = CONFIGS["default"].sensor_names
@@ -248,7 +248,7 @@ def test_the_paper_keeps_two_tracks_on_a_vehicle_that_two_sensors_see_and_the_de
         for k in range(30):
             table = tracker.step([(0.05 * k, "rgb", *box), (0.05 * k, "evt", *box)])
         reported[preset] = len(table)
-    assert reported == {"paper": 2, "default": 1}
+    assert reported == {"paper": 2, "default": 1, "highway": 1}
 
 
 def test_the_table_says_which_sensors_were_used():

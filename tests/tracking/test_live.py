@@ -45,7 +45,7 @@ def bytes_held(owner):
     return total
 
 
-@pytest.mark.parametrize("preset", ["default", "paper"])
+@pytest.mark.parametrize("preset", ["highway", "paper"])
 def test_memory_and_capacity_are_flat_over_minutes_of_100_hz_input(preset):
     tracker, peak, held = Tracker(load_config(preset, PLAIN)), 0, []
     for k, scan in enumerate(scans_100_hz(10_000)):
@@ -100,7 +100,7 @@ def test_growing_one_row_at_a_time_copies_seldom():
 
 def test_many_tracks_survive_growth_in_the_middle_of_a_run():
     grid = np.array([[60.0 * (k % 20), 60.0 * (k // 20), 40.0, 30.0] for k in range(200)])
-    tracker = Tracker(load_config("default", PLAIN))
+    tracker = Tracker(load_config("highway", PLAIN))
     for k in range(10):
         tracker.step((0.05 * k, "rgb", grid[:40], np.full(40, 0.95)))
     first = tracker.causal().track_id

@@ -7,8 +7,11 @@ from jeat_graph import Tracker, load_config
 
 STEP = 0.05
 
+# Not by scans.
+ONLY_BY_TIME = ("output.max_gap_scans=0",)
 
-def follow(overrides=(), steps=30, box=(100.0, 100.0, 40.0, 30.0), velocity=(0.0, 0.0), preset="default"):
+
+def follow(overrides=(), steps=30, box=(100.0, 100.0, 40.0, 30.0), velocity=(0.0, 0.0), preset="highway"):
     """Track one vehicle with the RGB camera; returns the tracker, the last table and the last time."""
     tracker = Tracker(load_config(preset, ["smoother.engine=none", *overrides]))
     for k in range(steps):
@@ -35,13 +38,15 @@ def test_one_look_confirms_nothing():
 
 def test_a_track_is_reported_until_the_longest_gap_has_passed():
     for gap, rows in ((0.19, 1), (0.21, 0)):
-        tracker, _, t = follow(["output.max_gap_s=0.2", "output.min_existence=0", "standing.enabled=false"])
+        tracker, _, t = follow(
+            [*ONLY_BY_TIME, "output.max_gap_s=0.2", "output.min_existence=0", "standing.enabled=false"]
+        )
         assert len(tracker.step((t + gap, "evt", [], []))) == rows
 
 
 def test_a_doubted_track_is_not_reported():
     tracker, table, t = follow(
-        ["output.max_gap_s=9", "lifecycle.max_gap_confirmed_s=9"], velocity=(60.0, 0.0)
+        [*ONLY_BY_TIME, "output.max_gap_s=9", "lifecycle.max_gap_confirmed_s=9"], velocity=(60.0, 0.0)
     )
     existence = table.existence[0]
     reported = []

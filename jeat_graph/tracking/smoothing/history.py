@@ -10,7 +10,7 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.smoothers.engine import TrackSmoother, make_smoother
 from jeat_graph.smoothers.measurements import concatenate_measurements
 from jeat_graph.smoothers.track_data import COINCIDENT_S, SmoothedTrack
-from jeat_graph.tracking.smoothing.observation_times import ObservationTimes
+from jeat_graph.tracking.smoothing.observation_times import BELIEVED, ObservationTimes
 from jeat_graph.tracking.smoothing.priors import ErrorStates, prior_of, size_prior_of
 from jeat_graph.tracking.smoothing.rows import rows_of
 from jeat_graph.tracking.smoothing.sizes import SizeWindow
@@ -48,6 +48,7 @@ class TrackHistory:
         self._sizes: SizeWindow | None = None
         self._waiting = -1  # measurements that the smoother has not had; the birth does not count
         self._fed = 0  # pieces of `measurements` that it has had
+        self._known = False  # whether it was believed in at a step whose row has been made
         self._last = -np.inf  # time of the last measurement
 
     @property
@@ -147,7 +148,9 @@ class TrackHistory:
         rows, end = self._rows(piece, float(piece.t[-1])), float(piece.t[-2])
         self._sizes.advance(end)
         observed = self.observed
-        self._observed = [observed.select(slice(int(np.searchsorted(observed.t, piece.t[-1])), None))]
+        first = int(np.searchsorted(observed.t, piece.t[-1]))
+        self._known = self._known or bool((observed.existence[:first] >= BELIEVED).any())
+        self._observed = [observed.select(slice(first, None))]
         return rows
 
     def _rows(self, piece: SmoothedTrack, end: float) -> list[Trajectories]:
@@ -157,10 +160,9 @@ class TrackHistory:
         chosen = (observed.t < end) & ((observed.t <= self._last + COINCIDENT_S) | observed.held)
         # Of two steps at one time the later one counts.
         chosen[:-1] &= observed.t[1:] > observed.t[:-1]
+        existence = observed.hindsight(self._config.lifecycle.lifetime_s, self._known)
+        chosen &= existence >= self._config.smoother.min_existence
         if not chosen.any():
             return []
-        existence = observed.hindsight()[chosen]
-        rows = rows_of(
-            self.track_id, piece, self._sizes.smooth(), observed.select(chosen), existence, self._config
-        )
-        return [rows]
+        kept = observed.select(chosen)
+        return [rows_of(self.track_id, piece, self._sizes.smooth(), kept, existence[chosen], self._config)]

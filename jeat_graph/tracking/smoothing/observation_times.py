@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,6 +11,11 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 
+#: A track has been taken for a vehicle once its existence was at least this.
+BELIEVED = 0.5
+#: How often one that has gone comes back to just where it would have been, against one that comes first.
+RETURNS = 0.02
+
 
 @dataclass(frozen=True, eq=False)
 class ObservationTimes:
@@ -17,7 +23,7 @@ class ObservationTimes:
 
     Attributes:
         t: (K,) times of the steps (s), ascending.
-        existence: (K,) causal probability that the track is a vehicle.
+        existence: (K,) causal probability that the track is a vehicle; NaN where it had no state.
         used: (K,) bit k is set where a detection of sensor k was taken.
         held: (K,) whether it was reported as standing still, if need be without any detection.
     """
@@ -45,7 +51,7 @@ class ObservationTimes:
         """Return times `t` (K,) between two fragments of one vehicle."""
         count = len(t)
         return ObservationTimes(
-            t, np.zeros(count), np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.bool_)
+            t, np.full(count, np.nan), np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.bool_)
         )
 
     @staticmethod
@@ -62,9 +68,68 @@ class ObservationTimes:
             np.concatenate([part.held for part in parts]),
         )
 
-    def hindsight(self) -> FloatArray:
-        """Existence (K,) seen from the end: what exists later has existed since its birth.
+    def hindsight(self, lifetime_s: float, known: bool = False) -> FloatArray:
+        """Probability (K,) that the track is a vehicle at each step, given its whole life.
 
-        The greatest of the causal probabilities from each step on, a lower bound of the smoothed one.
+        What each look said is the step of the causal log odds that it made; a backward pass over these looks
+        (forward-backward smoothing of a chain of two states, present and not) adds what came after. Before it
+        was believed in, a vehicle may have come at any time, so a track may begin with what was none; from
+        then on "not present" means that it has gone, for good.
+
+        Args:
+            lifetime_s: mean time a vehicle stays, and mean time until one comes (s).
+            known: whether it was believed in before the first of these steps.
         """
-        return np.asarray(np.maximum.accumulate(self.existence[::-1])[::-1])
+        if not len(self):
+            return np.zeros(0)
+        seen = np.isfinite(self.existence)
+        odds = _log_odds(np.where(seen, self.existence, 0.5))
+        gone = known | (np.maximum.accumulate(np.where(seen, self.existence, 0.0)) >= BELIEVED)
+        later = 0.0  # ln of what the future says for presence against absence
+        out = np.empty(len(self))
+        gained = 0.0
+        for k in range(len(self) - 1, -1, -1):
+            if k + 1 < len(self):
+                change = -math.expm1(-(self.t[k + 1] - self.t[k]) / lifetime_s)
+                later = _passed(later + gained, change, change * (RETURNS if gone[k] else 1.0))
+            out[k] = odds[k] + later if seen[k] else later
+            if k > 0 and seen[k] and seen[k - 1]:
+                before = _predicted(odds[k - 1], -math.expm1(-(self.t[k] - self.t[k - 1]) / lifetime_s))
+                gained = odds[k] - before
+            else:
+                gained = 0.0
+        if not seen.all():
+            # Between two fragments the vehicle was there if it was at their ends.
+            out[~seen] = np.minimum(_held(out, seen), _held(out[::-1], seen[::-1])[::-1])[~seen]
+        return np.asarray(1.0 / (1.0 + np.exp(-np.clip(out, -_MOST_ODDS, _MOST_ODDS))))
+
+
+def _log_odds(p: FloatArray) -> FloatArray:
+    return np.asarray(np.clip(np.log(np.maximum(p, 1e-12)) - np.log(np.maximum(1.0 - p, 1e-12)), -20.0, 20.0))
+
+
+def _predicted(odds: float, change: float) -> float:
+    """Log odds after a time in which presence ends with probability `change`."""
+    p = (1.0 - change) / (1.0 + math.exp(-odds))
+    return math.log(p) - math.log1p(-p)
+
+
+def _passed(future: float, end: float, begin: float) -> float:
+    """Log odds that the future gives the state before a step.
+
+    Args:
+        future: log odds that it gives the state after it.
+        end: probability that presence ends in the step.
+        begin: probability that it begins.
+    """
+    ratio = math.exp(min(max(future, -_MOST_ODDS), _MOST_ODDS))
+    return math.log((1.0 - end) * ratio + end) - math.log((1.0 - begin) + begin * ratio)
+
+
+def _held(values: FloatArray, known: BoolArray) -> FloatArray:
+    """The last known value (K,) at each place; the first known one before it."""
+    index = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
+    return values[np.where(index >= 0, index, int(np.argmax(known)))]
+
+
+_MOST_ODDS = 40.0

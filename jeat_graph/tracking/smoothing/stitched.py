@@ -123,6 +123,11 @@ def _join(parts: Sequence[TrackHistory], scan_t: FloatArray, config: Config) -> 
         if k + 1 < len(parts):
             # The earlier fragment may still have coasted when the later one was born.
             mine = mine.select(mine.t < births[k + 1])
+            # What it missed after its last detection, it missed because the vehicle was hidden.
+            found = np.flatnonzero(mine.used)
+            last = int(found[-1]) + 1 if len(found) else 0
+            unseen = ObservationTimes.unseen(mine.t[last:])
+            mine = ObservationTimes.concatenate([mine.select(slice(0, last)), unseen])
             # At a low output rate a fragment may have lived between two rows.
             since = mine.t[-1] if len(mine) else births[k]
             low = int(np.searchsorted(scan_t, since, side="right"))

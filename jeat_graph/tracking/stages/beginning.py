@@ -49,7 +49,7 @@ def give_birth(
         start_track(tracks, n + b, next_id + b, batch, parents[b], model, log)
         tracks.existence[n + b] = existence[parents[b]]
         tracks.p_detect[n + b] = scene.p_detect
-        tracks.hidden[n + b] = settings.lifecycle.hidden_prior
+        tracks.hidden[n + b] = settings.lifecycle.hidden_prior * scene.trust[batch.sensor[parents[b]]]
         tracks.hidden[n + b, batch.sensor[parents[b]]] = 0.0
     for j in range(len(partner)):
         if partner[j] >= 0:
@@ -130,6 +130,7 @@ def start_track(
     tracks.t_birth[i] = t
     tracks.t_update[i] = t
     tracks.used[i] = 1 << s
+    tracks.seen_by[i] = 1 << s
     if len(log.rows) > 0:
         jerk = jerk_of(tracks, i, model.settings)
         log_update(log, track_id, j, batch, white, coloured_std, jerk, sensors)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from numba import njit
 
 from jeat_graph.config.kernel_form import Model, Settings
@@ -15,6 +17,10 @@ from jeat_graph.tracking.state import Scene, TrackArrays
 _LEAST_CLUTTER = 0.1
 # A few tracks say less of a sensor than many; ten count in full.
 _LOOK_WEIGHT = 0.1
+# A track of so many detections has lasted; before that, others have hardly had the time to see it.
+_LASTING_HITS = 4
+# What is known of a sensor beforehand weighs as much as so many seconds of a track.
+_PRIOR_CLAIMS = 5.0
 
 
 @njit(cache=True)
@@ -45,6 +51,46 @@ def count_misses(
             tracks.p_detect[i, s] = max(
                 own - lifecycle.p_detect_weight * visible * own, lifecycle.p_detect_min
             )
+
+
+@njit(cache=True)
+def learn_trust(
+    tracks: TrackArrays, n: int, batch: Batch, association: Association, scene: Scene, model: Model
+) -> None:
+    """Follow how far each present sensor is borne out by the others, in place.
+
+    A detection on a track that has lasted is borne out where another sensor has ever seen that track. A
+    sensor that is mostly alone where others look and see vehicles takes false things for vehicles again and
+    again. A look at a moment when the others are blind (their P_D is low) counts little; while a sensor is
+    the only one that looks, nothing is learnt of it.
+    """
+    lifecycle, sensors = model.settings.lifecycle, model.sensors
+    for s in range(len(batch.present)):
+        if batch.present[s]:
+            scene.last_look[s] = batch.t
+    if lifecycle.disagreement <= 0.0:
+        return
+    for s in range(len(batch.present)):
+        if not batch.present[s]:
+            continue
+        sharpest = 0.0
+        for other in range(len(batch.present)):
+            if other != s and batch.t - scene.last_look[other] <= lifecycle.max_gap_confirmed_s:
+                sharpest = max(sharpest, scene.p_detect[other])
+        if sharpest == 0.0:
+            continue
+        kept = math.exp(-sensors.period_s[s] / lifecycle.disagreement_memory_s)
+        scene.claims[s] *= kept
+        scene.agreed[s] *= kept
+        # Detections of one track are no independent witnesses: a second of them is one.
+        weight = sharpest * sensors.period_s[s]
+        for i in range(n):
+            if association.match[i, s] >= 0 and tracks.hits[i] >= _LASTING_HITS:
+                scene.claims[s] += weight
+                if tracks.seen_by[i] & ~(1 << s):
+                    scene.agreed[s] += weight
+        agreed = scene.agreed[s] + _PRIOR_CLAIMS * lifecycle.agreement_prior
+        scene.trust[s] = (agreed / (scene.claims[s] + _PRIOR_CLAIMS)) ** lifecycle.disagreement
 
 
 @njit(cache=True)

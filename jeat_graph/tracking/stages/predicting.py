@@ -16,7 +16,7 @@ from jeat_graph.filters.existence import motion_visibility
 from jeat_graph.filters.jerk import track_jerk
 from jeat_graph.filters.kalman import predict, predict_size
 from jeat_graph.filters.noise import base_variance
-from jeat_graph.tracking.state import TrackArrays
+from jeat_graph.tracking.state import Scene, TrackArrays
 
 # A small rest remains: what should be invisible is still taken if it is detected.
 _LEAST_VISIBLE = 1e-5
@@ -38,7 +38,25 @@ def jerk_of(tracks: TrackArrays, i: int, settings: Settings) -> float:
 
 
 @njit(cache=True)
-def predict_all(tracks: TrackArrays, n: int, dt: float, model: Model) -> None:
+def most_trusted(seen_by: int, trust: FloatArray) -> float:
+    """Greatest trust among the sensors that have seen a track.
+
+    "Hidden from you" is an excuse for a sensor that misses a track; what only a sensor of little trust has
+    ever seen is excused less.
+
+    Args:
+        seen_by: bit s is set where sensor s has seen it.
+        trust: (S,) of the sensors.
+    """
+    best = 0.0
+    for s in range(len(trust)):
+        if seen_by >> s & 1:
+            best = max(best, trust[s])
+    return best
+
+
+@njit(cache=True)
+def predict_all(tracks: TrackArrays, n: int, dt: float, scene: Scene, model: Model) -> None:
     """Predict motion, size and existence of the first `n` tracks by `dt` seconds, in place."""
     tracks.used[:n] = 0
     if dt <= 0.0:
@@ -60,8 +78,11 @@ def predict_all(tracks: TrackArrays, n: int, dt: float, model: Model) -> None:
         relax = 1.0 - math.exp(-dt / lifecycle.hidden_memory_s)
         for i in range(n):
             tracks.existence[i] *= survival
+            believed = lifecycle.hidden_prior * most_trusted(tracks.seen_by[i], scene.trust)
             for s in range(tracks.hidden.shape[1]):
-                tracks.hidden[i, s] += relax * (lifecycle.hidden_prior - tracks.hidden[i, s])
+                known = tracks.seen_by[i] >> s & 1
+                usual = lifecycle.hidden_prior if known else believed
+                tracks.hidden[i, s] += relax * (usual - tracks.hidden[i, s])
 
 
 @njit(cache=True)

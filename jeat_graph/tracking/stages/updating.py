@@ -24,7 +24,7 @@ from jeat_graph.filters.standing import (
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.predicting import Expectation, expect_detections, jerk_of
-from jeat_graph.tracking.state import TrackArrays
+from jeat_graph.tracking.state import Scene, TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog, log_innovation, log_update
 
 
@@ -112,6 +112,7 @@ def update_track(
     tracks.hits[i] += 1
     tracks.t_update[i] = batch.t
     tracks.used[i] |= 1 << s
+    tracks.seen_by[i] |= 1 << s
 
 
 @njit(cache=True)
@@ -121,6 +122,7 @@ def update_matched(
     batch: Batch,
     expectation: Expectation,
     association: Association,
+    scene: Scene,
     model: Model,
     log: UpdateLog,
 ) -> None:
@@ -137,7 +139,9 @@ def update_matched(
             update_track(tracks, i, batch, j, noise, model, log)
             if lifecycle.by_existence:
                 tracks.existence[i] = existence_after_hit(
-                    tracks.existence[i], association.evidence[i, s], sensors.tempering[s]
+                    tracks.existence[i],
+                    association.evidence[i, s],
+                    sensors.tempering[s] * scene.trust[s],
                 )
             tracks.hidden[i, s] = 0.0
             p = tracks.p_detect[i, s] + lifecycle.p_detect_weight * (1.0 - tracks.p_detect[i, s])

@@ -38,7 +38,7 @@ def collect(config, detections):
 
 def test_nis_is_that_of_an_independent_filter_over_the_same_measurements(recording):
     config = load_config(
-        "default", ["standing.enabled=false", "motion.jerk_per_size=0", "motion.jerk_per_growth=0"]
+        "highway", ["standing.enabled=false", "motion.jerk_per_size=0", "motion.jerk_per_growth=0"]
     )
     one_sensor = recording.select(["rgb"])
     table = collect(config, one_sensor)
@@ -52,8 +52,8 @@ def test_nis_is_that_of_an_independent_filter_over_the_same_measurements(recordi
 
 
 def test_noise_scale_is_the_one_before_the_detection_adapted_it_by_equation_5(recording):
-    noise = load_config("default").noise
-    table = collect(load_config("default"), recording)
+    noise = load_config("highway").noise
+    table = collect(load_config("highway"), recording)
     pairs = np.unique(np.stack([table.track_id, table.sensor]), axis=1).T
     checked = 0
     for track_id, sensor in pairs.tolist():
@@ -106,8 +106,8 @@ def test_a_run_without_the_option_removes_the_table_of_an_earlier_one(tmp_path, 
 
 
 def test_it_works_without_a_smoother_too(recording):
-    with_smoother = collect(load_config("default"), recording)
-    without = collect(load_config("default", ["smoother.engine=none"]), recording)
+    with_smoother = collect(load_config("highway"), recording)
+    without = collect(load_config("highway", ["smoother.engine=none"]), recording)
     np.testing.assert_array_equal(with_smoother.nis, without.nis)
 
 
@@ -131,7 +131,7 @@ def test_what_is_written_is_read_again(tmp_path: Path):
 
 def test_a_tracker_without_diagnostics_says_how_to_get_them():
     with pytest.raises(JeatGraphError, match="diagnostics=True"):
-        Tracker(load_config("default")).last_updates()
+        Tracker(load_config("highway")).last_updates()
 
 
 @pytest.mark.parametrize(

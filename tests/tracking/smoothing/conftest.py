@@ -38,7 +38,7 @@ def recording(duration=3.0, cars=((0.0, 99.0, {}),), blind=(), seed=0, noise=1.5
 
 
 def make_tracker(*overrides):
-    return Tracker(load_config("default", overrides))
+    return Tracker(load_config("highway", overrides))
 
 
 def run(tracker, detections):

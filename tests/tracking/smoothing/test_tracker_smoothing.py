@@ -148,12 +148,21 @@ def test_the_output_rate_changes_which_rows_there_are_and_not_what_they_say(one_
     assert np.array_equal(every.take(np.isin(every.t, thinned.t)).mean, thinned.mean)
 
 
-def test_existence_in_hindsight_never_rises_from_one_row_to_the_next(one_car):
+def test_a_vehicle_that_stays_was_there_from_the_start(one_car):
     tracker = make_tracker("smoother.engine=rts")
     run(tracker, one_car)
-    existence = tracker.finish().existence
-    assert np.all(np.diff(existence) <= 0.0)
-    assert existence[0] > 0.9
+    assert tracker.finish().existence.min() > 0.9
+
+
+def test_only_rows_that_are_probable_are_written(one_car):
+    tables = []
+    for least in (0.0, 0.99999):
+        tracker = make_tracker("smoother.engine=rts", f"smoother.min_existence={least}")
+        run(tracker, one_car)
+        tables.append(tracker.finish())
+    every, sure = tables
+    assert 0 < len(sure) < len(every)
+    np.testing.assert_array_equal(sure.t, every.t[every.existence >= 0.99999])
 
 
 def test_boxes_are_clipped_to_the_picture_and_centres_are_not():

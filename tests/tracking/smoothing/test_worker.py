@@ -111,7 +111,7 @@ def test_work_that_kills_every_worker_ends_with_an_error():
 
 @pytest.mark.parametrize("call", ["smoothed", "finish"])
 def test_an_error_in_the_worker_reaches_whoever_waits_for_it_and_all_who_ask_later(call):
-    worker = SmoothingWorker(load_config("default"))
+    worker = SmoothingWorker(load_config("highway"))
     worker._send("consume", "no packet")
     with pytest.raises(AttributeError) as error:
         getattr(worker, call)()
@@ -269,7 +269,7 @@ def test_the_work_of_a_packet_is_spread_over_the_steps_that_follow():
 
 
 def test_packets_depend_on_the_steps_alone():
-    recorder = StepRecorder(load_config("default", ["smoother.chunk=5"]))
+    recorder = StepRecorder(load_config("highway", ["smoother.chunk=5"]))
     tracker = make_tracker("smoother.engine=none")
     sizes = []
     for table in tracker.run(recording(duration=0.5)):

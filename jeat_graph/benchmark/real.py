@@ -1,0 +1,181 @@
+"""`jeat-graph benchmark real`: real detectors that nothing here was made for, and simulated odd ones.
+
+Every set of real recordings is tracked as it comes, after blind calibration and after calibration with truth
+on the set's other recordings; both tables are judged, and so are the peers, with their defaults and tuned on
+the judged recordings themselves.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jeat_graph.benchmark import common
+from jeat_graph.benchmark.contenders import NAMES
+from jeat_graph.benchmark.judging import in_processes, summarise
+from jeat_graph.benchmark.peer_cache import PeerCache, cache_key
+from jeat_graph.benchmark.peer_search import peers_here
+from jeat_graph.benchmark.provenance import provenance
+from jeat_graph.benchmark.real_ours import OursOnSet, judge_row, rows_of
+from jeat_graph.benchmark.real_sets import RealSet, real_sets
+from jeat_graph.benchmark.robustness import PRESETS, judge_variation, variations
+from jeat_graph.config.argument_types import counting, natural, positive
+from jeat_graph.config.reading import load_config
+
+if TYPE_CHECKING:
+    from jeat_graph.eval.tables import Cell, Table
+
+METRICS = ("MOTA", "IDF1", "HOTA")
+_QUICK_RECORDINGS = 2
+_ROBUSTNESS_DURATION_S = 20.0
+_QUICK_DURATION_S = 6.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the benchmark's arguments."""
+    add = parser.add_argument
+    add("--out", metavar="DIR", help="write real.json and real.md there")
+    add("--data", metavar="DIR", help="folder that holds kitti/, kitti-pedestrian/, tud/ (../shared/data)")
+    add("--peers", metavar="JSON", help="keep the other trackers' scores in this file from run to run")
+    add("--no-peers", action="store_true", help="leave the other trackers out")
+    add("--tuned", action="store_true", help="search the others' parameters too, on what is judged (slow)")
+    add("--no-calibrate", action="store_true", help="leave the calibrated rows out (they take minutes)")
+    add("--no-robustness", action="store_true", help="leave the simulated detectors out")
+    add("--seeds", nargs="+", type=natural, metavar="N", help="of the simulated recordings (0 1)")
+    add("--duration", type=positive, metavar="S", help=f"of a simulated one ({_ROBUSTNESS_DURATION_S:g})")
+    add("--quick", action="store_true", help="two recordings a set, 6 s of simulation, nothing calibrated")
+    add("--jobs", type=counting, metavar="N", help="processes (as many as there are processors)")
+    add("--readme", metavar="FILE", help="renew the tables between the markers of this Markdown file")
+    add("--from", dest="source", metavar="JSON", help="render the tables of an earlier result; run nothing")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure (or read an earlier result), print and write."""
+    result = common.earlier(args.source, "real") if args.source else measure(args)
+    common.publish(args, "real", result, tables(result))
+    return 0
+
+
+def measure(args: argparse.Namespace) -> dict[str, Any]:
+    """Track and judge everything."""
+    data = Path(args.data or "../shared/data")
+    most = _QUICK_RECORDINGS if args.quick else None
+    sets = real_sets(data, most)
+    if not sets:
+        print(f"no real recordings in {data}: only the simulated ones are judged", file=sys.stderr)
+    calibrate = not (args.no_calibrate or args.quick)
+    jobs = [(row, data, most, one.name) for one in sets for row in rows_of(one, calibrate)]
+    ours = in_processes(_judge_ours, jobs, args.jobs, "real, ours")
+    peers: list[dict[str, Any]] = []
+    if sets and not args.no_peers:
+        cache = PeerCache(Path(args.peers) if args.peers else None)
+        names, tuned = peers_here(), args.tuned and not args.quick
+        peers = [one for found in sets for one in judge_peers(found, names, cache, tuned)]
+    setup = {
+        "data": {one.name: [r.name for r in one.recordings] for one in sets},
+        "seeds": list(args.seeds or ((0,) if args.quick else (0, 1))),
+        "duration_s": args.duration or (_QUICK_DURATION_S if args.quick else _ROBUSTNESS_DURATION_S),
+        "tuned": bool(args.tuned),
+    }
+    robustness: list[dict[str, Any]] = []
+    if not args.no_robustness:
+        odd = [
+            (preset, v.name, seed, setup["duration_s"])
+            for v in variations()
+            for seed in setup["seeds"]
+            for preset in PRESETS
+        ]
+        robustness = in_processes(judge_variation, odd, args.jobs, "odd detectors")
+    return {
+        "benchmark": "real",
+        **provenance(setup, {name: load_config(name) for name in PRESETS}),
+        "ours": ours,
+        "peers": peers,
+        "robustness": robustness,
+        "robustness_summary": summarise(robustness),
+    }
+
+
+def _judge_ours(job: tuple[OursOnSet, Path, int | None, str]) -> dict[str, Any]:
+    row, data, most, name = job
+    return judge_row(row, next(one for one in real_sets(data, most) if one.name == name))
+
+
+def judge_peers(one: RealSet, names: Sequence[str], cache: PeerCache, tuned: bool) -> list[dict[str, Any]]:
+    """Judge other trackers on every stream of a set, with their defaults and, if asked for, tuned."""
+    from jeat_graph.eval.baselines import best_baseline, judge_baseline
+
+    pairs = [(r.truth, r.detections) for r in one.recordings]
+    out = []
+    for stream in one.streams:
+        for name in names:
+            for how, function in (("defaults", judge_baseline), ("tuned", best_baseline))[: 1 + tuned]:
+
+                def compute(
+                    name: str = name, stream: tuple[str, ...] = stream, function: Any = function
+                ) -> dict[str, Any]:
+                    found = function(name, pairs, stream)
+                    return {"parameters": dict(found.parameters), "scores": found.scores.as_dict()}
+
+                found = cache.get(cache_key(f"{name} {how}", stream, {}, one.recordings), compute)
+                row = f"{NAMES[name]}, {' + '.join(stream)}" + (", tuned" if how == "tuned" else "")
+                out.append({"set": one.name, "row": row, "how": how, "sensors": list(stream), **found})
+    return out
+
+
+def tables(result: Mapping[str, Any]) -> dict[str, Table]:
+    """Tables of a result, by the name of their markers."""
+    out: dict[str, Table] = {}
+    names = list(dict.fromkeys(e["set"] for e in result["ours"]))
+    for name in names:
+        ours = [e for e in result["ours"] if e["set"] == name]
+        peers = [e for e in result["peers"] if e["set"] == name]
+        out[f"real-{name.lower().replace(' ', '-')}"] = set_table(name, ours, peers)
+    if result["robustness_summary"]:
+        seeds = common.over_seeds(len(result["settings"]["seeds"]))
+        out["robustness"] = common.scenario_table(
+            _turned(result["robustness_summary"]),
+            f"Odd detectors, simulated: {' / '.join(METRICS)}, {seeds}",
+            METRICS,
+        )
+    return out
+
+
+def set_table(name: str, ours: Sequence[Mapping[str, Any]], peers: Sequence[Mapping[str, Any]]) -> Table:
+    """One row a tracker: causal and smoothed scores, errors, and whether the covariances are honest."""
+    from jeat_graph.eval.tables import Table
+
+    records: list[dict[str, Cell]] = []
+    for e in ours:
+        records.append(
+            {
+                "": e["row"],
+                "causal " + " / ".join(METRICS): _cell(e["causal"]),
+                "smoothed": _cell(e["smoothed"]),
+                **{k: e["causal"][k] for k in ("FP", "FN", "IDSW")},
+                "ANEES": round(e["nees"]["causal"].get("anees", float("nan")), 2),
+                "95 %": round(100.0 * e["nees"]["causal"].get("coverage", float("nan")), 1),
+            }
+        )
+    for e in peers:
+        records.append(
+            {
+                "": e["row"],
+                "causal " + " / ".join(METRICS): _cell(e["scores"]),
+                **{k: e["scores"][k] for k in ("FP", "FN", "IDSW")},
+            }
+        )
+    columns = list(records[0])
+    return Table.from_records(records, columns, title=f"{name}, pooled")
+
+
+def _cell(scores: Mapping[str, float]) -> str:
+    return " / ".join(f"{scores[m]:.1f}" for m in METRICS)
+
+
+def _turned(entries: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Variations as rows and presets as columns."""
+    return [{**e, "row": e["scenario"], "scenario": e["row"]} for e in entries]

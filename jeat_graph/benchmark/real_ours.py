@@ -1,0 +1,147 @@
+"""Our tracker on the real sets: without calibration, calibrated blindly, and calibrated with truth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from jeat_graph.benchmark.real_sets import RealSet
+from jeat_graph.benchmark.recordings import Recording
+from jeat_graph.config.reading import load_config
+from jeat_graph.config.schema import Config
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.runs.declaring import fit_input
+
+_MATCH_IOU = 0.5
+_EDGE_PX = 5.0
+_ELLIPSE_95 = -2.0 * np.log(0.05)  # χ² of 2 degrees of freedom
+
+DEFAULT, BLIND, TRUTH = "default", "calibrated blindly", "calibrated with truth"
+
+
+@dataclass(frozen=True)
+class OursOnSet:
+    """One row: our tracker, in one dress, on one set.
+
+    Attributes:
+        row: its name.
+        sensors: what it is given.
+        how: `DEFAULT`, `BLIND` or `TRUTH`; calibration is on the other recordings of the set.
+        changes: `key=value` texts over the preset.
+    """
+
+    row: str
+    sensors: tuple[str, ...]
+    how: str = DEFAULT
+    changes: tuple[str, ...] = ()
+
+
+def rows_of(one: RealSet, calibrate: bool) -> list[OursOnSet]:
+    """The rows of a set: each stream as it comes, and all of them calibrated or with parts switched off."""
+    out = [OursOnSet(f"default, {' + '.join(s)}", s) for s in reversed(one.streams)]
+    every = one.streams[-1]
+    out.append(OursOnSet("default without NIS adaptation", every, changes=("noise.adaptation_rate=0.0",)))
+    shares = tuple(f"sensors.{name}={{correlated_share: 0.5, memory_s: 0.6}}" for name in every)
+    out.append(OursOnSet("default with errors that have memory", every, changes=shares))
+    out.append(OursOnSet("default without disagreement", every, changes=("lifecycle.disagreement=0.0",)))
+    if calibrate and len(one.recordings) > 1:
+        out += [OursOnSet(how, every, how) for how in (BLIND, TRUTH)]
+    return out
+
+
+def configs_for(row: OursOnSet, one: RealSet) -> list[Config]:
+    """The configuration of each recording: calibrated ones never saw it."""
+    base = load_config("default", row.changes)
+    seen = [recording.only(row.sensors) for recording in one.recordings]
+    if row.how == DEFAULT:
+        return [fit_input(base, detections)[0] for detections in seen]
+    whole = fit_input(base, Detections.concatenate(seen))[0]
+    return [_calibrated(row, one, k, seen, whole) for k in range(len(seen))]
+
+
+def _calibrated(
+    row: OursOnSet, one: RealSet, left_out: int, seen: Sequence[Detections], base: Config
+) -> Config:
+    from jeat_graph.calibration.blind import calibrate_blind
+    from jeat_graph.calibration.supervised import calibrate
+    from jeat_graph.calibration.tune import tune
+
+    others = [k for k in range(len(seen)) if k != left_out]
+    if row.how == BLIND:
+        return calibrate_blind([seen[k] for k in others], base)
+    pairs = [(seen[k], one.recordings[k].truth) for k in others]
+    return tune(calibrate(pairs, base), pairs)[0]
+
+
+def both_tables(config: Config, detections: Detections) -> tuple[Trajectories, Trajectories]:
+    """Track a recording and return its causal and its smoothed table."""
+    from jeat_graph.tracking.tracker import Tracker
+
+    engine = replace(config.smoother, engine="rts")
+    tracker = Tracker(replace(config, smoother=engine))
+    causal = [table for table in tracker.run(detections) if len(table)]
+    smoothed = tracker.finish()
+    return Trajectories.concatenate(causal or [Trajectories.empty(tracker.sensor_names)]), smoothed
+
+
+def judge_row(row: OursOnSet, one: RealSet) -> dict[str, Any]:
+    """Track a set and judge both tables, pooled and recording by recording."""
+    configs = configs_for(row, one)
+    tables = [both_tables(c, r.only(row.sensors)) for c, r in zip(configs, one.recordings, strict=True)]
+    return {
+        "set": one.name,
+        "row": row.row,
+        "sensors": list(row.sensors),
+        "how": row.how,
+        "changes": list(row.changes),
+        "causal": _scores(one.recordings, [causal for causal, _ in tables], row.sensors, "causal"),
+        "smoothed": _scores(one.recordings, [smoothed for _, smoothed in tables], row.sensors, "smoothed"),
+        "nees": {
+            kind: _nees(one.recordings, [pair[k] for pair in tables], kind)
+            for k, kind in enumerate(("causal", "smoothed"))
+        },
+        "by_recording": {
+            r.name: _scores([r], [table], row.sensors, "causal")
+            for r, (table, _) in zip(one.recordings, tables, strict=True)
+        },
+    }
+
+
+def _scores(
+    recordings: Sequence[Recording], tables: Sequence[Trajectories], sensors: Sequence[str], kind: Any
+) -> dict[str, Any]:
+    from jeat_graph.eval.metrics import evaluate
+
+    pairs = [(r.truth, table) for r, table in zip(recordings, tables, strict=True)]
+    instants = [r.instants(sensors) for r in recordings] if kind == "causal" else None
+    return evaluate(pairs, kind=kind, instants=instants).as_dict()
+
+
+def _nees(recordings: Sequence[Recording], tables: Sequence[Trajectories], kind: Any) -> dict[str, float]:
+    """Consistency of the position: mean of e² / var over both axes, and the share within 95 % ellipses.
+
+    A consistent filter has 1 and .95. Only matched boxes that keep off the edges of the picture count: the
+    truth of a box that is cut is the part that shows.
+    """
+    from jeat_graph.eval.frames import build_frames
+    from jeat_graph.eval.matching import matched_entries
+
+    ratios = [np.zeros((0, 2))]
+    for r, table in zip(recordings, tables, strict=True):
+        frames = build_frames(r.truth, table, kind=kind)
+        truth, track = matched_entries(frames.iou, _MATCH_IOU)
+        box = frames.truth_boxes[truth]
+        width, height = (r.truth.boxes[:, :2] + r.truth.boxes[:, 2:]).max(axis=0)
+        far = box[:, :2] + box[:, 2:]
+        inside = (box[:, :2] > _EDGE_PX).all(axis=1) & (far[:, 0] < width - _EDGE_PX)
+        inside &= far[:, 1] < height - _EDGE_PX
+        error = frames.tracks.mean[track, :2] - (box[:, :2] + 0.5 * box[:, 2:])
+        ratios.append((error**2 / frames.tracks.var[track, :2])[inside])
+    total = np.concatenate(ratios).sum(axis=1)
+    if not len(total):
+        return {}
+    return {"anees": float(total.mean() / 2.0), "coverage": float(np.mean(total < _ELLIPSE_95))}

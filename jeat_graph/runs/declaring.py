@@ -1,0 +1,83 @@
+"""A configuration fits itself to a recording: undeclared sensors, their rates, the picture's size."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from jeat_graph.config.schema import Config, SensorConfig
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.rates import median_rate_hz
+
+# A clock that differs more than this from the declared one is another clock.
+_SAME_RATE = 1.1
+# Fewer scans do not tell a clock.
+LEAST_SCANS = 3
+
+
+def fit_input(config: Config, detections: Detections) -> tuple[Config, list[str]]:
+    """Declare what a configuration leaves open (`config.input`) by what is seen in a recording.
+
+    Args:
+        config: with `input.undeclared` or `input.picture` set, or neither: then it comes back as it is.
+        detections: the whole recording.
+
+    Returns:
+        The configuration for this recording, and a line for each thing that was found.
+    """
+    notes: list[str] = []
+    if config.input.undeclared == "declare" and detections.num_scans:
+        config, notes = _declare_sensors(config, detections)
+    if config.input.picture == "seen" and len(detections):
+        config = fit_picture(config, [detections])
+        notes.append(
+            f"the picture is taken for {config.image.width:g} x {config.image.height:g} px, as far as the "
+            "boxes reach "
+            "(--set image.width=W --set image.height=H)"
+        )
+    return config, notes
+
+
+def fit_picture(config: Config, recordings: Sequence[Detections]) -> Config:
+    """Let the picture reach as far as the boxes of some recordings do (whole px)."""
+    reach = [(d.boxes[:, :2] + d.boxes[:, 2:]).max(axis=0) for d in recordings if len(d)]
+    if not reach:
+        return config
+    width, height = (float(max(math.ceil(v), 1)) for v in np.max(reach, axis=0))
+    image = replace(config.image, width=width, height=height)
+    return replace(config, image=image, input=replace(config.input, picture="given"))
+
+
+def _declare_sensors(config: Config, detections: Detections) -> tuple[Config, list[str]]:
+    notes: list[str] = []
+    sensors: dict[str, SensorConfig] = {}
+    for name in detections.sensors:
+        known = config.sensors.get(name)
+        sensor = SensorConfig() if known is None else known
+        rate = scan_rate_hz(detections, name)
+        other = rate is not None and not 1.0 / _SAME_RATE < rate / sensor.rate_hz < _SAME_RATE
+        if rate is not None and (known is None or other):
+            sensor = replace(sensor, rate_hz=rate)
+        if known is None:
+            notes.append(f"sensor {name!r} is not declared: taken for a detector at {sensor.rate_hz:.3g} Hz")
+        elif other:
+            notes.append(f"sensor {name!r} scans at {rate:.3g} Hz, not at {known.rate_hz:g}")
+        sensors[name] = sensor
+    association = config.association
+    priority = tuple(name for name in association.priority if name in sensors)
+    return replace(config, sensors=sensors, association=replace(association, priority=priority)), notes
+
+
+def scan_rate_hz(detections: Detections, sensor: str) -> float | None:
+    """Rate (Hz) of a sensor's clock, or None if its scans are too few to judge it by.
+
+    Args:
+        detections: the recording.
+        sensor: its name.
+    """
+    times = detections.sensor_times(sensor)
+    rate = median_rate_hz(times) if len(times) >= LEAST_SCANS else None
+    return None if rate is None else round(rate, 6)

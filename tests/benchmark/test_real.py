@@ -1,0 +1,93 @@
+"""`benchmark real`, in small, and what it is made of."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from jeat_graph.benchmark.peer_cache import PeerCache, cache_key
+from jeat_graph.benchmark.recordings import Recording, simulated
+from jeat_graph.benchmark.robustness import judge_variation, variations, varied
+from jeat_graph.cli.main import main
+from jeat_graph.data.errors import DataError
+from jeat_graph.io.detections_io import write_detections
+from jeat_graph.io.truth_io import write_truth
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    """Two short simulated recordings, laid out as the real ones are."""
+    folder = tmp_path_factory.mktemp("data")
+    for seed in (5, 6):
+        one = simulated("day", seed, 2.0)
+        renamed = replace(one.detections, sensors=("lidar", "rgb"))
+        path = folder / "kitti" / f"{seed:04d}"
+        path.mkdir(parents=True)
+        write_detections(renamed, path / "detections.csv")
+        write_truth(one.truth, path / "gt.csv")
+    return folder
+
+
+def test_every_stream_is_judged_and_the_tables_come_back_from_the_file(data, tmp_path, capsys):
+    out = tmp_path / "out"
+    small = ["--no-peers", "--no-calibrate", "--no-robustness", "--jobs", "1"]
+    assert main(["benchmark", "real", "--data", str(data), "--out", str(out), *small]) == 0
+    shown = capsys.readouterr().out
+    result = json.loads((out / "real.json").read_text())
+    assert result["settings"]["data"] == {"KITTI cars": ["0005", "0006"]}
+    streams = {tuple(one["sensors"]) for one in result["ours"]}
+    assert streams == {("rgb",), ("lidar",), ("rgb", "lidar")}
+    for one in result["ours"]:
+        assert one["causal"]["sequences"] == one["smoothed"]["sequences"] == 2
+        assert set(one["by_recording"]) == {"0005", "0006"}
+    assert main(["benchmark", "real", "--from", str(out / "real.json")]) == 0
+    assert capsys.readouterr().out == shown
+
+
+def test_a_folder_without_recordings_is_said(tmp_path, capsys):
+    small = ["--no-peers", "--no-robustness"]
+    assert main(["benchmark", "real", "--data", str(tmp_path), *small]) == 0
+    assert "no real recordings" in capsys.readouterr().err
+
+
+def test_a_result_is_computed_once_and_again_when_its_recording_changes(tmp_path):
+    one = simulated("day", 5, 2.0)
+    calls = []
+
+    def compute():
+        calls.append(1)
+        return {"scores": {"MOTA": 1.0}}
+
+    key = cache_key("sort", ("rgb",), {}, [one])
+    for _ in range(2):
+        assert PeerCache(tmp_path / "peers.json").get(key, compute) == {"scores": {"MOTA": 1.0}}
+    assert len(calls) == 1
+    other = Recording(one.name, replace(one.detections, scores=one.detections.scores * 0.5), one.truth)
+    assert cache_key("sort", ("rgb",), {}, [other]) != key
+    assert cache_key("sort", ("rgb",), {"min_score": 0.5}, [one]) != key
+
+
+def test_a_file_that_is_no_cache_is_refused(tmp_path):
+    path = tmp_path / "peers.json"
+    path.write_text("[1]")
+    with pytest.raises(DataError, match="no file of cached results"):
+        PeerCache(path)
+
+
+@pytest.mark.parametrize("name", [v.name for v in variations()])
+def test_each_variation_changes_the_recording(name):
+    plain, odd = varied("as it is", 0, 1.0), varied(name, 0, 1.0)
+    same = np.array_equal(plain.detections.boxes, odd.detections.boxes) and np.array_equal(
+        plain.detections.scores, odd.detections.scores
+    )
+    same = same and np.array_equal(plain.detections.scan_t, odd.detections.scan_t)
+    assert same == (name == "as it is")
+
+
+def test_a_variation_is_judged_with_sensors_that_the_preset_does_not_know():
+    record = judge_variation(("default", "with a third, poor detector", 0, 2.0))
+    assert record["scores"]["truth_boxes"] > 0
+    assert record["scenario"] == "with a third, poor detector"
