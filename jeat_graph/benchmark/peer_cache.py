@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from jeat_graph.benchmark.recordings import Recording
+from jeat_graph.benchmark.recordings import JudgedRecording
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.atomic import open_atomic
 
@@ -48,7 +48,7 @@ class PeerCache:
 
 
 def cache_key(
-    what: str, sensors: Sequence[str], parameters: Mapping[str, Any], recordings: Sequence[Recording]
+    what: str, sensors: Sequence[str], parameters: Mapping[str, Any], recordings: Sequence[JudgedRecording]
 ) -> str:
     """Key of one tracker with one set of parameters on some recordings.
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.benchmark.real_sets import RealSet
-from jeat_graph.benchmark.recordings import Recording
+from jeat_graph.benchmark.recordings import JudgedRecording
 from jeat_graph.config.reading import load_config
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
@@ -112,7 +112,7 @@ def judge_row(row: OursOnSet, one: RealSet) -> dict[str, Any]:
 
 
 def _scores(
-    recordings: Sequence[Recording], tables: Sequence[Trajectories], sensors: Sequence[str], kind: Any
+    recordings: Sequence[JudgedRecording], tables: Sequence[Trajectories], sensors: Sequence[str], kind: Any
 ) -> dict[str, Any]:
     from jeat_graph.eval.metrics import evaluate
 
@@ -121,7 +121,9 @@ def _scores(
     return evaluate(pairs, kind=kind, instants=instants).as_dict()
 
 
-def _nees(recordings: Sequence[Recording], tables: Sequence[Trajectories], kind: Any) -> dict[str, float]:
+def _nees(
+    recordings: Sequence[JudgedRecording], tables: Sequence[Trajectories], kind: Any
+) -> dict[str, float]:
     """Consistency of the position: mean of e² / var over both axes, and the share within 95 % ellipses.
 
     A consistent filter has 1 and .95. Only matched boxes that keep off the edges of the picture count: the

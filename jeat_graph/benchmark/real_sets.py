@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from jeat_graph.benchmark.recordings import Recording
+from jeat_graph.benchmark.recordings import JudgedRecording
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.trajectories import GroundTruth
 
@@ -27,7 +27,7 @@ class RealSet:
 
     name: str
     sensors: tuple[str, ...]
-    recordings: tuple[Recording, ...]
+    recordings: tuple[JudgedRecording, ...]
 
     @property
     def streams(self) -> list[tuple[str, ...]]:
@@ -55,14 +55,14 @@ def real_sets(data: Path, most: int | None = None) -> tuple[RealSet, ...]:
     return tuple(found)
 
 
-def _columns(path: Path) -> Recording:
+def _columns(path: Path) -> JudgedRecording:
     from jeat_graph.io.detections_io import read_detections
     from jeat_graph.io.truth_io import read_truth
 
     return _recording(path.name, read_detections(path / "detections.csv"), read_truth(path / "gt.csv"))
 
 
-def _motchallenge(path: Path) -> Recording:
+def _motchallenge(path: Path) -> JudgedRecording:
     from jeat_graph.io.detections_io import read_detections
     from jeat_graph.io.truth_io import read_truth
 
@@ -70,7 +70,7 @@ def _motchallenge(path: Path) -> Recording:
     return _recording(path.name, detections, read_truth(path / "gt.txt", rate_hz=TUD_RATE_HZ))
 
 
-def _recording(name: str, detections: Detections, truth: GroundTruth) -> Recording:
+def _recording(name: str, detections: Detections, truth: GroundTruth) -> JudgedRecording:
     # Frames without any object are frames too: a track there is false.
     frames = np.unique(np.concatenate([truth.frame_times(), detections.scan_t]))
-    return Recording(name, detections, replace(truth, frames=frames))
+    return JudgedRecording(name, detections, replace(truth, frames=frames))

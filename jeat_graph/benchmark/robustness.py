@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.benchmark.recordings import Recording
+from jeat_graph.benchmark.recordings import JudgedRecording
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.trajectories import GroundTruth
 
@@ -34,7 +34,7 @@ class Variation:
     name: str
     scenario: Mapping[str, Any] = field(default_factory=dict)
     sensors: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    change: Callable[[Recording], Recording] | None = None
+    change: Callable[[JudgedRecording], JudgedRecording] | None = None
 
 
 def variations() -> list[Variation]:
@@ -63,7 +63,7 @@ def variations() -> list[Variation]:
 
 
 @lru_cache(maxsize=2)
-def varied(name: str, seed: int, duration_s: float) -> Recording:
+def varied(name: str, seed: int, duration_s: float) -> JudgedRecording:
     """Simulate the recording of a variation."""
     import dataclasses
 
@@ -77,7 +77,7 @@ def varied(name: str, seed: int, duration_s: float) -> Recording:
         for change in (one.scenario, one.sensors.get(sensor, {})):
             tree["sensors"][sensor] = merge(tree["sensors"][sensor], change)
     detections, truth = simulate(scenario_from_dict(tree), seed=seed, duration_s=duration_s)
-    recording = Recording(f"{name}/{seed}", detections, truth)
+    recording = JudgedRecording(f"{name}/{seed}", detections, truth)
     return recording if one.change is None else one.change(recording)
 
 
@@ -99,19 +99,19 @@ def judge_variation(job: tuple[str, str, int, float]) -> dict[str, Any]:
     }
 
 
-def _meaningless_scores(one: Recording) -> Recording:
+def _meaningless_scores(one: JudgedRecording) -> JudgedRecording:
     rng = np.random.default_rng(0)
     return replace(one, detections=replace(one.detections, scores=rng.random(len(one.detections))))
 
 
-def _late(one: Recording) -> Recording:
+def _late(one: JudgedRecording) -> JudgedRecording:
     """Give the events the times at which they would arrive."""
     t, sensor, boxes, scores, empty, _ = one.detections.to_rows()
     late = t + np.where(sensor == "evt", _LATE_S, 0.0)
     return replace(one, detections=Detections.from_rows(late, sensor, boxes, scores, empty))
 
 
-def _sway(one: Recording) -> Recording:
+def _sway(one: JudgedRecording) -> JudgedRecording:
     """Move the whole picture to and fro, truth and all."""
 
     def shift(t: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
@@ -133,7 +133,7 @@ def _sway(one: Recording) -> Recording:
     return replace(one, detections=replace(d, boxes=d.boxes + shift(t)), truth=moved)
 
 
-def _third(one: Recording) -> Recording:
+def _third(one: JudgedRecording) -> JudgedRecording:
     """Add a detector at 10 Hz that finds half of the vehicles and takes a dozen fixed things for one."""
     rng = np.random.default_rng(1)
     truth = one.truth

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from jeat_graph.benchmark.peer_cache import PeerCache, cache_key
-from jeat_graph.benchmark.recordings import Recording, simulated
+from jeat_graph.benchmark.recordings import JudgedRecording, simulated
 from jeat_graph.benchmark.robustness import judge_variation, variations, varied
 from jeat_graph.cli.main import main
 from jeat_graph.data.errors import DataError
@@ -65,7 +65,7 @@ def test_a_result_is_computed_once_and_again_when_its_recording_changes(tmp_path
     for _ in range(2):
         assert PeerCache(tmp_path / "peers.json").get(key, compute) == {"scores": {"MOTA": 1.0}}
     assert len(calls) == 1
-    other = Recording(one.name, replace(one.detections, scores=one.detections.scores * 0.5), one.truth)
+    other = JudgedRecording(one.name, replace(one.detections, scores=one.detections.scores * 0.5), one.truth)
     assert cache_key("sort", ("rgb",), {}, [other]) != key
     assert cache_key("sort", ("rgb",), {"min_score": 0.5}, [one]) != key
 
