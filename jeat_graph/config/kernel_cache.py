@@ -29,7 +29,7 @@ def choose_cache() -> None:
         from numba.core import config
 
         os.environ[_VARIABLE] = str(folder)  # for processes that this one starts
-        config.CACHE_DIR = str(folder)
+        config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
         notice = f"neither the installation nor a home can be written: compiled code is kept in {folder}"
         return
     notice = "no folder can be written: the tracker is compiled anew in each run; set NUMBA_CACHE_DIR"
@@ -40,7 +40,7 @@ def _user_cache() -> Path:
     """The folder that the compiler takes second, as it names it."""
     from numba.misc.appdirs import AppDirs
 
-    return Path(AppDirs(appname="numba", appauthor=False).user_cache_dir)
+    return Path(AppDirs(appname="numba", appauthor=False).user_cache_dir)  # type: ignore[no-untyped-call]
 
 
 def _takes_files(folder: Path) -> bool:
@@ -70,4 +70,4 @@ def _temporary_folder() -> Path | None:
 def _compile_without_cache() -> None:
     from numba.core.dispatcher import Dispatcher
 
-    Dispatcher.enable_caching = lambda self: None
+    Dispatcher.enable_caching = lambda self: None  # type: ignore[method-assign]

@@ -34,7 +34,7 @@ def load_yaml(text: str) -> Any:
         # A date such as 2026-99-99, or a number of too many digits.
         raise yaml.YAMLError(str(error)) from None
     finally:
-        loader.dispose()  # type: ignore[no-untyped-call]
+        loader.dispose()
 
 
 def _count(node: yaml.Node, known: dict[int, int]) -> int:

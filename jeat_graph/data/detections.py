@@ -62,7 +62,8 @@ def find_bad_row(boxes: FloatArray, scores: FloatArray) -> tuple[int, str] | Non
     finite: BoolArray = np.all(np.isfinite(boxes), axis=1)
     # NaN compares false everywhere, so each test is written for what is good.
     size = (boxes[:, 2] > 0.0) & (boxes[:, 3] > 0.0)
-    fits = (np.abs(boxes) <= LARGEST_PX).all(axis=1) & (boxes[:, 2:] >= SMALLEST_PX).all(axis=1)
+    inside: BoolArray = np.all(np.abs(boxes) <= LARGEST_PX, axis=1)
+    fits = inside & np.all(boxes[:, 2:] >= SMALLEST_PX, axis=1)
     score = (scores >= 0.0) & (scores <= 1.0)
     good = finite & size & fits & score
     if good.all():
