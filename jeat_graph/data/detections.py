@@ -220,16 +220,9 @@ class Detections:
 
         Rows of one sensor at one time that stand in several parts become one scan.
         """
-        columns = [part.to_rows() for part in parts]
+        columns = [np.concatenate(column) for column in zip(*(p.to_rows() for p in parts), strict=True)]
         has_class = any(part.classes is not None for part in parts)
-        whole = Detections.from_rows(
-            t=np.concatenate([column[0] for column in columns]),
-            sensor=np.concatenate([column[1] for column in columns]),
-            boxes=np.concatenate([column[2] for column in columns]),
-            scores=np.concatenate([column[3] for column in columns]),
-            empty=np.concatenate([column[4] for column in columns]),
-            classes=np.concatenate([column[5] for column in columns]) if has_class else None,
-        )
+        whole = Detections.from_rows(*columns[:5], columns[5] if has_class else None)
         return replace(whole, dropped=sum(part.dropped for part in parts))
 
     def to_rows(
