@@ -56,7 +56,8 @@ def follow_boxes(
         fit = _fit(table, rows, camera, config, motion)
         if fit is not None:
             variance = np.diag(fit.size_covariance)
-            size = Size(tuple(float(v) for v in fit.size), tuple(float(v) for v in variance))
+            mean, spread = fit.size.tolist(), variance.tolist()
+            size = Size((mean[0], mean[1], mean[2]), (spread[0], spread[1], spread[2]))
             vehicle = Vehicle(int(one), t, fit.motion, fit.by_calibration, 0.0, 0.0)
             found.append(SizedVehicle(vehicle, size, CLASSES[fit.kind].name, fit.chi2))
         if progress is not None:

@@ -57,7 +57,8 @@ def sides(
     """
     place = corners(xy, heading, size)
     pixel, depth = camera.project(place)
-    pixel = np.where((depth > 0).all(axis=1)[:, None, None], pixel, np.nan)
+    front = np.asarray((depth > 0).all(axis=1))
+    pixel = np.where(front[:, None, None], pixel, np.nan)
     finite = np.nan_to_num(pixel)
     outer = np.concatenate([finite.argmin(axis=1), finite.argmax(axis=1)], axis=1)  # (N, 4)
     rows = np.arange(len(xy))[:, None]

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from jeat_graph.config.fields import check, number
-from jeat_graph.data.arrays import BoolArray, FloatArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.road.camera import PARAMETERS, RoadCamera
 from jeat_graph.road.cuboid import sides
 from jeat_graph.road.motion_fit import MotionFit, MotionFitConfig, basis_rows, motion_prior, spaced_knots
@@ -190,7 +190,7 @@ def fit_cuboid(
     )
 
 
-def _choose(t: FloatArray, config: CuboidConfig) -> FloatArray:
+def _choose(t: FloatArray, config: CuboidConfig) -> IntArray:
     """Rows at least `node_s` apart, the last one among them."""
     step = max(config.node_s, float(t[-1] - t[0]) / config.most_nodes)
     cell = np.floor((t - t[0]) / step + 1e-9)
