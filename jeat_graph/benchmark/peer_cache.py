@@ -62,8 +62,10 @@ def cache_key(
     for one in recordings:
         for array in (one.detections.scan_t, one.detections.boxes, one.detections.scores):
             digest.update(array.tobytes())
-        for array in (one.truth.t, one.truth.boxes, one.truth.object_id, one.truth.ignore):
-            digest.update(array.tobytes())
+        truth = one.truth
+        for part in (truth.t.tobytes(), truth.boxes.tobytes(), truth.object_id.tobytes()):
+            digest.update(part)
+        digest.update(truth.ignore.tobytes())
     versions = {name: _version(name) for name in _PACKAGES}
     told = json.dumps([what, list(sensors), dict(parameters), versions], sort_keys=True)
     digest.update(told.encode())

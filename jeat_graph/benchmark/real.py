@@ -74,7 +74,7 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
         cache = PeerCache(Path(args.peers) if args.peers else None)
         names, tuned = peers_here(), args.tuned and not args.quick
         peers = [one for found in sets for one in judge_peers(found, names, cache, tuned)]
-    setup = {
+    setup: dict[str, Any] = {
         "data": {one.name: [r.name for r in one.recordings] for one in sets},
         "seeds": list(args.seeds or ((0,) if args.quick else (0, 1))),
         "duration_s": args.duration or (_QUICK_DURATION_S if args.quick else _ROBUSTNESS_DURATION_S),

@@ -32,7 +32,7 @@ class RealSet:
     @property
     def streams(self) -> list[tuple[str, ...]]:
         """What a tracker may be given: each detector alone, and all of them."""
-        alone = [(name,) for name in self.sensors]
+        alone: list[tuple[str, ...]] = [(name,) for name in self.sensors]
         return alone if len(alone) == 1 else [*alone, self.sensors]
 
 

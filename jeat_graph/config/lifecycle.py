@@ -131,7 +131,7 @@ class LifecycleConfig(Section):
     @property
     def prior_trust(self) -> float:
         """Trust in a sensor of which nothing is known yet."""
-        return self.agreement_prior**self.disagreement
+        return float(self.agreement_prior**self.disagreement)
 
     @property
     def by_existence(self) -> bool:

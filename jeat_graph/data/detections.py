@@ -222,7 +222,8 @@ class Detections:
         """
         columns = [np.concatenate(column) for column in zip(*(p.to_rows() for p in parts), strict=True)]
         has_class = any(part.classes is not None for part in parts)
-        whole = Detections.from_rows(*columns[:5], columns[5] if has_class else None)
+        t, sensor, boxes, scores, empty, classes = columns
+        whole = Detections.from_rows(t, sensor, boxes, scores, empty, classes if has_class else None)
         return replace(whole, dropped=sum(part.dropped for part in parts))
 
     def to_rows(
