@@ -37,7 +37,7 @@ class VehicleClass(NamedTuple):
     spread: tuple[float, float, float]
 
 
-#: From registration statistics of Europe: bodies without mirrors.
+#: Rough sizes of bodies without mirrors, wide enough that a vehicle of each kind lies within two deviations.
 CLASSES = (
     VehicleClass("motorcycle", 0.01, (2.2, 0.8, 1.5), (0.2, 0.1, 0.15)),
     VehicleClass("car", 0.74, (4.4, 1.83, 1.55), (0.35, 0.08, 0.12)),
