@@ -63,7 +63,7 @@ def test_accuracy_compares_sensors_associations_and_detectors(tmp_path, capsys):
     args = ["benchmark", "accuracy", *SMALL, "--quick", "--no-peers", "--out", str(tmp_path)]
     assert main(args) == 0
     table = capsys.readouterr().out
-    for row in ("default, rgb + evt", "default, evt", "paper, rgb + evt", "sequential", "paper, no light"):
+    for row in ("highway, rgb + evt", "highway, evt", "paper, rgb + evt", "sequential", "paper, no light"):
         assert row in table
     found = json.loads((tmp_path / "accuracy.json").read_text())["detectors"]
     assert 0.0 < found["day"]["rgb"]["AP50"] <= 100.0

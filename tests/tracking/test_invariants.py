@@ -134,7 +134,8 @@ def test_what_is_drawn_is_more_than_empty_tables(preset):
     rows, born = [], []
     count()
     assert sum(born) > 100
-    assert sum(rows) > 20
+    # By age and hits, as in the paper, few of such short recordings confirm a track.
+    assert sum(rows) > (20 if CONFIGS[preset].lifecycle.method == "existence" else 0)
 
 
 @pytest.mark.parametrize("epoch", [0.0, 2001000.46, 1.7e9])

@@ -141,6 +141,8 @@ def test_difference_of_filter_and_smoother_is_that_of_the_rows(full_run, causal,
     for one in data["tracks"]:
         early = causal.take(causal.track_id == one["id"])
         late = smoothed.take(smoothed.track_id == one["id"])
+        if not len(early) or not len(late):
+            continue  # a track that is in one table only has no difference
         for ms, dx in zip(one["motion"]["t"], one["motion"]["dx"], strict=True):
             t = (ms + data["start_ms"]) / 1e3
             a, b = np.abs(early.t - t) < 6e-4, np.abs(late.t - t) < 6e-4
