@@ -136,7 +136,7 @@ def _tables(result: dict[str, Any]) -> str:
                 f"  {row['times_faster']:.1f} ({row['times_faster_min']:.1f} … {row['times_faster_max']:.1f})"
             )
         lines.append(line)
-    lines += ["", "Times real time, `default`, events at 100 Hz and RGB at 20 Hz"]
+    lines += ["", "Times real time, `highway`, events at 100 Hz and RGB at 20 Hz"]
     lines += [f"{'vehicles':>8}" + "".join(f"{engine:>15}" for engine in ENGINES)]
     for num in dict.fromkeys(row["vehicles"] for row in result["real_time"]):
         mine = {r["smoother"]: r["times_real_time"] for r in result["real_time"] if r["vehicles"] == num}

@@ -105,7 +105,7 @@ def summarise(runs: Sequence[dict[str, tuple[FloatArray, float]]]) -> list[dict[
 def real_time_factor(
     num_objects: int, engine: str, duration_s: float, *, seed: int = 0, clock: str = "wall"
 ) -> float:
-    """How many times faster than real time vehicles seen at 100 + 20 Hz are tracked by `default`.
+    """How many times faster than real time vehicles seen at 100 + 20 Hz are tracked by `highway`.
 
     Args:
         num_objects: vehicles in the picture.

@@ -50,7 +50,7 @@ def test_our_step_takes_less_than_an_eighth_of_bytetracks():
     if not installed_peers():
         pytest.skip("the package trackers is not installed")
     runs = [
-        time_side_by_side(["default", "bytetrack"], 50, frames=30, warm_up=20, seed=seed, clock="cpu")
+        time_side_by_side(["highway", "bytetrack"], 50, frames=30, warm_up=20, seed=seed, clock="cpu")
         for seed in range(2)
     ]
     assert summarise(runs)[0]["times_faster"] >= 8.0
@@ -60,7 +60,7 @@ def test_a_step_grows_no_faster_than_linearly_to_500_tracks():
     least = {
         num: min(
             np.quantile(
-                time_side_by_side(["default"], num, frames=30, warm_up=20, seed=0, clock="cpu")["default"][0],
+                time_side_by_side(["highway"], num, frames=30, warm_up=20, seed=0, clock="cpu")["highway"][0],
                 0.25,
             )
             for _ in range(2)
