@@ -7,7 +7,13 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent / "_ext"))
 
+from pygments.lexers import PythonLexer
+from sphinx.highlighting import lexers
+
 from jeat_graph.version import __version__
+
+# A block that needs Ray is Python, and is run by its own test.
+lexers["ray"] = PythonLexer()
 
 project = "jeat-graph"
 author = "The jeat-graph authors"
