@@ -12,6 +12,8 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
+from jeat_graph.io.detections_io import read_detections
+from jeat_graph.io.truth_io import read_truth
 
 if TYPE_CHECKING:
     from jeat_graph.eval.compare import Comparison
@@ -67,7 +69,7 @@ def track(
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.tracking.tracker import Tracker
 
-    recording = detections if isinstance(detections, Detections) else _read_detections(detections)
+    recording = detections if isinstance(detections, Detections) else read_detections(detections)
     tracker = Tracker(fit_input(as_config(config, image), recording)[0])
     causal = Trajectories.concatenate(list(tracker.run(recording)) or [Trajectories.empty()])
     wanted = tracker.config.smoother.engine != "none"
@@ -145,7 +147,7 @@ def compare(
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.tracking.records import record_tracks
 
-    recording = detections if isinstance(detections, Detections) else _read_detections(detections)
+    recording = detections if isinstance(detections, Detections) else read_detections(detections)
     objects = truth if isinstance(truth, GroundTruth) or truth is None else read_truth(truth)
     settings = fit_input(as_config(config), recording)[0]
     records, smoothed = record_tracks(settings, recording)
@@ -179,7 +181,7 @@ def calibrate(
     """
     from jeat_graph.runs.declaring import fit_input
 
-    recordings = [d if isinstance(d, Detections) else _read_detections(d) for d in _as_list(detections)]
+    recordings = [d if isinstance(d, Detections) else read_detections(d) for d in _as_list(detections)]
     start = fit_input(as_config(base, image), Detections.concatenate(recordings))[0]
     if truth is None:
         from jeat_graph.calibration.blind import calibrate_blind
@@ -221,27 +223,13 @@ def read_run(path: PathLike) -> Run:
     Raises:
         DataError: there is no run, or a file of it is not valid.
     """
-    from jeat_graph.eval.load import tables_of
-    from jeat_graph.io.trajectories_io import read_trajectories
+    from jeat_graph.eval.load import read_tables
 
     folder = Path(path)
-    tables = {kind: read_trajectories(file) for kind, file in tables_of(folder).items()}
+    tables = read_tables(folder)
     file = folder / "run.json"
     record = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
     return Run(tables.get("causal"), tables.get("smoothed"), record)
-
-
-def read_truth(path: PathLike, *, rate_hz: float | None = None) -> GroundTruth:
-    """Read ground truth in any format of the documentation (CSV, Parquet, MOTChallenge, KITTI)."""
-    from jeat_graph.io.truth_io import read_truth as read
-
-    return read(path, rate_hz=rate_hz)
-
-
-def _read_detections(path: PathLike) -> Detections:
-    from jeat_graph.io.detections_io import read_detections
-
-    return read_detections(path)
 
 
 def _as_list(values: Any) -> list[Any]:

@@ -16,11 +16,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Open the viewer; returns when all is sent."""
     from jeat_graph.drawing.rerun_log import log_run, rerun_module
-    from jeat_graph.eval.load import tables_of
-    from jeat_graph.io.trajectories_io import read_trajectories
+    from jeat_graph.eval.load import read_tables
 
     rerun_module()
-    files = tables_of(Path(args.source))
-    tables = {kind: read_trajectories(file) for kind, file in files.items()}
-    log_run(tables, Path(args.source).resolve().name)
+    path = Path(args.source)
+    log_run(read_tables(path), path.resolve().name)
     return 0

@@ -9,13 +9,13 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.views import BOX
 from jeat_graph.io.frames import check_rate
 from jeat_graph.io.time_units import in_seconds
 
 if TYPE_CHECKING:
     from jeat_graph.io.file_table import FileTable
 
-BOX = ("left", "top", "width", "height")
 #: Usual names of each column, in lower case; not `x` and `y`, which may be a corner or the centre.
 ALIASES: Mapping[str, tuple[str, ...]] = {
     "t": ("time", "timestamp", "time_s", "t_s", "timestamp_s", "seconds", "sec"),

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.csv_text import first_bytes
+from jeat_graph.io.headers import is_number
 from jeat_graph.io.limits import check_file
 
 FORMATS = ("csv", "parquet", "motchallenge", "kitti", "prophesee", "coco")
@@ -66,15 +67,7 @@ def _guess(path: Path) -> str:
         return "coco"
     line = re.split(r"[\r\n]", text, maxsplit=1)[0]
     words = line.split()
-    if len(words) >= _KITTI_FIELDS and "," not in line and not _is_number(words[2]):
+    if len(words) >= _KITTI_FIELDS and "," not in line and not is_number(words[2]):
         return "kitti"
     fields = re.split(r"\s*,\s*|\s+", line.strip())
-    return "motchallenge" if len(fields) >= _MOT_FIELDS and all(map(_is_number, fields)) else "csv"
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+    return "motchallenge" if len(fields) >= _MOT_FIELDS and all(map(is_number, fields)) else "csv"

@@ -77,7 +77,7 @@ def check_names(
     Raises:
         DataError: a column is missing, misspelt or there twice, or there is no header.
     """
-    if line is not None and any(_is_number(name) for name in names):
+    if line is not None and any(is_number(name) for name in names):
         raise DataError(f"the first line must name the columns: {','.join(required)}", path, line)
     twice = next((name for name, count in Counter(names).items() if count > 1), None)
     if twice is not None:
@@ -101,7 +101,8 @@ def _nearest(name: str, options: Sequence[str], cutoff: float) -> str | None:
     return lower[near[0]] if near else None
 
 
-def _is_number(text: str) -> bool:
+def is_number(text: str) -> bool:
+    """Tell whether a text is a number."""
     try:
         float(text)
     except ValueError:

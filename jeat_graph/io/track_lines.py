@@ -6,8 +6,9 @@ import json
 from typing import Any
 
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.data.views import BOX, MEAN, VAR
 from jeat_graph.io.table_writer import csv_lines
-from jeat_graph.io.trajectories_io import BOX, COLUMNS, MEAN, VAR, table_columns
+from jeat_graph.io.trajectories_io import COLUMNS, table_columns
 
 
 def json_line(t: float, table: Trajectories) -> str:

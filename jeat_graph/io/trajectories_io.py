@@ -16,6 +16,7 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.data.views import BOX, MEAN, VAR
 from jeat_graph.io import kitti, motchallenge
 from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.formats import recognise
@@ -25,9 +26,6 @@ from jeat_graph.io.plain_text import frames_of
 from jeat_graph.io.table_writer import TableWriter, round_decimals, round_significant, write_columns
 from jeat_graph.io.tables import read_table
 
-BOX = ("left", "top", "width", "height")
-MEAN = ("x", "y", "vx", "vy", "ax", "ay")
-VAR = tuple(f"var_{name}" for name in MEAN)
 COLUMNS = ("t", "track_id", *BOX, "existence", *MEAN, *VAR, "sensors")
 _PX_DECIMALS = 3
 _EXISTENCE_DECIMALS = 6

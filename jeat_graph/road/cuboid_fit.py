@@ -15,6 +15,7 @@ from scipy.linalg import solve_triangular
 
 from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.interop import to_xyxy
 from jeat_graph.road.camera import PARAMETERS, RoadCamera
 from jeat_graph.road.cuboid import sides
 from jeat_graph.road.motion_fit import MotionFit, MotionFitConfig, basis_rows, motion_prior, spaced_knots
@@ -129,7 +130,7 @@ def fit_cuboid(
     chosen = _choose(t, config)
     t, boxes = t[chosen], boxes[chosen]
     stated = np.zeros((len(t), 2)) if variance is None else variance[chosen]
-    seen = np.concatenate([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]], axis=1)
+    seen = to_xyxy(boxes)
     contact = camera.to_road(np.stack([boxes[:, 0] + boxes[:, 2] / 2.0, seen[:, 3]], axis=1))
     edge = config.edge_px
     usable = np.concatenate(
