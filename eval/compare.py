@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from jeat_graph.data.arrays import BoolArray
+from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.measured_track import MeasuredTrack
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.consistency import consistency
@@ -46,7 +46,8 @@ def compare(
     sensors: Sequence[str],
     *,
     truth: GroundTruth | None = None,
-    smoothed: Trajectories | None = None,
+    causal: Trajectories | None = None,
+    instants: FloatArray | None = None,
     lags_s: Sequence[float] = LAGS_S,
     iou: float = 0.5,
 ) -> Comparison:
@@ -58,7 +59,8 @@ def compare(
         tracks: confirmed tracks with their measurements.
         sensors: names of the sensors.
         truth: true boxes with motion; without them only consistency is judged.
-        smoothed: the smoothed table, which decides what track is matched to what object at what time.
+        causal: the causal table, which decides what track is matched to what object at what time.
+        instants: all times at which the tracker gave output (s), if known.
         lags_s: lags (s); 0 is the filter.
         iou: smallest IoU of a match.
     """
@@ -67,8 +69,8 @@ def compare(
     values["consistency"], table = consistency(tracks)
     tables = [table]
     samples = None
-    if truth is not None and smoothed is not None and truth.motion is not None:
-        samples = collect_samples(tracks, truth, smoothed, lags, iou)
+    if truth is not None and causal is not None and truth.motion is not None:
+        samples = collect_samples(tracks, truth, causal, lags, instants=instants, iou=iou)
         if len(samples):
             errors = {name: errors_of(samples, name) for name in samples.states}
             values["errors"] = errors

@@ -53,15 +53,25 @@ def lag_name(lag_s: float) -> str:
 def collect_samples(
     tracks: Sequence[MeasuredTrack],
     truth: GroundTruth,
-    smoothed: Trajectories,
+    causal: Trajectories,
     lags_s: Sequence[float],
+    *,
+    instants: FloatArray | None = None,
     iou: float = 0.5,
 ) -> Samples:
-    """Estimate each matched track at the times of the truth, by every estimator.
+    """Estimate each track at those times of the truth at which the causal table matches it to an object.
+
+    Args:
+        tracks: confirmed tracks with their measurements.
+        truth: true boxes with motion.
+        causal: the causal table, with the same identities.
+        lags_s: lags (s).
+        instants: all times at which the tracker gave output (s), if known.
+        iou: smallest IoU of a match.
 
     Objects cut off by the picture's edge are left out: a detector sees the centre of what is left of them.
     """
-    frames = build_frames(truth, smoothed, kind="smoothed")
+    frames = build_frames(truth, causal, kind="causal", instants=instants)
     matched = matched_errors(frames, iou=iou)
     assert matched is not None
     assert truth.motion is not None

@@ -142,6 +142,8 @@ def compare(
     Raises:
         JeatGraphError: what a file or the configuration has wrong.
     """
+    import numpy as np
+
     from jeat_graph.eval.compare import LAGS_S
     from jeat_graph.eval.compare import compare as compared
     from jeat_graph.runs.declaring import fit_input
@@ -150,9 +152,15 @@ def compare(
     recording = detections if isinstance(detections, Detections) else read_detections(detections)
     objects = truth if isinstance(truth, GroundTruth) or truth is None else read_truth(truth)
     settings = fit_input(as_config(config), recording)[0]
-    records, smoothed = record_tracks(settings, recording)
-    names = settings.sensor_names
-    return compared(records, names, truth=objects, smoothed=smoothed, lags_s=lags_s or LAGS_S)
+    records, causal = record_tracks(settings, recording)
+    return compared(
+        records,
+        settings.sensor_names,
+        truth=objects,
+        causal=causal,
+        instants=np.unique(recording.scan_t),
+        lags_s=lags_s or LAGS_S,
+    )
 
 
 def calibrate(

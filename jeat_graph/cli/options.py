@@ -134,7 +134,8 @@ def add_formats(parser: argparse.ArgumentParser) -> None:
     add(
         "--diagnostics",
         action="store_true",
-        help="also write diagnostics.csv: NIS and noise scale of every update, for the pages of `report`",
+        help="also write diagnostics.csv (NIS and noise scale of every update) and measurements.parquet (all "
+        "that tracks took in), for `report` and `compare`",
     )
 
 

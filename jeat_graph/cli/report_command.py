@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--no-compare",
         action="store_true",
-        help="leave out filter against smoother, for which the run's inputs are tracked again",
+        help="leave out filter against smoother: a run without measurements.parquet is tracked again for it",
     )
 
 
@@ -71,23 +71,27 @@ def _compare(args: argparse.Namespace) -> tuple[ComparedRun | None, str | None]:
     """Filter against smoothers on the run's inputs, or the reason why that is not on the page."""
     if args.no_compare:
         return None, "Filter against smoother was left out (--no-compare)."
-    from jeat_graph.cli.compare_command import recorded_inputs
     from jeat_graph.data.errors import DataError
     from jeat_graph.drawing.page.figures import compared_run
     from jeat_graph.eval.compare import compare
     from jeat_graph.io.truth_io import read_truth
-    from jeat_graph.tracking.records import record_tracks
+    from jeat_graph.runs.measured import measured_run
 
     folder = Path(args.run_directory)
     if not folder.is_dir():
         return None, "Filter against smoother is not shown: that needs a run directory with its inputs."
     try:
-        config, detections = recorded_inputs(folder, args.detections)
+        measured = measured_run(folder, args.detections, progress=sys.stderr.isatty())
     except DataError as error:
         if args.detections is not None:
             raise
         return None, f"Filter against smoother is not shown: {error}."
     truth = None if args.gt is None else read_truth(args.gt, rate_hz=args.rate)
-    records, smoothed = record_tracks(config, detections, progress=sys.stderr.isatty())
-    comparison = compare(records, config.sensor_names, truth=truth, smoothed=smoothed)
+    comparison = compare(
+        measured.tracks,
+        measured.sensors,
+        truth=truth,
+        causal=measured.causal,
+        instants=measured.instants,
+    )
     return compared_run(comparison), None

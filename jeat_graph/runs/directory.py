@@ -17,10 +17,11 @@ from jeat_graph.io.scans_io import SCANS
 RUN_JSON = "run.json"
 _UNFINISHED = ".unfinished-"
 DIAGNOSTICS = "diagnostics.csv"
+MEASUREMENTS = "measurements.parquet"
 TABLES = ("causal", "smoothed")
 SUFFIXES = {"csv": ".csv", "parquet": ".parquet", "motchallenge": ".mot.txt", "kitti": ".kitti.txt"}
 _TABLE_FILES = (kind + suffix for kind in TABLES for suffix in SUFFIXES.values())
-RUN_FILES = (*_TABLE_FILES, SCANS, DIAGNOSTICS, RUN_JSON)
+RUN_FILES = (*_TABLE_FILES, SCANS, DIAGNOSTICS, MEASUREMENTS, RUN_JSON)
 
 
 class RunDirectory:

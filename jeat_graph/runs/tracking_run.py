@@ -18,7 +18,7 @@ from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.eval.frames import Kind
 from jeat_graph.io.scans_io import SCANS, write_scans
-from jeat_graph.runs.directory import DIAGNOSTICS, RUN_JSON, SUFFIXES, RunDirectory
+from jeat_graph.runs.directory import DIAGNOSTICS, MEASUREMENTS, RUN_JSON, SUFFIXES, RunDirectory
 from jeat_graph.tracking.tracker import Tracker
 from jeat_graph.version import __version__
 
@@ -38,7 +38,7 @@ class RunOptions:
         frame_rate_hz: frames per second of formats that count frames; by default the declared rate of the
             slowest sensor that occurs.
         progress: whether to show a progress bar on stderr.
-        diagnostics: whether to write `diagnostics.csv` too.
+        diagnostics: whether to write `diagnostics.csv` and `measurements.parquet` too.
     """
 
     formats: tuple[str, ...] = ()
@@ -104,8 +104,6 @@ def _track(
     """Step through the recording, write `causal.csv`, `smoothed.csv`; return the times of the steps (I,)."""
     from tqdm import tqdm
 
-    from jeat_graph.io.diagnostics_io import DiagnosticsWriter
-
     tracker = Tracker(config, diagnostics=options.diagnostics)
     hidden = not options.progress
     instants = np.unique(detections.scan_t)
@@ -117,7 +115,7 @@ def _track(
     with (
         _TableFiles(run, "causal", options.formats) as writer,
         _TableFiles(run, "smoothed", options.formats) if smooths else nullcontext() as smoothed,
-        DiagnosticsWriter(run.path(DIAGNOSTICS)) if options.diagnostics else nullcontext() as diagnostics,
+        _UpdateFiles(run, tracker) if options.diagnostics else nullcontext() as updates,
         tqdm(total=detections.num_scans, desc="track", unit="scan", disable=hidden, leave=False) as bar,
     ):
         for k, batch in enumerate(detections.batches()):
@@ -125,8 +123,8 @@ def _track(
             table = tracker.step(batch)
             step_s[k] = time.perf_counter() - start
             writer.append(table)
-            if diagnostics is not None:
-                diagnostics.append(tracker.last_updates())
+            if updates is not None:
+                updates.add_step(k)
             reported.update(table.track_id.tolist())
             rows += len(table)
             bar.update(len(batch))
@@ -163,6 +161,31 @@ class _TableFiles(ExitStack):
     def append(self, table: Trajectories) -> None:
         for writer in self._writers:
             writer.append(table)
+
+
+class _UpdateFiles(ExitStack):
+    """The files of what the tracks took in: how each detection fitted, and the measurements themselves."""
+
+    def __init__(self, run: RunDirectory, tracker: Tracker) -> None:
+        from jeat_graph.io.diagnostics_io import DiagnosticsWriter
+        from jeat_graph.io.measurements_io import MeasurementWriter
+        from jeat_graph.tracking.measured import ConfirmedMeasurements
+
+        super().__init__()
+        self._tracker, self._kept = tracker, ConfirmedMeasurements(tracker)
+        self._diagnostics = self.enter_context(DiagnosticsWriter(run.path(DIAGNOSTICS)))
+        self._measured = self.enter_context(MeasurementWriter(run.path(MEASUREMENTS), tracker.sensor_names))
+        self.callback(self._release)  # what is left, before the files are closed
+
+    def add_step(self, k: int) -> None:
+        """Write what step `k` gave to the tracks."""
+        self._diagnostics.append(self._tracker.last_updates())
+        self._kept.add_step()
+        if k % STEPS_PER_DRAIN == 0:
+            self._release()
+
+    def _release(self) -> None:
+        self._measured.append(self._kept.release())
 
 
 def _write_at_frames(

@@ -8,14 +8,14 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.measured_track import MeasuredTrack
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.tracking.smoothing.priors import ErrorStates, track_data
+from jeat_graph.tracking.measured import ConfirmedMeasurements, measured_tracks
 from jeat_graph.tracking.tracker import Tracker
 
 
 def record_tracks(
     config: Config, detections: Detections, *, progress: bool = False
 ) -> tuple[list[MeasuredTrack], Trajectories]:
-    """Track a recording and return the confirmed tracks with their measurements, and the smoothed table.
+    """Track a recording and return the confirmed tracks with their measurements, and the causal table.
 
     Fragments of one vehicle stay apart here: each is compared for itself.
 
@@ -26,21 +26,15 @@ def record_tracks(
     """
     from tqdm import tqdm
 
-    # No joints are wanted, but the histories have to be kept.
-    smoother = replace(
-        config.smoother, engine="rts", stitch=True, stitch_max_gap_s=0.0, output_rate_hz=0.0, robust="none"
-    )
-    tracker = Tracker(replace(config, smoother=smoother))
+    config = replace(config, smoother=replace(config.smoother, engine="none"))
+    tracker = Tracker(config, diagnostics=True)
+    measured = ConfirmedMeasurements(tracker)
+    tables = [Trajectories.empty(config.sensor_names)]
     with tqdm(
         total=detections.num_scans, desc="track", unit="scan", disable=not progress, leave=False
     ) as bar:
         for batch in detections.batches():
-            tracker.step(batch)
+            tables.append(tracker.step(batch))
+            measured.add_step()
             bar.update(len(batch))
-    errors = ErrorStates.of(config)
-    records = []
-    for history in tracker.confirmed_histories():
-        rows = history.whole()
-        sensor = rows["sensor"].copy()
-        records.append(MeasuredTrack(history.track_id, track_data(rows, errors), sensor[1:], int(sensor[0])))
-    return records, tracker.finish()
+    return measured_tracks(measured.release(), config), Trajectories.concatenate(tables)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from jeat_graph.config.kernel_form import kernel_model
 from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config
+from jeat_graph.data.arrays import BoolArray, IntArray, RecordArray
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.diagnostics import Diagnostics
 from jeat_graph.data.errors import JeatGraphError, TimeOrderError
@@ -262,13 +263,24 @@ class Tracker(SmoothedTracks):
         Raises:
             JeatGraphError: the tracker was not made with `diagnostics`.
         """
+        rows, ids, _ = self.last_measurements()
+        t = 0.0 if self._t is None else self._t
+        return Diagnostics.from_log(t, rows, ids, self._tracks.existence[: len(ids)], self.sensor_names)
+
+    def last_measurements(self) -> tuple[RecordArray, IntArray, BoolArray]:
+        """Return what the last step gave to the tracks, for other smoothers.
+
+        Returns:
+            Records (M,) (`MEASUREMENT`), identities (N,) of the living tracks, whether each is confirmed.
+
+        Raises:
+            JeatGraphError: the tracker was not made with `diagnostics`.
+        """
         if not self._diagnostics:
             raise JeatGraphError("make the tracker with diagnostics=True to be told of its updates")
-        t = 0.0 if self._t is None else self._t
-        rows = self._log.rows[: int(self._log.count[0])]
-        n = self._num_tracks
-        living = (self._tracks.track_id[:n], self._tracks.existence[:n])
-        return Diagnostics.from_log(t, rows, *living, self.sensor_names)
+        n, count = self._num_tracks, int(self._log.count[0])
+        ids, confirmed = self._tracks.track_id[:n], self._tracks.confirmed[:n]
+        return self._log.rows[:count].copy(), ids.copy(), confirmed.copy()
 
     def run(self, detections: Detections) -> Iterator[Trajectories]:
         """Step through a recording and yield the table of each time; scans of one time are taken jointly."""

@@ -7,6 +7,7 @@ import json
 import pytest
 
 from jeat_graph.cli.main import main
+from jeat_graph.tracking import records
 
 
 @pytest.fixture(scope="module")
@@ -66,3 +67,30 @@ def test_inputs_that_have_moved_can_be_named(folder, tmp_path):
 def test_a_folder_that_holds_no_run_is_refused(tmp_path, capsys):
     assert main(["compare", str(tmp_path)]) == 2
     assert "run.json" in capsys.readouterr().err
+
+
+def test_a_run_that_kept_its_measurements_is_not_tracked_again_and_compares_the_same(
+    folder, tmp_path, monkeypatch
+):
+    detections, truth = str(folder / "sim" / "detections.csv"), str(folder / "sim" / "gt.csv")
+    kept, out, again = (str(tmp_path / name) for name in ("kept", "out", "again"))
+    assert main(["track", detections, "--out", kept, "--diagnostics"]) == 0
+    tracked = ["compare", kept, "--gt", truth, "--no-plots", "--out", again, "--detections", detections]
+    assert main(tracked) == 0
+    monkeypatch.setattr(records, "record_tracks", None)
+    assert main(["compare", kept, "--gt", truth, "--no-plots", "--out", out]) == 0
+    assert (tmp_path / "out" / "compare.json").read_bytes() == (
+        tmp_path / "again" / "compare.json"
+    ).read_bytes()
+
+
+@pytest.mark.parametrize("name", ["measurements.parquet", "causal.csv"])
+def test_a_file_of_the_run_that_has_changed_is_refused(folder, tmp_path, capsys, name):
+    kept = tmp_path / "kept"
+    assert main(["track", str(folder / "sim" / "detections.csv"), "--out", str(kept), "--diagnostics"]) == 0
+    (kept / name).write_bytes((kept / name).read_bytes()[:-1])
+    assert main(["compare", str(kept)]) == 2
+    assert f"{name}: has changed since the run" in capsys.readouterr().err
+    (kept / name).unlink()
+    assert main(["compare", str(kept)]) == 2
+    assert f"{name}: is missing from the run" in capsys.readouterr().err

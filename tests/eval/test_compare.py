@@ -138,7 +138,7 @@ def many(count=30, seed=4):
 @pytest.fixture(scope="module")
 def matched_model():
     tracks, truth, table = many()
-    return compare(tracks, ("a", "b"), truth=truth, smoothed=table, lags_s=(0.0, 0.1, 1.0))
+    return compare(tracks, ("a", "b"), truth=truth, causal=table, lags_s=(0.0, 0.1, 1.0))
 
 
 def test_on_a_matched_model_all_checks_come_out_as_expected(matched_model):
@@ -173,7 +173,7 @@ def test_measurements_noisier_than_claimed_show_in_nis_and_nees():
         d = one.data
         shy = replace(d, r=d.r / 9.0)
         tracks[k] = MeasuredTrack(one.track_id, shy, one.sensor, one.birth_sensor)
-    values = compare(tracks, ("a", "b"), truth=truth, smoothed=table, lags_s=(0.0,)).values
+    values = compare(tracks, ("a", "b"), truth=truth, causal=table, lags_s=(0.0,)).values
     assert values["consistency"]["nis"] > 2.0
     assert values["errors"]["full"]["anees_position"] > 2.0
 

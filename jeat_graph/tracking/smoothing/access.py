@@ -10,7 +10,6 @@ from jeat_graph.data.trajectories import Trajectories
 
 if TYPE_CHECKING:
     from jeat_graph.tracking.smoothing.behind import Smoothing
-    from jeat_graph.tracking.smoothing.history import TrackHistory
 
 
 class SmoothedTracks:
@@ -70,14 +69,6 @@ class SmoothedTracks:
     def smoother_counts(self) -> dict[str, int]:
         """How the smoothers fared: tracks, rebuilds, fallbacks, late measurements, joints; {} without one."""
         return self._smoothers.counts() if self._smoothers is not None else {}
-
-    def confirmed_histories(self) -> list[TrackHistory]:
-        """Return what the confirmed tracks took in so far; only engines that stitch (full, rts) keep it.
-
-        Raises:
-            JeatGraphError: the configuration asks for no smoother.
-        """
-        return self._wanted_smoothers().confirmed_histories()
 
     def _wanted_smoothers(self) -> Smoothing:
         if self._smoothers is None:

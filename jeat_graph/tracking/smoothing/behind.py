@@ -6,7 +6,6 @@ from typing import Protocol
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.tracking.smoothing.history import TrackHistory
 from jeat_graph.tracking.smoothing.online import TrackSmoothers
 from jeat_graph.tracking.smoothing.recorder import StepRecorder
 from jeat_graph.tracking.smoothing.shares import packet_cost
@@ -33,9 +32,6 @@ class Smoothing(Protocol):
 
     def counts(self) -> dict[str, int]:
         """How the smoothers fared; after `finish`, all of it."""
-
-    def confirmed_histories(self) -> list[TrackHistory]:
-        """Return what the confirmed tracks took in so far."""
 
 
 #: What waits is worked off within so many packets of steps, should it ever be more than comes in.
@@ -85,11 +81,6 @@ class InProcessSmoothing:
     def counts(self) -> dict[str, int]:
         """How the smoothers fared."""
         return {name: getattr(self._smoothers, name) for name in COUNTS}
-
-    def confirmed_histories(self) -> list[TrackHistory]:
-        """Return what the confirmed tracks took in so far; only engines that stitch keep it."""
-        self._consume()
-        return self._smoothers.confirmed_histories()
 
     def _consume(self) -> None:
         packet = self._recorder.drain()

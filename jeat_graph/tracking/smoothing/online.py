@@ -178,12 +178,6 @@ class TrackSmoothers:
         self._ready.drain()
         return table
 
-    def confirmed_histories(self) -> list[TrackHistory]:
-        """Return all confirmed tracks so far, with all they took in; for engines that stitch only."""
-        self.work()
-        found = [h for h in (*self._done, *self._histories.values()) if h.confirmed]
-        return sorted(found, key=lambda h: h.track_id)
-
     def _end(self, history: TrackHistory) -> None:
         """Collect the last rows of a track that is over, and its counts."""
         history.feed()

@@ -23,7 +23,6 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.smoothing.behind import COUNTS
-from jeat_graph.tracking.smoothing.history import TrackHistory
 from jeat_graph.tracking.smoothing.journal import PACKETS_PER_STATE, Journal
 from jeat_graph.tracking.smoothing.online import WHOLE, TrackSmoothers
 from jeat_graph.tracking.smoothing.outbox import Outbox
@@ -137,14 +136,6 @@ class SmoothingWorker:
         """How the smoothers fared, as far as the worker has told."""
         self._receive()
         return self._counts
-
-    def confirmed_histories(self) -> list[TrackHistory]:
-        """Refuse: the histories are in the other process.
-
-        Raises:
-            JeatGraphError: always.
-        """
-        raise JeatGraphError("the tracks' measurements are with the worker: set smoother.worker to false")
 
     def _send(self, order: str, content: Any) -> None:
         """Hand an order to the worker; where too many wait, take in answers until there is room."""

@@ -10,8 +10,8 @@ import pytest
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.smoothers.rts import filter_track
+from jeat_graph.tracking.records import record_tracks
 from jeat_graph.tracking.smoothing.online import TrackSmoothers
-from jeat_graph.tracking.smoothing.priors import ErrorStates, track_data
 
 from .conftest import make_tracker, recording, run
 
@@ -249,10 +249,9 @@ def test_a_failing_gtsam_is_survived_and_counted(one_car, monkeypatch):
 def test_the_log_holds_the_measurements_just_as_the_filter_used_them(one_car):
     """A filter over the logged measurements ends where the tracker's own does."""
     overrides = ("smoother.engine=rts", "standing.enabled=false", "size.rate_density=0.01")
-    tracker = make_tracker(*overrides)
-    causal = run(tracker, one_car)
-    [history] = tracker._smoothers.confirmed_histories()
-    mean, cov = filter_track(track_data(history.whole(), ErrorStates.of(tracker.config)))
+    config = make_tracker(*overrides).config
+    [one], causal = record_tracks(config, one_car)
+    mean, cov = filter_track(one.data)
     assert np.allclose(mean[-1, :, 0], causal.mean[-1, :2], atol=0.01)
     var = np.diagonal(cov[-1, :, :3, :3], axis1=1, axis2=2).T.reshape(-1)
     assert np.allclose(var, causal.var[-1], rtol=0.02)

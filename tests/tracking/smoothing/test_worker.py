@@ -234,13 +234,6 @@ def test_a_program_that_ends_without_finish_ends_and_so_does_its_worker(tmp_path
     assert ends(int(done.stdout))
 
 
-def test_the_histories_are_not_here():
-    tracker = make_tracker("smoother.worker=true")
-    with pytest.raises(JeatGraphError, match=r"smoother\.worker"):
-        tracker.confirmed_histories()
-    tracker.finish()
-
-
 #: What one track costs at most: a solve, two chunks of measurements, and the handing over of a share.
 ONE_TRACK = SOLVING + 2 * 48 + HANDING
 

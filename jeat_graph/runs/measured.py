@@ -1,0 +1,140 @@
+"""All that the tracks of a run took in, for other smoothers: as the run kept it, or tracked again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jeat_graph.config.reading import config_from_dict
+from jeat_graph.config.schema import Config
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.measured_track import MeasuredTrack
+from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.io.hashing import sha256_of
+from jeat_graph.io.scans_io import read_instants
+from jeat_graph.runs.directory import MEASUREMENTS, RUN_JSON
+from jeat_graph.runs.inputs import find_input
+
+
+class MeasuredRun(NamedTuple):
+    """A run with all that its confirmed tracks took in.
+
+    Attributes:
+        tracks: confirmed tracks with their measurements.
+        causal: the causal table, with the same identities.
+        instants: (I,) times at which the tracker gave output (s), or None if that is not known.
+        sensors: names of the sensors.
+    """
+
+    tracks: list[MeasuredTrack]
+    causal: Trajectories
+    instants: FloatArray | None
+    sensors: tuple[str, ...]
+
+
+def measured_run(folder: Path, moved: list[str] | None = None, *, progress: bool = False) -> MeasuredRun:
+    """Return a run's measurements: from `measurements.parquet` if it kept them, else by tracking again.
+
+    Args:
+        folder: the run directory.
+        moved: where the inputs are now, in their order; they are then tracked again in any case.
+        progress: whether to show a progress bar on stderr while tracking.
+
+    Raises:
+        DataError: there is no run, or a file of it, or an input, is missing or has changed since.
+    """
+    from jeat_graph.tracking.records import record_tracks
+
+    record = _read_record(folder)
+    if moved is None and MEASUREMENTS in record["files"]:
+        return _kept(folder, record)
+    config, detections = recorded_inputs(folder, record, moved)
+    tracks, causal = record_tracks(config, detections, progress=progress)
+    return MeasuredRun(tracks, causal, np.unique(detections.scan_t), config.sensor_names)
+
+
+def _kept(folder: Path, record: dict[str, Any]) -> MeasuredRun:
+    from jeat_graph.io.measurements_io import read_measurements
+    from jeat_graph.io.trajectories_io import read_trajectories
+    from jeat_graph.tracking.measured import measured_tracks
+
+    config, files = _config_of(folder, record), record["files"]
+    table = folder / "causal.csv"
+    for path in (folder / MEASUREMENTS, table):
+        if not path.is_file():
+            raise DataError("is missing from the run; track it again", path)
+        if sha256_of(path) != files[path.name]["sha256"]:
+            raise DataError("has changed since the run; track it again", path)
+    rows = read_measurements(folder / MEASUREMENTS, config.sensor_names)
+    tracks = measured_tracks(rows, config)
+    return MeasuredRun(tracks, read_trajectories(table), read_instants(folder), config.sensor_names)
+
+
+def _read_record(folder: Path) -> dict[str, Any]:
+    """Return `run.json`, with all that is needed of it."""
+    path = folder / RUN_JSON
+    try:
+        content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        if not isinstance(content["inputs"], list) or not isinstance(content["config"], dict):
+            raise TypeError
+        _ = dict(content["reading"])["detections"], dict(content["files"])
+    except OSError as error:
+        raise DataError(f"cannot be read: {error.strerror or error}; is {folder} a run?", path) from None
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        raise DataError(_NO_RECORD, path) from None
+    return content
+
+
+_NO_RECORD = "is not the record of a run by this version of `jeat-graph track`"
+
+
+def _config_of(folder: Path, record: dict[str, Any]) -> Config:
+    try:
+        return config_from_dict(record["config"])
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        raise DataError(_NO_RECORD, folder / RUN_JSON) from None
+
+
+def recorded_inputs(
+    folder: Path, record: dict[str, Any], moved: Sequence[str] | None = None
+) -> tuple[Config, Detections]:
+    """Read a run's configuration and its detections again, and check that they are the same.
+
+    Args:
+        folder: the run directory.
+        record: content of its `run.json`.
+        moved: where the inputs are now, in their order, if not where they were.
+
+    Raises:
+        DataError: an input is missing or has changed since.
+    """
+    from jeat_graph.io.detections_io import read_many, split_name
+
+    path = folder / RUN_JSON
+    config = _config_of(folder, record)
+    inputs, reading = record["inputs"], dict(record["reading"])
+    names = list(reading.pop("detections"))
+    if moved is not None:
+        if len(moved) != len(inputs):
+            raise DataError(f"the run has {len(inputs)} inputs, --detections names {len(moved)}", path)
+        prefixes = [split_name(name)[0] for name in names]
+        names = [
+            file if prefix is None else f"{prefix}={file}"
+            for prefix, file in zip(prefixes, moved, strict=True)
+        ]
+    found = []
+    for name, described in zip(names, inputs, strict=True):
+        prefix, file = split_name(name)
+        place = find_input(file, described, folder) if moved is None else Path(file)
+        if place is None or not place.is_file():
+            raise DataError("input of the run is not there; say where it is with --detections", file)
+        if sha256_of(place) != described["sha256"]:
+            raise DataError("has changed since the run; track it again", file)
+        found.append(str(place) if prefix is None else f"{prefix}={place}")
+    return config, read_many(found, **reading)

@@ -1,0 +1,64 @@
+"""Keeps what confirmed tracks took in, so that it can be written down or smoothed in other ways.
+
+Whether a track is ever confirmed is not known when it takes its first detections: what a tentative track took
+waits here until that is decided, and is forgotten if the track ends before.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jeat_graph.config.schema import Config
+from jeat_graph.data.arrays import IntArray, RecordArray
+from jeat_graph.data.measured_track import MeasuredTrack
+from jeat_graph.filters.measurement import MEASUREMENT
+from jeat_graph.tracking.smoothing.priors import ErrorStates, track_data
+from jeat_graph.tracking.tracker import Tracker
+
+
+class ConfirmedMeasurements:
+    """Collects the measurements of a tracker's confirmed tracks, step by step.
+
+    Args:
+        tracker: made with `diagnostics`.
+    """
+
+    def __init__(self, tracker: Tracker) -> None:
+        self._tracker = tracker
+        self._waiting: list[RecordArray] = []
+        self._confirmed: list[IntArray] = []
+        self._living: IntArray = np.zeros(0, dtype=np.int64)
+
+    def add_step(self) -> None:
+        """Take down what the tracker's last step gave to its tracks."""
+        rows, self._living, confirmed = self._tracker.last_measurements()
+        if len(rows):
+            self._waiting.append(rows)
+        self._confirmed.append(self._living[confirmed])
+
+    def release(self) -> RecordArray:
+        """Return, and forget, the records (M,) of tracks confirmed by now, those of each in order of time."""
+        rows = np.concatenate([np.zeros(0, dtype=MEASUREMENT), *self._waiting])
+        confirmed = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *self._confirmed]))
+        chosen = np.isin(rows["track_id"], confirmed)
+        self._waiting = [rows[~chosen & np.isin(rows["track_id"], self._living)]]
+        self._confirmed = [np.intersect1d(confirmed, self._living)]
+        return np.asarray(rows[chosen])
+
+
+def measured_tracks(rows: RecordArray, config: Config) -> list[MeasuredTrack]:
+    """Return confirmed tracks with their measurements, by identity, ascending.
+
+    Args:
+        rows: (M,) records (`MEASUREMENT`), each track's in order of time, its birth first.
+        config: the configuration that they were tracked with.
+    """
+    errors = ErrorStates.of(config)
+    rows = rows[np.argsort(rows["track_id"], kind="stable")]
+    cuts = np.flatnonzero(np.diff(rows["track_id"])) + 1
+    out = []
+    for part in np.split(rows, cuts) if len(rows) else []:
+        sensor = part["sensor"].copy()
+        identity = int(part["track_id"][0])
+        out.append(MeasuredTrack(identity, track_data(part, errors), sensor[1:], int(sensor[0])))
+    return out
