@@ -219,8 +219,9 @@ def test_a_run_without_record_is_shown_and_says_so(copy_of, report):
 
 
 def test_inputs_that_are_gone_leave_out_the_comparison_with_the_reason(copy_of, tmp_path):
-    run = copy_of()
+    run = copy_of("measurements.parquet")
     record = json.loads((run / "run.json").read_text())
+    del record["files"]["measurements.parquet"]
     record["reading"]["detections"] = [str(tmp_path / "gone.csv")]
     record["inputs"][0]["absolute"] = str(tmp_path / "gone.csv")
     (run / "run.json").write_text(json.dumps(record))
@@ -229,6 +230,19 @@ def test_inputs_that_are_gone_leave_out_the_comparison_with_the_reason(copy_of, 
     text = out.read_text()
     assert "Filter against smoother is not shown" in text
     assert "--detections" in text
+
+
+def test_a_run_that_kept_its_measurements_needs_no_inputs(copy_of, tmp_path):
+    run = copy_of()
+    record = json.loads((run / "run.json").read_text())
+    record["reading"]["detections"] = [str(tmp_path / "gone.csv")]
+    record["inputs"][0]["absolute"] = str(tmp_path / "gone.csv")
+    (run / "run.json").write_text(json.dumps(record))
+    out = tmp_path / "page.html"
+    assert main(["report", str(run), "--out", str(out)]) == 0
+    text = out.read_text()
+    assert "Filter against smoother is not shown" not in text
+    assert "innovation autocorrelation" in text
 
 
 def test_a_single_table_is_shown_and_named_as_one(full_run, report):
