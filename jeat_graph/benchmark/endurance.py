@@ -1,39 +1,38 @@
 """Hours of synthetic input through the live path as fast as they go, and what they cost hour by hour.
 
-Vehicles drive in circles that never end, so that there are as many in the last hour as in the first; both
-sensors see them with noise, misses and false boxes, and their scans arrive late and out of order. All is on:
-late scans are put where they belong, a smoother with a fixed lag runs behind, rows are fetched, checkpoints
-are written.
+All is on (`live/session.py`): late scans are put where they belong, messages that come twice are told, the
+health of the sensors is watched, a smoother with a fixed lag runs behind, its rows are fetched, checkpoints
+are written. A day takes hours: with `--checkpoint` a run that was broken off goes on where it was.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-import numpy as np
-
+from jeat_graph.benchmark.endurance_input import messages
+from jeat_graph.benchmark.latency_counts import LatencyCounts
 from jeat_graph.config.argument_types import counting, natural, positive
 from jeat_graph.config.reading import load_config
-from jeat_graph.data.arrays import FloatArray
-from jeat_graph.data.detections import Scan
+from jeat_graph.data.errors import ConfigError
+from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.eval.tables import Cell, Table
 from jeat_graph.live.late import LiveTracker
+from jeat_graph.live.session import Ends, Session
 from jeat_graph.tracking.tracker import Tracker
 
-RATES_HZ = {"evt": 100.0, "rgb": 20.0}
-DELAY_S = {"evt": 0.005, "rgb": 0.08}
-#: Further delay of each scan, at random up to so much (s).
-JITTER_S = 0.02
-_SIDE_PX, _NOISE_PX, _MISSED, _FALSE = 30.0, 0.7, 0.1, 0.3
-_DRAIN_SCANS, _CHECKPOINT_S = 64, 60.0
+PERIODS = 24
+_CHECKPOINT_S = 60.0
+_WARNING = "warning: "
 
 
 @dataclass(frozen=True)
@@ -43,9 +42,11 @@ class Period:
     Attributes:
         end_s: the input's time at its end (s).
         scans: scans in it.
-        p50_ms: median time of an arrival (ms).
+        p50_ms: median time of an arrival, with all that is done before the next one can be taken (ms).
         p99_ms: its 99th percentile.
         max_ms: the longest.
+        save_ms: median time of a checkpoint (ms).
+        save_kb: size of the last checkpoint (kB).
         memory_mb: resident memory at the end (MB).
         reported: tracks reported at the end.
         born: tracks started so far.
@@ -57,10 +58,27 @@ class Period:
     p50_ms: float
     p99_ms: float
     max_ms: float
+    save_ms: float
+    save_kb: float
     memory_mb: float
     reported: int
     born: int
     rows: int
+
+
+@dataclass(frozen=True)
+class Load:
+    """The input of an endurance test.
+
+    Attributes:
+        hours: its length.
+        vehicles: how many are in the picture.
+        seed: of its random numbers.
+    """
+
+    hours: float
+    vehicles: int
+    seed: int = 1
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -69,107 +87,176 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--hours", type=positive, default=24.0, metavar="H", help="length of the input (24)")
     add("--vehicles", type=counting, default=5, metavar="N", help="vehicles in the picture (5)")
     add("--seed", type=natural, default=1, metavar="N", help="seed of the input (1)")
-    add("--out", metavar="FILE", help="write the periods as JSON")
+    add("--out", metavar="FILE", help="write the periods as JSON, anew after each")
+    add("--checkpoint", metavar="FILE", help="keep the state there, and go on from it where it is")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run, print a line a period and the table; 1 if there was a warning."""
     from jeat_graph.io.atomic import open_atomic
 
-    def tell(one: Period) -> None:
+    def tell(periods: list[Period]) -> None:
+        one = periods[-1]
         if sys.stderr.isatty():
             print(
                 f"{one.end_s / 3600.0:.2f} h: {one.p99_ms:.2f} ms p99, {one.memory_mb:.0f} MB",
                 file=sys.stderr,
             )
+        if args.out is not None:
+            with open_atomic(args.out) as file:
+                json.dump([vars(one) for one in periods], file, indent=1)
 
-    periods, told = run_endurance(args.hours, args.vehicles, args.seed, tell)
+    load = Load(args.hours, args.vehicles, args.seed)
+    periods, told = run_endurance(load, tell, args.checkpoint)
     sys.stdout.write(table_of(periods).render())
     print(f"{len(told)} warnings")
     for text in told:
         print(f"jeat-graph benchmark: warning: {text}", file=sys.stderr)
-    if args.out is not None:
-        with open_atomic(args.out) as file:
-            json.dump([vars(one) for one in periods], file, indent=1)
     return 1 if told else 0
 
 
-def arrivals(seconds: float, vehicles: int, seed: int) -> Iterator[Scan]:
-    """Yield the scans of both sensors in order of arrival, made one second at a time."""
-    rng = np.random.default_rng(seed)
-    centre = rng.uniform((200.0, 150.0), (1080.0, 570.0), (vehicles, 2))
-    radius, speed = rng.uniform(20.0, 120.0, vehicles), rng.uniform(0.2, 0.6, vehicles)
-    phase = rng.uniform(0.0, 2.0 * np.pi, vehicles)
-    waiting: list[tuple[float, Scan]] = []
-    for second in range(int(np.ceil(seconds))):
-        for sensor, rate in RATES_HZ.items():
-            for t in second + (np.arange(int(rate)) + 0.3) / rate:
-                angle = phase + speed * t
-                here = centre + radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
-                when = t + DELAY_S[sensor] + rng.uniform(0.0, JITTER_S)
-                waiting.append((when, _scan(float(t), sensor, here, rng)))
-        waiting.sort(key=lambda item: item[0])
-        ready = sum(when <= second + 1.0 for when, _ in waiting)
-        yield from (scan for _, scan in waiting[:ready])
-        waiting = waiting[ready:]
-
-
-def _scan(t: float, sensor: str, centre: FloatArray, rng: np.random.Generator) -> Scan:
-    seen = centre[rng.random(len(centre)) > _MISSED]
-    false = rng.uniform((0.0, 0.0), (1280.0, 720.0), (rng.poisson(_FALSE), 2))
-    boxes = np.full((len(seen) + len(false), 4), _SIDE_PX)
-    boxes[:, :2] = np.concatenate([seen + rng.normal(0.0, _NOISE_PX, seen.shape), false]) - 0.5 * _SIDE_PX
-    score = np.concatenate([rng.uniform(0.6, 0.95, len(seen)), rng.uniform(0.1, 0.4, len(false))])
-    return Scan(t, sensor, boxes, score)
-
-
 def run_endurance(
-    hours: float, vehicles: int, seed: int = 1, progress: Callable[[Period], object] = lambda _: None
+    load: Load,
+    progress: Callable[[list[Period]], object] = lambda _: None,
+    checkpoint: str | Path | None = None,
 ) -> tuple[list[Period], list[str]]:
     """Run so many hours of input as fast as they go.
 
     Args:
-        hours: length of the input.
-        vehicles: how many are in the picture.
-        seed: of the input.
-        progress: called with each of 24 equal periods when it is over.
+        load: the input.
+        progress: called with all periods so far when one of the 24 equal ones is over.
+        checkpoint: file to keep the state in and to go on from, or None for one that is removed at the end.
 
     Returns:
         The periods, and the warnings that were raised, each once.
+
+    Raises:
+        ConfigError: the checkpoint is of another input.
     """
-    live = LiveTracker(Tracker(load_config("default")))
-    length = hours * 3600.0 / 24.0
-    periods: list[Period] = []
-    took: list[float] = []
-    rows, saved, reported = 0, 0.0, 0
     with (
         tempfile.TemporaryDirectory(prefix="jeat-graph-") as folder,
         warnings.catch_warnings(record=True) as caught,
     ):
-        for k, scan in enumerate(arrivals(hours * 3600.0, vehicles, seed)):
+        file = Path(folder) / "state.npz" if checkpoint is None else Path(checkpoint)
+        day = _Day(load, file, progress)
+        day.run()
+    return day.periods, sorted({*day.told, *(str(one.message) for one in caught)})
+
+
+class _Rows:
+    """Counts smoothed rows where a file of them would be; a day's are gigabytes.
+
+    Attributes:
+        count: rows so far.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def append(self, table: Trajectories) -> None:
+        self.count += len(table)
+
+    def flush(self) -> int:
+        return self.count
+
+
+class _Day:
+    """One endurance test, from its beginning or from where it was broken off.
+
+    Attributes:
+        periods: those that are over.
+        told: warnings so far.
+    """
+
+    def __init__(self, load: Load, file: Path, progress: Callable[[list[Period]], object]) -> None:
+        self._load, self._file, self._progress = load, file, progress
+        self.periods: list[Period] = []
+        self.told: list[str] = []
+        self._rows = _Rows()
+        self._took, self._saves = LatencyCounts(), LatencyCounts()
+        config = load_config("default")
+        live = LiveTracker(Tracker(config))
+        more: dict[str, Any] = {}
+        if file.is_file():
+            live, more = LiveTracker.load(file, config)
+            self._go_on(more)
+        self._reported = len(live.tracker.causal())
+        self._session = _TimedSession(live, self._ends(), file, _CHECKPOINT_S, more, saves=self._saves)
+
+    def _ends(self) -> Ends:
+        def warn(text: str) -> None:
+            if text.startswith(_WARNING):
+                self.told.append(text.removeprefix(_WARNING))
+
+        def note(t: float, table: Trajectories, *_: object) -> None:
+            self._reported = len(table)
+
+        return Ends(tracks=note, warn=warn, smoothed=self._rows, kept=self._kept)
+
+    def _kept(self) -> dict[str, Any]:
+        """What a checkpoint holds of the test itself."""
+        return {
+            "load": vars(self._load),
+            "periods": [vars(one) for one in self.periods],
+            "took": (self._took.counts, self._took.max_s),
+            "saves": (self._saves.counts, self._saves.max_s),
+            "told": self.told,
+        }
+
+    def _go_on(self, more: dict[str, Any]) -> None:
+        kept = more["kept"]
+        if kept["load"] != vars(self._load):
+            raise ConfigError(f"{self._file}: is of another endurance test: {kept['load']}")
+        self.periods = [Period(**one) for one in kept["periods"]]
+        self.told, self._rows.count = kept["told"], more["smoothed"]
+        self._took.counts, self._took.max_s = kept["took"]
+        self._saves.counts, self._saves.max_s = kept["saves"]
+
+    def run(self) -> None:
+        """Take all messages that have not been taken."""
+        session, load = self._session, self._load
+        length = load.hours * 3600.0 / PERIODS
+        # Whatever arrived before the second of the newest scan has been taken.
+        first = 0 if session.live.time is None else int(session.live.time)
+        for message in messages(math.ceil(load.hours * 3600.0), load.vehicles, load.seed, first):
+            duplicates = session.duplicates
             begin = time.perf_counter()
-            reported = len(live.step(scan).table)
-            took.append(time.perf_counter() - begin)
-            if k % _DRAIN_SCANS == 0:
-                rows += len(live.drain_smoothed())
-            if scan.t - saved > _CHECKPOINT_S:
-                live.save(Path(folder) / "state.npz")
-                saved = scan.t
-            if scan.t >= length * (len(periods) + 1):
-                periods.append(_period(scan.t, took, reported, live, rows))
-                progress(periods[-1])
-                took = []
-        if took:
-            periods.append(_period(hours * 3600.0, took, reported, live, rows))
-            progress(periods[-1])
-        live.finish()
-    return periods, sorted({str(one.message) for one in caught})
+            session.take(message)
+            if session.duplicates == duplicates:
+                self._took.add(time.perf_counter() - begin)
+            if message.batch.t >= length * (len(self.periods) + 1):
+                self._end_period(message.batch.t)
+        if len(self._took) and len(self.periods) < PERIODS:
+            self._end_period(load.hours * 3600.0)
+        session.finish()
+
+    def _end_period(self, t: float) -> None:
+        p50, p99 = (1e3 * self._took.quantile(share) for share in (0.5, 0.99))
+        most, saving = 1e3 * self._took.max_s, 1e3 * self._saves.quantile(0.5)
+        size = self._file.stat().st_size / 1e3 if self._file.is_file() else math.nan
+        live = self._session.live
+        self.periods.append(
+            Period(
+                *(t, len(self._took), p50, p99, most, saving, size),
+                *(memory_mb(), self._reported, live.tracker.num_born, self._rows.count),
+            )
+        )
+        self._progress(self.periods)
+        self._took.clear()
+        self._saves.clear()
 
 
-def _period(t: float, took: list[float], reported: int, live: LiveTracker, rows: int) -> Period:
-    p50, p99, most = 1e3 * np.quantile(took, (0.5, 0.99, 1.0))
-    born = live.tracker.num_born
-    return Period(t, len(took), float(p50), float(p99), float(most), memory_mb(), reported, born, rows)
+class _TimedSession(Session):
+    """A session that takes down how long its checkpoints took."""
+
+    def __init__(self, *args: Any, saves: LatencyCounts) -> None:
+        super().__init__(*args)
+        self._saves = saves
+
+    def save(self) -> None:
+        begin = time.perf_counter()
+        super().save()
+        self._saves.add(time.perf_counter() - begin)
 
 
 def memory_mb() -> float:

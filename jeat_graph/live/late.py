@@ -166,7 +166,7 @@ class LiveTracker:
         live.lateness.set_state(state["lateness"])
         for scans in state["steps"]:
             before = live.tracker.snapshot()
-            _, taken = live.tracker.take_in(scans)
+            taken = live.tracker.take_in(scans)
             live.steps.append(Step(scans[0].t, scans, before, taken))
         return live, state["more"]
 
@@ -217,7 +217,7 @@ class LiveTracker:
     def _insert(self, scans: list[Scan]) -> None:
         """Put scans of one time where they belong, and take all steps from there on again."""
         if self.policy != REWIND:
-            _, taken = self.tracker.take_in(scans)
+            taken = self.tracker.take_in(scans)
             self.tracker.hand_over(taken)
             return
         t = scans[0].t
@@ -235,7 +235,7 @@ class LiveTracker:
         for step in self.steps[k:]:
             if step is not self.steps[k]:
                 step.before = self.tracker.snapshot()
-            _, step.taken = self.tracker.take_in(step.scans)
+            step.taken = self.tracker.take_in(step.scans)
         self.replayed += len(self.steps) - k - 1
         newest = self.tracker.time
         assert newest is not None

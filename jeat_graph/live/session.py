@@ -6,19 +6,28 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.live.health import Event, SensorHealth
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.live.messages import Duplicates, ScanMessage
-from jeat_graph.live.smoothed_file import SmoothedFile
 
 #: Smoothed rows are fetched, and the sensors judged, at one arrival in so many.
 ARRIVALS_PER_DRAIN = 32
 #: So many scans passed over are told one by one; the rest is in the summary.
 MOST_TOLD = 5
+
+
+class RowsEnd(Protocol):
+    """Where smoothed rows go (`SmoothedFile`)."""
+
+    def append(self, table: Trajectories) -> None:
+        """Add rows."""
+
+    def flush(self) -> int:
+        """Hand all rows on; how much there is by now, for whoever goes on from a checkpoint."""
 
 
 @dataclass
@@ -30,6 +39,7 @@ class Ends:
         event: takes a change of a sensor's health.
         warn: takes one line for the user.
         smoothed: the file of smoothed rows, or None.
+        kept: what else a checkpoint is to hold; it is there again as `more["kept"]`.
         flush: sees to it that all that was given out has arrived.
         commit: tells the source of messages that all so far need not come again.
     """
@@ -37,7 +47,8 @@ class Ends:
     tracks: Callable[[float, Trajectories, ScanMessage, float], object]
     event: Callable[[Event], object] = lambda _: None
     warn: Callable[[str], object] = field(default=lambda text: print(text, file=sys.stderr))
-    smoothed: SmoothedFile | None = None
+    smoothed: RowsEnd | None = None
+    kept: Callable[[], dict[str, Any]] = dict
     flush: Callable[[], object] = lambda: None
     commit: Callable[[], object] = lambda: None
 
@@ -127,6 +138,7 @@ class Session:
                 "last": self._health.last,
                 "silent": self._health.silent,
                 "rubbish": self._health.rubbish,
+                "kept": self.ends.kept(),
                 "smoothed": None if self.ends.smoothed is None else self.ends.smoothed.flush(),
             }
             self.live.save(self._checkpoint, more)

@@ -46,7 +46,7 @@ def record_step(
         n: living tracks.
         births: how many of these were born in it.
         log: what the tracks took in.
-        reported: identities in the causal table of the step, ascending.
+        reported: identities in the causal table of the step, ascending; of those that stand at least.
     """
     ids = tracks.track_id[:n].copy()
     held = np.zeros(n, dtype=np.bool_)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.config.kernel_form import kernel_model
@@ -110,11 +111,11 @@ class Tracker(SmoothedTracks):
         """
         if self._finished:
             raise JeatGraphError("this tracker has been finished; make another one for another recording")
-        table, taken = self.take_in(as_scans(scans))
+        taken = self.take_in(as_scans(scans))
         self.hand_over(taken)
-        return table
+        return self.causal()
 
-    def take_in(self, batch: Sequence[Scan]) -> tuple[Trajectories, StepRecord | None]:
+    def take_in(self, batch: Sequence[Scan]) -> StepRecord | None:
         """Do a step without handing what it took in to the smoothers, which is left to the caller.
 
         For those who may have to take a step back (`snapshot`, `restore`) because an older scan comes late.
@@ -123,7 +124,7 @@ class Tracker(SmoothedTracks):
             batch: scans of one and the same time.
 
         Returns:
-            The tracks that are reported now, and what `hand_over` takes; None without a smoother.
+            What `hand_over` takes; None without a smoother. `causal` has the tracks that are reported.
 
         Raises:
             UnknownSensorError, TimeOrderError: as `step`.
@@ -146,11 +147,13 @@ class Tracker(SmoothedTracks):
         )
         self._t = t
         self._watch.look(batch)
-        table = self.causal()
         if self._smoothers is None:
-            return table, None
-        births = self._next_id - first_id
-        return table, record_step(t, self._tracks, self._num_tracks, births, self._log, table.track_id)
+            return None
+        n, births = self._num_tracks, self._next_id - first_id
+        # Only of tracks that stand still does it matter whether they are reported.
+        standing = bool(self._tracks.standing[:n].any())
+        reported = self.causal().track_id if standing else np.zeros(0, dtype=np.int64)
+        return record_step(t, self._tracks, n, births, self._log, reported)
 
     def hand_over(self, taken: StepRecord | None) -> None:
         """Give the smoothers what a step took in; in order of time, and once."""

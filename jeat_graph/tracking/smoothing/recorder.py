@@ -8,7 +8,7 @@ import numpy as np
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, RecordArray
-from jeat_graph.filters.measurement import MEASUREMENT
+from jeat_graph.smoothers.measurements import concatenate_measurements
 from jeat_graph.tracking.step_record import StepRecord
 
 
@@ -87,7 +87,7 @@ class StepRecorder:
             np.concatenate([step.used for step in steps]),
             np.concatenate([step.confirmed for step in steps]),
             np.concatenate([step.held for step in steps]),
-            np.concatenate([np.zeros(0, dtype=MEASUREMENT), *self._updates]),
+            concatenate_measurements(self._updates),
             self._ended,
         )
         self._recorded, self._updates, self._ended = [], [], []
