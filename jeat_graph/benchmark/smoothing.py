@@ -34,7 +34,7 @@ _DRAWN_SEEDS = 100
 
 
 @dataclass(frozen=True)
-class Job:
+class SmoothingJob:
     """One recording with one engine.
 
     Attributes:
@@ -69,7 +69,7 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
     setup = common.settings(args)
     default = load_config("highway")
     jobs = [
-        Job(default, engine, (scenario, seed), setup["duration_s"])
+        SmoothingJob(default, engine, (scenario, seed), setup["duration_s"])
         for scenario in setup["scenarios"]
         for seed in setup["seeds"]
         for engine in _ENGINES
@@ -95,7 +95,7 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
     if folds is not None:
         folder, targets = folds
         real = [
-            Job(config, engine, ("KITTI", name), folder=folder)
+            SmoothingJob(config, engine, ("KITTI", name), folder=folder)
             for name, config in targets.items()
             for engine in _ENGINES
         ]
@@ -105,7 +105,7 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
     return result
 
 
-def judge(job: Job) -> list[dict[str, Any]]:
+def judge(job: SmoothingJob) -> list[dict[str, Any]]:
     """Track with one engine and judge the smoothed table; with the first engine the causal one too."""
     from jeat_graph.data.trajectories import Trajectories
     from jeat_graph.eval.judge import judge_runs
@@ -126,7 +126,7 @@ def judge(job: Job) -> list[dict[str, Any]]:
     ]
 
 
-def _recording(job: Job) -> JudgedRecording:
+def _recording(job: SmoothingJob) -> JudgedRecording:
     if job.folder is not None:
         return next(one for one in kitti(job.folder) if one.name == job.where[1])
     assert job.duration_s is not None

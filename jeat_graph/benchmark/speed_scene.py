@@ -33,7 +33,7 @@ class Frame:
     scores: FloatArray
 
 
-class Scene:
+class SpeedScene:
     """Objects on straight paths, seen by any number of simulated detectors.
 
     Args:
@@ -91,6 +91,6 @@ class Scene:
 
 def make_frames(num_objects: int, num_frames: int, rate_hz: float, seed: int) -> list[Frame]:
     """Frames of one sensor at `rate_hz`, from time 0."""
-    scene = Scene(num_objects, seed)
+    scene = SpeedScene(num_objects, seed)
     rng = np.random.default_rng((seed, 1))
     return [scene.scan(k / rate_hz, rng) for k in range(num_frames)]

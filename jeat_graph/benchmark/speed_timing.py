@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.benchmark.speed_scene import Scene, make_frames
+from jeat_graph.benchmark.speed_scene import SpeedScene, make_frames
 from jeat_graph.benchmark.speed_subjects import REFERENCE, make_subject, stepper, tracker_for
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Scan
@@ -114,7 +114,7 @@ def real_time_factor(
         seed: of the scene.
         clock: as in `time_side_by_side`.
     """
-    scene = Scene(num_objects, seed)
+    scene = SpeedScene(num_objects, seed)
     rng = np.random.default_rng((seed, 2))
     batches = []
     for k in range(round(100 * duration_s)):

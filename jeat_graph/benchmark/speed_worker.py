@@ -113,11 +113,11 @@ def endurance(scans: int, objects: int) -> dict[str, Any]:
     """Memory (MiB) and time per scan (µs) minute by minute over a long input at 100 Hz."""
     import numpy as np
 
-    from jeat_graph.benchmark.speed_scene import Scene
+    from jeat_graph.benchmark.speed_scene import SpeedScene
     from jeat_graph.benchmark.speed_subjects import tracker_for
 
     tracker = tracker_for("highway", "none")
-    scene = Scene(objects, 0)
+    scene = SpeedScene(objects, 0)
     rng = np.random.default_rng(0)
     resident, per_scan = [], []
     spent = 0.0

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from jeat_graph.benchmark.speed_scene import HEIGHT_PX, WIDTH_PX, Scene, make_frames
+from jeat_graph.benchmark.speed_scene import HEIGHT_PX, WIDTH_PX, SpeedScene, make_frames
 
 
 def test_one_seed_gives_one_scene():
@@ -13,7 +13,7 @@ def test_one_seed_gives_one_scene():
 
 
 def test_all_objects_stay_in_the_picture():
-    scene = Scene(50, seed=0)
+    scene = SpeedScene(50, seed=0)
     for t in (0.0, 1.0, 30.0):
         boxes = scene.boxes(t)
         centre = boxes[:, :2] + 0.5 * boxes[:, 2:]
@@ -22,7 +22,7 @@ def test_all_objects_stay_in_the_picture():
 
 
 def test_objects_move_less_than_a_third_of_their_width_between_frames():
-    scene = Scene(200, seed=1)
+    scene = SpeedScene(200, seed=1)
     before, after = scene.boxes(0.0), scene.boxes(0.05)
     step = np.abs(after[:, :2] - before[:, :2])
     stayed = (step < 0.5 * HEIGHT_PX).all(axis=1)  # the others came back on the other side
