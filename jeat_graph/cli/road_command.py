@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from jeat_graph.cli.terminal import one_line
 from jeat_graph.data.errors import DataError
 
 HELP = "metres, km/h and lanes on the road, each with its uncertainty"
@@ -39,9 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fit the vehicles and write the tables."""
-    import numpy as np
-
-    from jeat_graph.io.trajectories_io import read_trajectories
+    from jeat_graph.road.box_rows import BoxConfig
     from jeat_graph.road.boxes_road import follow_boxes
     from jeat_graph.road.camera_file import read_camera
     from jeat_graph.road.cuboid_fit import CuboidConfig
@@ -50,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.road.motion_fit import MotionFitConfig
     from jeat_graph.road.points_road import follow_points, summarise
     from jeat_graph.road.results import write_result
-    from jeat_graph.road.sources import contact_pixels, only_points, run_table
+    from jeat_graph.road.sources import boxes_of, contact_pixels, only_points, run_table
     from jeat_graph.road.speeds import ContactConfig
 
     out = Path(args.out)
@@ -65,10 +64,10 @@ def run(args: argparse.Namespace) -> int:
     if args.contact == "cuboid" or (args.contact is None and not only_points(table)):
         if only_points(table):
             raise DataError("has points only, no boxes: --contact cuboid needs boxes, use center", table)
-        boxes = read_trajectories(table)
-        total = len(np.unique(boxes.track_id))
+        seen = boxes_of(args.source, camera, BoxConfig(), _say, sys.stderr.isatty())
+        total = len(seen)
         with _bar(total) as bar:
-            sized = follow_boxes(boxes, camera, CuboidConfig(), progress=lambda done, _: _advance(bar, done))
+            sized = follow_boxes(seen, camera, CuboidConfig(), progress=lambda done, _: _advance(bar, done))
         contact = ContactConfig(0.0, 0.0, 0.0)
         vehicles = [one.vehicle for one in sized]
     else:
@@ -89,6 +88,10 @@ def run(args: argparse.Namespace) -> int:
     lanes, crossings = len(result.lanes.names), len(result.crossings)
     print(f"{len(vehicles)} vehicles, {lanes} lanes, {crossings} crossings: {out}")
     return 0
+
+
+def _say(text: str) -> None:
+    print(f"jeat-graph road: {one_line(text)}", file=sys.stderr)
 
 
 def _bar(total: int) -> Any:

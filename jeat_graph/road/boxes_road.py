@@ -1,21 +1,25 @@
-"""From a run's boxes to vehicles on the road: place, speed and size, by the cuboid that made the boxes."""
+"""From boxes to vehicles on the road: place, speed and size, by the cuboid that made the boxes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from jeat_graph.data.arrays import BoolArray
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.road.box_rows import BoxConfig, rows_of_table
+from jeat_graph.road.box_solver import BoxRows
 from jeat_graph.road.camera import RoadCamera
-from jeat_graph.road.cuboid_fit import CLASSES, CuboidConfig, CuboidFit, fit_cuboid
+from jeat_graph.road.cuboid_fit import CuboidConfig, fit_cuboid
+from jeat_graph.road.fleet import CLASSES
 from jeat_graph.road.motion_fit import MotionFitConfig
 from jeat_graph.road.results import Size
 from jeat_graph.road.speeds import Vehicle
 
-_LEAST_BOXES = 4
+#: Boxes tell accelerations better than a single tracked point does, so the motion may be less stiff.
+BOX_MOTION = MotionFitConfig(acceleration_sd=0.8, jerk=0.4)
 
 
 class SizedVehicle(NamedTuple):
@@ -34,40 +38,53 @@ class SizedVehicle(NamedTuple):
     chi2: float
 
 
-#: A box's errors are steadier than a tracked point's, so the motion may be less stiff.
-BOX_MOTION = MotionFitConfig(acceleration_sd=0.8, jerk=0.4)
+class TrackBoxes(NamedTuple):
+    """What was seen of one track.
+
+    Attributes:
+        track_id: its identity.
+        t: (N,) times at which its state is asked for, ascending (s).
+        rows: its boxes.
+    """
+
+    track_id: int
+    t: FloatArray
+    rows: BoxRows
+
+
+def boxes_of_table(table: Trajectories, camera: RoadCamera, config: BoxConfig) -> list[TrackBoxes]:
+    """Take a table's own boxes for what was seen: for tables whose detections are not known."""
+    size = (camera.width, camera.height)
+    tracks = []
+    for one in each_track(table):
+        rows = rows_of_table(one.t, one.boxes, one.var[:, :2], size, config)
+        tracks.append(TrackBoxes(int(one.track_id[0]), one.t, rows))
+    return tracks
+
+
+def each_track(table: Trajectories) -> list[Trajectories]:
+    """Split a table by track, each in order of time."""
+    table = table.take(np.lexsort((table.t, table.track_id)))
+    cuts = np.flatnonzero(np.diff(table.track_id)) + 1
+    return [table.take(part) for part in np.split(np.arange(len(table)), cuts) if len(part)]
 
 
 def follow_boxes(
-    table: Trajectories,
+    tracks: Sequence[TrackBoxes],
     camera: RoadCamera,
     config: CuboidConfig,
     motion: MotionFitConfig = BOX_MOTION,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[SizedVehicle]:
-    """Fit every track of a table; `progress` hears how many of how many are done."""
-    order = np.lexsort((table.t, table.track_id))
-    table = table.take(order)
-    ids = np.unique(table.track_id)
+    """Fit every track; `progress` hears how many of how many are done."""
     found: list[SizedVehicle] = []
-    for k, one in enumerate(ids):
-        rows = table.track_id == one
-        t = table.t[rows]
-        fit = _fit(table, rows, camera, config, motion)
+    for k, one in enumerate(tracks):
+        fit = fit_cuboid(one.rows, camera, config, motion)
         if fit is not None:
-            variance = np.diag(fit.size_covariance)
-            mean, spread = fit.size.tolist(), variance.tolist()
+            mean, spread = fit.size.tolist(), np.diag(fit.size_covariance).tolist()
             size = Size((mean[0], mean[1], mean[2]), (spread[0], spread[1], spread[2]))
-            vehicle = Vehicle(int(one), t, fit.motion, fit.by_calibration, 0.0, 0.0)
+            vehicle = Vehicle(one.track_id, one.t, fit.motion, fit.by_calibration, 0.0, 0.0)
             found.append(SizedVehicle(vehicle, size, CLASSES[fit.kind].name, fit.chi2))
         if progress is not None:
-            progress(k + 1, len(ids))
+            progress(k + 1, len(tracks))
     return found
-
-
-def _fit(
-    table: Trajectories, rows: BoolArray, camera: RoadCamera, config: CuboidConfig, motion: MotionFitConfig
-) -> CuboidFit | None:
-    if rows.sum() < _LEAST_BOXES:
-        return None
-    return fit_cuboid(table.t[rows], table.boxes[rows], camera, config, motion, table.var[rows, :2])

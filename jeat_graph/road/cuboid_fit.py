@@ -1,7 +1,7 @@
 """One vehicle's motion and size from its boxes: the cuboid that made them, over its whole track at once.
 
-Length, width and height are the vehicle's own, shared by all its boxes; its kind (car, van, lorry ...) is
-chosen by the evidence of each kind's sizes. Sides that the picture's edge cuts off do not count.
+Length, width and height are the vehicle's own, shared by all its boxes; what kind it is (car, van, lorry ...)
+is weighed by the evidence of each kind's sizes, and where that leaves a doubt, the doubt is in the result.
 """
 
 from __future__ import annotations
@@ -11,59 +11,34 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from jeat_graph.config.fields import check, number
-from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
-from jeat_graph.data.interop import to_xyxy
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.road.box_kernel import CHANNELS, HIGH, WHOLE, KernelCamera, kernel_camera
+from jeat_graph.road.box_solver import BoxRows, Motion, linearise, solve_boxes, whiten
 from jeat_graph.road.camera import PARAMETERS, RoadCamera
-from jeat_graph.road.cuboid import sides
+from jeat_graph.road.fleet import CLASSES
 from jeat_graph.road.motion_fit import MotionFit, MotionFitConfig, basis_rows, motion_prior, spaced_knots
-from jeat_graph.road.robust import kernel
 
-
-class VehicleClass(NamedTuple):
-    """A kind of vehicle as fleets have it.
-
-    Attributes:
-        name: what it is called.
-        share: of traffic.
-        mean: length, width, height (m).
-        spread: their standard deviations (m).
-    """
-
-    name: str
-    share: float
-    mean: tuple[float, float, float]
-    spread: tuple[float, float, float]
-
-
-#: Rough sizes of bodies without mirrors, wide enough that a vehicle of each kind lies within two deviations.
-CLASSES = (
-    VehicleClass("motorcycle", 0.01, (2.2, 0.8, 1.5), (0.2, 0.1, 0.15)),
-    VehicleClass("car", 0.74, (4.4, 1.83, 1.55), (0.35, 0.08, 0.12)),
-    VehicleClass("van", 0.12, (5.6, 2.0, 2.35), (0.6, 0.08, 0.3)),
-    VehicleClass("truck", 0.07, (9.0, 2.5, 3.5), (1.8, 0.08, 0.4)),
-    VehicleClass("truck", 0.06, (14.5, 2.52, 3.8), (2.2, 0.06, 0.3)),
-)
+_LEAST_BOXES = 4
+_CALIBRATION_STEP = 1e-3  # in standard deviations of each parameter, where it has one
+_DOUBT = 12.0  # minus twice the log of the odds below which a kind is ruled out
+_SIZES = 3
 
 
 @dataclass(frozen=True)
 class CuboidConfig:
-    """How boxes err."""
+    """What is taken for a vehicle."""
 
-    side_px: float = number(0.7, "px", "error of a box's side that does not depend on size", open_low=True)
-    side_share: float = number(0.015, "1", "error of a side as a share of the box's size")
-    white_share: float = number(0.1, "1", "share of that variance which is new in every box", 0.0, 1.0)
-    memory_s: float = number(1.0, "s", "how long the rest persists", open_low=True)
-    node_s: float = number(0.1, "s", "boxes this close together in time are passed over", open_low=True)
-    most_nodes: int = number(150, "boxes", "for longer tracks more are", 4)
-    edge_px: float = number(2.0, "px", "a side this near the picture's edge is cut off by it")
-    soft: float = number(3.0, "1", "residual / error at which a side's weight is a quarter", open_low=True)
+    soft: float = number(3.0, "1", "residual / error at which a box's weight is a quarter", open_low=True)
     worst_chi2: float = number(
-        9.0, "1", "mean square of residuals above which it is no vehicle", open_low=True
+        6.0, "1", "mean square of residuals above which it is no vehicle", open_low=True
+    )
+    scale_strength: float = number(
+        40.0, "1", "observations' worth of belief in the stated errors", open_low=True
     )
     least_move_m: float = number(5.0, "m", "a vehicle that moves less faces along the road")
+    least_speed: float = number(2.0, "m/s", "a vehicle slower than this faces as it does on the whole")
 
     def __post_init__(self) -> None:
         check(self)
@@ -75,7 +50,7 @@ class CuboidFit(NamedTuple):
     Attributes:
         motion: of the middle of its footprint; covariance by noise alone.
         by_calibration: (2 C, 2 C) covariance of the motion's coefficients by the camera's.
-        kind: index into `CLASSES`.
+        kind: index into `CLASSES` of the likeliest.
         size: (3,) length, width, height (m).
         size_covariance: (3, 3) of them.
         chi2: mean square of the residuals in their stated errors.
@@ -89,187 +64,179 @@ class CuboidFit(NamedTuple):
     chi2: float
 
 
-class _Task(NamedTuple):
-    camera: RoadCamera
-    config: CuboidConfig
-    t: FloatArray
-    seen: FloatArray
-    usable: BoolArray
-    sigma: FloatArray
-    B: FloatArray
-    heading: FloatArray
-
-
-_STEPS = 12
-_SETTLED = 1e-5
-_CUT_OFF = 1e8
-_CALIBRATION_STEP = 1e-3  # in standard deviations of each parameter, where it has one
+class _Candidate(NamedTuple):
+    kind: int
+    theta: FloatArray
+    covariance: FloatArray
+    cost: float
+    chi2: float
+    weight: FloatArray
 
 
 def fit_cuboid(
-    t: FloatArray,
-    boxes: FloatArray,
-    camera: RoadCamera,
-    config: CuboidConfig,
-    motion: MotionFitConfig,
-    variance: FloatArray | None = None,
+    rows: BoxRows, camera: RoadCamera, config: CuboidConfig, motion: MotionFitConfig
 ) -> CuboidFit | None:
     """Fit one vehicle's boxes.
 
     Args:
-        t: (N,) times, ascending (s).
-        boxes: (N, 4) left, top, width, height (px).
+        rows: the boxes (`box_rows`), in order of time.
         camera: the camera.
-        config: how boxes err.
+        config: what is taken for a vehicle.
         motion: how vehicles move.
-        variance: (N, 2) of the boxes' middles as the tracker states them (px²), which are added.
 
     Returns:
         The fit, or None where too little of the vehicle is on the road, or no cuboid makes such boxes.
     """
-    chosen = _choose(t, config)
-    t, boxes = t[chosen], boxes[chosen]
-    stated = np.zeros((len(t), 2)) if variance is None else variance[chosen]
-    seen = to_xyxy(boxes)
-    contact = camera.to_road(np.stack([boxes[:, 0] + boxes[:, 2] / 2.0, seen[:, 3]], axis=1))
-    edge = config.edge_px
-    usable = np.concatenate(
-        [seen[:, :2] > edge, seen[:, 2:] < np.array([camera.width, camera.height]) - edge], axis=1
-    )
-    good = np.isfinite(contact).all(axis=1) & usable[:, 3]
-    if good.sum() < 4 or t[good][-1] <= t[good][0]:
+    contact = _contact(rows, camera)
+    good = np.asarray(np.isfinite(contact).all(axis=1))
+    if good.sum() < _LEAST_BOXES:
         return None
-    t, seen, usable, contact, boxes = t[good], seen[good], usable[good], contact[good], boxes[good]
-    stated = np.where(np.isfinite(stated[good]), stated[good], 0.0)
+    t_good, contact = rows.t[good], contact[good]
+    first, last = np.flatnonzero(good)[[0, -1]].tolist()
+    rows = _from_to(rows, first, last)
+    if t_good[-1] <= t_good[0]:
+        return None
+    t0 = float(rows.t.mean())
+    knots = spaced_knots(rows.t - t0, motion)
+    prior = motion_prior(rows.t - t0, knots, motion)
     move = contact[-1] - contact[0]
-    away = np.median(contact - camera.position[:2], axis=0)
-    away = away / np.linalg.norm(away)
     heading = math.atan2(move[0], move[1]) if np.linalg.norm(move) > config.least_move_m else 0.0
-    s = t - t.mean()
-    knots = spaced_knots(s, motion)
-    B = basis_rows(s, knots, 0)
-    sigma = np.hypot(config.side_px, config.side_share * np.tile(boxes[:, 2:], 2))
-    sigma = np.sqrt(sigma**2 + np.tile(stated, 2))
-    task = _Task(camera, config, t, seen, usable, sigma, B, np.full(len(t), heading))
-    prior = motion_prior(s, knots, motion)
-    best: tuple[float, int, tuple[FloatArray, FloatArray, FloatArray, FloatArray]] | None = None
+    basis = Motion(
+        basis_rows(rows.t - t0, knots, 0), basis_rows(rows.t - t0, knots, 1), heading, config.least_speed
+    )
+    away = np.median(contact - camera.position[:2], axis=0)
+    reach = abs(float(away @ [math.sin(heading), math.cos(heading)])) / float(np.linalg.norm(away)) ** 2
+    B = basis_rows(t_good - t0, knots, 0)
+    normal = np.kron(np.eye(2), B.T @ B) + prior
+    kernel = kernel_camera(camera)
+    found: list[_Candidate] = []
     for k, one in enumerate(CLASSES):
-        start = contact + away * one.mean[0] / 2.0 * abs(float(away @ [math.sin(heading), math.cos(heading)]))
-        # Near a straight motion: the prior keeps accelerations and jerks small.
-        C = B.shape[1]
-        normal = np.kron(np.eye(2), B.T @ B) + prior
-        c = np.linalg.solve(normal, (B.T @ start).T.ravel())
-        found = _solve(task, np.concatenate([c, one.mean]), prior, one)
-        if found is not None and (best is None or found[0] < best[0]):
-            best = found[0], k, found[1:]
-    if best is None:
+        # From the near end, which stands on the road where the box ends, to the middle.
+        middle = contact + away * (one.mean[0] / 2.0 * reach)
+        c = np.linalg.solve(normal, (B.T @ middle).T.ravel())
+        fit = _fit_kind(kernel, rows, basis, np.concatenate([c, one.mean]), prior, k, config)
+        if fit is not None:
+            found.append(fit)
+    if not found:
         return None
-    _, kind, (theta, inverse, gain, weight) = best
-    C = B.shape[1]
+    return _joined(found, rows, basis, camera, (t0, knots), config)
+
+
+def _contact(rows: BoxRows, camera: RoadCamera) -> FloatArray:
+    """Where the middles of the lower edges are on the road (N, 2); NaN where a side is cut off."""
+    x, y = rows.mode.T
+    bottom = rows.z[:, 1] + np.where(y == WHOLE, np.exp(rows.z[:, 3]) / 2.0, 0.0)
+    place = camera.to_road(np.stack([rows.z[:, 0], bottom], axis=1))
+    seen = (x == WHOLE) & ((y == WHOLE) | (y == HIGH))
+    return np.where(seen[:, None], place, np.nan)
+
+
+def _from_to(rows: BoxRows, first: int, last: int) -> BoxRows:
+    part = slice(first, last + 1)
+    cut = {
+        name: np.ascontiguousarray(getattr(rows, name)[part])
+        for name in rows._fields
+        if name not in ("memory_s",)
+    }
+    return rows._replace(**cut)
+
+
+def _fit_kind(
+    camera: KernelCamera,
+    rows: BoxRows,
+    motion: Motion,
+    start: FloatArray,
+    motion_precision: FloatArray,
+    kind: int,
+    config: CuboidConfig,
+) -> _Candidate | None:
+    P, one = len(start), CLASSES[kind]
+    precision = np.zeros((P, P))
+    precision[: P - _SIZES, : P - _SIZES] = motion_precision
+    precision[P - _SIZES :, P - _SIZES :] = np.diag(np.array(one.spread) ** -2.0)
+    mean = np.concatenate([np.zeros(P - _SIZES), one.mean])
+    C = (P - _SIZES) // 2
+    mean[0], mean[C] = start[0], start[C]
+    weight = np.ones(len(rows.t))
+    settled, theta, normal, cost, chi2 = solve_boxes(
+        camera, rows, motion, start, mean, precision, config.soft, weight
+    )
+    if not settled or not math.isfinite(cost) or (theta[P - _SIZES :] <= 0).any():
+        return None
+    sign, log_determinant = np.linalg.slogdet(normal)
+    if sign <= 0:
+        return None
+    # The evidence: how well the data agree, less what it costs to have been able to agree with others.
+    score = cost + float(log_determinant) + 2.0 * float(np.log(one.spread).sum()) - 2.0 * math.log(one.share)
+    return _Candidate(kind, theta, np.asarray(np.linalg.inv(normal), dtype=np.float64), score, chi2, weight)
+
+
+def _joined(
+    found: list[_Candidate],
+    rows: BoxRows,
+    motion: Motion,
+    camera: RoadCamera,
+    times: tuple[float, FloatArray],
+    config: CuboidConfig,
+) -> CuboidFit | None:
+    """Weigh the kinds by their evidence: mean and covariance of the mixture."""
+    best = min(found, key=lambda one: one.cost)
+    if not best.chi2 <= config.worst_chi2:
+        return None
+    likely = [one for one in found if one.cost - best.cost < _DOUBT]
+    share = np.exp(-0.5 * np.array([one.cost - best.cost for one in likely]))
+    share /= share.sum()
+    theta = np.einsum("k,kp->p", share, [one.theta for one in likely])
+    # Errors that are larger than stated, by what is left over, are believed to be so.
+    count = float(best.weight.sum()) * CHANNELS
+    factor = (config.scale_strength + best.chi2 * count) / (config.scale_strength + count)
+    covariance = np.zeros((len(theta), len(theta)))
+    for weight, one in zip(share, likely, strict=True):
+        off = one.theta - theta
+        covariance += weight * (one.covariance * max(factor, 1.0) + np.outer(off, off))
+    covariance = (covariance + covariance.T) / 2.0
+    t0, knots = times
+    C = motion.basis.shape[1]
     fit = MotionFit(
-        float(t.mean()),
+        t0,
         knots,
         theta[: 2 * C].reshape(2, C),
-        inverse[: 2 * C, : 2 * C],
-        np.zeros((2 * C, len(t), 2)),
-        t,
-        np.zeros((len(t), 2)),
-        weight,
+        covariance[: 2 * C, : 2 * C],
+        np.zeros((2 * C, 0, 2)),
+        rows.t,
+        np.zeros((len(rows.t), 2)),
+        best.weight,
     )
-    effect = _calibration_effect(task, theta, gain)[: 2 * C]
-    residual = (_predicted(task, camera, theta)[0] - seen) / sigma
-    chi2 = float(np.median((residual[usable]) ** 2) / 0.4549)  # the median of a chi-square of one
-    if not chi2 <= config.worst_chi2:
-        return None
+    effect = _calibration_effect(camera, rows, motion, best)[: 2 * C]
     return CuboidFit(
         fit,
         effect @ camera.covariance @ effect.T,
-        kind,
+        best.kind,
         theta[2 * C :],
-        inverse[2 * C :, 2 * C :],
-        chi2,
+        covariance[2 * C :, 2 * C :],
+        best.chi2,
     )
 
 
-def _choose(t: FloatArray, config: CuboidConfig) -> IntArray:
-    """Rows at least `node_s` apart, the last one among them."""
-    step = max(config.node_s, float(t[-1] - t[0]) / config.most_nodes)
-    cell = np.floor((t - t[0]) / step + 1e-9)
-    return np.flatnonzero(np.r_[True, cell[1:] != cell[:-1]])
-
-
-def _predicted(task: _Task, camera: RoadCamera, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-    C = task.B.shape[1]
-    xy = task.B @ theta[: 2 * C].reshape(2, C).T
-    return sides(camera, xy, task.heading, theta[2 * C :])
-
-
-def _jacobian(task: _Task, J: FloatArray) -> FloatArray:
-    """Derivative (4, N, P) of the sides with respect to all unknowns."""
-    parts = [J[..., 0, None] * task.B[:, None], J[..., 1, None] * task.B[:, None], J[..., 2:]]
-    return np.swapaxes(np.concatenate(parts, axis=-1), 0, 1)
-
-
-def _solve(
-    task: _Task, theta: FloatArray, motion_precision: FloatArray, kind: VehicleClass
-) -> tuple[float, FloatArray, FloatArray, FloatArray, FloatArray] | None:
-    """Gauss-Newton; returns minus the log evidence, the unknowns, their covariance, the gain, the weights."""
-    config = task.config
-    P = len(theta)
-    precision = np.zeros((P, P))
-    precision[: P - 3, : P - 3] = motion_precision
-    precision[P - 3 :, P - 3 :] = np.diag(np.array(kind.spread) ** -2.0)
-    C = task.B.shape[1]
-    mean = np.concatenate([np.zeros(P - 3), kind.mean])
-    mean[0], mean[C] = theta[0], theta[C]
-    apart = np.abs(task.t[:, None] - task.t[None, :])
-    shared = (1.0 - config.white_share) * np.exp(-apart / config.memory_s)
-    weight = np.where(task.usable, 1.0, 0.0)
-    cost = math.inf
-    step = np.full(P, math.inf)
-    for k in range(_STEPS):
-        predicted, J = _predicted(task, task.camera, theta)
-        if not np.isfinite(predicted).all():
-            return None
-        residual = (task.seen - predicted) / task.sigma
-        if k > 1:
-            weight = np.where(task.usable, kernel(np.abs(residual), config.soft), 0.0)
-        H = _jacobian(task, J) / task.sigma.T[..., None]
-        normal, right = precision.copy(), precision @ (mean - theta)
-        gain = np.zeros((P, 4, len(task.t)))
-        cost = float((theta - mean) @ precision @ (theta - mean))
-        for side in range(4):
-            extra = np.minimum(1.0 / np.maximum(weight[:, side], 1e-8), _CUT_OFF) - 1.0
-            L = np.linalg.cholesky(shared + np.diag(config.white_share + extra))
-            A = solve_triangular(L, H[side], lower=True)
-            b = solve_triangular(L, residual[:, side], lower=True)
-            normal += A.T @ A
-            right += A.T @ b
-            gain[:, side] = solve_triangular(L.T, A, lower=False).T / task.sigma[:, side]
-            cost += float(b @ b) + 2.0 * float(np.log(np.diag(L)).sum())
-        inverse = np.linalg.inv(normal)
-        step = inverse @ right
-        theta = theta + step
-        if np.all(np.abs(step) <= _SETTLED * np.sqrt(np.diag(inverse)) + 1e-12) and k > 2:
-            break
-    if (theta[P - 3 :] <= 0).any():
-        return None
-    log_determinant = float(np.linalg.slogdet(normal)[1]) + 2.0 * float(np.log(kind.spread).sum())
-    score = cost + log_determinant - 2.0 * math.log(kind.share)
-    gain = np.einsum("ab,bsn->asn", inverse, gain)
-    return score, theta, (inverse + inverse.T) / 2.0, gain, weight.mean(axis=1)
-
-
-def _calibration_effect(task: _Task, theta: FloatArray, gain: FloatArray) -> FloatArray:
+def _calibration_effect(camera: RoadCamera, rows: BoxRows, motion: Motion, best: _Candidate) -> FloatArray:
     """Derivative (P, 12) of the unknowns with respect to the camera's parameters."""
-    effect = np.zeros((len(theta), len(PARAMETERS)))
-    spread = np.sqrt(np.diag(task.camera.covariance))
+    P, count = len(best.theta), len(PARAMETERS)
+    effect = np.zeros((P, count))
+    spread = np.sqrt(np.diag(camera.covariance))
+    if not spread.any():
+        return effect
+    columns = np.zeros((len(rows.t), CHANNELS, P + 1 + count))
+    trial = np.zeros((len(rows.t), CHANNELS, P + 1))
+    linearise(kernel_camera(camera), rows, motion, best.theta, trial)
+    columns[..., : P + 1] = trial
     for k in np.flatnonzero(spread > 0):
-        change = np.zeros(len(PARAMETERS))
-        change[k] = _CALIBRATION_STEP * spread[k]
-        ahead = _predicted(task, task.camera.moved(change), theta)[0]
-        behind = _predicted(task, task.camera.moved(-change), theta)[0]
-        slope = (ahead - behind) / (2.0 * change[k])
-        # A camera that predicts a side farther right makes the vehicle seem farther left.
-        effect[:, k] = -np.einsum("asn,ns->a", gain, slope)
-    return effect
+        slope = []
+        for sign in (1.0, -1.0):
+            change = np.zeros(count)
+            change[k] = sign * _CALIBRATION_STEP * spread[k]
+            linearise(kernel_camera(camera.moved(change)), rows, motion, best.theta, trial)
+            slope.append(trial[..., P].copy())
+        columns[..., P + 1 + k] = (slope[0] - slope[1]) / (2.0 * _CALIBRATION_STEP * spread[k])
+    whiten(columns, rows, best.weight)
+    flat = columns.reshape(-1, columns.shape[2])
+    return np.asarray(best.covariance @ (flat[:, :P].T @ flat[:, P + 1 :]), dtype=np.float64)

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.trajectories_io import read_trajectories
+from jeat_graph.road.box_rows import BoxConfig
+from jeat_graph.road.boxes_road import TrackBoxes, boxes_of_table
+from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.inputs import PointTable, read_points_table
+from jeat_graph.road.taken_boxes import boxes_of_log, sensor_errors
+from jeat_graph.runs.directory import RUN_JSON
+from jeat_graph.runs.measured import measurement_rows
 
 _RUN_TABLES = ("smoothed.csv", "smoothed.parquet", "causal.csv", "causal.parquet")
 
@@ -39,6 +46,36 @@ def contact_pixels(source: str | Path, contact: str | None = None) -> PointTable
     else:
         pixels = np.stack([left + width / 2.0, top + height], axis=1)
     return PointTable(table.t, table.track_id, pixels)
+
+
+def boxes_of(
+    source: str | Path,
+    camera: RoadCamera,
+    config: BoxConfig,
+    say: Callable[[str], object] = lambda _: None,
+    progress: bool = False,
+) -> list[TrackBoxes]:
+    """Boxes of the vehicles: the detections that a run's tracks took in, else those of its table.
+
+    Args:
+        source: a run directory, or a trajectory table or result.
+        camera: the camera.
+        config: how boxes err.
+        say: called with why a run's detections are not what is used, if so.
+        progress: whether to show a progress bar on stderr where a run is tracked again.
+
+    Raises:
+        DataError: the table cannot be read.
+    """
+    table = read_trajectories(run_table(source))
+    if not (Path(source) / RUN_JSON).is_file():
+        return boxes_of_table(table, camera, config)
+    try:
+        log, settings = measurement_rows(Path(source), progress=progress)
+    except DataError as error:
+        say(f"{error}; the table's smoothed boxes are used instead, which are less sure")
+        return boxes_of_table(table, camera, config)
+    return boxes_of_log(log, sensor_errors(settings), table, camera, config)
 
 
 def only_points(path: Path) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 
 from jeat_graph.config.reading import config_from_dict
 from jeat_graph.config.schema import Config
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray, RecordArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.measured_track import MeasuredTrack
@@ -59,18 +59,44 @@ def measured_run(folder: Path, moved: list[str] | None = None, *, progress: bool
     return MeasuredRun(tracks, causal, np.unique(detections.scan_t), config.sensor_names)
 
 
+def measurement_rows(folder: Path, *, progress: bool = False) -> tuple[RecordArray, Config]:
+    """Return the records of what a run's confirmed tracks took in, and its configuration.
+
+    Args:
+        folder: the run directory.
+        progress: whether to show a progress bar on stderr where it has to be tracked again.
+
+    Raises:
+        DataError: there is no run, or a file of it, or an input, is missing or has changed since.
+    """
+    from jeat_graph.io.measurements_io import read_measurements
+    from jeat_graph.tracking.records import record_measurements
+
+    record = _read_record(folder)
+    if MEASUREMENTS in record["files"]:
+        config = _config_of(folder, record)
+        _unchanged(folder / MEASUREMENTS, record)
+        return read_measurements(folder / MEASUREMENTS, config.sensor_names), config
+    config, detections = recorded_inputs(folder, record)
+    return record_measurements(config, detections, progress=progress)[0], config
+
+
+def _unchanged(path: Path, record: dict[str, Any]) -> None:
+    if not path.is_file():
+        raise DataError("is missing from the run; track it again", path)
+    if sha256_of(path) != record["files"][path.name]["sha256"]:
+        raise DataError("has changed since the run; track it again", path)
+
+
 def _kept(folder: Path, record: dict[str, Any]) -> MeasuredRun:
     from jeat_graph.io.measurements_io import read_measurements
     from jeat_graph.io.trajectories_io import read_trajectories
     from jeat_graph.tracking.measured import measured_tracks
 
-    config, files = _config_of(folder, record), record["files"]
+    config = _config_of(folder, record)
     table = folder / "causal.csv"
     for path in (folder / MEASUREMENTS, table):
-        if not path.is_file():
-            raise DataError("is missing from the run; track it again", path)
-        if sha256_of(path) != files[path.name]["sha256"]:
-            raise DataError("has changed since the run; track it again", path)
+        _unchanged(path, record)
     rows = read_measurements(folder / MEASUREMENTS, config.sensor_names)
     tracks = measured_tracks(rows, config)
     return MeasuredRun(tracks, read_trajectories(table), read_instants(folder), config.sensor_names)

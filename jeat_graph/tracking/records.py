@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from jeat_graph.config.schema import Config
+from jeat_graph.data.arrays import RecordArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.measured_track import MeasuredTrack
 from jeat_graph.data.trajectories import Trajectories
@@ -24,6 +25,20 @@ def record_tracks(
         detections: the recording.
         progress: whether to show a progress bar on stderr.
     """
+    rows, causal = record_measurements(config, detections, progress=progress)
+    return measured_tracks(rows, config), causal
+
+
+def record_measurements(
+    config: Config, detections: Detections, *, progress: bool = False
+) -> tuple[RecordArray, Trajectories]:
+    """Track a recording and return what its confirmed tracks took in (M,), and the causal table.
+
+    Args:
+        config: the configuration; its smoother does not matter.
+        detections: the recording.
+        progress: whether to show a progress bar on stderr.
+    """
     from tqdm import tqdm
 
     config = replace(config, smoother=replace(config.smoother, engine="none"))
@@ -37,4 +52,4 @@ def record_tracks(
             tables.append(tracker.step(batch))
             measured.add_step()
             bar.update(len(batch))
-    return measured_tracks(measured.release(), config), Trajectories.concatenate(tables)
+    return measured.release(), Trajectories.concatenate(tables)

@@ -9,8 +9,13 @@ import numpy as np
 import pytest
 from road_scenes import camera
 
+from jeat_graph.road.box_kernel import cuboid_sides, kernel_camera
+from jeat_graph.road.box_rows import BoxConfig, rows_of_table
+from jeat_graph.road.box_solver import BoxRows, whiten
+from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.cuboid import sides
-from jeat_graph.road.cuboid_fit import CLASSES, CuboidConfig, fit_cuboid
+from jeat_graph.road.cuboid_fit import CuboidConfig, CuboidFit, fit_cuboid
+from jeat_graph.road.fleet import CLASSES
 from jeat_graph.road.motion_fit import MotionFitConfig
 
 MOTION = MotionFitConfig(acceleration_sd=0.8, jerk=0.3)
@@ -42,6 +47,46 @@ def test_derivatives_are_finite_differences() -> None:
         np.testing.assert_allclose(J[0, :, k], (up - down) / (2 * h), rtol=1e-5, atol=1e-4)
 
 
+def test_compiled_sides_are_those_of_the_plain_model() -> None:
+    rng, cam = np.random.default_rng(3), camera(k2=0.01)
+    for _ in range(20):
+        xy, heading = rng.uniform([-8.0, 20.0], [8.0, 90.0]), float(rng.uniform(-3.0, 3.0))
+        size = np.array([rng.uniform(2, 16), rng.uniform(0.8, 2.6), rng.uniform(1.3, 4.0)])
+        side, slope = np.empty(4), np.empty((4, 5))
+        assert cuboid_sides(kernel_camera(cam), xy[0], xy[1], heading, size, side, slope)
+        expected, J = sides(cam, xy[None], np.array([heading]), size)
+        np.testing.assert_allclose(side, expected[0], rtol=1e-12)
+        np.testing.assert_allclose(slope, J[0], rtol=1e-9, atol=1e-9)
+
+
+def test_whitening_is_the_inverse_root_of_the_dense_covariance() -> None:
+    """The filter's innovations against Cholesky: same quadratic forms, same determinant."""
+    rng, n = np.random.default_rng(4), 30
+    t, group = np.sort(rng.uniform(0, 3, n)), rng.integers(0, 2, n)
+    memory = np.array([0.2, 0.7])
+    white, coloured = rng.uniform(0.5, 2.0, (n, 4)), rng.uniform(0.5, 2.0, (n, 4))
+    mode = np.zeros((n, 2), dtype=np.int64)
+    rows = BoxRows(t, np.zeros((n, 4)), white, coloured, mode, group, memory)
+    columns = rng.standard_normal((n, 4, 3))
+    weight = rng.uniform(0.3, 1.0, n)
+    got = columns.copy()
+    log_determinant, expected = whiten(got, rows, weight), 0.0
+    for channel in range(4):
+        apart = np.exp(-np.abs(t[:, None] - t) / memory[group][:, None])
+        h, total = coloured[:, channel], white[:, channel] + coloured[:, channel] ** 2
+        cov = np.where(group[:, None] == group, h[:, None] * h * apart, 0.0)
+        cov += np.diag(white[:, channel] + total * (1.0 / weight - 1.0))
+        expected += np.linalg.slogdet(cov)[1]
+        form = columns[:, channel].T @ np.linalg.solve(cov, columns[:, channel])
+        np.testing.assert_allclose(got[:, channel].T @ got[:, channel], form, rtol=1e-9, atol=1e-12)
+    assert log_determinant == pytest.approx(expected, rel=1e-9)
+
+
+def _fit(t: np.ndarray, boxes: np.ndarray, cam: RoadCamera, config: CuboidConfig) -> CuboidFit | None:
+    rows = rows_of_table(t, boxes, np.zeros((len(t), 2)), (cam.width, cam.height), BoxConfig())
+    return fit_cuboid(rows, cam, config, MOTION)
+
+
 def _drive(
     size: tuple[float, float, float], rng: np.random.Generator, noise: float
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -58,7 +103,7 @@ def _drive(
 )
 def test_a_vehicle_is_found_again_with_its_kind(size: tuple[float, float, float], kind: str) -> None:
     t, boxes = _drive(size, np.random.default_rng(0), 0.3)
-    found = fit_cuboid(t, boxes, camera(), CuboidConfig(), MOTION)
+    found = _fit(t, boxes, camera(), CuboidConfig())
     assert found is not None
     assert CLASSES[found.kind].name == kind
     np.testing.assert_allclose(found.size, size, atol=3.0 * np.sqrt(np.diag(found.size_covariance)).max())
@@ -70,13 +115,13 @@ def test_a_vehicle_is_found_again_with_its_kind(size: tuple[float, float, float]
 
 def test_sides_cut_by_the_picture_do_not_count() -> None:
     t, boxes = _drive((4.5, 1.8, 1.5), np.random.default_rng(1), 0.2)
-    whole = fit_cuboid(t, boxes, camera(), CuboidConfig(), MOTION)
+    whole = _fit(t, boxes, camera(), CuboidConfig())
     cut = boxes.copy()
     right = cut[:, 0] + cut[:, 2]
     cut[:, 0] = np.maximum(cut[:, 0], 0.0)
     cut[:8, 2] = right[:8] - 0.0
     cut[:8, 0] = 0.0  # the left edge of the picture hides the left part of the first eight
-    found = fit_cuboid(t, cut, camera(), CuboidConfig(), MOTION)
+    found = _fit(t, cut, camera(), CuboidConfig())
     assert whole is not None
     assert found is not None
     assert np.abs(found.motion.at(t) - whole.motion.at(t)).max() < 1.0
@@ -87,8 +132,8 @@ def test_calibration_moves_a_vehicle_as_foretold() -> None:
     spread = np.zeros((12, 12))
     spread[11, 11] = 0.05**2
     cam = replace(camera(), covariance=spread)
-    found = fit_cuboid(t, boxes, cam, CuboidConfig(soft=1e6), MOTION)
-    lifted = fit_cuboid(t, boxes, cam.moved(np.r_[np.zeros(11), 0.05]), CuboidConfig(soft=1e6), MOTION)
+    found = _fit(t, boxes, cam, CuboidConfig(soft=1e6))
+    lifted = _fit(t, boxes, cam.moved(np.r_[np.zeros(11), 0.05]), CuboidConfig(soft=1e6))
     assert found is not None
     assert lifted is not None
     row = np.r_[np.zeros(found.motion.coefficients.shape[1]), found.motion.basis(np.array(0.8), 1)]
