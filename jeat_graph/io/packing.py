@@ -2,22 +2,25 @@
 
 For files that hold the state of a running program. Of objects only those of classes that the caller names are
 taken, attribute by attribute; nothing in a file can name another class or run anything.
+
+What is alike is packed together, column by column: the same attribute of many objects is one piece, and so
+are many arrays of one kind. So the cost is that of the kinds of things there are, hardly of their number.
 """
 
 from __future__ import annotations
 
 import json
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.io.packed_numbers import NumberReader, NumberWriter
 
-_KINDS = {"list": list, "tuple": tuple, "deque": deque}
-_ALIGN = 8
+_LISTS: dict[str, type[Any]] = {"list": list, "deque": deque, "tuple": tuple}
+_PLAIN = frozenset((type(None), bool, int, float, str))
 
 
 class Codec(NamedTuple):
@@ -25,7 +28,7 @@ class Codec(NamedTuple):
 
     Attributes:
         kind: the class.
-        apart: returns its attributes by name.
+        apart: returns its attributes by name, the same names for all of the class.
         together: makes an object of them.
     """
 
@@ -60,11 +63,9 @@ def pack(tree: Any, codecs: Mapping[str, Codec]) -> tuple[str, bytes]:
         TypeError: something else.
     """
     packer = _Packer(codecs)
-    node = packer.node(tree)
-    # Each kind of array is described once: of records there are many, and their fields are many words.
-    kinds = [kind.descr if kind.names else kind.str for kind in packer.kinds]
-    text = json.dumps({"kinds": kinds, "tree": node}, separators=(",", ":"))
-    return text, b"".join(packer.blocks)
+    node = packer.column([tree])
+    text = json.dumps({"kinds": packer.numbers.kinds(), "tree": node}, separators=(",", ":"))
+    return text, packer.numbers.block()
 
 
 def unpack(text: str, block: bytes, codecs: Mapping[str, Codec]) -> Any:
@@ -75,98 +76,139 @@ def unpack(text: str, block: bytes, codecs: Mapping[str, Codec]) -> Any:
     """
     try:
         content = json.loads(text)
-        return _Unpacker(block, codecs, content["kinds"]).tree(content["tree"])
-    except (ValueError, TypeError, KeyError, IndexError, AttributeError) as error:
+        (tree,) = _Unpacker(codecs, NumberReader(block, content["kinds"])).column(content["tree"])
+    except (ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:
         raise DataError(f"is damaged: {type(error).__name__}: {error}") from None
+    return tree
 
 
 class _Packer:
-    """Collects the bytes of the arrays while a tree is walked."""
+    """Walks a tree column by column; a column is a list of things, a node what the text says of it."""
 
     def __init__(self, codecs: Mapping[str, Codec]) -> None:
         self._codecs = {codec.kind: (name, codec) for name, codec in codecs.items()}
-        self.blocks: list[bytes] = []
-        self.kinds: dict[np.dtype[Any], int] = {}
-        self._at = 0
+        self.numbers = NumberWriter()
         self._known: dict[int, int] = {}
         self._held: list[Any] = []  # no other object gets the number of one that is known
 
-    def node(self, value: Any) -> Any:
-        kind = type(value)
-        if value is None or kind in (bool, int, float, str):
-            return value
+    def column(self, values: Sequence[Any]) -> Any:
+        """Return the node of some things."""
+        kinds = {type(value) for value in values}
+        if kinds <= _PLAIN:
+            return _runs(values) if len(kinds) == 1 and len(values) > 1 else values
+        if len(kinds) > 1:
+            return self._mixed(values)
+        (kind,) = kinds
         if kind is np.ndarray:
-            return {"array": self._array(value)}
-        if kind in (list, tuple, deque):
-            return {kind.__name__: [self.node(item) for item in value]}
+            dtype = values[0].dtype
+            alike = len(values) == 1 or all(value.dtype == dtype for value in values)
+            return {"array": self.numbers.arrays(values, dtype)} if alike else self._mixed(values)
+        if kind in _LISTS.values():
+            return self._lists(values, kind)
         if kind is dict:
-            return {"dict": [[self.node(k), self.node(v)] for k, v in value.items()]}
+            keys, items = [k for v in values for k in v], [i for v in values for i in v.values()]
+            return {"dict": [[len(v) for v in values], self.column(keys), self.column(items)]}
         if kind is slice:
-            return {"slice": [value.start, value.stop]}
-        if isinstance(value, np.generic):
-            return value.item()
+            return {"slice": [[v.start, v.stop] for v in values]}
+        if issubclass(kind, np.generic):
+            return [v.item() for v in values]
         if kind not in self._codecs:
             raise TypeError(f"cannot be saved: {kind.__name__}")
-        if id(value) in self._known:
-            return {"again": self._known[id(value)]}
-        self._known[id(value)] = len(self._held)
-        self._held.append(value)
-        name, codec = self._codecs[kind]
-        parts = codec.apart(value)
-        return {"object": [name, {key: self.node(part) for key, part in parts.items()}]}
+        return self._objects(values, *self._codecs[kind])
 
-    def _array(self, value: npt.NDArray[Any]) -> list[Any]:
-        if value.dtype.hasobject:
-            raise TypeError("cannot be saved: an array of objects")
-        content = np.ascontiguousarray(value).tobytes()
-        at = self._at
-        padding = -len(content) % _ALIGN
-        self.blocks.append(content + bytes(padding))
-        self._at += len(content) + padding
-        return [self.kinds.setdefault(value.dtype, len(self.kinds)), value.shape, at]
+    def _mixed(self, values: Sequence[Any]) -> Any:
+        """Things of several kinds: which is of which, and a column of each kind."""
+        groups: dict[Any, list[Any]] = {}
+        which = []
+        for value in values:
+            kind = type(value)
+            label: Any = _PLAIN if kind in _PLAIN else (kind, getattr(value, "dtype", None))
+            group = groups.setdefault(label, [])
+            which.append(list(groups).index(label))
+            group.append(value)
+        return {"mixed": [which, [self.column(group) for group in groups.values()]]}
+
+    def _lists(self, values: Sequence[Any], kind: type[Any]) -> Any:
+        if kind is tuple and len({len(v) for v in values}) == 1:
+            return {"row": [len(values), [self.column(items) for items in zip(*values, strict=True)]]}
+        flat = [item for value in values for item in value]
+        return {kind.__name__: [[len(v) for v in values], self.column(flat)]}
+
+    def _objects(self, values: Sequence[Any], name: str, codec: Codec) -> Any:
+        first, fresh = len(self._held), []
+        for value in values:
+            if id(value) not in self._known:
+                self._known[id(value)] = len(self._held)
+                self._held.append(value)
+                fresh.append(value)
+        places = [self._known[id(value)] for value in values]
+        parts = [codec.apart(value) for value in fresh]
+        names = list(parts[0]) if parts else []
+        if any(list(part) != names for part in parts):
+            raise TypeError(f"cannot be saved: objects of {name} with different attributes")
+        columns = [[key, self.column([part[key] for part in parts])] for key in names]
+        return {"object": [name, places, first, len(fresh), columns]}
+
+
+def _runs(values: Sequence[Any]) -> Any:
+    """Plain values, shorter where all are alike."""
+    first = values[0]
+    if values[-1] == first and all(value == first for value in values):
+        return {"same": [len(values), first]}
+    return values
 
 
 class _Unpacker:
-    """Makes a tree of a text that was read, in the order in which it was written."""
+    """Makes columns of nodes, in the order in which they were made."""
 
-    def __init__(self, block: bytes, codecs: Mapping[str, Codec], kinds: list[Any]) -> None:
-        self._block = block
+    def __init__(self, codecs: Mapping[str, Codec], numbers: NumberReader) -> None:
         self._codecs = codecs
-        self._kinds = [_dtype(kind) for kind in kinds]
+        self._numbers = numbers
         self._held: list[Any] = []
 
-    def tree(self, node: Any) -> Any:
-        if not isinstance(node, dict):
+    def column(self, node: Any) -> list[Any]:
+        """Return the things of a node."""
+        if isinstance(node, list):
             return node
         ((kind, content),) = node.items()
         if kind == "array":
-            return self._array(*content)
-        if kind in _KINDS:
-            return _KINDS[kind](self.tree(item) for item in content)
-        if kind == "dict":
-            return {self.tree(key): self.tree(value) for key, value in content}
+            return self._numbers.arrays(content)
+        if kind == "same":
+            return [content[1]] * content[0]
         if kind == "slice":
-            return slice(*content)
-        if kind == "again":
-            return self._held[content]
-        name, parts = content
-        place = len(self._held)
-        self._held.append(None)
-        one = self._codecs[name].together({key: self.tree(part) for key, part in parts.items()})
-        self._held[place] = one
-        return one
+            return [slice(*bounds) for bounds in content]
+        if kind == "mixed":
+            which, nodes = content
+            groups = [iter(self.column(part)) for part in nodes]
+            return [next(groups[k]) for k in which]
+        if kind == "row":
+            count, nodes = content
+            rows = list(zip(*(self.column(part) for part in nodes), strict=True)) if nodes else [()] * count
+            if len(rows) != count:
+                raise ValueError("rows are missing")
+            return rows
+        if kind == "dict":
+            lengths, keys, items = content
+            pairs = list(zip(self.column(keys), self.column(items), strict=True))
+            return [dict(part) for part in _cut(pairs, lengths)]
+        if kind == "object":
+            return self._objects(*content)
+        lengths, flat = content
+        return [_LISTS[kind](part) for part in _cut(self.column(flat), lengths)]
 
-    def _array(self, kind: int, shape: list[int], at: int) -> npt.NDArray[Any]:
-        count = int(np.prod(shape))
-        return np.frombuffer(self._block, self._kinds[kind], count, at).reshape(shape).copy()
+    def _objects(self, name: str, places: list[int], first: int, fresh: int, columns: list[Any]) -> list[Any]:
+        if first != len(self._held):
+            raise ValueError("objects are missing")
+        self._held += [None] * fresh
+        codec = self._codecs[name]
+        filled = {key: self.column(node) for key, node in columns}
+        for k in range(fresh):
+            self._held[first + k] = codec.together({key: values[k] for key, values in filled.items()})
+        return [self._held[place] for place in places]
 
 
-def _dtype(described: Any) -> np.dtype[Any]:
-    """Kind of array from its description: a name, or the names, kinds and shapes of a record's fields."""
-    if isinstance(described, str):
-        dtype = np.dtype(described)
-    else:
-        dtype = np.dtype([tuple(tuple(p) if isinstance(p, list) else p for p in f) for f in described])
-    if dtype.hasobject:
-        raise ValueError("an array of objects")
-    return dtype
+def _cut(items: list[Any], lengths: list[int]) -> list[list[Any]]:
+    if sum(lengths) != len(items):
+        raise ValueError("items are missing")
+    ends = np.cumsum(lengths).tolist()
+    return [items[end - length : end] for end, length in zip(ends, lengths, strict=True)]

@@ -31,7 +31,7 @@ from jeat_graph.tracking.smoothing.observation_times import ObservationTimes
 from jeat_graph.tracking.smoothing.online import TrackSmoothers
 from jeat_graph.tracking.smoothing.priors import ErrorStates
 from jeat_graph.tracking.smoothing.recorder import StepRecorder
-from jeat_graph.tracking.smoothing.shares import Share, SortedPacket
+from jeat_graph.tracking.smoothing.shares import Share
 from jeat_graph.tracking.smoothing.sizes import SizeWindow
 from jeat_graph.tracking.smoothing.waiting import WaitingRows
 from jeat_graph.tracking.snapshot import Snapshot
@@ -40,7 +40,7 @@ from jeat_graph.tracking.step_record import StepRecord
 from jeat_graph.version import __version__
 
 #: Raised with every change of what is saved: a file of another format is refused, not guessed at.
-FORMAT = 2
+FORMAT = 3
 _MAGIC = "jeat-graph tracker"
 _PLAIN = (
     InProcessSmoothing,
@@ -48,11 +48,9 @@ _PLAIN = (
     Prior,
     Scan,
     Scene,
-    Share,
     SizeWindow,
     SmoothedTrack,
     Snapshot,
-    SortedPacket,
     StepRecord,
     StepRecorder,
     TrackArrays,
@@ -88,6 +86,7 @@ def _codecs(config: Config, forget: bool = True) -> dict[str, Codec]:
         "FixedLagSmoother": Codec(FixedLagSmoother, lag_apart, lag.together),
         "Window": Codec(Window, Window.saved, Window.from_saved),
         "WaitingRows": Codec(WaitingRows, _rows_apart, lambda saved: _rows_together(config, saved)),
+        "Share": Codec(Share, Share.saved, Share.from_saved),
         "Config": Codec(type(config), lambda _: {}, lambda _: config),
         "ErrorStates": Codec(ErrorStates, lambda _: {}, lambda _: ErrorStates.of(config)),
     }
@@ -118,15 +117,28 @@ def save_state(path: str | Path, config: Config, state: dict[str, Any]) -> None:
     Raises:
         JeatGraphError: the smoothers are in a process of their own.
     """
-    head = {"kind": _MAGIC, "format": FORMAT, "version": __version__, "config": config_to_dict(config)}
     if config.smoother.worker:
         raise JeatGraphError("a smoothing worker's state cannot be saved: set smoother.worker to false")
     text, block = pack(state, _codecs(config))
-    described = json.dumps(head).encode() + b"\n" + text.encode()
+    described = _head(config) + b"\n" + text.encode()
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         np.savez(
             file, text=np.frombuffer(described, np.uint8), block=np.frombuffer(block or bytes(1), np.uint8)
         )
+
+
+_heads: dict[int, tuple[Config, bytes]] = {}
+
+
+def _head(config: Config) -> bytes:
+    """What the file says of its origin; made once for the configuration of the last call, which is frozen."""
+    known = _heads.get(id(config))
+    if known is None:
+        head = {"kind": _MAGIC, "format": FORMAT, "version": __version__, "config": config_to_dict(config)}
+        known = config, json.dumps(head).encode()
+        _heads.clear()
+        _heads[id(config)] = known
+    return known[1]
 
 
 def load_state(path: str | Path, config: Config | None = None) -> tuple[Config, dict[str, Any]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 
 import numpy as np
@@ -11,7 +10,6 @@ import pytest
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.io.packing import pack, unpack
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.simulation.scenario import load_scenario
 from jeat_graph.simulation.simulate import record
@@ -109,39 +107,38 @@ def test_a_file_that_is_none_is_refused(tmp_path):
         Tracker.load(path)
 
 
-def test_a_damaged_file_is_refused_and_names_no_class_of_its_own(tmp_path):
-    text, block = pack({"now": {"x": [1, (2, 3)]}, "a": np.arange(3)}, {})
-    assert unpack(text, block, {})["now"] == {"x": [1, (2, 3)]}
-    with pytest.raises(DataError, match="damaged"):
-        unpack(text, block[:8], {})
-    with pytest.raises(DataError, match="damaged"):
-        unpack(json.dumps({"kinds": [], "tree": {"object": ["Popen", {"args": "ls"}]}}), b"", {})
-    with pytest.raises(TypeError, match="cannot be saved"):
-        pack({"a": object()}, {})
-
-
-def crowd(tracker, steps):
-    """Twenty vehicles that stay, seen by both sensors, for so many steps at 120 Hz in all."""
+def crowd(count, steps):
+    """Scans of so many vehicles that stay, seen by both sensors at 120 Hz in all."""
     rng = np.random.default_rng(1)
-    start = rng.uniform((50, 50), (1100, 600), (20, 2))
+    start = rng.uniform((50, 50), (1100, 600), (count, 2))
     for k in range(steps):
-        sensor = "rgb" if k % 6 == 0 else "evt"
-        boxes = np.column_stack([start + 0.1 * k + rng.normal(0, 0.5, (20, 2)), np.full((20, 2), 30.0)])
-        tracker.step((k / 120.0, sensor, boxes, np.full(20, 0.9)))
+        boxes = np.column_stack([start + 0.1 * k + rng.normal(0, 0.5, (count, 2)), np.full((count, 2), 30.0)])
+        yield k / 120.0, "rgb" if k % 6 == 0 else "evt", boxes, np.full(count, 0.9)
 
 
-def test_a_checkpoint_of_twenty_vehicles_is_small_and_costs_little(tmp_path, full, capsys):
+@pytest.mark.parametrize("late", [False, True])
+def test_a_checkpoint_of_twenty_vehicles_is_small_and_costs_little(late, tmp_path, full, capsys):
+    """At every moment: what waits for the smoothers grows and shrinks by packets of steps."""
     tracker = Tracker(load_config("highway"))
-    crowd(tracker, 400)
-    tracker.drain_smoothed()  # as a live caller does now and then
-    took = []
-    for _ in range(20 if full else 3):
-        begin = time.thread_time()
-        tracker.save(tmp_path / "state.npz")
-        took.append(time.thread_time() - begin)
-    size = (tmp_path / "state.npz").stat().st_size
+    live = LiveTracker(tracker) if late else tracker
+    took, adding, sizes = [], [], []
+    for k, scan in enumerate(crowd(20, 460)):
+        live.step(scan)
+        if k % 32 == 0:
+            live.drain_smoothed()  # as a live caller does now and then
+        if k >= 380 and k % (1 if full else 5) == 0:
+            begin = time.thread_time()
+            live.save(tmp_path / "state.npz")
+            took.append(time.thread_time() - begin)
+            begin = time.thread_time()
+            sum(range(100_000))
+            adding.append(time.thread_time() - begin)
+            sizes.append((tmp_path / "state.npz").stat().st_size)
     with capsys.disabled():
         if full:
-            print(f"\n{size / 1e6:.2f} MB, {1e3 * float(np.median(took)):.1f} ms")
-    # Besides the windows up to a packet of steps that waits for the smoothers.
-    assert size <= 1_200_000
+            ms = 1e3 * np.quantile(took, (0.0, 0.5))
+            print(f"\n{max(sizes) / 1e6:.2f} MB at most, {ms[0]:.1f} ms at least, {ms[1]:.1f} ms median")
+    assert len(tracker.causal()) == 20
+    assert max(sizes) <= 1_000_000
+    # 5 ms where Python adds up so many numbers in one; a slower or busier machine gets as much more.
+    assert min(took) <= 0.005 * max(1.0, min(adding) / 0.001)

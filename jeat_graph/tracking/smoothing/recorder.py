@@ -57,13 +57,10 @@ class StepRecorder:
         self._ids: IntArray = np.zeros(0, dtype=np.int64)
         self._confirmed: BoolArray = np.zeros(0, dtype=np.bool_)
         self._ended: list[int] = []
-        self._updates: list[RecordArray] = []
         self._recorded: list[tuple[StepRecord, bool]] = []
 
     def record(self, step: StepRecord) -> bool:
         """Record one step; whether the packet is full then."""
-        if len(step.updates):
-            self._updates.append(step.updates)
         self._recorded.append((step, self._row_wanted(step.t)))
         over = False
         if len(step.ids) - step.births != len(self._ids):
@@ -87,10 +84,10 @@ class StepRecorder:
             np.concatenate([step.used for step in steps]),
             np.concatenate([step.confirmed for step in steps]),
             np.concatenate([step.held for step in steps]),
-            concatenate_measurements(self._updates),
+            concatenate_measurements([step.updates for step in steps if len(step.updates)]),
             self._ended,
         )
-        self._recorded, self._updates, self._ended = [], [], []
+        self._recorded, self._ended = [], []
         return packet
 
     def _row_wanted(self, t: float) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -59,6 +59,24 @@ class Share(NamedTuple):
         """Time of its first row (s), or infinity."""
         part = self.observed
         return float(self.packet.observed.t[part.start]) if part.stop > part.start else np.inf
+
+    def saved(self) -> dict[str, Any]:
+        """Return what it holds, without the rest of the packet, for `from_saved`."""
+        packet = self.packet
+        return {
+            **vars(packet.observed.select(self.observed)),
+            "confirmed": packet.confirmed[self.steps],
+            "updates": packet.updates[self.updates],
+            "last": self.last,
+        }
+
+    @staticmethod
+    def from_saved(saved: dict[str, Any]) -> Share:
+        """Make a share of what `saved` returned, in a packet of its own."""
+        confirmed, updates, last = (saved.pop(name) for name in ("confirmed", "updates", "last"))
+        observed = ObservationTimes(**saved)
+        whole = (slice(0, len(rows)) for rows in (observed, confirmed, updates))
+        return Share(SortedPacket(observed, confirmed, updates), *whole, last)
 
     def give_to(self, history: TrackHistory) -> None:
         """Hand it to the track's history."""
