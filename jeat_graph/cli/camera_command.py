@@ -61,7 +61,7 @@ def _calibrate(args: argparse.Namespace) -> int:
 
     if Path(args.out).suffix not in (".yaml", ".yml"):
         raise DataError("the name of a camera's file must end in .yaml", args.out)
-    if args.lengths is None and args.points is None:
+    if args.lengths is None and args.points is None and args.tracks is None:
         raise DataError("nothing tells the scale: give --lengths or --points")
     config = CalibrationConfig()
     lengths = None if args.lengths is None else read_lengths(args.lengths)

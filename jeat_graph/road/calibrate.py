@@ -12,9 +12,11 @@ from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.road.camera import PARAMETERS, Georeference, RoadCamera
 from jeat_graph.road.evidence import Points
+from jeat_graph.road.lane_spacing import comb_pitch, find_comb
 from jeat_graph.road.residuals import (
     Problem,
     Weighting,
+    lane_residuals,
     length_residuals,
     length_spread,
     point_residuals,
@@ -65,9 +67,10 @@ def calibrate(problem: Problem, zone: str = "") -> Calibration:
         DataError: there is no evidence of scale, or no camera above a road fits.
     """
     if problem.points is None:
-        if problem.lengths is None:
+        calibration = _solve(problem)
+        if problem.lengths is None and calibration.weighting.lanes is None:
             raise DataError("nothing tells the scale: give measured lengths or surveyed points")
-        return _solve(problem)
+        return calibration if problem.lengths is not None else _with_lanes_as_wide(calibration)
     surveyed = problem.points
     east, north = (float(v) for v in surveyed.places.mean(axis=0))
     map_axes = Georeference(east, north, 0.0, zone)
@@ -80,6 +83,20 @@ def calibrate(problem: Problem, zone: str = "") -> Calibration:
         places = map_axes.from_map(surveyed.places)
         calibration = _solve(replace(problem, points=Points(surveyed.pixels, places)))
     return _with_origin_below(calibration, map_axes)
+
+
+def _with_lanes_as_wide(calibration: Calibration) -> Calibration:
+    """Set the height by the lanes alone: what is believed of accelerations makes every scene look smaller."""
+    camera, problem, w = calibration.camera, calibration.problem, calibration.weighting
+    assert problem.tracks is not None
+    assert w.lanes is not None
+    x = fit_tracks(camera, problem.tracks, problem.config, w.track_px, 0.0, w.node_weight).motion[:, 0]
+    factor = problem.config.lane_m / comb_pitch(x, w.lanes)
+    scale = np.ones(len(PARAMETERS))
+    scale[-3:] = factor
+    covariance = camera.covariance * np.outer(scale, scale)
+    camera = replace(camera, position=camera.position * factor, covariance=covariance)
+    return replace(calibration, camera=camera)
 
 
 def _along(camera: RoadCamera, problem: Problem) -> float:
@@ -133,7 +150,7 @@ def _solve(problem: Problem) -> Calibration:
             try:
                 return _residuals(start.moved(change), problem, w, float(x[-1]))
             except DataError:  # a trial below the road
-                return np.full(_count(problem), 1e3)
+                return np.full(_count(problem, w), 1e3)
 
         solution = least_squares(
             residuals,
@@ -155,11 +172,11 @@ def _solve(problem: Problem) -> Calibration:
     return Calibration(camera, problem, weighting, used, acceleration)
 
 
-def _count(problem: Problem) -> int:
+def _count(problem: Problem, w: Weighting) -> int:
     tracks = 0 if problem.tracks is None else problem.tracks.t.size * 2 + 2 * len(problem.tracks)
     lengths = 0 if problem.lengths is None else 2 * len(problem.lengths)
     points = 0 if problem.points is None else 2 * len(problem.points)
-    return 9 + tracks + lengths + points
+    return 9 + tracks + lengths + points + (w.lanes is not None)
 
 
 def _residuals(camera: RoadCamera, problem: Problem, w: Weighting, acceleration: float) -> FloatArray:
@@ -168,6 +185,7 @@ def _residuals(camera: RoadCamera, problem: Problem, w: Weighting, acceleration:
         parts.append(length_residuals(camera, problem, w.length_spread))
     if problem.points is not None:
         parts.append(point_residuals(camera, problem, w.point_scale))
+    parts.append(lane_residuals(camera, problem, w))
     if problem.tracks is not None:
         parts.append(track_residuals(camera, problem, w, acceleration))
     return np.concatenate(parts)
@@ -202,7 +220,8 @@ def _reweighted(camera: RoadCamera, problem: Problem, w: Weighting, acceleration
         )
     typical = float(np.median(mean[enough]))
     track = np.where(enough, 1.0 / (1.0 + mean / (_BAD_TRACK * typical)) ** 2, 0.0)
-    return replace(w, track_px=problem.config.track_px, node_weight=fit.weight * track[:, None])
+    lanes = find_comb(fit.motion[:, 0], track) if problem.needs_lanes else None
+    return replace(w, track_px=problem.config.track_px, node_weight=fit.weight * track[:, None], lanes=lanes)
 
 
 def _shared(

@@ -35,6 +35,8 @@ class CalibrationConfig:
     )
     height_m: float = number(8.0, "m", "height of a camera over a road that is most likely", open_low=True)
     height_log_sd: float = number(0.7, "1", "spread of its logarithm", open_low=True)
+    lane_m: float = number(3.6, "m", "distance of lanes that is most likely", open_low=True)
+    lane_log_sd: float = number(0.06, "1", "spread of its logarithm, where it tells the scale", open_low=True)
     most_tracks: int = number(120, "tracks", "as many as are used", 1)
     nodes: int = number(14, "points", "a track is thinned to these", 4)
     edge_share: float = number(0.01, "1", "points this near the edge are cut by it / height of the picture")

@@ -78,6 +78,11 @@ def calibration_lines(calibration: Calibration) -> list[str]:
         lines.append(
             f"{len(miss)} points: {np.sqrt((miss**2).mean()):.2f} px off on average, at most {miss.max():.2f}"
         )
+    if w.lanes is not None:
+        lines.append(
+            f"nothing measured tells the scale across the road: lanes {problem.config.lane_m:g} m apart"
+            f" (± {100.0 * Z95 * problem.config.lane_log_sd:.0f} %) are assumed to"
+        )
     if problem.tracks is not None:
         lines.append(
             f"tracks: {int(calibration.tracks_used.sum())} of {len(problem.tracks)} used,"

@@ -10,6 +10,7 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.evidence import CalibrationConfig, Lengths, Points, TrackNodes
+from jeat_graph.road.lane_spacing import LaneComb, comb_pitch
 from jeat_graph.road.track_fit import fit_tracks
 
 _UNSEEN = 1e3  # residual of a length that the trial camera sees in the sky
@@ -35,6 +36,12 @@ class Problem:
     tracks: TrackNodes | None
     config: CalibrationConfig
 
+    @property
+    def needs_lanes(self) -> bool:
+        """Whether nothing that was measured tells the scale across the road."""
+        across = self.lengths is not None and not self.lengths.along.all()
+        return self.points is None and not across and self.tracks is not None
+
 
 @dataclass(frozen=True, eq=False)
 class Weighting:
@@ -46,6 +53,7 @@ class Weighting:
         track_px: error of a track's node (px).
         track_share: how many independent tracks' worth one track is (design effect's inverse).
         node_weight: (K, M) robust weights.
+        lanes: the lanes of the tracks where their distance is evidence, or None.
     """
 
     length_spread: FloatArray
@@ -53,6 +61,7 @@ class Weighting:
     track_px: float
     track_share: float
     node_weight: FloatArray
+    lanes: LaneComb | None = None
 
 
 def prior_residuals(camera: RoadCamera, problem: Problem, common_acceleration: float) -> FloatArray:
@@ -118,6 +127,18 @@ def point_residuals(camera: RoadCamera, problem: Problem, scale: float) -> Float
     with np.errstate(invalid="ignore"):
         white = np.linalg.solve(np.linalg.cholesky(cov), (pixels - problem.points.pixels)[..., None])[..., 0]
     return np.where(depth[:, None] > 0, white / scale, _UNSEEN).ravel()
+
+
+def lane_residuals(camera: RoadCamera, problem: Problem, weighting: Weighting) -> FloatArray:
+    """Residual (1,) of the distance of the lanes that the tracks keep to; none (0,) without lanes."""
+    if weighting.lanes is None or problem.tracks is None:
+        return np.zeros(0)
+    c = problem.config
+    x = fit_tracks(camera, problem.tracks, c, weighting.track_px, 0.0, weighting.node_weight).motion[:, 0]
+    pitch = comb_pitch(x, weighting.lanes)
+    if not pitch > 0:
+        return np.array([_UNSEEN])
+    return np.array([math.log(pitch / c.lane_m) / c.lane_log_sd])
 
 
 def track_residuals(

@@ -9,8 +9,9 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.road.camera import RoadCamera, mounted
+from jeat_graph.road.lane_spacing import comb_pitch, find_comb
 from jeat_graph.road.residuals import Problem, length_errors, length_residuals, length_spread, prior_residuals
-from jeat_graph.road.track_fit import fit_tracks
+from jeat_graph.road.track_fit import TrackFit, fit_tracks
 from jeat_graph.road.vanishing import vanishing_point
 
 _FOCAL_RATIOS = np.geomspace(0.35, 4.0, 18)
@@ -18,7 +19,9 @@ _ROLLS_DEG = (-6.0, -3.0, 0.0, 3.0, 6.0)
 _PITCHES_DEG = np.arange(2.0, 66.0, 3.0)
 _YAWS_DEG = np.arange(-60.0, 61.0, 5.0)
 _LEAST_PITCH = 0.01
+_HEIGHT_FACTORS = np.geomspace(0.4, 2.5, 19)
 _COARSE_PX = 3.0
+_NO_LANES = 25.0  # what it costs a camera at most through which the tracks keep to no lanes
 
 
 def first_guess(problem: Problem) -> RoadCamera:
@@ -38,6 +41,8 @@ def first_guess(problem: Problem) -> RoadCamera:
         cost = _cost(camera, problem)
         if best is None or cost < best[0]:
             best = cost, camera
+    if best is None and problem.lengths is None:
+        raise DataError("nothing tells the scale: give measured lengths or surveyed points")
     if best is None:
         raise DataError(
             "no camera above a road can have seen this: check the pixels of the lengths and the image size"
@@ -80,9 +85,12 @@ def _poses(problem: Problem) -> list[tuple[float, FloatArray]]:
 
 
 def _scaled(problem: Problem, camera: RoadCamera) -> RoadCamera | None:
-    """Give the camera the height at which the lengths fit; None where it sees one of them in the sky."""
+    """Give the camera the height at which the lengths fit; None where it sees one of them in the sky.
+
+    Without lengths, that at which the tracks are as far apart as lanes.
+    """
     if problem.lengths is None:
-        return camera
+        return _scaled_by_lanes(problem, camera)
     size = length_errors(camera, problem.lengths)[:, 0] + problem.lengths.metres
     if not np.isfinite(size).all() or (size <= 0).any():
         return None
@@ -90,6 +98,32 @@ def _scaled(problem: Problem, camera: RoadCamera) -> RoadCamera | None:
     change = np.zeros(12)
     change[11] = camera.position[2] * (factor - 1.0)
     return camera.moved(change)
+
+
+def _scaled_by_lanes(problem: Problem, camera: RoadCamera) -> RoadCamera | None:
+    if problem.tracks is None:
+        return None
+    fit = fit_tracks(camera, problem.tracks, problem.config, _COARSE_PX)
+    if not np.isfinite(fit.motion).all():
+        return None
+    cost = [_lane_cost(problem, fit, float(factor)) for factor in _HEIGHT_FACTORS]
+    best = int(np.argmin(cost))
+    if cost[best] >= _NO_LANES:
+        return None
+    change = np.zeros(12)
+    change[11] = camera.position[2] * (_HEIGHT_FACTORS[best] - 1.0)
+    return camera.moved(change)
+
+
+def _lane_cost(problem: Problem, fit: TrackFit, factor: float = 1.0) -> float:
+    """What speaks against the distance of lanes, were the camera `factor` times as high."""
+    x = fit.motion[:, 0] * factor
+    lanes = find_comb(x, fit.weight.mean(axis=1))
+    pitch = 0.0 if lanes is None else comb_pitch(x, lanes)
+    if not pitch > 0:
+        return _NO_LANES
+    off = math.log(pitch / problem.config.lane_m) / problem.config.lane_log_sd
+    return min(off**2, _NO_LANES)
 
 
 def _cost(camera: RoadCamera, problem: Problem) -> float:
@@ -104,6 +138,15 @@ def _cost(camera: RoadCamera, problem: Problem) -> float:
         fit = fit_tracks(camera, problem.tracks, problem.config, _COARSE_PX)
         each = np.log1p((fit.residual**2).sum(axis=-1)).mean(axis=1)
         cost += float(np.median(each)) * 2.0 * problem.config.nodes
+        if problem.needs_lanes:
+            lanes = find_comb(fit.motion[:, 0], fit.weight.mean(axis=1))
+            pitch = math.inf if lanes is None else comb_pitch(fit.motion[:, 0], lanes)
+            off = (
+                math.log(pitch / problem.config.lane_m) / problem.config.lane_log_sd
+                if pitch > 0
+                else math.inf
+            )
+            cost += min(off**2, _NO_LANES)
     return cost
 
 

@@ -8,8 +8,10 @@ from road_scenes import HEIGHT, WIDTH, camera, drives, lengths, see
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.road.calibrate import calibrate
-from jeat_graph.road.evidence import CalibrationConfig, Points, thin
+from jeat_graph.road.evidence import CalibrationConfig, Points, TrackNodes, thin
+from jeat_graph.road.lane_spacing import comb_pitch, find_comb
 from jeat_graph.road.residuals import Problem
+from jeat_graph.road.track_fit import fit_tracks
 from jeat_graph.road.vanishing import vanishing_point
 
 CONFIG = CalibrationConfig(most_tracks=40)
@@ -83,3 +85,29 @@ def test_surveyed_points_place_the_camera_on_the_map() -> None:
 def test_without_scale_there_is_no_camera() -> None:
     with pytest.raises(DataError, match="scale"):
         calibrate(Problem(WIDTH, HEIGHT, None, None, None, CONFIG))
+
+
+def test_lanes_are_a_comb_whose_pitch_is_found() -> None:
+    rng = np.random.default_rng(8)
+    x = 1.3 + 2.9 * rng.integers(0, 3, 60) + 0.2 * rng.standard_normal(60)
+    comb = find_comb(x, np.ones(60))
+    assert comb is not None
+    assert comb_pitch(x, comb) == pytest.approx(2.9, abs=0.1)
+    assert find_comb(rng.uniform(0.0, 12.0, 400), np.ones(400)) is None
+
+
+def test_tracks_alone_tell_a_scale_by_their_lanes() -> None:
+    """Nothing measured at all: the scale is that of lanes 3.6 m apart, and is said to be no surer."""
+    given = _problem(3, 0.3, 1.0, 0.02)
+    assert given.tracks is not None
+    few = TrackNodes(given.tracks.t[::3], given.tracks.pixels[::3])
+    found = calibrate(Problem(WIDTH, HEIGHT, None, None, few, CONFIG))
+    w = found.weighting
+    assert w.lanes is not None
+    x = fit_tracks(found.camera, few, CONFIG, w.track_px, 0.0, w.node_weight).motion[:, 0]
+    assert comb_pitch(x, w.lanes) == pytest.approx(3.6, rel=0.03)
+    assert np.sqrt(found.camera.covariance[11, 11]) > 0.04 * found.camera.position[2]
+
+
+def test_a_measured_width_leaves_the_lanes_out() -> None:
+    assert not _problem(3, 0.3, 1.0, 0.02).needs_lanes
