@@ -20,6 +20,7 @@ from jeat_graph.version import __version__
 COMMANDS = (
     "demo",
     "simulate",
+    "events",
     "track",
     "stream",
     "batch",

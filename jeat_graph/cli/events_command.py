@@ -1,0 +1,69 @@
+"""`jeat-graph events`: what is in a file of events, and one format from another."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from jeat_graph.cli.terminal import one_line
+from jeat_graph.config.argument_types import picture_size
+from jeat_graph.data.errors import DataError
+from jeat_graph.io.events.converting import WRITTEN
+from jeat_graph.io.events.opening import FORMATS
+
+HELP = "say what is in a file of events, or convert it: RAW (EVT2, EVT3), DAT, AEDAT, HDF5, ROS bags"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    todo = parser.add_subparsers(dest="todo", metavar="info|convert", required=True)
+    info = todo.add_parser(
+        "info", help="format, picture, duration, rate, polarity, noise, hot pixels", description=FORMATS
+    )
+    info.add_argument("file", metavar="FILE", help=f"file of events: {FORMATS}")
+    info.add_argument("--json", action="store_true", help="print as JSON")
+    change = todo.add_parser("convert", help="write the events of one file into another", description=FORMATS)
+    change.add_argument("file", metavar="IN", help=f"file of events: {FORMATS}")
+    change.add_argument("out", metavar="OUT", help="FILE.raw (EVT3), FILE.dat or FILE.h5 (layout of DSEC)")
+    change.add_argument(
+        "--format", choices=tuple(WRITTEN), help="format of OUT, where its name leaves a choice (evt2)"
+    )
+    for sub in (info, change):
+        sub.add_argument(
+            "--size", type=picture_size, metavar="WxH", help="size of the picture in px, if IN does not say"
+        )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Read, and print or write."""
+    from jeat_graph.io.events.opening import open_events
+
+    with open_events(args.file, args.size) as reader:
+        if args.todo == "info":
+            from jeat_graph.detection.summary import summarise
+
+            found = summarise(reader)
+            print(json.dumps(found._asdict(), indent=2) if args.json else "\n".join(found.lines()))
+            return 0
+        out = Path(args.out)
+        if out.resolve() == Path(args.file).resolve():
+            raise DataError("would be replaced by the result; choose another OUT", out)
+        count = _convert(reader, out, args.format)
+        for note in reader.damage.notes():
+            print(f"jeat-graph events: warning: {one_line(f'{args.file}: {note}')}", file=sys.stderr)
+    print(f"wrote {out}: {count} events")
+    return 0
+
+
+def _convert(reader: object, out: Path, fmt: str | None) -> int:
+    from tqdm import tqdm
+
+    from jeat_graph.io.events.converting import convert
+    from jeat_graph.io.events.reader import EventReader
+
+    assert isinstance(reader, EventReader)
+    hidden = not sys.stderr.isatty()
+    with tqdm(desc="events", unit="ev", unit_scale=True, disable=hidden, leave=False) as bar:
+        return convert(reader, out, fmt, bar.update)

@@ -1,0 +1,1 @@
+"""From raw pictures and raw events to detections: windows, noise, detectors with and without weights."""

@@ -1,0 +1,152 @@
+"""Noise of an event camera: events that stand alone, and pixels that fire all the time.
+
+An edge that moves fires in several neighbouring pixels within a few milliseconds; noise fires in single ones.
+An event with no other in the eight pixels around it within the last `support_s` is *background activity*. A
+*hot pixel* fires faster than `hot_hz` over a second while the pixels around it do not.
+Source of the first: Delbruck, "Frame-free dynamic digital vision" (2008).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.data.arrays import BoolArray, IntArray
+from jeat_graph.data.errors import ConfigError
+from jeat_graph.data.events import EventArray
+
+_US_PER_S = 1e6
+_LONG_AGO = -(1 << 62)
+_NEIGHBOURS = 8
+
+
+@dataclass(frozen=True)
+class NoiseSettings:
+    """What is taken for noise.
+
+    Attributes:
+        background: whether events that stand alone are left out.
+        support_s: an event stands alone if no pixel around it fired within this time before it (s). An edge
+            at 100 px/s passes from pixel to pixel in 10 ms.
+        hot_pixels: whether pixels that fire all the time are left out.
+        hot_hz: rate from which a pixel may be hot (Hz); an IMX636 indoors has .002 Hz/px, its hottest 10 Hz.
+        hot_ratio: a hot pixel fires so many times as often as those around it on average; an edge fires in
+        all. period_s: over which the rate is taken (s); hot pixels are looked for anew after each.
+    """
+
+    background: bool = True
+    support_s: float = 0.03
+    hot_pixels: bool = True
+    hot_hz: float = 10.0
+    hot_ratio: float = 8.0
+    period_s: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in ("support_s", "hot_hz", "hot_ratio", "period_s"):
+            if not 0.0 < getattr(self, name) < float("inf"):
+                raise ConfigError(f"{name} must be positive, not {getattr(self, name)}")
+
+
+class NoiseFilter:
+    """Leaves out noise from events that come piece by piece.
+
+    Args:
+        size_px: width and height of the picture; events outside are left out.
+        settings: what noise is.
+
+    Attributes:
+        hot: (H, W) pixels that are taken for hot now.
+        alone: events that stood alone so far, those of hot pixels not counted.
+    """
+
+    def __init__(self, size_px: tuple[int, int], settings: NoiseSettings | None = None) -> None:
+        width, height = size_px
+        self.settings = settings or NoiseSettings()
+        self.hot: BoolArray = np.zeros((height, width), dtype=bool)
+        self.alone = 0
+        # One pixel of margin, so that every pixel has eight around it.
+        self._last = np.full((height + 2, width + 2), _LONG_AGO, dtype=np.int64)
+        self._counts = np.zeros((height, width), dtype=np.int64)
+        self._period_end = _LONG_AGO
+
+    def keep(self, events: EventArray) -> EventArray:
+        """Return the events that are not noise."""
+        return events.take(self.signal(events))
+
+    def signal(self, events: EventArray) -> BoolArray:
+        """Return which events (N,) are not noise."""
+        settings = self.settings
+        good: BoolArray = np.zeros(len(events), dtype=bool)
+        period_us = round(settings.period_s * _US_PER_S)
+        start = 0
+        while start < len(events):
+            if events.t_us[start] >= self._period_end:
+                self._look_for_hot(settings.period_s if self._period_end > _LONG_AGO else 0.0)
+                self._period_end = int(events.t_us[start]) + period_us
+            end = int(np.searchsorted(events.t_us, self._period_end))
+            rows = slice(start, max(end, start + 1))
+            part = events.take(rows)
+            alone = _judge(
+                part.t_us,
+                part.x,
+                part.y,
+                self._last,
+                self._counts,
+                self.hot,
+                (round(settings.support_s * _US_PER_S), settings.background),
+                good[rows],
+            )
+            self.alone += int(alone)
+            start = rows.stop
+        return good
+
+    def _look_for_hot(self, period_s: float) -> None:
+        if self.settings.hot_pixels and period_s > 0.0:
+            padded = np.pad(self._counts, 1)
+            around = sum(
+                padded[1 + dy : padded.shape[0] - 1 + dy, 1 + dx : padded.shape[1] - 1 + dx]
+                for dy in (-1, 0, 1)
+                for dx in (-1, 0, 1)
+                if dx or dy
+            )
+            often = self._counts >= self.settings.hot_hz * period_s
+            self.hot = often & (self._counts * _NEIGHBOURS >= self.settings.hot_ratio * around)
+        self._counts[:] = 0
+
+
+@numba.njit(cache=True)
+def _judge(
+    t: IntArray,
+    x: npt.NDArray[np.uint16],
+    y: npt.NDArray[np.uint16],
+    last: npt.NDArray[np.int64],
+    counts: npt.NDArray[np.int64],
+    hot: BoolArray,
+    settings: tuple[int, bool],
+    good: BoolArray,
+) -> int:
+    """Mark the events that are no noise in `good`, keep the last times; return how many stood alone."""
+    support_us, background = settings
+    height, width = counts.shape
+    alone = 0
+    for k in range(len(t)):
+        column, row = np.int64(x[k]), np.int64(y[k])
+        if column >= width or row >= height:
+            continue
+        counts[row, column] += 1
+        if hot[row, column]:
+            continue
+        since = t[k] - support_us
+        near = False
+        for dy in range(3):
+            for dx in range(3):
+                if (dx != 1 or dy != 1) and last[row + dy, column + dx] >= since:
+                    near = True
+        last[row + 1, column + 1] = t[k]
+        if not near:
+            alone += 1
+        good[k] = near or not background
+    return alone

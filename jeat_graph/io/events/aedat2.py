@@ -1,0 +1,175 @@
+"""AEDAT 2.0, the format of jAER: a header of lines with `#`, then big-endian words of address and time (µs).
+
+==========  ==================================================================================================
+DAVIS       31 set: a sample of a frame or of the inertial sensors, passed over; 30..22 row, 21..12 column,
+            11 polarity, 10 set: an edge of a signal
+DVS128      15 set: an edge of a signal; 14..8 row, 7..1 column, 0 polarity
+==========  ==================================================================================================
+
+Rows count from the bottom and columns from the right; here they count from the top left, as in pictures.
+The polarity bit of a DAVIS is 1 where it became brighter, that of a DVS128 where it became darker.
+Times of 32 bits begin again after 71 min. The header names the camera (`AEChip`), if jAER wrote it.
+Source: https://docs.inivation.com/software/software-advanced-usage/file-formats/aedat-2.0.html
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import BinaryIO
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.data.arrays import IntArray
+from jeat_graph.data.errors import DataError
+from jeat_graph.io.events.reader import Triggers
+from jeat_graph.io.events.words import (
+    BACKWARDS,
+    FILLED,
+    HIGH,
+    JUMP_US,
+    JUMPS,
+    LAST,
+    OUTSIDE,
+    TRIGGERS,
+    WRAPS,
+    Columns,
+    Limits,
+    WordReader,
+    wraps,
+)
+
+TIME_BITS = 32
+#: Pictures of the cameras by what their names hold, in lower case.
+CAMERAS = {
+    "davis240": (240, 180),
+    "davis346": (346, 260),
+    "davis640": (640, 480),
+    "dvs128": (128, 128),
+    "tmpdiff128": (128, 128),
+}
+_DVS128 = (128, 128)
+_END = b"# End Of ASCII Header"
+_MOST_HEADER_LINES = 10_000
+_MOST_LINE_BYTES = 1 << 16
+
+
+class Aedat2Reader(WordReader):
+    """Reads AEDAT 2.0.
+
+    Args:
+        path: the file.
+        file: open, at its beginning.
+        size_px: width and height of the picture, if the user says.
+
+    Raises:
+        DataError: neither the header nor the user tells the camera, so that addresses cannot be read.
+    """
+
+    format_name = "AEDAT2"
+
+    def __init__(self, path: Path, file: BinaryIO, size_px: tuple[int, int] | None) -> None:
+        header = _header(file)
+        named = next((size for name, size in CAMERAS.items() if name in header), None)
+        size = size_px or named
+        if size is None:
+            raise DataError(
+                "does not say which camera recorded it, so its addresses cannot be read; give the size of "
+                f"its picture, one of {', '.join(f'{w}x{h}' for w, h in sorted(set(CAMERAS.values())))}",
+                path,
+            )
+        super().__init__(path, file, np.uint64, decode_dvs128 if size == _DVS128 else decode_davis, size)
+
+
+def _header(file: BinaryIO) -> str:
+    """Read the lines of the header, in lower case; the file then stands at the first word."""
+    lines: list[bytes] = []
+    while len(lines) < _MOST_HEADER_LINES:
+        at = file.tell()
+        line = file.readline(_MOST_LINE_BYTES)
+        if not line.startswith(b"#") or not line.endswith(b"\n"):
+            file.seek(at)
+            break
+        lines.append(line)
+        if line.startswith(_END):
+            break
+    return b"".join(lines).decode("latin-1").lower()
+
+
+@numba.njit(cache=True)
+def _swap(word: np.uint64) -> np.int64:
+    """Turn a 32-bit word from big-endian."""
+    w = np.int64(word)
+    return ((w & 0xFF) << 24) | ((w & 0xFF00) << 8) | ((w >> 8) & 0xFF00) | (w >> 24)
+
+
+@numba.njit(cache=True)
+def _decode(
+    words: npt.NDArray[np.uint64],
+    state: IntArray,
+    out: Columns,
+    triggers: Triggers,
+    limits: Limits,
+    davis: bool,
+) -> int:
+    n, m, turns = state[FILLED], state[TRIGGERS], state[WRAPS]
+    last, low = state[LAST], state[HIGH]
+    time = turns << TIME_BITS
+    used = len(words)
+    for k in range(len(words)):
+        address = _swap(words[k] & np.uint64(0xFFFFFFFF))
+        new = _swap(words[k] >> np.uint64(32))
+        if davis and address >> 31:
+            continue
+        special = (address >> 10) & 1 if davis else (address >> 15) & 1
+        if n == len(out.t) or m == len(triggers.t_us):
+            used = k
+            break
+        if davis:
+            x, y, polarity = (address >> 12) & 0x3FF, (address >> 22) & 0x1FF, (address >> 11) & 1
+        else:
+            x, y, polarity = (address >> 1) & 0x7F, (address >> 8) & 0x7F, 1 - (address & 1)
+        if not special and (x >= limits.width or y >= limits.height):
+            state[OUTSIDE] += 1
+            continue
+        if new < low:
+            if wraps(low, new, 1 << TIME_BITS):
+                turns += 1
+                time = turns << TIME_BITS
+            else:
+                state[BACKWARDS] += 1
+        elif low >= 0 and new - low > JUMP_US:
+            state[JUMPS] += 1
+        low = new
+        last = max(time + new, last)
+        if special:
+            triggers.t_us[m] = last
+            triggers.channel[m] = 0
+            triggers.value[m] = polarity
+            m += 1
+        else:
+            out.t[n] = last
+            out.x[n] = limits.width - 1 - x
+            out.y[n] = limits.height - 1 - y
+            out.p[n] = polarity
+            n += 1
+    state[FILLED], state[TRIGGERS], state[WRAPS] = n, m, turns
+    state[LAST], state[HIGH] = last, low
+    return used
+
+
+@numba.njit(cache=True)
+def decode_davis(
+    words: npt.NDArray[np.uint64], state: IntArray, out: Columns, triggers: Triggers, limits: Limits
+) -> int:
+    """Decode events of a DAVIS; see `words.Decode`."""
+    return int(_decode(words, state, out, triggers, limits, True))
+
+
+@numba.njit(cache=True)
+def decode_dvs128(
+    words: npt.NDArray[np.uint64], state: IntArray, out: Columns, triggers: Triggers, limits: Limits
+) -> int:
+    """Decode events of a DVS128; see `words.Decode`."""
+    return int(_decode(words, state, out, triggers, limits, False))

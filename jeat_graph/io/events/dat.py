@@ -1,0 +1,131 @@
+"""DAT, Prophesee's older format: a header of lines with `%`, two bytes, then eight bytes an event.
+
+==================  ==========================================================================================
+two bytes           kind of event (0 or 12: of pixels; 14: edges of signals), and 8, the bytes of one
+bytes 0 to 3        time (µs); it begins again after 71 min
+bytes 4 to 7        13..0 column, 27..14 row, 31..28 polarity; in files of version 1 8..0 column, 16..9 row,
+                    17 polarity
+==================  ==========================================================================================
+
+Source: https://docs.prophesee.ai/stable/data/file_formats/dat.html
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import BinaryIO
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.data.arrays import IntArray
+from jeat_graph.data.errors import DataError
+from jeat_graph.io.events.reader import Triggers
+from jeat_graph.io.events.words import (
+    BACKWARDS,
+    FILLED,
+    HIGH,
+    JUMP_US,
+    JUMPS,
+    LAST,
+    OUTSIDE,
+    PREVIOUS,
+    UNKNOWN,
+    WRAPS,
+    Columns,
+    Limits,
+    WordReader,
+    wraps,
+)
+
+TIME_BITS = 32
+EVENT_BYTES = 8
+PIXELS, PIXELS_12, EDGES = 0, 12, 14
+
+
+class DatReader(WordReader):
+    """Reads DAT.
+
+    Args:
+        path: the file.
+        file: open, at the two bytes that follow the header.
+        size_px: width and height of the picture, if known.
+        version: what the header says, 2 if it says nothing.
+
+    Raises:
+        DataError: the two bytes announce something else than events of pixels.
+    """
+
+    format_name = "DAT"
+
+    def __init__(self, path: Path, file: BinaryIO, size_px: tuple[int, int] | None, version: int = 2) -> None:
+        kind = file.read(2)
+        if len(kind) == 2 and kind[0] == EDGES:
+            raise DataError("holds edges of signals (event type 14), no events of pixels", path)
+        if len(kind) < 2 or kind[0] not in (PIXELS, PIXELS_12) or kind[1] != EVENT_BYTES:
+            raise DataError(
+                f"is not DAT: its header must be followed by the type of events, 0 or 12, and their size, 8, "
+                f"not by {list(kind)}",
+                path,
+            )
+        super().__init__(path, file, np.uint64, decode_first if version < 2 else decode, size_px)
+
+
+@numba.njit(cache=True)
+def _decode(
+    words: npt.NDArray[np.uint64], state: IntArray, out: Columns, limits: Limits, x_bits: int, y_bits: int
+) -> int:
+    n, turns = state[FILLED], state[WRAPS]
+    last, previous, low = state[LAST], state[PREVIOUS], state[HIGH]
+    time = turns << TIME_BITS
+    used = len(words)
+    for k in range(len(words)):
+        if n == len(out.t):
+            used = k
+            break
+        new = np.int64(words[k] & np.uint64(0xFFFFFFFF))
+        address = np.int64(words[k] >> np.uint64(32))
+        x = address & ((1 << x_bits) - 1)
+        y = (address >> x_bits) & ((1 << y_bits) - 1)
+        polarity = address >> (x_bits + y_bits)
+        if polarity > 1:
+            state[UNKNOWN] += 1
+            continue
+        if x >= limits.width or y >= limits.height:
+            state[OUTSIDE] += 1
+            continue
+        if new < low:
+            if wraps(low, new, 1 << TIME_BITS):
+                turns += 1
+                time = turns << TIME_BITS
+            else:
+                state[BACKWARDS] += 1
+        elif low >= 0 and new - low > JUMP_US:
+            state[JUMPS] += 1
+        low = new
+        last = max(time + new, last)
+        out.t[n] = last
+        out.x[n] = x
+        out.y[n] = y
+        out.p[n] = polarity
+        n += 1
+    state[FILLED], state[WRAPS] = n, turns
+    state[LAST], state[PREVIOUS], state[HIGH] = last, previous, low
+    return used
+
+
+@numba.njit(cache=True)
+def decode(
+    words: npt.NDArray[np.uint64], state: IntArray, out: Columns, triggers: Triggers, limits: Limits
+) -> int:
+    """Decode events of version 2; see `words.Decode`."""
+    return int(_decode(words, state, out, limits, 14, 14))
+
+
+@numba.njit(cache=True)
+def decode_first(
+    words: npt.NDArray[np.uint64], state: IntArray, out: Columns, triggers: Triggers, limits: Limits
+) -> int:
+    """Decode events of version 1, of cameras of 304 x 240 px; see `words.Decode`."""
+    return int(_decode(words, state, out, limits, 9, 8))

@@ -1,0 +1,50 @@
+"""Events in the layout of the DSEC data set, which is our own HDF5 too, through the common reader."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from jeat_graph.data.events import EventArray
+from jeat_graph.io.events.reader import PIECE_ROWS, EventReader
+from jeat_graph.io.events_dsec import EventFile
+
+#: DSEC's own files do not say their size; its cameras have this one (px).
+DSEC_SIZE = (640, 480)
+
+
+class DsecReader(EventReader):
+    """Reads HDF5 in the layout of DSEC (`io.events_dsec`).
+
+    Args:
+        path: the file.
+        size_px: width and height of the picture; by default as the file says, else that of DSEC.
+
+    Raises:
+        DataError: as `EventFile`.
+    """
+
+    format_name = "HDF5 (DSEC)"
+
+    def __init__(self, path: Path, size_px: tuple[int, int] | None) -> None:
+        file = EventFile(path)
+        super().__init__(path, size_px or file.size_px or DSEC_SIZE)
+        self._events = file
+        self.t_offset_us = file.t_offset_us
+
+    def close(self) -> None:
+        """Close the file."""
+        self._events.close()
+
+    def pieces(self) -> Iterator[EventArray]:
+        """Yield all events in the order of their times, at most `PIECE_ROWS` at a time.
+
+        Raises:
+            DataError: times run backwards, or the data are damaged.
+        """
+        assert self.size_px is not None
+        width, height = self.size_px
+        for piece in self._events.pieces(PIECE_ROWS):
+            inside = (piece.x < width) & (piece.y < height)
+            self.damage.outside += int((~inside).sum())
+            yield piece if inside.all() else piece.take(inside)

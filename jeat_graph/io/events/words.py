@@ -1,0 +1,190 @@
+"""Event files that are a header and then words of one width: read block by block, decoded by a compiled loop.
+
+A format gives the loop; this module gives it blocks of words and room for the events, and keeps its state
+from block to block. A format that is not what its header says shows by words that it does not have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.data.arrays import IntArray
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.events import EventArray
+from jeat_graph.io.events.reader import PIECE_ROWS, EventReader, Triggers
+
+BLOCK_BYTES = 1 << 20
+#: A time that steps ahead by more than this (µs) is remarked on: a camera's clock does not do so.
+JUMP_US = 10_000_000
+#: So many events one word may stand for.
+MOST_OF_A_WORD = 32
+#: Words beyond this share that a format does not have: the file is of another one. Of random 16-bit words 31
+#: % have types that EVT3 leaves free, the rarest case of another format read as this one.
+_MOST_WRONG = 0.05
+_TRIGGER_ROWS = 1 << 12
+_NO_LIMIT = 1 << 16
+
+# Places of the state that a loop keeps from block to block (int64).
+FILLED, TRIGGERS, LAST, PREVIOUS, HIGH, WRAPS, LOW, ROW, BASE, POLARITY = range(10)
+OUTSIDE, BACKWARDS, UNKNOWN, UNTIMED, JUMPS = range(10, 15)
+STATE_SIZE = 15
+
+
+class Columns(NamedTuple):
+    """Room for events: t_us (N,) int64, x, y (N,) uint16, polarity (N,) uint8."""
+
+    t: IntArray
+    x: npt.NDArray[np.uint16]
+    y: npt.NDArray[np.uint16]
+    p: npt.NDArray[np.uint8]
+
+
+class Limits(NamedTuple):
+    """First column and row outside the picture (px)."""
+
+    width: int
+    height: int
+
+
+#: (words, state, events, triggers, limits) -> words that were used: all, unless the room is full.
+Decode = Callable[[Any, IntArray, Columns, Triggers, Limits], int]
+
+
+@numba.njit(cache=True)
+def wraps(old: Any, new: Any, full: int) -> bool:
+    """Tell a counter of `full` values that began again from one that stepped back by a fault."""
+    quarter = full // 4
+    return bool(old >= full - quarter and new < quarter)
+
+
+def empty_state() -> IntArray:
+    """Return the state before the first word: no time and no row is known."""
+    state = np.zeros(STATE_SIZE, dtype=np.int64)
+    state[HIGH] = state[ROW] = state[LAST] = state[PREVIOUS] = -1
+    return state
+
+
+class WordReader(EventReader):
+    """Reads a file of words.
+
+    Args:
+        path: the file.
+        file: open, at the first word.
+        word: type of a word.
+        decode: the format's loop.
+        size_px: width and height of the picture, if known.
+    """
+
+    def __init__(
+        self, path: Path, file: BinaryIO, word: type[Any], decode: Decode, size_px: tuple[int, int] | None
+    ) -> None:
+        super().__init__(path, size_px)
+        self._file = file
+        self._word = np.dtype(word)
+        self._decode = decode
+        self._state = empty_state()
+        self._words = 0
+        self._judged = False
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def pieces(self) -> Iterator[EventArray]:
+        """Yield all events in the order of their times, at most `PIECE_ROWS` at a time.
+
+        Raises:
+            DataError: words that the format does not have: the file is of another one.
+        """
+        width, height = self.size_px or (_NO_LIMIT, _NO_LIMIT)
+        limits = Limits(width, height)
+        triggers = _trigger_room()
+        out = _room()
+        state = self._state
+        for words in self._blocks():
+            used = 0
+            while used < len(words):
+                got = self._decode(words[used:], state, out, triggers, limits)
+                used += got
+                self._words += got
+                if state[FILLED] + MOST_OF_A_WORD > PIECE_ROWS or state[TRIGGERS] == _TRIGGER_ROWS:
+                    yield self._take(out, triggers)
+                    out = _room()
+        self._judge()
+        if state[FILLED] or state[TRIGGERS]:
+            yield self._take(out, triggers)
+
+    def _blocks(self) -> Iterator[npt.NDArray[Any]]:
+        width = self._word.itemsize
+        buffer = bytearray(BLOCK_BYTES)
+        view = memoryview(buffer)
+        kept = 0
+        while True:
+            try:
+                got = self._file.readinto(view[kept:])  # type: ignore[attr-defined]
+            except OSError as error:
+                raise DataError(f"cannot be read: {error.strerror or error}", self.path) from None
+            if not got:
+                break
+            whole = (kept + got) // width * width
+            yield np.frombuffer(buffer, self._word, whole // width)
+            rest = kept + got - whole
+            buffer[:rest] = buffer[whole : whole + rest]
+            kept = rest
+        self.damage.tail_bytes = kept
+
+    def _take(self, out: Columns, triggers: Triggers) -> EventArray:
+        """Hand out what was decoded, and empty the room for triggers."""
+        self._judge()
+        state = self._state
+        n, m = int(state[FILLED]), int(state[TRIGGERS])
+        state[FILLED] = state[TRIGGERS] = 0
+        self.triggers = Triggers(
+            triggers.t_us[:m].copy(), triggers.channel[:m].copy(), triggers.value[:m].copy()
+        )
+        # The loop keeps the times in order.
+        return EventArray.trusted(out.t[:n], out.x[:n], out.y[:n], out.p[:n])
+
+    def _count(self) -> None:
+        counts = {"outside": OUTSIDE, "backwards": BACKWARDS, "unknown": UNKNOWN, "untimed": UNTIMED}
+        for name, place in counts.items():
+            setattr(self.damage, name, int(self._state[place]))
+        self.damage.jumps = int(self._state[JUMPS])
+
+    def _judge(self) -> None:
+        """Refuse a file that is not what it says, before anything of it is handed out."""
+        self._count()
+        if self._judged:
+            return
+        self._judged = True
+        damage = self.damage
+        if damage.outside + damage.unknown + damage.backwards > _MOST_WRONG * self._words:
+            raise DataError(
+                f"is not {self.format_name}, or damaged: of {self._words} words {damage.unknown} are not of "
+                f"that format, {damage.outside} events lie outside the picture, {damage.backwards} steps go "
+                "back in time",
+                self.path,
+            )
+
+
+def _room() -> Columns:
+    return Columns(
+        np.empty(PIECE_ROWS, np.int64),
+        np.empty(PIECE_ROWS, np.uint16),
+        np.empty(PIECE_ROWS, np.uint16),
+        np.empty(PIECE_ROWS, np.uint8),
+    )
+
+
+def _trigger_room() -> Triggers:
+    return Triggers(
+        np.empty(_TRIGGER_ROWS, np.int64),
+        np.empty(_TRIGGER_ROWS, np.uint8),
+        np.empty(_TRIGGER_ROWS, np.uint8),
+    )
