@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from jeat_graph.cli.terminal import one_line
+from jeat_graph.config.argument_types import positive
 from jeat_graph.data.errors import DataError
 
 HELP = "metres, km/h and lanes on the road, each with its uncertainty"
@@ -35,11 +36,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar=("M", "SD"),
         help="height of the tracked point above the road and how well it is known (0.1 0.058)",
     )
-    add("--out", required=True, metavar="DIR", help="where road.csv, speeds.csv and crossings.csv go")
+    add("--interval", type=positive, metavar="S", help="length of an interval of counts.csv (300)")
+    add(
+        "--out",
+        required=True,
+        metavar="DIR",
+        help="where road.csv, speeds.csv, crossings.csv, counts.csv, headways.csv and road.html go",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Fit the vehicles and write the tables."""
+    from jeat_graph.io.table_writer import write_columns
     from jeat_graph.road.box_rows import BoxConfig
     from jeat_graph.road.boxes_road import follow_boxes
     from jeat_graph.road.camera_file import read_camera
@@ -49,8 +57,10 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.road.motion_fit import MotionFitConfig
     from jeat_graph.road.points_road import follow_points, summarise
     from jeat_graph.road.results import write_result
+    from jeat_graph.road.road_page import write_road_page
     from jeat_graph.road.sources import boxes_of, contact_pixels, only_points, run_table
     from jeat_graph.road.speeds import ContactConfig
+    from jeat_graph.road.traffic import TrafficConfig, count_columns, headway_columns
 
     out = Path(args.out)
     if out.exists() and not out.is_dir():
@@ -80,6 +90,10 @@ def run(args: argparse.Namespace) -> int:
             )
     result = summarise(vehicles, camera, marks, contact, LaneConfig(), sized)
     write_result(result, out)
+    traffic = TrafficConfig() if args.interval is None else TrafficConfig(interval_s=args.interval)
+    write_columns(count_columns(result, traffic), out / "counts.csv")
+    write_columns(headway_columns(result, traffic), out / "headways.csv")
+    write_road_page(result, camera, traffic, Path(args.source).name or str(args.source), out / "road.html")
     if total > len(vehicles):
         print(
             f"jeat-graph road: {total - len(vehicles)} tracks too short, or not on the road, are left out",

@@ -20,11 +20,13 @@ class Crossing(NamedTuple):
     Attributes:
         t: when its point is on the line (s).
         x: where across the road (m).
+        y: where along it (m).
         speed: how fast it is then.
     """
 
     t: float
     x: float
+    y: float
     speed: Speed
 
 
@@ -57,5 +59,5 @@ def crossing(vehicle: Vehicle, ends: FloatArray) -> Crossing | None:
         place = vehicle.fit.at(np.array(at))
         share = float((place - ends[0]) @ along / (along @ along))
         if 0.0 <= share <= 1.0:
-            return Crossing(at, float(place[0]), vehicle.speed_at(at))
+            return Crossing(at, float(place[0]), float(place[1]), vehicle.speed_at(at))
     return None

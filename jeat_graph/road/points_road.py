@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.road.boxes_road import SizedVehicle
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.crossings import crossing, road_line
@@ -37,6 +38,22 @@ def follow_points(
     return vehicles
 
 
+#: Name of the line that is used where none is given.
+MIDDLE = "middle"
+_ANYWHERE_M = 1e3
+
+
+def _middle_line(vehicles: list[Vehicle]) -> FloatArray:
+    """Ends (2, 2) in m of a line square across the road where most vehicles come by."""
+    places = np.array([[v.fit.at(np.array(t))[1] for t in v.fit.window()] for v in vehicles])
+    low, high = places.min(axis=1), places.max(axis=1)
+    tried = np.sort(np.concatenate([low, high]))
+    passing = ((low <= tried[:, None]) & (tried[:, None] <= high)).sum(axis=1)
+    best = np.flatnonzero(passing == passing.max())
+    y = float(tried[best[len(best) // 2]])
+    return np.array([[-_ANYWHERE_M, y], [_ANYWHERE_M, y]])
+
+
 def summarise(
     vehicles: list[Vehicle],
     camera: RoadCamera,
@@ -48,11 +65,14 @@ def summarise(
     """Speeds, lanes and crossings of fitted vehicles.
 
     A vehicle's speed is its mean between the first and the last line that it crosses, where lines are given
-    and it crosses two; otherwise over all of its track that the fit believes.
+    and it crosses two; otherwise over all of its track that the fit believes. Where no line is given,
+    crossings are those of a line across the road where most vehicles come by (`MIDDLE`).
     """
     middle = np.array([v.fit.at(np.array(np.mean(v.fit.window())))[0] for v in vehicles], dtype=np.float64)
     lanes = given_lanes(marks.lanes) if marks.lanes else find_lanes(middle, lane_config)
     ends = {name: road_line(camera, line, contact.height_m) for name, line in marks.lines.items()}
+    if not ends and vehicles:
+        ends = {MIDDLE: _middle_line(vehicles)}
     crossings, speeds = [], []
     for k, vehicle in enumerate(vehicles):
         own = [(name, crossing(vehicle, line)) for name, line in ends.items() if line is not None]

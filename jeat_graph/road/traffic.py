@@ -1,0 +1,200 @@
+"""Traffic at lines across the road: counts, mean and 85th-percentile speeds, headways and gaps, by lane."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.config.fields import check, number
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.io.table_writer import round_decimals
+from jeat_graph.road.crossings import Crossing
+from jeat_graph.road.results import RoadResult
+from jeat_graph.road.speeds import KMH, Z95, Vehicle
+
+ALL = "all"
+
+
+@dataclass(frozen=True)
+class TrafficConfig:
+    """How traffic is summed up."""
+
+    interval_s: float = number(300.0, "s", "length of an interval of the counts", open_low=True)
+    longest_headway_s: float = number(60.0, "s", "two vehicles farther apart do not follow one another")
+    draws: int = number(400, "draws", "of the errors, for the interval of the 85th percentile", 20)
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+class Passage(NamedTuple):
+    """A vehicle at a line.
+
+    Attributes:
+        line: name of the line.
+        lane: name of the lane, empty where it is in none.
+        vehicle: its place in the result.
+        crossing: when, where, how fast.
+    """
+
+    line: str
+    lane: str
+    vehicle: int
+    crossing: Crossing
+
+
+def passages(result: RoadResult) -> list[Passage]:
+    """All crossings with their lanes, by line and time."""
+    rows = sorted(result.crossings, key=lambda row: (row[0], row[2].t, row[1]))
+    if not rows:
+        return []
+    lanes = result.lanes.of(np.array([row[2].x for row in rows], dtype=np.float64)).tolist()
+    return [Passage(row[0], lane, row[1], row[2]) for row, lane in zip(rows, lanes, strict=True)]
+
+
+def count_columns(result: RoadResult, config: TrafficConfig) -> dict[str, npt.NDArray[Any]]:
+    """Rows of `counts.csv`: line, lane (or all) and class (or all) in each interval with any vehicle.
+
+    The intervals of the speeds are for the vehicles that were there: by noise of each and by the calibration,
+    which is wrong for all of them alike.
+    """
+    groups: dict[tuple[str, int, str, str], list[Passage]] = {}
+    for one in passages(result):
+        k = math.floor(one.crossing.t / config.interval_s)
+        kind = result.classes[one.vehicle]
+        for lane in dict.fromkeys((ALL, one.lane or ALL)):
+            for name in dict.fromkeys((ALL, kind or ALL)):
+                groups.setdefault((one.line, k, lane, name), []).append(one)
+    order = sorted(groups, key=lambda key: (key[0], key[1], key[2] != ALL, key[2], key[3] != ALL, key[3]))
+    rows = [_count_row(key, groups[key], config) for key in order]
+    text = ("line", "lane", "class")
+    names = ("t_start", "t_end", "count", "per_hour", *_SPEEDS)
+    return {
+        **{name: np.array([row[name] for row in rows], dtype=np.str_) for name in text},
+        **{
+            name: np.array([row[name] for row in rows], dtype=np.int64)
+            if name == "count"
+            else round_decimals(np.array([row[name] for row in rows], dtype=np.float64), 3)
+            for name in names
+        },
+    }
+
+
+_SPEEDS = ("mean_kmh", "mean_low_kmh", "mean_high_kmh", "p85_kmh", "p85_low_kmh", "p85_high_kmh")
+
+
+def _count_row(
+    key: tuple[str, int, str, str], group: Sequence[Passage], config: TrafficConfig
+) -> dict[str, Any]:
+    line, k, lane, kind = key
+    start = k * config.interval_s
+    return {
+        "line": line,
+        "lane": lane,
+        "class": kind,
+        "t_start": start,
+        "t_end": start + config.interval_s,
+        "count": len(group),
+        "per_hour": 3600.0 * len(group) / config.interval_s,
+        **dict(zip(_SPEEDS, speed_summary([one.crossing.speed for one in group], config), strict=True)),
+    }
+
+
+def speed_summary(speeds: Sequence[Any], config: TrafficConfig) -> tuple[float, ...]:
+    """Mean and 85th percentile of speeds (km/h), each with the ends of its 95 % interval.
+
+    Args:
+        speeds: `Speed`s, whose calibration part is common to all.
+        config: how many draws of the errors there are; they are the same ones every time.
+    """
+    kmh, noise, common = (
+        np.array([getattr(s, name) for s in speeds]) for name in ("kmh", "noise_kmh", "calibration_kmh")
+    )
+    n = len(kmh)
+    half = Z95 * math.hypot(float(np.sqrt((noise**2).sum())) / n, float(common.mean()))
+    rng = np.random.default_rng(0)
+    drawn = kmh + noise * rng.standard_normal((config.draws, n))
+    drawn += common * rng.standard_normal((config.draws, 1))
+    p85 = float(np.percentile(kmh, 85.0))
+    # Noise alone spreads the speeds, so that percentiles of draws lie too far out: only their spread counts.
+    spread = Z95 * float(np.percentile(drawn, 85.0, axis=1).std())
+    mean = float(kmh.mean())
+    return mean, max(mean - half, 0.0), mean + half, p85, max(p85 - spread, 0.0), p85 + spread
+
+
+def headway_columns(result: RoadResult, config: TrafficConfig) -> dict[str, npt.NDArray[Any]]:
+    """Rows of `headways.csv`: each vehicle that follows another over a line in its lane.
+
+    Headways are from front to front where sizes are known, else from point to point; gaps, from the rear of
+    the one ahead to the front, need sizes.
+    """
+    by_lane: dict[tuple[str, str], list[Passage]] = {}
+    for one in passages(result):
+        if one.lane:
+            by_lane.setdefault((one.line, one.lane), []).append(one)
+    rows: list[dict[str, Any]] = []
+    for (line, lane), group in sorted(by_lane.items()):
+        for ahead, behind in pairwise(group):
+            row = _headway(result, ahead, behind)
+            if row["headway_s"] <= config.longest_headway_s:
+                rows.append({"line": line, "lane": lane, **row})
+    names = [f"{kind}{end}" for kind in ("headway_s", "gap_s", "gap_m") for end in ("", "_low", "_high")]
+    ids = ("track_id", "ahead_id")
+
+    def column(name: str, make: Callable[[list[Any]], npt.NDArray[Any]]) -> npt.NDArray[Any]:
+        return make([row[name] for row in rows])
+
+    return {
+        **{name: column(name, lambda v: np.array(v, dtype=np.str_)) for name in ("line", "lane")},
+        "t": column("t", lambda v: round_decimals(np.array(v, dtype=np.float64), 4)),
+        **{name: column(name, lambda v: np.array(v, dtype=np.int64)) for name in ids},
+        **{name: column(name, lambda v: round_decimals(np.array(v, dtype=np.float64), 3)) for name in names},
+    }
+
+
+def _headway(result: RoadResult, ahead: Passage, behind: Passage) -> dict[str, Any]:
+    first, second = result.vehicles[ahead.vehicle], result.vehicles[behind.vehicle]
+    speed = [max(one.crossing.speed.kmh / KMH, 1e-3) for one in (ahead, behind)]
+    length = [result.sizes[one.vehicle].mean[0] for one in (ahead, behind)]
+    spread = [math.sqrt(result.sizes[one.vehicle].var[0]) for one in (ahead, behind)]
+    known = math.isfinite(length[0]) and math.isfinite(length[1])
+    half = [size / 2.0 / v if known else 0.0 for size, v in zip(length, speed, strict=True)]
+    headway = (behind.crossing.t - half[1]) - (ahead.crossing.t - half[0])
+    variance = _time_variance(first, ahead.crossing.t) + _time_variance(second, behind.crossing.t)
+    if known:
+        variance += sum((s / 2.0 / v) ** 2 for s, v in zip(spread, speed, strict=True))
+    gap = headway - length[0] / speed[0] if known else math.nan
+    gap_variance = variance + (spread[0] / speed[0]) ** 2 if known else math.nan
+    sigma = behind.crossing.speed
+    metre_variance = gap_variance * speed[1] ** 2
+    metre_variance += (gap / KMH) ** 2 * (sigma.noise_kmh**2 + sigma.calibration_kmh**2)
+    out: dict[str, Any] = {
+        "t": behind.crossing.t,
+        "track_id": second.track_id,
+        "ahead_id": first.track_id,
+    }
+    for name, value, var in (
+        ("headway_s", headway, variance),
+        ("gap_s", gap, gap_variance),
+        ("gap_m", gap * speed[1], metre_variance),
+    ):
+        reach = Z95 * math.sqrt(var)
+        out |= {name: value, f"{name}_low": value - reach, f"{name}_high": value + reach}
+    return out
+
+
+def _time_variance(vehicle: Vehicle, t: float) -> float:
+    """Variance of the time (s²) at which a vehicle is where it is at t, by its own noise."""
+    velocity: FloatArray = vehicle.fit.at(np.array(t), 1)
+    size = float(np.linalg.norm(velocity))
+    if size < 1e-3:
+        return math.inf
+    row = vehicle.fit.basis(np.array(t))
+    gradient = np.concatenate([velocity[0] * row, velocity[1] * row]) / size**2
+    return float(gradient @ vehicle.fit.covariance @ gradient)

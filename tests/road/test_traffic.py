@@ -1,0 +1,138 @@
+"""Traffic at a line: counts, speeds and headways of vehicles whose motion is known, and the page of it."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from road_scenes import camera
+
+from jeat_graph.road.boxes_road import SizedVehicle
+from jeat_graph.road.inputs import RoadMarks
+from jeat_graph.road.lanes import LaneConfig
+from jeat_graph.road.motion_fit import MotionFit
+from jeat_graph.road.points_road import summarise
+from jeat_graph.road.results import RoadResult, Size
+from jeat_graph.road.road_page import render_road_page
+from jeat_graph.road.speeds import ContactConfig, Speed, Vehicle, interval
+from jeat_graph.road.traffic import TrafficConfig, count_columns, headway_columns, speed_summary
+
+LENGTH = 4.0
+
+
+def _vehicle(number: int, x: float, t_at_50: float, speed: float, var: float = 0.0) -> SizedVehicle:
+    """One that drives away from the camera at constant speed and passes y = 50 m at a known time."""
+    t = np.linspace(t_at_50 - 2.0, t_at_50 + 2.0, 41)
+    coefficients = np.array([[x, 0.0, 0.0], [50.0, speed, 0.0]])
+    covariance = np.diag([var, 0.0, 0.0, var, 0.0, 0.0])
+    fit = MotionFit(
+        t_at_50, np.zeros(0), coefficients, covariance, np.zeros((6, 0, 2)), t, np.zeros((41, 2)), np.ones(41)
+    )
+    vehicle = Vehicle(number, t, fit, np.zeros((6, 6)), 0.0, 0.0)
+    return SizedVehicle(vehicle, Size((LENGTH, 1.8, 1.5), (0.01, 0.01, 0.01)), "car", 1.0)
+
+
+def _result() -> RoadResult:
+    sized = [_vehicle(k, 0.0, 10.0 + 3.0 * k, 20.0 + k, 0.04) for k in range(4)]
+    sized += [_vehicle(4 + k, 3.6, 40.0 + 2.0 * k, 30.0) for k in range(2)]
+    return summarise(
+        [one.vehicle for one in sized],
+        camera(),
+        RoadMarks({}, {"slow": (-1.8, 1.8), "fast": (1.8, 5.4)}),
+        ContactConfig(0.0, 0.0, 0.0),
+        LaneConfig(),
+        sized,
+    )
+
+
+def test_without_lines_all_are_counted_where_most_come_by() -> None:
+    result = _result()
+    assert {line for line, _, _ in result.crossings} == {"middle"}
+    assert len(result.crossings) == 6
+
+
+def test_counts_by_lane_class_and_interval() -> None:
+    columns = count_columns(_result(), TrafficConfig(interval_s=30.0))
+    rows = [
+        (lane, kind, start, count)
+        for lane, kind, start, count in zip(
+            *(columns[k].tolist() for k in ("lane", "class", "t_start", "count")), strict=True
+        )
+    ]
+    assert ("slow", "car", 0.0, 4) in rows
+    assert ("all", "all", 30.0, 2) in rows
+    assert ("slow", "all", 30.0, 2) not in rows
+    slow = (columns["lane"] == "slow") & (columns["class"] == "all")
+    assert columns["mean_kmh"][slow][0] == pytest.approx(3.6 * 21.5, abs=0.01)
+    assert columns["per_hour"][slow][0] == pytest.approx(480.0)
+
+
+def test_headways_are_from_front_to_front_and_gaps_from_rear_to_front() -> None:
+    columns = headway_columns(_result(), TrafficConfig())
+    first = (columns["track_id"] == 1) & (columns["ahead_id"] == 0)
+    at = float(columns["t"][first][0])  # of the line, which need not be at 50 m
+    y = 50.0 + 21.0 * (at - 13.0)
+    ahead, behind = 10.0 + (y - LENGTH / 2 - 50.0) / 20.0, 13.0 + (y - LENGTH / 2 - 50.0) / 21.0
+    assert columns["headway_s"][first][0] == pytest.approx(behind - ahead, abs=2e-3)
+    assert columns["gap_s"][first][0] == pytest.approx(behind - ahead - LENGTH / 20.0, abs=2e-3)
+    assert columns["gap_m"][first][0] == pytest.approx(21.0 * (behind - ahead - LENGTH / 20.0), abs=0.05)
+    sigma = np.sqrt(0.04 / 20.0**2 + 0.04 / 21.0**2 + (0.1 / 2 / 20.0) ** 2 + (0.1 / 2 / 21.0) ** 2)
+    half = columns["headway_s_high"][first][0] - columns["headway_s"][first][0]
+    assert half == pytest.approx(1.96 * sigma, abs=2e-3)
+
+
+def test_intervals_of_the_mean_add_noise_and_keep_calibration() -> None:
+    speeds = [interval(v, 1.0, 0.5) for v in np.linspace(80.0, 120.0, 100)]
+    mean, low, high, p85, p85_low, p85_high = speed_summary(speeds, TrafficConfig())
+    assert mean == pytest.approx(100.0)
+    assert high - mean == pytest.approx(1.96 * np.hypot(0.1, 0.5), rel=1e-3)
+    assert mean - low == pytest.approx(high - mean)
+    assert p85 == pytest.approx(np.percentile([s.kmh for s in speeds], 85))
+    assert p85_low < p85 < p85_high
+
+
+def test_the_calibrations_share_does_not_average_away() -> None:
+    few, many = ([Speed(90.0, 2.0, 0.7, 0.0, 0.0)] * n for n in (1, 400))
+    widths = [np.subtract(*speed_summary(s, TrafficConfig())[2:0:-1]) for s in (few, many)]
+    assert widths[1] == pytest.approx(2 * 1.96 * 0.7, rel=0.02)
+    assert widths[0] > 2.5 * widths[1]
+
+
+class _Ids(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.bad: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in ("meta", "rect", "line", "path", "img", "br"):
+            self.open.append(tag)
+        self.bad += [f"{k}={v}" for k, v in attrs if k in ("src", "href") and v and "data:" not in v]
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag in ("rect", "line", "path"):
+            return
+        assert self.open.pop() == tag
+
+
+def test_the_page_holds_everything_and_asks_for_nothing() -> None:
+    page = render_road_page(_result(), camera(), TrafficConfig(), "<road> & co")
+    parser = _Ids()
+    parser.feed(page)
+    assert parser.open == []
+    assert parser.bad == []
+    assert "&lt;road&gt; &amp; co" in page
+    assert len(re.findall(r'class="bars"', page)) == 2
+    assert len(re.findall(r'class="way"', page)) == 12
+    for lane in ("slow", "fast"):
+        assert f"Lane {lane}" in page
+    assert page == render_road_page(_result(), camera(), TrafficConfig(), "<road> & co")
+
+
+def test_a_road_without_vehicles_has_a_page_too() -> None:
+    none = summarise([], camera(), RoadMarks({}, {}), ContactConfig(), LaneConfig())
+    assert "No vehicle" in render_road_page(none, camera(), TrafficConfig(), "empty")
+    assert len(count_columns(none, TrafficConfig())["line"]) == 0
+    assert len(headway_columns(none, TrafficConfig())["line"]) == 0
