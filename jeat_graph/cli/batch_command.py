@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.eval.judge import summary_table
     from jeat_graph.live.batch import TABLE, BatchOptions, run_batch
     from jeat_graph.live.manifest import read_manifest
-    from jeat_graph.runs.tracking_run import RunOptions
+    from jeat_graph.runs.run_options import RunOptions
 
     recordings = read_manifest(args.manifest)
     options = BatchOptions(

@@ -45,7 +45,8 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.runs.directory import RunDirectory
     from jeat_graph.runs.input_checks import check_detections
     from jeat_graph.runs.inputs import describe_inputs
-    from jeat_graph.runs.tracking_run import RunOptions, RunRecord, write_run
+    from jeat_graph.runs.run_options import RunOptions, RunRecord
+    from jeat_graph.runs.tracking_run import write_run
     from jeat_graph.simulation.scenario import load_scenario
     from jeat_graph.simulation.simulate import record
     from jeat_graph.tracking.notice import notice_if_cold

@@ -44,6 +44,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_output_rate(parser, "frames per second of output that counts frames", "--frame-rate")
     add_reading(parser)
     add(
+        "--resume",
+        action="store_true",
+        help="go on where a run of the same command into the same folder was broken off",
+    )
+    add(
         "--frames",
         metavar="VIDEO|DIR",
         help="pictures that the detections were made from: tell the picture's size and the frame rate",
@@ -52,8 +57,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Read, check, track, and write the run directory."""
+    from jeat_graph.runs.run_options import RunOptions
     from jeat_graph.runs.track_files import TrackRequest, track_files
-    from jeat_graph.runs.tracking_run import RunOptions
 
     request = TrackRequest(
         detections=tuple(str(item) for item in args.detections),
@@ -71,6 +76,7 @@ def run(args: argparse.Namespace) -> int:
             frame_rate_hz=args.output_rate if args.output_rate is not None else args.rate,
             progress=sys.stderr.isatty(),
             diagnostics=args.diagnostics,
+            resume=args.resume,
         ),
     )
     counts = track_files(request, _warn, _say).counts

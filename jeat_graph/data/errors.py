@@ -21,6 +21,10 @@ class TimeOrderError(JeatGraphError):
     """A scan older than one that has been processed already."""
 
 
+class OtherRunError(JeatGraphError):
+    """A run that was broken off and cannot be gone on with: its state is another's, or damaged."""
+
+
 class InputWarning(UserWarning):
     """Input that is valid but most likely not what was meant, such as times in ms."""
 

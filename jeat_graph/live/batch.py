@@ -12,8 +12,8 @@ from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.live.engines import ENGINES, run_local, run_on_ray
 from jeat_graph.live.manifest import ManifestRow
 from jeat_graph.live.recording_job import FAILED, Job, Outcome, run_job
+from jeat_graph.runs.run_options import RunOptions
 from jeat_graph.runs.track_files import TrackRequest
-from jeat_graph.runs.tracking_run import RunOptions
 
 if TYPE_CHECKING:
     from jeat_graph.eval.judge import Judgement

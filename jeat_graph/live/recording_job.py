@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from jeat_graph.data.errors import JeatGraphError
+from jeat_graph.data.errors import JeatGraphError, OtherRunError
 from jeat_graph.runs.track_files import TrackRequest
 
 DONE, KEPT, FAILED = "done", "kept", "failed"
@@ -65,7 +65,7 @@ def run_job(job: Job) -> Outcome:
             return _outcome(job.name, KEPT, known)
         for folder in out.glob(_STAGING):  # of a worker that was killed here
             shutil.rmtree(folder, ignore_errors=True)
-        track_request(job.request)
+        _track(job.request)
         return _outcome(job.name, DONE, _record_of(out))
     except (JeatGraphError, OSError) as error:
         return Outcome(job.name, FAILED, {}, error=_one_line(str(error)))
@@ -74,11 +74,18 @@ def run_job(job: Job) -> Outcome:
         return Outcome(job.name, FAILED, {}, error=what, trace=traceback.format_exc())
 
 
-def track_request(request: TrackRequest) -> None:
-    """Track, without a progress bar: the batch has one over all."""
+def _track(request: TrackRequest) -> None:
+    """Track, on from where a worker died if it is the same run; the batch has a progress bar over all."""
+    from jeat_graph.config.reading import load_config
     from jeat_graph.runs.track_files import track_files
 
-    track_files(replace(request, options=replace(request.options, progress=False)))
+    # Where smoothing has a process of its own, a recording begins anew.
+    resumes = not load_config(request.config, request.overrides).smoother.worker
+    options = replace(request.options, progress=False, resume=resumes)
+    try:
+        track_files(replace(request, options=options))
+    except OtherRunError:
+        track_files(replace(request, options=replace(options, resume=False)))
 
 
 def _finished(request: TrackRequest) -> dict[str, Any] | None:

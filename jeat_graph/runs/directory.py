@@ -15,6 +15,8 @@ from jeat_graph.io.locking import hold_folder, remove_folders
 from jeat_graph.io.scans_io import SCANS
 
 RUN_JSON = "run.json"
+#: Folder with the state of a run that is not finished (`runs/unfinished.py`).
+RESUME = ".resume"
 _UNFINISHED = ".unfinished-"
 DIAGNOSTICS = "diagnostics.csv"
 MEASUREMENTS = "measurements.parquet"
@@ -102,6 +104,7 @@ class RunDirectory:
                 (self.folder / name).unlink(missing_ok=True)
         for name in new:
             (staging / name).replace(self.folder / name)
+        remove_folders(self.folder, RESUME)
 
     def _remove_made(self) -> None:
         for folder in self._made:

@@ -12,7 +12,8 @@ import numpy as np
 from jeat_graph.data.detections import Detections
 from jeat_graph.runs.beside import Facts, facts_beside, facts_of_frames, with_picture
 from jeat_graph.runs.inputs import describe_inputs
-from jeat_graph.runs.tracking_run import RunOptions, RunRecord, write_run
+from jeat_graph.runs.run_options import RunOptions, RunRecord
+from jeat_graph.runs.tracking_run import write_run
 
 if TYPE_CHECKING:
     from jeat_graph.config.schema import Config

@@ -6,6 +6,8 @@ waits here until that is decided, and is forgotten if the track ends before.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from jeat_graph.config.schema import Config
@@ -35,6 +37,14 @@ class ConfirmedMeasurements:
         if len(rows):
             self._waiting.append(rows)
         self._confirmed.append(self._living[confirmed])
+
+    def state(self) -> dict[str, Any]:
+        """Return what `set_state` takes: all that is kept here."""
+        return {"waiting": self._waiting, "confirmed": self._confirmed, "living": self._living}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go on from what `state` returned."""
+        self._waiting, self._confirmed, self._living = (state[k] for k in ("waiting", "confirmed", "living"))
 
     def release(self) -> RecordArray:
         """Return, and forget, the records (M,) of tracks confirmed by now, those of each in order of time."""

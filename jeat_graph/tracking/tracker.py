@@ -111,14 +111,11 @@ class Tracker(SmoothedTracks):
         """
         if self._finished:
             raise JeatGraphError("this tracker has been finished; make another one for another recording")
-        taken = self.take_in(as_scans(scans))
-        self.hand_over(taken)
+        self.hand_over(self.take_in(as_scans(scans)))
         return self.causal()
 
     def take_in(self, batch: Sequence[Scan]) -> StepRecord | None:
-        """Do a step without handing what it took in to the smoothers, which is left to the caller.
-
-        For those who may have to take a step back (`snapshot`, `restore`) because an older scan comes late.
+        """Do a step for a caller who may have to take it back, and hands it to the smoothers later.
 
         Args:
             batch: scans of one and the same time.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import types
 from pathlib import Path
@@ -15,12 +14,6 @@ from jeat_graph.cli.main import main
 _package = types.ModuleType("live_tests")
 _package.__path__ = [str(Path(__file__).parent)]
 sys.modules["live_tests"] = _package
-
-
-@pytest.fixture(scope="session")
-def full() -> bool:
-    """Whether the long form is asked for."""
-    return os.environ.get("JEAT_GRAPH_FULL", "") not in ("", "0")
 
 
 @pytest.fixture(scope="session")

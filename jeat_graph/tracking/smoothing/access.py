@@ -65,6 +65,15 @@ class SmoothedTracks:
             return Trajectories.empty(self.sensor_names)
         return self._smoothers.finish()
 
+    def settle(self) -> None:
+        """Let the smoothers take in all that they had set aside, and begin anew from what is known then.
+
+        Their state after it follows from the steps so far alone, so that a tracker which is saved here and
+        loaded goes on with the same bytes as one that settles here and is not saved.
+        """
+        if self._smoothers is not None:
+            self._smoothers.settle()
+
     @property
     def smoother_counts(self) -> dict[str, int]:
         """How the smoothers fared: tracks, rebuilds, fallbacks, late measurements, joints; {} without one."""

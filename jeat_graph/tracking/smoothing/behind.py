@@ -30,6 +30,9 @@ class Smoothing(Protocol):
     def finish(self) -> Trajectories:
         """End all tracks and return all rows not drained yet."""
 
+    def settle(self) -> None:
+        """Work off all that waits, and have GTSAM's windows built anew from our arrays."""
+
     def counts(self) -> dict[str, int]:
         """How the smoothers fared; after `finish`, all of it."""
 
@@ -77,6 +80,11 @@ class InProcessSmoothing:
         """End all tracks and return all rows not drained yet."""
         self._consume()
         return self._smoothers.finish()
+
+    def settle(self) -> None:
+        """Work off all that waits, and have GTSAM's windows built anew from our arrays."""
+        self._consume()
+        self._smoothers.settle()
 
     def counts(self) -> dict[str, int]:
         """How the smoothers fared."""

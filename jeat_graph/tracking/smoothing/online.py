@@ -11,6 +11,7 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.smoothers.engine import load_engine
+from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
 from jeat_graph.tracking.smoothing.history import TrackHistory
 from jeat_graph.tracking.smoothing.priors import ErrorStates
 from jeat_graph.tracking.smoothing.recorder import Packet
@@ -125,6 +126,13 @@ class TrackSmoothers:
             history.feed()
             self._collect(history.departed())
         return HANDING + cost_of_solving(to_solve)
+
+    def settle(self) -> None:
+        """Work on all shares, and have GTSAM's windows built anew from our arrays."""
+        self.work()
+        for history in self._histories.values():
+            if isinstance(history.smoother, FixedLagSmoother):
+                history.smoother.forget_gtsam()
 
     def drain(self) -> Trajectories:
         """Return, and forget, the final rows that no later ones can precede, by time and identity."""

@@ -75,8 +75,8 @@ class Share(NamedTuple):
         """Make a share of what `saved` returned, in a packet of its own."""
         confirmed, updates, last = (saved.pop(name) for name in ("confirmed", "updates", "last"))
         observed = ObservationTimes(**saved)
-        whole = (slice(0, len(rows)) for rows in (observed, confirmed, updates))
-        return Share(SortedPacket(observed, confirmed, updates), *whole, last)
+        steps, rows = slice(0, len(confirmed)), slice(0, len(updates))
+        return Share(SortedPacket(observed, confirmed, updates), slice(0, len(observed)), steps, rows, last)
 
     def give_to(self, history: TrackHistory) -> None:
         """Hand it to the track's history."""

@@ -132,6 +132,11 @@ class SmoothingWorker:
         self._stop()
         return Trajectories.concatenate([*self._rows.drain(), last])
 
+    def settle(self) -> None:
+        """Have the worker work off all that waits, and build GTSAM's windows anew from our arrays."""
+        self._send("consume", self._recorder.drain())
+        self._send("settle", None)
+
     def counts(self) -> dict[str, int]:
         """How the smoothers fared, as far as the worker has told."""
         self._receive()
@@ -238,6 +243,8 @@ def _serve(config: Config, orders: Connection, answers: Connection, most_waiting
                 consumed += 1
                 if bounded and consumed % PACKETS_PER_STATE == 0:
                     answer("state", (before + consumed, pack_smoothers(config, smoothers)))
+            elif order == "settle":
+                smoothers.settle()
             elif order == "load":
                 before, state = content
                 smoothers = unpack_smoothers(config, state)

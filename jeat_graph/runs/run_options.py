@@ -1,0 +1,55 @@
+"""How a run is written, and what its record says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from jeat_graph.data.errors import ConfigError
+
+FRAME_FORMATS = ("motchallenge", "kitti")
+EXTRA_FORMATS = ("parquet", *FRAME_FORMATS)
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """How a run is written.
+
+    Attributes:
+        formats: further formats of its tables beside CSV, of `EXTRA_FORMATS`.
+        frame_rate_hz: frames per second of formats that count frames; by default the declared rate of the
+            slowest sensor that occurs.
+        progress: whether to show a progress bar on stderr.
+        diagnostics: whether to write `diagnostics.csv` and `measurements.parquet` too.
+        resume: whether to go on where an earlier run in the same folder was broken off.
+    """
+
+    formats: tuple[str, ...] = ()
+    frame_rate_hz: float | None = None
+    progress: bool = False
+    diagnostics: bool = False
+    resume: bool = False
+
+    def __post_init__(self) -> None:
+        unknown = [name for name in self.formats if name not in EXTRA_FORMATS]
+        if unknown:
+            raise ConfigError(f"unknown format {unknown[0]!r}; known: {', '.join(EXTRA_FORMATS)}")
+
+
+@dataclass
+class RunRecord:
+    """What `run.json` says of a run.
+
+    Attributes:
+        source: the inputs and the configuration's name, as the caller describes them.
+        counts: scans, detections, tracks and rows.
+        timings: seconds by stage, and time per step; the only part that differs from run to run.
+        warnings: one line each.
+        smoother: what the smoother did, None without one.
+    """
+
+    source: dict[str, Any] = field(default_factory=dict)
+    counts: dict[str, Any] = field(default_factory=dict)
+    timings: dict[str, float] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+    smoother: dict[str, Any] | None = None

@@ -1,0 +1,193 @@
+"""The steps of a run: each scan tracked, rows written while they are made, the state saved now and then."""
+
+from __future__ import annotations
+
+import json
+import time
+from contextlib import ExitStack
+from typing import Any
+
+import numpy as np
+
+from jeat_graph.config.reading import config_to_dict
+from jeat_graph.config.schema import Config
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.errors import ConfigError
+from jeat_graph.io.piecewise import PiecewiseWriter
+from jeat_graph.runs.directory import DIAGNOSTICS, MEASUREMENTS, RESUME, SUFFIXES, RunDirectory
+from jeat_graph.runs.run_options import FRAME_FORMATS, RunOptions, RunRecord
+from jeat_graph.runs.unfinished import UnfinishedRun
+from jeat_graph.tracking.measured import ConfirmedMeasurements
+from jeat_graph.tracking.tracker import Tracker
+
+#: So many steps go by before smoothed rows that have become final are written.
+STEPS_PER_DRAIN = 256
+#: So many before the state is saved (some ten seconds of work); a shorter run is not worth it.
+STEPS_PER_SAVE = 40 * STEPS_PER_DRAIN
+
+
+class RunSteps:
+    """All steps of a run, from its beginning or from where it was broken off.
+
+    At the moments at which the state is saved the smoothers settle, in every run: so the rows do not depend
+    on whether, and where, it was broken off.
+
+    Args:
+        detections: the recording.
+        config: the configuration.
+        run: the directory, entered.
+        record: gets counts, timings and what the smoother did.
+        options: how to write the run.
+    """
+
+    def __init__(
+        self,
+        detections: Detections,
+        config: Config,
+        run: RunDirectory,
+        record: RunRecord,
+        options: RunOptions,
+    ) -> None:
+        if options.resume and config.smoother.worker:
+            raise ConfigError("--resume does not go with smoother.worker: its state is in another process")
+        self._detections, self._config, self._run = detections, config, run
+        self._record, self._options = record, options
+        self._instants = np.unique(detections.scan_t)
+        self._smooths = config.smoother.engine != "none"
+        self._tracker = Tracker(config, diagnostics=options.diagnostics)
+        self._reported: set[int] = set()
+        self._rows = {"causal": 0, "smoothed": 0}
+        self._done = 0
+        self._unfinished: UnfinishedRun | None = None
+        saved = None
+        if len(self._instants) > STEPS_PER_SAVE and not config.smoother.worker:
+            self._unfinished = UnfinishedRun(run.folder / RESUME, self._identity())
+            saved = self._unfinished.load() if options.resume else None
+        if saved is not None:
+            self._tracker = Tracker.from_state(config, saved["tracker"])
+            self._done, self._rows = saved["done"], saved["counts"]
+            self._reported = set(saved["reported"].tolist())
+        self._kept = ConfirmedMeasurements(self._tracker) if options.diagnostics else None
+        if saved is not None and self._kept is not None:
+            self._kept.set_state(saved["kept"])
+
+    def take_all(self) -> FloatArray:
+        """Take the steps, and write the tables; return the times of all steps (I,), in s."""
+        from tqdm import tqdm
+
+        step_s = np.zeros(len(self._instants))
+        hidden = not self._options.progress
+        begin = time.perf_counter()
+        with (
+            _Files(self._run, self._config, self._options) as self._files,
+            tqdm(total=len(self._instants), desc="track", unit="step", disable=hidden, leave=False) as bar,
+        ):
+            if self._unfinished is not None:
+                self._unfinished.begin()
+                for name, piece in self._unfinished.rows():
+                    self._files.append(name, piece)
+            bar.update(self._done)
+            for k, batch in enumerate(self._detections.batches()):
+                if k < self._done:
+                    continue
+                start = time.perf_counter()
+                table = self._tracker.step(batch)
+                step_s[k] = time.perf_counter() - start
+                self._reported.update(table.track_id.tolist())
+                self._write("causal", table)
+                self._after_step(k)
+                bar.update()
+            if self._smooths:
+                self._write("smoothed", self._tracker.finish())
+            if self._kept is not None:
+                self._write("measured", self._kept.release())
+        taken = step_s[self._done :]
+        self._sum_up(taken if len(taken) else np.zeros(1), time.perf_counter() - begin)
+        return self._instants
+
+    def _after_step(self, k: int) -> None:
+        """Write what else step `k` gave, and now and then what has become final, and the state."""
+        if self._kept is not None:
+            self._write("diagnostics", self._tracker.last_updates())
+            self._kept.add_step()
+        saves = k and k % STEPS_PER_SAVE == 0
+        if saves:
+            self._tracker.settle()
+        if k % STEPS_PER_DRAIN == 0:
+            if self._smooths:
+                self._write("smoothed", self._tracker.drain_smoothed())
+            if self._kept is not None:
+                self._write("measured", self._kept.release())
+            if self._unfinished is not None:
+                self._unfinished.flush()
+        if saves and self._unfinished is not None:
+            self._unfinished.save(self._config, self._state(k + 1))
+
+    def _write(self, name: str, piece: Any) -> None:
+        if not len(piece):
+            return
+        self._files.append(name, piece)
+        if name in self._rows:
+            self._rows[name] += len(piece)
+        if self._unfinished is not None:
+            self._unfinished.add(name, piece)
+
+    def _state(self, done: int) -> dict[str, Any]:
+        return {
+            "tracker": self._tracker.state(),
+            "done": done,
+            "counts": self._rows,
+            "reported": np.array(sorted(self._reported), dtype=np.int64),
+            "kept": None if self._kept is None else self._kept.state(),
+        }
+
+    def _identity(self) -> dict[str, Any]:
+        """All that the rows depend on, as it stands in messages."""
+        source = self._record.source
+        content = {
+            "inputs": [one.get("sha256") for one in source.get("inputs", [])],
+            "scans": [self._detections.num_scans, len(self._detections), float(self._instants[-1])],
+            "settings": config_to_dict(self._config),
+            "options": self._options.diagnostics,
+        }
+        plain: dict[str, Any] = json.loads(json.dumps(content))
+        return plain
+
+    def _sum_up(self, step_s: FloatArray, seconds: float) -> None:
+        record = self._record
+        record.timings["track_s"] = round(seconds, 4)
+        record.timings["step_median_ms"] = round(1e3 * float(np.median(step_s)), 4)
+        record.timings["step_p99_ms"] = round(1e3 * float(np.quantile(step_s, 0.99)), 4)
+        record.counts |= {"tracks_born": self._tracker.num_born, "tracks_reported": len(self._reported)}
+        record.counts["causal_rows"] = self._rows["causal"]
+        if self._smooths:
+            record.counts["smoothed_rows"] = self._rows["smoothed"]
+            record.smoother = {"engine": self._config.smoother.engine, **self._tracker.smoother_counts}
+
+
+class _Files(ExitStack):
+    """The files of a run that are written while it is made, by name of what goes into them."""
+
+    def __init__(self, run: RunDirectory, config: Config, options: RunOptions) -> None:
+        from jeat_graph.io.diagnostics_io import DiagnosticsWriter
+        from jeat_graph.io.measurements_io import MeasurementWriter
+        from jeat_graph.io.trajectories_io import TrajectoryWriter
+
+        super().__init__()
+        suffixes = [SUFFIXES[name] for name in ("csv", *options.formats) if name not in FRAME_FORMATS]
+        kinds = ("causal", "smoothed") if config.smoother.engine != "none" else ("causal",)
+        writers: dict[str, list[PiecewiseWriter | MeasurementWriter]] = {
+            kind: [TrajectoryWriter(run.path(kind + suffix)) for suffix in suffixes] for kind in kinds
+        }
+        if options.diagnostics:
+            writers["diagnostics"] = [DiagnosticsWriter(run.path(DIAGNOSTICS))]
+            writers["measured"] = [MeasurementWriter(run.path(MEASUREMENTS), config.sensor_names)]
+        self._writers: dict[str, list[Any]] = {
+            kind: [self.enter_context(writer) for writer in files] for kind, files in writers.items()
+        }
+
+    def append(self, name: str, piece: Any) -> None:
+        """Add rows to the files of a name."""
+        for writer in self._writers[name]:
+            writer.append(piece)
