@@ -13,71 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, TextArray
+from jeat_graph.data.boxes import check_boxes, find_bad_row
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.grouping import group_rows
 from jeat_graph.data.interop import from_xyxy
-
-#: Smallest side, and farthest place or largest side, of a box (px): beyond what any picture can hold.
-SMALLEST_PX, LARGEST_PX = 1e-9, 1e9
-
-
-def check_boxes(boxes: npt.ArrayLike, scores: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Convert and check boxes and scores.
-
-    Args:
-        boxes: (M, 4) left, top, width, height in px: finite, within `SMALLEST_PX` and `LARGEST_PX`.
-        scores: (M,) detector confidence in [0, 1].
-
-    Returns:
-        The boxes (M, 4) and scores (M,) as contiguous float64 arrays.
-
-    Raises:
-        DataError: wrong shape, a value that is not finite, a size that is not positive, or a score
-            outside [0, 1]. The message names the first row at fault.
-    """
-    try:
-        b = np.ascontiguousarray(boxes, dtype=np.float64)
-        s = np.ascontiguousarray(scores, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise DataError("boxes must have shape (M, 4) and scores shape (M,), all of them numbers") from None
-    if b.size == 0:
-        b = b.reshape(0, 4)
-    if b.ndim != 2 or b.shape[1] != 4:
-        raise DataError(f"boxes must have shape (M, 4), not {b.shape}")
-    if s.shape != (b.shape[0],):
-        raise DataError(f"scores must have shape ({b.shape[0]},), not {s.shape}")
-    bad = find_bad_row(b, s)
-    if bad is not None:
-        row, what = bad
-        raise DataError(f"box {row}: {what}")
-    return b, s
-
-
-def find_bad_row(boxes: FloatArray, scores: FloatArray) -> tuple[int, str] | None:
-    """Find the first row that is not a detection: (row, what is wrong), or None if all are good.
-
-    Args:
-        boxes: (M, 4) left, top, width, height.
-        scores: (M,) confidence.
-    """
-    finite: BoolArray = np.all(np.isfinite(boxes), axis=1)
-    # NaN compares false everywhere, so each test is written for what is good.
-    size = (boxes[:, 2] > 0.0) & (boxes[:, 3] > 0.0)
-    inside: BoolArray = np.all(np.abs(boxes) <= LARGEST_PX, axis=1)
-    fits = inside & np.all(boxes[:, 2:] >= SMALLEST_PX, axis=1)
-    score = (scores >= 0.0) & (scores <= 1.0)
-    good = finite & size & fits & score
-    if good.all():
-        return None
-    row = int(np.argmin(good))
-    left, top, width, height = boxes[row]
-    if not finite[row]:
-        return row, f"left, top, width, height must be finite, got {left}, {top}, {width}, {height}"
-    if not size[row]:
-        return row, f"width and height must be positive, got {width} x {height}"
-    if not fits[row]:
-        bounds = f"places to {LARGEST_PX:g}, sizes from {SMALLEST_PX:g} to {LARGEST_PX:g}"
-        return row, f"no picture holds a box at {left:g}, {top:g} of {width:g} x {height:g} px ({bounds})"
-    return row, f"score must be in [0, 1], got {scores[row]}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,39 +102,52 @@ class Detections:
         Raises:
             DataError: a time or a box that is not valid; the message names the row.
         """
-        time = np.asarray(t, dtype=np.float64).reshape(-1)
+        time = np.array(t, dtype=np.float64).reshape(-1)
         names = np.asarray(sensor, dtype=np.str_).reshape(-1)
-        b = np.asarray(boxes, dtype=np.float64).reshape(-1, 4)
-        s = np.asarray(scores, dtype=np.float64).reshape(-1)
+        b = np.array(boxes, dtype=np.float64, order="C").reshape(-1, 4)
+        s = np.array(scores, dtype=np.float64).reshape(-1)
         gap = np.zeros(len(time), dtype=bool) if empty is None else np.asarray(empty, dtype=bool)
         if not len(time) == len(names) == len(b) == len(s) == len(gap):
             raise DataError("t, sensor, boxes, scores and empty must have one entry a row")
         if not np.isfinite(time).all():
             row = int(np.argmin(np.isfinite(time)))
             raise DataError(f"row {row}: t must be finite, got {time[row]}")
-        rows = np.flatnonzero(~gap)
+        rows = np.flatnonzero(~gap) if gap.any() else slice(None)
         bad = find_bad_row(b[rows], s[rows])
         if bad is not None:
-            raise DataError(f"row {rows[bad[0]]}: {bad[1]}")
-
+            raise DataError(f"row {np.arange(len(time))[rows][bad[0]]}: {bad[1]}")
         sensors, code = np.unique(names, return_inverse=True)
-        code = code.reshape(-1)
-        order = np.lexsort((np.arange(len(time)), code, time))
-        new_scan = np.ones(len(time), dtype=bool)
-        new_scan[1:] = (np.diff(time[order]) != 0) | (np.diff(code[order]) != 0)
-        first = np.flatnonzero(new_scan)
-        scan_of_row = np.cumsum(new_scan) - 1
-        keep = ~gap[order]
-        count = np.bincount(scan_of_row[keep], minlength=len(first))
-        kept = order[keep]
+        kinds = None if classes is None else np.array(classes, dtype=np.str_)
+        return Detections.from_checked(time, sensors.tolist(), code.reshape(-1), (b, s, kinds), gap)
+
+    @staticmethod
+    def from_checked(
+        t: FloatArray,
+        sensors: Sequence[str],
+        code: IntArray,
+        found: tuple[FloatArray, FloatArray, TextArray | None],
+        empty: BoolArray,
+    ) -> Detections:
+        """Group rows that are known to be good, as `from_rows`; their arrays may become the detections' own.
+
+        Args:
+            t: (R,) time of each row (s).
+            sensors: names, in alphabetical order; each occurs.
+            code: (R,) index into them.
+            found: boxes (R, 4), scores (R,), and classes (R,) or None.
+            empty: (R,) true where the row only says that the scan took place.
+        """
+        groups = group_rows(t, code, empty)
+        boxes, scores, classes = found
+        rows = slice(None) if groups.rows is None else groups.rows
         return Detections(
-            sensors=tuple(str(name) for name in sensors),
-            scan_t=time[order][first],
-            scan_sensor=code[order][first].astype(np.int64),
-            scan_start=np.concatenate(([0], np.cumsum(count))).astype(np.int64),
-            boxes=np.ascontiguousarray(b[kept]),
-            scores=np.ascontiguousarray(s[kept]),
-            classes=None if classes is None else np.asarray(classes, dtype=np.str_)[kept],
+            sensors=tuple(sensors),
+            scan_t=t[groups.first],
+            scan_sensor=code[groups.first].astype(np.int64),
+            scan_start=groups.start,
+            boxes=np.ascontiguousarray(boxes[rows]),
+            scores=np.ascontiguousarray(scores[rows]),
+            classes=None if classes is None else classes[rows],
         )
 
     @staticmethod

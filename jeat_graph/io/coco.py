@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.io.coco_columns import read_entries
 from jeat_graph.io.csv_text import read_text
 from jeat_graph.io.frames import check_rate
 
@@ -49,42 +50,56 @@ def read_results(path: str | Path, rate_hz: float | None, images: str | Path | N
     Raises:
         DataError: names the entry (from 1) that is not as it should be.
     """
-    tree = _load(path)
+    text = read_text(path)
+    found = read_entries(text)
+    tree = _load(text, path) if found is None else found.rest
+    del text
     entries = tree.get("annotations") if isinstance(tree, dict) else tree
     if not isinstance(entries, list):
         raise DataError("must be a list of results, or an object with `annotations`", path)
-    lists: Any = _load(images) if images is not None else tree
+    lists: Any = _load(read_text(images), images) if images is not None else tree
     source = path if images is None else images
     if images is not None and not isinstance(lists, dict):
         raise DataError("must be an object with a list of `images`", images)
     lists = lists if isinstance(lists, dict) else {}
     time_of = _image_times(lists.get("images"), rate_hz, source)
+    ids, boxes, scores, category = _one_by_one(entries, path) if found is None else found[:4]
 
-    rows = [_result(entry, k, path) for k, entry in enumerate(entries)]
-    ids = [row[0] for row in rows]
+    image, of_entry = np.unique(ids, return_inverse=True)
+    recorded = None
     if time_of is None:
         if rate_hz is None:
             raise DataError("COCO results have image ids only; give the frame rate (rate_hz) or images", path)
-        rate = check_rate(rate_hz, path)
-        time_of = {image: image / rate for image in ids}
-        recorded = None
+        t = (image / check_rate(rate_hz, path))[of_entry]
     else:
         recorded = np.unique(np.array(list(time_of.values()), dtype=np.float64))
-        stray = next((k for k, image in enumerate(ids) if image not in time_of), None)
-        if stray is not None:
+        known = np.array([number in time_of for number in image.tolist()], dtype=bool)
+        if not known.all():
+            stray = int(np.argmin(known[of_entry]))
             raise DataError(f"entry {stray + 1}: image {ids[stray]} is not in the list of images", path)
+        t = np.array([time_of[number] for number in image.tolist()], dtype=np.float64)[of_entry]
     names = _category_names(lists.get("categories"))
-    return CocoBoxes(
-        t=np.array([time_of[image] for image in ids], dtype=np.float64),
-        boxes=np.array([row[1] for row in rows], dtype=np.float64).reshape(-1, 4),
-        scores=np.array([row[2] for row in rows], dtype=np.float64),
-        classes=np.array([names.get(row[3], str(row[3])) for row in rows], dtype=np.str_),
-        recorded=recorded,
+    kind, of_entry = np.unique(category, return_inverse=True)
+    words = np.array([names.get(number, str(number)) for number in kind.tolist()], dtype=np.str_)
+    return CocoBoxes(t=t, boxes=boxes, scores=scores, classes=words[of_entry], recorded=recorded)
+
+
+def _one_by_one(entries: list[Any], path: str | Path) -> tuple[IntArray, FloatArray, FloatArray, IntArray]:
+    """Image (R,), box (R, 4), score (R,) and category (R,) of each entry.
+
+    Raises:
+        DataError: names the entry that is not as it should be.
+    """
+    rows = [_result(entry, k, path) for k, entry in enumerate(entries)]
+    return (
+        np.array([row[0] for row in rows], dtype=np.int64),
+        np.array([row[1] for row in rows], dtype=np.float64).reshape(-1, 4),
+        np.array([row[2] for row in rows], dtype=np.float64),
+        np.array([row[3] for row in rows], dtype=np.int64),
     )
 
 
-def _load(path: str | Path) -> Any:
-    text = read_text(path)
+def _load(text: bytes, path: str | Path) -> Any:
     try:
         return json.loads(text.decode("utf-8"))
     except json.JSONDecodeError as error:

@@ -36,6 +36,8 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
 }
 #: Columns that may stand for `t`, with their units.
 TIME_COLUMNS = {"t_ms": "ms", "t_us": "us", "t_ns": "ns"}
+#: Columns of times and boxes that hold numbers, by any of their names.
+NUMBER_COLUMNS = ("t", *TIME_COLUMNS, *BOX, "right", "bottom")
 _STAND_INS = {"t": (*TIME_COLUMNS, "frame"), "width": ("right",), "height": ("bottom",)}
 _CANONICAL = {alias: name for name, aliases in ALIASES.items() for alias in aliases}
 
@@ -104,8 +106,9 @@ def boxes_of(table: FileTable) -> FloatArray:
         DataError: names the first line or row with something that is no finite number.
     """
     names = standing_in(table.names, BOX)
-    columns = [table.number(name, blank_ok=True) for name in names]
+    boxes = np.empty((len(table), 4))
     for k, name in enumerate(names):
+        boxes[:, k] = table.number(name, blank_ok=True)
         if name in ("right", "bottom"):
-            columns[k] = columns[k] - columns[k - 2]
-    return np.stack(columns, axis=1)
+            boxes[:, k] -= boxes[:, k - 2]
+    return boxes

@@ -10,7 +10,7 @@ import csv
 import io
 import re
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -31,6 +31,10 @@ _OTHERS = {
     b"\x28\xb5\x2f\xfd": "is compressed with zstd; unpack it",
     b"\x89HDF": "is an HDF5 file, not text",
 }
+_SOMETHING = re.compile(rb"\S")
+_NO_LINE_END = re.compile(rb"[^\r\n]")
+#: How a column is read where all its fields allow it: as numbers, or as text of which there are few kinds.
+NUMBER, WORD, TEXT = "number", "word", "text"
 #: Bytes that a compressed file may unpack to: beyond, it is a mistake or an attack.
 LARGEST_UNPACKED = 2**33
 #: Share of the free memory that it may fill, for columns are made of it.
@@ -65,7 +69,7 @@ def read_text(path: str | Path) -> bytes:
     if data.startswith(_WIDE_BOMS):
         raise DataError("is UTF-16; save it as UTF-8", path)
     data = data.removeprefix(_BOM)
-    if not data.strip():
+    if not _SOMETHING.search(data):
         raise DataError("is empty", path)
     if b"\0" in data:
         raise DataError("is not text (NUL byte)", path, line_at(data, data.index(b"\0")))
@@ -121,7 +125,8 @@ class CsvBody:
 
     Attributes:
         path: the file, for messages.
-        data: the lines, UTF-8.
+        data: bytes of the file, UTF-8.
+        start: where in them the lines begin; a copy without what is before them would need as much again.
         first_line: number of the first of these lines in the file, from 1.
         width: fields that each line must have.
         wanted: where `width` comes from, such as "the header names", for messages.
@@ -136,26 +141,37 @@ class CsvBody:
     wanted: str
     short: int = 0
     delimiter: str = ","
+    start: int = 0
 
-    def parse(self) -> tuple[CsvBody, list[Any]]:
-        """Split into columns of text.
+    def parse(self, kinds: Sequence[str] = ()) -> tuple[CsvBody, list[Any]]:
+        """Split into columns.
+
+        Args:
+            kinds: of each column, `NUMBER`, `WORD` or `TEXT`; all are text where a field is not of its kind,
+                so that whoever converts it can say which one.
 
         Returns:
-            The body that was parsed at last (short lines filled up), and per column an Arrow array of text
-            (R,), null where a field is blank; lines without any character are not rows.
+            The body that was parsed at last (short lines filled up), and per column an Arrow array (R,),
+            null where a field is blank; lines without any character are not rows.
 
         Raises:
             DataError: names the first line with a wrong number of fields, or that is not UTF-8.
         """
         import pyarrow as pa
 
+        for ways in (kinds, ()) if kinds else ((),):
+            try:
+                return self, self._arrow_columns(ways)
+            except (pa.ArrowException, UnicodeDecodeError):
+                pass
+        repaired = self.filled_up()
+        if kinds:
+            try:
+                return repaired, repaired._arrow_columns(kinds)
+            except (pa.ArrowException, UnicodeDecodeError):
+                pass
         try:
-            return self, self._arrow_columns()
-        except (pa.ArrowException, UnicodeDecodeError):
-            pass
-        repaired = self._filled_up()
-        try:
-            return repaired, repaired._arrow_columns()
+            return repaired, repaired._arrow_columns(())
         except (pa.ArrowException, UnicodeDecodeError) as error:
             raise repaired._diagnosis(error) from None
 
@@ -163,40 +179,46 @@ class CsvBody:
         """Return the line number of a row (from 0) of the columns; rows that are quite empty do not count."""
         return next(islice(self._records(), row, None), (self.first_line, []))[0]
 
-    def _arrow_columns(self) -> list[Any]:
+    def _arrow_columns(self, kinds: Sequence[str]) -> list[Any]:
         import pyarrow as pa
         from pyarrow import csv as arrow_csv
 
         names = [str(k) for k in range(self.width)]
-        if not self.data.strip(b"\r\n"):
+        if not _NO_LINE_END.search(self.data, self.start):
             return [pa.chunked_array([], type=pa.string()) for _ in names]
+        types = {NUMBER: pa.float64(), WORD: pa.dictionary(pa.int32(), pa.string()), TEXT: pa.string()}
+        chosen = [types[kind] for kind in kinds or [TEXT] * self.width]
         table = arrow_csv.read_csv(
-            pa.BufferReader(self.data),
+            pa.BufferReader(pa.py_buffer(self.data).slice(self.start)),
             read_options=arrow_csv.ReadOptions(column_names=names),
             parse_options=arrow_csv.ParseOptions(
-                delimiter=self.delimiter, newlines_in_values=b'"' in self.data
+                delimiter=self.delimiter, newlines_in_values=self.data.find(b'"', self.start) >= 0
             ),
             convert_options=arrow_csv.ConvertOptions(
-                column_types=dict.fromkeys(names, pa.string()), null_values=[""], strings_can_be_null=True
+                column_types=dict(zip(names, chosen, strict=True)),
+                null_values=[""],
+                strings_can_be_null=True,
             ),
         )
         return list(table.columns)
 
-    def _filled_up(self) -> CsvBody:
+    def filled_up(self) -> CsvBody:
         """Empty the lines of white space only, and give short lines their commas; line numbers stay."""
         blank = rb"(?m)^ +(?=\r?$)" if self.delimiter == "\t" else rb"(?m)^[ \t]+(?=\r?$)"
-        data = re.sub(blank, b"", self.data)
+        data = re.sub(blank, b"", self.data[self.start :])
         if 0 < self.short < self.width:
             mark = self.delimiter.encode()
             field = rb"[^" + mark + rb'"\r\n]+'
             line = rb"(?m)^(" + mark.join([field] * self.short) + rb")(?=\r?$)"
             data = re.sub(line, rb"\g<1>" + mark * (self.width - self.short), data)
-        return replace(self, data=data, short=0)
+        return replace(self, data=data, start=0, short=0)
 
     def _records(self) -> Iterator[tuple[int, list[str]]]:
         """Yield (line number, fields) of each row, by Python's own reader."""
         # Decoded piece by piece: a line without an end does not become four bytes a character.
-        text = io.TextIOWrapper(io.BytesIO(self.data), "utf-8", errors="replace", newline="")
+        source = io.BytesIO(self.data)
+        source.seek(self.start)
+        text = io.TextIOWrapper(source, "utf-8", errors="replace", newline="")
         reader = csv.reader(text, delimiter=self.delimiter)
         line = self.first_line
         while True:
@@ -212,10 +234,11 @@ class CsvBody:
 
     def _diagnosis(self, error: Exception) -> DataError:
         """Say which line made the reader fail."""
+        data = self.data[self.start :]
         try:
-            self.data.decode("utf-8")
+            data.decode("utf-8")
         except UnicodeDecodeError as bad:
-            line = self.first_line + line_at(self.data, bad.start) - 1
+            line = self.first_line + line_at(data, bad.start) - 1
             return DataError("is not UTF-8; save the file as UTF-8", self.path, line)
         try:
             for line, fields in self._records():

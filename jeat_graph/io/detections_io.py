@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray
-from jeat_graph.data.detections import Detections, find_bad_row
+from jeat_graph.data.boxes import find_bad_row
+from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.io import coco, kitti, motchallenge, prophesee
-from jeat_graph.io.column_names import boxes_of, standing_in, times_of
+from jeat_graph.io.column_names import NUMBER_COLUMNS, boxes_of, standing_in, times_of
+from jeat_graph.io.csv_text import NUMBER, WORD
 from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.formats import recognise
 from jeat_graph.io.frames import check_rate, fill_frames, gap_times, scale_scores, score_hint
@@ -25,6 +27,7 @@ from jeat_graph.io.tables import read_table
 DEFAULT_SENSOR = "rgb"
 _BOX = ("left", "top", "width", "height")
 _COLUMNS = ("t", "sensor", *_BOX, "score")
+_KINDS = {**dict.fromkeys((*NUMBER_COLUMNS, "score"), NUMBER), "sensor": WORD, "class": WORD}
 
 
 def read_detections(
@@ -160,7 +163,9 @@ def _read_contract(
 ) -> Detections:
     required = _COLUMNS if sensor is None else tuple(name for name in _COLUMNS if name != "sensor")
     try:
-        table = read_table(path, required, ("class", "sensor"), short=("t", "sensor"), aliases=True)
+        table = read_table(
+            path, required, ("class", "sensor"), short=("t", "sensor"), aliases=True, kinds=_KINDS
+        )
     except DataError as error:
         if error.message.startswith("column 'sensor' is missing;"):
             raise DataError(
@@ -170,13 +175,31 @@ def _read_contract(
             ) from None
         raise
     t = times_of(table, time_unit, rate_hz)
-    names = table.text("sensor", blank_ok=sensor is not None) if "sensor" in table else np.zeros(len(t), "U1")
+    names, code = [""], np.zeros(len(t), dtype=np.int64)
+    if "sensor" in table:
+        names, code = table.words("sensor", blank_ok=sensor is not None)
     if sensor is not None:
-        several = np.unique(names)
-        if len(several) > 1:
-            raise DataError(f"holds the sensors {', '.join(several)}; none can be renamed to {sensor}", path)
-        names = np.full(len(t), sensor)
+        if len(names) > 1:
+            raise DataError(f"holds the sensors {', '.join(names)}; none can be renamed to {sensor}", path)
+        names = [sensor] if len(t) else []
+    empty = _rows_without_box(table)
+    boxes, scores = boxes_of(table), table.number("score", blank_ok=True)
+    scores = scale_scores(scores, score_scale, path)
+    classes = table.text("class", blank_ok=True) if "class" in table else None
+    if classes is not None and not (classes != "").any():
+        classes = None
+    flat = _without_area(boxes) & ~empty
+    _check(boxes, scores, empty | flat, table.error)
+    del table  # the file's own columns are in the way of what is to come
+    found = Detections.from_checked(t, names, code, (boxes, scores, classes), empty | flat)
+    return replace(found, dropped=int(flat.sum()))
+
+
+def _rows_without_box(table: FileTable) -> BoolArray:
+    """Which rows (R,) only say that a scan took place; a row with part of a box is an error."""
     values = [*standing_in(table.names, _BOX), "score"]
+    if not any(table.blank(name).any() for name in values):
+        return np.zeros(len(table), dtype=bool)
     blanks = np.stack([table.blank(name) for name in values], axis=1)
     empty: BoolArray = np.asarray(blanks.all(axis=1))
     torn = blanks.any(axis=1) & ~empty
@@ -184,15 +207,7 @@ def _read_contract(
         row = int(np.argmax(torn))
         which = values[int(np.argmax(blanks[row]))]
         raise table.error(row, f"{which} is missing; a scan that found nothing has only t and sensor")
-    boxes, scores = boxes_of(table), table.number("score", blank_ok=True)
-    scores = scale_scores(scores, score_scale, path)
-    classes = table.text("class", blank_ok=True) if "class" in table else None
-    if classes is not None and not (classes != "").any():
-        classes = None
-    flat = _without_area(boxes) & ~empty
-    _check(boxes, scores, ~(empty | flat), table.error)
-    found = Detections.from_rows(t, names, boxes, scores, empty | flat, classes)
-    return replace(found, dropped=int(flat.sum()))
+    return empty
 
 
 def _read_coco(
@@ -226,18 +241,20 @@ def _scores(table: FileTable, name: str, spoken: str) -> FloatArray:
 def _without_area(boxes: FloatArray) -> BoolArray:
     """Which boxes (M, 4) a detector has clipped to nothing: no side is negative and one is zero."""
     side = boxes[:, 2:]
+    if len(boxes) == 0 or side.min() > 0.0:
+        return np.zeros(len(boxes), dtype=bool)
     finite = np.isfinite(boxes).all(axis=1)
     return np.asarray(finite & (side >= 0.0).all(axis=1) & (side == 0.0).any(axis=1))
 
 
 def _check(
-    boxes: FloatArray, scores: FloatArray, rows: BoolArray, error: Callable[[int, str], DataError]
+    boxes: FloatArray, scores: FloatArray, passed_over: BoolArray, error: Callable[[int, str], DataError]
 ) -> None:
-    """Refuse the first of the chosen rows that is no detection, at its place in the file."""
-    index = np.flatnonzero(rows)
-    bad = find_bad_row(boxes[index], scores[index])
+    """Refuse the first row that is no detection, at its place in the file, but for those passed over."""
+    index = np.flatnonzero(~passed_over) if passed_over.any() else None
+    bad = find_bad_row(boxes, scores) if index is None else find_bad_row(boxes[index], scores[index])
     if bad is not None:
-        row = int(index[bad[0]])
+        row = bad[0] if index is None else int(index[bad[0]])
         what = score_hint(float(scores[row])) if bad[1].startswith("score") else bad[1]
         raise error(row, what)
 
@@ -254,14 +271,13 @@ def _assemble(
     """Check boxes of one sensor and put empty scans at the `missing` times."""
     n, gaps = len(t), len(missing)
     flat = _without_area(boxes)
-    _check(boxes, scores, ~flat, error)
-    blank = np.full(gaps, np.nan)
-    found = Detections.from_rows(
-        t=np.concatenate([t, missing]),
-        sensor=np.full(n + gaps, sensor),
-        boxes=np.concatenate([boxes, np.full((gaps, 4), np.nan)]),
-        scores=np.concatenate([scores, blank]),
-        empty=np.concatenate([flat, np.ones(gaps, dtype=bool)]),
-        classes=None if classes is None else np.concatenate([classes, np.zeros(gaps, dtype="U1")]),
-    )
-    return replace(found, dropped=int(flat.sum()))
+    _check(boxes, scores, flat, error)
+    if gaps:
+        t, flat = np.concatenate([t, missing]), np.concatenate([flat, np.ones(gaps, dtype=bool)])
+        boxes = np.concatenate([boxes, np.full((gaps, 4), np.nan)])
+        scores = np.concatenate([scores, np.full(gaps, np.nan)])
+        classes = None if classes is None else np.concatenate([classes, np.zeros(gaps, dtype="U1")])
+    names = [sensor] if n + gaps else []
+    code = np.zeros(n + gaps, dtype=np.int64)
+    found = Detections.from_checked(t, names, code, (boxes, scores, classes), flat)
+    return replace(found, dropped=int(flat[:n].sum()))

@@ -120,26 +120,40 @@ class FileTable:
         Raises:
             DataError: names the first line or row that is blank, unless that is allowed.
         """
+        words, index = self.words(name, blank_ok=blank_ok)
+        return np.asarray(words, dtype=np.str_)[index] if words else np.zeros(len(index), dtype=np.str_)
+
+    def words(self, name: str, *, blank_ok: bool = False) -> tuple[list[str], IntArray]:
+        """Convert a column of few distinct texts, without surrounding white space, empty where blank.
+
+        Returns:
+            The distinct texts in alphabetical order, and for each row (R,) which it has.
+
+        Raises:
+            DataError: names the first line or row that is blank, unless that is allowed.
+        """
         import pyarrow as pa
         from pyarrow import compute
 
         column = self._columns[name]
         try:
-            if pa.types.is_dictionary(column.type):
-                column = column.cast(column.type.value_type)
-            # Few distinct texts, many rows: work on the distinct ones.
-            coded = pa.chunked_array([column.cast(pa.string()).combine_chunks()]).combine_chunks()
-            coded = coded.dictionary_encode()
-            distinct = compute.utf8_trim_whitespace(coded.dictionary).to_pylist()
+            if not (pa.types.is_dictionary(column.type) and pa.types.is_string(column.type.value_type)):
+                if pa.types.is_dictionary(column.type):
+                    column = column.cast(column.type.value_type)
+                column = column.cast(pa.string()).dictionary_encode()
+            coded = pa.chunked_array([column.unify_dictionaries().combine_chunks()]).combine_chunks()
+            texts = compute.utf8_trim_whitespace(coded.dictionary).fill_null("").to_pylist()
         except (pa.ArrowException, UnicodeDecodeError):
             raise DataError(f"column {name} must hold text", self.path) from None
-        index = np.asarray(
-            coded.indices.fill_null(len(distinct)).to_numpy(zero_copy_only=False), dtype=np.int64
-        )
-        values = np.asarray([*distinct, ""], dtype=np.str_)[index]
-        if not blank_ok and (values == "").any():
-            raise self.error(int(np.argmax(values == "")), f"{name} is missing")
-        return values
+        index = np.asarray(coded.indices.fill_null(len(texts)).to_numpy(zero_copy_only=False), dtype=np.int64)
+        texts.append("")
+        used = np.bincount(index, minlength=len(texts)) > 0
+        words = sorted({text for text, there in zip(texts, used, strict=True) if there})
+        place = {text: k for k, text in enumerate(words)}
+        index = np.array([place.get(text, 0) for text in texts], dtype=np.int64)[index]
+        if not blank_ok and "" in place:
+            raise self.error(int(np.argmax(index == place[""])), f"{name} is missing")
+        return words, index
 
     def _floats(self, name: str) -> tuple[FloatArray, BoolArray]:
         import pyarrow as pa
@@ -156,7 +170,8 @@ class FileTable:
             numbers = _cast(column, self._decimal_comma)
         except (pa.ArrowException, UnicodeDecodeError):
             raise self._not_a_number(name, column) from None
-        return np.array(numbers.to_numpy(), dtype=np.float64), is_null
+        values = np.asarray(numbers.to_numpy(), dtype=np.float64)
+        return values if values.flags.writeable else values.copy(), is_null
 
     def _not_a_number(self, name: str, column: Any) -> DataError:
         """Find the first field of a column that is no number, by halving."""

@@ -13,6 +13,7 @@ from typing import NamedTuple
 from jeat_graph.data.errors import DataError
 
 _MOST_COLUMNS = 10_000
+_LINE_END = re.compile(rb"\r\n|\n|\r")
 
 
 class Header(NamedTuple):
@@ -20,27 +21,28 @@ class Header(NamedTuple):
 
     Attributes:
         names: of the columns.
-        body: the bytes below it.
+        end: where in the file's bytes it ends.
         line: its line number, from 1.
         delimiter: what stands between fields: a comma, a tab or a semicolon.
     """
 
     names: list[str]
-    body: bytes
+    end: int
     line: int
     delimiter: str
 
 
 def split_header(data: bytes, path: Path) -> Header:
-    """Take the header off a CSV file's text.
+    """Read the header of a CSV file's text.
 
     Raises:
         DataError: it is not UTF-8, its quotes are torn, or it names more columns than any table has.
     """
-    line = 1
+    line, start = 1, 0
     while True:
-        end = re.search(rb"\r\n|\n|\r", data)
-        head, data = (data[: end.start()], data[end.end() :]) if end else (data, b"")
+        mark = _LINE_END.search(data, start)
+        head = data[start : mark.start() if mark else None]
+        start = mark.end() if mark else len(data)
         if head.strip():
             break
         line += 1
@@ -54,7 +56,7 @@ def split_header(data: bytes, path: Path) -> Header:
         raise DataError(f"cannot be read: {error}", path, line) from None
     if len(fields) > _MOST_COLUMNS:
         raise DataError(f"has {len(fields)} columns; at most {_MOST_COLUMNS} are read", path, line)
-    return Header([field.strip() for field in fields], data, line, delimiter)
+    return Header([field.strip() for field in fields], start, line, delimiter)
 
 
 def _delimiter(header: str) -> str:

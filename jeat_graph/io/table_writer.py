@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.atomic import atomic_path
 from jeat_graph.io.piecewise import PiecewiseWriter
@@ -18,6 +18,7 @@ from jeat_graph.io.tables import PARQUET_SUFFIXES
 # Rows kept in memory, and a Parquet row group. Fixed, because the bytes of a Parquet file depend on it.
 _CHUNK_ROWS = 1 << 16
 _MOST_DECIMALS = 22  # 10^22 is the largest power of ten that a float holds exactly
+_POWERS: FloatArray = 10.0 ** np.arange(0.0, 309.0)
 
 
 class TableWriter(PiecewiseWriter):
@@ -118,14 +119,18 @@ def round_decimals(values: FloatArray, decimals: int) -> FloatArray:
 
 def round_significant(values: FloatArray, digits: int) -> FloatArray:
     """Round to a number of significant decimal digits; zero, NaN and infinity stay."""
-    good = np.isfinite(values) & (values != 0)
-    safe = np.where(good, np.abs(values), 1.0)
-    decimals = np.minimum(digits - 1 - np.floor(np.log10(safe)), _MOST_DECIMALS)
+    good: BoolArray = np.isfinite(values) & (values != 0)
+    all_good = bool(good.all())
+    safe = np.abs(values) if all_good else np.where(good, np.abs(values), 1.0)
+    decimals = np.minimum(digits - 1 - np.floor(np.log10(safe)).astype(np.int64), _MOST_DECIMALS)
     # Both factors are exact powers of ten, and one is 1, so the result is the float nearest to its digits.
-    up, down = 10.0 ** np.maximum(decimals, 0), 10.0 ** np.maximum(-decimals, 0)
+    up, down = _POWERS[np.maximum(decimals, 0)], _POWERS[np.maximum(-decimals, 0)]
     with np.errstate(over="ignore", invalid="ignore"):
-        rounded = np.rint(values * up / down) / up * down
-    return np.asarray(np.where(good & np.isfinite(rounded), rounded, values) + 0.0, dtype=np.float64)
+        rounded = np.rint(values * up / down) / up * down + 0.0
+    fits: BoolArray = np.isfinite(rounded)
+    if all_good and fits.all():
+        return np.asarray(rounded)
+    return np.asarray(np.where(good & fits, rounded, values + 0.0), dtype=np.float64)
 
 
 def _to_arrow(values: npt.NDArray[Any]) -> Any:

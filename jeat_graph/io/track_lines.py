@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 from typing import Any
 
+import numpy as np
+
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.data.views import BOX, MEAN, VAR
 from jeat_graph.io.table_writer import csv_lines
-from jeat_graph.io.trajectories_io import COLUMNS, table_columns
+from jeat_graph.io.trajectories_io import COLUMNS, rounded, table_columns
+
+_ENCODER = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"), check_circular=False)
 
 
 def json_line(t: float, table: Trajectories) -> str:
@@ -23,20 +26,24 @@ def json_line(t: float, table: Trajectories) -> str:
     """
     tracks: list[dict[str, Any]] = []
     if len(table):
-        columns = {name: values.tolist() for name, values in table_columns(table).items()}
-        for k in range(len(table)):
-            var = [columns[name][k] for name in VAR]
+        boxes, existence, mean, var = (values.tolist() for values in rounded(table))
+        known = not np.isnan(table.var).any()
+        names = {
+            used: [name for s, name in enumerate(table.sensors) if used >> s & 1]
+            for used in set(table.used.tolist())
+        }
+        for k, (track_id, used) in enumerate(zip(table.track_id.tolist(), table.used.tolist(), strict=True)):
             tracks.append(
                 {
-                    "track_id": columns["track_id"][k],
-                    "box": [columns[name][k] for name in BOX],
-                    "existence": columns["existence"][k],
-                    "mean": [columns[name][k] for name in MEAN],
-                    "var": [None if value != value else value for value in var],
-                    "sensors": [name for s, name in enumerate(table.sensors) if table.used[k] >> s & 1],
+                    "track_id": track_id,
+                    "box": boxes[k],
+                    "existence": existence[k],
+                    "mean": mean[k],
+                    "var": var[k] if known else [None if value != value else value for value in var[k]],
+                    "sensors": names[used],
                 }
             )
-    return json.dumps({"t": t, "tracks": tracks}, ensure_ascii=False, separators=(",", ":")) + "\n"
+    return _ENCODER.encode({"t": t, "tracks": tracks}) + "\n"
 
 
 def csv_header() -> str:

@@ -22,7 +22,7 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.live.lateness import LatenessCounter
 from jeat_graph.tracking.checkpoint import load_state, save_state
 from jeat_graph.tracking.prediction import Prediction
-from jeat_graph.tracking.scans import ScanLike, arrivals_of, as_scans
+from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
 from jeat_graph.tracking.snapshot import Snapshot
 from jeat_graph.tracking.step_record import StepRecord
 from jeat_graph.tracking.tracker import Tracker
@@ -112,7 +112,8 @@ class LiveTracker:
             TimeOrderError: a scan comes late, and late scans are refused.
         """
         batch = [self._corrected(scan) for scan in as_scans(scans)]
-        arrivals_of(batch, self.tracker.sensor_names)  # unknown sensors are refused before anything is done
+        for scan in batch:
+            sensor_index(scan.sensor, self.tracker.sensor_names)  # refused before anything is done
         now = self.tracker.time
         late_s = 0.0
         dropped: list[Scan] = []

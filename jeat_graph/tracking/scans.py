@@ -51,7 +51,7 @@ def arrivals_of(batch: Sequence[Scan], sensor_names: Sequence[str]) -> Arrivals:
     Raises:
         UnknownSensorError: a sensor that is not among them.
     """
-    codes = [_sensor_index(scan.sensor, sensor_names) for scan in batch]
+    codes = [sensor_index(scan.sensor, sensor_names) for scan in batch]
     if len(batch) == 1:
         boxes, scores = batch[0].boxes, batch[0].scores
         sensor = np.full(len(scores), codes[0], dtype=np.int64)
@@ -64,7 +64,12 @@ def arrivals_of(batch: Sequence[Scan], sensor_names: Sequence[str]) -> Arrivals:
     return Arrivals(batch[0].t, boxes, scores, sensor, present)
 
 
-def _sensor_index(name: str, names: Sequence[str]) -> int:
+def sensor_index(name: str, names: Sequence[str]) -> int:
+    """Return the place of a sensor among the names of all.
+
+    Raises:
+        UnknownSensorError: it is not among them.
+    """
     if name in names:
         return names.index(name)
     near = difflib.get_close_matches(name, names, 1)

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jeat_graph.data.detections import Detections, Scan, check_boxes
+from jeat_graph.data.boxes import check_boxes
+from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import DataError
 
 BOX = [10.0, 20.0, 30.0, 40.0]

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jeat_graph.data.detections import LARGEST_PX, SMALLEST_PX
+from jeat_graph.data.boxes import LARGEST_PX, SMALLEST_PX
 
 REFUSED_SHARE = 0.15
 BURST = 300

@@ -1,15 +1,18 @@
 """Time compared with time: a peer's, that of a simpler way to the same, or of the same at another size."""
 
 import csv
+import json
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from jeat_graph.benchmark.speed_subjects import installed_peers
 from jeat_graph.benchmark.speed_timing import summarise, time_side_by_side
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.metrics import evaluate
+from jeat_graph.io.detections_io import read_detections
 from jeat_graph.io.tables import read_table
 from jeat_graph.io.trajectories_io import read_trajectories, write_trajectories
 from jeat_graph.smoothers.engine import make_smoother
@@ -149,3 +152,27 @@ def test_trajectories_are_written_faster_than_by_pythons_own_writer(tmp_path, be
     )
     assert ours < plain
     assert len(read_trajectories(tmp_path / "ours.csv")) == len(table)
+
+
+def write_boxes(folder: Path, n: int) -> tuple[Path, Path]:
+    """The same boxes as CSV and as results of COCO."""
+    rng = np.random.default_rng(0)
+    boxes = rng.uniform(1, 1000, (n, 4)).round(2).tolist()
+    lines = [f"{0.05 * (k // 5)},rgb,{l},{t},{w},{h},0.5\n" for k, (l, t, w, h) in enumerate(boxes)]  # noqa: E741
+    (folder / "d.csv").write_text("t,sensor,left,top,width,height,score\n" + "".join(lines), encoding="utf-8")
+    entries = [
+        {"image_id": k // 5, "category_id": 1, "bbox": box, "score": 0.5} for k, box in enumerate(boxes)
+    ]
+    (folder / "d.json").write_text(json.dumps(entries), encoding="utf-8")
+    return folder / "d.csv", folder / "d.json"
+
+
+def test_boxes_are_read_about_as_fast_as_pandas_reads_their_columns(tmp_path, best):
+    path, results = write_boxes(tmp_path, 200_000)
+    table, plain = best(lambda: read_detections(path), lambda: pd.read_csv(path))
+    assert table < 2.2 * plain  # 1.25 measured; three times where all columns are text first
+    coco, tree = best(
+        lambda: read_detections(results, rate_hz=20.0),
+        lambda: json.loads(results.read_bytes()),
+    )
+    assert coco < 1.2 * tree  # .45 measured; three times where entries are looked at one by one

@@ -6,7 +6,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from jeat_graph import Tracker, load_config
-from jeat_graph.data.detections import LARGEST_PX, SMALLEST_PX, Detections, Scan
+from jeat_graph.data.boxes import LARGEST_PX, SMALLEST_PX
+from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import DataError, TimeOrderError, UnknownSensorError
 from jeat_graph.tracking.tracker import track
 

@@ -1,0 +1,81 @@
+"""What counts as a box: the shape, the numbers and the bounds that every detection is held to."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.data.arrays import BoolArray, FloatArray
+from jeat_graph.data.errors import DataError
+
+#: Smallest side, and farthest place or largest side, of a box (px): beyond what any picture can hold.
+SMALLEST_PX, LARGEST_PX = 1e-9, 1e9
+
+
+def check_boxes(boxes: npt.ArrayLike, scores: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Convert and check boxes and scores.
+
+    Args:
+        boxes: (M, 4) left, top, width, height in px: finite, within `SMALLEST_PX` and `LARGEST_PX`.
+        scores: (M,) detector confidence in [0, 1].
+
+    Returns:
+        The boxes (M, 4) and scores (M,) as contiguous float64 arrays.
+
+    Raises:
+        DataError: wrong shape, a value that is not finite, a size that is not positive, or a score
+            outside [0, 1]. The message names the first row at fault.
+    """
+    try:
+        b = np.ascontiguousarray(boxes, dtype=np.float64)
+        s = np.ascontiguousarray(scores, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise DataError("boxes must have shape (M, 4) and scores shape (M,), all of them numbers") from None
+    if b.size == 0:
+        b = b.reshape(0, 4)
+    if b.ndim != 2 or b.shape[1] != 4:
+        raise DataError(f"boxes must have shape (M, 4), not {b.shape}")
+    if s.shape != (b.shape[0],):
+        raise DataError(f"scores must have shape ({b.shape[0]},), not {s.shape}")
+    bad = find_bad_row(b, s)
+    if bad is not None:
+        row, what = bad
+        raise DataError(f"box {row}: {what}")
+    return b, s
+
+
+def find_bad_row(boxes: FloatArray, scores: FloatArray) -> tuple[int, str] | None:
+    """Find the first row that is not a detection: (row, what is wrong), or None if all are good.
+
+    Args:
+        boxes: (M, 4) left, top, width, height.
+        scores: (M,) confidence.
+    """
+    if len(scores) == 0 or (
+        # NaN compares false, and so do least and largest of an array that holds one.
+        scores.min() >= 0.0
+        and scores.max() <= 1.0
+        and boxes[:, 2:].min() >= SMALLEST_PX
+        and boxes.min() >= -LARGEST_PX
+        and boxes.max() <= LARGEST_PX
+    ):
+        return None
+    finite: BoolArray = np.all(np.isfinite(boxes), axis=1)
+    # NaN compares false everywhere, so each test is written for what is good.
+    size = (boxes[:, 2] > 0.0) & (boxes[:, 3] > 0.0)
+    inside: BoolArray = np.all(np.abs(boxes) <= LARGEST_PX, axis=1)
+    fits = inside & np.all(boxes[:, 2:] >= SMALLEST_PX, axis=1)
+    score = (scores >= 0.0) & (scores <= 1.0)
+    good = finite & size & fits & score
+    if good.all():
+        return None
+    row = int(np.argmin(good))
+    left, top, width, height = boxes[row]
+    if not finite[row]:
+        return row, f"left, top, width, height must be finite, got {left}, {top}, {width}, {height}"
+    if not size[row]:
+        return row, f"width and height must be positive, got {width} x {height}"
+    if not fits[row]:
+        bounds = f"places to {LARGEST_PX:g}, sizes from {SMALLEST_PX:g} to {LARGEST_PX:g}"
+        return row, f"no picture holds a box at {left:g}, {top:g} of {width:g} x {height:g} px ({bounds})"
+    return row, f"score must be in [0, 1], got {scores[row]}"
