@@ -5,30 +5,53 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from jeat_graph.config.argument_types import positive
 from jeat_graph.data.errors import DataError
 
-HELP = "write a run for other programs: CVAT, trajectory tools (TUM), rerun"
-TARGETS = ("cvat", "tum", "rerun")
+if TYPE_CHECKING:
+    from jeat_graph.data.trajectories import Trajectories
+
+HELP = "write a run for other programs: CVAT, OTAnalytics, TUM, rerun; a road for SUMO, highD's users, maps"
+ROAD_TARGETS = ("sumo", "highd", "geojson")
+TARGETS = ("cvat", "ottrk", "tum", "rerun", *ROAD_TARGETS)
+
+_ROAD_RATE_HZ = 25.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("source", metavar="RUN", help="run directory or trajectory table")
+    parser.add_argument(
+        "source", metavar="RUN|ROAD", help="run directory or trajectory table; for roads, what `road` wrote"
+    )
     parser.add_argument("--to", choices=TARGETS, required=True, help="what reads it")
     parser.add_argument(
-        "--out", required=True, metavar="FILE", help=".zip (cvat), .txt (tum) or .rrd (rerun)"
+        "--out",
+        required=True,
+        metavar="FILE",
+        help=".zip (cvat), .ottrk, .txt (tum), .rrd (rerun), .xml (sumo), folder (highd) or .geojson",
     )
     parser.add_argument(
         "--only", choices=("causal", "smoothed"), help="which table (default: smoothed, if there)"
     )
     parser.add_argument("--track", type=int, metavar="ID", help="the track, for tum")
-    parser.add_argument("--frames-per-second", type=positive, metavar="HZ", help="of the video, for cvat")
+    parser.add_argument(
+        "--frames-per-second", type=positive, metavar="HZ", help="of the video, or of the road's frames"
+    )
+    parser.add_argument(
+        "--camera", metavar="CAMERA.yaml", help="with its place on the map, for sumo and geojson"
+    )
+    parser.add_argument("--video", metavar="NAME", help="file name of the video, for ottrk")
+    parser.add_argument(
+        "--start", type=float, default=0.0, metavar="S", help="of the video, since 1970, for ottrk"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Export."""
+    if args.to in ROAD_TARGETS:
+        return _export_road(args)
     from jeat_graph.eval.load import tables_of
     from jeat_graph.io.trajectories_io import read_trajectories
 
@@ -57,11 +80,45 @@ def run(args: argparse.Namespace) -> int:
         from jeat_graph.runs.frame_export import at_frames
 
         if args.frames_per_second is None:
-            raise DataError("--to cvat counts frames: give their rate with --frames-per-second HZ")
+            raise DataError(f"--to {args.to} counts frames: give their rate with --frames-per-second HZ")
         instants = read_instants(Path(args.source))
         instants = np.unique(table.t) if instants is None else instants
         kind: Kind = "smoothed" if kinds[-1] == "smoothed" else "causal"
         frames = at_frames(table, kind, instants, args.frames_per_second)
-        write_cvat(frames, args.out, args.frames_per_second)
+        if args.to == "ottrk":
+            _write_ottrk(args, frames)
+        else:
+            write_cvat(frames, args.out, args.frames_per_second)
     print(f"wrote {args.out} ({', '.join(kinds)} tracks)", file=sys.stderr)
+    return 0
+
+
+def _write_ottrk(args: argparse.Namespace, frames: Trajectories) -> None:
+    from jeat_graph.io.ottrk import OttrkVideo, write_ottrk
+    from jeat_graph.runs.recorded import load_run_data
+
+    width, height = load_run_data(args.source).size_px()
+    name = args.video or f"{Path(args.source).resolve().name}.mp4"
+    video = OttrkVideo(name, int(width), int(height), args.frames_per_second, args.start)
+    write_ottrk(frames, args.out, video)
+
+
+def _export_road(args: argparse.Namespace) -> int:
+    from jeat_graph.road.camera_file import read_camera
+    from jeat_graph.road.exports.frames import read_road_frames
+    from jeat_graph.road.exports.geojson import write_geojson
+    from jeat_graph.road.exports.highd import write_highd
+    from jeat_graph.road.exports.sumo import write_fcd
+
+    frames = read_road_frames(args.source, args.frames_per_second or _ROAD_RATE_HZ)
+    camera = None if args.camera is None else read_camera(args.camera)
+    if args.to == "highd":
+        write_highd(frames, args.out)
+    elif args.to == "sumo":
+        write_fcd(frames, args.out, None if camera is None else camera.georeference)
+    elif camera is None:
+        raise DataError("--to geojson needs to know where the road is: give --camera")
+    else:
+        write_geojson(frames, camera, args.out)
+    print(f"wrote {args.out}", file=sys.stderr)
     return 0

@@ -1,0 +1,1 @@
+"""Vehicles on the road for other programs: SUMO, users of highD, maps."""
