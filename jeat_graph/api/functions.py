@@ -67,10 +67,12 @@ def track(
         JeatGraphError: what the file or the configuration has wrong.
     """
     from jeat_graph.runs.declaring import fit_input
+    from jeat_graph.runs.latency import at_measurement
     from jeat_graph.tracking.tracker import Tracker
 
     recording = detections if isinstance(detections, Detections) else read_detections(detections)
     tracker = Tracker(fit_input(as_config(config, image), recording)[0])
+    recording = at_measurement(recording, tracker.config)
     causal = Trajectories.concatenate(list(tracker.run(recording)) or [Trajectories.empty()])
     wanted = tracker.config.smoother.engine != "none"
     return Tracks(causal, tracker.finish() if wanted else None)
@@ -147,11 +149,13 @@ def compare(
     from jeat_graph.eval.compare import LAGS_S
     from jeat_graph.eval.compare import compare as compared
     from jeat_graph.runs.declaring import fit_input
+    from jeat_graph.runs.latency import at_measurement
     from jeat_graph.tracking.records import record_tracks
 
     recording = detections if isinstance(detections, Detections) else read_detections(detections)
     objects = truth if isinstance(truth, GroundTruth) or truth is None else read_truth(truth)
     settings = fit_input(as_config(config), recording)[0]
+    recording = at_measurement(recording, settings)
     records, causal = record_tracks(settings, recording)
     return compared(
         records,
@@ -188,9 +192,11 @@ def calibrate(
         JeatGraphError: what a file or the data have wrong.
     """
     from jeat_graph.runs.declaring import fit_input
+    from jeat_graph.runs.latency import at_measurement
 
     recordings = [d if isinstance(d, Detections) else read_detections(d) for d in _as_list(detections)]
     start = fit_input(as_config(base, image), Detections.concatenate(recordings))[0]
+    recordings = [at_measurement(one, start) for one in recordings]
     if truth is None:
         from jeat_graph.calibration.blind import calibrate_blind
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -47,7 +48,7 @@ def calibrate(recordings: Sequence[Recording], base: Config | None = None) -> Co
         ]
         matches[name] = SensorMatches.pool(parts)
         found = calibrate_sensor(matches[name], scan_rate([d for d, _ in recordings], name))
-        sensors[name] = replace(found, tempering=_tempering(base, name))
+        sensors[name] = replace(found, tempering=_tempering(base, name), **_delays(base, name))
     config = (
         Config(sensors=sensors)
         if base is None
@@ -89,6 +90,13 @@ def fit_births(
     initial = boxes / sum(len(f) for f in frames)
     arrivals = max(births - initial * len(recordings), 1.0)
     return replace(config.birth, arrival_rate_hz=arrivals / max(duration, 1.0), initial=initial)
+
+
+def _delays(base: Config | None, name: str) -> dict[str, Any]:
+    """What detections do not tell of a sensor's clock: the base's, where it knows the sensor."""
+    if base is None or name not in base.sensors:
+        return {}
+    return {key: getattr(base.sensors[name], key) for key in ("latency_s", "late_s")}
 
 
 def _tempering(base: Config | None, name: str) -> float:

@@ -20,6 +20,7 @@ from jeat_graph.io.hashing import sha256_of
 from jeat_graph.io.scans_io import read_instants
 from jeat_graph.runs.directory import MEASUREMENTS, RUN_JSON
 from jeat_graph.runs.inputs import find_input
+from jeat_graph.runs.latency import at_measurement
 
 
 class MeasuredRun(NamedTuple):
@@ -163,4 +164,4 @@ def recorded_inputs(
         if sha256_of(place) != described["sha256"]:
             raise DataError("has changed since the run; track it again", file)
         found.append(str(place) if prefix is None else f"{prefix}={place}")
-    return config, read_many(found, **reading)
+    return config, at_measurement(read_many(found, **reading), config)

@@ -7,9 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from jeat_graph.data.detections import Detections
 from jeat_graph.runs.beside import Facts, facts_beside, facts_of_frames, with_picture
 from jeat_graph.runs.inputs import describe_inputs
 from jeat_graph.runs.run_options import RunOptions, RunRecord
@@ -133,6 +130,7 @@ def track_files(
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.directory import RunDirectory
     from jeat_graph.runs.input_checks import check_detections, check_units
+    from jeat_graph.runs.latency import at_measurement
     from jeat_graph.tracking.notice import notice_if_cold
 
     begin = time.perf_counter()
@@ -157,15 +155,3 @@ def track_files(
     with directory:
         write_run(detections, config, directory, record, request.options)
     return record
-
-
-def at_measurement(detections: Detections, config: Config) -> Detections:
-    """Take each sensor's known latency off the times of its scans (`sensors.NAME.latency_s`)."""
-    latency = np.array([config.sensors[name].latency_s for name in detections.sensors])
-    if not latency.any():
-        return detections
-    t, sensor, boxes, scores, empty, classes = detections.to_rows()
-    of_row = dict(zip(detections.sensors, latency.tolist(), strict=True))
-    earlier = t - np.array([of_row[name] for name in sensor.tolist()])
-    known = None if detections.classes is None else classes
-    return Detections.from_rows(earlier, sensor, boxes, scores, empty, known)

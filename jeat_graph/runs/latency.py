@@ -1,0 +1,26 @@
+"""Known constant delays of sensors: a recording's times as the sensors' own, not those of their arrival."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jeat_graph.config.schema import Config
+from jeat_graph.data.detections import Detections
+
+
+def at_measurement(detections: Detections, config: Config) -> Detections:
+    """Take each sensor's known latency off the times of its scans (`sensors.NAME.latency_s`).
+
+    Args:
+        detections: a recording, as its files have it.
+        config: the sensors; one that it does not declare has no latency.
+    """
+    known = config.sensors
+    latency = np.array([known[name].latency_s if name in known else 0.0 for name in detections.sensors])
+    if not latency.any():
+        return detections
+    t, sensor, boxes, scores, empty, classes = detections.to_rows()
+    of_row = dict(zip(detections.sensors, latency.tolist(), strict=True))
+    earlier = t - np.array([of_row[name] for name in sensor.tolist()])
+    named = None if detections.classes is None else classes
+    return Detections.from_rows(earlier, sensor, boxes, scores, empty, named)

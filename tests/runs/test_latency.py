@@ -1,0 +1,86 @@
+"""A sensor's known delay is taken off its times wherever a recording is tracked, compared or calibrated."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from jeat_graph import calibrate, compare, load_config, simulate, track
+from jeat_graph.cli.main import main
+from jeat_graph.data.detections import Detections
+from jeat_graph.io.detections_io import write_detections
+from jeat_graph.io.truth_io import write_truth
+from jeat_graph.runs.latency import at_measurement
+
+LATENCY_S = 0.0625  # exact in binary, so that times come back to the last bit
+SETTING = f"sensors.rgb.latency_s={LATENCY_S}"
+
+
+def delayed(detections):
+    """The recording as a computer stamps it: pictures are marked when they arrive."""
+    t, sensor, boxes, scores, empty, _ = detections.to_rows()
+    return Detections.from_rows(t + np.where(sensor == "rgb", LATENCY_S, 0.0), sensor, boxes, scores, empty)
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    detections, truth = simulate("night", duration_s=4.0, seed=2)
+    t, sensor, boxes, scores, empty, _ = detections.to_rows()
+    detections = Detections.from_rows(np.round(t * 1024.0) / 1024.0, sensor, boxes, scores, empty)
+    return detections, truth
+
+
+def test_times_come_back(recorded):
+    detections, _ = recorded
+    back = at_measurement(delayed(detections), load_config("default", [SETTING]))
+    np.testing.assert_array_equal(back.scan_t, detections.scan_t)
+    np.testing.assert_array_equal(back.boxes, detections.boxes)
+    assert at_measurement(detections, load_config("default")) is detections
+
+
+def test_track_and_compare_take_it_off(recorded):
+    detections, truth = recorded
+    plain, late = load_config("highway"), load_config("highway", [SETTING])
+    here, there = track(detections, plain), track(delayed(detections), late)
+    np.testing.assert_array_equal(here.causal.mean, there.causal.mean)
+    np.testing.assert_array_equal(here.smoothed.t, there.smoothed.t)
+    values = [
+        compare(one, config, truth, lags_s=[0.0, 0.5]).values
+        for one, config in ((detections, plain), (delayed(detections), late))
+    ]
+    assert json.dumps(values[0]) == json.dumps(values[1])
+
+
+def test_calibrate_takes_it_off_and_keeps_it(recorded, tmp_path):
+    detections, truth = recorded
+    late = load_config("highway", [SETTING])
+    for known in (None, truth):
+        here = calibrate(detections, known, "highway", tuned=False)
+        there = calibrate(delayed(detections), known, late, tuned=False)
+        assert there.sensors["rgb"].latency_s == LATENCY_S
+        assert there.sensors["rgb"].sigma_px == here.sensors["rgb"].sigma_px
+    # Without it, vehicles at speed are found where they were: the noise would be thought larger.
+    wrong = calibrate(delayed(detections), truth, "highway", tuned=False)
+    assert wrong.sensors["rgb"].rho_x > 1.5 * here.sensors["rgb"].rho_x
+
+
+def test_the_commands_take_it_off(recorded, tmp_path):
+    detections, truth = recorded
+    write_detections(detections, tmp_path / "plain.csv")
+    write_detections(delayed(detections), tmp_path / "late.csv")
+    write_truth(truth, tmp_path / "gt.csv")
+    (tmp_path / "late.yaml").write_text("base: highway\nsensors:\n  rgb:\n    latency_s: 0.0625\n")
+    found = []
+    for name, config in (("plain", "highway"), ("late", str(tmp_path / "late.yaml"))):
+        run, out = tmp_path / name, tmp_path / f"{name}-calibrated.yaml"
+        files = [str(tmp_path / f"{name}.csv"), "--config", config]
+        assert main(["track", *files, "--out", str(run)]) == 0
+        assert main(["compare", str(run), "--gt", str(tmp_path / "gt.csv"), "--out", str(run / "cmp")]) == 0
+        assert (
+            main(["calibrate", *files, "--gt", str(tmp_path / "gt.csv"), "--no-tune", "--out", str(out)]) == 0
+        )
+        calibrated = load_config(out)
+        found.append(((run / "causal.csv").read_bytes(), calibrated.sensors["rgb"].sigma_px))
+    assert found[0] == found[1]
