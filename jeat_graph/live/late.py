@@ -58,12 +58,14 @@ class Arrival(NamedTuple):
         t: time of the newest step (s): that of the table.
         late_s: how much older the scans were than the newest before them (s), 0 for scans in order.
         dropped: those that were passed over: too late, or of a sensor that has given one of that time.
+        repeated: those that had been taken before a checkpoint from which the tracker went on.
     """
 
     table: Trajectories
     t: float
     late_s: float
     dropped: list[Scan]
+    repeated: list[Scan]
 
 
 class LiveTracker:
@@ -91,6 +93,8 @@ class LiveTracker:
         self.lateness = LatenessCounter(tracker.sensor_names)
         self.steps: list[Step] = []
         self.replayed = 0
+        self._again_until: float | None = None  # after a restart: time of the newest scan that was known then
+        self._newest: list[str] = []  # where nothing is taken again: sensors of the scans at the newest time
         self._settled = -math.inf  # time of the last step that the smoothers have been told of
         self._latency = {name: sensor.latency_s for name, sensor in config.sensors.items()}
         self._late_s = {name: _late_s(config, name) for name in config.sensors}
@@ -116,14 +120,14 @@ class LiveTracker:
             sensor_index(scan.sensor, self.tracker.sensor_names)  # refused before anything is done
         now = self.tracker.time
         late_s = 0.0
+        repeated = [scan for scan in batch if self._comes_again(scan)]
+        batch = [scan for scan in batch if scan not in repeated]
         dropped: list[Scan] = []
         for t in sorted({scan.t for scan in batch}):
             here = [scan for scan in batch if scan.t == t]
             late_s = max(late_s, 0.0 if now is None else now - t)
             dropped += self._take(here)
-        assert self.tracker.time is not None or dropped
-        table = self.tracker.causal()
-        return Arrival(table, self.tracker.time or 0.0, late_s, dropped)
+        return Arrival(self.tracker.causal(), self.tracker.time or 0.0, late_s, dropped, repeated)
 
     def save(self, path: str | Path, more: dict[str, Any] | None = None) -> None:
         """Write the whole state to a file, for `load` to go on from (see `Tracker.save`).
@@ -142,6 +146,7 @@ class LiveTracker:
             "steps": [step.scans for step in self.steps],
             "settled": self._settled,
             "replayed": self.replayed,
+            "newest": self._newest,
             "lateness": self.lateness.state(),
             "more": more or {},
         }
@@ -164,11 +169,13 @@ class LiveTracker:
             raise DataError("holds a tracker, but not one that takes late scans", path)
         live = LiveTracker(Tracker.from_state(kept, state), state["policy"])
         live._settled, live.replayed = state["settled"], state["replayed"]
+        live._newest = state["newest"]
         live.lateness.set_state(state["lateness"])
         for scans in state["steps"]:
             before = live.tracker.snapshot()
             taken = live.tracker.take_in(scans)
             live.steps.append(Step(scans[0].t, scans, before, taken))
+        live._again_until = live.tracker.time
         return live, state["more"]
 
     def predict(self, t: float) -> Prediction:
@@ -203,14 +210,29 @@ class LiveTracker:
             self._insert(good)
         return [scan for scan in batch if scan not in good]
 
+    def _comes_again(self, scan: Scan) -> bool:
+        """Whether a scan was taken before the restart: the input may come again from anywhere before it."""
+        if self._again_until is None:
+            return False
+        if scan.t > self._again_until:
+            self._again_until = None  # the first new one: no other of those before can follow
+            return False
+        if self.policy != REWIND:
+            return scan.t < self._again_until or scan.sensor in self._newest
+        return scan.t <= self._settled or self._is_known(scan)
+
+    def _is_known(self, scan: Scan) -> bool:
+        """Whether the sensor has given a scan of that time which may still be taken again."""
+        k = self._place(scan.t)
+        known = self.steps[k].scans if k < len(self.steps) and self.steps[k].t == scan.t else []
+        return any(other.sensor == scan.sensor for other in known)
+
     def _may_come(self, scan: Scan, late_s: float) -> bool:
         if self.policy != REWIND:
             return late_s == 0.0
         if late_s > self._late_s[scan.sensor] + _ROUNDING_S or scan.t <= self._settled:
             return False
-        k = self._place(scan.t)
-        known = self.steps[k].scans if k < len(self.steps) and self.steps[k].t == scan.t else []
-        return all(other.sensor != scan.sensor for other in known)
+        return not self._is_known(scan)
 
     def _place(self, t: float) -> int:
         return bisect_left(self.steps, t, key=lambda step: step.t)
@@ -218,8 +240,9 @@ class LiveTracker:
     def _insert(self, scans: list[Scan]) -> None:
         """Put scans of one time where they belong, and take all steps from there on again."""
         if self.policy != REWIND:
-            taken = self.tracker.take_in(scans)
-            self.tracker.hand_over(taken)
+            earlier = self._newest if scans[0].t == self.tracker.time else []
+            self._newest = earlier + [scan.sensor for scan in scans]
+            self.tracker.hand_over(self.tracker.take_in(scans))
             return
         t = scans[0].t
         k = self._place(t)

@@ -8,11 +8,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
+from jeat_graph.config.reading import config_to_dict
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.live.health import Event, SensorHealth
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.live.messages import Duplicates, ScanMessage
+from jeat_graph.version import __version__
 
 #: Smoothed rows are fetched, and the sensors judged, at one arrival in so many.
 ARRIVALS_PER_DRAIN = 32
@@ -79,7 +81,6 @@ class Session:
     ) -> None:
         self.live, self.ends = live, ends
         self._checkpoint, self._every_s = checkpoint, every_s
-        self._resumed_at = live.time if more else None
         kept = more or {}
         self.count: int = kept.get("count", 0)
         self.bad: int = kept.get("bad", 0)
@@ -107,9 +108,13 @@ class Session:
             return
         before = self.live.time
         arrival = self.live.step(message.batch.scans)
+        passed_over = len(arrival.dropped) + len(arrival.repeated)
+        if len(arrival.repeated) == len(message.batch.scans):
+            self.duplicates += 1
+            return
         self.count += 1
         self._tell_dropped(arrival.dropped, arrival.late_s, place)
-        if len(arrival.dropped) < len(message.batch.scans):
+        if passed_over < len(message.batch.scans):
             self.ends.tracks(arrival.t, arrival.table, message, arrival.late_s)
             for event in self._health.saw(message.batch.scans, arrival.t):
                 self._tell(event)
@@ -154,9 +159,11 @@ class Session:
             self.ends.warn(text)
 
     def summary(self) -> dict[str, Any]:
-        """Counts of the session: messages, and how late each sensor's scans came."""
+        """The record of the session: version, configuration, counts, how late each sensor's scans came."""
         lateness = {name: one._asdict() for name, one in self.live.lateness.summary().items()}
         return {
+            "version": __version__,
+            "config": config_to_dict(self.live.tracker.config),
             "messages": self.count,
             "unreadable": self.bad,
             "duplicates": self.duplicates,
@@ -165,12 +172,13 @@ class Session:
         }
 
     def summary_lines(self) -> list[str]:
-        """What is worth a line at the end: late scans, and messages passed over."""
+        """What is worth a line at the end: late scans of any sensor, and messages passed over."""
+        lateness = self.live.lateness.summary()
         lines = [
             f"sensor {name!r}: {one.late} of {one.scans} scans late, median {1e3 * one.median_s:.0f} ms, "
             f"99 % within {1e3 * one.p99_s:.0f} ms, {one.dropped} passed over"
-            for name, one in self.live.lateness.summary().items()
-            if one.late
+            for name, one in lateness.items()
+            if any(other.late for other in lateness.values())
         ]
         if self.bad:
             lines.append(f"{self.bad} messages could not be read and were passed over")
@@ -181,8 +189,8 @@ class Session:
         self.ends.event(event)
 
     def _tell_dropped(self, dropped: list[Scan], late_s: float, place: str) -> None:
-        """Tell of the first scans passed over; those of before a checkpoint are expected to come again."""
-        if not dropped or (self._resumed_at is not None and dropped[0].t <= self._resumed_at):
+        """Tell of the first scans passed over."""
+        if not dropped:
             return
         self._told += 1
         if self._told <= MOST_TOLD:

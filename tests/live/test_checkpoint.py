@@ -84,6 +84,31 @@ def test_a_live_tracker_is_saved_with_the_scans_that_may_be_taken_again(batches,
     assert outcomes[0][2] == outcomes[1][2]
 
 
+@pytest.mark.parametrize("policy", ["rewind", "skip", "refuse"])
+@pytest.mark.parametrize("from_the_start", [True, False])
+def test_what_comes_again_after_a_restart_is_recognised_and_not_counted_twice(
+    policy, from_the_start, batches, tmp_path
+):
+    config = load_config("highway", ["smoother.engine=none"])
+    scans = [scan for batch in batches for scan in batch]
+    if policy != "refuse":
+        delay = np.random.default_rng(1).uniform(0.0, 0.1, len(scans))
+        scans = [scans[k] for k in np.argsort([s.t for s in scans] + delay).tolist()]
+    whole = LiveTracker(Tracker(config), policy)
+    for scan in scans:
+        whole.step(scan)
+    live = LiveTracker(Tracker(config), policy)
+    for scan in scans[:120]:
+        live.step(scan)
+    live.save(tmp_path / "live.npz")
+    again, _ = LiveTracker.load(tmp_path / "live.npz")
+    first = 0 if from_the_start else 100
+    arrivals = [again.step(scan) for scan in scans[first:]]
+    assert sum(len(one.repeated) for one in arrivals) == 120 - first
+    assert again.lateness.summary() == whole.lateness.summary()
+    assert_equal(again.tracker.causal(), whole.tracker.causal())
+
+
 def test_a_file_of_other_settings_or_of_another_version_is_refused_with_a_sentence(tmp_path, monkeypatch):
     path = tmp_path / "state.npz"
     Tracker("highway").save(path)

@@ -35,7 +35,14 @@ def lines(simulated):
 def options(folder):
     return [
         *("--smoothed", str(folder / "s.csv"), "--checkpoint", str(folder / "state.npz"), "--every", "0.4"),
-        *("--set", "smoother.lag_s=0.4", "--set", "smoother.chunk=8"),
+        *(
+            "--set",
+            "smoother.lag_s=0.4",
+            "--set",
+            "smoother.chunk=8",
+            "--record",
+            str(folder / "record.json"),
+        ),
     ]
 
 
@@ -51,6 +58,12 @@ def to_the_end(lines, folder):
     )
     assert done.returncode == 0, f"{done.stderr.decode()}\n{[(p.name, p.stat()) for p in folder.iterdir()]}"
     return done
+
+
+def counts_of(folder):
+    """The record, but for what says that messages came again."""
+    record = json.loads((folder / "record.json").read_text())
+    return {key: value for key, value in record.items() if key != "duplicates"}
 
 
 def killed_after(answers, lines, folder):
@@ -98,3 +111,4 @@ def test_killed_and_started_again_it_says_and_writes_the_same(lines, tmp_path, f
         assert len(again) >= len(answers) - len(said)  # nothing is left out in between
         assert (folder / "s.csv").read_bytes() == smoothed
         assert b"warning" not in done.stderr
+        assert counts_of(folder) == counts_of(tmp_path / "whole")
