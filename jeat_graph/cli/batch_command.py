@@ -18,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "manifest",
         metavar="MANIFEST",
         help="CSV or Parquet, one recording a row: detections (files joined by ;) and, optional, name, "
-        "config, set (settings joined by ;), gt, rate; paths as seen from the manifest's folder",
+        "config, set (settings joined by ;), gt, rate, camera; paths as seen from the manifest's folder",
     )
     add(
         "--out",

@@ -108,7 +108,8 @@ def _job(recording: ManifestRow, folder: Path, options: BatchOptions) -> Job:
         rate_hz=recording.rate_hz,
         options=options.options,
     )
-    return Job(recording.name, request)
+    camera = None if recording.camera is None else str(Path(recording.camera).resolve())
+    return Job(recording.name, request, camera)
 
 
 def _absolute(item: str) -> str:

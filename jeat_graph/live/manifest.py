@@ -10,7 +10,7 @@ from jeat_graph.data.errors import DataError
 
 #: Separates several files, or several settings, in one field.
 SEPARATOR = ";"
-COLUMNS = ("name", "detections", "config", "set", "gt", "rate")
+COLUMNS = ("name", "detections", "config", "set", "gt", "rate", "camera")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
@@ -25,6 +25,7 @@ class ManifestRow:
         overrides: `key=value` settings of this recording.
         truth: true boxes, or None.
         rate_hz: frame rate of files that count frames, or None.
+        camera: the calibrated camera, for speeds on the road, or None.
     """
 
     name: str
@@ -33,14 +34,15 @@ class ManifestRow:
     overrides: tuple[str, ...] = ()
     truth: str | None = None
     rate_hz: float | None = None
+    camera: str | None = None
 
 
 def read_manifest(path: str | Path) -> list[ManifestRow]:
     """Read a manifest, CSV or Parquet.
 
     Columns: `detections` (files of the recording, joined by `;`), and, all optional, `name` (default: the
-    first file's name without its suffix), `config`, `set` (settings joined by `;`), `gt`, `rate` (Hz). Paths
-    are relative to the manifest's folder. The files themselves are not looked at here: a recording that
+    first file's name without its suffix), `config`, `set` (settings joined by `;`), `gt`, `rate` (Hz),
+    `camera` (YAML file). Paths are relative to the manifest's folder. The files themselves are not looked at here: a recording that
     cannot be read is that recording's failure, not the batch's.
 
     Raises:
@@ -84,6 +86,7 @@ def read_manifest(path: str | Path) -> list[ManifestRow]:
                 overrides=tuple(_parts(field.get("set", ""))),
                 truth=_located(field["gt"], folder) if field.get("gt") else None,
                 rate_hz=hz,
+                camera=_located(field["camera"], folder) if field.get("camera") else None,
             )
         )
     if not recordings:

@@ -24,10 +24,12 @@ class Job:
     Attributes:
         name: the recording's name.
         request: what to track, and where to.
+        camera: file of the calibrated camera, or None.
     """
 
     name: str
     request: TrackRequest
+    camera: str | None = None
 
 
 @dataclass(frozen=True)
@@ -62,11 +64,11 @@ def run_job(job: Job) -> Outcome:
         out = Path(job.request.out)
         known = _finished(job.request)
         if known is not None:
-            return _outcome(job.name, KEPT, known)
+            return _on_road(_outcome(job.name, KEPT, known), job)
         for folder in out.glob(_STAGING):  # of a worker that was killed here
             shutil.rmtree(folder, ignore_errors=True)
         _track(job.request)
-        return _outcome(job.name, DONE, _record_of(out))
+        return _on_road(_outcome(job.name, DONE, _record_of(out)), job)
     except (JeatGraphError, OSError) as error:
         return Outcome(job.name, FAILED, {}, error=_one_line(str(error)))
     except Exception as error:  # one recording's trouble must not be the others'
@@ -86,6 +88,16 @@ def _track(request: TrackRequest) -> None:
         track_files(replace(request, options=options))
     except OtherRunError:
         track_files(replace(request, options=replace(options, resume=False)))
+
+
+def _on_road(outcome: Outcome, job: Job) -> Outcome:
+    """Add the vehicles on the road, where there is a camera."""
+    from jeat_graph.live.recording_road import drive_on_road
+
+    if job.camera is None:
+        return outcome
+    vehicles = drive_on_road(Path(job.request.out), job.camera)
+    return replace(outcome, counts=outcome.counts | {"vehicles": vehicles})
 
 
 def _finished(request: TrackRequest) -> dict[str, Any] | None:

@@ -69,6 +69,35 @@ def test_a_batch_makes_the_runs_of_track_and_pools_their_scores(manifest, tmp_pa
     assert [row["status"] for row in rows_of(out)] == ["done"] * 2
 
 
+def test_with_a_camera_each_run_has_its_speeds_on_the_road(tmp_path, simulated):
+    folder, path, out = simulated(0), tmp_path / "m.csv", tmp_path / "out"
+    path.write_text(
+        "name,detections,camera\n"
+        + "".join(
+            f"{name},{folder / 'detections.csv'},{camera}\n"
+            for name, camera in (
+                ("with", folder / "camera.yaml"),
+                ("without", ""),
+                ("wrong", folder / "gt.csv"),
+            )
+        )
+    )
+    assert main(["batch", str(path), "--out", str(out), "--workers", "1"]) == 1
+    rows = {row["name"]: row for row in rows_of(out)}
+    assert [rows[name]["status"] for name in ("with", "without", "wrong")] == ["done", "done", "failed"]
+    assert "gt.csv" in rows["wrong"]["error"]
+    assert int(rows["with"]["vehicles"]) > 3
+    road = out / "runs" / "with" / "road"
+    camera = ["--camera", str(folder / "camera.yaml")]
+    assert main(["road", str(road.parent), *camera, "--out", str(tmp_path / "road")]) == 0
+    for file in (tmp_path / "road").iterdir():
+        assert (road / file.name).read_bytes() == file.read_bytes(), file.name
+    made = {file: file.stat().st_mtime_ns for file in road.iterdir()}
+    assert main(["batch", str(path), "--out", str(out), "--workers", "1"]) == 1
+    assert {file: file.stat().st_mtime_ns for file in road.iterdir()} == made
+    assert rows_of(out)[0]["vehicles"] == rows["with"]["vehicles"]
+
+
 def test_a_second_call_keeps_what_is_there_and_makes_what_changed(manifest, tmp_path):
     path, out = manifest(2), tmp_path / "out"
     assert main(["batch", str(path), "--out", str(out)]) == 0

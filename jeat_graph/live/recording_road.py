@@ -1,0 +1,67 @@
+"""Speeds on the road for a recording of a batch, where its row names a calibrated camera."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from jeat_graph.version import __version__
+
+#: Folder beside the tables of a run, and the file in it that says what it was made from, written last.
+ROAD, SOURCE = "road", "source.json"
+
+
+def drive_on_road(run: Path, camera_file: str) -> int:
+    """Write what `jeat-graph road RUN --camera FILE --out RUN/road` writes; kept where nothing has changed.
+
+    Args:
+        run: the run directory, complete.
+        camera_file: the calibrated camera.
+
+    Returns:
+        How many vehicles have a speed.
+
+    Raises:
+        JeatGraphError: the camera, or a file of the run, is not valid.
+    """
+    from jeat_graph.io.atomic import open_atomic
+    from jeat_graph.io.hashing import sha256_of
+    from jeat_graph.runs.directory import RUN_JSON
+
+    origin = {"version": __version__, "camera": sha256_of(camera_file), "run": sha256_of(run / RUN_JSON)}
+    source = run / ROAD / SOURCE
+    if source.is_file():
+        known = json.loads(source.read_text(encoding="utf-8"))
+        if known | origin == known:
+            return int(known["vehicles"])
+    vehicles = _write_road(run, camera_file)
+    with open_atomic(source) as file:
+        json.dump(origin | {"vehicles": vehicles}, file)
+    return vehicles
+
+
+def _write_road(run: Path, camera_file: str) -> int:
+    from jeat_graph.io.table_writer import write_columns
+    from jeat_graph.road.box_rows import BoxConfig
+    from jeat_graph.road.boxes_road import follow_boxes
+    from jeat_graph.road.camera_file import read_camera
+    from jeat_graph.road.cuboid_fit import CuboidConfig
+    from jeat_graph.road.inputs import RoadMarks
+    from jeat_graph.road.lanes import LaneConfig
+    from jeat_graph.road.points_road import summarise
+    from jeat_graph.road.results import write_result
+    from jeat_graph.road.road_page import write_road_page
+    from jeat_graph.road.sources import boxes_of
+    from jeat_graph.road.speeds import ContactConfig
+    from jeat_graph.road.traffic import TrafficConfig, count_columns, headway_columns
+
+    camera, out, traffic = read_camera(camera_file), run / ROAD, TrafficConfig()
+    sized = follow_boxes(boxes_of(run, camera, BoxConfig()), camera, CuboidConfig())
+    vehicles = [one.vehicle for one in sized]
+    marks = RoadMarks({}, {})
+    result = summarise(vehicles, camera, marks, ContactConfig(0.0, 0.0, 0.0), LaneConfig(), sized)
+    write_result(result, out)
+    write_columns(count_columns(result, traffic), out / "counts.csv")
+    write_columns(headway_columns(result, traffic), out / "headways.csv")
+    write_road_page(result, camera, traffic, run.name, out / "road.html")
+    return len(vehicles)
