@@ -42,8 +42,8 @@ def read_manifest(path: str | Path) -> list[ManifestRow]:
 
     Columns: `detections` (files of the recording, joined by `;`), and, all optional, `name` (default: the
     first file's name without its suffix), `config`, `set` (settings joined by `;`), `gt`, `rate` (Hz),
-    `camera` (YAML file). Paths are relative to the manifest's folder. The files themselves are not looked at here: a recording that
-    cannot be read is that recording's failure, not the batch's.
+    `camera` (YAML file). Paths are relative to the manifest's folder. The files themselves are not looked at
+    here: a recording that cannot be read is that recording's failure, not the batch's.
 
     Raises:
         DataError: names the line and what is wrong: an unknown column, a name that is no file name or that
