@@ -11,7 +11,7 @@ from numba import njit
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.simulation.imaging.config import RenderConfig
 from jeat_graph.simulation.imaging.ground import Layout, ground_albedo, layout_of
-from jeat_graph.simulation.imaging.lighting import Lights, Surface, lamp_lux
+from jeat_graph.simulation.imaging.lighting import LUMINANCE, Lights, Surface, lamp_lux
 from jeat_graph.simulation.imaging.optics import Optics, splat_glow
 from jeat_graph.simulation.imaging.smooth import value_noise
 from jeat_graph.simulation.imaging.tiles import View, view_of
@@ -54,6 +54,32 @@ class Background(NamedTuple):
     front_depth: FloatArray
     glow: FloatArray
     whole: FloatArray
+
+
+# Of a pixel of the packed picture: light of the ground (lux), its place x, y (m), cover and depth of what
+# stands in front, its place x, y (m); from PACKED on, in each channel: radiance of the back, albedo over π in
+# headlights, radiance of the front times cover, its albedo likewise, glow.
+LUX, PLACE, COVER, DEPTH, WALL, PACKED = 0, 1, 3, 4, 5, 7
+
+
+def pack(background: Background, lights: Lights, view: View, channels: int) -> FloatArray:
+    """Lay the static picture flat, (H, W, 7 + 5 C), in three channels or in luminance alone."""
+    b = background
+    height, width = b.lux.shape
+    tint = lights.head_tint / math.pi
+    planes = [b.back, b.albedo * tint, b.front, b.front_albedo * tint, b.glow]
+    if channels == 1:
+        planes = [(plane @ LUMINANCE)[..., None] for plane in planes]
+    lens = view.lens
+    X = (np.arange(width) + 0.5 - lens[2])[None, :] / lens[0]
+    Y = (np.arange(height) + 0.5 - lens[3])[:, None] / lens[1]
+    depth = np.where(np.isfinite(b.front_depth), b.front_depth, 0.0)
+    wall = [
+        view.eye[k] + depth * (X * view.rotation[0, k] + Y * view.rotation[1, k] + view.rotation[2, k])
+        for k in range(2)
+    ]
+    flat = [b.lux[..., None], b.place, b.front_cover[..., None], b.front_depth[..., None]]
+    return np.concatenate([*flat, np.stack(wall, axis=2), *planes], axis=2)
 
 
 def make_background(scene: Scene, lights: Lights, optics: Optics, config: RenderConfig) -> Background:

@@ -4,14 +4,40 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 
-from jeat_graph.data.arrays import FloatArray
-from jeat_graph.simulation.imaging.layers import insert, meets
-from jeat_graph.simulation.imaging.optics import core_at, glow_at
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.simulation.imaging.layers import GLOW, Canvas, insert, meets
+from jeat_graph.simulation.imaging.moments import (
+    BOX,
+    FACE,
+    FACE_LIGHT,
+    FACE_PLANE,
+    FACE_RECORD,
+    FACE_SIDE,
+    FACE_SLANT,
+    FACES,
+    FAR,
+    HULL,
+    LAMP_FLUX,
+    LAMP_REACH,
+    LAMP_SEEN,
+    NEAR,
+    PAINT,
+    SIDES,
+)
+from jeat_graph.simulation.imaging.optics import Optics, core_at, glow_at
 from jeat_graph.simulation.imaging.paint import Body, paint
 from jeat_graph.simulation.imaging.smooth import clamp01
-from jeat_graph.simulation.imaging.stage import Stage
+from jeat_graph.simulation.imaging.stage import (
+    SKIN_COLOUR,
+    SKIN_KIND,
+    SKIN_SALT,
+    SKY_LUX,
+    SKY_TINT,
+    SUN_LUX,
+)
 from jeat_graph.simulation.imaging.tiles import TILE_W, Tile
 
 _LAMP_AHEAD_M = 0.4
@@ -19,34 +45,60 @@ _GLASS_MIRROR = 0.10
 
 
 @njit(cache=True)
-def add_body(tile: Tile, j: int, v: int, part: int, stage: Stage) -> None:
-    """Add one body of one vehicle: its cover of each pixel is the product of its outline's half-planes."""
-    row0, column0, rows, columns = tile
-    moments, look, lights, view = stage.moments, stage.look, stage.lights, stage.camera
-    sides = moments.hull_count[j, v, part]
-    box = moments.part_box[j, v, part]
-    if sides == 0 or not meets(box, row0, column0):
+def add_body(
+    tile: Tile, body: FloatArray, pose: FloatArray, fade: float, skin: FloatArray, camera: FloatArray,
+    scene: FloatArray, canvas: Canvas,
+) -> None:  # fmt: skip
+    """Add one body of one vehicle: its cover of each pixel is the product of its outline's half-planes.
+
+    Args:
+        tile: where.
+        body: (BODY_RECORD,) of it (see `moments`).
+        pose: (4,) of the vehicle.
+        fade: of the vehicle.
+        skin: (8,) of the vehicle (see `stage`).
+        camera: (18,) of the stage.
+        scene: (12,) of the stage.
+        canvas: where to.
+    """
+    if body[SIDES] == 0.0 or not meets(body[BOX : BOX + 4], tile.row, tile.column):
         return
-    hull, plane = moments.hull[j, v, part], moments.face_depth[j, v, part]
-    border, light = moments.face_side[j, v, part], moments.face_light[j, v, part]
-    faces, face = moments.face_count[j, v, part], moments.face[j, v, part]
-    slant, fade = moments.face_slant[j, v, part], moments.fade[j, v]
-    x, y, sin, cos = moments.pose[j, v]
-    fx, fy, cx, cy = view.lens[0], view.lens[1], view.lens[2], view.lens[3]
-    R, eye = view.rotation, view.eye
-    length, wide, high = look.size[v]
-    colour = (look.colour[v, 0], look.colour[v, 1], look.colour[v, 2])
-    body = Body(look.kind[v], part, length, wide, high, colour, look.salt[v])
-    near, far = moments.depth[j, v, part, 0], moments.depth[j, v, part, 1]
-    mirror = _GLASS_MIRROR * (lights.sky_lux + 0.2 * lights.sun_lux)
-    tint = lights.sky_tint
-    for r in range(max(0, int(box[1]) - row0), min(rows, int(box[3]) + 1 - row0)):
+    # Most half-planes have a tile wholly within them, or wholly without: only the others are looked at again.
+    active = np.empty(6, dtype=np.int64)
+    sides = _active(body, HULL, int(body[SIDES]), tile, active)
+    if sides < 0:
+        return
+    borders = np.empty((3, 4), dtype=np.int64)
+    edges = np.empty(3, dtype=np.int64)
+    for f in range(int(body[FACES])):
+        edges[f] = _active(body, FACE + f * FACE_RECORD + FACE_SIDE, 4, tile, borders[f])
+    row0, column0 = tile.row, tile.column
+    x, y, sin, cos = pose
+    fx, fy, cx, cy = camera[0], camera[1], camera[2], camera[3]
+    off_x, off_y, eye_z = camera[6] - x, camera[7] - y, camera[8]
+    near, far = body[NEAR], body[FAR]
+    faces = int(body[FACES])
+    mirror = _GLASS_MIRROR * (scene[SKY_LUX] + 0.2 * scene[SUN_LUX])
+    thing = Body(
+        int(skin[SKIN_KIND]),
+        int(body[PAINT]),
+        skin[0],
+        skin[1],
+        skin[2],
+        (skin[SKIN_COLOUR], skin[SKIN_COLOUR + 1], skin[SKIN_COLOUR + 2]),
+        int(skin[SKIN_SALT]),
+    )
+    first = max(0, int(body[BOX]) - column0)
+    last = min(tile.columns, int(body[BOX + 2]) + 1 - column0)
+    for r in range(max(0, int(body[BOX + 1]) - row0), min(tile.rows, int(body[BOX + 3]) + 1 - row0)):
         b = row0 + r + 0.5
-        for c in range(max(0, int(box[0]) - column0), min(columns, int(box[2]) + 1 - column0)):
+        favourite = 0
+        for c in range(first, last):
             a = column0 + c + 0.5
             cover = 1.0
             for k in range(sides):
-                cover *= clamp01(hull[k, 0] * a + hull[k, 1] * b + hull[k, 2])
+                at = active[k]
+                cover *= clamp01(body[at] * a + body[at + 1] * b + body[at + 2])
                 if cover <= 0.0:
                     break
             if cover <= 0.0:
@@ -54,65 +106,100 @@ def add_body(tile: Tile, j: int, v: int, part: int, stage: Stage) -> None:
             total, best, depth = 0.0, 0.0, far
             red = green = blue = 0.0
             X, Y = (a - cx) / fx, (b - cy) / fy
-            for f in range(faces):
+            for turn in range(faces):
+                # The face of the pixel before comes first: where it has all of the pixel, others have none.
+                f = favourite if turn == 0 else (turn - 1 if turn <= favourite else turn)
+                face = FACE + f * FACE_RECORD
                 weight = 1.0
-                for k in range(4):
-                    weight *= clamp01(border[f, k, 0] * a + border[f, k, 1] * b + border[f, k, 2])
+                if edges[f] < 0:
+                    continue
+                for k in range(edges[f]):
+                    at = borders[f, k]
+                    weight *= clamp01(body[at] * a + body[at + 1] * b + body[at + 2])
                 if weight <= 0.0:
                     continue
-                inverse = plane[f, 0] * a + plane[f, 1] * b + plane[f, 2]
+                at = face + FACE_PLANE
+                inverse = body[at] * a + body[at + 1] * b + body[at + 2]
                 Z = 1.0 / inverse if inverse > 1e-9 else far
                 Z = min(max(Z, near), far)
                 if weight > best:
-                    best, depth = weight, Z
-                dx = eye[0] - x + Z * (X * R[0, 0] + Y * R[1, 0] + R[2, 0])
-                dy = eye[1] - y + Z * (X * R[0, 1] + Y * R[1, 1] + R[2, 1])
-                dz = eye[2] + Z * (X * R[0, 2] + Y * R[1, 2] + R[2, 2])
+                    best, depth, favourite = weight, Z, f
+                dx = off_x + Z * (X * camera[9] + Y * camera[12] + camera[15])
+                dy = off_y + Z * (X * camera[10] + Y * camera[13] + camera[16])
+                dz = eye_z + Z * (X * camera[11] + Y * camera[14] + camera[17])
                 along, across = dx * sin + dy * cos, dx * cos - dy * sin
-                pr, pg, pb, glass = paint(body, face[f], along, across, dz, Z / fx * slant[f])
-                red += weight * (pr * light[f, 0] + mirror * glass * tint[0])
-                green += weight * (pg * light[f, 1] + mirror * glass * tint[1])
-                blue += weight * (pb * light[f, 2] + mirror * glass * tint[2])
+                pr, pg, pb, glass = paint(
+                    thing, int(body[face]), along, across, dz, Z / fx * body[face + FACE_SLANT]
+                )
+                at = face + FACE_LIGHT
+                red += weight * (pr * body[at] + mirror * glass * scene[SKY_TINT])
+                green += weight * (pg * body[at + 1] + mirror * glass * scene[SKY_TINT + 1])
+                blue += weight * (pb * body[at + 2] + mirror * glass * scene[SKY_TINT + 2])
                 total += weight
+                if weight >= 1.0:
+                    break
             if total <= 0.0:
                 continue
             cover *= fade
             scale = cover / (total * math.pi)
-            insert(stage.layers, r * TILE_W + c, depth, cover, red * scale, green * scale, blue * scale)
+            p = r * TILE_W + c
+            insert(canvas.filled, canvas.value, p, depth, cover, red * scale, green * scale, blue * scale)
 
 
 @njit(cache=True)
-def add_lamps(tile: Tile, j: int, v: int, stage: Stage) -> None:
-    """Add the images of a vehicle's lamps, just before its body."""
-    row0, column0, rows, columns = tile
-    moments, optics, layers = stage.moments, stage.optics, stage.layers
-    for k in range(4):
-        red, green, blue = moments.lamp_flux[j, v, k]
+def _active(body: FloatArray, first: int, count: int, tile: Tile, active: IntArray) -> int:
+    """List the half-planes that cut a tile, by their places in the record; -1 if one leaves nothing of it."""
+    left, top = tile.column + 0.5, tile.row + 0.5
+    right, low = left + tile.columns - 1, top + tile.rows - 1
+    found = 0
+    for k in range(count):
+        at = first + 3 * k
+        a, b, c = body[at], body[at + 1], body[at + 2]
+        most = max(a * left, a * right) + max(b * top, b * low) + c
+        if most <= 0.0:
+            return -1
+        if min(a * left, a * right) + min(b * top, b * low) + c < 1.0:
+            active[found] = at
+            found += 1
+    return found
+
+
+@njit(cache=True)
+def add_lamps(tile: Tile, lamps: FloatArray, optics: Optics, filled: IntArray, value: FloatArray) -> None:
+    """Add the images of a vehicle's lamps (LAMPS, LAMP_RECORD), just before its body."""
+    row0, column0 = tile.row, tile.column
+    for k in range(len(lamps)):
+        red, green, blue = lamps[k, LAMP_FLUX], lamps[k, LAMP_FLUX + 1], lamps[k, LAMP_FLUX + 2]
         if red <= 0.0:
             continue
-        u, w, Z, sigma = moments.lamp[j, v, k]
+        u, w, Z, sigma = lamps[k, 0], lamps[k, 1], lamps[k, 2], lamps[k, 3]
         reach = 4.0 * sigma
-        for r in range(max(0, int(w - reach) - row0), min(rows, int(w + reach) + 1 - row0)):
-            for c in range(max(0, int(u - reach) - column0), min(columns, int(u + reach) + 1 - column0)):
+        for r in range(max(0, int(w - reach) - row0), min(tile.rows, int(w + reach) + 1 - row0)):
+            for c in range(max(0, int(u - reach) - column0), min(tile.columns, int(u + reach) + 1 - column0)):
                 part = core_at((column0 + c + 0.5 - u) ** 2 + (row0 + r + 0.5 - w) ** 2, sigma, optics)
                 if part > 0.0:
                     p = r * TILE_W + c
-                    insert(layers, p, Z - _LAMP_AHEAD_M, 0.0, part * red, part * green, part * blue)
+                    insert(filled, value, p, Z - _LAMP_AHEAD_M, 0.0, part * red, part * green, part * blue)
 
 
 @njit(cache=True)
-def add_glow(tile: Tile, j: int, v: int, k: int, stage: Stage, out: FloatArray) -> None:
-    """Add a lamp's glow, which lies over everything."""
-    row0, column0, rows, columns = tile
-    moments, optics = stage.moments, stage.optics
-    reach = optics.reach_px
-    u, w = moments.lamp[j, v, k, 0], moments.lamp[j, v, k, 1]
-    seen = moments.lamp_seen[j, v, k]
-    red, green, blue = moments.lamp_flux[j, v, k]
-    for r in range(max(0, int(w - reach) - row0), min(rows, int(w + reach) + 1 - row0)):
-        for c in range(max(0, int(u - reach) - column0), min(columns, int(u + reach) + 1 - column0)):
-            part = seen * glow_at((column0 + c + 0.5 - u) ** 2 + (row0 + r + 0.5 - w) ** 2, optics)
-            p = r * TILE_W + c
-            out[p, 0] += part * red
-            out[p, 1] += part * green
-            out[p, 2] += part * blue
+def add_glow(tile: Tile, lamps: FloatArray, optics: Optics, light: FloatArray) -> None:
+    """Add the glow of a vehicle's lamps (LAMPS, LAMP_RECORD), which lies over everything, to `light`."""
+    row0, column0 = tile.row, tile.column
+    mono = light.shape[1] == GLOW + 1
+    for k in range(len(lamps)):
+        seen, reach = lamps[k, LAMP_SEEN], lamps[k, LAMP_REACH]
+        if seen <= 0.0:
+            continue
+        u, w = lamps[k, 0], lamps[k, 1]
+        red, green, blue = lamps[k, LAMP_FLUX], lamps[k, LAMP_FLUX + 1], lamps[k, LAMP_FLUX + 2]
+        for r in range(max(0, int(w - reach) - row0), min(tile.rows, int(w + reach) + 1 - row0)):
+            for c in range(max(0, int(u - reach) - column0), min(tile.columns, int(u + reach) + 1 - column0)):
+                part = seen * glow_at((column0 + c + 0.5 - u) ** 2 + (row0 + r + 0.5 - w) ** 2, optics)
+                p = r * TILE_W + c
+                if mono:
+                    light[p, GLOW] += part * (0.2126 * red + 0.7152 * green + 0.0722 * blue)
+                else:
+                    light[p, GLOW] += part * red
+                    light[p, GLOW + 1] += part * green
+                    light[p, GLOW + 2] += part * blue

@@ -8,6 +8,7 @@ from typing import Any
 
 from jeat_graph.config.fields import check, choice, number
 from jeat_graph.config.section_tree import build
+from jeat_graph.simulation.imaging.event_sensors import SENSORS, with_sensor
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,11 @@ class RenderConfig:
         0.06, "1", "how far glow reaches, as a fraction of the picture's width", 0.005, 0.2
     )
     max_step_px: float = number(
-        1.0, "px", "no vehicle moves farther than this from one rendering to the next", 0.1, 8.0
+        2.0,
+        "px",
+        "no vehicle moves farther than this from one rendering to the next; 1 for studies of timing",
+        0.1,
+        8.0,
     )
     far_m: float = number(230.0, "m", "vehicles beyond are not drawn", 30.0)
 
@@ -78,10 +83,13 @@ class EventCameraConfig:
     """The event camera: `physical`, a pixel circuit on linear radiance, or `carla`, as that simulator does.
 
     Physical pixels follow ESIM (Rebecq, Gehrig, Scaramuzza 2018) with the noise sources of v2e (Hu, Liu,
-    Delbruck 2021).
+    Delbruck 2021), at rates that were measured on real cameras (see `event_sensors`).
     """
 
     mode: str = choice("physical", ("physical", "carla"), "which model")
+    sensor: str = choice(
+        "davis346", tuple(SENSORS), "whose noise it has; the settings below are those of davis346"
+    )
     threshold_on: float = number(0.2, "ln", "contrast threshold of brighter events (v2e: 0.2)", 0.01)
     threshold_off: float = number(0.2, "ln", "contrast threshold of darker events (v2e: 0.2)", 0.01)
     threshold_sigma: float = number(
@@ -100,12 +108,26 @@ class EventCameraConfig:
     dark_luminance: float = number(
         0.005, "cd/m²", "luminance whose photocurrent equals the dark current (Nozaki, Delbruck 2017)"
     )
-    leak_rate_hz: float = number(0.1, "Hz", "rate of leak events, always brighter (v2e `noisy`: 0.1)")
-    shot_rate_hz: float = number(1.0, "Hz", "rate of shot-noise events of a pixel in the dark (v2e: 1 to 10)")
-    shot_bright_factor: float = number(0.25, "1", "factor on that rate in bright light (v2e: 0.25)", 0.0, 1.0)
-    shot_half_luminance: float = number(
-        0.3, "cd/m²", "luminance at which half of the fall is done", open_low=True
+    leak_rate_hz: float = number(
+        0.001,
+        "Hz",
+        "leak events, always brighter, in the dark and at 25 °C",
     )
+    leak_per_cd_m2: float = number(
+        0.0006,
+        "1/(cd/m²)",
+        "how much larger the leak is per luminance (stray light; Nozaki 2017)",
+    )
+    temperature_c: float = number(25.0, "°C", "of the chip: leak in the dark doubles every 8 K", -40.0, 125.0)
+    shot_rate_hz: float = number(12.0, "Hz", "rate of shot-noise events of a pixel in the dark (IEBCS: 11.8)")
+    shot_half_luminance: float = number(
+        0.03, "cd/m²", "luminance at which that rate has fallen to a half", open_low=True
+    )
+    shot_power: float = number(1.25, "1", "power with which it falls beyond", 0.1, 4.0)
+    shot_bright_factor: float = number(0.0, "1", "what it falls to at most, as a share", 0.0, 1.0)
+    shot_on_share: float = number(0.5, "1", "share of brighter events in shot noise", 0.0, 1.0)
+    hot_share: float = number(0.0, "1", "share of pixels that are hot", 0.0, 0.1)
+    hot_rate_hz: tuple[float, float] = number((10.0, 300.0), "Hz", "rates of hot pixels, lowest and highest")
     rate_spread_decades: float = number(
         0.1, "decades", "spread of leak and shot rates over pixels, std (v2e `noise_rate_cov_decades`: 0.1)"
     )
@@ -153,6 +175,9 @@ def load_imaging(tree: Mapping[str, Any] | None = None) -> ImagingConfig:
     Raises:
         ConfigError: unknown key (with the nearest known one) or bad value.
     """
-    out = build(ImagingConfig, tree, "imaging.")
+    sections = dict(tree or {})
+    if isinstance(sections.get("evt"), Mapping):
+        sections["evt"] = with_sensor(sections["evt"])
+    out = build(ImagingConfig, sections, "imaging.")
     assert isinstance(out, ImagingConfig)
     return out

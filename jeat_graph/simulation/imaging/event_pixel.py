@@ -3,11 +3,12 @@
 ESIM's rule on linear radiance: between two samples the logarithm of the photocurrent is a straight line, and
 an event falls where it has gone a threshold away from where it was at the event before. What a real pixel
 adds, after v2e: a photoreceptor whose bandwidth falls with light, thresholds that differ between pixels, a
-dead time, leak, and shot noise.
+dead time, leak that grows with light, shot noise that grows as light falls, and a few hot pixels.
 
 An event is *by motion* if the noise-free signal (the photoreceptor's output, without leak and noise) has
-itself gone at least half a threshold in the event's direction since the pixel's last reset, which is the end
-of its last event's dead time; else noise had the larger share in it.
+itself gone at least half a threshold in the event's direction since the end of the dead time of the pixel's
+last event by motion; else noise had the larger share in it. Events of noise in between change nothing in
+that count, so that they neither take a vehicle's events for themselves nor hide behind them.
 """
 
 from __future__ import annotations
@@ -26,18 +27,26 @@ from jeat_graph.simulation.imaging.pixel_random import exponential, seeds, unifo
 
 _LEAST_THRESHOLD = 0.01
 _ARRIVED = 1e-6  # a photoreceptor this near to its input (ln) is taken to be there
+_HOT_ON = 0.9  # share of brighter events of hot pixels, whose leak is what makes them hot
+_WARM_K = 8.0  # warming that doubles a junction's dark current
+_ROOM_C = 25.0
+
+# Columns of the pixels' constants and of their state.
+ON, OFF, LEAK, SHOT, HOT = range(5)
+LUMINANCE, SIGNAL, OUTPUT, REFERENCE, AT_RESET, BLIND_UNTIL, NEXT_SHOT, HELD = range(8)
 
 
 class PixelModel(NamedTuple):
     """Constants of all pixels; times in µs.
 
     Attributes:
-        on: (N,) threshold of brighter events (ln).
-        off: (N,) threshold of darker events (ln).
-        leak: (N,) drift of the reference (ln/µs).
-        shot: (N,) rate of shot noise in the dark (1/µs).
-        shot_bright: factor on it in bright light.
-        shot_half: luminance at which half of the fall is done (cd/m²).
+        table: (N, 5) thresholds of brighter and darker events (ln), leak in the dark (ln/µs), rates of shot
+            noise in the dark and of a hot pixel's events (1/µs).
+        leak_light: how much larger the leak is per luminance (1/(cd/m²)).
+        shot_half: luminance at which shot noise has fallen to a half (cd/m²).
+        shot_power: of its fall.
+        shot_least: what it falls to, as a share of that in the dark.
+        shot_on: share of brighter events in it.
         refractory: dead time (µs).
         dark: luminance of the dark current (cd/m²).
         cutoff_max: highest bandwidth (1/µs, as 2 π f); 0 for no limit.
@@ -45,57 +54,67 @@ class PixelModel(NamedTuple):
         cutoff_min: lowest bandwidth.
     """
 
-    on: FloatArray
-    off: FloatArray
-    leak: FloatArray
-    shot: FloatArray
-    shot_bright: float
+    table: FloatArray
+    leak_light: float
     shot_half: float
+    shot_power: float
+    shot_least: float
+    shot_on: float
     refractory: float
     dark: float
     cutoff_max: float
     cutoff_slope: float
     cutoff_min: float
 
+    @property
+    def on(self) -> FloatArray:
+        """Thresholds of brighter events (N,)."""
+        return self.table[:, ON]
+
+    @property
+    def off(self) -> FloatArray:
+        """Thresholds of darker events (N,)."""
+        return self.table[:, OFF]
+
 
 class PixelState(NamedTuple):
-    """What all pixels remember, each (N,).
+    """What all pixels remember.
 
     Attributes:
-        luminance: what was seen at the last sample (cd/m²).
-        signal: logarithm of the photocurrent then.
-        output: the photoreceptor's output at the last sample.
-        reference: output at the last event, less what has leaked since.
-        at_reset: output, noise-free, when the pixel was last reset.
-        blind_until: end of the dead time (µs).
-        next_shot: next candidate of shot noise (µs).
-        random: states of the pixels' random numbers.
+        table: (N, 8) luminance at the last sample (cd/m²), logarithm of the photocurrent then, the
+            photoreceptor's output, output at the last event less what has leaked since, noise-free output
+            after the last event by motion, end of the dead time (µs), next candidate of noise (µs), and
+            whether the dead time is that of an event by motion (1).
+        random: (N,) states of the pixels' random numbers.
     """
 
-    luminance: FloatArray
-    signal: FloatArray
-    output: FloatArray
-    reference: FloatArray
-    at_reset: FloatArray
-    blind_until: FloatArray
-    next_shot: FloatArray
+    table: FloatArray
     random: npt.NDArray[np.uint64]
 
 
 def make_model(config: EventCameraConfig, rng: np.random.Generator, count: int) -> PixelModel:
     """Draw the pixels of one camera: its mismatch is the same in every segment."""
     draw = rng.standard_normal((4, count))
-    on = np.maximum(config.threshold_on + config.threshold_sigma * draw[0], _LEAST_THRESHOLD)
-    off = np.maximum(config.threshold_off + config.threshold_sigma * draw[1], _LEAST_THRESHOLD)
+    table = np.zeros((count, 5))
+    table[:, ON] = np.maximum(config.threshold_on + config.threshold_sigma * draw[0], _LEAST_THRESHOLD)
+    table[:, OFF] = np.maximum(config.threshold_off + config.threshold_sigma * draw[1], _LEAST_THRESHOLD)
     spread = 10.0 ** (config.rate_spread_decades * draw[2:])
+    warm = 2.0 ** ((config.temperature_c - _ROOM_C) / _WARM_K)
+    table[:, LEAK] = 1e-6 * config.leak_rate_hz * warm * spread[0] * table[:, ON]
+    table[:, SHOT] = 1e-6 * config.shot_rate_hz * spread[1]
+    hot = rng.random(count) < config.hot_share
+    low, high = config.hot_rate_hz
+    # Many are barely hot and few are very hot: rates are even in their logarithm.
+    rates = np.exp(rng.uniform(math.log(low), math.log(high), count))
+    table[:, HOT] = np.where(hot, 1e-6 * rates, 0.0)
     angular = 2.0 * math.pi * 1e-6
     return PixelModel(
-        on=on,
-        off=off,
-        leak=1e-6 * config.leak_rate_hz * spread[0] * on,
-        shot=1e-6 * config.shot_rate_hz * spread[1],
-        shot_bright=config.shot_bright_factor,
+        table=table,
+        leak_light=config.leak_per_cd_m2 / warm,
         shot_half=config.shot_half_luminance,
+        shot_power=config.shot_power,
+        shot_least=config.shot_bright_factor,
+        shot_on=config.shot_on_share,
         refractory=1e6 * config.refractory_s,
         dark=config.dark_luminance,
         cutoff_max=angular * config.cutoff_max_hz,
@@ -111,18 +130,15 @@ def make_state(model: PixelModel, luminance: FloatArray, rng: np.random.Generato
     """
     signal = np.log(luminance + model.dark)
     count = len(signal)
-    phase = np.where(model.leak > 0.0, rng.random(count), 0.0)
+    phase = np.where(model.table[:, LEAK] > 0.0, rng.random(count), 0.0)
     random = seeds(rng, count)
-    return PixelState(
-        luminance=np.array(luminance, dtype=np.float64),
-        signal=signal,
-        output=signal.copy(),
-        reference=signal - phase * model.on,
-        at_reset=signal.copy(),
-        blind_until=np.full(count, -np.inf),
-        next_shot=_first_shots(random, model.shot),
-        random=random,
-    )
+    table = np.zeros((count, 8))
+    table[:, LUMINANCE] = luminance
+    table[:, SIGNAL] = table[:, OUTPUT] = table[:, AT_RESET] = signal
+    table[:, REFERENCE] = signal - phase * model.on
+    table[:, BLIND_UNTIL] = -np.inf
+    table[:, NEXT_SHOT] = _first_shots(random, model.table[:, SHOT] + model.table[:, HOT])
+    return PixelState(table, random)
 
 
 @njit(cache=True)
@@ -152,6 +168,14 @@ def photoreceptor(
 
 
 @njit(cache=True)
+def shot_share(luminance: float, model: PixelModel) -> float:
+    """Rate of shot noise at a luminance (cd/m²), as a share of that in the dark."""
+    falling = 1.0 / (1.0 + (luminance / model.shot_half) ** model.shot_power)
+    out: float = model.shot_least + (1.0 - model.shot_least) * falling
+    return out
+
+
+@njit(cache=True)
 def advance(
     pixels: IntArray, luminance: FloatArray, start: float, end: float, settled: bool, model: PixelModel,
     state: PixelState, sink: Sink,
@@ -169,77 +193,83 @@ def advance(
         sink: where events go; it must have room.
     """
     duration = end - start
+    constants, memory, random = model.table, state.table, state.random
     for n in range(len(pixels)):
         i = pixels[n]
-        first = state.output[i]
+        first = memory[i, OUTPUT]
         last = first
         if not settled:
-            before = state.signal[i]
+            before = memory[i, SIGNAL]
             after = before
             # Most pixels of a tile see nothing new, and logarithms and exponentials are what costs.
-            if luminance[n] != state.luminance[i]:
+            if luminance[n] != memory[i, LUMINANCE]:
                 after = math.log(luminance[n] + model.dark)
-                state.luminance[i] = luminance[n]
-                state.signal[i] = after
+                memory[i, LUMINANCE] = luminance[n]
+                memory[i, SIGNAL] = after
             if after != before or first != after:
                 last = photoreceptor(first, before, after, duration, luminance[n], model)
                 if after == before and abs(last - after) < _ARRIVED:
                     last = after
-                state.output[i] = last
+                memory[i, OUTPUT] = last
         # The leak of the reference is taken as a rise of the signal, and given back at the end.
-        leak = model.leak[i]
+        leak = constants[i, LEAK] * (1.0 + model.leak_light * luminance[n])
+        rise = last - first + leak * duration
+        reference = memory[i, REFERENCE]
+        on, off = constants[i, ON], constants[i, OFF]
+        blind = memory[i, BLIND_UNTIL]
+        if memory[i, NEXT_SHOT] > end and -off < first + rise - reference < on and blind <= start:
+            memory[i, REFERENCE] = reference - leak * duration
+            continue
         true_slope = (last - first) / duration
         slope = true_slope + leak
-        reference = state.reference[i]
-        on, off = model.on[i], model.off[i]
-        blind = state.blind_until[i]
-        top = first + slope * duration - reference
-        if state.next_shot[i] > end and -off < top < on and blind <= start:
-            state.reference[i] = reference - leak * duration
-            continue
+        shot_rate, hot_rate = constants[i, SHOT], constants[i, HOT]
         now = start
         while True:
             if blind > now:
                 # In the dead time the pixel's amplifier is held at its input; shot noise is lost.
-                while state.next_shot[i] < blind:
-                    state.next_shot[i] += exponential(state.random, i, model.shot[i])
+                while memory[i, NEXT_SHOT] < blind:
+                    memory[i, NEXT_SHOT] += exponential(random, i, shot_rate + hot_rate)
                 if blind > end:
                     break
                 now = blind
                 reference = first + slope * (now - start)
-                state.at_reset[i] = first + true_slope * (now - start)
+                if memory[i, HELD] > 0.0:
+                    memory[i, AT_RESET] = first + true_slope * (now - start)
+                    memory[i, HELD] = 0.0
             crossing = math.inf
             if slope > 0.0:
                 crossing = start + (reference + on - first) / slope
             elif slope < 0.0:
                 crossing = start + (reference - off - first) / slope
             crossing = max(crossing, now)
-            shot = state.next_shot[i]
+            shot = memory[i, NEXT_SHOT]
+            true = 0.0
             if crossing <= end and crossing <= shot:
                 now = crossing
                 brighter = slope > 0.0
                 reference += on if brighter else -off
                 true = first + true_slope * (now - start)
-                change = true - state.at_reset[i]
+                change = true - memory[i, AT_RESET]
                 by_motion = change >= 0.5 * on if brighter else -change >= 0.5 * off
             elif shot <= end:
                 now = max(shot, now)
-                state.next_shot[i] = shot + exponential(state.random, i, model.shot[i])
-                dimming = luminance[n] / (luminance[n] + model.shot_half)
-                if uniform(state.random, i) >= 1.0 - (1.0 - model.shot_bright) * dimming:
+                memory[i, NEXT_SHOT] = shot + exponential(random, i, shot_rate + hot_rate)
+                pick = uniform(random, i) * (shot_rate + hot_rate)
+                if pick >= hot_rate + shot_rate * shot_share(luminance[n], model):
                     continue
-                brighter = uniform(state.random, i) < 0.5
-                true = first + true_slope * (now - start)
+                brighter = uniform(random, i) < (_HOT_ON if pick < hot_rate else model.shot_on)
                 reference = first + slope * (now - start)
                 by_motion = False
             else:
                 break
             put(sink, now, i, brighter, by_motion)
-            state.at_reset[i] = true
+            if by_motion:
+                memory[i, AT_RESET] = true
+                memory[i, HELD] = 1.0
             if model.refractory > 0.0:
                 blind = now + model.refractory
-        state.blind_until[i] = blind
-        state.reference[i] = reference - leak * duration
+        memory[i, BLIND_UNTIL] = blind
+        memory[i, REFERENCE] = reference - leak * duration
 
 
 @njit(cache=True)
@@ -247,6 +277,5 @@ def unsettled(pixels: IntArray, luminance: FloatArray, model: PixelModel, state:
     """Greatest distance (ln) of the pixels' outputs from what they see."""
     most = 0.0
     for n in range(len(pixels)):
-        i = pixels[n]
-        most = max(most, abs(math.log(luminance[n] + model.dark) - state.output[i]))
+        most = max(most, abs(math.log(luminance[n] + model.dark) - state.table[pixels[n], OUTPUT]))
     return most

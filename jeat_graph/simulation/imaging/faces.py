@@ -5,11 +5,21 @@ from __future__ import annotations
 from numba import njit
 
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.simulation.imaging.lighting import Headlamps, Lights, Surface, beam_lux, lamp_lux
+from jeat_graph.simulation.imaging.lamps import chord
+from jeat_graph.simulation.imaging.lighting import (
+    LAMP_HEIGHT_M,
+    Headlamps,
+    Lights,
+    Surface,
+    beam_lux,
+    lamp_lux,
+)
 from jeat_graph.simulation.imaging.moments import Look, Moments
 
 # A face is lit evenly; beams light it as at most this high, for most of their light falls on its lower part.
 _LIT_HEIGHT_M = 0.9
+_NEGLIGIBLE_LUX = 0.01
+_BLOCKED_M = 0.5  # way through a vehicle after which a beam is blocked
 _BACK_LUX = 0.3  # what the road before a vehicle gives back of its own beams to its front
 
 
@@ -29,13 +39,16 @@ def light_face(
     beams = 0.0
     if lights.on:
         for w in range(len(look.kind)):
-            if w == v or look.parked[w] or out.fade[j, w] <= 0.0:
+            if w == v or not look.beams[w] or out.fade[j, w] <= 0.0:
                 continue
             ox, oy, sin, cos = out.pose[j, w]
             lamp_x, lamp_y = ox + 0.5 * look.size[w, 0] * sin, oy + 0.5 * look.size[w, 0] * cos
             low = Surface(at.x, at.y, min(at.z, _LIT_HEIGHT_M), nx, ny, nz)
-            beams += beam_lux(low, Headlamps(lamp_x, lamp_y, sin, cos), lights)
-        if ny * out.pose[j, v, 3] + nx * out.pose[j, v, 2] > 0.5 and not look.parked[v]:
+            lux = beam_lux(low, Headlamps(lamp_x, lamp_y, sin, cos), lights)
+            if lux > _NEGLIGIBLE_LUX:
+                lux *= _free(out, j, v, w, look, low, lamp_x, lamp_y)
+            beams += lux
+        if ny * out.pose[j, v, 3] + nx * out.pose[j, v, 2] > 0.5 and look.beams[v]:
             beams += _BACK_LUX
     for c in range(3):
         light[c] = (
@@ -44,3 +57,22 @@ def light_face(
             + lamp * lights.lamp_tint[c]
             + beams * lights.head_tint[c]
         )
+
+
+@njit(cache=True)
+def _free(
+    out: Moments, j: int, v: int, w: int, look: Look, at: Surface, lamp_x: float, lamp_y: float
+) -> float:
+    """Part of the beams of vehicle `w` that others leave free on their way to a face of vehicle `v`."""
+    free = 1.0
+    for k in range(len(look.kind)):
+        if k in (v, w) or out.fade[j, k] <= 0.0:
+            continue
+        ox, oy = out.pose[j, k, 0], out.pose[j, k, 1]
+        half = 0.5 * (look.size[k, 0] + look.size[k, 1])
+        apart = ox + half < min(lamp_x, at.x) or ox - half > max(lamp_x, at.x)
+        apart |= oy + half < min(lamp_y, at.y) or oy - half > max(lamp_y, at.y)
+        if not apart:
+            inside = chord(lamp_x, lamp_y, LAMP_HEIGHT_M, at.x, at.y, at.z, out.pose[j, k], look.size[k])
+            free *= 1.0 - min(1.0, inside / _BLOCKED_M)
+    return free

@@ -8,29 +8,42 @@ from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.simulation.imaging.lighting import LAMP_HEIGHT_M, Lights, beam_candela
-from jeat_graph.simulation.imaging.moments import Look, Moments
+from jeat_graph.simulation.imaging.moments import LAMP_FLUX, LAMP_REACH, LAMP_SEEN, Look, Moments
 from jeat_graph.simulation.imaging.optics import Optics
 from jeat_graph.simulation.imaging.tiles import View
 
-LAMPS = 4  # two in front, two behind
+LAMPS = 7
+NONE, HEAD, TAIL, BRAKE, MARKER, FLASHER = range(6)
+# Across (of the width), height (m), kind and strength of the lamps that every vehicle has.
+COMMON_LAMPS = (
+    (-0.39, LAMP_HEIGHT_M, HEAD, 1.0),
+    (0.39, LAMP_HEIGHT_M, HEAD, 1.0),
+    (-0.39, LAMP_HEIGHT_M + 0.2, TAIL, 1.0),
+    (0.39, LAMP_HEIGHT_M + 0.2, TAIL, 1.0),
+    *((0.0, 0.0, NONE, 0.0),) * 3,
+)
 _LAMP_SIGMA_M = 0.07
-_TAIL_ABOVE_M = 0.2  # how much higher than headlights tail lamps stand
-_LAMP_ACROSS = 0.39  # of the width, from the middle
+_MARKER_SHARE = 0.25  # of a tail lamp's intensity (UN R7: end-outline markers)
 _HIDDEN_M = 0.2  # way through another vehicle after which a lamp is hidden
+_FAINT = 0.002  # of the luminance there is: glow below it is left out
+_INVERSE_POWER = 0.8  # 1 / 1.25, of the glow's power in the squared distance
 
 
 @njit(cache=True)
 def light_lamps(out: Moments, j: int, v: int, brake: float, look: Look, view: View, lights: Lights) -> None:
-    """Place the lamps of a vehicle in the picture: two in front, two behind."""
+    """Place the lamps of a vehicle in the picture."""
     x, y, sin, cos = out.pose[j, v]
     length, wide = look.size[v, 0], look.size[v, 1]
     fx, fy, cx, cy = view.lens[0], view.lens[1], view.lens[2], view.lens[3]
     eye, rotation = view.eye, view.rotation
     for k in range(LAMPS):
-        ahead = 1.0 if k < 2 else -1.0
-        across = _LAMP_ACROSS * wide * (1.0 if k & 1 else -1.0)
+        kind = int(look.lamps[v, k, 2])
+        if kind == NONE:
+            continue
+        ahead = 1.0 if kind == HEAD else -1.0
+        across = look.lamps[v, k, 0] * wide
         along = 0.5 * length * ahead
-        z = LAMP_HEIGHT_M + (0.0 if k < 2 else _TAIL_ABOVE_M)
+        z = look.lamps[v, k, 1]
         dx, dy = x + along * sin + across * cos - eye[0], y + along * cos - across * sin - eye[1]
         dz = z - eye[2]
         Z = rotation[2, 0] * dx + rotation[2, 1] * dy + rotation[2, 2] * dz
@@ -42,24 +55,33 @@ def light_lamps(out: Moments, j: int, v: int, brake: float, look: Look, view: Vi
         facing = forward / math.sqrt(distance2)
         if look.parked[v]:
             power = lights.parking_candela * facing
-        elif k < 2:
+        elif kind == HEAD:
             right = -(dx * cos - dy * sin)
             power = 0.5 * beam_candela(forward, right, -dz, lights.beam_candela, lights.beam_stray)
-        else:
+        elif kind == TAIL:
             power = (lights.tail_candela + (lights.brake_candela - lights.tail_candela) * brake) * facing
+        elif kind == BRAKE:
+            power = lights.brake_candela * brake * facing
+        else:
+            power = _MARKER_SHARE * lights.tail_candela * facing
         at = out.lamp[j, v, k]
         at[0] = fx * (rotation[0, 0] * dx + rotation[0, 1] * dy + rotation[0, 2] * dz) / Z + cx
         at[1] = fy * (rotation[1, 0] * dx + rotation[1, 1] * dy + rotation[1, 2] * dz) / Z + cy
         at[2] = Z
         at[3] = math.sqrt((_LAMP_SIGMA_M * fx / Z) ** 2 + 0.25)
-        red = k >= 2
+        power *= look.lamps[v, k, 3]
         for c in range(3):
-            tint = lights.tail_tint[c] if red else lights.head_tint[c]
-            out.lamp_flux[j, v, k, c] = out.fade[j, v] * power * fx * fy / distance2 * tint
+            tint = lights.head_tint[c] if kind == HEAD else lights.tail_tint[c]
+            at[LAMP_FLUX + c] = out.fade[j, v] * power * fx * fy / distance2 * tint
+        box, reach = out.touch[j, v, 0], 4.0 * at[3]
+        box[0], box[1] = min(box[0], at[0] - reach), min(box[1], at[1] - reach)
+        box[2], box[3] = max(box[2], at[0] + reach), max(box[3], at[1] + reach)
 
 
 @njit(cache=True)
-def hide_lamps(out: Moments, j: int, look: Look, eye: FloatArray, optics: Optics, every: IntArray) -> None:
+def hide_lamps(
+    out: Moments, j: int, look: Look, eye: FloatArray, lights: Lights, optics: Optics, every: IntArray
+) -> None:
     """Dim the lamps that stand behind other vehicles, and say how far their glow reaches."""
     for v in range(len(look.kind)):
         if (j + 1) % every[v] != 0:
@@ -67,13 +89,14 @@ def hide_lamps(out: Moments, j: int, look: Look, eye: FloatArray, optics: Optics
         box = out.touch[j, v, 1]
         box[0], box[1], box[2], box[3] = 1e9, 1e9, -1e9, -1e9
         for k in range(LAMPS):
-            if out.lamp_flux[j, v, k, 0] <= 0.0:
+            at = out.lamp[j, v, k]
+            if at[LAMP_FLUX] <= 0.0:
                 continue
             x, y, sin, cos = out.pose[j, v]
-            along = (0.5 if k < 2 else -0.5) * look.size[v, 0]
-            across = _LAMP_ACROSS * look.size[v, 1] * (1.0 if k & 1 else -1.0)
+            along = (0.5 if look.lamps[v, k, 2] == HEAD else -0.5) * look.size[v, 0]
+            across = look.lamps[v, k, 0] * look.size[v, 1]
             px, py = x + along * sin + across * cos, y + along * cos - across * sin
-            pz = LAMP_HEIGHT_M + (0.0 if k < 2 else _TAIL_ABOVE_M)
+            pz = look.lamps[v, k, 1]
             free = 1.0
             for w in range(len(look.kind)):
                 if w != v and out.fade[j, w] > 0.0:
@@ -82,12 +105,15 @@ def hide_lamps(out: Moments, j: int, look: Look, eye: FloatArray, optics: Optics
                         continue
                     inside = chord(px, py, pz, eye[0], eye[1], eye[2], out.pose[j, w], look.size[w])
                     free *= 1.0 - min(1.0, inside / _HIDDEN_M)
-            out.lamp_seen[j, v, k] = free
+            at[LAMP_SEEN] = free
             if free > 0.0:
-                u, vv = out.lamp[j, v, k, 0], out.lamp[j, v, k, 1]
-                reach = max(optics.reach_px, 4.0 * out.lamp[j, v, k, 3])
-                box[0], box[1] = min(box[0], u - reach), min(box[1], vv - reach)
-                box[2], box[3] = max(box[2], u + reach), max(box[3], vv + reach)
+                # Where glow falls below what can be told from the picture it is left out.
+                level = optics.scale * at[LAMP_FLUX] / (_FAINT * lights.floor)
+                reach = optics.core_px * math.sqrt(max(level, 1.0) ** _INVERSE_POWER - 1.0)
+                at[LAMP_REACH] = min(optics.reach_px, reach)
+                reach = max(at[LAMP_REACH], 4.0 * at[3])
+                box[0], box[1] = min(box[0], at[0] - reach), min(box[1], at[1] - reach)
+                box[2], box[3] = max(box[2], at[0] + reach), max(box[3], at[1] + reach)
 
 
 @njit(cache=True)

@@ -10,47 +10,63 @@ from numba import njit
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.simulation.imaging.tiles import TILE, TILE_H, TILE_W
 
-_LAYERS = 12  # bodies and lights over one pixel; more are left out, and nobody would see them
+LAYERS = 12  # bodies and lights over one pixel; more are left out, and nobody would see them
+# Of a tile's light: on the ground and on barriers by headlights (lux), then glow in each channel.
+ON_GROUND, ON_WALL, GLOW = 0, 1, 2
 
 
-class Layers(NamedTuple):
-    """Room to work in, for the P pixels of a tile.
+class Canvas(NamedTuple):
+    """Room to work in, for the P pixels of a tile in C channels (3, or 1 for luminance alone).
 
     Attributes:
         filled: (P,) bodies and lights over each pixel.
-        value: (P, _LAYERS, 5) their depth, cover and colour times cover, the farthest first.
+        value: (P, LAYERS, 2 + C) their depth, cover and colour times cover, the farthest first.
         shade: (P, 2) part of the sky's and of the sun's light that vehicles leave the ground.
-        beams: (P, 2) illuminance of the ground and of the barriers by headlights (lux).
+        ground: (P, 7 + 5 C) the tile's part of `Background.packed`.
+        light: (P, 2 + C) light of beams (lux) and glow (cd/m²) over the tile.
+        out: (P, C) what was painted (cd/m²).
     """
 
     filled: IntArray
     value: FloatArray
     shade: FloatArray
-    beams: FloatArray
+    ground: FloatArray
+    light: FloatArray
+    out: FloatArray
 
 
-def make_layers() -> Layers:
+def make_canvas(channels: int) -> Canvas:
     """Make room for one tile."""
-    return Layers(
-        np.zeros(TILE, dtype=np.int64), np.zeros((TILE, _LAYERS, 5)), np.zeros((TILE, 2)), np.zeros((TILE, 2))
+    return Canvas(
+        filled=np.zeros(TILE, dtype=np.int64),
+        value=np.zeros((TILE, LAYERS, 2 + channels)),
+        shade=np.ones((TILE, 2)),
+        ground=np.zeros((TILE, 7 + 5 * channels)),
+        light=np.zeros((TILE, 2 + channels)),
+        out=np.zeros((TILE, channels)),
     )
 
 
 @njit(cache=True)
-def insert(layers: Layers, p: int, depth: float, cover: float, r: float, g: float, b: float) -> None:
+def insert(
+    filled: IntArray, value: FloatArray, p: int, depth: float, cover: float, r: float, g: float, b: float
+) -> None:
     """Put a layer over a pixel in its place by depth, the farthest first."""
-    n = layers.filled[p]
-    if n == _LAYERS:
+    n = filled[p]
+    if n == LAYERS:
         return
-    value = layers.value
+    channels = value.shape[2] - 2
     at = n
     while at > 0 and value[p, at - 1, 0] < depth:
-        for k in range(5):
+        for k in range(2 + channels):
             value[p, at, k] = value[p, at - 1, k]
         at -= 1
     value[p, at, 0], value[p, at, 1] = depth, cover
-    value[p, at, 2], value[p, at, 3], value[p, at, 4] = r, g, b
-    layers.filled[p] = n + 1
+    if channels == 1:
+        value[p, at, 2] = 0.2126 * r + 0.7152 * g + 0.0722 * b
+    else:
+        value[p, at, 2], value[p, at, 3], value[p, at, 4] = r, g, b
+    filled[p] = n + 1
 
 
 @njit(cache=True)

@@ -16,6 +16,7 @@ from jeat_graph.simulation.world.scene import Scene
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB primaries (ITU-R BT.709)
 LAMP_HEIGHT_M = 0.65  # of headlights above the road
 _FAR_LAMPS_M = 400.0
+_FLOOR_CD_M2 = 0.005  # what a pixel's dark current is worth
 # A beam is drawn as far as it adds this fraction of the light that is there anyway, and no farther.
 _BEAM_SHARE, _BEAM_MIN_M, _BEAM_MAX_M = 0.005, 6.0, 90.0
 
@@ -40,6 +41,7 @@ class Lights(NamedTuple):
         beam_candela: peak of a vehicle's low beams (cd).
         beam_stray: share of it above the cut-off.
         beam_range_m: distance at which beams are cut off.
+        floor: luminance of the darkest that there is to see (cd/m²), below which nothing shows.
         tail_candela: of one tail light (cd).
         brake_candela: of one brake light (cd).
         parking_candela: of one light of a parked vehicle (cd).
@@ -59,6 +61,7 @@ class Lights(NamedTuple):
     beam_candela: float
     beam_stray: float
     beam_range_m: float
+    floor: float
     tail_candela: float
     brake_candela: float
     parking_candela: float
@@ -115,6 +118,7 @@ def lights_of(scene: Scene, config: RenderConfig) -> Lights:
         beam_candela=config.headlight_candela,
         beam_stray=config.headlight_stray,
         beam_range_m=min(max(reach, _BEAM_MIN_M), _BEAM_MAX_M),
+        floor=_FLOOR_CD_M2 + 0.04 * there / math.pi,
         tail_candela=config.taillight_candela,
         brake_candela=config.brakelight_candela,
         parking_candela=config.parking_candela,

@@ -23,6 +23,9 @@ class Look(NamedTuple):
         way: (V,) +1 facing away from the camera, -1 facing it.
         parked: (V,) true where it is parked.
         number: (V,) identity, for the instance buffer.
+        shape: (V, PARTS, 9) bodies as fractions of the size, and their paint (see `shapes`).
+        lamps: (V, LAMPS, 4) across (of the width), height (m), kind and strength (see `lamps`).
+        beams: (V,) true where headlights shine on the road.
     """
 
     kind: IntArray
@@ -32,10 +35,23 @@ class Look(NamedTuple):
     way: IntArray
     parked: BoolArray
     number: IntArray
+    shape: FloatArray
+    lamps: FloatArray
+    beams: BoolArray
+
+
+# A body's record: sides and faces seen, box, nearest and farthest depth, outline, then a record a face.
+SIDES, FACES, BOX, NEAR, FAR, HULL, FACE = 0, 1, 2, 6, 7, 8, 26
+# A face's record: which, depth plane, light, 1 / cosine of the angle of view, half-planes of its four sides.
+FACE_PLANE, FACE_LIGHT, FACE_SLANT, FACE_SIDE, FACE_RECORD = 1, 4, 7, 8, 20
+PAINT = FACE + 3 * FACE_RECORD  # what it is painted as
+BODY_RECORD = PAINT + 1
+# A lamp's record: u, v (px), depth (m), size (px), flux in three channels, part seen, reach of its glow (px).
+LAMP_FLUX, LAMP_SEEN, LAMP_REACH, LAMP_RECORD = 4, 7, 8, 9
 
 
 class Moments(NamedTuple):
-    """V vehicles at J times, in the picture.
+    """V vehicles at J times, in the picture, as flat records that kernels take a view of cheaply.
 
     A half-plane is (a, b, c): a u + b v + c is 0.5 plus the signed distance (px, inside positive) measured
     along the pixel grid, so that, limited to [0, 1], it is the part of a pixel on its inner side. A depth
@@ -45,38 +61,21 @@ class Moments(NamedTuple):
         times: (J,) s.
         pose: (J, V, 4) x, y (m), sine and cosine of the direction of the vehicle's front.
         fade: (J, V) 0 where the vehicle is not there or out of range, up to 1.
-        part_box: (J, V, PARTS, 4) left, top, right, bottom (px) of each body; empty where it is not seen.
-        hull_count: (J, V, PARTS) sides of its outline.
-        hull: (J, V, PARTS, 6, 3) half-planes of the outline.
-        face_count: (J, V, PARTS) faces seen.
-        face: (J, V, PARTS, 3) which.
-        face_side: (J, V, PARTS, 3, 4, 3) half-planes of each face.
-        face_depth: (J, V, PARTS, 3, 3) depth planes.
-        face_light: (J, V, PARTS, 3, 3) illuminance in three channels (lux).
-        face_slant: (J, V, PARTS, 3) 1 / cosine of the angle of view.
-        depth: (J, V, PARTS, 2) nearest and farthest depth (m).
-        lamp: (J, V, 4, 4) u, v (px), depth (m) and size (px) of head and tail lamps.
-        lamp_flux: (J, V, 4, 3) radiance of the lamp's image, summed over pixels (cd/m²·px).
-        lamp_seen: (J, V, 4) part of it that other vehicles leave free.
+        body: (J, V, PARTS, BODY_RECORD) each body: sides of its outline and faces seen (0 where it is not
+            seen), box left, top, right, bottom (px), nearest and farthest depth (m), half-planes of the
+            outline (6), and of each face seen (3): which, depth plane, illuminance in three channels (lux),
+            1 / cosine of the angle of view, half-planes of its sides (4).
+        lamp: (J, V, LAMPS, LAMP_RECORD) each lamp: u, v (px), depth (m) and size (px), radiance of its image
+            summed over pixels (cd/m²·px) in three channels, the part of it that other vehicles leave free,
+            and how far its glow matters (px).
         touch: (J, V, 3, 4) boxes (px) of what a vehicle changes: body and shadow, glow, its beams' light.
     """
 
     times: FloatArray
     pose: FloatArray
     fade: FloatArray
-    part_box: FloatArray
-    hull_count: IntArray
-    hull: FloatArray
-    face_count: IntArray
-    face: IntArray
-    face_side: FloatArray
-    face_depth: FloatArray
-    face_light: FloatArray
-    face_slant: FloatArray
-    depth: FloatArray
+    body: FloatArray
     lamp: FloatArray
-    lamp_flux: FloatArray
-    lamp_seen: FloatArray
     touch: FloatArray
 
 
@@ -118,6 +117,7 @@ def line_up(states: VehicleStates, number: IntArray, times: FloatArray, far_m: f
     out.pose[at] = np.column_stack([states.pose[:, :2], sin, cos])[known]
     ahead = states.acceleration[:, 0] * sin + states.acceleration[:, 1] * cos
     # Vehicles come out of the distance gradually: one that appeared at once would be a burst of events.
-    out.fade[at] = np.clip((far_m - states.pose[:, 1]) / _FADE_M, 0.0, 1.0)[known]
+    away = np.hypot(states.pose[:, 0], states.pose[:, 1])
+    out.fade[at] = np.clip((far_m - away) / _FADE_M, 0.0, 1.0)[known]
     out.brake[at] = np.clip((-ahead - 0.6) / 0.8, 0.0, 1.0)[known]
     return out

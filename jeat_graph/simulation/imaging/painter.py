@@ -1,100 +1,122 @@
 """Radiance of one tile of the picture at one time: ground, bodies by depth, lights, glow.
 
-Each function loops over the pixels itself: handing all the tables to a function costs more than a pixel.
+Light that spreads smoothly, of beams and glow, is made apart from bodies, for it needs fewer times.
 """
 
 from __future__ import annotations
 
-import math
-
 from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.simulation.imaging.background import COVER, DEPTH, LUX, PACKED
 from jeat_graph.simulation.imaging.bodies import add_body, add_glow, add_lamps
-from jeat_graph.simulation.imaging.layers import meets
+from jeat_graph.simulation.imaging.layers import GLOW, ON_GROUND, ON_WALL, Canvas, meets
 from jeat_graph.simulation.imaging.road_light import cast_beams, cast_shadow
 from jeat_graph.simulation.imaging.shapes import PARTS
-from jeat_graph.simulation.imaging.stage import Stage
+from jeat_graph.simulation.imaging.stage import LIGHTS_ON, SUN_LUX, Stage
 from jeat_graph.simulation.imaging.tiles import TILE_H, TILE_W, Tile
 
 
 @njit(cache=True)
-def paint_tile(
-    row0: int, column0: int, j: int, who: IntArray, counts: IntArray, stage: Stage, out: FloatArray
-) -> None:
-    """Render the tile whose upper left pixel is (row0, column0) at time `j` of the stage's moments.
-
-    Args:
-        row0: first row.
-        column0: first column.
-        j: index of the time.
-        who: (3, V) vehicles whose bodies and shadows, glow and beams may touch the tile.
-        counts: (3,) how many of each.
-        stage: what there is to paint.
-        out: (TILE, 3) radiance (cd/m²), TILE_W pixels a row; those beyond the picture are left as they are.
-    """
-    moments, layers, on = stage.moments, stage.layers, stage.lights.on
-    height, width = stage.ground.lux.shape
+def take_ground(row0: int, column0: int, packed: FloatArray, ground: FloatArray) -> Tile:
+    """Copy a tile's part of the static picture to where it is at hand; returns the tile."""
+    height, width = packed.shape[:2]
     tile = Tile(row0, column0, min(TILE_H, height - row0), min(TILE_W, width - column0))
-    layers.filled[:] = 0
-    layers.shade[:] = 1.0
-    layers.beams[:] = 0.0
-    for n in range(counts[0]):
-        v = who[0, n]
-        if moments.fade[j, v] > 0.0:
-            for part in range(PARTS):
-                add_body(tile, j, v, part, stage)
-            if on:
-                add_lamps(tile, j, v, stage)
-            if meets(moments.touch[j, v, 0], row0, column0):
-                cast_shadow(tile, j, v, stage)
-    if counts[2]:
-        cast_beams(tile, j, who[2, : counts[2]], stage)
-    _compose(tile, stage, out)
-    for n in range(counts[1]):
-        v = who[1, n]
-        for k in range(4):
-            if moments.lamp_seen[j, v, k] > 0.0:
-                add_glow(tile, j, v, k, stage, out)
+    for r in range(tile.rows):
+        for c in range(tile.columns):
+            ground[r * TILE_W + c] = packed[row0 + r, column0 + c]
+    return tile
 
 
 @njit(cache=True)
-def _compose(tile: Tile, stage: Stage, out: FloatArray) -> None:
-    """Lay everything over the ground, from far to near."""
-    row0, column0, rows, columns = tile
-    ground, lights, layers = stage.ground, stage.lights, stage.layers
-    tint = lights.head_tint / math.pi
-    sun = lights.sun_lux
-    for r in range(rows):
-        for c in range(columns):
-            row, column, p = row0 + r, column0 + c, r * TILE_W + c
-            lux = ground.lux[row, column]
-            shade = 1.0
-            if lux > 0.0:
-                shade = ((lux - sun) * layers.shade[p, 0] + sun * layers.shade[p, 1]) / lux
-            lit, wall = layers.beams[p, 0], layers.beams[p, 1]
-            red = shade * ground.back[row, column, 0] + ground.albedo[row, column, 0] * lit * tint[0]
-            green = shade * ground.back[row, column, 1] + ground.albedo[row, column, 1] * lit * tint[1]
-            blue = shade * ground.back[row, column, 2] + ground.albedo[row, column, 2] * lit * tint[2]
-            cover = ground.front_cover[row, column]
-            depth = ground.front_depth[row, column] if cover > 0.0 else -1.0
-            for n in range(layers.filled[p] + 1):
-                last = n == layers.filled[p]
-                if depth > 0.0 and (last or layers.value[p, n, 0] < depth):
-                    red, green, blue = red * (1.0 - cover), green * (1.0 - cover), blue * (1.0 - cover)
-                    red += ground.front[row, column, 0] + ground.front_albedo[row, column, 0] * wall * tint[0]
-                    green += (
-                        ground.front[row, column, 1] + ground.front_albedo[row, column, 1] * wall * tint[1]
-                    )
-                    blue += (
-                        ground.front[row, column, 2] + ground.front_albedo[row, column, 2] * wall * tint[2]
-                    )
-                    depth = -1.0
-                if not last:
-                    free = 1.0 - layers.value[p, n, 1]
-                    red = red * free + layers.value[p, n, 2]
-                    green = green * free + layers.value[p, n, 3]
-                    blue = blue * free + layers.value[p, n, 4]
-            out[p, 0] = red + ground.glow[row, column, 0]
-            out[p, 1] = green + ground.glow[row, column, 1]
-            out[p, 2] = blue + ground.glow[row, column, 2]
+def light_tile(tile: Tile, j: int, who: IntArray, counts: IntArray, stage: Stage, light: FloatArray) -> None:
+    """Light of beams and glow over a tile at time `j`.
+
+    Args:
+        tile: whose ground is on the canvas.
+        j: index of the time.
+        who: (3, V) vehicles whose bodies, glow and beams may touch the tile.
+        counts: (3,) how many of each.
+        stage: what there is.
+        light: (P, 2 + C) filled.
+    """
+    moments = stage.moments
+    light[:] = 0.0
+    if counts[2]:
+        cast_beams(
+            tile, who[2, : counts[2]], moments.pose[j], moments.fade[j], stage.skin, stage.scene,
+            stage.canvas.ground, light,
+        )  # fmt: skip
+    for n in range(counts[1]):
+        add_glow(tile, moments.lamp[j, who[1, n]], stage.optics, light)
+
+
+@njit(cache=True)
+def paint_tile(tile: Tile, j: int, who: IntArray, counts: IntArray, stage: Stage, light: FloatArray) -> bool:
+    """Render a tile at time `j` onto the canvas; says whether any vehicle touched it.
+
+    Args:
+        tile: whose ground is on the canvas.
+        j: index of the time.
+        who: (3, V) vehicles whose bodies, glow and beams may touch the tile.
+        counts: (3,) how many of each.
+        stage: what there is.
+        light: (P, 2 + C) of beams and glow, as from `light_tile`.
+    """
+    canvas, scene, moments = stage.canvas, stage.scene, stage.moments
+    canvas.filled[:] = 0
+    shaded = touched = False
+    for n in range(counts[0]):
+        v = who[0, n]
+        fade = moments.fade[j, v]
+        if fade > 0.0 and meets(moments.touch[j, v, 0], tile.row, tile.column):
+            if not shaded:
+                canvas.shade[:] = 1.0
+                shaded = touched = True
+            pose, skin = moments.pose[j, v], stage.skin[v]
+            for part in range(PARTS):
+                add_body(tile, moments.body[j, v, part], pose, fade, skin, stage.camera, scene, canvas)
+            cast_shadow(tile, pose, skin, scene, canvas.ground, canvas.shade)
+            if scene[LIGHTS_ON] > 0.0:
+                add_lamps(tile, moments.lamp[j, v], stage.optics, canvas.filled, canvas.value)
+    compose(tile, shaded, scene[SUN_LUX], light, canvas)
+    return touched
+
+
+@njit(cache=True)
+def compose(tile: Tile, shaded: bool, sun: float, light: FloatArray, canvas: Canvas) -> None:
+    """Lay everything over the ground, from far to near.
+
+    Args:
+        tile: where.
+        shaded: whether the canvas's `shade` counts.
+        sun: light of the sun (lux).
+        light: of beams and glow.
+        canvas: its `out` is filled.
+    """
+    ground, filled, value, shade, out = canvas.ground, canvas.filled, canvas.value, canvas.shade, canvas.out
+    channels = out.shape[1]
+    back, albedo = PACKED, PACKED + channels
+    front, front_albedo, glow = PACKED + 2 * channels, PACKED + 3 * channels, PACKED + 4 * channels
+    for r in range(tile.rows):
+        for c in range(tile.columns):
+            p = r * TILE_W + c
+            lux = ground[p, LUX]
+            left = 1.0
+            if shaded and lux > 0.0:
+                left = ((lux - sun) * shade[p, 0] + sun * shade[p, 1]) / lux
+            lit, wall = light[p, ON_GROUND], light[p, ON_WALL]
+            cover = ground[p, COVER]
+            depth = ground[p, DEPTH] if cover > 0.0 else -1.0
+            for k in range(channels):
+                level = left * ground[p, back + k] + ground[p, albedo + k] * lit
+                waiting = depth > 0.0
+                for n in range(filled[p] + 1):
+                    last = n == filled[p]
+                    if waiting and (last or value[p, n, 0] < depth):
+                        level = level * (1.0 - cover) + ground[p, front + k]
+                        level += ground[p, front_albedo + k] * wall
+                        waiting = False
+                    if not last:
+                        level = level * (1.0 - value[p, n, 1]) + value[p, n, 2 + k]
+                out[p, k] = level + ground[p, glow + k] + light[p, GLOW + k]

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.simulation.imaging.moments import Look, Moments
+from jeat_graph.simulation.imaging.moments import NEAR, SIDES, Look, Moments
 from jeat_graph.simulation.imaging.tiles import TILE_H, TILE_W, View
 
 MAX_STEPS = 256
@@ -24,7 +24,8 @@ class Plan(NamedTuple):
     Attributes:
         look: the V vehicles there are in it.
         boxes: (V, 3, 4) what each changes in the picture (px): body and shadow, glow, beams' light.
-        steps: (T,) how often each tile is rendered, a power of two; 0 where nothing changes.
+        steps: (T,) how often each tile's bodies are painted, a power of two; 0 where there are none.
+        lit: (T,) how often its beams and glow are at most, a power of two; 0 where there are none.
         most: the greatest of them, at least 1.
         every: (V,) stride at which a vehicle is needed among `most` times.
     """
@@ -32,6 +33,7 @@ class Plan(NamedTuple):
     look: Look
     boxes: FloatArray
     steps: IntArray
+    lit: IntArray
     most: int
     every: IntArray
 
@@ -50,7 +52,7 @@ def make_plan(
 
     Args:
         moments: the vehicles at the interval's beginning, middle and end.
-        velocity: (V, 2) greatest speed across and along the road (m/s).
+        velocity: (V, 2) greatest speed across and along each vehicle's way (m/s).
         look: the vehicles.
         tiles: (T, 2) first row and column of the tiles.
         view: the camera.
@@ -64,13 +66,17 @@ def make_plan(
     boxes = np.concatenate([low, high], axis=2)
     if not on:
         boxes[:, 1:, 2] = -np.inf
-    seen = (moments.hull_count > 0) & (moments.fade > 0.0)[..., None]
-    near = np.where(seen, moments.depth[..., 0], np.inf).min(axis=(0, 2))
-    steps, needed = _plan(
-        tiles, boxes, velocity, near, np.ascontiguousarray(look.size[:, 2]), view, duration_s, step_px
+    seen = (moments.body[..., SIDES] > 0) & (moments.fade > 0.0)[..., None]
+    near = np.where(seen, moments.body[..., NEAR], np.inf).min(axis=(0, 2))
+    way = np.zeros((len(look.kind), 2))
+    for j in range(len(moments.times)):
+        way = np.where(moments.fade[j][:, None] > 0.0, moments.pose[j, :, 2:], way)
+    motion = np.column_stack([velocity, way])
+    steps, lit, needed = _plan(
+        tiles, boxes, motion, near, np.ascontiguousarray(look.size[:, 2]), view, duration_s, step_px
     )
-    count = int(max(steps.max(initial=1), 1))
-    return Plan(look, boxes, steps, count, count // np.maximum(needed, 1))
+    count = int(max(steps.max(initial=1), lit.max(initial=1), 1))
+    return Plan(look, boxes, steps, lit, count, count // np.maximum(needed, 1))
 
 
 @njit(cache=True)
@@ -101,50 +107,64 @@ def who_touches(row0: int, column0: int, boxes: FloatArray, who: IntArray, count
 
 @njit(cache=True)
 def _plan(
-    tiles: IntArray, boxes: FloatArray, velocity: FloatArray, near: FloatArray, top: FloatArray, view: View,
+    tiles: IntArray, boxes: FloatArray, motion: FloatArray, near: FloatArray, top: FloatArray, view: View,
     duration: float, step_px: float,
-) -> tuple[IntArray, IntArray]:  # fmt: skip
-    """Steps of each tile, and the most that each vehicle's own image is needed for."""
+) -> tuple[IntArray, IntArray, IntArray]:  # fmt: skip
+    """Steps of each tile's bodies and of its light, and the most that each vehicle's image is needed for."""
     fx, fy, cx, cy = view.lens[0], view.lens[1], view.lens[2], view.lens[3]
     R = view.rotation
     steps = np.zeros(len(tiles), dtype=np.int64)
+    lit = np.zeros(len(tiles), dtype=np.int64)
     needed = np.ones(len(boxes), dtype=np.int64)
     who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)
     counts = np.zeros(3, dtype=np.int64)
-    # What moves along the road moves away from the road's vanishing point, in proportion to the distance
+    # What moves straight on moves away from its direction's vanishing point, in proportion to the distance
     # from it and to speed over depth.
-    vanish_u, vanish_v = np.inf, np.inf
-    if R[2, 1] > 1e-6:
-        vanish_u, vanish_v = fx * R[0, 1] / R[2, 1] + cx, fy * R[1, 1] / R[2, 1] + cy
+    vanish = np.full((len(boxes), 2), np.inf)
+    for v in range(len(boxes)):
+        sin, cos = motion[v, 2], motion[v, 3]
+        ahead = R[2, 0] * sin + R[2, 1] * cos
+        if abs(ahead) > 1e-6:
+            vanish[v, 0] = fx * (R[0, 0] * sin + R[0, 1] * cos) / ahead + cx
+            vanish[v, 1] = fy * (R[1, 0] * sin + R[1, 1] * cos) / ahead + cy
     for n in range(len(tiles)):
         row0, column0 = tiles[n]
         if who_touches(row0, column0, boxes, who, counts) == 0:
             continue
-        du = max(abs(column0 - vanish_u), abs(column0 + TILE_W - vanish_u))
-        dv = max(abs(row0 - vanish_v), abs(row0 + TILE_H - vanish_v))
-        away = np.sqrt(du * du + dv * dv)
         X, Y = (column0 + 0.5 * TILE_W - cx) / fx, (row0 + TILE_H - cy) / fy
         fall = X * R[0, 2] + Y * R[1, 2] + R[2, 2]
-        most = 1.0
         for kind in range(3):
+            most = 1.0
             for m in range(counts[kind]):
                 v = who[kind, m]
+                du = max(abs(column0 - vanish[v, 0]), abs(column0 + TILE_W - vanish[v, 0]))
+                dv = max(abs(row0 - vanish[v, 1]), abs(row0 + TILE_H - vanish[v, 1]))
                 # The nearest place of the vehicle that this tile can show is at the height of its roof.
                 depth = near[v]
                 if fall < -1e-6:
                     depth = max(depth, 0.95 * (top[v] - view.eye[2]) / fall)
-                across, along = velocity[v, 0], velocity[v, 1]
-                flow = duration * (along * away + across * fx) / max(depth, 0.3) / step_px
+                across, along = motion[v, 0], motion[v, 1]
+                flow = duration * (along * np.sqrt(du * du + dv * dv) + across * fx)
+                flow /= max(depth, 0.3) * step_px
                 if kind == 1:
                     flow /= _GLOW_EASE
                 elif kind == 2:
                     flow = min(flow / _BEAM_EASE, duration * along / (_BEAM_STEP_M * step_px))
                 most = max(most, flow)
-        count = 1
-        while count < most and count < MAX_STEPS:
-            count *= 2
-        steps[n] = count
-        for kind in range(2):
-            for m in range(counts[kind]):
-                needed[who[kind, m]] = max(needed[who[kind, m]], count)
-    return steps, needed
+            count = 1
+            while count < most and count < MAX_STEPS:
+                count *= 2
+            if counts[kind] == 0:
+                continue
+            if kind == 0:
+                steps[n] = count
+            else:
+                lit[n] = max(lit[n], count)
+            if kind < 2:
+                for m in range(counts[kind]):
+                    needed[who[kind, m]] = max(needed[who[kind, m]], count)
+        if counts[1] and lit[n] > 1:
+            # Glow and beams share their times, so that each glowing vehicle is needed at all of them.
+            for m in range(counts[1]):
+                needed[who[1, m]] = max(needed[who[1, m]], lit[n])
+    return steps, lit, needed

@@ -11,16 +11,33 @@ from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.simulation.imaging.faces import light_face
 from jeat_graph.simulation.imaging.lamps import LAMPS, hide_lamps, light_lamps
 from jeat_graph.simulation.imaging.lighting import Lights, Surface
-from jeat_graph.simulation.imaging.moments import Look, Moments, Placed
+from jeat_graph.simulation.imaging.moments import (
+    BODY_RECORD,
+    BOX,
+    FACE,
+    FACE_LIGHT,
+    FACE_PLANE,
+    FACE_RECORD,
+    FACE_SIDE,
+    FACE_SLANT,
+    FACES,
+    FAR,
+    HULL,
+    LAMP_RECORD,
+    NEAR,
+    PAINT,
+    SIDES,
+    Look,
+    Moments,
+    Placed,
+)
 from jeat_graph.simulation.imaging.optics import Optics
 from jeat_graph.simulation.imaging.reach import touch
-from jeat_graph.simulation.imaging.shapes import BOTTOM, EDGES, FACE_CORNERS, PARTS, body_table
+from jeat_graph.simulation.imaging.shapes import BOTTOM, EDGES, FACE_CORNERS, PARTS
 from jeat_graph.simulation.imaging.tiles import View
-from jeat_graph.simulation.world.vehicles import KINDS
 
 NEAR_M = 0.5
 _MOST_SLANT = 6.0  # a face seen at a grazing angle is filtered no wider than this
-_BODIES = body_table(tuple(kind.name for kind in KINDS))
 
 
 def project_moments(
@@ -38,24 +55,12 @@ def project_moments(
         optics: of the lens.
     """
     count, vehicles = placed.pose.shape[:2]
-    p = (count, vehicles, PARTS)
     out = Moments(
         times=placed.times,
         pose=placed.pose,
         fade=placed.fade,
-        part_box=np.zeros((*p, 4)),
-        hull_count=np.zeros(p, dtype=np.int64),
-        hull=np.zeros((*p, 6, 3)),
-        face_count=np.zeros(p, dtype=np.int64),
-        face=np.zeros((*p, 3), dtype=np.int64),
-        face_side=np.zeros((*p, 3, 4, 3)),
-        face_depth=np.zeros((*p, 3, 3)),
-        face_light=np.zeros((*p, 3, 3)),
-        face_slant=np.zeros((*p, 3)),
-        depth=np.zeros((*p, 2)),
-        lamp=np.zeros((count, vehicles, LAMPS, 4)),
-        lamp_flux=np.zeros((count, vehicles, LAMPS, 3)),
-        lamp_seen=np.zeros((count, vehicles, LAMPS)),
+        body=np.zeros((count, vehicles, PARTS, BODY_RECORD)),
+        lamp=np.zeros((count, vehicles, LAMPS, LAMP_RECORD)),
         touch=np.zeros((count, vehicles, 3, 4)),
     )
     _project(out, placed.brake, look, every, view, lights, optics)
@@ -80,7 +85,9 @@ def _project(
             length, wide, high = look.size[v]
             low_m, high_m = _in_front(x, y, sin, cos, wide, high, eye, forward)
             for part in range(PARTS):
-                body = _BODIES[look.kind[v], part]
+                body = look.shape[v, part]
+                if body[7] <= body[6]:
+                    continue
                 if min(body[1], body[3]) * length <= low_m or max(body[0], body[2]) * length >= high_m:
                     continue
                 mid_x, mid_y, mid_z, mid_u, mid_v = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -105,9 +112,10 @@ def _project(
                     mid_v += pixel[k, 1] / 8.0
                 left, up = pixel[:, 0].min() - 1.0, pixel[:, 1].min() - 1.0
                 right, low = pixel[:, 0].max() + 1.0, pixel[:, 1].max() + 1.0
-                out.part_box[j, v, part] = np.array([left, up, right, low])
-                out.depth[j, v, part, 0] = pixel[:, 2].min()
-                out.depth[j, v, part, 1] = pixel[:, 2].max()
+                record = out.body[j, v, part]
+                record[BOX], record[BOX + 1], record[BOX + 2], record[BOX + 3] = left, up, right, low
+                record[PAINT] = body[8]
+                record[NEAR], record[FAR] = pixel[:, 2].min(), pixel[:, 2].max()
                 faces = 0
                 for f in range(6):
                     a, b = corner[FACE_CORNERS[f, 0]], corner[FACE_CORNERS[f, 1]]
@@ -127,31 +135,30 @@ def _project(
                     seen[f] = facing > 1e-6
                     if not seen[f] or f == BOTTOM or faces == 3:
                         continue
-                    out.face[j, v, part, faces] = f
+                    shown = record[FACE + faces * FACE_RECORD : FACE + (faces + 1) * FACE_RECORD]
+                    shown[0] = f
                     centre = (a + c) / 2.0
                     surface = Surface(centre[0], centre[1], centre[2], nx, ny, nz)
-                    _face_plane(out.face_depth[j, v, part, faces], surface, facing, view)
-                    _face_sides(out.face_side[j, v, part, faces], f, pixel)
+                    _face_plane(shown[FACE_PLANE : FACE_PLANE + 3], surface, facing, view)
+                    _face_sides(shown[FACE_SIDE:], f, pixel)
                     far = math.sqrt((eye[0] - mid_x) ** 2 + (eye[1] - mid_y) ** 2 + (eye[2] - mid_z) ** 2)
-                    out.face_slant[j, v, part, faces] = min(_MOST_SLANT, far / facing)
-                    light = out.face_light[j, v, part, faces]
-                    light_face(out, j, v, look, surface, lights, light)
+                    shown[FACE_SLANT] = min(_MOST_SLANT, far / facing)
+                    light_face(out, j, v, look, surface, lights, shown[FACE_LIGHT : FACE_LIGHT + 3])
                     faces += 1
-                out.face_count[j, v, part] = faces
+                record[FACES] = faces
                 sides = 0
                 middle = np.array([mid_u, mid_v, 0.0])
                 for k in range(12):
                     if seen[EDGES[k, 2]] != seen[EDGES[k, 3]] and sides < 6:
-                        _half_plane(
-                            pixel[EDGES[k, 0]], pixel[EDGES[k, 1]], middle, out.hull[j, v, part, sides]
-                        )
+                        side = record[HULL + 3 * sides : HULL + 3 * sides + 3]
+                        _half_plane(pixel[EDGES[k, 0]], pixel[EDGES[k, 1]], middle, side)
                         sides += 1
-                out.hull_count[j, v, part] = sides
+                record[SIDES] = sides
             touch(out, j, v, look, view, lights)
             if lights.on:
                 light_lamps(out, j, v, brake[j, v], look, view, lights)
         if lights.on:
-            hide_lamps(out, j, look, eye, optics, every)
+            hide_lamps(out, j, look, eye, lights, optics, every)
 
 
 @njit(cache=True)
@@ -186,11 +193,11 @@ def _face_plane(plane: FloatArray, face: Surface, facing: float, view: View) -> 
 
 @njit(cache=True)
 def _face_sides(sides: FloatArray, f: int, pixel: FloatArray) -> None:
-    """Write the half-planes (4, 3) of face `f` from the pixels (8, 3) of its body's corners."""
+    """Write the half-planes (12,) of face `f` from the pixels (8, 3) of its body's corners."""
     centre = (pixel[FACE_CORNERS[f, 0]] + pixel[FACE_CORNERS[f, 2]]) / 2.0
     for k in range(4):
         start, end = pixel[FACE_CORNERS[f, k]], pixel[FACE_CORNERS[f, (k + 1) % 4]]
-        _half_plane(start, end, centre, sides[k])
+        _half_plane(start, end, centre, sides[3 * k : 3 * k + 3])
 
 
 @njit(cache=True)

@@ -6,7 +6,7 @@ from numba import njit
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.simulation.imaging.lighting import Lights
-from jeat_graph.simulation.imaging.moments import Look, Moments
+from jeat_graph.simulation.imaging.moments import BOX, SIDES, Look, Moments
 from jeat_graph.simulation.imaging.shapes import PARTS
 from jeat_graph.simulation.imaging.tiles import View
 
@@ -21,10 +21,10 @@ def touch(out: Moments, j: int, v: int, look: Look, view: View, lights: Lights) 
     box = out.touch[j, v, 0]
     box[0], box[1], box[2], box[3] = 1e9, 1e9, -1e9, -1e9
     for part in range(PARTS):
-        if out.hull_count[j, v, part]:
-            body = out.part_box[j, v, part]
-            box[0], box[1] = min(box[0], body[0]), min(box[1], body[1])
-            box[2], box[3] = max(box[2], body[2]), max(box[3], body[3])
+        body = out.body[j, v, part]
+        if body[SIDES] > 0.0:
+            box[0], box[1] = min(box[0], body[BOX]), min(box[1], body[BOX + 1])
+            box[2], box[3] = max(box[2], body[BOX + 2]), max(box[3], body[BOX + 3])
     shift_x = shift_y = 0.0
     if lights.sun_lux > 0.0:
         shift_x = -lights.sun[0] / lights.sun[2] * high
@@ -41,7 +41,7 @@ def touch(out: Moments, j: int, v: int, look: Look, view: View, lights: Lights) 
         box[3] = view.lens[5]
     beam = out.touch[j, v, 2]
     beam[0], beam[1], beam[2], beam[3] = 1e9, 1e9, -1e9, -1e9
-    if lights.on and not look.parked[v]:
+    if lights.on and look.beams[v]:
         whole = True
         for k in range(16):
             share = (k >> 1) / 7.0

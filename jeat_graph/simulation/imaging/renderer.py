@@ -8,18 +8,20 @@ from numba import njit
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.simulation.imaging.background import Background, make_background
 from jeat_graph.simulation.imaging.config import RenderConfig
-from jeat_graph.simulation.imaging.layers import make_layers
+from jeat_graph.simulation.imaging.lamps import COMMON_LAMPS
 from jeat_graph.simulation.imaging.lighting import lights_of
 from jeat_graph.simulation.imaging.moments import Look, Moments, line_up
 from jeat_graph.simulation.imaging.optics import optics_of
 from jeat_graph.simulation.imaging.paint import PALETTE
-from jeat_graph.simulation.imaging.painter import paint_tile
+from jeat_graph.simulation.imaging.painter import light_tile, paint_tile, take_ground
 from jeat_graph.simulation.imaging.plan import Plan, make_plan, who_touches
 from jeat_graph.simulation.imaging.projection import project_moments
-from jeat_graph.simulation.imaging.stage import Stage
-from jeat_graph.simulation.imaging.tiles import TILE, TILE_H, TILE_W, tile_raster, view_of
+from jeat_graph.simulation.imaging.shapes import PARTS, shape_of
+from jeat_graph.simulation.imaging.stage import Setting, Stage, make_setting
+from jeat_graph.simulation.imaging.tiles import TILE_W, tile_raster, view_of
 from jeat_graph.simulation.streams import stream
 from jeat_graph.simulation.world.scene import Scene, VehicleStates
+from jeat_graph.simulation.world.vehicles import KIND_NAMES
 
 _NEAR_M = -25.0
 
@@ -43,7 +45,7 @@ class Renderer:
         self.view = view_of(scene.camera)
         self.background: Background = make_background(scene, self.lights, self.optics, config)
         self.tiles = tile_raster(scene.camera.width, scene.camera.height)
-        self._layers = make_layers()
+        self._settings: dict[int, Setting] = {}
         rng = stream(seed, "paint")
         total = max(1, len(scene.fleet) + len(scene.parked_fleet))
         palette = np.array(PALETTE)
@@ -67,7 +69,10 @@ class Renderer:
         moments = self._project(states, times, look, one)
         velocity = np.zeros((len(row), 2))
         column = np.searchsorted(look.number, states.object_id)
-        np.maximum.at(velocity, column, np.abs(states.velocity[:, :2]))
+        sin, cos = np.sin(states.pose[:, 2]), np.cos(states.pose[:, 2])
+        vx, vy = states.velocity[:, 0], states.velocity[:, 1]
+        way = np.stack([np.abs(vx * cos - vy * sin), np.abs(vx * sin + vy * cos)], axis=1)
+        np.maximum.at(velocity, column, way)
         duration = end_s - start_s if duration_s is None else duration_s
         step = self.config.max_step_px if step_px is None else step_px
         return make_plan(moments, velocity, look, self.tiles, self.view, step, duration, self.lights.on)
@@ -78,9 +83,13 @@ class Renderer:
         stride = np.ones(len(look.number), dtype=np.int64) if every is None else every
         return self._project(states, times, look, stride)
 
-    def stage(self, moments: Moments, look: Look) -> Stage:
-        """Put together what tiles are painted from."""
-        return Stage(self.background, moments, look, self.lights, self.optics, self.view, self._layers)
+    def stage(self, moments: Moments, look: Look, channels: int = 3) -> Stage:
+        """Put together what tiles are painted from, in three channels or in luminance alone (1)."""
+        if channels not in self._settings:
+            self._settings[channels] = make_setting(
+                self.background, self.lights, self.optics, self.view, channels
+            )
+        return self._settings[channels].stage(moments, look)
 
     def picture(self, time_s: float) -> FloatArray:
         """Render the whole picture at one time: radiance (H, W, 3) in cd/m²."""
@@ -100,6 +109,11 @@ class Renderer:
             way=states.direction[first],
             parked=states.parked[first],
             number=number,
+            shape=np.stack([shape_of(KIND_NAMES[k], 0) for k in states.kind[first]])
+            if len(first)
+            else np.zeros((0, PARTS, 9)),
+            lamps=np.tile(np.array(COMMON_LAMPS), (len(first), 1, 1)),
+            beams=~states.parked[first],
         )
         return look, first.astype(np.int64)
 
@@ -110,17 +124,17 @@ class Renderer:
 
 @njit(cache=True)
 def _paint_all(out: FloatArray, tiles: IntArray, boxes: FloatArray, stage: Stage) -> None:
-    """Paint the tiles that vehicles touch, at the first of the moments, into a picture (H, W, 3)."""
-    height, width = out.shape[:2]
+    """Paint the tiles that vehicles touch, at the first of the moments, into a picture (H, W, C)."""
     who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)
     counts = np.zeros(3, dtype=np.int64)
-    patch = np.zeros((TILE, 3))
+    canvas = stage.canvas
     for n in range(len(tiles)):
         row0, column0 = tiles[n]
         if who_touches(row0, column0, boxes, who, counts) == 0:
             continue
-        paint_tile(row0, column0, 0, who, counts, stage, patch)
-        for r in range(min(TILE_H, height - row0)):
-            for c in range(min(TILE_W, width - column0)):
-                for k in range(3):
-                    out[row0 + r, column0 + c, k] = patch[r * TILE_W + c, k]
+        tile = take_ground(row0, column0, stage.packed, canvas.ground)
+        light_tile(tile, 0, who, counts, stage, canvas.light)
+        paint_tile(tile, 0, who, counts, stage, canvas.light)
+        for r in range(tile.rows):
+            for c in range(tile.columns):
+                out[row0 + r, column0 + c] = canvas.out[r * TILE_W + c]

@@ -15,12 +15,13 @@ from numba import njit
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.simulation.imaging.config import RGBConfig
 from jeat_graph.simulation.imaging.lighting import LUMINANCE
-from jeat_graph.simulation.imaging.painter import paint_tile
+from jeat_graph.simulation.imaging.painter import light_tile, paint_tile, take_ground
 from jeat_graph.simulation.imaging.plan import who_touches
 from jeat_graph.simulation.imaging.renderer import Renderer
 from jeat_graph.simulation.imaging.stage import Stage
-from jeat_graph.simulation.imaging.tiles import TILE, TILE_H, TILE_W
+from jeat_graph.simulation.imaging.tiles import TILE_H, TILE_W
 
+_POISSON_BELOW_E = 60.0
 _EASE = 2.0  # a mean over time needs half the samples that events do
 
 
@@ -64,24 +65,32 @@ def expose(renderer: Renderer, time_s: float, exposure_s: float, readout_s: floa
     middle = np.minimum(renderer.tiles[:, 0] + TILE_H / 2.0, height)
     first = np.round(extra * middle / height).astype(np.int64)
     out = renderer.background.whole.copy()
-    _expose(out, renderer.tiles, plan.boxes, plan.steps, first, plan.most, renderer.stage(moments, plan.look))
+    steps = np.where((plan.steps == 0) & (plan.lit > 0), 1, plan.steps)
+    _expose(out, renderer.tiles, plan.boxes, steps, first, plan.most, renderer.stage(moments, plan.look))
     return out
 
 
 def electrons(radiance: FloatArray, time_s: float, config: RGBConfig, rng: np.random.Generator) -> FloatArray:
-    """Charge that is read from each pixel (e-): Poisson photoelectrons up to full well, plus read noise."""
+    """Charge that is read from each pixel (e-): Poisson photoelectrons up to full well, plus read noise.
+
+    From 60 electrons on a normal distribution stands for the Poisson one, whose skewness is then below 0.13.
+    """
     mean = np.maximum(radiance, 0.0) * (config.responsivity * time_s)
-    # Far above full well the noise does not matter, and large means cost more.
-    charge = rng.poisson(np.minimum(mean, 2.0 * config.full_well_e)).astype(np.float64)
-    out: FloatArray = np.minimum(charge, config.full_well_e)
-    out += config.read_noise_e * rng.standard_normal(out.shape)
-    return out
+    few = mean < _POISSON_BELOW_E
+    out = mean + np.sqrt(mean) * rng.standard_normal(mean.shape, dtype=np.float32)
+    out[few] = rng.poisson(mean[few])
+    np.minimum(out, config.full_well_e, out=out)
+    out += config.read_noise_e * rng.standard_normal(out.shape, dtype=np.float32)
+    return np.asarray(out, dtype=np.float64)
 
 
 def develop(charge: FloatArray, gain: float, config: RGBConfig) -> npt.NDArray[np.uint8]:
     """Gain, gamma and rounding to 8 bit."""
-    level = np.clip(charge * (gain / config.full_well_e), 0.0, 1.0)
-    return np.floor(255.0 * level ** (1.0 / config.gamma) + 0.5).astype(np.uint8)
+    level = np.clip(charge.astype(np.float32) * np.float32(gain / config.full_well_e), 0.0, 1.0)
+    out: npt.NDArray[np.uint8] = np.floor(255.0 * level ** np.float32(1.0 / config.gamma) + 0.5).astype(
+        np.uint8
+    )
+    return out
 
 
 @njit(cache=True)
@@ -90,24 +99,25 @@ def _expose(
     stage: Stage,
 ) -> None:  # fmt: skip
     """Replace the tiles that vehicles touch by the mean of their samples, from each tile's first on."""
-    height, width = out.shape[:2]
     who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)
     counts = np.zeros(3, dtype=np.int64)
-    patch = np.zeros((TILE, 3))
+    canvas = stage.canvas
     for n in range(len(tiles)):
         count = steps[n]
         if count == 0:
             continue
         row0, column0 = tiles[n]
         who_touches(row0, column0, boxes, who, counts)
+        tile = take_ground(row0, column0, stage.packed, canvas.ground)
+        # Beams and glow change smoothly: their light in the middle is their mean.
+        light_tile(tile, first[n] + available // 2, who, counts, stage, canvas.light)
         stride = available // count
-        rows, columns = min(TILE_H, height - row0), min(TILE_W, width - column0)
-        out[row0 : row0 + rows, column0 : column0 + columns] = 0.0
+        out[row0 : row0 + tile.rows, column0 : column0 + tile.columns] = 0.0
         for k in range(count):
             # The sample next to the middle of its part, which is the middle itself where the part is one.
             j = first[n] + k * stride + stride // 2
-            paint_tile(row0, column0, j, who, counts, stage, patch)
-            for r in range(rows):
-                for c in range(columns):
+            paint_tile(tile, j, who, counts, stage, canvas.light)
+            for r in range(tile.rows):
+                for c in range(tile.columns):
                     for channel in range(3):
-                        out[row0 + r, column0 + c, channel] += patch[r * TILE_W + c, channel] / count
+                        out[row0 + r, column0 + c, channel] += canvas.out[r * TILE_W + c, channel] / count

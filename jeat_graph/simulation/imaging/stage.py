@@ -4,21 +4,72 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from jeat_graph.simulation.imaging.background import Background
-from jeat_graph.simulation.imaging.layers import Layers
+import numpy as np
+
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.simulation.imaging.background import Background, pack
+from jeat_graph.simulation.imaging.layers import Canvas, make_canvas
 from jeat_graph.simulation.imaging.lighting import Lights
 from jeat_graph.simulation.imaging.moments import Look, Moments
 from jeat_graph.simulation.imaging.optics import Optics
 from jeat_graph.simulation.imaging.tiles import View
 
+# Of the flat numbers of a scene, for the kernels.
+SKY_LUX, SUN_LUX, SUN, BEAM_RANGE, BEAM_PEAK, BEAM_STRAY, LIGHTS_ON, SKY_TINT = 0, 1, 2, 5, 6, 7, 8, 9
+# Of the flat numbers of a vehicle: size, colour, kind, salt.
+SKIN_COLOUR, SKIN_KIND, SKIN_SALT = 3, 6, 7
+
 
 class Stage(NamedTuple):
-    """All that a tile is painted from: static picture, vehicles, lights, lens, camera, room to work."""
+    """All that a tile is painted from, in few arrays: handing tables to a function has its price.
 
-    ground: Background
+    Attributes:
+        packed: (H, W, 7 + 5 C) the static picture.
+        moments: the V vehicles at J times.
+        skin: (V, 8) their size, colour, kind, salt.
+        camera: (18,) fx, fy, cx, cy, width, height, eye (3), rotation (9).
+        scene: (12,) light of sky and sun, headlights.
+        optics: glow of the lens.
+        canvas: room to work.
+    """
+
+    packed: FloatArray
     moments: Moments
-    look: Look
-    lights: Lights
+    skin: FloatArray
+    camera: FloatArray
+    scene: FloatArray
     optics: Optics
-    camera: View
-    layers: Layers
+    canvas: Canvas
+
+
+class Setting(NamedTuple):
+    """What of a stage stays the same through a segment, in one number of channels."""
+
+    packed: FloatArray
+    camera: FloatArray
+    scene: FloatArray
+    optics: Optics
+    canvas: Canvas
+
+    def stage(self, moments: Moments, look: Look) -> Stage:
+        """Put the vehicles of some times on it."""
+        skin = np.column_stack([look.size, look.colour, look.kind, look.salt]).astype(np.float64)
+        return Stage(self.packed, moments, skin, self.camera, self.scene, self.optics, self.canvas)
+
+
+def make_setting(
+    background: Background, lights: Lights, optics: Optics, view: View, channels: int
+) -> Setting:
+    """Lay a scene's constants flat, for pictures of 3 channels or of luminance alone (1)."""
+    scene = [
+        *(lights.sky_lux, lights.sun_lux, *lights.sun),
+        *(lights.beam_range_m, lights.beam_candela, lights.beam_stray, float(lights.on)),
+        *lights.sky_tint,
+    ]
+    return Setting(
+        packed=pack(background, lights, view, channels),
+        camera=np.concatenate([view.lens, view.eye, view.rotation.ravel()]),
+        scene=np.array(scene, dtype=np.float64),
+        optics=optics,
+        canvas=make_canvas(channels),
+    )

@@ -9,8 +9,8 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.simulation.world.camera import Camera
 
-# Tiles are low, so that a rolling shutter may expose each row of them at a time of its own.
-TILE_H, TILE_W = 8, 32
+# Small tiles: only what changes is painted anew, and a rolling shutter exposes rows at times of their own.
+TILE_H, TILE_W = 8, 8
 TILE = TILE_H * TILE_W
 
 

@@ -6,7 +6,17 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.simulation.imaging.moments import Look, Moments
+from jeat_graph.simulation.imaging.moments import (
+    BOX,
+    FACE,
+    FACE_PLANE,
+    FACE_RECORD,
+    FACES,
+    HULL,
+    SIDES,
+    Look,
+    Moments,
+)
 from jeat_graph.simulation.imaging.shapes import PARTS
 
 
@@ -45,15 +55,15 @@ def _fill(depth: FloatArray, instance: IntArray, whole: IntArray, moments: Momen
     for v in range(len(look.number)):
         left, top, right, low = 1e9, 1e9, -1e9, -1e9
         for part in range(PARTS):
-            if moments.hull_count[0, v, part]:
-                box = moments.part_box[0, v, part]
-                left, top = min(left, box[0]), min(top, box[1])
-                right, low = max(right, box[2]), max(low, box[3])
+            body = moments.body[0, v, part]
+            if body[SIDES] > 0.0:
+                left, top = min(left, body[BOX]), min(top, body[BOX + 1])
+                right, low = max(right, body[BOX + 2]), max(low, body[BOX + 3])
         for row in range(int(max(top, -height)), int(min(low, 2 * height))):
             for column in range(int(max(left, -width)), int(min(right, 2 * width))):
                 near = np.inf
                 for part in range(PARTS):
-                    near = min(near, _depth_at(column + 0.5, row + 0.5, v, part, moments))
+                    near = min(near, _depth_at(column + 0.5, row + 0.5, moments.body[0, v, part]))
                 if near == np.inf:
                     continue
                 whole[v] += 1
@@ -63,19 +73,19 @@ def _fill(depth: FloatArray, instance: IntArray, whole: IntArray, moments: Momen
 
 
 @njit(cache=True)
-def _depth_at(u: float, w: float, v: int, part: int, moments: Moments) -> float:
-    """Depth of a body along the ray through a place in the picture; infinite where it misses."""
-    sides = moments.hull_count[0, v, part]
+def _depth_at(u: float, w: float, body: FloatArray) -> float:
+    """Depth of a body (its record) along the ray through a place in the picture; infinite where it misses."""
+    sides = int(body[SIDES])
     if sides == 0:
         return np.inf
     for k in range(sides):
-        plane = moments.hull[0, v, part, k]
-        if plane[0] * u + plane[1] * w + plane[2] < 0.5:
+        at = HULL + 3 * k
+        if body[at] * u + body[at + 1] * w + body[at + 2] < 0.5:
             return np.inf
     # Within its outline, the face that is hit is that of the least inverse depth: a convex body's nearest
     # visible plane is the last one that the ray enters.
     inverse = np.inf
-    for f in range(moments.face_count[0, v, part]):
-        plane = moments.face_depth[0, v, part, f]
-        inverse = min(inverse, plane[0] * u + plane[1] * w + plane[2])
+    for f in range(int(body[FACES])):
+        at = FACE + f * FACE_RECORD + FACE_PLANE
+        inverse = min(inverse, body[at] * u + body[at + 1] * w + body[at + 2])
     return 1.0 / inverse if 0.0 < inverse < np.inf else np.inf

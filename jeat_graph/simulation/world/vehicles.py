@@ -34,6 +34,9 @@ KINDS = (
     VehicleKind("suv", (4.7, 1.90, 1.72), (0.3, 0.06, 0.08), (28.0, 40.0), 1.5),
     VehicleKind("van", (5.6, 2.02, 2.45), (0.5, 0.05, 0.20), (26.0, 35.0), 1.2),
     VehicleKind("truck", (12.0, 2.50, 3.75), (3.5, 0.05, 0.25), (22.0, 25.0), 0.7),
+    VehicleKind("bus", (12.3, 2.52, 3.40), (0.9, 0.03, 0.25), (24.0, 28.0), 0.8),
+    VehicleKind("motorcycle", (2.15, 0.85, 1.50), (0.15, 0.08, 0.12), (29.0, 45.0), 2.4),
+    VehicleKind("pickup", (5.3, 1.90, 1.82), (0.3, 0.07, 0.08), (27.0, 37.0), 1.4),
 )
 KIND_NAMES = np.array([kind.name for kind in KINDS])
 
@@ -46,6 +49,9 @@ class FleetConfig:
     suv: float = number(0.20, "1", "weight of SUVs")
     van: float = number(0.12, "1", "weight of vans")
     truck: float = number(0.13, "1", "weight of trucks")
+    bus: float = number(0.0, "1", "weight of buses")
+    motorcycle: float = number(0.0, "1", "weight of motorcycles")
+    pickup: float = number(0.0, "1", "weight of pick-ups")
 
     def __post_init__(self) -> None:
         check(self)

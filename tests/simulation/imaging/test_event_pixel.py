@@ -106,6 +106,7 @@ def test_leak_events_come_at_the_configured_rate() -> None:
     rate, seconds, pixels = 2.0, 20.0, 500
     times = 50_000.0 * np.arange(int(seconds / 0.05) + 1)
     config = {**QUIET, "leak_rate_hz": rate, "threshold_sigma": 0.03, "rate_spread_decades": 0.0}
+    config["leak_per_cd_m2"] = 0.0
     events = run(times, np.ones((len(times), pixels)), **{**config, "refractory_s": 0.0})
     expected = rate * seconds * pixels
     assert abs(len(events) - expected) < 4.0 * math.sqrt(expected)
@@ -114,11 +115,12 @@ def test_leak_events_come_at_the_configured_rate() -> None:
     assert not events.by_motion.any()
 
 
-@pytest.mark.parametrize(("luminance", "factor"), [(1e-6, 1.0), (0.3, 0.625), (1e5, 0.25)])
+@pytest.mark.parametrize(("luminance", "factor"), [(1e-6, 1.0), (0.3, 0.625), (1e6, 0.25)])
 def test_shot_noise_has_the_configured_rate_and_falls_with_light(luminance: float, factor: float) -> None:
     rate, seconds, pixels = 5.0, 10.0, 800
     times = 50_000.0 * np.arange(int(seconds / 0.05) + 1)
     config = {"leak_rate_hz": 0.0, "shot_rate_hz": rate, "rate_spread_decades": 0.0, "refractory_s": 0.0}
+    config |= {"shot_half_luminance": 0.3, "shot_bright_factor": 0.25}
     events = run(times, np.full((len(times), pixels), luminance), **config)
     expected = factor * rate * seconds * pixels
     assert abs(len(events) - expected) < 5.0 * math.sqrt(expected)
@@ -146,7 +148,11 @@ def test_the_photoreceptor_follows_a_ramp_one_time_constant_behind() -> None:
 def test_events_of_motion_and_of_noise_are_told_apart() -> None:
     times, light = bar(1.0, 8.0, 40, 0.125)
     clean = run(times, light, **{**IDEAL, "threshold_on": 0.2, "threshold_off": 0.2})
-    noisy = run(times, light, **{**IDEAL, "shot_rate_hz": 400.0, "rate_spread_decades": 0.0})
+    noisy = run(
+        times,
+        light,
+        **{**IDEAL, "shot_rate_hz": 400.0, "shot_half_luminance": 1e6, "rate_spread_decades": 0.0},
+    )
     assert clean.by_motion is not None
     assert noisy.by_motion is not None
     assert clean.by_motion.all()

@@ -4,12 +4,18 @@ import numpy as np
 import pytest
 
 from jeat_graph.simulation.imaging.lighting import LUMINANCE
+from jeat_graph.simulation.imaging.moments import BOX, HULL, SIDES
 from jeat_graph.simulation.imaging.smooth import clamp01
 from jeat_graph.simulation.world.light import LightConfig
 
 from .scenes import CAR, DARK, DAY, LAMPS, renderer_of
 
 OTHERS = [CAR, (1, -4.0, 30.0, -25.0, 4.7, 1.9, 1.72), (3, 9.0, 26.0, 22.0, 11.0, 2.5, 3.7)]
+
+
+def outline_of(body: np.ndarray) -> np.ndarray:
+    """Half-planes (sides, 3) of a body's outline."""
+    return body[HULL : HULL + 3 * int(body[SIDES])].reshape(-1, 3)
 
 
 @pytest.mark.parametrize("light", [DAY, LAMPS, DARK])
@@ -66,8 +72,8 @@ def test_radiance_changes_continuously_with_motion(light: LightConfig) -> None:
 def test_a_bodys_cover_is_the_part_of_the_pixel_within_its_outline() -> None:
     renderer = renderer_of([CAR], DAY)
     moments = renderer.moments(np.array([0.0]), renderer.plan(0.0, 0.0).look)
-    sides = moments.hull[0, 0, 1, : moments.hull_count[0, 0, 1]]
-    box = moments.part_box[0, 0, 1]
+    sides = outline_of(moments.body[0, 0, 1])
+    box = moments.body[0, 0, 1, BOX : BOX + 4]
     fine = (np.arange(24) + 0.5) / 24
     worst, total = 0.0, [0.0, 0.0]
     for row in range(int(box[1]), int(box[3]) + 1):
@@ -104,7 +110,7 @@ def test_a_vehicle_hides_what_is_behind_it() -> None:
     alone = renderer_of([truck], DAY, headlights_below_lux=0.0).picture(0.0)
     both = renderer_of([truck, hidden], DAY, headlights_below_lux=0.0)
     moments = both.moments(np.array([0.0]), both.plan(0.0, 0.0).look)
-    outline = moments.hull[0, 0, 1, : moments.hull_count[0, 0, 1]]
+    outline = outline_of(moments.body[0, 0, 1])
     rows, columns = np.mgrid[0:112, 0:192] + 0.5
     inside = np.all([s[0] * columns + s[1] * rows + s[2] >= 1.0 for s in outline], axis=0)
     assert inside.sum() > 100

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from jeat_graph.simulation.imaging.shapes import FACE_CORNERS, body_table
+from jeat_graph.simulation.imaging.shapes import FACE_CORNERS, shape_of
 from jeat_graph.simulation.imaging.visibility import buffers
 from jeat_graph.simulation.world.vehicles import KIND_NAMES
 
@@ -27,7 +27,7 @@ def cast(rows, renderer, width: int, height: int):  # type: ignore[no-untyped-de
     who = np.zeros((height, width), dtype=np.int64)
     for number, (kind, x, y, speed, length, wide, high) in enumerate(rows, 1):
         way = 1.0 if speed >= 0 else -1.0
-        for body in body_table((str(KIND_NAMES[kind]),))[0]:
+        for body in shape_of(str(KIND_NAMES[kind]), 0)[:3]:
             corners = np.array(
                 [
                     (

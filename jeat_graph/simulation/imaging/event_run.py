@@ -1,0 +1,244 @@
+"""What the pixels of the event camera see within an interval, tile by tile, and their events."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.simulation.imaging.background import PACKED
+from jeat_graph.simulation.imaging.event_pixel import LUMINANCE as SEEN
+from jeat_graph.simulation.imaging.event_pixel import PixelModel, PixelState, advance, unsettled
+from jeat_graph.simulation.imaging.event_sink import Sink, with_room
+from jeat_graph.simulation.imaging.layers import GLOW, ON_GROUND, ON_WALL, meets
+from jeat_graph.simulation.imaging.moments import Moments
+from jeat_graph.simulation.imaging.painter import light_tile, paint_tile, take_ground
+from jeat_graph.simulation.imaging.plan import who_touches
+from jeat_graph.simulation.imaging.stage import Stage
+from jeat_graph.simulation.imaging.tiles import TILE, TILE_H, TILE_W, Tile
+
+_SETTLE_STEPS = 8  # of pixels that see nothing move, while their photoreceptors still follow
+_FOLLOWING, _SETTLED = 0.01, 1e-6  # ln
+_MAX_KEYS = 32
+_COARSE = 4  # steps that are tried as one
+_UNNOTICED = 0.02  # relative change that needs no samples between
+_BEND = 0.02  # relative distance of beams' and glow's light from a straight line in time
+_FAINT_CD_M2 = 0.005
+
+
+class Interval(NamedTuple):
+    """What the pixels see within an interval of time.
+
+    Attributes:
+        tiles: (T, 2) first row and column of the tiles.
+        boxes: (V, 3, 4) what each vehicle changes in the picture (px).
+        steps: (T,) how often each tile's bodies are painted; 0 where there are none.
+        lit: (T,) how often its beams and glow are at most; 0 where there are none.
+        times_us: (J + 1,) beginning of the interval and the J times of painting (µs).
+        static: (H, W) luminance of the picture without vehicles (cd/m²).
+        quiet: (T,) true where a tile's pixels see the static picture and have settled; changed.
+        glowing: (T,) true where beams or glow were on a tile at the interval's beginning; changed.
+        light: (T, P, 3) that light; changed.
+    """
+
+    tiles: IntArray
+    boxes: FloatArray
+    steps: IntArray
+    lit: IntArray
+    times_us: FloatArray
+    static: FloatArray
+    quiet: BoolArray
+    glowing: BoolArray
+    light: FloatArray
+
+
+@njit(cache=True)
+def light_all(
+    tiles: IntArray, boxes: FloatArray, lit: IntArray, stage: Stage, glowing: BoolArray, light: FloatArray
+) -> None:
+    """Fill the light of beams and glow of all tiles at the first of the moments."""
+    who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)
+    counts = np.zeros(3, dtype=np.int64)
+    for n in range(len(tiles)):
+        glowing[n] = lit[n] > 0
+        if glowing[n]:
+            row0, column0 = tiles[n]
+            who_touches(row0, column0, boxes, who, counts)
+            tile = take_ground(row0, column0, stage.packed, stage.canvas.ground)
+            light_tile(tile, 0, who, counts, stage, light[n])
+
+
+@njit(cache=True)
+def fill(row0: int, column0: int, static: FloatArray, pixels: IntArray, luminance: FloatArray) -> int:
+    """Pixels of a tile and what they see while nothing moves; returns how many there are."""
+    height, width = static.shape
+    count = 0
+    for row in range(row0, min(row0 + TILE_H, height)):
+        for column in range(column0, min(column0 + TILE_W, width)):
+            pixels[count] = row * width + column
+            luminance[count] = static[row, column]
+            count += 1
+    return count
+
+
+@njit(cache=True)
+def take(patch: FloatArray, tile: Tile, luminance: FloatArray) -> None:
+    """Luminance of a painted tile, in the order of `_fill`."""
+    count = 0
+    for r in range(tile.rows):
+        for c in range(tile.columns):
+            luminance[count] = patch[r * TILE_W + c, 0]
+            count += 1
+
+
+@njit(cache=True)
+def _key_lights(
+    tile: Tile, most: int, who: IntArray, counts: IntArray, stage: Stage, keys: FloatArray
+) -> int:
+    """Fill the light of beams and glow after the beginning at key times, between which it is linear.
+
+    Args:
+        tile: whose ground is on the canvas.
+        most: how many keys there may be at most, a power of two.
+        who: vehicles that may touch it.
+        counts: how many.
+        stage: the scene at J times.
+        keys: (1 + MAX_KEYS, P, 3) the first is that of the interval's beginning; the others are filled.
+
+    Returns:
+        How many keys follow the first, a power of two.
+    """
+    available = len(stage.moments.times)
+    most = min(most, len(keys) - 1)
+    light_tile(tile, available - 1, who, counts, stage, keys[most])
+    if most == 1:
+        return 1
+    middle, end = keys[most // 2], keys[most]
+    light_tile(tile, available // 2 - 1, who, counts, stage, middle)
+    bend = 0.0
+    ground = stage.canvas.ground
+    for r in range(tile.rows):
+        for c in range(tile.columns):
+            p = r * TILE_W + c
+            on_ground, on_wall = ground[p, PACKED + 1], ground[p, PACKED + 3]
+            sum0 = on_ground * keys[0, p, ON_GROUND] + on_wall * keys[0, p, ON_WALL] + keys[0, p, GLOW]
+            sum1 = on_ground * middle[p, ON_GROUND] + on_wall * middle[p, ON_WALL] + middle[p, GLOW]
+            sum2 = on_ground * end[p, ON_GROUND] + on_wall * end[p, ON_WALL] + end[p, GLOW]
+            level = ground[p, PACKED] + ground[p, PACKED + 2] + ground[p, PACKED + 4] + _FAINT_CD_M2
+            bend = max(bend, abs(sum1 - 0.5 * (sum0 + sum2)) / (level + min(sum0, sum1, sum2)))
+    count = 2
+    # A parabola's distance from its chord falls by four with each halving.
+    while count < most and bend > _BEND:
+        count *= 2
+        bend *= 0.25
+    for k in range(1, count + 1):
+        if k == count:
+            keys[k] = end
+        elif 2 * k == count:
+            keys[k] = middle
+        else:
+            light_tile(tile, k * (available // count) - 1, who, counts, stage, keys[k])
+    return count
+
+
+@njit(cache=True)
+def run_physical(
+    work: Interval, stage: Stage, model: PixelModel, state: PixelState, sink: Sink, room: int
+) -> tuple[Sink, int]:
+    """Take all pixels through an interval, tile by tile; returns the sink and how many tiles were painted."""
+    tiles, boxes, steps, lit, times_us, static, quiet, glowing, light_now = work
+    who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)
+    counts = np.zeros(3, dtype=np.int64)
+    pixels, luminance = np.zeros(TILE, dtype=np.int64), np.zeros(TILE)
+    keys = np.zeros((1 + _MAX_KEYS, TILE, GLOW + 1))
+    light = np.zeros((TILE, GLOW + 1))
+    seen, still = np.zeros((4, TILE)), np.zeros(TILE)
+    stack, painted = np.zeros(4, dtype=np.int64), np.zeros(4, dtype=np.bool_)
+    available = len(times_us) - 1
+    start, end = times_us[0], times_us[available]
+    canvas = stage.canvas
+    rendered = 0
+    for n in range(len(tiles)):
+        row0, column0 = tiles[n]
+        count = fill(row0, column0, static, pixels, luminance)
+        sink = with_room(sink, room)
+        if steps[n] == 0 and lit[n] == 0 and not glowing[n]:
+            pieces = 1
+            if not quiet[n]:
+                apart = unsettled(pixels[:count], luminance[:count], model, state)
+                pieces = _SETTLE_STEPS if apart > _FOLLOWING else 1
+                quiet[n] = apart < _SETTLED
+            for k in range(pieces):
+                a, b = start + (end - start) * k / pieces, start + (end - start) * (k + 1) / pieces
+                advance(pixels[:count], luminance[:count], a, b, quiet[n], model, state, sink)
+            continue
+        quiet[n] = False
+        who_touches(row0, column0, boxes, who, counts)
+        tile = take_ground(row0, column0, stage.packed, canvas.ground)
+        still[:count] = luminance[:count]
+        key_count = 1
+        if lit[n] > 0 or glowing[n]:
+            keys[0] = light_now[n]
+            key_count = _key_lights(tile, max(lit[n], 1), who, counts, stage, keys)
+            glowing[n] = lit[n] > 0
+            light_now[n] = keys[key_count]
+            constant = False
+        else:
+            keys[:2] = 0.0
+            constant = True
+        samples = max(steps[n], key_count, 1)
+        stride = available // samples
+        # Samples are taken coarsely first, and where they differ, those between them too. Nothing as wide as
+        # a vehicle passes a tile unseen within four steps; its lamps might, and so might light.
+        coarse = min(samples, _COARSE if constant else _COARSE // 2)
+        for k in range(0, samples, coarse):
+            top, stack[0] = 0, k + coarse
+            done = k
+            while top >= 0:
+                here = stack[top]
+                if not painted[top]:
+                    if constant and not _any_touch(here * stride - 1, who, counts, stage.moments, tile):
+                        seen[top, :count] = still[:count]
+                    else:
+                        if not constant:
+                            place = here * key_count / samples
+                            low = min(int(place), key_count - 1)
+                            share = place - low
+                            light[:] = keys[low] + share * (keys[low + 1] - keys[low])
+                        paint_tile(tile, here * stride - 1, who, counts, stage, light)
+                        take(canvas.out, tile, seen[top])
+                        rendered += 1
+                    painted[top] = True
+                if here - done > 1 and _differ(seen[top, :count], pixels, model, state):
+                    top += 1
+                    stack[top] = (done + here) // 2
+                    painted[top] = False
+                    continue
+                sink = with_room(sink, room)
+                a, b = times_us[done * stride], times_us[here * stride]
+                advance(pixels[:count], seen[top, :count], a, b, False, model, state, sink)
+                painted[top] = False
+                done = here
+                top -= 1
+    return sink, rendered
+
+
+@njit(cache=True)
+def _any_touch(j: int, who: IntArray, counts: IntArray, moments: Moments, tile: Tile) -> bool:
+    """Say whether any body or shadow may be on a tile at time `j`."""
+    found = False
+    for n in range(counts[0]):
+        found |= meets(moments.touch[j, who[0, n], 0], tile.row, tile.column)
+    return found
+
+
+@njit(cache=True)
+def _differ(luminance: FloatArray, pixels: IntArray, model: PixelModel, state: PixelState) -> bool:
+    """Say whether what pixels see differs from what they saw last by more than would go unnoticed."""
+    for n in range(len(luminance)):
+        before = state.table[pixels[n], SEEN]
+        if abs(luminance[n] - before) > _UNNOTICED * (before + model.dark):
+            return True
+    return False
