@@ -21,6 +21,7 @@ COMMANDS = (
     "demo",
     "simulate",
     "events",
+    "detect",
     "track",
     "stream",
     "batch",

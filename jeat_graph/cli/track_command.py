@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from jeat_graph.cli.detect_options import add_detecting, detect_request
 from jeat_graph.cli.options import (
     add_config,
     add_formats,
@@ -17,8 +18,11 @@ from jeat_graph.cli.options import (
     overrides,
 )
 from jeat_graph.cli.terminal import one_line
+from jeat_graph.data.errors import DataError
 
-HELP = "track the vehicles in files of detections and write a run directory"
+HELP = "track the vehicles in files of detections, or in raw frames and events, and write a run directory"
+#: Within the run directory, where raw recordings were tracked.
+DETECTIONS = "detections.csv"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add(
         "detections",
-        nargs="+",
+        nargs="*",
         metavar="DETECTIONS",
         help="files of one scene, say one a sensor: CSV or Parquet with t, sensor, left, top, width, height, "
         "score; MOTChallenge det.txt; KITTI; Prophesee or DSEC .npy; COCO results; NAME=path names a sensor",
@@ -50,18 +54,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--frames",
-        metavar="VIDEO|DIR",
-        help="pictures that the detections were made from: tell the picture's size and the frame rate",
+        metavar="VIDEO|DIR|AEDAT4",
+        help="with DETECTIONS: the pictures that they were made from, which tell the picture's size and the "
+        "frame rate; without: the pictures to detect in",
     )
+    raw = parser.add_argument_group(
+        "raw recordings",
+        "Without DETECTIONS vehicles are found in --frames, --events or both, and tracked; detections.csv "
+        "in the run directory holds what was found.",
+    )
+    raw.add_argument("--events", metavar="FILE", help="events to detect in: RAW, DAT, AEDAT, HDF5, ROS bag")
+    add_detecting(raw)
 
 
 def run(args: argparse.Namespace) -> int:
     """Read, check, track, and write the run directory."""
+    if args.detections and args.events is not None:
+        raise DataError("--events is detected in where no DETECTIONS are given; give one or the other")
     from jeat_graph.runs.run_options import RunOptions
     from jeat_graph.runs.track_files import TrackRequest, track_files
 
+    detections = tuple(str(item) for item in args.detections) or _detected(args)
     request = TrackRequest(
-        detections=tuple(str(item) for item in args.detections),
+        detections=detections,
         out=args.out,
         config=args.config,
         overrides=tuple(overrides(args)),
@@ -83,6 +98,29 @@ def run(args: argparse.Namespace) -> int:
     print(f"{counts['scans']} scans, {counts['detections']} detections: {counts['tracks_reported']} tracks")
     print(f"wrote {Path(args.out)}")
     return 0
+
+
+def _detected(args: argparse.Namespace) -> tuple[str, ...]:
+    """Detect in raw recordings; returns the file of detections, which lies in the run directory."""
+    from jeat_graph.cli.detect_command import detect_with_bar
+    from jeat_graph.detection.detecting import picture_of
+    from jeat_graph.io.atomic import check_writable
+    from jeat_graph.io.detections_io import write_detections
+
+    if args.frames is None and args.events is None:
+        raise DataError("nothing to track: give files of detections, or --frames, --events or both")
+    for name in ("input_format", "images"):
+        if getattr(args, name) is not None:
+            raise DataError(f"--{name.replace('_', '-')} is for files of detections; there is none")
+    out = Path(args.out)
+    if out.exists() and not out.is_dir():
+        raise DataError("is a file; --out must be a folder", out)
+    found = out / DETECTIONS
+    check_writable(found)
+    request = detect_request(args)
+    args.image = args.image or picture_of(request)
+    write_detections(detect_with_bar(request, "track"), found)
+    return (str(found),)
 
 
 def _say(text: str) -> None:

@@ -14,8 +14,8 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+from jeat_graph.config.fields import Section, flag, number
 from jeat_graph.data.arrays import BoolArray, IntArray
-from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.events import EventArray
 
 _US_PER_S = 1e6
@@ -24,30 +24,30 @@ _NEIGHBOURS = 8
 
 
 @dataclass(frozen=True)
-class NoiseSettings:
-    """What is taken for noise.
+class NoiseSettings(Section):
+    """What is taken for noise in events and left out."""
 
-    Attributes:
-        background: whether events that stand alone are left out.
-        support_s: an event stands alone if no pixel around it fired within this time before it (s). An edge
-            at 100 px/s passes from pixel to pixel in 10 ms.
-        hot_pixels: whether pixels that fire all the time are left out.
-        hot_hz: rate from which a pixel may be hot (Hz); an IMX636 indoors has .002 Hz/px, its hottest 10 Hz.
-        hot_ratio: a hot pixel fires so many times as often as those around it on average; an edge fires in
-        all. period_s: over which the rate is taken (s); hot pixels are looked for anew after each.
-    """
-
-    background: bool = True
-    support_s: float = 0.03
-    hot_pixels: bool = True
-    hot_hz: float = 10.0
-    hot_ratio: float = 8.0
-    period_s: float = 1.0
-
-    def __post_init__(self) -> None:
-        for name in ("support_s", "hot_hz", "hot_ratio", "period_s"):
-            if not 0.0 < getattr(self, name) < float("inf"):
-                raise ConfigError(f"{name} must be positive, not {getattr(self, name)}")
+    background: bool = flag(True, "whether events that stand alone are left out")
+    support_s: float = number(
+        0.03,
+        "s",
+        "an event stands alone if no pixel around it fired within this time before it; an edge of 100 px/s "
+        "passes from pixel to pixel in 10 ms",
+        open_low=True,
+    )
+    hot_pixels: bool = flag(True, "whether pixels that fire all the time are left out")
+    hot_hz: float = number(
+        10.0,
+        "Hz",
+        "rate from which a pixel may be hot; an IMX636 indoors has .002 Hz/px, its hottest 10 Hz",
+        open_low=True,
+    )
+    hot_ratio: float = number(
+        8.0, "1", "a hot pixel fires so many times as often as those around it; an edge fires in all", 1.0
+    )
+    period_s: float = number(
+        1.0, "s", "over which the rate of a pixel is taken; hot pixels are looked for anew after each", 0.01
+    )
 
 
 class NoiseFilter:

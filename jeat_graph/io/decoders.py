@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 
 RgbImage = npt.NDArray[np.uint8]
@@ -33,6 +34,10 @@ class Decoder:
     def rate_hz(self) -> float | None:
         """Return the declared rate (Hz), None where there is none."""
         raise NotImplementedError
+
+    def times_s(self) -> FloatArray | None:
+        """Return the time of each frame (s), where the file itself has them."""
+        return None
 
     def bgr(self, index: int) -> RgbImage:
         """Return a frame (H, W, 3): blue, green, red."""

@@ -94,9 +94,9 @@ class FrameSource:
 def open_frames(path: str | Path, rate_hz: float | None = None) -> FrameSource:
     """Open a video file, a folder of pictures, or a folder that holds one of them under its name above.
 
-    Times come from `frames.csv`, in the folder or beside it or beside the video, or from DSEC's
-    `timestamps.txt` in or above the folder; without them they are index / rate, by `rate_hz` or by
-    what the video declares.
+    An AEDAT 4 file has frames with times of their own. Else times come from `frames.csv`, in the folder or
+    beside it or beside the video, or from DSEC's `timestamps.txt` in or above the folder; without them they
+    are index / rate, by `rate_hz` or by what the video declares.
 
     Args:
         path: the video or folder. Pictures are `.png` or `.jpg`, in natural order (2 before 10).
@@ -112,13 +112,16 @@ def open_frames(path: str | Path, rate_hz: float | None = None) -> FrameSource:
             return open_frames(inner, rate_hz)
         decode: Decoder = PictureDecoder(place)
     elif place.is_file():
-        decode = VideoDecoder(place)
+        decode = _decoder(place)
     else:
         raise DataError("no such video or folder of pictures", place)
     try:
-        table = _times_beside(place)
+        own = decode.times_s()
+        table = None if own is not None else _times_beside(place)
         count = decode.count()
-        if table is not None and rate_hz is None:
+        if own is not None:
+            times = own
+        elif table is not None and rate_hz is None:
             times = read_frame_times(table) / _US_PER_S
             if len(times) != count:
                 raise DataError(f"has {count} frames, but {table} has {len(times)}", place)
@@ -149,14 +152,24 @@ def peek(path: str | Path) -> tuple[tuple[int, int], float | None]:
             return peek(inner)
     elif not place.is_file():
         raise DataError("no such video or folder of pictures", place)
-    decode: Decoder = PictureDecoder(place) if place.is_dir() else VideoDecoder(place)
+    decode: Decoder = PictureDecoder(place) if place.is_dir() else _decoder(place)
     try:
         height, width = decode.bgr(0).shape[:2]
+        own = decode.times_s()
+        if own is not None:
+            return (width, height), median_rate_hz(own)
         table = _times_beside(place)
         rate = decode.rate_hz() if table is None else median_rate_hz(read_frame_times(table) / _US_PER_S)
         return (width, height), rate
     finally:
         decode.close()
+
+
+def _decoder(place: Path) -> Decoder:
+    """Open a file of frames: an AEDAT 4 recording, or a video."""
+    from jeat_graph.io.aedat4_frames import Aedat4Decoder, is_aedat4
+
+    return Aedat4Decoder(place) if is_aedat4(place) else VideoDecoder(place)
 
 
 def _times_beside(place: Path) -> Path | None:

@@ -68,5 +68,5 @@ def test_events_outside_the_picture_are_left_out():
 
 
 def test_settings_are_checked():
-    with pytest.raises(ConfigError, match="support_s must be positive"):
+    with pytest.raises(ConfigError, match=r"support_s: 0.0 is not in"):
         NoiseSettings(support_s=0.0)

@@ -1,7 +1,7 @@
 """AEDAT 4, iniVation's format of events, frames and triggers in one file, through the package `aedat`.
 
 Times in the file count from 1970. Here they count from the first frame or event, whichever is earlier, the
-same for both, so that frames and events of one file share a clock; `t_offset_us` leads back.
+same for both, so that frames and events of one file share a clock; `origin_us` leads back.
 Source: https://docs.inivation.com/software/software-advanced-usage/file-formats/aedat-4.0.html
 """
 
@@ -43,7 +43,7 @@ class Aedat4Reader(EventReader):
         if "events" not in streams:
             raise DataError(f"holds no events, only {', '.join(sorted(streams)) or 'nothing'}", path)
         super().__init__(path, size_px or streams["events"])
-        self.t_offset_us = origin_us(path)
+        self.origin_us = origin_us(path)
 
     def pieces(self) -> Iterator[EventArray]:
         """Yield all events in the order of their times, packet by packet.
@@ -57,13 +57,13 @@ class Aedat4Reader(EventReader):
         for packet in self._packets():
             if "triggers" in packet:
                 rows = packet["triggers"]
-                t = rows["t"].astype(np.int64) - self.t_offset_us
+                t = rows["t"].astype(np.int64) - self.origin_us
                 edges.append(Triggers(t, rows["source"].astype(np.uint8), np.ones(len(t), dtype=np.uint8)))
                 continue
             rows = packet["events"]
             inside = (rows["x"] < width) & (rows["y"] < height)
             self.damage.outside += int((~inside).sum())
-            t = rows["t"].astype(np.int64)[inside] - self.t_offset_us
+            t = rows["t"].astype(np.int64)[inside] - self.origin_us
             if not len(t):
                 continue
             before = t[0] if last is None else last

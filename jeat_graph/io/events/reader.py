@@ -79,8 +79,8 @@ class EventReader:
         format_name: what the file is, such as `EVT3`.
         path: the file.
         size_px: width and height of the picture; None if neither the file nor the caller says.
-        t_offset_us: what to add to the events' times for the clock that the file gives them by (µs); for
-            frames of the same file it is the same.
+        t_offset_us: what to add to the events' times for the clock of frames that belong to them (µs).
+        origin_us: time 0 on the clock that the file gives times by (µs).
         triggers: edges of external signals that came with the last piece.
         damage: what was passed over so far.
     """
@@ -91,6 +91,7 @@ class EventReader:
         self.path = Path(path)
         self.size_px = size_px
         self.t_offset_us = 0
+        self.origin_us = 0
         self.triggers = Triggers.none()
         self.damage = Damage()
 

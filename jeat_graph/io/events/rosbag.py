@@ -6,7 +6,7 @@
 `event_camera_msgs/EventPacket`           words of the camera; of the encodings `evt3` is read
 ========================================  ====================================================================
 
-Times count from the first event's whole second; `t_offset_us` leads back to the clock of the bag.
+Times count from the first event's whole second; `origin_us` leads back to the clock of the bag.
 Sources: https://github.com/uzh-rpg/rpg_dvs_ros, https://github.com/ros-event-camera/event_camera_msgs
 """
 
@@ -91,9 +91,9 @@ class RosbagReader(EventReader):
             if not len(t_us):
                 continue
             if last is None:
-                self.t_offset_us = int(t_us[0]) // _US_PER_S * _US_PER_S
-                last = int(t_us[0]) - self.t_offset_us
-            t = t_us - self.t_offset_us
+                self.origin_us = int(t_us[0]) // _US_PER_S * _US_PER_S
+                last = int(t_us[0]) - self.origin_us
+            t = t_us - self.origin_us
             inside = (x < width) & (y < height)
             self.damage.outside += int((~inside).sum())
             self.damage.backwards += int((np.diff(t, prepend=last) < 0).sum())

@@ -36,7 +36,7 @@ def by_dv(path):
 
 
 def check_same(events, reader, expected):
-    np.testing.assert_array_equal(events.t_us + reader.t_offset_us, expected[:, 0])
+    np.testing.assert_array_equal(events.t_us + reader.origin_us, expected[:, 0])
     for column, name in enumerate(("x", "y", "polarity"), start=1):
         np.testing.assert_array_equal(getattr(events, name), expected[:, column])
 

@@ -84,7 +84,7 @@ def test_lists_of_events_are_read(tmp_path, version):
         messages.append(array(header=header(store, version), height=260, width=346, events=events))
     path = write(tmp_path, version, messages, "dvs_msgs/msg/EventArray", store)
     found, reader = read(path)
-    assert (reader.size_px, reader.t_offset_us) == ((346, 260), SECOND * 10**6)
+    assert (reader.size_px, reader.origin_us) == ((346, 260), SECOND * 10**6)
     for name, expected in (("t_us", t), ("x", x), ("y", y), ("polarity", p)):
         np.testing.assert_array_equal(getattr(found, name), expected)
 

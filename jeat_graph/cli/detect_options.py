@@ -1,0 +1,59 @@
+"""Options of the commands that detect in raw pictures and events: `detect` and `track`."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from jeat_graph.config.argument_types import picture_size, positive
+
+if TYPE_CHECKING:
+    from jeat_graph.detection.detecting import DetectRequest
+
+
+def add_detecting(parser: argparse._ActionsContainer) -> None:
+    """Declare what a detector is, and how it looks; `--frames` and `--events` are the command's own."""
+    add = parser.add_argument
+    add(
+        "--detection-config",
+        metavar="FILE",
+        help="YAML with settings of the detectors `motion` (sections frames, events)",
+    )
+    add("--event-rate", type=positive, metavar="HZ", help="scans of the events per second (default: 50)")
+    add(
+        "--event-size",
+        type=picture_size,
+        metavar="WxH",
+        help="picture of the events, if their file does not say",
+    )
+    add(
+        "--event-delay",
+        type=float,
+        default=0.0,
+        metavar="S",
+        help="what to add to the events' times for the clock of the frames (default: 0)",
+    )
+
+
+def detect_request(args: argparse.Namespace) -> DetectRequest:
+    """Return what the arguments ask for.
+
+    Raises:
+        ConfigError: settings that are not valid, or nothing to detect in.
+    """
+    from dataclasses import replace
+
+    from jeat_graph.detection.detecting import DetectRequest
+    from jeat_graph.detection.settings import load_settings
+
+    settings = load_settings(args.detection_config)
+    if args.event_rate is not None:
+        settings = replace(settings, events=replace(settings.events, rate_hz=args.event_rate))
+    return DetectRequest(
+        frames=args.frames,
+        events=args.events,
+        rate_hz=args.rate,
+        event_size_px=args.event_size,
+        events_later_s=args.event_delay,
+        settings=settings,
+    )

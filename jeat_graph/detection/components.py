@@ -1,0 +1,108 @@
+"""Boxes around what belongs together: pixels that are marked and lie near one another."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+
+
+class Components(NamedTuple):
+    """What was found.
+
+    Attributes:
+        boxes: (M, 4) left, top, width, height (px) of the marked pixels.
+        weight: (M,) sum of their marks.
+        pixels: (M,) number of them.
+    """
+
+    boxes: FloatArray
+    weight: FloatArray
+    pixels: IntArray
+
+    def take(self, keep: BoolArray) -> Components:
+        """Return some of them."""
+        return Components(self.boxes[keep], self.weight[keep], self.pixels[keep])
+
+
+def linked(marks: npt.NDArray[Any], link_px: int) -> tuple[int, npt.NDArray[np.int32]]:
+    """Number the groups of marked pixels: two belong together across a gap of less than `link_px`.
+
+    Args:
+        marks: (H, W), marked where positive.
+        link_px: the gap (px), along rows and columns.
+
+    Returns:
+        The number of groups, and (H, W) the group of each pixel, from 1; 0 where there is none.
+    """
+    import cv2
+
+    mask: Any = (marks > 0).astype(np.uint8)
+    if link_px > 1:
+        mask = cv2.dilate(mask, np.ones((link_px, link_px), dtype=np.uint8))
+    count, labels = cv2.connectedComponents(mask, connectivity=8, ltype=cv2.CV_32S)
+    return count - 1, np.asarray(labels, dtype=np.int32)
+
+
+def measured(
+    count: int, labels: npt.NDArray[np.int32], marks: npt.NDArray[Any], *, keep_empty: bool = False
+) -> Components:
+    """Measure groups by their marked pixels.
+
+    Args:
+        count: number of groups.
+        labels: (H, W) group of each pixel, 0 for none.
+        marks: (H, W) weight of each pixel; 0 where it is not marked.
+        keep_empty: also return groups without a marked pixel, with boxes of no size, so that rows are groups.
+    """
+    corners, weight, pixels = _measure(count, labels, marks)
+    found = (pixels > 0) | keep_empty
+    corners[pixels == 0] = 0
+    corners = corners[found].astype(np.float64)
+    boxes = np.column_stack([corners[:, :2], corners[:, 2:] - corners[:, :2]])
+    return Components(boxes.reshape(-1, 4), weight[found], pixels[found])
+
+
+def without_inner(found: Components, share: float) -> BoolArray:
+    """Return which groups (M,) do not lie inside another with more weight.
+
+    Args:
+        found: the groups.
+        share: of a box's area, from which on it lies inside (0 to 1).
+    """
+    boxes = found.boxes
+    ends = boxes[:, :2] + boxes[:, 2:]
+    low = np.maximum(boxes[:, None, :2], boxes[None, :, :2])
+    high = np.minimum(ends[:, None], ends[None])
+    common = np.prod(np.clip(high - low, 0.0, None), axis=2)
+    area = np.prod(boxes[:, 2:], axis=1)
+    heavier = found.weight[None, :] > found.weight[:, None]
+    inside: BoolArray = (common >= share * area[:, None]) & heavier
+    return np.asarray(~inside.any(axis=1))
+
+
+@numba.njit(cache=True)
+def _measure(count: int, labels: Any, marks: Any) -> tuple[Any, Any, Any]:
+    """Corners (M, 4) left, top, right, bottom, sums and numbers of the marked pixels of each group."""
+    height, width = labels.shape
+    corners = np.empty((count, 4), dtype=np.int64)
+    corners[:, 0], corners[:, 1] = width, height
+    corners[:, 2] = corners[:, 3] = 0
+    weight = np.zeros(count)
+    pixels = np.zeros(count, dtype=np.int64)
+    for row in range(height):
+        for column in range(width):
+            mark = marks[row, column]
+            if mark > 0 and labels[row, column] > 0:
+                k = labels[row, column] - 1
+                corners[k, 0] = min(corners[k, 0], column)
+                corners[k, 1] = min(corners[k, 1], row)
+                corners[k, 2] = max(corners[k, 2], column + 1)
+                corners[k, 3] = max(corners[k, 3], row + 1)
+                weight[k] += mark
+                pixels[k] += 1
+    return corners, weight, pixels

@@ -1,0 +1,155 @@
+"""From files of pictures and events to scans in the order of their times: what `detect` and `track` do."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jeat_graph.data.detections import Detections, Scan
+from jeat_graph.data.errors import ConfigError, DataError
+from jeat_graph.data.events import EventArray
+from jeat_graph.detection.event_detector import EventDetector
+from jeat_graph.detection.picture_detector import PictureDetector
+from jeat_graph.detection.settings import DetectionSettings
+
+FRAMES_SENSOR, EVENTS_SENSOR = "rgb", "evt"
+_US_PER_S = 1e6
+
+
+@dataclass(frozen=True)
+class DetectRequest:
+    """What shall be looked for, and where.
+
+    Attributes:
+        frames: a video, a folder of pictures, or an AEDAT 4 file; or None.
+        events: a file of events; or None.
+        rate_hz: frames per second where neither the video nor a table beside it says.
+        event_size_px: width and height of the event camera's picture, where the file does not say.
+        events_later_s: what to add to the times of the events for the clock of the frames (s).
+        settings: of the detectors without weights.
+    """
+
+    frames: str | Path | None = None
+    events: str | Path | None = None
+    rate_hz: float | None = None
+    event_size_px: tuple[int, int] | None = None
+    events_later_s: float = 0.0
+    settings: DetectionSettings = field(default_factory=DetectionSettings)
+
+    def __post_init__(self) -> None:
+        if self.frames is None and self.events is None:
+            raise ConfigError("nothing to detect in: give --frames, --events or both")
+
+    @property
+    def files(self) -> list[str]:
+        """The inputs, each once."""
+        return list(dict.fromkeys(str(path) for path in (self.frames, self.events) if path is not None))
+
+
+def detect_scans(
+    request: DetectRequest,
+    say: Callable[[str], object] = lambda _: None,
+    on_time: Callable[[float], object] = lambda _: None,
+) -> Iterator[Scan]:
+    """Yield the scans of both cameras in the order of their times; memory does not grow with the files.
+
+    Args:
+        request: what to do.
+        say: called with each thing that was found out or that is wrong with a file.
+        on_time: called with the time that has been reached (s).
+
+    Raises:
+        ConfigError: an extra package is needed.
+        DataError: a file cannot be read, or does not say what is needed.
+    """
+    with ExitStack() as stack:
+        streams = []
+        if request.frames is not None:
+            streams.append(_picture_scans(request, stack, say))
+        if request.events is not None:
+            streams.append(_event_scans(request, stack, say))
+        for scan in heapq.merge(*streams, key=lambda scan: scan.t):
+            on_time(scan.t)
+            yield scan
+
+
+def picture_of(request: DetectRequest) -> tuple[int, int] | None:
+    """Return the picture (width, height, px) of the events, where there are no frames that tell it."""
+    from jeat_graph.io.events.opening import open_events
+
+    if request.frames is not None or request.events is None:
+        return None
+    with open_events(request.events, request.event_size_px) as reader:
+        return reader.size_px
+
+
+def detect_files(
+    request: DetectRequest,
+    say: Callable[[str], object] = lambda _: None,
+    on_time: Callable[[float], object] = lambda _: None,
+) -> Detections:
+    """Return all scans of both cameras as one table; arguments as `detect_scans`.
+
+    Raises:
+        DataError: as `detect_scans`, or there was not one scan.
+    """
+    found = Detections.from_scans(detect_scans(request, say, on_time))
+    if not found.num_scans:
+        names = " + ".join(request.files)
+        raise DataError(f"{names}: no scan: the recording is too short for the detectors to look once")
+    return found
+
+
+def _picture_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str], object]) -> Iterator[Scan]:
+    from jeat_graph.io.video import open_frames
+
+    assert request.frames is not None
+    source = stack.enter_context(open_frames(request.frames, request.rate_hz))
+    width, height = source.size_px
+    say(f"frames: {len(source)} of {width} x {height} px, {request.frames}")
+    if source.missing:
+        say(f"{request.frames}: damaged or cut off: {source.missing} frames cannot be decoded")
+    detector = PictureDetector(FRAMES_SENSOR, request.settings.frames)
+    _prime(detector, source, request)
+    found = (detector(frame, t) for t, frame in source)
+    return (scan for scan in found if scan is not None)
+
+
+def _prime(detector: PictureDetector, source: Any, request: DetectRequest) -> None:
+    """Take the background from the first seconds before the first picture is looked at."""
+    settings = request.settings.frames
+    end_s = source.times_s[0] + settings.warm_up_s
+    count = max(int(np.searchsorted(source.times_s, end_s, side="right")), min(3, len(source)))
+    chosen = np.unique(np.linspace(0, count - 1, min(settings.samples, count)).round().astype(int))
+    if len(chosen) < 3:
+        raise DataError("has fewer than three frames: what moves cannot be told", request.frames)
+    detector.prime([source.frame(int(k)) for k in chosen])
+
+
+def _event_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str], object]) -> Iterator[Scan]:
+    from jeat_graph.io.events.opening import open_events
+
+    assert request.events is not None
+    reader = stack.enter_context(open_events(request.events, request.event_size_px))
+    if reader.size_px is None:
+        raise DataError("does not say the size of its picture; give it with --event-size WxH", request.events)
+    width, height = reader.size_px
+    say(f"events: {reader.format_name} of {width} x {height} px, {request.events}")
+    detector = EventDetector(reader.size_px, EVENTS_SENSOR, request.settings.events)
+    later_us = reader.t_offset_us + round(request.events_later_s * _US_PER_S)
+
+    def scans() -> Iterator[Scan]:
+        for piece in reader.pieces():
+            moved = EventArray.trusted(piece.t_us + later_us, piece.x, piece.y, piece.polarity)
+            yield from detector.push(moved)
+        yield from detector.finish()
+        for note in reader.damage.notes():
+            say(f"{request.events}: {note}")
+
+    return scans()

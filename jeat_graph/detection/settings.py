@@ -1,0 +1,117 @@
+"""Settings of the detectors that need no weights, from YAML with the sections `frames` and `events`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from jeat_graph.config.fields import Section, number
+from jeat_graph.config.section_tree import build, read_tree
+from jeat_graph.data.errors import ConfigError
+from jeat_graph.detection.noise import NoiseSettings
+
+_SAME = 1e-6
+_LINK = (
+    "what is closer belongs together, as a share of the picture's diagonal: 5 px at 346 x 260, 9 px at "
+    "640 x 384, 18 px at 1280 x 720"
+)
+_INSIDE = "a group is part of a heavier one if this share of its box lies in the other's"
+_APART = "two groups that run together stay two if they were there, and moved apart, for so long"
+
+
+@dataclass(frozen=True)
+class EventSettings(Section):
+    """How moving things are found in events."""
+
+    rate_hz: float = number(50.0, "Hz", "scans per second; a step is a whole number of bins", 1.0, 1000.0)
+    window_s: float = number(0.04, "s", "events of so long are linked", open_low=True)
+    extent_s: float = number(0.02, "s", "a box reaches as far as the newest events of so long", open_low=True)
+    bin_s: float = number(0.005, "s", "length of a bin; the other times are whole multiples of it", 1e-4, 1.0)
+    link_share: float = number(0.012, "1", _LINK, 0.0, 0.2)
+    least_events: int = number(12, "1", "a cloud of fewer events in the window is none", 1)
+    least_side_px: float = number(3.0, "px", "a cloud that is narrower or lower is none", 1.0)
+    inside_share: float = number(0.6, "1", _INSIDE, 0.0, 1.0)
+    apart_s: float = number(0.1, "s", _APART)
+    certain_events: float = number(40.0, "1", "at so many events a score reaches 1 - 1/e", open_low=True)
+    longest_gap_s: float = number(
+        10.0, "s", "where the time of a file leaps ahead by more, no scans are made for the gap", 0.1
+    )
+    noise: NoiseSettings = field(default_factory=NoiseSettings)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name, length_s in (("rate_hz", 1.0 / self.rate_hz), ("window_s", self.window_s)):
+            if not self._whole(length_s):
+                raise ConfigError(
+                    f"{name}: {getattr(self, name):g} gives {length_s:g} s, no whole number of bins of "
+                    f"{self.bin_s:g} s; with 5 ms 10, 20, 25, 40, 50, 100 and 200 Hz do"
+                )
+        if not self._whole(self.extent_s) or self.extent_s > self.window_s:
+            raise ConfigError(
+                f"extent_s: {self.extent_s:g} s must be a whole number of bins, and no longer than window_s"
+            )
+
+    def _whole(self, length_s: float) -> bool:
+        bins = length_s / self.bin_s
+        return round(bins) >= 1 and abs(bins - round(bins)) < _SAME
+
+    def bins(self, length_s: float) -> int:
+        """Return how many bins a time has (s)."""
+        return round(length_s / self.bin_s)
+
+
+@dataclass(frozen=True)
+class PictureSettings(Section):
+    """How moving things are found in pictures."""
+
+    warm_up_s: float = number(
+        4.0,
+        "s",
+        "the background is first the median of pictures of so long; no scans before a camera has shown it",
+    )
+    samples: int = number(25, "1", "pictures that the first background is made of", 3, 255)
+    adapt_s: float = number(
+        0.4,
+        "s",
+        "the background follows by one grey level in this time: slow light yes, vehicles that wait no",
+        open_low=True,
+    )
+    sigmas: float = number(
+        6.0, "σ", "a pixel is foreground if it differs by so much of its own noise", open_low=True
+    )
+    least_contrast: float = number(12.0, "grey levels", "and by at least this, of 255", 0.0, 255.0)
+    link_share: float = number(0.012, "1", _LINK, 0.0, 0.2)
+    least_pixels: int = number(12, "px", "a group of fewer pixels is none", 1)
+    least_side_px: float = number(4.0, "px", "a group that is narrower or lower is none", 1.0)
+    most_share: float = number(
+        0.4,
+        "1",
+        "where more of the picture differs, the light has changed or the camera moved: a new background",
+        0.01,
+        1.0,
+    )
+    inside_share: float = number(0.6, "1", _INSIDE, 0.0, 1.0)
+    apart_s: float = number(0.2, "s", _APART)
+    certain_pixels: float = number(
+        40.0, "px", "at so many pixels of foreground a score reaches 1 - 1/e", open_low=True
+    )
+
+
+@dataclass(frozen=True)
+class DetectionSettings:
+    """Settings of both detectors."""
+
+    frames: PictureSettings = field(default_factory=PictureSettings)
+    events: EventSettings = field(default_factory=EventSettings)
+
+
+def load_settings(path: str | Path | None = None) -> DetectionSettings:
+    """Read the settings from a YAML file; what it does not name keeps its default.
+
+    Raises:
+        ConfigError: no such file, unknown key (with the nearest known one) or bad value.
+    """
+    tree = {} if path is None else read_tree(str(path), (), str, "detection file")
+    out = build(DetectionSettings, tree, "")
+    assert isinstance(out, DetectionSettings)
+    return out

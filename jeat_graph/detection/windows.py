@@ -1,0 +1,105 @@
+"""Events as pictures: counts in a ring of short bins, so that a window costs only what is new in it.
+
+Time is cut into bins at whole multiples of their length. A window is the last so many bins; the next one, a
+step later, shares all bins with it but those of the step. `EventBins` counts per pixel and polarity; `stack`
+gives the histogram that detectors of the RVT family take, (2 x bins, H, W), and `total` the count of each
+pixel.
+Source: Gehrig and Scaramuzza, "Recurrent Vision Transformers for Object Detection with Event Cameras" (2023).
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.data.errors import ConfigError
+from jeat_graph.data.events import EventArray
+
+_US_PER_S = 1e6
+_MOST = 255
+
+
+class EventBins:
+    """The last bins of an event camera.
+
+    Args:
+        size_px: width and height of the picture; events outside are left out.
+        bins: how many are kept.
+        bin_s: length of a bin (s), a whole number of µs.
+
+    Attributes:
+        end_us: where the newest bin ends (µs).
+
+    Raises:
+        ConfigError: no bins, or bins shorter than 1 µs.
+    """
+
+    def __init__(self, size_px: tuple[int, int], bins: int = 10, bin_s: float = 0.005) -> None:
+        self.bin_us = round(bin_s * _US_PER_S)
+        if bins < 1 or self.bin_us < 1:
+            raise ConfigError(f"windows need bins of at least 1 µs, not {bins} of {bin_s} s")
+        width, height = size_px
+        self.end_us = 0
+        self._ring = np.zeros((bins, 2, height, width), dtype=np.uint8)
+        self._total = np.zeros((height, width), dtype=np.uint16)
+        self._newest = bins - 1
+
+    @property
+    def total(self) -> npt.NDArray[np.uint16]:
+        """Events of each pixel (H, W) in the window, of both polarities; at most 255 a bin and polarity."""
+        return self._total
+
+    def advance(self, events: EventArray) -> None:
+        """Add the next bin.
+
+        Args:
+            events: those with `end_us` <= t < `end_us` + bin; others must not be given.
+        """
+        self._newest = (self._newest + 1) % len(self._ring)
+        slot = self._ring[self._newest]
+        if slot.any():
+            self._total -= slot[0]
+            self._total -= slot[1]
+            slot[:] = 0
+        _count(events.x, events.y, events.polarity, slot, self._total)
+        self.end_us += self.bin_us
+
+    def skip_to(self, end_us: int) -> None:
+        """Empty the window and let it end at `end_us`, a whole multiple of the bin."""
+        self._ring[:] = 0
+        self._total[:] = 0
+        self.end_us = end_us
+
+    def stack(self) -> npt.NDArray[np.uint8]:
+        """Return the histogram (2 x bins, H, W): bins from old to new, each first darker, then brighter."""
+        order = (np.arange(len(self._ring)) + self._newest + 1) % len(self._ring)
+        stacked = self._ring[order]
+        return stacked.reshape(-1, *stacked.shape[2:])
+
+    def recent(self, bins: int) -> npt.NDArray[np.uint16]:
+        """Return the events of each pixel (H, W) in the newest `bins`."""
+        out = np.zeros_like(self._total)
+        for k in range(bins):
+            slot = self._ring[(self._newest - k) % len(self._ring)]
+            out += slot[0]
+            out += slot[1]
+        return out
+
+
+@numba.njit(cache=True)
+def _count(
+    x: npt.NDArray[np.uint16],
+    y: npt.NDArray[np.uint16],
+    polarity: npt.NDArray[np.uint8],
+    slot: npt.NDArray[np.uint8],
+    total: npt.NDArray[np.uint16],
+) -> None:
+    height, width = total.shape
+    for k in range(len(x)):
+        column, row = np.int64(x[k]), np.int64(y[k])
+        if column < width and row < height:
+            which = 1 if polarity[k] > 0 else 0
+            if slot[which, row, column] < _MOST:
+                slot[which, row, column] += 1
+                total[row, column] += 1

@@ -1,0 +1,132 @@
+"""`jeat-graph detect`, and `track` of raw recordings: one command from raw to tracks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from jeat_graph.cli.main import main
+from jeat_graph.io.detections_io import read_detections
+from jeat_graph.io.events.evt3_writer import Evt3Writer
+
+from ..detection.moving import SIZE, box_at, events_of, iou, picture_of
+
+CAR = ((10, 60), (60, 8), (40, 20))
+SECONDS = 3
+STREET = Path(__file__).parents[3] / "shared" / "data" / "davis346" / "street.aedat4"
+
+
+@pytest.fixture(scope="module")
+def raw(tmp_path_factory):
+    """A folder of pictures with its times, and a RAW file, of one thing that moves."""
+    import cv2
+
+    folder = tmp_path_factory.mktemp("raw")
+    rng = np.random.default_rng(0)
+    background = rng.uniform(40, 120, (SIZE[1], SIZE[0]))
+    (folder / "frames").mkdir()
+    times = np.arange(SECONDS * 20) * 50_000
+    for k, t in enumerate(times):
+        cv2.imwrite(
+            str(folder / "frames" / f"{k:06d}.png"), picture_of([(CAR, 200)], t / 1e6, background, rng)
+        )
+    lines = "".join(f"{k},{t}\n" for k, t in enumerate(times))
+    (folder / "frames.csv").write_text("index,t_us\n" + lines, encoding="utf-8")
+    with Evt3Writer(folder / "events.raw", SIZE) as writer:
+        writer.append(events_of([CAR], SECONDS, noise_hz_px=0.05))
+    return folder
+
+
+def test_detect_writes_the_boxes_of_both_cameras(raw, tmp_path, capsys):
+    out = tmp_path / "detections.csv"
+    command = [
+        "detect",
+        "--frames",
+        str(raw / "frames"),
+        "--events",
+        str(raw / "events.raw"),
+        "--out",
+        str(out),
+    ]
+    assert main(command) == 0
+    assert f"wrote {out}" in capsys.readouterr().out
+    found = read_detections(out)
+    assert found.sensors == ("evt", "rgb")
+    for scan in found.scans():
+        if scan.t > 0.1:
+            assert len(scan) == 1
+            assert iou(scan.boxes[0], box_at(*CAR, scan.t)) > 0.7
+    first = out.read_bytes()
+    assert main(command) == 0
+    assert out.read_bytes() == first
+
+
+def test_track_goes_from_raw_to_tracks(raw, tmp_path):
+    out = tmp_path / "run"
+    files = ["--frames", str(raw / "frames"), "--events", str(raw / "events.raw")]
+    assert main(["track", *files, "--out", str(out)]) == 0
+    for name in ("causal.csv", "smoothed.csv"):
+        table = pd.read_csv(out / name)
+        assert table.track_id.nunique() == 1
+        rows = table[table.t > 0.2]
+        truth = np.array([box_at(*CAR, t) for t in rows.t])
+        assert np.abs(rows.x - truth[:, 0] - truth[:, 2] / 2).mean() < 1.5
+    assert len(read_detections(out / "detections.csv")) > 100
+
+
+def test_one_camera_is_enough(raw, tmp_path):
+    assert main(["track", "--events", str(raw / "events.raw"), "--out", str(tmp_path / "e")]) == 0
+    assert main(["track", "--frames", str(raw / "frames"), "--out", str(tmp_path / "f")]) == 0
+    for name in "ef":
+        assert pd.read_csv(tmp_path / name / "causal.csv").track_id.nunique() == 1
+
+
+def test_a_delay_moves_the_events(raw, tmp_path):
+    times = []
+    for delay in ("0", "0.2"):
+        out = tmp_path / "d.csv"
+        command = ["detect", "--events", str(raw / "events.raw"), "--event-delay", delay, "--out", str(out)]
+        assert main(command) == 0
+        times.append(read_detections(out).scan_t)
+    np.testing.assert_allclose(times[1] - times[0], 0.2, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["detect", "--out", "d.csv"], "nothing to detect in: give --frames, --events or both"),
+        (["track", "--out", "r"], "nothing to track: give files of detections, or --frames"),
+        (
+            ["track", "d.csv", "--events", "e.raw", "--out", "r"],
+            "--events is detected in where no DETECTIONS",
+        ),
+        (["detect", "--events", "absent.raw", "--out", "d.csv"], "absent.raw: no such file"),
+        (["detect", "--events", "e.raw", "--out", "d.txt"], "must end in .csv or .parquet"),
+        (["detect", "--events", "e.raw", "--event-rate", "30", "--out", "d.csv"], "rate_hz: 30 gives"),
+    ],
+)
+def test_what_cannot_be_is_said_in_one_line(words, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(words) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(not STREET.is_file(), reason=f"{STREET} is not there")
+def test_a_real_street_from_one_file(tmp_path):
+    pytest.importorskip("aedat", reason="pip install 'jeat-graph[aedat4]'")
+    assert main(["track", "--frames", str(STREET), "--events", str(STREET), "--out", str(tmp_path)]) == 0
+    table = pd.read_csv(tmp_path / "smoothed.csv")
+    # Three cars: near and white all the time, far and white all the time, dark from the shadow at 1.3 s.
+    lives = table.groupby("track_id").t.agg(["min", "max"])
+    long = lives[lives["max"] - lives["min"] > 1.0]
+    assert len(long) == 3
+    assert sorted(long["min"].round(1)) == [0.0, 0.0, 1.3]
+    assert (long["max"] > 2.3).all()
+    # The parked van does not move, so nobody sees it.
+    assert not ((table.x - 170).abs() + (table.y - 171).abs() < 10).any()

@@ -1,0 +1,68 @@
+"""Windows of events hold what a histogram of their events holds."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from jeat_graph.data.errors import ConfigError
+from jeat_graph.detection.windows import EventBins
+
+from .moving import events_of
+
+SIZE = (64, 40)
+THINGS = [((5, 5), (200, 60), (20, 10))]
+
+
+def brute_force(events, end_us, bins, bin_us):
+    edges = end_us - bin_us * np.arange(bins, -1, -1)
+    columns = []
+    for first, last in pairwise(edges.tolist()):
+        part = events.between(first, last)
+        for polarity in (0, 1):
+            of_it = part.take(part.polarity == polarity)
+            counts, *_ = np.histogram2d(
+                of_it.y, of_it.x, bins=(SIZE[1], SIZE[0]), range=((0, SIZE[1]), (0, SIZE[0]))
+            )
+            columns.append(counts)
+    return np.array(columns)
+
+
+def test_every_window_is_the_histogram_of_its_events():
+    events = events_of(THINGS, 0.2, noise_hz_px=5.0, size=SIZE)
+    ring = EventBins(SIZE, bins=10, bin_s=0.005)
+    for k in range(40):
+        ring.advance(events.between(k * 5000, (k + 1) * 5000))
+        assert ring.end_us == (k + 1) * 5000
+        expected = brute_force(events, ring.end_us, 10, 5000)
+        np.testing.assert_array_equal(ring.stack(), expected)
+        np.testing.assert_array_equal(ring.total, expected.sum(axis=0))
+        np.testing.assert_array_equal(ring.recent(3), expected[-6:].sum(axis=0))
+
+
+def test_a_leap_empties_the_window():
+    ring = EventBins(SIZE)
+    ring.advance(events_of(THINGS, 0.005, size=SIZE))
+    assert ring.total.any()
+    ring.skip_to(10_000_000)
+    assert not ring.total.any()
+    assert not ring.stack().any()
+
+
+def test_many_events_of_one_pixel_do_not_overflow():
+    events = events_of(THINGS, 0.005, size=SIZE)
+    many = events.take(np.zeros(600, dtype=np.int64))
+    ring = EventBins(SIZE, bins=2)
+    ring.advance(many)
+    assert ring.total.max() == 255
+    ring.advance(many)
+    ring.advance(many.take(slice(0, 0)))
+    ring.advance(many.take(slice(0, 0)))
+    assert not ring.total.any()
+
+
+def test_a_window_needs_bins():
+    with pytest.raises(ConfigError, match="windows need bins"):
+        EventBins(SIZE, bins=0)
