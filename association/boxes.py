@@ -30,6 +30,25 @@ def visible_fraction(box: FloatArray, width: float, height: float) -> float:
 
 
 @njit(cache=True)
+def clip_boxes(boxes: FloatArray, width: float, height: float) -> FloatArray:
+    """Parts (N, 4) of boxes that lie inside a picture of `width` x `height` px; without area where none does.
+
+    Args:
+        boxes: (N, 4) left, top, width, height (px).
+        width: of the picture (px).
+        height: of the picture (px).
+    """
+    out = np.empty_like(boxes)
+    for i in range(boxes.shape[0]):
+        for axis in range(2):
+            extent = width if axis == 0 else height
+            low = min(max(boxes[i, axis], 0.0), extent)
+            out[i, axis] = low
+            out[i, 2 + axis] = max(min(boxes[i, axis] + boxes[i, 2 + axis], extent) - low, 0.0)
+    return out
+
+
+@njit(cache=True)
 def occluded_fraction(boxes: FloatArray, existence: FloatArray) -> FloatArray:
     """Fraction (N,) of each box that the one track in front which covers most of it hides.
 

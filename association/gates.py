@@ -8,7 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from jeat_graph.association.densities import Likelihood, log_constants, log_density_of
 from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.filters.cut_boxes import BOTH_CUT, HIGH_CUT, centre_from_side
 
 
 class Expected(NamedTuple):
@@ -39,12 +41,16 @@ class Found(NamedTuple):
         log_size: (M, 2) detected ln width, ln height.
         weight: (M,) factor on a detection's measurement variance (g of the paper).
         sensor: (M,) sensor of each detection, 0 … S − 1.
+        cut: (M, 2) which sides the edges of the picture cut, along x and y (`filters.cut_boxes`).
+        side: (M, 2) coordinate of the side that shows where one is cut (px).
     """
 
     z: FloatArray
     log_size: FloatArray
     weight: FloatArray
     sensor: IntArray
+    cut: IntArray
+    side: FloatArray
 
 
 class Pairs(NamedTuple):
@@ -66,7 +72,9 @@ class Pairs(NamedTuple):
 
 
 @njit(cache=True)
-def gated_pairs(expected: Expected, found: Found, gate: float, size_gate: float) -> Pairs:
+def gated_pairs(
+    expected: Expected, found: Found, likelihood: Likelihood, gate: float, size_gate: float
+) -> Pairs:
     """List the pairs of track and detection inside the gates.
 
     The detections are sorted by x once and each track looks only at those within its gate's width, so the
@@ -75,6 +83,7 @@ def gated_pairs(expected: Expected, found: Found, gate: float, size_gate: float)
     Args:
         expected: what the tracks are expected to show.
         found: what the detections measured.
+        likelihood: of the differences.
         gate: χ² bound on the Mahalanobis distance d² of the centre (2 degrees of freedom).
         size_gate: χ² bound on that of the size; +inf for no size gate.
     """
@@ -88,7 +97,7 @@ def gated_pairs(expected: Expected, found: Found, gate: float, size_gate: float)
             values[1],
             values[2],
         )
-        count = _fill(pairs, expected, found, gate, size_gate)
+        count = _fill(pairs, expected, found, likelihood, gate, size_gate)
         if count >= 0:
             return Pairs(
                 pairs.rows[:count],
@@ -101,14 +110,21 @@ def gated_pairs(expected: Expected, found: Found, gate: float, size_gate: float)
 
 
 @njit(cache=True)
-def _fill(pairs: Pairs, expected: Expected, found: Found, gate: float, size_gate: float) -> int:
+def _fill(
+    pairs: Pairs,
+    expected: Expected,
+    found: Found,
+    likelihood: Likelihood,
+    gate: float,
+    size_gate: float,
+) -> int:
     """Write the pairs of `gated_pairs`; return how many, or -1 if they do not fit.
 
     A function of its own, because arrays that may be replaced inside the loop make it five times slower.
     """
     rows, cols, d2, log_density, log_size_density = pairs
     position, position_var, noise, log_size, log_size_var, size_noise = expected
-    z, z_log_size, weight, sensor = found
+    z, z_log_size, weight, sensor, cut, side = found
     num_tracks = position.shape[0]
     num_dets = z.shape[0]
     capacity = len(rows)
@@ -119,16 +135,23 @@ def _fill(pairs: Pairs, expected: Expected, found: Found, gate: float, size_gate
     x_sorted = z[order, 0]
     y_sorted = z[order, 1]
     heaviest = np.max(weight)
-    log_2pi = math.log(2.0 * math.pi)
+    constants = log_constants(likelihood.freedom)
+    unseen_density = -math.log(likelihood.log_size_range)
+    some_cut = (np.max(cut[:, 0]) > 0, np.max(cut[:, 1]) > 0)
     for i in range(num_tracks):
         left, right = np.inf, -np.inf
         top, bottom = np.inf, -np.inf
+        # The middle of the part that shows lies within half a size of the centre.
+        reach_x, open_x = _reach(some_cut[0], log_size[i, 0], log_size_var[i, 0])
+        reach_y, open_y = _reach(some_cut[1], log_size[i, 1], log_size_var[i, 1])
         for s in range(noise.shape[1]):
             # A hair wider than any gate, so that rounding never decides here.
-            half = 1.000001 * math.sqrt(gate * (position_var[i, s, 0] + noise[i, s, 0] * heaviest))
+            half = 1.000001 * math.sqrt(gate * (position_var[i, s, 0] + noise[i, s, 0] * heaviest + open_x))
+            half += reach_x
             left = min(left, position[i, s, 0] - half)
             right = max(right, position[i, s, 0] + half)
-            half = 1.000001 * math.sqrt(gate * (position_var[i, s, 1] + noise[i, s, 1] * heaviest))
+            half = 1.000001 * math.sqrt(gate * (position_var[i, s, 1] + noise[i, s, 1] * heaviest + open_y))
+            half += reach_y
             top = min(top, position[i, s, 1] - half)
             bottom = max(bottom, position[i, s, 1] + half)
         k = np.searchsorted(x_sorted, left)
@@ -142,19 +165,35 @@ def _fill(pairs: Pairs, expected: Expected, found: Found, gate: float, size_gate
             s = sensor[j]
             dy = y - position[i, s, 1]
             Sy = position_var[i, s, 1] + noise[i, s, 1] * weight[j]
+            if cut[j, 1]:
+                known = log_size[i, 1], log_size_var[i, 1]
+                shown = cut[j, 1], side[j, 1], z_log_size[j, 1]
+                centre, var = centre_of_cut(*shown, *known)
+                dy = 0.0 if cut[j, 1] == BOTH_CUT else centre - position[i, s, 1]
+                Sy += var
             ny = dy * dy / Sy
             if ny > gate:
                 continue
             dx = z[j, 0] - position[i, s, 0]
             Sx = position_var[i, s, 0] + noise[i, s, 0] * weight[j]
+            if cut[j, 0]:
+                known = log_size[i, 0], log_size_var[i, 0]
+                shown = cut[j, 0], side[j, 0], z_log_size[j, 0]
+                centre, var = centre_of_cut(*shown, *known)
+                dx = 0.0 if cut[j, 0] == BOTH_CUT else centre - position[i, s, 0]
+                Sx += var
             distance = dx * dx / Sx + ny
             if not distance <= gate:
                 continue
             size_distance = 0.0
             size_det = 1.0
-            for side in range(2):
-                e = z_log_size[j, side] - log_size[i, side]
-                V = log_size_var[i, side] + size_noise[s, side]
+            seen = 0
+            for axis in range(2):
+                e = z_log_size[j, axis] - log_size[i, axis]
+                if cut[j, axis] and e <= 0.0:
+                    continue  # the rest of the vehicle is outside
+                seen += 1
+                V = log_size_var[i, axis] + size_noise[s, axis]
                 size_distance += e * e / V
                 size_det *= V
             if size_distance > size_gate:
@@ -172,7 +211,38 @@ def _fill(pairs: Pairs, expected: Expected, found: Found, gate: float, size_gate
             rows[count] = i
             cols[at] = j
             d2[at] = distance
-            log_density[at] = -0.5 * (distance + math.log(Sx * Sy)) - log_2pi
-            log_size_density[at] = -0.5 * (size_distance + math.log(size_det)) - log_2pi
+            log_density[at] = log_density_of(distance, Sx * Sy, 2, likelihood.freedom, constants)
+            log_size_density[at] = (
+                log_density_of(size_distance, size_det, seen, likelihood.freedom, constants)
+                + (2 - seen) * unseen_density
+            )
             count += 1
     return count
+
+
+@njit(cache=True)
+def _reach(some_cut: bool, log_size: float, log_size_var: float) -> tuple[float, float]:
+    """How far the middle of a cut box may lie from the centre of a track, and the variance its size adds."""
+    if not some_cut:
+        return 0.0, 0.0
+    half, var = centre_from_side(HIGH_CUT, 0.0, log_size, log_size_var)
+    return half, var
+
+
+@njit(cache=True)
+def centre_of_cut(
+    cut: int, side: float, shown: float, log_size: float, log_size_var: float
+) -> tuple[float, float]:
+    """Where a track's centre is by a box that is cut along one axis, and the variance that its size adds.
+
+    Args:
+        cut: which sides are cut; where both are, nothing is measured, and the variance is that of a place
+            anywhere in the picture.
+        side: the side that shows (px).
+        shown: ln of the length that shows (ln px).
+        log_size: of the track (ln px).
+        log_size_var: its variance.
+    """
+    if cut == BOTH_CUT:
+        return 0.0, math.exp(2.0 * shown) / (2.0 * math.pi)
+    return centre_from_side(cut, side, log_size, log_size_var)

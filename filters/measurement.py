@@ -10,6 +10,8 @@ import numpy as np
 #: - `z` (2,) centre (px); `r` (2,) variances of its white noise (px²), noise scale and score included.
 #: - `error` the sensor's error state, or -1; `coloured_std` (2,) standard deviations of that error (px).
 #: - `jerk` root spectral density of the track's jerk at the time (px/s^2.5), > 0.
+#: - `cut` (2,) which sides the edges of the picture cut (`cut_boxes.py`), `side` (2,) the side that shows
+#:   (px): there `z` and `r` are what that side and the track's size said of the centre.
 #: - `log_size` (2,) ln width and ln height (ln px); `size_var` (2,) their variances.
 #: - `velocity_var` (2,), `acceleration_var` (2,), `rate_var`: where it started the track, the variances of
 #:   what one detection does not tell (px²/s², px²/s⁴, 1/s²; `prior.py`); 0 elsewhere.
@@ -32,5 +34,7 @@ MEASUREMENT = np.dtype(
         ("rate_var", np.float64),
         ("nis", np.float64),
         ("scale", np.float64),
+        ("cut", np.int64, (2,)),
+        ("side", np.float64, (2,)),
     ]
 )

@@ -6,19 +6,23 @@ from numba import njit
 
 
 @njit(cache=True)
-def base_variance(sigma_px: float, rho: float, side: float) -> float:
-    """Variance (px²) of a box centre along one axis: σ² + (ρ side)².
+def base_variance(sigma_px: float, rho: float, side: float, rho_size: float, size: float) -> float:
+    """Variance (px²) of a box centre along one axis: σ² + (ρ side)² + (ρ_s size)².
 
     A detector misses the edges of a box by a fraction of the box; a constant in pixels is wrong by an
-    order of magnitude between a near vehicle and a far one.
+    order of magnitude between a near vehicle and a far one. Of a narrow object, a walker, it misses all sides
+    by a fraction of the whole.
 
     Args:
         sigma_px: the part that does not depend on size (px).
         rho: the part that does, as a fraction of the side.
         side: width for the x axis, height for the y axis (px).
+        rho_size: the part that goes with the size of the whole box, as a fraction of it.
+        size: sqrt(w h) (px).
     """
     r = rho * side
-    return sigma_px * sigma_px + r * r
+    whole = rho_size * size
+    return sigma_px * sigma_px + r * r + whole * whole
 
 
 @njit(cache=True)

@@ -14,6 +14,12 @@ class ImageConfig(Section):
 
     width: float = number(1280.0, "px", "width of the picture", open_low=True)
     height: float = number(720.0, "px", "height of the picture", open_low=True)
+    edge_px: float = number(
+        0.0,
+        "px",
+        "a side of a box so near to the edge of the picture is where the picture ends, and measures nothing; "
+        "0: all boxes are whole",
+    )
 
 
 @dataclass(frozen=True)

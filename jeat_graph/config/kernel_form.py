@@ -68,6 +68,7 @@ class SensorArrays(NamedTuple):
     Attributes:
         sigma_px: (S,) px.
         rho: (S, 2) fraction of width and height.
+        rho_size: (S,) fraction of sqrt(w h).
         correlated_share: (S,) share of the centre's noise variance that is correlated in time.
         error: (S,) the sensor's error state, counted from 0; -1 where its errors are white.
         correlation_time_s: (B,) correlation time of each error state (s).
@@ -85,6 +86,7 @@ class SensorArrays(NamedTuple):
 
     sigma_px: FloatArray
     rho: FloatArray
+    rho_size: FloatArray
     correlated_share: FloatArray
     error: IntArray
     correlation_time_s: FloatArray

@@ -41,6 +41,11 @@ class AssociationConfig(Section):
         default=(), metadata={"doc": "order of sensors for `sequential`; those not named follow by name"}
     )
     second_pass: bool = flag(True, "joint and sequential: a matched track takes another sensor's leftover")
+    tail_freedom: float = number(
+        0.0,
+        "1",
+        "likelihoods of pairs have the tails of Student's t with so many degrees of freedom (> 2); 0: normal",
+    )
     log_size_range: float = number(
         3.0, "ln px", "range of ln width and of ln height over which false boxes spread", open_low=True
     )

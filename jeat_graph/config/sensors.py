@@ -17,6 +17,9 @@ class SensorConfig(Section):
     sigma_px: float = number(2.0, "px", "noise of the box centre that does not depend on size", open_low=True)
     rho_x: float = number(0.03, "1", "noise of the box centre in x as a fraction of the width (method: rho)")
     rho_y: float = number(0.03, "1", "noise of the box centre in y as a fraction of the height (method: rho)")
+    rho_size: float = number(
+        0.0, "1", "noise of the box centre in both as a fraction of the box size sqrt(w h)"
+    )
     correlated_share: float = number(
         0.0, "1", "share of the centre's noise variance that persists from scan to scan", 0.0, 0.99
     )
@@ -72,6 +75,12 @@ class InputConfig(Section):
         "a sensor that is not declared is an error, or is declared by what is seen of it; then the rates of "
         "all sensors are those of the recording too",
     )
+    sigma_px: float = number(2.0, "px", "of a sensor that is declared by what is seen of it", open_low=True)
+    rho_x: float = number(0.03, "1", "of such a sensor")
+    rho_y: float = number(0.03, "1", "of such a sensor")
+    rho_size: float = number(0.0, "1", "of such a sensor")
+    correlated_share: float = number(0.0, "1", "of such a sensor", 0.0, 0.99)
+    memory_s: float = number(0.2, "s", "of such a sensor", 1e-3, 1e4)
     picture: str = choice(
         "given",
         ("given", "seen"),

@@ -84,7 +84,10 @@ def read_measurements(path: str | Path, sensors: Sequence[str]) -> RecordArray:
         if field == "sensor":
             rows[field] = _numbered(table, sensors)
         elif np.issubdtype(MEASUREMENT[field].base, np.integer):
-            rows[field] = table.whole(field)
+            if len(names) == 1:
+                rows[field] = table.whole(field)
+            else:
+                rows[field] = np.column_stack([table.whole(name) for name in names])
         elif len(names) == 1:
             rows[field] = table.number(field, blank_ok=field in _MAY_BE_BLANK)
         else:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from jeat_graph.config.schema import Config, SensorConfig
+from jeat_graph.config.schema import Config, InputConfig, SensorConfig
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.rates import median_rate_hz
 
@@ -56,7 +56,7 @@ def _declare_sensors(config: Config, detections: Detections) -> tuple[Config, li
     sensors: dict[str, SensorConfig] = {}
     for name in detections.sensors:
         known = config.sensors.get(name)
-        sensor = SensorConfig() if known is None else known
+        sensor = undeclared_sensor(config.input) if known is None else known
         rate = scan_rate_hz(detections, name)
         other = rate is not None and not 1.0 / _SAME_RATE < rate / sensor.rate_hz < _SAME_RATE
         if rate is not None and (known is None or other):
@@ -69,6 +69,18 @@ def _declare_sensors(config: Config, detections: Detections) -> tuple[Config, li
     association = config.association
     priority = tuple(name for name in association.priority if name in sensors)
     return replace(config, sensors=sensors, association=replace(association, priority=priority)), notes
+
+
+def undeclared_sensor(assumed: InputConfig) -> SensorConfig:
+    """Return what is assumed of a sensor of which nothing is known but that it is there."""
+    return SensorConfig(
+        sigma_px=assumed.sigma_px,
+        rho_x=assumed.rho_x,
+        rho_y=assumed.rho_y,
+        rho_size=assumed.rho_size,
+        correlated_share=assumed.correlated_share,
+        memory_s=assumed.memory_s,
+    )
 
 
 def scan_rate_hz(detections: Detections, sensor: str) -> float | None:

@@ -11,6 +11,7 @@ from numba import njit
 from jeat_graph.association.costs import log_score_ratio
 from jeat_graph.config.kernel_form import Model
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.filters.cut_boxes import LOW_CUT, cut_of
 from jeat_graph.filters.noise import score_weight
 
 # A calibrated precision is never certain, or a single score would outweigh all else that is known.
@@ -48,6 +49,8 @@ class Batch(NamedTuple):
         weight: (M,) factor on the measurement variance (g of the paper).
         sensor: (M,) sensor index.
         present: (S,) which sensors looked, including those that found nothing.
+        cut: (M, 2) which sides the edges of the picture cut, along x and y (`filters.cut_boxes`).
+        side: (M, 2) coordinate of the side that shows where one is cut (px).
     """
 
     t: float
@@ -59,6 +62,26 @@ class Batch(NamedTuple):
     weight: FloatArray
     sensor: IntArray
     present: BoolArray
+    cut: IntArray
+    side: FloatArray
+
+
+class Measured(NamedTuple):
+    """One detection as one track takes it in: what it measures, and how exactly.
+
+    Attributes:
+        z: (2,) box centre (px).
+        log_size: (2,) ln width and ln height (ln px).
+        white: (2,) variances of the white part of the centre's noise (px²).
+        coloured_std: (2,) standard deviations of the part that is correlated in time (px), 0 for none.
+        log_size_var: (2,) variances of ln width and ln height.
+    """
+
+    z: FloatArray
+    log_size: FloatArray
+    white: FloatArray
+    coloured_std: FloatArray
+    log_size_var: FloatArray
 
 
 @njit(cache=True)
@@ -76,7 +99,7 @@ def interpolate(x: float, knots: FloatArray, values: FloatArray) -> float:
 @njit(cache=True)
 def prepare(arrivals: Arrivals, model: Model) -> Batch:
     """Turn the detections of one instant into measurements: bias removed, scores calibrated."""
-    sensors, noise = model.sensors, model.settings.noise
+    sensors, noise, image = model.sensors, model.settings.noise, model.settings.image
     boxes, scores, sensor = arrivals.boxes, arrivals.scores, arrivals.sensor
     num = len(scores)
     z = np.empty((num, 2))
@@ -85,10 +108,20 @@ def prepare(arrivals: Arrivals, model: Model) -> Batch:
     precision = np.empty(num)
     log_score = np.empty(num)
     weight = np.empty(num)
+    cut = np.zeros((num, 2), dtype=np.int64)
+    seen_side = np.zeros((num, 2))
     for j in range(num):
         s = sensor[j]
         for axis in range(2):
             side = boxes[j, 2 + axis]
+            low, high = boxes[j, axis], boxes[j, axis] + side
+            cut[j, axis] = cut_of(low, high, image.width if axis == 0 else image.height, image.edge_px)
+            if cut[j, axis]:
+                # The detector's bias is that of whole boxes.
+                seen_side[j, axis] = high if cut[j, axis] == LOW_CUT else low
+                log_size[j, axis], z[j, axis] = math.log(side), low + 0.5 * side
+                corrected[j, axis], corrected[j, 2 + axis] = low, side
+                continue
             log_size[j, axis] = math.log(side) - sensors.bias[s, 2 + axis]
             z[j, axis] = boxes[j, axis] + (0.5 - sensors.bias[s, axis]) * side
             true_side = math.exp(log_size[j, axis])
@@ -98,4 +131,5 @@ def prepare(arrivals: Arrivals, model: Model) -> Batch:
         precision[j] = min(max(calibrated, _LEAST_PRECISION), _MOST_PRECISION)
         log_score[j] = log_score_ratio(precision[j], sensors.precision[s])
         weight[j] = score_weight(scores[j], noise.score_floor) if noise.score_weighting else 1.0
-    return Batch(arrivals.t, z, log_size, corrected, precision, log_score, weight, sensor, arrivals.present)
+    found = z, log_size, corrected, precision, log_score, weight
+    return Batch(arrivals.t, *found, sensor, arrivals.present, cut, seen_side)

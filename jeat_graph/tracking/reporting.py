@@ -73,7 +73,9 @@ def report(
             continue
         if output.clip:
             visible = visible_fraction(boxes[i], width, height)
-            if visible <= 0.0 or visible < output.min_visible:
+            # What was detected just now does show, however little of it.
+            shown = image.edge_px > 0.0 and tracks.used[i] != 0
+            if visible <= 0.0 or (visible < output.min_visible and not shown):
                 continue
         rows[count] = i
         count += 1

@@ -15,7 +15,7 @@ from numba import njit
 from jeat_graph.config.kernel_form import SensorArrays
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 from jeat_graph.filters.measurement import MEASUREMENT
-from jeat_graph.tracking.batch import Batch
+from jeat_graph.tracking.batch import Batch, Measured
 
 # A configuration may ask for no jerk at all; the smoothers want process noise that can be inverted.
 _LEAST_JERK = 1e-6
@@ -44,8 +44,7 @@ def log_update(
     track_id: int,
     j: int,
     batch: Batch,
-    R: FloatArray,
-    coloured_std: FloatArray,
+    measured: Measured,
     jerk: float,
     sensors: SensorArrays,
 ) -> None:
@@ -56,8 +55,7 @@ def log_update(
         track_id: the track that took it.
         j: the detection.
         batch: all detections of the step.
-        R: (2,) variances of its white noise (px²).
-        coloured_std: (2,) standard deviations of the part that is correlated in time (px), 0 for none.
+        measured: what it measures of the track.
         jerk: root spectral density of the track's jerk (px/s^2.5).
         sensors: parameters of the sensors.
     """
@@ -75,11 +73,13 @@ def log_update(
     row["nis"] = math.nan
     row["scale"] = 1.0
     for axis in range(2):
-        row["z"][axis] = batch.z[j, axis]
-        row["r"][axis] = R[axis]
-        row["coloured_std"][axis] = coloured_std[axis]
-        row["log_size"][axis] = batch.log_size[j, axis]
-        row["size_var"][axis] = sensors.size_var[s, axis]
+        row["z"][axis] = measured.z[axis]
+        row["r"][axis] = measured.white[axis]
+        row["coloured_std"][axis] = measured.coloured_std[axis]
+        row["log_size"][axis] = measured.log_size[axis]
+        row["size_var"][axis] = measured.log_size_var[axis]
+        row["cut"][axis] = batch.cut[j, axis]
+        row["side"][axis] = batch.side[j, axis]
         row["velocity_var"][axis] = 0.0
         row["acceleration_var"][axis] = 0.0
     log.count[0] = k + 1

@@ -4,9 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.stats import multivariate_normal
+from scipy.stats import multivariate_normal, multivariate_t
 
+from jeat_graph.association.densities import Likelihood, log_constants, log_density_of
 from jeat_graph.association.gates import Expected, Found, gated_pairs
+from jeat_graph.filters.cut_boxes import BOTH_CUT, HIGH_CUT, LOW_CUT
+
+NORMAL = Likelihood(0.0, 3.0)
 
 
 def random_scene(rng, tracks, dets, sensors=2, width=300.0):
@@ -24,13 +28,15 @@ def random_scene(rng, tracks, dets, sensors=2, width=300.0):
         rng.normal(4.0, 0.3, (dets, 2)),
         rng.uniform(1.0, 10.0, dets),
         rng.integers(0, sensors, dets),
+        np.zeros((dets, 2), dtype=np.int64),
+        np.zeros((dets, 2)),
     )
-    return expected, found
+    return expected, found, NORMAL
 
 
-def all_pairs(expected, found, gate, size_gate):
+def all_pairs(expected, found, _, gate, size_gate):
     position, var, noise, log_size, size_var, size_noise = expected
-    z, z_size, weight, sensor = found
+    z, z_size, weight, sensor, _, _ = found
     out = []
     for i in range(len(position)):
         for j in range(len(z)):
@@ -80,7 +86,73 @@ def test_a_detection_on_the_gate_is_inside():
     z = np.array([[6.0, 0.0]])
     arguments = (
         Expected(flat[None], one[None], np.ones((1, 1, 2)), flat, one, one),
-        Found(z, flat, np.ones(1), np.zeros(1, dtype=np.int64)),
+        Found(z, flat, np.ones(1), np.zeros(1, dtype=np.int64), np.zeros((1, 2), dtype=np.int64), flat),
+        NORMAL,
     )
     assert len(gated_pairs(*arguments, 18.0, np.inf)[0]) == 1
     assert len(gated_pairs(*arguments, 17.999, np.inf)[0]) == 0
+
+
+@pytest.mark.parametrize("dims", [1, 2])
+@pytest.mark.parametrize("freedom", [3.0, 5.0, 30.0])
+def test_heavy_tails_are_students_t_of_the_same_covariance(dims, freedom):
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        S, y = rng.uniform(0.5, 9.0, dims), rng.normal(0.0, 6.0, dims)
+        shape = np.diag(S) * (freedom - 2.0) / freedom
+        expected = multivariate_t(np.zeros(dims), shape, df=freedom).logpdf(y)
+        d2, det = float((y**2 / S).sum()), float(S.prod())
+        found = log_density_of(d2, det, dims, freedom, log_constants(freedom))
+        assert found == pytest.approx(expected, rel=1e-9)
+
+
+def one_cut(cut, side, shown, centre=100.0, width=80.0, size_var=0.04):
+    """Pairs of one track 80 px wide around x = 100 with one detection cut along x, of which `side` shows."""
+    track = Expected(
+        np.array([[[centre, 50.0]]]),
+        np.full((1, 1, 2), 4.0),
+        np.full((1, 1, 2), 5.0),
+        np.log([[width, 40.0]]),
+        np.full((1, 2), size_var),
+        np.full((1, 2), 0.01),
+    )
+    middle = side - 0.5 * shown if cut == LOW_CUT else side + 0.5 * shown
+    found = Found(
+        np.array([[middle, 50.0]]),
+        np.log([[shown, 40.0]]),
+        np.ones(1),
+        np.zeros(1, dtype=np.int64),
+        np.array([[cut, 0]]),
+        np.array([[side, 0.0]]),
+    )
+    return gated_pairs(track, found, NORMAL, 55.0, 55.0)
+
+
+@pytest.mark.parametrize(("cut", "side"), [(LOW_CUT, 143.0), (HIGH_CUT, 57.0)])
+def test_a_cut_box_is_judged_by_the_side_that_shows(cut, side):
+    pairs = one_cut(cut, side, 25.0)
+    # 3 px off where the track's other side should be; half a width's spread is 40 px times .2.
+    S = 4.0 + 5.0 + 40.0**2 * 0.04
+    assert pairs.d2[0] == pytest.approx(9.0 / S)
+    assert pairs.log_density[0] == pytest.approx(
+        multivariate_normal.logpdf([3.0, 0.0], [0, 0], np.diag([S, 9.0]))
+    )
+
+
+def test_a_part_that_shows_says_no_more_of_the_size_than_clutter_would():
+    height = -0.5 * np.log(2.0 * np.pi * 0.05)
+    assert one_cut(LOW_CUT, 140.0, 25.0).log_size_density[0] == pytest.approx(height - np.log(3.0))
+
+
+def test_a_part_larger_than_the_whole_is_a_difference_in_size():
+    pairs = one_cut(LOW_CUT, 140.0, 100.0)
+    e, V = np.log(100.0 / 80.0), 0.05
+    expected = multivariate_normal.logpdf([e, 0.0], [0, 0], np.diag([V, V]))
+    assert pairs.log_size_density[0] == pytest.approx(expected)
+
+
+def test_a_box_cut_on_both_sides_may_belong_to_any_place():
+    far = one_cut(BOTH_CUT, 0.0, 1000.0, centre=700.0, width=1500.0)
+    near = one_cut(BOTH_CUT, 0.0, 1000.0, centre=500.0, width=1500.0)
+    assert far.d2[0] == near.d2[0] == 0.0
+    assert far.log_density[0] == near.log_density[0]

@@ -12,7 +12,12 @@ PAPER = (0.1, 0.5, 5.0)
 
 @given(sigma=st.floats(0.0, 50.0), rho=st.floats(0.0, 1.0), side=st.floats(0.0, 2000.0))
 def test_base_variance_grows_with_the_square_of_the_side(sigma, rho, side):
-    assert base_variance(sigma, rho, side) == pytest.approx(sigma**2 + (rho * side) ** 2)
+    assert base_variance(sigma, rho, side, 0.0, 1e6) == pytest.approx(sigma**2 + (rho * side) ** 2)
+
+
+@given(rho=st.floats(0.0, 1.0), size=st.floats(0.0, 2000.0))
+def test_a_part_of_it_goes_with_the_whole_box(rho, size):
+    assert base_variance(2.0, 0.0, 10.0, rho, size) == pytest.approx(4.0 + (rho * size) ** 2)
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.smoothers.engine import TrackSmoother, make_smoother
 from jeat_graph.smoothers.measurements import concatenate_measurements
 from jeat_graph.smoothers.track_data import COINCIDENT_S, SmoothedTrack
+from jeat_graph.tracking.smoothing.cut_sides import any_cut, place_by_sides, sizes_by_parts
 from jeat_graph.tracking.smoothing.observation_times import BELIEVED, ObservationTimes
 from jeat_graph.tracking.smoothing.priors import ErrorStates, prior_of, size_prior_of
 from jeat_graph.tracking.smoothing.rows import rows_of
@@ -87,6 +88,14 @@ class TrackHistory:
         if not self.confirmed or self._fed == len(self.measurements):
             return
         rows = concatenate_measurements(self.measurements[self._fed :])
+        if self._sizes is None:
+            rows = sizes_by_parts(rows)
+            self._sizes = SizeWindow(size_prior_of(rows[0]), self._config.size.rate_density)
+            self._sizes.append(rows[1:])
+        else:
+            self._sizes.append(rows)
+        if any_cut(rows):
+            rows = place_by_sides(rows, self._sizes.smooth(), self._config)
         if self.smoother is None:
             settings = self._config.smoother
             self.smoother = make_smoother(
@@ -97,9 +106,7 @@ class TrackHistory:
                 robust=settings.robust,
                 correlation_time=self._errors.correlation_time,
             )
-            self._sizes = SizeWindow(size_prior_of(rows[0]), self._config.size.rate_density)
             rows = rows[1:]
-        assert self._sizes is not None
         if self._keep:
             self._fed = len(self.measurements)
         else:
@@ -107,7 +114,6 @@ class TrackHistory:
         self._waiting = 0
         if len(rows):
             self.smoother.feed(rows)
-            self._sizes.append(rows)
 
     def departed(self) -> list[Trajectories]:
         """Return the rows that have become final since the last call."""

@@ -45,7 +45,8 @@ def rows_of(
     boxes, visible = _boxes(mean, size, config.image.width, config.image.height, config.output.clip)
     keep: slice | BoolArray = slice(None)
     if config.output.clip:
-        keep = (visible > 0.0) & (visible >= config.output.min_visible)
+        shown = observed.used != 0 if config.image.edge_px > 0.0 else np.zeros(len(t), dtype=bool)
+        keep = (visible > 0.0) & ((visible >= config.output.min_visible) | shown)
         if keep.all():
             keep = slice(None)
     var = np.diagonal(cov, axis1=2, axis2=3)

@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.association.costs import likelihood_cost, log_evidence
+from jeat_graph.association.densities import Likelihood
 from jeat_graph.association.gates import Expected, Found, gated_pairs
 from jeat_graph.association.joint import associate_joint, associate_sequential, associate_slots
 from jeat_graph.association.methods import JOINT, SLOTS
@@ -55,7 +56,8 @@ def associate(
             tracks.size_cov[:n, :, 0, 0],
             sensors.size_var,
         ),
-        Found(batch.z, batch.log_size, batch.weight, batch.sensor),
+        Found(batch.z, batch.log_size, batch.weight, batch.sensor, batch.cut, batch.side),
+        Likelihood(settings.tail_freedom, settings.log_size_range),
         settings.gate_bound,
         settings.size_gate_bound,
     )

@@ -8,16 +8,25 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.association.births import choose_births
-from jeat_graph.association.boxes import track_boxes
-from jeat_graph.config.kernel_form import Model, SensorArrays
+from jeat_graph.association.boxes import clip_boxes, track_boxes
+from jeat_graph.config.kernel_form import Model, SensorArrays, Settings
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.filters.cut_boxes import (
+    BOTH_CUT,
+    FIRST_LOG_GROWTH,
+    FIRST_LOG_GROWTH_STD,
+    HIGH_CUT,
+    UNKNOWN,
+    WHOLE,
+    centre_from_side,
+)
 from jeat_graph.filters.noise import base_variance
 from jeat_graph.filters.prior import write_prior, write_size_prior
-from jeat_graph.tracking.batch import Batch
+from jeat_graph.tracking.batch import Batch, Measured
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.ending import confirm
 from jeat_graph.tracking.stages.predicting import jerk_of, split_noise
-from jeat_graph.tracking.stages.updating import Noise, update_track
+from jeat_graph.tracking.stages.updating import update_track
 from jeat_graph.tracking.state import Scene, TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog, log_birth, log_update
 
@@ -41,7 +50,7 @@ def give_birth(
         existence,
         batch.sensor,
         association.taken,
-        track_boxes(tracks.mean[:n], tracks.size_mean[:n]),
+        shown_boxes(tracks, n, settings),
         settings.birth.min_existence,
         settings.birth.max_overlap,
     )
@@ -54,7 +63,7 @@ def give_birth(
     for j in range(len(partner)):
         if partner[j] >= 0:
             i = n + partner[j]
-            update_track(tracks, i, batch, j, own_noise(batch, j, model.sensors), model, log)
+            update_track(tracks, i, batch, j, second_view(tracks, i, batch, j, model.sensors), model, log)
             # Two sensors' false boxes seldom coincide: each view's chance to be false remains.
             tracks.existence[i] = 1.0 - (1.0 - tracks.existence[i]) * (1.0 - batch.precision[j])
     confirm(tracks, n + len(parents), batch.t, settings)
@@ -62,15 +71,52 @@ def give_birth(
 
 
 @njit(cache=True)
-def own_noise(batch: Batch, j: int, sensors: SensorArrays) -> Noise:
-    """Noise of detection `j` by its own size, where no track's is known."""
+def first_view(batch: Batch, j: int, sensors: SensorArrays) -> Measured:
+    """Say what detection `j` measures where no track's size is known; one that is cut may be much larger."""
     s = batch.sensor[j]
     white, coloured_std = np.empty(2), np.empty(2)
+    z, log_size, log_size_var = batch.z[j].copy(), batch.log_size[j].copy(), sensors.size_var[s].copy()
+    size = math.sqrt(batch.boxes[j, 2] * batch.boxes[j, 3])
     for axis in range(2):
-        base = base_variance(sensors.sigma_px[s], sensors.rho[s, axis], batch.boxes[j, 2 + axis])
+        side = batch.boxes[j, 2 + axis]
+        base = base_variance(sensors.sigma_px[s], sensors.rho[s, axis], side, sensors.rho_size[s], size)
         r, h = split_noise(base, s, sensors)
         white[axis], coloured_std[axis] = r * batch.weight[j], h
-    return Noise(white, coloured_std)
+        cut = batch.cut[j, axis]
+        if cut != WHOLE:
+            log_size[axis] += FIRST_LOG_GROWTH
+            log_size_var[axis] += FIRST_LOG_GROWTH_STD**2
+            half_var = centre_from_side(HIGH_CUT, 0.0, log_size[axis], log_size_var[axis])[1]
+            if cut != BOTH_CUT:
+                z[axis], _ = centre_from_side(cut, batch.side[j, axis], log_size[axis], 0.0)
+            white[axis] += half_var
+    return Measured(z, log_size, white, coloured_std, log_size_var)
+
+
+@njit(cache=True)
+def second_view(tracks: TrackArrays, i: int, batch: Batch, j: int, sensors: SensorArrays) -> Measured:
+    """Say what detection `j` measures of track `i`, which another sensor's detection has just begun."""
+    own = first_view(batch, j, sensors)
+    for axis in range(2):
+        cut = batch.cut[j, axis]
+        if cut == WHOLE:
+            continue
+        known = tracks.size_mean[i, axis, 0]
+        if cut == BOTH_CUT:
+            own.z[axis] = tracks.mean[i, axis, 0]
+        else:
+            own.z[axis], _ = centre_from_side(cut, batch.side[j, axis], known, 0.0)
+        # Both views guess the part that does not show in the same way.
+        own.log_size[axis], own.log_size_var[axis] = known, UNKNOWN
+    return own
+
+
+@njit(cache=True)
+def shown_boxes(tracks: TrackArrays, n: int, settings: Settings) -> FloatArray:
+    """Boxes (n, 4) of the first `n` tracks; where boxes may be cut, the part in the picture."""
+    boxes = track_boxes(tracks.mean[:n], tracks.size_mean[:n])
+    image = settings.image
+    return clip_boxes(boxes, image.width, image.height) if image.edge_px > 0.0 else boxes
 
 
 @njit(cache=True)
@@ -111,14 +157,14 @@ def start_track(
     acceleration_std = motion.acceleration_std_px + motion.acceleration_std_per_size * side
     velocity_var, acceleration_var = np.full(2, velocity_std**2), np.full(2, acceleration_std**2)
     rate_var = model.settings.size.rate_std**2
-    noise = own_noise(batch, j, sensors)
-    white, coloured_std, error = noise.white, noise.coloured_std, sensors.error[s]
+    view = first_view(batch, j, sensors)
+    white, coloured_std, error = view.white, view.coloured_std, sensors.error[s]
     mean, cov = tracks.mean[i], tracks.cov[i]
-    write_prior(batch.z[j], white, coloured_std, error, velocity_var, acceleration_var, mean, cov)
+    write_prior(view.z, white, coloured_std, error, velocity_var, acceleration_var, mean, cov)
     size_mean, size_cov = tracks.size_mean[i], tracks.size_cov[i]
-    write_size_prior(batch.log_size[j], sensors.size_var[s], rate_var, size_mean, size_cov)
+    write_size_prior(view.log_size, view.log_size_var, rate_var, size_mean, size_cov)
     for axis in range(2):
-        tracks.rest_point[i, axis] = batch.z[j, axis]
+        tracks.rest_point[i, axis] = view.z[axis]
         tracks.rest_var[i, axis] = white[axis] + coloured_std[axis] * coloured_std[axis]
     tracks.rest_since[i] = t
     tracks.standing_log_odds[i] = 0.0
@@ -133,5 +179,5 @@ def start_track(
     tracks.seen_by[i] = 1 << s
     if len(log.rows) > 0:
         jerk = jerk_of(tracks, i, model.settings)
-        log_update(log, track_id, j, batch, white, coloured_std, jerk, sensors)
+        log_update(log, track_id, j, batch, view, jerk, sensors)
         log_birth(log, velocity_var, acceleration_var, rate_var)

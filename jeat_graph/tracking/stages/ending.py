@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numba import njit
 
-from jeat_graph.association.boxes import track_boxes
+from jeat_graph.association.boxes import clip_boxes, track_boxes, visible_fraction
 from jeat_graph.association.merging import find_duplicates
 from jeat_graph.config.kernel_form import Settings
 from jeat_graph.tracking.compaction import keep_rows
@@ -44,7 +44,7 @@ def remove_ended(tracks: TrackArrays, n: int, t: float, settings: Settings) -> i
                 velocity[i, axis] = tracks.mean[i, axis, 1]
                 velocity_var[i, axis] = tracks.cov[i, axis, 1, 1]
         remove = find_duplicates(
-            boxes,
+            clip_boxes(boxes, image.width, image.height) if image.edge_px > 0.0 else boxes,
             velocity,
             velocity_var,
             tracks.confirmed[:n],
@@ -60,6 +60,9 @@ def remove_ended(tracks: TrackArrays, n: int, t: float, settings: Settings) -> i
             most = max(most, settings.standing.max_gap_s)
         x, y = tracks.mean[i, 0, 0], tracks.mean[i, 1, 0]
         outside = x < 0.0 or y < 0.0 or x > image.width or y > image.height
+        if image.edge_px > 0.0:
+            # The centre may be outside while a part still shows.
+            outside = visible_fraction(boxes[i], image.width, image.height) <= 0.0
         doubted = lifecycle.by_existence and tracks.existence[i] < lifecycle.delete_existence
         # A state that overflowed (a coasting track on wild input) must not survive as NaN.
         broken = not (math.isfinite(x) and math.isfinite(y))

@@ -110,7 +110,10 @@ def current_p_detect(tracks: TrackArrays, n: int, present: BoolArray, model: Mod
 def detection_variance(tracks: TrackArrays, i: int, s: int, axis: int, sensors: SensorArrays) -> float:
     """Variance (px²) of a detection of sensor `s` on track `i`, one axis, at weight 1: s · R_base(size)."""
     side = math.exp(min(tracks.size_mean[i, axis, 0], _MOST_LOG_SIZE))
-    return float(tracks.scale[i, s] * base_variance(sensors.sigma_px[s], sensors.rho[s, axis], side))
+    half_log_area = 0.5 * (tracks.size_mean[i, 0, 0] + tracks.size_mean[i, 1, 0])
+    size = math.exp(min(half_log_area, _MOST_LOG_SIZE))
+    base = base_variance(sensors.sigma_px[s], sensors.rho[s, axis], side, sensors.rho_size[s], size)
+    return float(tracks.scale[i, s] * base)
 
 
 @njit(cache=True)

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from jeat_graph.config.kernel_form import Model, Settings
+from jeat_graph.config.kernel_form import Model, SensorArrays, Settings
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.filters.coloured_noise import update_centre
+from jeat_graph.filters.cut_boxes import (
+    BOTH_CUT,
+    UNKNOWN,
+    WHOLE,
+    centre_from_side,
+    floor_of_centre,
+)
 from jeat_graph.filters.existence import existence_after_hit
 from jeat_graph.filters.kalman import update_block
 from jeat_graph.filters.noise import adapt_scale
@@ -21,23 +27,38 @@ from jeat_graph.filters.standing import (
     update_odds,
     update_rest_point,
 )
-from jeat_graph.tracking.batch import Batch
+from jeat_graph.tracking.batch import Batch, Measured
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.predicting import Expectation, expect_detections, jerk_of
 from jeat_graph.tracking.state import Scene, TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog, log_innovation, log_update
 
 
-class Noise(NamedTuple):
-    """Measurement noise of one detection.
-
-    Attributes:
-        white: (2,) variances of the white part (px²).
-        coloured_std: (2,) standard deviations of the part that is correlated in time (px), 0 for none.
-    """
-
-    white: FloatArray
-    coloured_std: FloatArray
+@njit(cache=True)
+def measured_by(
+    tracks: TrackArrays, i: int, batch: Batch, j: int, expectation: Expectation, sensors: SensorArrays
+) -> Measured:
+    """Say what detection `j` measures of track `i`; a box that is cut only what its visible sides tell."""
+    s = batch.sensor[j]
+    white = expectation.white[i, s] * batch.weight[j]
+    coloured_std, log_size_var = expectation.coloured_std[i, s], sensors.size_var[s]
+    if batch.cut[j, 0] == WHOLE and batch.cut[j, 1] == WHOLE:
+        return Measured(batch.z[j], batch.log_size[j], white, coloured_std, log_size_var)
+    z, log_size, log_size_var = batch.z[j].copy(), batch.log_size[j].copy(), log_size_var.copy()
+    for axis in range(2):
+        cut = batch.cut[j, axis]
+        if cut == WHOLE:
+            continue
+        known, known_var = tracks.size_mean[i, axis, 0], tracks.size_cov[i, axis, 0, 0]
+        if cut == BOTH_CUT:
+            z[axis], white[axis] = tracks.mean[i, axis, 0], UNKNOWN
+        else:
+            # The whole is no smaller than the part.
+            at_least = max(known, log_size[axis])
+            z[axis], var = centre_from_side(cut, batch.side[j, axis], at_least, known_var)
+            white[axis] += var
+        log_size[axis], log_size_var[axis] = max(known, log_size[axis]), UNKNOWN
+    return Measured(z, log_size, white, coloured_std, log_size_var)
 
 
 @njit(cache=True, forceinline=True)
@@ -69,21 +90,21 @@ def update_track(
     i: int,
     batch: Batch,
     j: int,
-    noise: Noise,
+    measured: Measured,
     model: Model,
     log: UpdateLog,
 ) -> None:
     """Update track `i` with detection `j`: filter, size, noise scale, standing."""
     sensors, settings = model.sensors, model.settings
-    R, coloured_std = noise.white, noise.coloured_std
+    z, R, coloured_std = measured.z, measured.white, measured.coloured_std
     s = batch.sensor[j]
     if len(log.rows) > 0:
         jerk = jerk_of(tracks, i, settings)
-        log_update(log, tracks.track_id[i], j, batch, R, coloured_std, jerk, sensors)
+        log_update(log, tracks.track_id[i], j, batch, measured, jerk, sensors)
     if settings.standing.enabled:
         # Both models take the coloured noise for white, so that they are compared on equal terms.
-        judge_standing(tracks, i, batch.t, batch.z[j], R + coloured_std * coloured_std, settings)
-    nis = update_centre(tracks.mean[i], tracks.cov[i], batch.z[j], R, coloured_std, sensors.error[s])
+        judge_standing(tracks, i, batch.t, z, R + coloured_std * coloured_std, settings)
+    nis = update_centre(tracks.mean[i], tracks.cov[i], z, R, coloured_std, sensors.error[s])
     log_innovation(log, nis, tracks.scale[i, s])
     tracks.scale[i, s] = adapt_scale(
         tracks.scale[i, s],
@@ -96,8 +117,16 @@ def update_track(
         update_block(
             tracks.size_mean[i, side],
             tracks.size_cov[i, side],
-            batch.log_size[j, side],
-            sensors.size_var[s, side],
+            measured.log_size[side],
+            measured.log_size_var[side],
+        )
+        if batch.cut[j, side] != WHOLE:
+            tracks.size_mean[i, side, 0] = max(tracks.size_mean[i, side, 0], batch.log_size[j, side])
+        floor_of_centre(
+            batch.cut[j, side],
+            tracks.size_mean[i, side, 0],
+            tracks.size_cov[i, side, 0, 0],
+            tracks.cov[i, side],
         )
     if tracks.standing[i]:
         size = math.exp(0.5 * (tracks.size_mean[i, 0, 0] + tracks.size_mean[i, 1, 0]))
@@ -135,8 +164,8 @@ def update_matched(
             if j < 0:
                 continue
             taken[j] = 1
-            noise = Noise(expectation.white[i, s] * batch.weight[j], expectation.coloured_std[i, s])
-            update_track(tracks, i, batch, j, noise, model, log)
+            measured = measured_by(tracks, i, batch, j, expectation, sensors)
+            update_track(tracks, i, batch, j, measured, model, log)
             if lifecycle.by_existence:
                 tracks.existence[i] = existence_after_hit(
                     tracks.existence[i],
@@ -190,8 +219,7 @@ def take_second_views(
                     best = d2
                     chosen = int(j)
             if chosen >= 0:
-                white = expectation.white[i, s] * batch.weight[chosen]
-                noise = Noise(white, expectation.coloured_std[i, s])
-                update_track(tracks, i, batch, chosen, noise, model, log)
+                measured = measured_by(tracks, i, batch, chosen, expectation, model.sensors)
+                update_track(tracks, i, batch, chosen, measured, model, log)
                 match[i, s] = chosen
                 taken[chosen] = 1

@@ -1,0 +1,78 @@
+"""With hindsight a box that the edge cut says more: the size of the vehicle is known once it was seen whole.
+
+The filter turns the side that shows into a centre with the size that it knows at that moment. Of a vehicle
+that enters the picture that is a guess; its smoothed size tells better, and the records of what the track
+took in are written anew with it before a smoother gets them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jeat_graph.config.schema import Config
+from jeat_graph.data.arrays import BoolArray, RecordArray
+from jeat_graph.filters.cut_boxes import BOTH_CUT, FIRST_LOG_GROWTH_STD, WHOLE, centre_from_side
+from jeat_graph.filters.noise import base_variance
+from jeat_graph.smoothers.size import SmoothedSize
+
+# Variance of ln size that leaves it to the whole boxes: a factor of e² to either side.
+_OPEN_LOG_VAR = 4.0
+
+
+def any_cut(rows: RecordArray) -> bool:
+    """Whether the edge of the picture cut any box of some records (M,)."""
+    return bool((rows["cut"] != WHOLE).any())
+
+
+def sizes_by_parts(rows: RecordArray) -> RecordArray:
+    """Say what the parts that showed tell of a size, given whether the vehicle was seen whole as well.
+
+    Of a vehicle that never was, they stand for the whole. Of one that was, they say nothing, and neither does
+    the guess with which its track began.
+
+    Args:
+        rows: (M,) records of one track, the birth first.
+
+    Returns:
+        (M,) records.
+    """
+    cut = rows["cut"] != WHOLE
+    if not cut.any():
+        return rows
+    out, never = rows.copy(), cut.all(axis=0)
+    var = np.where(cut & never, FIRST_LOG_GROWTH_STD**2, rows["size_var"])
+    var[0] = np.where(cut[0] & ~never, _OPEN_LOG_VAR, var[0])
+    out["size_var"] = var
+    return out
+
+
+def place_by_sides(rows: RecordArray, sizes: SmoothedSize, config: Config) -> RecordArray:
+    """Write the centres of cut boxes anew, by the side that shows and the smoothed size.
+
+    Args:
+        rows: (M,) records of one track, the birth too if it is among them.
+        sizes: its smoothed sizes.
+        config: what is known of the sensors' noise.
+
+    Returns:
+        (M,) records.
+    """
+    cut = rows["cut"]
+    one_sided: BoolArray = (cut != WHOLE) & (cut != BOTH_CUT)
+    if not one_sided.any():
+        return rows
+    out = rows.copy()
+    sensors = [config.sensors[name] for name in config.sensor_names]
+    at = np.clip(np.searchsorted(sizes.t, rows["t"]), 0, len(sizes.t) - 1)
+    for i in np.flatnonzero(one_sided.any(axis=1)).tolist():
+        row, log_size, log_var = rows[i], sizes.mean[at[i], :, 0], sizes.cov[at[i], :, 0, 0]
+        sensor, side = sensors[int(row["sensor"])], np.exp(log_size)
+        whole = float(np.sqrt(side.prod()))
+        for axis in np.flatnonzero(one_sided[i]).tolist():
+            rho = sensor.rho_x if axis == 0 else sensor.rho_y
+            base = base_variance(sensor.sigma_px, rho, float(side[axis]), sensor.rho_size, whole)
+            white = row["scale"] * (1.0 - sensor.correlated_share) * base
+            code = int(row["cut"][axis])
+            found = centre_from_side(code, row["side"][axis], log_size[axis], log_var[axis])
+            out["z"][i, axis], out["r"][i, axis] = found[0], white + found[1]
+    return out
