@@ -137,13 +137,13 @@ def _fill(
     heaviest = np.max(weight)
     constants = log_constants(likelihood.freedom)
     unseen_density = -math.log(likelihood.log_size_range)
-    some_cut = (np.max(cut[:, 0]) > 0, np.max(cut[:, 1]) > 0)
+    cut_x, cut_y = bool(np.max(cut[:, 0]) > 0), bool(np.max(cut[:, 1]) > 0)
     for i in range(num_tracks):
         left, right = np.inf, -np.inf
         top, bottom = np.inf, -np.inf
         # The middle of the part that shows lies within half a size of the centre.
-        reach_x, open_x = _reach(some_cut[0], log_size[i, 0], log_size_var[i, 0])
-        reach_y, open_y = _reach(some_cut[1], log_size[i, 1], log_size_var[i, 1])
+        reach_x, open_x = _reach(cut_x, log_size[i, 0], log_size_var[i, 0])
+        reach_y, open_y = _reach(cut_y, log_size[i, 1], log_size_var[i, 1])
         for s in range(noise.shape[1]):
             # A hair wider than any gate, so that rounding never decides here.
             half = 1.000001 * math.sqrt(gate * (position_var[i, s, 0] + noise[i, s, 0] * heaviest + open_x))

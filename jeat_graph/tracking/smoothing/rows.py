@@ -46,9 +46,8 @@ def rows_of(
     keep: slice | BoolArray = slice(None)
     if config.output.clip:
         shown = observed.used != 0 if config.image.edge_px > 0.0 else np.zeros(len(t), dtype=bool)
-        keep = (visible > 0.0) & ((visible >= config.output.min_visible) | shown)
-        if keep.all():
-            keep = slice(None)
+        inside: BoolArray = (visible > 0.0) & ((visible >= config.output.min_visible) | shown)
+        keep = slice(None) if inside.all() else inside
     var = np.diagonal(cov, axis1=2, axis2=3)
     return Trajectories(
         t=observed.t[keep],
