@@ -32,12 +32,14 @@ class OursOnSet:
         sensors: what it is given.
         how: `DEFAULT`, `BLIND` or `TRUTH`; calibration is on the other recordings of the set.
         changes: `key=value` texts over the preset.
+        white: whether the sensors' errors are taken to have no memory.
     """
 
     row: str
     sensors: tuple[str, ...]
     how: str = DEFAULT
     changes: tuple[str, ...] = ()
+    white: bool = False
 
 
 def rows_of(one: RealSet, calibrate: bool) -> list[OursOnSet]:
@@ -45,8 +47,8 @@ def rows_of(one: RealSet, calibrate: bool) -> list[OursOnSet]:
     out = [OursOnSet(f"default, {' + '.join(s)}", s) for s in reversed(one.streams)]
     every = one.streams[-1]
     out.append(OursOnSet("default without NIS adaptation", every, changes=("noise.adaptation_rate=0.0",)))
-    shares = tuple(f"sensors.{name}={{correlated_share: 0.5, memory_s: 0.6}}" for name in every)
-    out.append(OursOnSet("default with errors that have memory", every, changes=shares))
+    out.append(OursOnSet("default without errors with memory", every, white=True))
+    out.append(OursOnSet("default, cut boxes taken for whole", every, changes=("image.edge_px=0.0",)))
     out.append(OursOnSet("default without disagreement", every, changes=("lifecycle.disagreement=0.0",)))
     if calibrate and len(one.recordings) > 1:
         out += [OursOnSet(how, every, how) for how in (BLIND, TRUTH)]
@@ -58,9 +60,15 @@ def configs_for(row: OursOnSet, one: RealSet) -> list[Config]:
     base = load_config("default", row.changes)
     seen = [recording.only(row.sensors) for recording in one.recordings]
     if row.how == DEFAULT:
-        return [fit_input(base, detections)[0] for detections in seen]
+        fitted = [fit_input(base, detections)[0] for detections in seen]
+        return [_without_memory(config) for config in fitted] if row.white else fitted
     whole = fit_input(base, Detections.concatenate(seen))[0]
     return [_calibrated(row, one, k, seen, whole) for k in range(len(seen))]
+
+
+def _without_memory(config: Config) -> Config:
+    sensors = {name: replace(s, correlated_share=0.0) for name, s in config.sensors.items()}
+    return replace(config, sensors=sensors)
 
 
 def _calibrated(

@@ -13,7 +13,7 @@ from jeat_graph.benchmark.recordings import JudgedRecording
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.trajectories import GroundTruth
 
-SCENARIO = "day"
+SCENARIO, DARK = "day", "night-nolight"
 PRESETS = ("default", "highway")
 _LATE_S = 0.05
 _SWAY_PX, _SWAY_HZ = 6.0, 0.7
@@ -28,12 +28,14 @@ class Variation:
         name: in the table.
         scenario: nested settings laid over each sensor of the scenario.
         sensors: the same by sensor.
+        world: name of the scenario.
         change: what is done to the recording afterwards.
     """
 
     name: str
     scenario: Mapping[str, Any] = field(default_factory=dict)
     sensors: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    world: str = SCENARIO
     change: Callable[[JudgedRecording], JudgedRecording] | None = None
 
 
@@ -59,6 +61,8 @@ def variations() -> list[Variation]:
         Variation(f"events {_LATE_S * 1e3:g} ms late", change=_late),
         Variation("gantry swaying", change=_sway),
         Variation("with a third, poor detector", change=_third),
+        Variation("no light", world=DARK),
+        Variation("no light, half of the vehicles found", {"detect": {"p_max": 0.5}}, world=DARK),
     ]
 
 
@@ -72,7 +76,7 @@ def varied(name: str, seed: int, duration_s: float) -> JudgedRecording:
     from jeat_graph.simulation.simulate import simulate
 
     one = next(v for v in variations() if v.name == name)
-    tree = plain(dataclasses.asdict(load_scenario(SCENARIO)))
+    tree = plain(dataclasses.asdict(load_scenario(one.world)))
     for sensor in tree["sensors"]:
         for change in (one.scenario, one.sensors.get(sensor, {})):
             tree["sensors"][sensor] = merge(tree["sensors"][sensor], change)

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from jeat_graph.association.costs import likelihood_cost, log_evidence, log_score_ratio
+from jeat_graph.association.densities import Likelihood
 from jeat_graph.association.gates import Expected, Found, Pairs, gated_pairs
 
 PROBABILITY = st.floats(0.01, 0.99)
@@ -24,8 +25,9 @@ def two_sensors(residual, variances, weights=(1.0, 1.0), track_var=4.0):
         small,
         np.full((2, 2), 0.01),
     )
-    found = Found(np.full((2, 2), residual), np.zeros((2, 2)), np.array(weights), np.array([0, 1]))
-    pairs = gated_pairs(expected, found, 1e6, np.inf)
+    cut = np.zeros((2, 2), dtype=np.int64), np.zeros((2, 2))
+    measured = np.full((2, 2), residual), np.zeros((2, 2)), np.array(weights), np.array([0, 1])
+    pairs = gated_pairs(expected, Found(*measured, *cut), Likelihood(0.0, 3.0), 1e6, np.inf)
     p_detect, sensor = np.full((1, 2), 0.9), np.array([0, 1])
     evidence = log_evidence(pairs, p_detect, np.zeros(2), np.full(2, -10.0), sensor)
     return pairs.d2, likelihood_cost(pairs.rows, pairs.cols, evidence, np.array([0.9]), p_detect, sensor)
