@@ -56,3 +56,12 @@ def test_text_that_cannot_be_encoded_leaves_no_file(tmp_path):
 def test_a_writer_that_was_not_entered_says_so(tmp_path):
     with pytest.raises(RuntimeError, match="with"):
         TableWriter(tmp_path / "t.csv").append({"a": np.array([1])})
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.parquet"])
+def test_an_append_without_rows_between_others_changes_nothing(tmp_path, name):
+    with TableWriter(tmp_path / name) as writer:
+        for values in ([1, 2], [], [3]):
+            writer.append({"a": np.array(values, dtype=np.int64)})
+    write_columns({"a": np.array([1, 2, 3])}, tmp_path / ("whole" + name))
+    assert (tmp_path / name).read_bytes() == (tmp_path / ("whole" + name)).read_bytes()
