@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.class_columns import rows_of_class
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.rates import ANY_RATE_HZ, median_rate_hz
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
@@ -56,7 +57,8 @@ def load_run(
             causal), or a MOTChallenge or KITTI result.
         truth: the truth, in any format that `read_truth` knows.
         rate_hz: frame rate of files that count frames; by default that of the truth.
-        classes: classes of objects to be found; others are ignored. All by default.
+        classes: classes of objects to be found; others are ignored, and so are tracks that have another
+            class. All by default.
 
     Raises:
         DataError: a file is missing or not valid, or run and truth do not fit together.
@@ -76,6 +78,8 @@ def load_run(
         rate_hz = median_rate_hz(objects.frame_times()) or ANY_RATE_HZ
     instants = objects.frame_times() if form in BY_FRAME else read_instants(path)
     read = {kind: _read_table(file, objects, rate_hz, instants is None) for kind, file in tables.items()}
+    if classes is not None:
+        read = {kind: restrict_tracks(table, classes) for kind, table in read.items()}
     return JudgedRun(str(run), objects, read.get("causal"), read.get("smoothed"), instants)
 
 
@@ -91,6 +95,17 @@ def restrict_classes(truth: GroundTruth, classes: Sequence[str]) -> GroundTruth:
         raise DataError("the truth has no classes to choose from")
     wanted = np.isin(truth.classes, list(classes))
     return dataclasses.replace(truth, ignore=truth.ignore | ~wanted)
+
+
+def restrict_tracks(table: Trajectories, classes: Sequence[str]) -> Trajectories:
+    """Leave out the rows that are of another class; those of which none is known stay.
+
+    Raises:
+        DataError: the table names classes, but none of these: most likely a name is misspelt.
+    """
+    if table.classes is None or not (table.classes != "").any():
+        return table
+    return table.take(rows_of_class(table.classes, classes, unknown=True))
 
 
 def check_classes(truths: Sequence[GroundTruth], classes: Sequence[str]) -> None:

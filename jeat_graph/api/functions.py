@@ -91,7 +91,8 @@ def evaluate(
         tracks: a table, both tables of `track`, or a path that `jeat-graph eval` takes.
         truth: the truth, or a file that `read_truth` knows.
         kind: what a table alone is: `causal` or `smoothed`.
-        classes: classes of objects to be found; others are ignored. All by default.
+        classes: classes of objects to be found; others are ignored, and so are tracks that have another
+            class. All by default.
 
     Returns:
         By kind of table, MOTA, HOTA, IDF1 and so on by name, as `eval --json` writes them.
@@ -100,7 +101,7 @@ def evaluate(
         DataError: a file is not valid, or tracks and truth do not fit together.
     """
     from jeat_graph.eval.judge import judge_runs
-    from jeat_graph.eval.load import JudgedRun, check_classes, load_run, restrict_classes
+    from jeat_graph.eval.load import JudgedRun, check_classes, load_run, restrict_classes, restrict_tracks
 
     if isinstance(tracks, (str, Path)):
         if isinstance(truth, GroundTruth):
@@ -119,6 +120,8 @@ def evaluate(
             tables = {kind: tracks}
         else:
             tables = {name: table for name, table in tracks._asdict().items() if table is not None}
+        if classes is not None:
+            tables = {name: restrict_tracks(table, classes) for name, table in tables.items()}
         run = JudgedRun("tracks", objects, tables.get("causal"), tables.get("smoothed"))
     return {name: one.as_dict() for name, one in judge_runs([run]).items()}
 

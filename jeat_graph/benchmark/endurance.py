@@ -153,6 +153,9 @@ class _Rows:
     def __init__(self) -> None:
         self.count = 0
 
+    def begin(self, classes: bool) -> None:
+        """Nothing is written, with classes or without."""
+
     def append(self, table: Trajectories) -> None:
         self.count += len(table)
 

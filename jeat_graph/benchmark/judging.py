@@ -85,7 +85,7 @@ def judge_recordings(
         sensors: which sensors the tracker is given; all by default.
     """
     from jeat_graph.eval.metrics import evaluate
-    from jeat_graph.tracking.tracker import track
+    from jeat_graph.tracking.whole import track
 
     configs = [config] * len(recordings) if isinstance(config, Config) else config
     pairs = [(one.truth, track(c, one.only(sensors))) for c, one in zip(configs, recordings, strict=True)]

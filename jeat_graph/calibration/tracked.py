@@ -12,7 +12,7 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
-from jeat_graph.tracking.tracker import track
+from jeat_graph.tracking.whole import track
 
 _MIN_ROWS = 50
 # Tracks are followed through gaps as long as this, so that the misses in them are counted.

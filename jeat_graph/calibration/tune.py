@@ -20,7 +20,7 @@ from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.eval.metrics import evaluate
-from jeat_graph.tracking.tracker import track
+from jeat_graph.tracking.whole import track
 
 Recording = tuple[Detections, GroundTruth]
 

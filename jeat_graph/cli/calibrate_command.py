@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.config.reading import load_config
     from jeat_graph.io.atomic import check_writable
     from jeat_graph.io.config_io import save_config
-    from jeat_graph.io.detections_io import read_detections
+    from jeat_graph.io.detections_io import read_many
     from jeat_graph.io.truth_io import read_truth
     from jeat_graph.runs.latency import at_measurement
 
@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(f"--out {args.out}: the name of a configuration must end in .yaml")
     check_writable(args.out)
     base = load_config(args.config)
-    recordings = [at_measurement(read_detections(path, **reading(args)), base) for path in args.detections]
+    recordings = [at_measurement(read_many([path], **reading(args)), base) for path in args.detections]
     beside = None if args.image else _size_beside(args.detections)
     base = with_image(base, recordings, args.image or beside)
     choices: tuple[Choice, ...] = ()

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.cli.options import add_rate
+from jeat_graph.cli.options import add_classes, add_rate
 from jeat_graph.config.argument_types import positive
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
@@ -33,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--interval", type=positive, metavar="S", help="length of one interval (default: all)"
     )
+    add_classes(parser, "count vehicles of these classes only (a track's class is the one it ends with)")
     add_rate(parser)
     parser.add_argument("--out", metavar="FILE", help="write the counts as CSV (default: print a table)")
     parser.add_argument("--crossings", metavar="FILE", help="also write every crossing as CSV")
@@ -53,8 +54,11 @@ def run(args: argparse.Namespace) -> int:
     tables = tables_of(Path(args.source))
     kind = "smoothed" if "smoothed" in tables else "causal"
     table = read_trajectories(tables[kind], rate_hz=args.rate)
-    found = [c for line in lines for c in counting.crossings(table, line)]
     first, last = (float(table.t.min()), float(table.t.max())) if len(table) else (0.0, 0.0)
+    if args.classes is not None:
+        table = table.of_class(*args.classes, final=True)
+    known = table.final_classes()
+    found = [c for line in lines for c in counting.crossings(table, line, known)]
     step = args.interval or max(last - first, 1e-9) * (1.0 + 1e-9)
     number = int(np.ceil((last - first) / step + 1e-12))
     edges: FloatArray = np.asarray(first + step * np.arange(number + 1), dtype=np.float64)
@@ -96,6 +100,5 @@ def _columns(rows: list[Any], kind: type) -> dict[str, npt.NDArray[Any]]:
     """One column an attribute; classes that are not known are left out."""
     names = [f.name for f in dataclasses.fields(kind)]
     columns = {name: np.array([getattr(row, name) for row in rows]) for name in names}
-    if not any(row.vehicle_class for row in rows):
-        del columns["vehicle_class"]
-    return columns
+    classes = columns.pop("vehicle_class")
+    return columns | {"class": classes} if any(classes) else columns

@@ -96,7 +96,7 @@ def _compare(recording: SimulatedRecording, config: Config, causal: Trajectories
     from jeat_graph.eval.metrics import evaluate
     from jeat_graph.eval.tables import Cell, Table
     from jeat_graph.io.trajectories_io import read_trajectories
-    from jeat_graph.tracking.tracker import track
+    from jeat_graph.tracking.whole import track
 
     detections, truth = recording.detections, recording.truth
     names = " + ".join(detections.sensors)

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jeat_graph.cli.options import add_rate
+from jeat_graph.cli.options import add_classes, add_rate
 from jeat_graph.cli.progress import stages
 from jeat_graph.config.argument_types import positive, share
 from jeat_graph.data.errors import DataError
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--json", metavar="FILE", help="write all scores as JSON; - writes them to stdout instead")
     add("--format", choices=FORMATS, default="text", help="form of the table on stdout")
     add("--iou", type=share, default=0.5, help="smallest IoU of a match (0.5)")
-    add("--class", **_MANY, dest="classes", metavar="NAME", help="classes to be found; others are ignored")
+    add_classes(parser, "classes to be found; others are ignored, and so are tracks of another class")
     add_rate(parser)
     add("--max-age", type=positive, metavar="S", help="how far to predict causal rows (0.15)")
     add("--max-gap", type=positive, metavar="S", help="join no smoothed rows further apart than this")

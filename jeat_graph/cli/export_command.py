@@ -12,10 +12,11 @@ from jeat_graph.data.errors import DataError
 
 if TYPE_CHECKING:
     from jeat_graph.data.trajectories import Trajectories
+    from jeat_graph.eval.frames import Kind
 
-HELP = "write a run for other programs: CVAT, OTAnalytics, TUM, rerun; a road for SUMO, highD's users, maps"
+HELP = "write a run for other programs: CVAT, COCO, OTAnalytics, TUM, rerun; a road for SUMO, highD, maps"
 ROAD_TARGETS = ("sumo", "highd", "geojson")
-TARGETS = ("cvat", "ottrk", "tum", "rerun", *ROAD_TARGETS)
+TARGETS = ("cvat", "coco", "ottrk", "tum", "rerun", *ROAD_TARGETS)
 
 _ROAD_RATE_HZ = 25.0
 
@@ -30,7 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out",
         required=True,
         metavar="FILE",
-        help=".zip (cvat), .ottrk, .txt (tum), .rrd (rerun), .xml (sumo), folder (highd) or .geojson",
+        help=".zip (cvat), .json (coco), .ottrk, .txt (tum), .rrd (rerun), .xml (sumo), folder (highd), "
+        ".geojson",
     )
     parser.add_argument(
         "--only", choices=("causal", "smoothed"), help="which table (default: smoothed, if there)"
@@ -72,23 +74,7 @@ def run(args: argparse.Namespace) -> int:
             raise DataError("--to tum writes one trajectory: say which with --track ID")
         write_tum(table, args.track, args.out)
     else:
-        import numpy as np
-
-        from jeat_graph.eval.frames import Kind
-        from jeat_graph.io.cvat import write_cvat
-        from jeat_graph.io.scans_io import read_instants
-        from jeat_graph.runs.frame_export import at_frames
-
-        if args.frames_per_second is None:
-            raise DataError(f"--to {args.to} counts frames: give their rate with --frames-per-second HZ")
-        instants = read_instants(Path(args.source))
-        instants = np.unique(table.t) if instants is None else instants
-        kind: Kind = "smoothed" if kinds[-1] == "smoothed" else "causal"
-        frames = at_frames(table, kind, instants, args.frames_per_second)
-        if args.to == "ottrk":
-            _write_ottrk(args, frames)
-        else:
-            write_cvat(frames, args.out, args.frames_per_second)
+        _at_frames(args, table, "smoothed" if kinds[-1] == "smoothed" else "causal")
     print(f"wrote {args.out} ({', '.join(kinds)} tracks)", file=sys.stderr)
     return 0
 
@@ -122,3 +108,28 @@ def _export_road(args: argparse.Namespace) -> int:
         write_geojson(frames, camera, args.out)
     print(f"wrote {args.out}", file=sys.stderr)
     return 0
+
+
+def _at_frames(args: argparse.Namespace, table: Trajectories, kind: Kind) -> None:
+    """Write for programs that count frames."""
+    import numpy as np
+
+    from jeat_graph.io.coco_tracks import write_coco_tracks
+    from jeat_graph.io.cvat import write_cvat
+    from jeat_graph.io.scans_io import read_instants
+    from jeat_graph.runs.frame_export import at_frames
+    from jeat_graph.runs.recorded import load_run_data
+
+    rate_hz = args.frames_per_second
+    if rate_hz is None:
+        raise DataError(f"--to {args.to} counts frames: give their rate with --frames-per-second HZ")
+    instants = read_instants(Path(args.source))
+    frames = at_frames(table, kind, np.unique(table.t) if instants is None else instants, rate_hz)
+    if args.to == "cvat":
+        write_cvat(frames, args.out, rate_hz)
+        return
+    if args.to == "ottrk":
+        _write_ottrk(args, frames)
+        return
+    width, height = load_run_data(args.source).size_px()
+    write_coco_tracks(frames, args.out, rate_hz, (round(width), round(height)))

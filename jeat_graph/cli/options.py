@@ -94,7 +94,19 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
         help="scores are in [0, 1] (unit), percent, or raw scores of any size (logistic)",
     )
     add("--images", metavar="FILE", help="COCO data set with the images and times of COCO results")
-    add("--time-unit", choices=tuple(TIME_UNITS), default="s", help="unit of the column t (default: s)")
+    add_time_unit(parser)
+    add_classes(parser, "take detections of these classes only, and those without a class")
+
+
+def add_time_unit(parser: argparse.ArgumentParser) -> None:
+    """Declare `--time-unit`."""
+    units = tuple(TIME_UNITS)
+    parser.add_argument("--time-unit", choices=units, default="s", help="unit of the column t (default: s)")
+
+
+def add_classes(parser: argparse.ArgumentParser, text: str) -> None:
+    """Declare `--class` (`classes`)."""
+    parser.add_argument("--class", dest="classes", nargs="+", action="extend", metavar="NAME", help=text)
 
 
 def reading(args: argparse.Namespace) -> dict[str, Any]:
@@ -105,6 +117,7 @@ def reading(args: argparse.Namespace) -> dict[str, Any]:
         "score_scale": args.score_scale,
         "images": args.images,
         "time_unit": args.time_unit,
+        "classes": args.classes,
     }
 
 

@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jeat_graph.cli.options import add_output_rate, add_rate
+from jeat_graph.cli.options import add_classes, add_output_rate, add_rate
 from jeat_graph.cli.terminal import one_line
 from jeat_graph.config.argument_types import drawn_size, not_negative, positive
 from jeat_graph.data.errors import DataError
@@ -47,6 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--only", choices=("causal", "smoothed"), help="draw only these tracks")
     add_output_rate(parser, "pictures per second of the film (default: each frame; else 25)")
     add("--size", type=drawn_size, metavar="WxH", help="size of each picture (default: the recording's)")
+    add_classes(parser, "draw only tracks that are of one of these classes then")
     add_rate(parser)
     add("--frame-rate", dest="rate", type=positive, help=argparse.SUPPRESS)
     add(
@@ -87,6 +88,7 @@ def run(args: argparse.Namespace) -> int:
         window_s=args.window,
         labels=args.labels,
         trail_s=args.trails,
+        classes=args.classes,
     )
     inputs = [path for path in (request.frames, request.events, request.truth) if path is not None]
     if any(path.resolve() == out.resolve() for path in inputs):

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jeat_graph.cli.options import add_config, add_image, overrides
+from jeat_graph.cli.options import add_config, add_image, add_time_unit, overrides
 from jeat_graph.config.argument_types import positive
 
 if TYPE_CHECKING:
@@ -35,9 +35,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.description = HELP + (
         '. A scan is {"t": 0.05, "sensor": "rgb", "boxes": [[left, top, width, height], …], "scores": [s, …]}'
-        " on a line of its own; a list of such scans of one time on one line is taken jointly. CSV has a "
-        "header and the columns of `track`; its scans are complete when another time, or an empty line, "
-        "arrives."
+        ' on a line of its own, with "classes": [name, …] if they are known; a list of such scans of one time'
+        " on one line is taken jointly. CSV has a header and the columns of `track`; its scans are complete "
+        "when another time, or an empty line, arrives."
     )
     add = parser.add_argument
     add_config(parser)
@@ -51,6 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--source", metavar="URL", help="take scans from mqtt://, nats:// or kafka://host/topic, not stdin")
     add("--sink", metavar="URL", help="send tracks to mqtt://, nats:// or kafka://host/topic, not stdout")
     add("--encoding", choices=("json", "msgpack"), default="json", help="of messages to --sink")
+    add_time_unit(parser)
     add(
         "--joint",
         action="store_true",
@@ -108,6 +109,7 @@ def run(args: argparse.Namespace) -> int:
         output.seq = more.get("count", 0)
         try:
             _take_all(session, args, interrupts, source)
+            output.begin()  # an input without scans gives a table without rows
         finally:
             # An error in a line, a signal or a reader that has gone: what is known is kept all the same.
             _finish(session, args)
@@ -181,12 +183,12 @@ def _take_all(
     bad = _skip(session) if args.on_error == "skip" else None
     if source is None:
         for message, place in from_lines(interrupts.lines(sys.stdin.buffer.readline), STDIN, args.joint, bad):
-            _take(session, message, place, bad)
+            _take(session, message, place, bad, args.time_unit)
         return
     since = 0
     for item in from_source(source, args.source, interrupts, bad):
         if item is not None:
-            _take(session, *item, bad)
+            _take(session, *item, bad, args.time_unit)
             since += 1
         if since and (item is None or since >= _COMMIT_PART * source.most_open):
             session.save()
@@ -194,13 +196,18 @@ def _take_all(
 
 
 def _take(
-    session: Session, message: ScanMessage, place: str, bad: Callable[[DataError], None] | None
+    session: Session,
+    message: ScanMessage,
+    place: str,
+    bad: Callable[[DataError], None] | None,
+    unit: str,
 ) -> None:
     """Take a message; errors get the place where it came from."""
     from jeat_graph.data.errors import DataError, TimeOrderError, UnknownSensorError
+    from jeat_graph.live.inputs import in_seconds
 
     try:
-        session.take(message, place)
+        session.take(in_seconds(message, unit), place)
     except (UnknownSensorError, TimeOrderError) as error:
         name, _, line = place.removesuffix(": ").rpartition(":")
         trouble = DataError(str(error), name, int(line))
@@ -244,13 +251,10 @@ class _Output:
     """
 
     def __init__(self, form: str, encoding: str, sink: Sink | None) -> None:
-        from jeat_graph.io.track_lines import csv_header
-
         self.seq = 0
         self._encoding, self._sink = encoding, sink
         self._csv = form == "csv"
-        if self._csv:
-            self._say(csv_header())
+        self._classes: bool | None = None  # whether the rows of CSV have them
 
     def tracks(self, t: float, table: Trajectories, message: ScanMessage, late_s: float) -> None:
         """Give out the tracks after an arrival; CSV has no rows twice, so none after a late one."""
@@ -263,7 +267,16 @@ class _Output:
         elif not self._csv:
             self._say(json_line(t, table))
         elif late_s == 0.0:
-            self._say(csv_rows(table))
+            self.begin(table.classes is not None)
+            self._say(csv_rows(table, bool(self._classes)))
+
+    def begin(self, classes: bool = False) -> None:
+        """Give out the header of CSV, once; the first answer shows whether there are classes."""
+        from jeat_graph.io.track_lines import csv_header
+
+        if self._csv and self._classes is None:
+            self._classes = classes
+            self._say(csv_header(classes))
 
     def event(self, event: Event) -> None:
         """Say on the output, too, that a sensor fails or is well again."""

@@ -85,6 +85,7 @@ def run(args: argparse.Namespace) -> int:
         score_scale=args.score_scale,
         images=args.images,
         time_unit=args.time_unit,
+        classes=None if args.classes is None else tuple(args.classes),
         frames=args.frames,
         options=RunOptions(
             formats=extra_formats(args),

@@ -1,11 +1,13 @@
-"""What counts as a box: the shape, the numbers and the bounds that every detection is held to."""
+"""What counts as a box, a score and a class: the shape, the numbers, the bounds that all are held to."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.data.arrays import BoolArray, FloatArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, TextArray
 from jeat_graph.data.errors import DataError
 
 #: Smallest side, and farthest place or largest side, of a box (px): beyond what any picture can hold.
@@ -79,3 +81,19 @@ def find_bad_row(boxes: FloatArray, scores: FloatArray) -> tuple[int, str] | Non
         bounds = f"places to {LARGEST_PX:g}, sizes from {SMALLEST_PX:g} to {LARGEST_PX:g}"
         return row, f"no picture holds a box at {left:g}, {top:g} of {width:g} x {height:g} px ({bounds})"
     return row, f"score must be in [0, 1], got {scores[row]}"
+
+
+def class_texts(classes: Any, count: int) -> TextArray:
+    """Return class names (M,) as an array of text, None and NaN as empty ones.
+
+    Raises:
+        DataError: not `count` of them.
+    """
+    found: TextArray = np.asarray(classes)
+    if found.dtype.kind != "U":
+        blank = ("", None)
+        texts = ["" if one in blank or one != one else str(one) for one in found.reshape(-1).tolist()]
+        found = np.array(texts, dtype=np.str_)
+    if found.shape != (count,):
+        raise DataError(f"classes must have shape ({count},), not {found.shape}")
+    return found

@@ -13,7 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, TextArray
-from jeat_graph.data.boxes import check_boxes, find_bad_row
+from jeat_graph.data.boxes import check_boxes, class_texts, find_bad_row
+from jeat_graph.data.class_columns import rows_of_class
+from jeat_graph.data.detection_views import DetectionViews
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.grouping import group_rows
 from jeat_graph.data.interop import from_xyxy
@@ -28,6 +30,7 @@ class Scan:
         sensor: name of the sensor.
         boxes: (M, 4) left, top, width, height (px); M may be 0.
         scores: (M,) confidence in [0, 1].
+        classes: (M,) class names, empty text where unknown, or None.
 
     Raises:
         DataError: if any value is not valid (see `check_boxes`).
@@ -37,6 +40,7 @@ class Scan:
     sensor: str
     boxes: FloatArray
     scores: FloatArray
+    classes: TextArray | None = None
 
     def __post_init__(self) -> None:
         t = float(self.t)
@@ -46,18 +50,26 @@ class Scan:
         object.__setattr__(self, "t", t)
         object.__setattr__(self, "boxes", boxes)
         object.__setattr__(self, "scores", scores)
+        if self.classes is not None:
+            object.__setattr__(self, "classes", class_texts(self.classes, len(scores)))
 
     def __len__(self) -> int:
         return len(self.scores)
 
     @staticmethod
-    def from_xyxy(t: float, sensor: str, corners: npt.ArrayLike, scores: npt.ArrayLike) -> Scan:
+    def from_xyxy(
+        t: float,
+        sensor: str,
+        corners: npt.ArrayLike,
+        scores: npt.ArrayLike,
+        classes: TextArray | None = None,
+    ) -> Scan:
         """Make a scan of boxes (M, 4) that are given as left, top, right, bottom (px)."""
-        return Scan(t, sensor, from_xyxy(corners), np.asarray(scores, dtype=np.float64))
+        return Scan(t, sensor, from_xyxy(corners), np.asarray(scores, dtype=np.float64), classes)
 
 
 @dataclass(frozen=True, eq=False)
-class Detections:
+class Detections(DetectionViews):
     """Scans of any number of sensors, in time order, in columns.
 
     Attributes:
@@ -117,7 +129,7 @@ class Detections:
         if bad is not None:
             raise DataError(f"row {np.arange(len(time))[rows][bad[0]]}: {bad[1]}")
         sensors, code = np.unique(names, return_inverse=True)
-        kinds = None if classes is None else np.array(classes, dtype=np.str_)
+        kinds = None if classes is None else class_texts(classes, len(time)).copy()
         return Detections.from_checked(time, sensors.tolist(), code.reshape(-1), (b, s, kinds), gap)
 
     @staticmethod
@@ -164,6 +176,7 @@ class Detections:
                 [scan.scores if len(scan) else blank[:, 0] for scan in items] or [blank[:0, 0]]
             ),
             empty=np.repeat([len(scan) == 0 for scan in items], rows),
+            classes=_classes_of_rows(items),
         )
 
     @staticmethod
@@ -214,7 +227,11 @@ class Detections:
         """Return scan `k` (0 <= k < num_scans)."""
         rows = slice(int(self.scan_start[k]), int(self.scan_start[k + 1]))
         return _trusted_scan(
-            float(self.scan_t[k]), self.sensors[self.scan_sensor[k]], self.boxes[rows], self.scores[rows]
+            float(self.scan_t[k]),
+            self.sensors[self.scan_sensor[k]],
+            self.boxes[rows],
+            self.scores[rows],
+            None if self.classes is None else self.classes[rows],
         )
 
     def sensor_times(self, sensor: str) -> FloatArray:
@@ -238,12 +255,42 @@ class Detections:
         keep = np.array([name in wanted for name in self.sensors], dtype=bool)
         return Detections.from_scans(self.scan(k) for k in range(self.num_scans) if keep[self.scan_sensor[k]])
 
+    def of_class(self, *names: str) -> Detections:
+        """Keep the detections of some classes, and those of which no class is known; all scans stay.
 
-def _trusted_scan(t: float, sensor: str, boxes: FloatArray, scores: FloatArray) -> Scan:
+        Raises:
+            DataError: no detection has a class, or none is of one of these.
+        """
+        keep = rows_of_class(self.classes, names, unknown=True)
+        before = np.concatenate(([0], np.cumsum(keep)))
+        return replace(
+            self,
+            scan_start=before[self.scan_start].astype(np.int64),
+            boxes=self.boxes[keep],
+            scores=self.scores[keep],
+            classes=None if self.classes is None else self.classes[keep],
+        )
+
+
+def _classes_of_rows(scans: Sequence[Scan]) -> TextArray | None:
+    """Classes of the rows that `from_scans` makes, one of them for an empty scan; None if nothing has any."""
+    if all(scan.classes is None for scan in scans):
+        return None
+    texts = [
+        np.zeros(max(len(scan), 1), dtype="U1") if scan.classes is None or not len(scan) else scan.classes
+        for scan in scans
+    ]
+    return np.concatenate(texts)
+
+
+def _trusted_scan(
+    t: float, sensor: str, boxes: FloatArray, scores: FloatArray, classes: TextArray | None
+) -> Scan:
     """Make a scan of arrays that were checked already, without checking them again."""
     scan = object.__new__(Scan)
     object.__setattr__(scan, "t", t)
     object.__setattr__(scan, "sensor", sensor)
     object.__setattr__(scan, "boxes", boxes)
     object.__setattr__(scan, "scores", scores)
+    object.__setattr__(scan, "classes", classes)
     return scan

@@ -77,6 +77,39 @@ def to_xyxy(boxes: FloatArray) -> FloatArray:
     return np.hstack([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]])
 
 
+def supervision_of(
+    boxes: FloatArray,
+    confidence: FloatArray,
+    classes: TextArray | None,
+    tracker_id: npt.NDArray[np.int64] | None = None,
+) -> Any:
+    """Make `supervision.Detections`; with classes `class_id` counts them in the order of the alphabet.
+
+    Args:
+        boxes: (M, 4) left, top, width, height (px).
+        confidence: (M,) scores or probabilities.
+        classes: (M,) names, kept in `data["class_name"]`, or None: then all have `class_id` 0.
+        tracker_id: (M,) identities, or None.
+
+    Raises:
+        ImportError: the package `supervision` is not installed.
+    """
+    import supervision
+
+    class_id = np.zeros(len(boxes), dtype=int)
+    data: dict[str, Any] = {}
+    if classes is not None:
+        class_id = np.unique(classes, return_inverse=True)[1].reshape(-1).astype(int)
+        data = {"class_name": classes.copy()}
+    return supervision.Detections(
+        xyxy=to_xyxy(boxes),
+        confidence=confidence.copy(),
+        class_id=class_id,
+        tracker_id=None if tracker_id is None else tracker_id.astype(int),
+        data=data,
+    )
+
+
 def _from_supervision(source: Any, scores: npt.ArrayLike | None) -> Boxes:
     found = source.confidence if scores is None else scores
     count = len(source.xyxy)

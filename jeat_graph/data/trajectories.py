@@ -6,12 +6,14 @@ The causal table of a run, its smoothed table and the tracks of one moment are a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, TextArray
+from jeat_graph.data.class_columns import check_classes, join_classes
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.views import TrajectoryViews
 
@@ -29,6 +31,9 @@ class Trajectories(TrajectoryViews):
         var: (N, 6) variances of `mean`.
         used: (N,) bit k is set where a detection of `sensors[k]` was used at `t`.
         sensors: names of the sensors, at most 63.
+        classes: (N,) class that most of the track's detections so far name, weighed by their scores; empty
+            text where none names any. None where no detection of the recording has a class.
+        class_probability: (N,) share of those scores that speak for it, NaN where it is unknown; or None.
 
     Raises:
         DataError: if the columns differ in length or shape.
@@ -42,6 +47,8 @@ class Trajectories(TrajectoryViews):
     var: FloatArray
     used: IntArray
     sensors: tuple[str, ...] = ()
+    classes: TextArray | None = None
+    class_probability: FloatArray | None = None
 
     def __post_init__(self) -> None:
         n = len(self.t)
@@ -51,6 +58,7 @@ class Trajectories(TrajectoryViews):
         for name in ("track_id", "existence", "used"):
             if getattr(self, name).shape != (n,):
                 raise DataError(f"{name} must have shape ({n},), not {getattr(self, name).shape}")
+        check_classes(n, self.classes, self.class_probability)
 
     def __len__(self) -> int:
         return len(self.t)
@@ -74,17 +82,20 @@ class Trajectories(TrajectoryViews):
         """Stack tables that name the same sensors, in the order given."""
         if not parts:
             return Trajectories.empty()
-        columns = [f.name for f in fields(Trajectories) if f.name != "sensors"]
         if any(part.sensors != parts[0].sensors for part in parts):
             raise DataError("tables of different sensors cannot be joined")
-        stacked = {name: np.concatenate([getattr(part, name) for part in parts]) for name in columns}
-        return Trajectories(**stacked, sensors=parts[0].sensors)
+        stacked = {name: np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS}
+        classes, probability = join_classes([(len(p), p.classes, p.class_probability) for p in parts])
+        return Trajectories(
+            **stacked, sensors=parts[0].sensors, classes=classes, class_probability=probability
+        )
 
-    def take(self, rows: npt.ArrayLike) -> Trajectories:
+    def take(self, rows: npt.ArrayLike) -> Self:
         """Return the rows chosen by an index or mask array."""
         index = np.asarray(rows)
-        columns = {f.name: getattr(self, f.name)[index] for f in fields(self) if f.name != "sensors"}
-        return Trajectories(**columns, sensors=self.sensors)
+        columns: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
+        arrays = {name: c[index] for name, c in columns.items() if isinstance(c, np.ndarray)}
+        return replace(self, **arrays)
 
     def sensor_text(self) -> list[str]:
         """Names of the sensors used in each row, joined by `|`; empty where the track coasted."""
@@ -93,6 +104,10 @@ class Trajectories(TrajectoryViews):
             for mask in np.unique(self.used)
         }
         return [text[int(mask)] for mask in self.used]
+
+
+#: Names of the columns that every table has.
+COLUMNS = ("t", "track_id", "boxes", "existence", "mean", "var", "used")
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray, IntArray, TextArray
+from jeat_graph.data.class_columns import class_column, rows_of_class
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.interop import columns_of, to_xyxy
+from jeat_graph.data.interop import columns_of, supervision_of, to_xyxy
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,6 +34,8 @@ class TrajectoryViews:
         var: FloatArray
         used: IntArray
         sensors: tuple[str, ...]
+        classes: TextArray | None
+        class_probability: FloatArray | None
 
         def take(self, rows: npt.ArrayLike) -> Self:
             """Return some rows."""
@@ -70,6 +73,30 @@ class TrajectoryViews:
         """Return the rows with t0 <= t <= t1 (s)."""
         return self.take((self.t >= t0) & (self.t <= t1))
 
+    def of_class(self, *names: str, final: bool = False) -> Self:
+        """Return the rows whose class is one of some.
+
+        Args:
+            names: of classes.
+            final: go by the class that each track ends with, so that tracks stay whole; otherwise by that of
+                each row, which knows nothing that came later.
+
+        Raises:
+            DataError: the table has no classes, or no row is of one of these.
+        """
+        classes = self.classes
+        if final and classes is not None:
+            last = self.final_classes()
+            classes = np.array([last[track_id] for track_id in self.track_id.tolist()], dtype=np.str_)
+        return self.take(rows_of_class(classes, names, unknown=False))
+
+    def final_classes(self) -> dict[int, str]:
+        """Return the class of each track at the end of its life; empty text where it is unknown."""
+        if self.classes is None:
+            return {}
+        order = np.argsort(self.t, kind="stable")
+        return dict(zip(self.track_id[order].tolist(), self.classes[order].tolist(), strict=True))
+
     def to_pandas(self) -> pd.DataFrame:
         """Return the table as a data frame with the columns of `causal.csv`, not rounded."""
         import pandas as pd
@@ -80,6 +107,8 @@ class TrajectoryViews:
         columns |= {name: self.mean[:, k] for k, name in enumerate(MEAN)}
         columns |= {name: self.var[:, k] for k, name in enumerate(VAR)}
         columns["sensors"] = self.sensor_text()
+        if self.classes is not None:
+            columns |= {"class": self.classes, "class_probability": self.class_probability}
         return pd.DataFrame(columns)
 
     @classmethod
@@ -109,25 +138,19 @@ class TrajectoryViews:
             var=stack(VAR),
             used=np.array(used, dtype=np.int64),
             sensors=tuple(names),
+            **class_column(c.get("class"), c.get("class_probability")),
         )
 
     def to_supervision(self) -> Any:
         """Return the rows as `supervision.Detections` with `tracker_id`, for its annotators.
 
-        The existence probability stands in `confidence`. Take the rows of one moment: a step's table, or
-        `between(t, t)`.
+        The existence probability stands in `confidence`, the class in `data["class_name"]`. Take the rows of
+        one moment: a step's table, or `between(t, t)`.
 
         Raises:
             ImportError: the package `supervision` is not installed.
         """
-        import supervision
-
-        return supervision.Detections(
-            xyxy=self.xyxy,
-            confidence=self.existence.copy(),
-            class_id=np.zeros(len(self), dtype=int),
-            tracker_id=self.track_id.astype(int),
-        )
+        return supervision_of(self.boxes, self.existence, self.classes, self.track_id)
 
     def plot(self, kind: str = "picture", ax: Any = None) -> Any:
         """Draw the tracks with matplotlib.
@@ -174,7 +197,8 @@ class TrajectoryViews:
         for k in range(min(len(self), _SHOWN_ROWS)):
             box = " ".join(f"{v:.1f}" for v in self.boxes[k])
             speed = float(np.hypot(*self.mean[k, 2:4]))
-            text = f"track {self.track_id[k]} at [{box}] px, {speed:.1f} px/s"
+            kind = "track" if self.classes is None or not self.classes[k] else str(self.classes[k])
+            text = f"{kind} {self.track_id[k]} at [{box}] px, {speed:.1f} px/s"
             lines.append(f"  {self.t[k]:.3f} s  {text}, existence {self.existence[k]:.2f}")
         if len(self) > _SHOWN_ROWS:
             lines.append(f"  … {len(self) - _SHOWN_ROWS} more rows")
@@ -182,13 +206,14 @@ class TrajectoryViews:
 
     def _repr_html_(self) -> str:
         """Return a short table for notebooks."""
-        head = ("t (s)", "track", "box (px)", "velocity (px/s)", "existence", "seen by")
+        head: tuple[str, ...] = ("t (s)", "track", "box (px)", "velocity (px/s)", "existence", "seen by")
+        head += () if self.classes is None else ("class",)
         rows = []
         texts = self.take(np.arange(min(len(self), _SHOWN_ROWS))).sensor_text()
         for k, seen in enumerate(texts):
             box = ", ".join(f"{v:.1f}" for v in self.boxes[k])
             vx, vy = self.mean[k, 2:4]
-            cells = (
+            cells: tuple[str, ...] = (
                 f"{self.t[k]:.3f}",
                 str(self.track_id[k]),
                 box,
@@ -196,6 +221,8 @@ class TrajectoryViews:
                 f"{self.existence[k]:.2f}",
                 html.escape(seen),
             )
+            if self.classes is not None:
+                cells += (html.escape(str(self.classes[k])),)
             rows.append("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>")
         tracks = len(np.unique(self.track_id))
         note = f"{len(self)} rows, {tracks} tracks"

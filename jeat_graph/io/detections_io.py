@@ -78,13 +78,13 @@ def read_detections(
     name = DEFAULT_SENSOR if sensor is None else sensor
     if kind == "coco":
         return _read_coco(path, name, rate_hz, score_scale, fill_empty, images)
-    classes: Any
+    kinds: Any
     missing: FloatArray = np.zeros(0)
     if kind == "motchallenge":
         table = motchallenge.read_lines(path)
         rate, length = motchallenge.sequence_rate(path, rate_hz)
         frame = frames_of(table, motchallenge.FIRST_FRAME) - motchallenge.FIRST_FRAME
-        t, boxes, classes = frame / rate, motchallenge.boxes_of(table), motchallenge.class_names(table)
+        t, boxes, kinds = frame / rate, motchallenge.boxes_of(table), motchallenge.class_names(table)
         scores = _scores(table, "conf", "column 7 (confidence)")
         if fill_empty:
             wanted = fill_frames(frame + 1, path, length) - 1
@@ -93,17 +93,17 @@ def read_detections(
         table = kitti.read_lines(path)
         rate = check_rate(kitti.RATE_HZ if rate_hz is None else rate_hz, path)
         frame = frames_of(table, kitti.FIRST_FRAME)
-        t, boxes, classes = frame / rate, kitti.boxes_of(table), table.text("type")
+        t, boxes, kinds = frame / rate, kitti.boxes_of(table), table.text("type")
         scores = _scores(table, "score", "column 18 (score)")
         if fill_empty:
             missing = np.setdiff1d(fill_frames(frame, path), frame) / rate
     else:
         table = prophesee.read_array(path)
-        t, boxes, classes = prophesee.times_of(table), prophesee.boxes_of(table), prophesee.class_names(table)
+        t, boxes, kinds = prophesee.times_of(table), prophesee.boxes_of(table), prophesee.class_names(table)
         scores = _scores(table, "class_confidence", "the field class_confidence (or confidence)")
         if fill_empty and rate_hz is not None:
             missing = gap_times(t, rate_hz, path)
-    return _assemble(t, name, boxes, scale_scores(scores, score_scale, path), classes, missing, table.error)
+    return _assemble(t, name, boxes, scale_scores(scores, score_scale, path), kinds, missing, table.error)
 
 
 def read_many(paths: Sequence[str | Path], **options: Any) -> Detections:
@@ -111,13 +111,16 @@ def read_many(paths: Sequence[str | Path], **options: Any) -> Detections:
 
     Args:
         paths: files, each alone or as `NAME=path` to name its sensor.
-        options: as `read_detections`, for all files.
+        options: as `read_detections`, for all files; and `classes`, to take detections of these only, and
+            those without a class.
 
     Raises:
         DataError: as `read_detections`; or two files whose format does not name sensors are not told apart.
     """
     if not paths:
         raise DataError("no detections file given")
+    # The files of some sensors may have classes and others none: chosen when they are together.
+    classes = options.pop("classes", None)
     parts: list[Detections] = []
     unnamed: str | Path | None = None
     for item in paths:
@@ -128,7 +131,15 @@ def read_many(paths: Sequence[str | Path], **options: Any) -> Detections:
                 raise DataError(f"does not name its sensor, nor does {unnamed}; give NAME=path", path)
             unnamed = path
         parts.append(read_detections(path, **{**options, "sensor": name}))
-    return parts[0] if len(parts) == 1 else Detections.concatenate(parts)
+    whole = parts[0] if len(parts) == 1 else Detections.concatenate(parts)
+    return whole if classes is None else _of_class(whole, classes, split_name(paths[0])[1])
+
+
+def _of_class(detections: Detections, classes: Sequence[str], path: str | Path) -> Detections:
+    try:
+        return detections.of_class(*classes)
+    except DataError as error:
+        raise DataError(error.message, path) from None
 
 
 def split_name(item: str | Path) -> tuple[str | None, str | Path]:

@@ -16,7 +16,7 @@ import numpy as np
 from jeat_graph.data.arrays import TextArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.atomic import atomic_path
-from jeat_graph.io.trajectories_io import by_frame
+from jeat_graph.io.frame_results import by_frame
 from jeat_graph.version import __version__
 
 _FIRST_FRAME = 1
@@ -50,13 +50,14 @@ def write_ottrk(
         table: the tracks; times go to the nearest frame.
         path: the file, ending in `.ottrk`.
         video: the video.
-        classes: (N,) class of each row; `car` where it is empty or not given.
+        classes: (N,) class of each row, if not the table's; `car` where neither says it.
 
     Raises:
         DataError: the rate is not positive, or a time lies before the first frame.
     """
     frame, rows = by_frame(table, path, video.rate_hz)
-    kinds = np.full(len(rows), "car") if classes is None or len(classes) != len(rows) else classes
+    kinds = rows.classes if classes is None else classes
+    kinds = np.full(len(rows), "car") if kinds is None or len(kinds) != len(rows) else kinds
     last_of = {int(k): int(frame[rows.track_id == k].max()) for k in np.unique(rows.track_id)}
     seen: set[int] = set()
     detections = []

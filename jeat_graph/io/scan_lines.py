@@ -7,12 +7,16 @@ import json
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple, TypeVar
 
+import numpy as np
+
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError
 
 _KEYS = ("t", "sensor", "boxes", "scores")
+_CLASSES = "classes"  # may follow: names, one a box
 _Result = TypeVar("_Result")
 _COLUMNS = ("t", "sensor", "left", "top", "width", "height", "score")
+_CLASS = "class"  # a column that may be there
 
 
 class Batch(NamedTuple):
@@ -43,8 +47,9 @@ def read_batches(
     """Read scans as their lines arrive.
 
     A line of JSON is one scan, `{"t": 0.05, "sensor": "rgb", "boxes": [[l, t, w, h], …], "scores": [s, …]}`,
-    or a list of scans of one time. It is given out at once; with `joint` only when a later time is seen, so
-    that scans of one time that came in lines of their own are given out together.
+    maybe with `"classes": [name, …]`, or a list of scans of one time. It is given out at once; with `joint`
+    only when a later time is seen, so that scans of one time that came in lines of their own are given out
+    together.
 
     CSV begins with a header and has one row a detection; a row with only `t` and `sensor` is a scan that
     found nothing. Rows of one time are given out together, when a row of another time or an empty line
@@ -146,9 +151,10 @@ def _scan_of(item: Any, name: str, number: int) -> Scan:
     example = '{"t": 0.05, "sensor": "rgb", "boxes": [[10, 20, 30, 40]], "scores": [0.9]}'
     if not isinstance(item, dict):
         raise DataError(f"a scan is an object such as {example}", name, number)
-    strange = next((key for key in item if key not in _KEYS), None)
+    strange = next((key for key in item if key not in (*_KEYS, _CLASSES)), None)
     if strange is not None:
-        raise DataError(f"unknown key {strange!r}; a scan has {', '.join(_KEYS)}", name, number)
+        known = ", ".join((*_KEYS, _CLASSES))
+        raise DataError(f"unknown key {strange!r}; a scan has {known}", name, number)
     missing = next((key for key in _KEYS if key not in item), None)
     if missing is not None:
         raise DataError(f"{missing} is missing; a scan has {', '.join(_KEYS)}", name, number)
@@ -158,11 +164,24 @@ def _scan_of(item: Any, name: str, number: int) -> Scan:
     if not isinstance(sensor, str) or not sensor:
         raise DataError(f"sensor must be a name, got {sensor!r}", name, number)
     try:
-        return Scan(t, sensor, item["boxes"], item["scores"])
+        return Scan(t, sensor, item["boxes"], item["scores"], _class_names(item.get(_CLASSES), name, number))
     except DataError as error:
         raise DataError(error.message, name, number) from None
     except OverflowError:
         raise DataError("t is too large", name, number) from None
+
+
+def _class_names(found: Any, name: str, number: int) -> Any:
+    """The names of classes in a scan, None if it has none.
+
+    Raises:
+        DataError: not a list of text (null where a class is not known).
+    """
+    if found is None:
+        return None
+    if not isinstance(found, list) or not all(one is None or isinstance(one, str) for one in found):
+        raise DataError(f"{_CLASSES} must be a list of names, one a box, got {found!r}", name, number)
+    return np.array([one or "" for one in found], dtype=np.str_)
 
 
 class _Row(NamedTuple):
@@ -170,6 +189,7 @@ class _Row(NamedTuple):
     sensor: str
     box: list[float] | None
     score: float
+    kind: str | None
 
 
 def _csv_columns(header: str, name: str, at: int) -> dict[str, int]:
@@ -182,7 +202,8 @@ def _csv_columns(header: str, name: str, at: int) -> dict[str, int]:
             name,
             at,
         )
-    return {column: columns.index(column) for column in _COLUMNS}
+    known = (*_COLUMNS, _CLASS) if _CLASS in columns else _COLUMNS
+    return {column: columns.index(column) for column in known}
 
 
 def _csv_batches(
@@ -230,7 +251,7 @@ def _csv_row(text: str, place: dict[str, int], name: str, number: int) -> _Row:
             what = f"must be a number, got {value[column]!r}" if value[column] else "is missing"
             raise DataError(f"{column} {what}", name, number) from None
     box = None if empty else [found[column] for column in ("left", "top", "width", "height")]
-    row = _Row(found["t"], value["sensor"], box, found.get("score", 0.0))
+    row = _Row(found["t"], value["sensor"], box, found.get("score", 0.0), value.get(_CLASS))
     try:
         _scan_of_rows([row], number)
     except DataError as error:
@@ -241,7 +262,8 @@ def _csv_row(text: str, place: dict[str, int], name: str, number: int) -> _Row:
 def _scan_of_rows(rows: list[_Row], line: int) -> Batch:
     found = [row for row in rows if row.box is not None]
     boxes, scores = [row.box for row in found], [row.score for row in found]
-    return Batch([Scan(rows[0].t, rows[0].sensor, boxes, scores)], [line])  # type: ignore[arg-type]
+    kinds = None if rows[0].kind is None else np.array([row.kind for row in found], dtype=np.str_)
+    return Batch([Scan(rows[0].t, rows[0].sensor, boxes, scores, kinds)], [line])  # type: ignore[arg-type]
 
 
 def _joined(parts: Iterable[Batch | None], name: str, ordered: bool) -> Iterator[Batch]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.table_writer import csv_lines
-from jeat_graph.io.trajectories_io import COLUMNS, rounded, table_columns
+from jeat_graph.io.trajectories_io import CLASS_COLUMNS, COLUMNS, EXISTENCE_DECIMALS, rounded, table_columns
 
 _ENCODER = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"), check_circular=False)
 
@@ -19,6 +19,7 @@ def json_line(t: float, table: Trajectories) -> str:
 
     `{"t": s, "tracks": [{"track_id", "box": [l, t, w, h], "existence", "mean": [x, y, vx, vy, ax, ay],
     "var": [the six variances], "sensors": [names used now]}, …]}`. Variances that are not known are null.
+    Where detections have classes, `"class"` and `"class_probability"` follow, null where nothing names one.
 
     Args:
         t: time of the step (s).
@@ -43,14 +44,18 @@ def json_line(t: float, table: Trajectories) -> str:
                     "sensors": names[used],
                 }
             )
+            if table.classes is not None and table.class_probability is not None:
+                kind, share = str(table.classes[k]), float(table.class_probability[k])
+                share_text = None if share != share else round(share, EXISTENCE_DECIMALS)
+                tracks[-1] |= {"class": kind or None, "class_probability": share_text}
     return _ENCODER.encode({"t": t, "tracks": tracks}) + "\n"
 
 
-def csv_header() -> str:
-    """Return the first line of a causal table."""
-    return ",".join(COLUMNS) + "\n"
+def csv_header(classes: bool = False) -> str:
+    """Return the first line of a causal table, with or without the columns of classes."""
+    return ",".join((*COLUMNS, *CLASS_COLUMNS) if classes else COLUMNS) + "\n"
 
 
-def csv_rows(table: Trajectories) -> str:
+def csv_rows(table: Trajectories, classes: bool = False) -> str:
     """Return the rows of one moment, byte for byte as `causal.csv` has them."""
-    return csv_lines(table_columns(table)) if len(table) else ""
+    return csv_lines(table_columns(table, classes)) if len(table) else ""

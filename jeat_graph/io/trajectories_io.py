@@ -1,4 +1,4 @@
-"""Trajectory tables from and to files: the run's own tables, and results of MOTChallenge and KITTI.
+"""Trajectory tables from and to files: the run's own tables; results of MOTChallenge and KITTI are read too.
 
 A run's table keeps times to the last bit, boxes and motion to 0.001 px (px/s, px/s²), existence to 1e-6 and
 variances to six significant digits, in CSV and Parquet alike; the same table gives the same bytes.
@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import graphlib
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.class_columns import class_column, unknown_classes
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.data.views import BOX, MEAN, VAR
@@ -23,14 +25,17 @@ from jeat_graph.io.formats import recognise
 from jeat_graph.io.frames import check_rate
 from jeat_graph.io.piecewise import PiecewiseWriter
 from jeat_graph.io.plain_text import frames_of
-from jeat_graph.io.table_writer import TableWriter, round_decimals, round_significant, write_columns
+from jeat_graph.io.table_writer import TableWriter, round_decimals, round_significant
 from jeat_graph.io.tables import read_table
 
+#: Columns of every table, and those behind them where the detections have classes.
 COLUMNS = ("t", "track_id", *BOX, "existence", *MEAN, *VAR, "sensors")
-_PX_DECIMALS = 3
-_EXISTENCE_DECIMALS = 6
+CLASS_COLUMNS = ("class", "class_probability")
+#: Decimals that boxes, motion, and probabilities are written with.
+PX_DECIMALS = 3
+EXISTENCE_DECIMALS = 6
 _VAR_DIGITS = 6
-_SCALE = np.repeat([10.0**_PX_DECIMALS, 10.0**_EXISTENCE_DECIMALS], [10, 1])
+_SCALE = np.repeat([10.0**PX_DECIMALS, 10.0**EXISTENCE_DECIMALS], [10, 1])
 _JOINT = "|"
 _FLUSH_ROWS = 8192
 _MOST_SENSORS = 63  # bits of `Trajectories.used`
@@ -44,17 +49,19 @@ class TrajectoryWriter(PiecewiseWriter):
 
     Args:
         path: the file; `.parquet` and `.pq` are Parquet, all else is CSV.
+        classes: whether it has the columns of classes; where it has not, those of the tables are left out.
     """
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(self, path: str | Path, *, classes: bool = False) -> None:
         super().__init__()
+        self._classes = classes
         self._writer = TableWriter(path)
         self._pending: list[Trajectories] = []
         self._rows = 0
 
     def _begin(self) -> None:
         self._stack.enter_context(self._writer)
-        self._writer.append(table_columns(Trajectories.empty()))  # a run without tracks has a header too
+        self._writer.append(table_columns(Trajectories.empty(), self._classes))
 
     def _finish(self) -> None:
         self._flush()
@@ -78,12 +85,17 @@ class TrajectoryWriter(PiecewiseWriter):
     def _flush(self) -> None:
         """Convert what has come together: tables of a few rows each would cost far more one by one."""
         if self._pending:
-            self._writer.append(table_columns(Trajectories.concatenate(self._pending)))
+            self._writer.append(table_columns(Trajectories.concatenate(self._pending), self._classes))
         self._pending, self._rows = [], 0
 
 
-def table_columns(table: Trajectories) -> dict[str, Any]:
-    """Return the columns of the contract (N,) by name, rounded as they are written."""
+def table_columns(table: Trajectories, classes: bool | None = None) -> dict[str, Any]:
+    """Return the columns of the contract (N,) by name, rounded as they are written.
+
+    Args:
+        table: the rows.
+        classes: whether those of classes are among them; by default where the table has such.
+    """
     boxes, existence, mean, var = rounded(table)
     columns: dict[str, Any] = {"t": table.t + 0.0, "track_id": table.track_id}
     columns |= {name: boxes[:, k] for k, name in enumerate(BOX)}
@@ -91,6 +103,11 @@ def table_columns(table: Trajectories) -> dict[str, Any]:
     columns |= {name: mean[:, k] for k, name in enumerate(MEAN)}
     columns |= {name: var[:, k] for k, name in enumerate(VAR)}
     columns["sensors"] = np.asarray(table.sensor_text(), dtype=np.str_)
+    if table.classes is not None if classes is None else classes:
+        names, share = unknown_classes(len(table))
+        if table.classes is not None and table.class_probability is not None:
+            names, share = table.classes, table.class_probability
+        columns |= {"class": names, "class_probability": round_decimals(share, EXISTENCE_DECIMALS)}
     return columns
 
 
@@ -104,7 +121,7 @@ def rounded(table: Trajectories) -> tuple[FloatArray, FloatArray, FloatArray, Fl
 
 def write_trajectories(table: Trajectories, path: str | Path) -> None:
     """Write a table of the contract as CSV, or as Parquet where the name ends so."""
-    with TrajectoryWriter(path) as writer:
+    with TrajectoryWriter(path, classes=table.classes is not None) as writer:
         writer.append(table)
 
 
@@ -136,8 +153,9 @@ def read_trajectories(
         rate = check_rate(kitti.RATE_HZ if rate_hz is None else rate_hz, path)
         frame = frames_of(table, kitti.FIRST_FRAME)
         found = _without_motion(table, frame / rate, kitti.boxes_of(table), "score")
+        found = replace(found, **class_column(table.text("type"), None))
     else:
-        table = read_table(path, COLUMNS)
+        table = read_table(path, COLUMNS, CLASS_COLUMNS)
         found = _read_contract(table)
     _check(table, found)
     return found
@@ -146,63 +164,6 @@ def read_trajectories(
 def has_motion(table: Trajectories) -> bool:
     """Tell whether a table holds estimates of motion, rather than boxes only (then all variances are NaN)."""
     return bool(np.isfinite(table.var).any())
-
-
-def write_motchallenge(table: Trajectories, path: str | Path, rate_hz: float) -> None:
-    """Write boxes as a MOTChallenge result: `frame, id, left, top, width, height, existence, -1, -1, -1`.
-
-    Times go to the nearest frame, counted from 1; sampling the table at frame times is the caller's business.
-    Of several rows of one track in one frame the last is written.
-
-    Raises:
-        DataError: the rate is not positive, or a time lies before frame 1.
-    """
-    frame, kept = by_frame(table, path, rate_hz)
-    boxes = round_decimals(kept.boxes, _PX_DECIMALS)
-    columns: dict[str, Any] = {"frame": frame + motchallenge.FIRST_FRAME, "id": kept.track_id}
-    columns |= {name: boxes[:, k] for k, name in enumerate(BOX)}
-    columns["conf"] = round_decimals(kept.existence, _EXISTENCE_DECIMALS)
-    columns |= {name: np.full(len(kept), -1) for name in ("world_x", "world_y", "world_z")}
-    write_columns(columns, path, header=False)
-
-
-def write_kitti(
-    table: Trajectories, path: str | Path, rate_hz: float = kitti.RATE_HZ, object_type: str = "Car"
-) -> None:
-    """Write boxes as a KITTI tracking result, frames from 0, the 3D columns marked as unknown.
-
-    Rows are chosen as by `write_motchallenge`; the score is the existence.
-
-    Raises:
-        DataError: the rate is not positive, a time lies before frame 0, or the type holds white space.
-    """
-    if object_type.split() != [object_type]:
-        raise DataError(f"a KITTI object type is one word, not {object_type!r}", path)
-    frame, kept = by_frame(table, path, rate_hz)
-    n = len(kept)
-    edges = np.concatenate([kept.boxes[:, :2], kept.boxes[:, :2] + kept.boxes[:, 2:]], axis=1)
-    edges = round_decimals(edges, _PX_DECIMALS)
-    columns: dict[str, Any] = {"frame": frame, "id": kept.track_id, "type": np.full(n, object_type)}
-    columns |= {
-        name: np.full(n, value) for name, value in (("truncated", -1), ("occluded", -1), ("alpha", -10))
-    }
-    columns |= {name: edges[:, k] for k, name in enumerate(("left", "top", "right", "bottom"))}
-    columns |= {f"size_{name}": np.full(n, -1) for name in "hwl"}
-    columns |= {f"loc_{name}": np.full(n, -1000) for name in "xyz"}
-    columns |= {"rotation": np.full(n, -10), "score": round_decimals(kept.existence, _EXISTENCE_DECIMALS)}
-    write_columns(columns, path, header=False, delimiter=" ")
-
-
-def by_frame(table: Trajectories, path: str | Path, rate_hz: float) -> tuple[IntArray, Trajectories]:
-    """Return frames (from 0) and rows, sorted by frame and id, the last row of each pair only."""
-    frame = np.rint(table.t * check_rate(rate_hz, path)).astype(np.int64)
-    if (frame < 0).any():
-        raise DataError(f"t = {table.t.min():g} lies before the first frame, which is at 0 s", path)
-    order = np.lexsort((np.arange(len(frame)), table.track_id, frame))
-    last = np.ones(len(order), dtype=bool)
-    last[:-1] = (np.diff(frame[order]) != 0) | (np.diff(table.track_id[order]) != 0)
-    rows = order[last]
-    return frame[rows], table.take(rows)
 
 
 def _read_contract(table: FileTable) -> Trajectories:
@@ -222,7 +183,17 @@ def _read_contract(table: FileTable) -> Trajectories:
         var=np.stack([table.number(name, blank_ok=True, nan_ok=True) for name in VAR], axis=1),
         used=np.asarray(mask, dtype=np.int64)[index.reshape(-1)],
         sensors=sensors,
+        **_classes_of(table),
     )
+
+
+def _classes_of(table: FileTable) -> dict[str, Any]:
+    if "class" not in table:
+        return {}
+    share = None
+    if "class_probability" in table:
+        share = table.number("class_probability", blank_ok=True, nan_ok=True)
+    return class_column(table.text("class", blank_ok=True), share)
 
 
 def _sensor_order(texts: Iterable[str]) -> tuple[str, ...]:

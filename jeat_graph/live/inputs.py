@@ -5,10 +5,14 @@ from __future__ import annotations
 import contextlib
 import signal
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from types import FrameType
 from typing import Self
 
+import numpy as np
+
 from jeat_graph.data.errors import DataError
+from jeat_graph.io import time_units
 from jeat_graph.io.scan_lines import read_batches
 from jeat_graph.live.messages import ScanMessage, decode_scans
 from jeat_graph.live.transport.ends import Source
@@ -57,6 +61,17 @@ class Interrupts:
             if not line:
                 return
             yield line
+
+
+def in_seconds(message: ScanMessage, unit: str) -> ScanMessage:
+    """Return a message whose times are of a unit (`io.time_units`) with times in seconds."""
+    if unit == "s":
+        return message
+    scans = [
+        replace(scan, t=float(time_units.in_seconds(np.array([scan.t]), unit)[0]))
+        for scan in message.batch.scans
+    ]
+    return message._replace(batch=message.batch._replace(scans=scans))
 
 
 def from_lines(

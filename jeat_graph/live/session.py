@@ -25,6 +25,9 @@ MOST_TOLD = 5
 class RowsEnd(Protocol):
     """Where smoothed rows go (`SmoothedFile`)."""
 
+    def begin(self, classes: bool) -> None:
+        """Say, with every answer, whether rows have classes."""
+
     def append(self, table: Trajectories) -> None:
         """Add rows."""
 
@@ -114,6 +117,8 @@ class Session:
             return
         self.count += 1
         self._tell_dropped(arrival.dropped, arrival.late_s, place)
+        if self.ends.smoothed is not None:
+            self.ends.smoothed.begin(arrival.table.classes is not None)
         if passed_over < len(message.batch.scans):
             self.ends.tracks(arrival.t, arrival.table, message, arrival.late_s)
             for event in self._health.saw(message.batch.scans, arrival.t):

@@ -54,6 +54,7 @@ class RunSteps:
         self._detections, self._config, self._run = detections, config, run
         self._record, self._options = record, options
         self._instants = np.unique(detections.scan_t)
+        self._named = detections.classes is not None
         self._smooths = config.smoother.engine != "none"
         self._tracker = Tracker(config, diagnostics=options.diagnostics)
         self._reported: set[int] = set()
@@ -80,7 +81,7 @@ class RunSteps:
         hidden = not self._options.progress
         begin = time.perf_counter()
         with (
-            _Files(self._run, self._config, self._options) as self._files,
+            _Files(self._run, self._config, self._options, self._named) as self._files,
             tqdm(total=len(self._instants), desc="track", unit="step", disable=hidden, leave=False) as bar,
         ):
             if self._unfinished is not None:
@@ -167,9 +168,12 @@ class RunSteps:
 
 
 class _Files(ExitStack):
-    """The files of a run that are written while it is made, by name of what goes into them."""
+    """The files of a run that are written while it is made, by name of what goes into them.
 
-    def __init__(self, run: RunDirectory, config: Config, options: RunOptions) -> None:
+    The tables have classes if the detections (`named`) have.
+    """
+
+    def __init__(self, run: RunDirectory, config: Config, options: RunOptions, named: bool) -> None:
         from jeat_graph.io.diagnostics_io import DiagnosticsWriter
         from jeat_graph.io.measurements_io import MeasurementWriter
         from jeat_graph.io.trajectories_io import TrajectoryWriter
@@ -178,7 +182,8 @@ class _Files(ExitStack):
         suffixes = [SUFFIXES[name] for name in ("csv", *options.formats) if name not in FRAME_FORMATS]
         kinds = ("causal", "smoothed") if config.smoother.engine != "none" else ("causal",)
         writers: dict[str, list[PiecewiseWriter | MeasurementWriter]] = {
-            kind: [TrajectoryWriter(run.path(kind + suffix)) for suffix in suffixes] for kind in kinds
+            kind: [TrajectoryWriter(run.path(kind + suffix), classes=named) for suffix in suffixes]
+            for kind in kinds
         }
         if options.diagnostics:
             writers["diagnostics"] = [DiagnosticsWriter(run.path(DIAGNOSTICS))]

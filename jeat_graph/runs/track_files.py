@@ -30,6 +30,7 @@ class TrackRequest:
         score_scale: how their scores are to be read, see `read_detections`.
         images: COCO data set with the times of COCO results, or None.
         time_unit: unit of the column `t`, of `io.time_units`.
+        classes: classes of detections to be taken, and those without one; None takes all.
         frames: pictures that tell the picture's size and the frame rate, or None.
         options: how the run is written.
     """
@@ -43,6 +44,7 @@ class TrackRequest:
     score_scale: str = "unit"
     images: str | None = None
     time_unit: str = "s"
+    classes: tuple[str, ...] | None = None
     frames: str | None = None
     options: RunOptions = field(default_factory=RunOptions)
 
@@ -99,12 +101,14 @@ class TrackRequest:
         }
 
     def _reading(self) -> dict[str, Any]:
+        classes = {} if self.classes is None else {"classes": list(self.classes)}
         return {
             "rate_hz": self.rate_hz,
             "fmt": self.input_format,
             "score_scale": self.score_scale,
             "images": self.images,
             "time_unit": self.time_unit,
+            **classes,
         }
 
 

@@ -50,7 +50,8 @@ def _write_at_frames(
     run: RunDirectory, kind: Kind, instants: FloatArray, rate_hz: float, formats: Sequence[str]
 ) -> None:
     """Write a table at the frames of formats that count them: from its CSV, as anybody would later."""
-    from jeat_graph.io.trajectories_io import read_trajectories, write_kitti, write_motchallenge
+    from jeat_graph.io.frame_results import write_kitti, write_motchallenge
+    from jeat_graph.io.trajectories_io import read_trajectories
     from jeat_graph.runs.frame_export import at_frames
 
     wanted = [name for name in formats if name in FRAME_FORMATS]

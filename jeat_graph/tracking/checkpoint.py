@@ -25,6 +25,7 @@ from jeat_graph.smoothers.engine import WholeTrackSmoother
 from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
 from jeat_graph.smoothers.track_data import Prior, SmoothedTrack
 from jeat_graph.smoothers.window import Window
+from jeat_graph.tracking.classes import ClassTally, Votes
 from jeat_graph.tracking.smoothing.behind import InProcessSmoothing
 from jeat_graph.tracking.smoothing.history import TrackHistory
 from jeat_graph.tracking.smoothing.observation_times import ObservationTimes
@@ -40,9 +41,10 @@ from jeat_graph.tracking.step_record import StepRecord
 from jeat_graph.version import __version__
 
 #: Raised with every change of what is saved: a file of another format is refused, not guessed at.
-FORMAT = 3
+FORMAT = 4
 _MAGIC = "jeat-graph tracker"
 _PLAIN = (
+    ClassTally,
     InProcessSmoothing,
     ObservationTimes,
     Prior,
@@ -57,6 +59,7 @@ _PLAIN = (
     TrackHistory,
     TrackSmoothers,
     Trajectories,
+    Votes,
     WholeTrackSmoother,
 )
 

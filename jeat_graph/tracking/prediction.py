@@ -45,7 +45,9 @@ def predict_reported(now: Snapshot, t: float, model: Model, sensors: tuple[str, 
     predict_all(now.tracks, n, max(t - here, 0.0), now.scene, model)
     # Nobody has looked in between, so nobody can have missed a track either: what counts is the gap now.
     now.tracks.t_update[:] += t - here
-    columns = Trajectories(*report(now.tracks, n, t, *how), sensors=sensors)
+    found = report(now.tracks, n, t, *how)
+    classes = (None, None) if now.classes is None else now.classes.columns(found[1])
+    columns = Trajectories(*found, sensors, *classes)
     table = columns.take(np.isin(columns.track_id, reported))
     rows = np.searchsorted(now.tracks.track_id, table.track_id)
     cov = np.zeros((len(table), 6, 6))

@@ -13,7 +13,11 @@ from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import TimeOrderError, UnknownSensorError
 from jeat_graph.tracking.batch import Arrivals
 
-ScanLike: TypeAlias = Scan | tuple[float, str, npt.ArrayLike, npt.ArrayLike]
+ScanLike: TypeAlias = (
+    Scan
+    | tuple[float, str, npt.ArrayLike, npt.ArrayLike]
+    | tuple[float, str, npt.ArrayLike, npt.ArrayLike, Any]
+)
 
 
 def as_scans(scans: Any) -> list[Scan]:
@@ -32,7 +36,7 @@ def as_scans(scans: Any) -> list[Scan]:
 def _listed(scans: Any) -> list[Scan]:
     if isinstance(scans, Scan):
         return [scans]
-    if isinstance(scans, tuple) and len(scans) == 4 and isinstance(scans[1], str):
+    if isinstance(scans, tuple) and len(scans) in (4, 5) and isinstance(scans[1], str):
         return [Scan(*scans)]
     if isinstance(scans, Iterable):
         out = [scan if isinstance(scan, Scan) else Scan(*scan) for scan in scans]

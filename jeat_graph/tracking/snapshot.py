@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from jeat_graph.tracking.classes import ClassTally
 from jeat_graph.tracking.state import Scene, TrackArrays
 
 
@@ -15,12 +16,14 @@ class Snapshot(NamedTuple):
         next_id: identity of the next track to be born.
         tracks: the N living tracks.
         scene: what is learnt of the scene.
+        classes: votes on the tracks' classes, or None before the first.
     """
 
     t: float | None
     next_id: int
     tracks: TrackArrays
     scene: Scene
+    classes: ClassTally | None = None
 
     @staticmethod
     def of(t: float | None, next_id: int, tracks: TrackArrays, num_tracks: int, scene: Scene) -> Snapshot:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, RecordArray
+from jeat_graph.tracking.classes import Votes
 from jeat_graph.tracking.state import TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog
 
@@ -23,6 +24,7 @@ class StepRecord(NamedTuple):
         confirmed: (N,) whether the track is confirmed.
         held: (N,) whether it is reported as standing still.
         updates: (M,) records of the update log.
+        votes: what these detections say of classes, or None.
     """
 
     t: float
@@ -33,10 +35,17 @@ class StepRecord(NamedTuple):
     confirmed: BoolArray
     held: BoolArray
     updates: RecordArray
+    votes: Votes | None = None
 
 
 def record_step(
-    t: float, tracks: TrackArrays, n: int, births: int, log: UpdateLog, reported: IntArray
+    t: float,
+    tracks: TrackArrays,
+    n: int,
+    births: int,
+    log: UpdateLog,
+    reported: IntArray,
+    votes: Votes | None = None,
 ) -> StepRecord:
     """Take down one step.
 
@@ -47,6 +56,7 @@ def record_step(
         births: how many of these were born in it.
         log: what the tracks took in.
         reported: identities in the causal table of the step, ascending; of those that stand at least.
+        votes: what the detections in the log say of classes, or None.
     """
     ids = tracks.track_id[:n].copy()
     held = np.zeros(n, dtype=np.bool_)
@@ -61,4 +71,5 @@ def record_step(
         tracks.confirmed[:n].copy(),
         held,
         log.rows[: int(log.count[0])].copy(),
+        votes,
     )

@@ -19,6 +19,7 @@ from jeat_graph.data.diagnostics import Diagnostics
 from jeat_graph.data.errors import JeatGraphError, TimeOrderError
 from jeat_graph.data.interop import boxes_of
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.tracking.classes import ClassTally, check_names, count_votes
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.notice import notice_if_cold
 from jeat_graph.tracking.prediction import Prediction, predict_reported
@@ -75,6 +76,7 @@ class Tracker(SmoothedTracks):
         self._next_id = 1
         self._t: float | None = None
         self._log = allocate_log(0)
+        self._classes: ClassTally | None = None
         self._watch = InputWatch(config)
         notice_if_cold()
 
@@ -97,8 +99,8 @@ class Tracker(SmoothedTracks):
         """Take in one scan, or several of one and the same time, which are associated jointly.
 
         Args:
-            scans: a `Scan` or a tuple (t, sensor, boxes (M, 4), scores (M,)), or a sequence of these. A scan
-                that found nothing (M = 0) is information too.
+            scans: a `Scan` or a tuple (t, sensor, boxes (M, 4), scores (M,)), also with names of classes (M,)
+                behind, or a sequence of these. A scan that found nothing (M = 0) is information too.
 
         Returns:
             The tracks that are reported now, one row each.
@@ -124,18 +126,19 @@ class Tracker(SmoothedTracks):
             What `hand_over` takes; None without a smoother. `causal` has the tracks that are reported.
 
         Raises:
-            UnknownSensorError, TimeOrderError: as `step`.
+            DataError, UnknownSensorError, TimeOrderError: as `step`.
         """
         arrivals = arrivals_of(batch, self.sensor_names)
         t, count = arrivals.t, len(arrivals.scores)
         if self._t is not None and t < self._t:
             raise TimeOrderError(f"scan at t = {t} s is older than the last one at {self._t} s")
+        check_names(self._classes, batch)
         longest = self.config.lifecycle.max_silence_s
         dt = 0.0 if self._t is None else min(t - self._t, longest)
         if dt == longest:
             self._num_tracks = 0
         self._tracks = grow(self._tracks, self._num_tracks, self._num_tracks + count)
-        logs = self._diagnostics or self._smoothers is not None
+        logs = self._diagnostics or self._smoothers is not None or any(s.classes is not None for s in batch)
         if logs and count > len(self._log.rows):
             self._log = allocate_log(2 * count)
         first_id = self._next_id
@@ -144,13 +147,16 @@ class Tracker(SmoothedTracks):
         )
         self._t = t
         self._watch.look(batch)
+        self._classes, votes = count_votes(
+            self._classes, batch, self._log, self._tracks.track_id[: self._num_tracks]
+        )
         if self._smoothers is None:
             return None
         n, births = self._num_tracks, self._next_id - first_id
         # Only of tracks that stand still does it matter whether they are reported.
         standing = bool(self._tracks.standing[:n].any())
         reported = self.causal().track_id if standing else np.zeros(0, dtype=np.int64)
-        return record_step(t, self._tracks, n, births, self._log, reported)
+        return record_step(t, self._tracks, n, births, self._log, reported, votes)
 
     def hand_over(self, taken: StepRecord | None) -> None:
         """Give the smoothers what a step took in; in order of time, and once."""
@@ -159,11 +165,13 @@ class Tracker(SmoothedTracks):
 
     def snapshot(self) -> Snapshot:
         """Copy all that the next step depends on; the smoothers are not part of it."""
-        return Snapshot.of(self._t, self._next_id, self._tracks, self._num_tracks, self._scene)
+        now = Snapshot.of(self._t, self._next_id, self._tracks, self._num_tracks, self._scene)
+        return now._replace(classes=self._classes)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to a snapshot of this tracker."""
         self._t, self._next_id, self._num_tracks = snapshot.t, snapshot.next_id, snapshot.num_tracks
+        self._classes = snapshot.classes
         self._tracks = grow(self._tracks, 0, self._num_tracks)
         snapshot.copy_to(self._tracks, self._scene)
 
@@ -244,7 +252,7 @@ class Tracker(SmoothedTracks):
         Returns and raises as `step`; also a DataError where it cannot be told what `source` is.
         """
         found = boxes_of(source, scores)
-        return self.step(Scan(t, sensor, found.boxes, found.scores))
+        return self.step(Scan(t, sensor, found.boxes, found.scores, found.classes))
 
     def causal(self) -> Trajectories:
         """Return the tracks that are reported now, as the last step did."""
@@ -255,7 +263,8 @@ class Tracker(SmoothedTracks):
         columns = report(
             self._tracks, self._num_tracks, t, gap, settings.image, settings.output, by_existence
         )
-        return Trajectories(*columns, sensors=self.sensor_names)
+        classes = (None, None) if self._classes is None else self._classes.columns(columns[1])
+        return Trajectories(*columns, self.sensor_names, *classes)
 
     def last_updates(self) -> Diagnostics:
         """Return what the last step gave to the tracks, those too that are not reported.
@@ -286,14 +295,3 @@ class Tracker(SmoothedTracks):
         """Step through a recording and yield the table of each time; scans of one time are taken jointly."""
         for batch in detections.batches():
             yield self.step(batch)
-
-
-def track(config: Config, detections: Detections) -> Trajectories:
-    """Track a recording from beginning to end and return the whole causal table.
-
-    Args:
-        config: sensors and settings.
-        detections: the recording.
-    """
-    causal_only = replace(config, smoother=replace(config.smoother, engine="none"))
-    return Trajectories.concatenate(list(Tracker(causal_only).run(detections)) or [Trajectories.empty()])

@@ -26,16 +26,19 @@ class UpdateLog(NamedTuple):
 
     Attributes:
         rows: (C,) records (`MEASUREMENT`); C is at least the number of detections of the step, or 0.
+        detection: (C,) which detection of the step each is.
         count: (1,) rows in use.
     """
 
     rows: RecordArray
+    detection: IntArray
     count: IntArray  # type: ignore[assignment]  # hides tuple.count, which nobody calls
 
 
 def allocate_log(capacity: int) -> UpdateLog:
     """Allocate a log for steps of at most `capacity` detections; 0 for a log that takes nothing."""
-    return UpdateLog(np.zeros(capacity, dtype=MEASUREMENT), np.zeros(1, dtype=np.int64))
+    index = np.zeros(capacity, dtype=np.int64)
+    return UpdateLog(np.zeros(capacity, dtype=MEASUREMENT), index, np.zeros(1, dtype=np.int64))
 
 
 @njit(cache=True)
@@ -63,6 +66,7 @@ def log_update(
     if k >= len(log.rows):
         return
     row, s = log.rows[k], batch.sensor[j]
+    log.detection[k] = j
     row["t"] = batch.t
     row["track_id"] = track_id
     row["sensor"] = s

@@ -10,7 +10,7 @@ from jeat_graph.benchmark.steps import STEPS, rows, start, without
 from jeat_graph.config.reading import load_config
 from jeat_graph.simulation.scenario import load_scenario
 from jeat_graph.simulation.simulate import simulate
-from jeat_graph.tracking.tracker import track
+from jeat_graph.tracking.whole import track
 
 
 @pytest.mark.parametrize("target", ["highway", "kitti"])

@@ -13,7 +13,7 @@ from jeat_graph.eval.resampling import predict_to
 from jeat_graph.io.detections_io import read_detections
 from jeat_graph.io.hashing import sha256_of
 from jeat_graph.io.trajectories_io import read_trajectories
-from jeat_graph.tracking.tracker import track
+from jeat_graph.tracking.whole import track
 
 STEADY = [f"{k * 0.05:.2f},rgb,{100 + 2 * k},200,40,30,0.95" for k in range(30)]
 HIGHWAY = ("--config", "highway")

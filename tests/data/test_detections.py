@@ -203,3 +203,47 @@ def test_columns_of_different_length_are_refused():
 def test_what_an_empty_row_holds_is_not_looked_at():
     detections = Detections.from_rows([0.0], ["rgb"], [[np.nan] * 4], [np.nan], empty=[True])
     assert (detections.num_scans, len(detections)) == (1, 0)
+
+
+def test_a_data_frame_and_detections_are_two_ways_to_say_one_thing():
+    named = Detections.from_scans(
+        [
+            Scan(0.0, "rgb", [BOX, [1, 2, 3, 4]], [0.5, 0.75], ["car", None]),
+            Scan(0.05, "evt", [], []),
+            Scan(0.1, "rgb", [BOX], [0.25], ["van"]),
+        ]
+    )
+    for detections in (named, Detections.from_scans([Scan(0.0, "rgb", [BOX], [0.5])])):
+        back = Detections.from_pandas(detections.to_pandas())
+        for ours, theirs in zip(detections.to_rows(), back.to_rows(), strict=True):
+            assert np.array_equal(ours, theirs, equal_nan=ours.dtype.kind == "f")
+        assert (back.classes is None) == (detections.classes is None)
+
+
+def test_a_data_frame_may_have_corners_and_nothing_more_than_boxes():
+    pd = pytest.importorskip("pandas")
+    frame = pd.DataFrame({"t": [0.0], "left": [10.0], "top": [20.0], "right": [50.0], "bottom": [80.0]})
+    found = Detections.from_pandas(frame, sensor="gantry")
+    assert found.sensors == ("gantry",)
+    assert found.boxes.tolist() == [[10.0, 20.0, 40.0, 60.0]]
+    assert found.scores.tolist() == [1.0]
+    with pytest.raises(DataError, match="need the column t"):
+        Detections.from_pandas(frame.drop(columns="t"))
+
+
+def test_supervision_and_detections_are_two_ways_to_say_one_thing():
+    sv = pytest.importorskip("supervision")
+    source = sv.Detections(
+        xyxy=np.array([[10.0, 20.0, 50.0, 80.0]]),
+        confidence=np.array([0.5]),
+        class_id=np.array([2]),
+        data={"class_name": np.array(["car"])},
+    )
+    found = Detections.from_supervision(source, t=0.5)
+    assert found.scan_t.tolist() == [0.5]
+    assert found.classes.tolist() == ["car"]
+    back = found.to_supervision()
+    assert np.array_equal(back.xyxy, source.xyxy)
+    assert back.data["class_name"].tolist() == ["car"]
+    nothing = Detections.from_supervision(sv.Detections.empty(), t=0.5)
+    assert (nothing.num_scans, len(nothing)) == (1, 0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -91,3 +93,43 @@ def test_plots_have_a_line_a_track(table, kind):
 def test_another_kind_of_plot_is_refused(table):
     with pytest.raises(DataError, match="timeline"):
         table.plot("pie")
+
+
+@pytest.fixture
+def named(table):
+    """Track 1 a van that is later taken for a car, track 2 a bus, track 5 not known."""
+    kinds = ["van", "bus", ""] * 2 + ["car", "bus", ""] * 2
+    share = np.where(np.array(kinds) == "", np.nan, 0.5)
+    return replace(table, classes=np.array(kinds), class_probability=share)
+
+
+def test_classes_are_seen_in_every_view(named):
+    frame = named.to_pandas()
+    assert list(frame.columns)[-2:] == ["class", "class_probability"]
+    assert Trajectories.from_pandas(frame).classes.tolist() == named.classes.tolist()
+    assert "van 1 at" in repr(named)
+    assert "track 5 at" in repr(named)
+    assert "<th>class</th>" in named._repr_html_()
+    sv = pytest.importorskip("supervision")
+    now = named.between(0.5, 0.5).to_supervision()
+    assert isinstance(now, sv.Detections)
+    assert now.data["class_name"].tolist() == ["van", "bus", ""]
+    assert len(set(now.class_id.tolist())) == 3
+
+
+def test_rows_are_chosen_by_the_class_of_now_or_of_the_end(named, table):
+    assert named.of_class("van").track_id.tolist() == [1, 1]
+    assert named.of_class("car", "bus", final=True).track_id.tolist() == [1, 2] * 4
+    assert named.final_classes() == {1: "car", 2: "bus", 5: ""}
+    with pytest.raises(DataError, match="bus, car, van"):
+        named.of_class("truck")
+    with pytest.raises(DataError, match="no detection has one"):
+        table.of_class("car")
+
+
+def test_tables_with_and_without_classes_join(named, table):
+    whole = Trajectories.concatenate([table, named])
+    assert whole.classes.tolist() == [""] * len(table) + named.classes.tolist()
+    assert np.isnan(whole.class_probability[: len(table)]).all()
+    with pytest.raises(DataError, match="both or neither"):
+        replace(named, class_probability=None)

@@ -14,13 +14,12 @@ from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.io.frame_results import write_kitti, write_motchallenge
 from jeat_graph.io.trajectories_io import (
     COLUMNS,
     TrajectoryWriter,
     has_motion,
     read_trajectories,
-    write_kitti,
-    write_motchallenge,
     write_trajectories,
 )
 

@@ -9,7 +9,7 @@ from jeat_graph import Tracker, load_config
 from jeat_graph.data.boxes import LARGEST_PX, SMALLEST_PX
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import DataError, TimeOrderError, UnknownSensorError
-from jeat_graph.tracking.tracker import track
+from jeat_graph.tracking.whole import track
 
 PRESETS = ("default", "highway", "paper")
 # Most of this is about the filter; one test below lets the presets' smoothers run as well.

@@ -48,6 +48,7 @@ class Request:
         window_s: how long events are shown (s); by default the time of a picture.
         labels: which tracks have their number beside them: `all`, `thin` or `none`.
         trail_s: how far trails go back (s).
+        classes: classes of the tracks to be drawn.
     """
 
     run: Path
@@ -64,6 +65,7 @@ class Request:
     window_s: float | None = None
     labels: str = "thin"
     trail_s: float = TRAIL_S
+    classes: list[str] | None = None
 
 
 def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[str]]:
@@ -143,7 +145,10 @@ def _resolve(request: Request) -> tuple[dict[str, Trajectories], Request]:
     if request.only is not None and request.only not in files:
         raise DataError(f"has no {request.only} table", run)
     kinds = [request.only] if request.only is not None else list(files)
-    return {kind: read_trajectories(files[kind], rate_hz=request.frame_rate_hz) for kind in kinds}, request
+    tables = {kind: read_trajectories(files[kind], rate_hz=request.frame_rate_hz) for kind in kinds}
+    if request.classes is not None:
+        tables = {kind: table.of_class(*request.classes) for kind, table in tables.items()}
+    return tables, request
 
 
 def _has_frames(folder: Path) -> bool:

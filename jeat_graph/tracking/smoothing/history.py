@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from jeat_graph.config.schema import Config
@@ -10,6 +12,7 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.smoothers.engine import TrackSmoother, make_smoother
 from jeat_graph.smoothers.measurements import concatenate_measurements
 from jeat_graph.smoothers.track_data import COINCIDENT_S, SmoothedTrack
+from jeat_graph.tracking.classes import Votes
 from jeat_graph.tracking.smoothing.cut_sides import any_cut, place_by_sides, sizes_by_parts
 from jeat_graph.tracking.smoothing.observation_times import BELIEVED, ObservationTimes
 from jeat_graph.tracking.smoothing.priors import ErrorStates, prior_of, size_prior_of
@@ -35,12 +38,14 @@ class TrackHistory:
         measurements: measurements (M,) that wait, or all of them if `keep`, in pieces; the first
             row of the first piece is the birth.
         smoother: the smoother, once there is one.
+        votes: weight of the detections so far that speak for each class, by name.
     """
 
     def __init__(self, track_id: int, config: Config, errors: ErrorStates, keep: bool) -> None:
         self.track_id = track_id
         self.confirmed = False
         self.measurements: list[RecordArray] = []
+        self.votes: dict[str, float] = {}
         self._observed: list[ObservationTimes] = []
         self.smoother: TrackSmoother | None = None
         self._config = config
@@ -69,6 +74,14 @@ class TrackHistory:
         self.measurements.append(rows)
         self._waiting += len(rows)
         self._last = float(rows["t"][-1])
+
+    def add_votes(self, votes: Votes) -> None:
+        """Count what measurements say of the track's class."""
+        names, place = np.unique(votes.classes, return_inverse=True)
+        sums = np.bincount(place.reshape(-1), votes.weights, len(names))
+        for name, weight in zip(names.tolist(), sums.tolist(), strict=True):
+            if name:
+                self.votes[name] = self.votes.get(name, 0.0) + weight
 
     def add_steps(self, observed: ObservationTimes, confirmed: bool) -> None:
         """Add steps that the track has lived through, and whether it was confirmed in one of them."""
@@ -171,4 +184,13 @@ class TrackHistory:
         if not chosen.any():
             return []
         kept = observed.select(chosen)
-        return [rows_of(self.track_id, piece, self._sizes.smooth(), kept, existence[chosen], self._config)]
+        rows = rows_of(self.track_id, piece, self._sizes.smooth(), kept, existence[chosen], self._config)
+        return [self._classified(rows)]
+
+    def _classified(self, rows: Trajectories) -> Trajectories:
+        """The rows with the class of all that has been taken in by now, if anything was said of it."""
+        if not self.votes:
+            return rows
+        name = max(sorted(self.votes), key=self.votes.__getitem__)
+        share = self.votes[name] / sum(self.votes[one] for one in sorted(self.votes))
+        return replace(rows, classes=np.full(len(rows), name), class_probability=np.full(len(rows), share))

@@ -9,6 +9,7 @@ import numpy as np
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, RecordArray
 from jeat_graph.smoothers.measurements import concatenate_measurements
+from jeat_graph.tracking.classes import Votes
 from jeat_graph.tracking.step_record import StepRecord
 
 
@@ -26,6 +27,7 @@ class Packet(NamedTuple):
         held: (L,) whether it is reported as standing still.
         updates: (M,) records of the update log.
         ended: identities of the tracks that ended.
+        votes: what the M detections say of classes, or None.
     """
 
     t: FloatArray
@@ -38,6 +40,7 @@ class Packet(NamedTuple):
     held: BoolArray
     updates: RecordArray
     ended: list[int]
+    votes: Votes | None = None
 
 
 class StepRecorder:
@@ -86,6 +89,7 @@ class StepRecorder:
             np.concatenate([step.held for step in steps]),
             concatenate_measurements([step.updates for step in steps if len(step.updates)]),
             self._ended,
+            Votes.join([step.votes for step in steps], [len(step.updates) for step in steps]),
         )
         self._recorded, self._ended = [], []
         return packet

@@ -8,6 +8,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, RecordArray
+from jeat_graph.tracking.classes import Votes
 from jeat_graph.tracking.smoothing.history import TrackHistory
 from jeat_graph.tracking.smoothing.observation_times import ObservationTimes
 from jeat_graph.tracking.smoothing.recorder import Packet
@@ -25,11 +26,13 @@ class SortedPacket(NamedTuple):
         observed: (L,) steps that the table has rows at.
         confirmed: (L',) whether the track was confirmed, in all steps.
         updates: (M,) measurements.
+        votes: what these say of classes, or None.
     """
 
     observed: ObservationTimes
     confirmed: BoolArray
     updates: RecordArray
+    votes: Votes | None = None
 
 
 class Share(NamedTuple):
@@ -67,16 +70,19 @@ class Share(NamedTuple):
             **vars(packet.observed.select(self.observed)),
             "confirmed": packet.confirmed[self.steps],
             "updates": packet.updates[self.updates],
+            "votes": None if packet.votes is None else packet.votes.take(self.updates),
             "last": self.last,
         }
 
     @staticmethod
     def from_saved(saved: dict[str, Any]) -> Share:
         """Make a share of what `saved` returned, in a packet of its own."""
-        confirmed, updates, last = (saved.pop(name) for name in ("confirmed", "updates", "last"))
+        names = ("confirmed", "updates", "votes", "last")
+        confirmed, updates, votes, last = (saved.pop(name) for name in names)
         observed = ObservationTimes(**saved)
         steps, rows = slice(0, len(confirmed)), slice(0, len(updates))
-        return Share(SortedPacket(observed, confirmed, updates), slice(0, len(observed)), steps, rows, last)
+        packet = SortedPacket(observed, confirmed, updates, votes)
+        return Share(packet, slice(0, len(observed)), steps, rows, last)
 
     def give_to(self, history: TrackHistory) -> None:
         """Hand it to the track's history."""
@@ -85,6 +91,8 @@ class Share(NamedTuple):
         )
         if self.measured:
             history.add_measurements(self.packet.updates[self.updates])
+            if self.packet.votes is not None:
+                history.add_votes(self.packet.votes.take(self.updates))
 
 
 def packet_cost(packet: Packet, chunk: int) -> int:
@@ -114,8 +122,10 @@ def split(packet: Packet, rate_hz: float) -> Iterator[tuple[int, Share]]:
         packet.used[rows],
         packet.held[rows],
     )
-    updates = packet.updates[np.argsort(packet.updates["track_id"], kind="stable")]
-    whole = SortedPacket(observed, packet.confirmed[order], updates)
+    by_track = np.argsort(packet.updates["track_id"], kind="stable")
+    updates = packet.updates[by_track]
+    votes = None if packet.votes is None else packet.votes.take(by_track)
+    whole = SortedPacket(observed, packet.confirmed[order], updates, votes)
     # A track that ended between two packets has no step in this one.
     ids = np.union1d(packet.ids, np.array(packet.ended, dtype=np.int64))
     owners = packet.ids[rows], packet.ids[order], updates["track_id"]

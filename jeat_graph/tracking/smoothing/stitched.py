@@ -119,6 +119,8 @@ def _join(parts: Sequence[TrackHistory], scan_t: FloatArray, config: Config) -> 
     for k, part in enumerate(parts):
         for rows in part.measurements:
             whole.add_measurements(rows)
+        for name, weight in part.votes.items():
+            whole.votes[name] = whole.votes.get(name, 0.0) + weight
         mine = part.observed
         if k + 1 < len(parts):
             # The earlier fragment may still have coasted when the later one was born.

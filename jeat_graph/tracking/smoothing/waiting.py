@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import tempfile
 import warnings
-from dataclasses import fields
 from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.data.class_columns import unknown_classes
+from jeat_graph.data.trajectories import COLUMNS, Trajectories
 
 #: Rows beyond this many go to the file; about 20 MB.
 MOST_IN_MEMORY = 100_000
 
+_CLASS = ("classes", "class_probability")
 # Rows that there is room for at first.
 _ROOM = 1024
 
@@ -37,20 +38,33 @@ class WaitingRows:
         self._columns = _allocate(_ROOM)
         self._count = 0
         self._file: IO[bytes] | None = None
-        self._blocks = 0
+        self._blocks: list[tuple[str, ...]] = []  # the columns of each in the file
 
     def append(self, table: Trajectories) -> None:
         """Add the rows of a table of the same sensors."""
         start, self._count = self._count, self._count + len(table)
+        if table.classes is not None and "classes" not in self._columns:
+            self._columns |= dict(zip(_CLASS, unknown_classes(len(self._columns["t"])), strict=True))
         # Copied at once, while they are in the processor's cache, into arrays with room for more.
         if self._count > len(self._columns["t"]):
-            old, self._columns = self._columns, _allocate(2 * self._count)
+            old, self._columns = self._columns, _like(self._columns, 2 * self._count)
             for name, column in old.items():
                 self._columns[name][:start] = column[:start]
-        for name, column in self._columns.items():
-            column[start : self._count] = getattr(table, name)
+        for name in COLUMNS:
+            self._columns[name][start : self._count] = getattr(table, name)
+        if "classes" in self._columns:
+            self._append_classes(table, start)
         if self._count > self._most:
             self._put_aside()
+
+    def _append_classes(self, table: Trajectories, start: int) -> None:
+        classes, probability = unknown_classes(len(table))
+        if table.classes is not None and table.class_probability is not None:
+            classes, probability = table.classes, table.class_probability
+        wider = np.promote_types(classes.dtype, self._columns["classes"].dtype)
+        self._columns["classes"] = self._columns["classes"].astype(wider, copy=False)
+        self._columns["classes"][start : self._count] = classes
+        self._columns["class_probability"][start : self._count] = probability
 
     def peek(self) -> list[Trajectories]:
         """Return all rows, in order, and keep them."""
@@ -61,7 +75,7 @@ class WaitingRows:
         tables = self.peek()
         if self._count:
             self._columns, self._count = _allocate(len(self._columns["t"])), 0
-        self._blocks = 0
+        self._blocks = []
         if self._file is not None:
             self._file.close()
             self._file = None
@@ -83,7 +97,7 @@ class WaitingRows:
         self._file.seek(0, 2)
         for column in self._columns.values():
             np.save(self._file, column[: self._count], allow_pickle=False)
-        self._blocks += 1
+        self._blocks.append(tuple(self._columns))
         self._columns, self._count = _allocate(_ROOM), 0
 
     def _read_back(self) -> list[Trajectories]:
@@ -92,15 +106,19 @@ class WaitingRows:
         self._file.seek(0)
         return [
             Trajectories(
-                **{name: np.load(self._file, allow_pickle=False) for name in self._columns},
+                **{name: np.load(self._file, allow_pickle=False) for name in names},
                 sensors=self._sensors,
             )
-            for _ in range(self._blocks)
+            for names in self._blocks
         ]
 
 
 def _allocate(rows: int) -> dict[str, NDArray[Any]]:
     """Columns of a table with room for so many rows."""
     empty = Trajectories.empty()
-    columns = {f.name: getattr(empty, f.name) for f in fields(Trajectories) if f.name != "sensors"}
-    return {name: np.empty((rows, *none.shape[1:]), none.dtype) for name, none in columns.items()}
+    return _like({name: getattr(empty, name) for name in COLUMNS}, rows)
+
+
+def _like(columns: dict[str, NDArray[Any]], rows: int) -> dict[str, NDArray[Any]]:
+    """The same columns with room for so many rows."""
+    return {name: np.empty((rows, *one.shape[1:]), one.dtype) for name, one in columns.items()}

@@ -1,0 +1,81 @@
+"""What kind of vehicle each row of a table is: a column of class names, and one of how sure they are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from jeat_graph.data.arrays import BoolArray, FloatArray, TextArray
+from jeat_graph.data.errors import DataError
+
+#: Number of rows N, their classes (N,) and the probabilities of these (N,), or None twice.
+ClassPart: TypeAlias = tuple[int, TextArray | None, FloatArray | None]
+
+
+def check_classes(n: int, classes: TextArray | None, probability: FloatArray | None) -> None:
+    """Check that both columns are there with `n` rows, or neither is.
+
+    Raises:
+        DataError: they are not.
+    """
+    if (classes is None) != (probability is None):
+        raise DataError("classes and class_probability go together: give both or neither")
+    for name, column in (("classes", classes), ("class_probability", probability)):
+        if column is not None and column.shape != (n,):
+            raise DataError(f"{name} must have shape ({n},), not {column.shape}")
+
+
+def unknown_classes(n: int) -> tuple[TextArray, FloatArray]:
+    """Return the columns of `n` rows of which nothing is known: empty text and NaN."""
+    return np.zeros(n, dtype="U1"), np.full(n, np.nan)
+
+
+def join_classes(parts: Sequence[ClassPart]) -> tuple[TextArray | None, FloatArray | None]:
+    """Stack the columns of several tables; None twice where none of them has any."""
+    if all(classes is None for _, classes, _ in parts):
+        return None, None
+    filled = [
+        unknown_classes(n) if classes is None or probability is None else (classes, probability)
+        for n, classes, probability in parts
+    ]
+    return np.concatenate([one[0] for one in filled]), np.concatenate([one[1] for one in filled])
+
+
+def class_column(classes: Any, probability: Any) -> dict[str, Any]:
+    """Return the fields of `Trajectories` that columns of a table stand for; none where there are none.
+
+    Args:
+        classes: (N,) names, or None where the table has no such column; what is no text is unknown.
+        probability: (N,) numbers, or None: then NaN.
+    """
+    if classes is None:
+        return {}
+    texts = [one if isinstance(one, str) else "" for one in classes]
+    share = np.full(len(texts), np.nan) if probability is None else np.asarray(probability, dtype=np.float64)
+    return {"classes": np.array(texts, dtype=np.str_), "class_probability": share}
+
+
+def rows_of_class(classes: TextArray | None, wanted: Iterable[str], *, unknown: bool) -> BoolArray:
+    """Tell which rows are of one of some classes.
+
+    Args:
+        classes: (N,) class of each row, empty where unknown.
+        wanted: names of classes.
+        unknown: whether rows of which the class is not known are to be kept too.
+
+    Returns:
+        (N,) true where the row is of one of them.
+
+    Raises:
+        DataError: there are no classes at all, or none of those wanted; the message names those there are.
+    """
+    names = list(wanted)
+    if classes is None:
+        raise DataError("there is no class to choose by: no detection has one")
+    there = sorted({str(name) for name in np.unique(classes)} - {""})
+    if not set(names) & set(there):
+        raise DataError(f"nothing is of class {' or '.join(names)}; there are: {', '.join(there) or 'none'}")
+    chosen = np.isin(classes, names)
+    return np.asarray(chosen | (classes == "") if unknown else chosen, dtype=np.bool_)

@@ -1,0 +1,96 @@
+"""Detections from and to the tables of other libraries: data frames, `supervision.Detections`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from jeat_graph.data.arrays import BoolArray, FloatArray, TextArray
+from jeat_graph.data.interop import boxes_of, columns_of, from_xyxy, supervision_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from jeat_graph.data.detections import Detections
+
+_BOX = ("left", "top", "width", "height")
+
+
+class DetectionViews:
+    """What `Detections` offers beside its columns; see there for the attributes."""
+
+    if TYPE_CHECKING:
+        boxes: FloatArray
+        scores: FloatArray
+        classes: TextArray | None
+
+        def to_rows(self) -> tuple[FloatArray, TextArray, FloatArray, FloatArray, BoolArray, TextArray]:
+            """One row a detection or empty scan."""
+
+        @staticmethod
+        def from_rows(*columns: Any) -> Detections:
+            """Group rows into scans."""
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return a data frame with the columns of `detections.csv`: one row a detection or empty scan."""
+        import pandas as pd
+
+        t, sensor, boxes, scores, _, classes = self.to_rows()
+        columns: dict[str, Any] = {"t": t, "sensor": sensor}
+        columns |= {name: boxes[:, k] for k, name in enumerate(_BOX)}
+        columns["score"] = scores
+        if self.classes is not None:
+            columns["class"] = classes
+        return pd.DataFrame(columns)
+
+    @classmethod
+    def from_pandas(cls, frame: pd.DataFrame, sensor: str = "rgb") -> Detections:
+        """Read a data frame, one row a detection.
+
+        Args:
+            frame: `t` (s); `left, top, width, height`, or `left, top, right, bottom` (px); `score` (1 where
+                there is none), `sensor` and `class` where there are such. A row without a box is a scan that
+                found nothing.
+            sensor: name of the sensor where the frame has no such column.
+
+        Raises:
+            DataError: a column is missing, or a row is no detection; the message names it.
+        """
+        corners = "width" not in frame.columns and "right" in frame.columns
+        sides = ("left", "top", "right", "bottom") if corners else _BOX
+        c = columns_of(frame, ("t", *sides), "detections")
+        box = np.column_stack([np.asarray(c[name], dtype=np.float64) for name in sides])
+        empty = np.isnan(box).all(axis=1)
+        return cls.from_rows(
+            c["t"],
+            [sensor] * len(frame) if "sensor" not in c else [str(name) for name in c["sensor"]],
+            from_xyxy(box) if corners else box,
+            c.get("score", np.ones(len(frame))),
+            empty,
+            c.get("class"),
+        )
+
+    @classmethod
+    def from_supervision(cls, source: Any, *, t: float, sensor: str = "rgb") -> Detections:
+        """Take `supervision.Detections` of one picture as a scan; `concatenate` joins those of a video.
+
+        Args:
+            source: the detections, with names of classes if they have any.
+            t: time of the picture (s).
+            sensor: name of the sensor.
+        """
+        boxes, scores, classes = boxes_of(source)
+        if not len(boxes):
+            return cls.from_rows([t], [sensor], np.full((1, 4), np.nan), [np.nan], [True])
+        return cls.from_rows(np.full(len(boxes), t), [sensor] * len(boxes), boxes, scores, None, classes)
+
+    def to_supervision(self) -> Any:
+        """Return all boxes as `supervision.Detections`; classes are numbered in the order of the alphabet.
+
+        Take those of one time: `Detections.from_scans([detections.scan(k)])`.
+
+        Raises:
+            ImportError: the package `supervision` is not installed.
+        """
+        return supervision_of(self.boxes, self.scores, self.classes)
