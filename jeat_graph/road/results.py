@@ -77,29 +77,50 @@ def road_columns(vehicle: Vehicle, size: Size) -> dict[str, npt.NDArray[Any]]:
     side = np.stack([unit[:, 1], -unit[:, 0]], axis=1)
     var_speed = np.einsum("ni,nij,nj->n", unit, var_velocity, unit)
     var_turn = np.einsum("ni,nij,nj->n", side, var_velocity, side) / np.maximum(speed, 1e-3) ** 2
-    columns: dict[str, npt.NDArray[Any]] = {
-        "t": t + 0.0,
-        "track_id": np.full(len(t), vehicle.track_id, dtype=np.int64),
-        "x": round_decimals(place[:, 0], _DECIMALS),
-        "y": round_decimals(place[:, 1], _DECIMALS),
-        "speed_kmh": round_decimals(speed * KMH, _DECIMALS),
-        "heading_deg": round_decimals(np.arctan2(velocity[:, 0], velocity[:, 1]) * _DEGREES, _DECIMALS),
-        "acceleration": round_decimals((acceleration * unit).sum(axis=1), _DECIMALS),
+    same = np.ones(len(t))
+    mean = [
+        *place.T,
+        speed * KMH,
+        np.arctan2(velocity[:, 0], velocity[:, 1]),
+        (acceleration * unit).sum(axis=1),
+        *(same * value for value in size.mean),
+    ]
+    var = [
+        var_place[:, 0, 0],
+        var_place[:, 1, 1],
+        var_speed * KMH**2,
+        var_turn,
+        np.einsum("ni,nij,nj->n", unit, var_acceleration, unit),
+        *(same * value for value in size.var),
+    ]
+    ids = np.full(len(t), vehicle.track_id, dtype=np.int64)
+    return columns_of_states(t, ids, np.stack(mean), np.stack(var))
+
+
+#: Columns of the table of the road with a variance each.
+STATES = ("x", "y", "speed_kmh", "heading_deg", "acceleration", "length", "width", "height")
+_HEADING = STATES.index("heading_deg")
+
+
+def columns_of_states(
+    t: FloatArray, track_id: npt.NDArray[Any], mean: FloatArray, var: FloatArray
+) -> dict[str, npt.NDArray[Any]]:
+    """Columns of the table of the road, rounded.
+
+    Args:
+        t: (N,) times (s).
+        track_id: (N,) identities.
+        mean: (8, N) in the order of `STATES`, the heading in rad.
+        var: (8, N) variances.
+    """
+    mean, var = mean.copy(), var.copy()
+    mean[_HEADING] *= _DEGREES
+    var[_HEADING] = np.minimum(var[_HEADING] * _DEGREES**2, 180.0**2)
+    columns: dict[str, npt.NDArray[Any]] = {"t": t + 0.0, "track_id": track_id}
+    columns |= {name: round_decimals(values, _DECIMALS) for name, values in zip(STATES, mean, strict=True)}
+    return columns | {
+        f"var_{name}": round_significant(values, _DIGITS) for name, values in zip(STATES, var, strict=True)
     }
-    for name, mean in zip(("length", "width", "height"), size.mean, strict=True):
-        columns[name] = round_decimals(np.full(len(t), mean), _DECIMALS)
-    variances = {
-        "var_x": var_place[:, 0, 0],
-        "var_y": var_place[:, 1, 1],
-        "var_speed_kmh": var_speed * KMH**2,
-        "var_heading_deg": np.minimum(var_turn * _DEGREES**2, 180.0**2),
-        "var_acceleration": np.einsum("ni,nij,nj->n", unit, var_acceleration, unit),
-        **{
-            f"var_{name}": np.full(len(t), value)
-            for name, value in zip(("length", "width", "height"), size.var, strict=True)
-        },
-    }
-    return columns | {name: round_significant(values, _DIGITS) for name, values in variances.items()}
 
 
 def speed_columns(result: RoadResult) -> dict[str, npt.NDArray[Any]]:
@@ -154,7 +175,5 @@ def write_result(result: RoadResult, folder: str | Path) -> None:
 
 def empty_road_columns() -> dict[str, npt.NDArray[Any]]:
     """The columns of `road.csv` without rows."""
-    names = ("x", "y", "speed_kmh", "heading_deg", "acceleration", "length", "width", "height")
-    spread = ("x", "y", "speed_kmh", "heading_deg", "acceleration", "length", "width", "height")
     none: dict[str, npt.NDArray[Any]] = {"t": np.zeros(0), "track_id": np.zeros(0, dtype=np.int64)}
-    return none | {name: np.zeros(0) for name in (*names, *(f"var_{s}" for s in spread))}
+    return none | {name: np.zeros(0) for name in (*STATES, *(f"var_{s}" for s in STATES))}

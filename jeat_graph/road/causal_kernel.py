@@ -1,0 +1,307 @@
+"""Compiled steps of the filter on the road: boxes read, states begun, all tracks advanced at once."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
+from jeat_graph.road.box_kernel import (
+    CHANNELS,
+    HIGH,
+    LOW,
+    NEITHER,
+    UNKNOWNS,
+    WHOLE,
+    KernelCamera,
+    box_channels,
+    cuboid_sides,
+)
+from jeat_graph.road.road_state import (
+    AY,
+    LEAST_SIZE,
+    LENGTH,
+    OF_UNKNOWN,
+    STATES,
+    VX,
+    VY,
+    RoadModel,
+    RoadState,
+    X,
+    Y,
+    predict,
+    update,
+)
+
+_FIRST_STEPS = 4
+# A filter that takes a box for whole that is cut off believes in a vehicle that stands in the edge.
+_EDGE_SIGMAS, _EDGE_SHARE = 3.5, 0.4
+_FIRST_BOXES = 5  # of a track that have to be whole
+#: Strips along the road, about the road below the camera: how many, and how wide (m).
+STRIPS, _STRIP_M = 60, 2.0
+_TELLS_AFTER = 60  # boxes of a track after which its speed counts for its strip
+_ENOUGH = 3.0  # vehicles of a strip that tell how fast the next one will be
+_RECENT = 20.0  # vehicles that a strip remembers
+
+
+@njit(cache=True)
+def read_box(
+    row: RecordArray, since_s: float, model: RoadModel, z: FloatArray, R: FloatArray, mode: IntArray
+) -> None:
+    """Turn a record of the update log into channels, with white errors that tell as much as its own do.
+
+    An error that persists tells (1 - φ) / (1 + φ) of what a new one does, φ its correlation between boxes.
+
+    Args:
+        row: of `filters.measurement.MEASUREMENT`.
+        since_s: time since the sensor's last box of this track (s).
+        model: what is believed of boxes.
+        z: (4,) filled: channels.
+        R: (4,) filled: variances.
+        mode: (2,) filled: what of each axis is measured.
+    """
+    s = row["sensor"]
+    forget = math.exp(-min(since_s, 1e3) / model.memory_s[s])
+    factor = (1.0 + forget) / max(1.0 - forget, 1e-3)
+    share = model.coloured_share[s]
+    for axis in range(2):
+        centre, extent = row["z"][axis], math.exp(row["log_size"][axis])
+        size_var = row["size_var"][axis] * row["scale"]
+        R[axis] = row["r"][axis] + factor * row["coloured_std"][axis] ** 2
+        R[axis + 2] = size_var * (1.0 - share + share * factor)
+        spread = math.sqrt(
+            row["r"][axis] + row["coloured_std"][axis] ** 2 + 0.25 * extent * extent * size_var
+        )
+        margin = model.edge_px + min(_EDGE_SIGMAS * spread, _EDGE_SHARE * extent)
+        low, high = centre - 0.5 * extent, centre + 0.5 * extent
+        sees_low, sees_high = low > margin, high < model.picture[axis] - margin
+        z[axis], z[axis + 2] = centre, row["log_size"][axis]
+        if sees_low and sees_high:
+            mode[axis] = WHOLE
+            continue
+        R[axis] += 0.25 * extent * extent * R[axis + 2]
+        if sees_low:
+            mode[axis], z[axis] = LOW, low
+        elif sees_high:
+            mode[axis], z[axis] = HIGH, high
+        else:
+            mode[axis] = NEITHER
+
+
+@njit(cache=True)
+def strip_of(x: float) -> int:
+    """Strip that a place across the road (m) lies in."""
+    return min(max(int(x / _STRIP_M + STRIPS / 2), 0), STRIPS - 1)
+
+
+@njit(cache=True)
+def tell_speed(strip: FloatArray, x: float, speed: float) -> None:
+    """Count a vehicle's speed for its strip, in place: mean and variance of the recent ones."""
+    row = strip[strip_of(x)]
+    row[0] = min(row[0] + 1.0, _RECENT)
+    off = speed - row[1]
+    row[1] += off / row[0]
+    row[2] += (off * (speed - row[1]) - row[2]) / row[0]
+
+
+@njit(cache=True)
+def begin(
+    m: FloatArray,
+    P: FloatArray,
+    z: FloatArray,
+    R: FloatArray,
+    mode: IntArray,
+    model: RoadModel,
+    camera: KernelCamera,
+    strip: FloatArray,
+) -> bool:
+    """Start a state at one box, in place; False where it does not stand on the road before the camera."""
+    bottom = z[1] + 0.5 * math.exp(z[3]) if mode[1] == WHOLE else z[1]
+    if mode[1] == LOW or mode[1] == NEITHER or mode[0] == NEITHER:
+        return False
+    lens, rotation, position = camera.lens, camera.rotation, camera.position
+    d0, d1 = (z[0] - lens[2]) / lens[0], (bottom - lens[3]) / lens[1]
+    n0, n1 = d0, d1
+    for _ in range(4):
+        r2 = n0 * n0 + n1 * n1
+        gain = 1.0 + lens[4] * r2 + lens[5] * r2 * r2
+        n0, n1 = d0 / gain, d1 / gain
+    ray = n0 * rotation[0] + n1 * rotation[1] + rotation[2]
+    if ray[2] >= -1e-6:
+        return False
+    reach = -position[2] / ray[2]
+    dx, dy = ray[0] * reach, ray[1] * reach
+    distance = math.hypot(dx, dy)
+    m[:] = 0.0
+    P[:] = 0.0
+    for a in range(3):
+        m[LENGTH + a] = model.size_mean[a]
+        for b in range(3):
+            P[LENGTH + a, LENGTH + b] = model.size_cov[a, b]
+    ahead = 0.5 * model.size_mean[0] * dy / distance / distance * abs(dy)
+    m[X], m[Y] = position[0] + dx, position[1] + dy + ahead
+    P[X, X] = (0.2 * distance) ** 2
+    P[Y, Y] = (0.5 * distance) ** 2
+    P[VX, VX] = model.lateral_std**2
+    P[VY, VY] = model.speed_std**2
+    near = strip[strip_of(m[X])]
+    if near[0] >= _ENOUGH:
+        m[VY] = near[1]
+        P[VY, VY] = near[2] + model.strip_std**2
+    P[AY, AY] = model.acceleration_std**2
+    prior_m, prior_P = m.copy(), P.copy()
+    for _ in range(_FIRST_STEPS):
+        # Linearised anew about what the last pass found, each time from the prior.
+        at = m.copy()
+        m[:], P[:] = prior_m, prior_P
+        if not _update_about(at, m, P, z, R, mode, camera):
+            return False
+    return True
+
+
+@njit(cache=True)
+def _update_about(
+    at: FloatArray,
+    m: FloatArray,
+    P: FloatArray,
+    z: FloatArray,
+    R: FloatArray,
+    mode: IntArray,
+    camera: KernelCamera,
+) -> bool:
+    side, slope = np.empty(4), np.empty((4, UNKNOWNS))
+    expected, J = np.empty(CHANNELS), np.empty((CHANNELS, UNKNOWNS))
+    if not cuboid_sides(camera, at[X], at[Y], 0.0, at[LENGTH:], side, slope):
+        return False
+    box_channels(side, slope, mode, expected, J)
+    for channel in range(CHANNELS):
+        axis = channel % 2
+        if mode[axis] == NEITHER or (channel >= 2 and mode[axis] != WHOLE):
+            continue
+        h = np.zeros(STATES)
+        for c in range(UNKNOWNS):
+            h[OF_UNKNOWN[c]] = J[channel, c]
+        innovation = z[channel] - expected[channel] - h @ (m - at)
+        gain = P @ h
+        S = h @ gain + R[channel]
+        m += gain * (innovation / S)
+        P -= np.outer(gain, gain) / S
+    for c in range(3):
+        m[LENGTH + c] = max(m[LENGTH + c], LEAST_SIZE[c])
+    return True
+
+
+@njit(cache=True)
+def find(state: RoadState, track_id: int) -> int:
+    """Row of a track, or minus one."""
+    n = state.count[0]
+    k = int(np.searchsorted(state.track_id[:n], track_id))
+    return k if k < n and state.track_id[k] == track_id else -1
+
+
+@njit(cache=True)
+def copy_row(state: RoadState, source: int, target: int) -> None:
+    """Copy one track's row over another's."""
+    state.track_id[target], state.t[target] = state.track_id[source], state.t[source]
+    state.updated[target], state.boxes[target] = state.updated[source], state.boxes[source]
+    state.mean[target], state.cov[target] = state.mean[source], state.cov[source]
+    state.seen[target] = state.seen[source]
+
+
+@njit(cache=True)
+def remove(state: RoadState, i: int) -> None:
+    """Remove one track, in place."""
+    for r in range(i, state.count[0] - 1):
+        copy_row(state, r + 1, r)
+    state.count[0] -= 1
+
+
+@njit(cache=True)
+def advance(state: RoadState, t: float, rows: RecordArray, model: RoadModel, camera: KernelCamera) -> None:
+    """Take in what one step of the tracker gave to its tracks, in place.
+
+    Args:
+        state: with room for as many new tracks as there are rows.
+        t: time of the step (s).
+        rows: (M,) records of `filters.measurement.MEASUREMENT`.
+        model: what is believed of vehicles and boxes.
+        camera: the camera.
+    """
+    z, R, mode = np.empty(CHANNELS), np.empty(CHANNELS), np.empty(2, dtype=np.int64)
+    for j in range(len(rows)):
+        row = rows[j]
+        s, identity = row["sensor"], row["track_id"]
+        i = find(state, identity)
+        if i < 0:
+            read_box(row, np.inf, model, z, R, mode)
+            n = state.count[0]
+            k = int(np.searchsorted(state.track_id[:n], identity))
+            if not begin(state.mean[n], state.cov[n], z, R, mode, model, camera, state.strip):
+                continue
+            if k < n:  # a track that is older than its first whole box
+                mean, cov = state.mean[n].copy(), state.cov[n].copy()
+                for r in range(n, k, -1):
+                    copy_row(state, r - 1, r)
+                state.mean[k], state.cov[k] = mean, cov
+            state.track_id[k], state.t[k], state.updated[k] = identity, t, t
+            state.seen[k] = -np.inf
+            state.seen[k, s] = t
+            state.boxes[k] = 1
+            state.count[0] = n + 1
+            continue
+        predict(state.mean[i], state.cov[i], t - state.t[i], model)
+        state.t[i] = t
+        read_box(row, t - state.seen[i, s], model, z, R, mode)
+        if state.boxes[i] < _FIRST_BOXES and (mode[0] != WHOLE or mode[1] != WHOLE):
+            remove(state, i)  # it may not have been whole at first either
+            continue
+        if update(state.mean[i], state.cov[i], z, R, mode, model, camera):
+            state.seen[i, s] = t
+            state.updated[i] = t
+            state.boxes[i] += 1
+            if state.boxes[i] == _TELLS_AFTER:
+                tell_speed(state.strip, state.mean[i, X], state.mean[i, VY])
+
+
+@njit(cache=True)
+def states_at(
+    state: RoadState, t: float, ids: IntArray, model: RoadModel
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """States of some tracks at a time.
+
+    Args:
+        state: of all tracks; those asked for are predicted to t in place.
+        t: time (s), not before theirs.
+        ids: (N,) identities.
+        model: what is believed of vehicles.
+
+    Returns:
+        Which of `ids` are known (K,), their means (K, 8) and covariances (K, 8, 8).
+    """
+    known = np.empty(len(ids), dtype=np.int64)
+    mean, cov = np.empty((len(ids), STATES)), np.empty((len(ids), STATES, STATES))
+    count = 0
+    for j in range(len(ids)):
+        i = find(state, ids[j])
+        if i < 0:
+            continue
+        predict(state.mean[i], state.cov[i], t - state.t[i], model)
+        state.t[i] = max(t, state.t[i])
+        known[count], mean[count], cov[count] = j, state.mean[i], state.cov[i]
+        count += 1
+    return known[:count], mean[:count], cov[:count]
+
+
+@njit(cache=True)
+def forget(state: RoadState, t: float, silence_s: float) -> None:
+    """Remove tracks without a box for longer than `silence_s`, in place."""
+    kept = 0
+    for i in range(state.count[0]):
+        if t - state.updated[i] > silence_s:
+            continue
+        if kept < i:
+            copy_row(state, i, kept)
+        kept += 1
+    state.count[0] = kept
