@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from jeat_graph.cli.detect_options import add_detecting, detect_request
 from jeat_graph.cli.options import (
@@ -19,6 +21,9 @@ from jeat_graph.cli.options import (
 )
 from jeat_graph.cli.terminal import one_line
 from jeat_graph.data.errors import DataError
+
+if TYPE_CHECKING:
+    from jeat_graph.config.schema import Config
 
 HELP = "track the vehicles in files of detections, or in raw frames and events, and write a run directory"
 #: Within the run directory, where raw recordings were tracked.
@@ -58,6 +63,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="with DETECTIONS: the pictures that they were made from, which tell the picture's size and the "
         "frame rate; without: the pictures to detect in",
     )
+    add(
+        "--camera",
+        metavar="CAMERA.yaml",
+        help="a calibrated camera over the road: also write road_causal.csv and road_smoothed.csv (m, km/h) "
+        "and what they are made from, as --diagnostics does",
+    )
     raw = parser.add_argument_group(
         "raw recordings",
         "Without DETECTIONS vehicles are found in --frames, --events or both, and tracked; detections.csv "
@@ -91,7 +102,8 @@ def run(args: argparse.Namespace) -> int:
             formats=extra_formats(args),
             frame_rate_hz=args.output_rate if args.output_rate is not None else args.rate,
             progress=sys.stderr.isatty(),
-            diagnostics=args.diagnostics,
+            diagnostics=args.diagnostics or args.camera is not None,
+            after=None if args.camera is None else _road_tables(args.camera),
             resume=args.resume,
         ),
     )
@@ -122,6 +134,20 @@ def _detected(args: argparse.Namespace) -> tuple[str, ...]:
     args.image = args.image or picture_of(request)
     write_detections(detect_with_bar(request, "track"), found)
     return (str(found),)
+
+
+def _road_tables(camera_file: str) -> Callable[[Path, Config], None]:
+    """Read the camera now, for a wrong file should be known before the tracking."""
+    from jeat_graph.road.camera_file import read_camera
+
+    camera = read_camera(camera_file)
+
+    def write(folder: Path, config: Config) -> None:
+        from jeat_graph.road.run_tables import write_run_tables
+
+        write_run_tables(folder, config, camera)
+
+    return write
 
 
 def _say(text: str) -> None:

@@ -15,10 +15,10 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 from jeat_graph.road.box_kernel import kernel_camera
 from jeat_graph.road.camera import RoadCamera
-from jeat_graph.road.causal_kernel import STRIPS, advance, forget, states_at
+from jeat_graph.road.causal_kernel import advance, forget, states_at
 from jeat_graph.road.fleet import CLASSES
 from jeat_graph.road.results import columns_of_states
-from jeat_graph.road.road_state import AY, LENGTH, STATES, VX, VY, RoadModel, RoadState, X, Y
+from jeat_graph.road.road_state import AY, LENGTH, STATES, STRIPS, VX, VY, RoadModel, RoadState, X, Y
 from jeat_graph.road.speeds import KMH
 from jeat_graph.road.taken_boxes import sensor_errors
 

@@ -32,6 +32,8 @@ from jeat_graph.road.road_state import (
     X,
     Y,
     predict,
+    strip_of,
+    tell_speed,
     update,
 )
 
@@ -39,11 +41,8 @@ _FIRST_STEPS = 4
 # A filter that takes a box for whole that is cut off believes in a vehicle that stands in the edge.
 _EDGE_SIGMAS, _EDGE_SHARE = 3.5, 0.4
 _FIRST_BOXES = 5  # of a track that have to be whole
-#: Strips along the road, about the road below the camera: how many, and how wide (m).
-STRIPS, _STRIP_M = 60, 2.0
 _TELLS_AFTER = 60  # boxes of a track after which its speed counts for its strip
 _ENOUGH = 3.0  # vehicles of a strip that tell how fast the next one will be
-_RECENT = 20.0  # vehicles that a strip remembers
 
 
 @njit(cache=True)
@@ -56,7 +55,7 @@ def read_box(
 
     Args:
         row: of `filters.measurement.MEASUREMENT`.
-        since_s: time since the sensor's last box of this track (s).
+        since_s: time since the sensor's last box (s).
         model: what is believed of boxes.
         z: (4,) filled: channels.
         R: (4,) filled: variances.
@@ -88,22 +87,6 @@ def read_box(
             mode[axis], z[axis] = HIGH, high
         else:
             mode[axis] = NEITHER
-
-
-@njit(cache=True)
-def strip_of(x: float) -> int:
-    """Strip that a place across the road (m) lies in."""
-    return min(max(int(x / _STRIP_M + STRIPS / 2), 0), STRIPS - 1)
-
-
-@njit(cache=True)
-def tell_speed(strip: FloatArray, x: float, speed: float) -> None:
-    """Count a vehicle's speed for its strip, in place: mean and variance of the recent ones."""
-    row = strip[strip_of(x)]
-    row[0] = min(row[0] + 1.0, _RECENT)
-    off = speed - row[1]
-    row[1] += off / row[0]
-    row[2] += (off * (speed - row[1]) - row[2]) / row[0]
 
 
 @njit(cache=True)
@@ -171,8 +154,8 @@ def _update_about(
     mode: IntArray,
     camera: KernelCamera,
 ) -> bool:
-    side, slope = np.empty(4), np.empty((4, UNKNOWNS))
-    expected, J = np.empty(CHANNELS), np.empty((CHANNELS, UNKNOWNS))
+    side, slope, expected = np.empty(4), np.empty((4, UNKNOWNS)), np.empty(CHANNELS)
+    J = np.empty((CHANNELS, UNKNOWNS))
     if not cuboid_sides(camera, at[X], at[Y], 0.0, at[LENGTH:], side, slope):
         return False
     box_channels(side, slope, mode, expected, J)

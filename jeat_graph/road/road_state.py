@@ -29,6 +29,9 @@ from jeat_graph.road.box_kernel import (
 X, VX, Y, VY, AY, LENGTH, WIDTH, HEIGHT = range(8)
 STATES = 8
 OF_UNKNOWN = np.array([X, Y, LENGTH, WIDTH, HEIGHT])
+#: Strips along the road, about the road below the camera: how many, and how wide (m).
+STRIPS, _STRIP_M = 60, 2.0
+_RECENT = 20.0  # vehicles that a strip remembers
 LEAST_SIZE = np.array([1.2, 0.4, 0.8])
 _LEAST_SPEED = 2.0
 
@@ -102,23 +105,25 @@ def predict(m: FloatArray, P: FloatArray, dt: float, model: RoadModel) -> None:
     fade = math.exp(-dt / model.acceleration_s)
     calm = math.exp(-dt / model.lateral_s)
     h = 0.5 * dt * dt
+    to_speed = model.acceleration_s * (1.0 - fade)
+    to_place = model.acceleration_s * (dt - to_speed)
     gain_x = model.lateral_s * (1.0 - calm)
     m[X] += gain_x * m[VX]
     m[VX] *= calm
-    m[Y] += dt * m[VY] + h * m[AY]
-    m[VY] += dt * m[AY]
+    m[Y] += dt * m[VY] + to_place * m[AY]
+    m[VY] += to_speed * m[AY]
     m[AY] *= fade
     for c in range(STATES):  # rows, F P
         P[X, c] += gain_x * P[VX, c]
         P[VX, c] *= calm
-        P[Y, c] += dt * P[VY, c] + h * P[AY, c]
-        P[VY, c] += dt * P[AY, c]
+        P[Y, c] += dt * P[VY, c] + to_place * P[AY, c]
+        P[VY, c] += to_speed * P[AY, c]
         P[AY, c] *= fade
     for r in range(STATES):  # columns, (F P) Fᵀ
         P[r, X] += gain_x * P[r, VX]
         P[r, VX] *= calm
-        P[r, Y] += dt * P[r, VY] + h * P[r, AY]
-        P[r, VY] += dt * P[r, AY]
+        P[r, Y] += dt * P[r, VY] + to_place * P[r, AY]
+        P[r, VY] += to_speed * P[r, AY]
         P[r, AY] *= fade
     lateral = model.lateral_std**2 * (1.0 - calm * calm)
     P[VX, VX] += lateral
@@ -182,3 +187,19 @@ def update(
     for c in range(3):
         m[LENGTH + c] = max(m[LENGTH + c], LEAST_SIZE[c])
     return True
+
+
+@njit(cache=True)
+def strip_of(x: float) -> int:
+    """Strip that a place across the road (m) lies in."""
+    return min(max(int(x / _STRIP_M + STRIPS / 2), 0), STRIPS - 1)
+
+
+@njit(cache=True)
+def tell_speed(strip: FloatArray, x: float, speed: float) -> None:
+    """Count a vehicle's speed for its strip, in place: mean and variance of the recent ones."""
+    row = strip[strip_of(x)]
+    row[0] = min(row[0] + 1.0, _RECENT)
+    off = speed - row[1]
+    row[1] += off / row[0]
+    row[2] += (off * (speed - row[1]) - row[2]) / row[0]

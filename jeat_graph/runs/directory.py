@@ -20,10 +20,11 @@ RESUME = ".resume"
 _UNFINISHED = ".unfinished-"
 DIAGNOSTICS = "diagnostics.csv"
 MEASUREMENTS = "measurements.parquet"
+ROAD_CAUSAL, ROAD_SMOOTHED = "road_causal.csv", "road_smoothed.csv"
 TABLES = ("causal", "smoothed")
 SUFFIXES = {"csv": ".csv", "parquet": ".parquet", "motchallenge": ".mot.txt", "kitti": ".kitti.txt"}
 _TABLE_FILES = (kind + suffix for kind in TABLES for suffix in SUFFIXES.values())
-RUN_FILES = (*_TABLE_FILES, SCANS, DIAGNOSTICS, MEASUREMENTS, RUN_JSON)
+RUN_FILES = (*_TABLE_FILES, SCANS, DIAGNOSTICS, MEASUREMENTS, ROAD_CAUSAL, ROAD_SMOOTHED, RUN_JSON)
 
 
 class RunDirectory:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
+from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import ConfigError
 
 FRAME_FORMATS = ("motchallenge", "kitti")
@@ -22,6 +25,8 @@ class RunOptions:
         progress: whether to show a progress bar on stderr.
         diagnostics: whether to write `diagnostics.csv` and `measurements.parquet` too.
         resume: whether to go on where an earlier run in the same folder was broken off.
+        after: called with the folder and the configuration when the tables are complete, to write more files
+            of the run from them; or None. Needs `diagnostics` if it wants the measurements.
     """
 
     formats: tuple[str, ...] = ()
@@ -29,6 +34,7 @@ class RunOptions:
     progress: bool = False
     diagnostics: bool = False
     resume: bool = False
+    after: Callable[[Path, Config], object] | None = None
 
     def __post_init__(self) -> None:
         unknown = [name for name in self.formats if name not in EXTRA_FORMATS]

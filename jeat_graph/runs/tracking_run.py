@@ -43,6 +43,8 @@ def write_run(
     _write_at_frames(run, "causal", instants, rate_hz, options.formats)
     if config.smoother.engine != "none":
         _write_at_frames(run, "smoothed", instants, rate_hz, options.formats)
+    if options.after is not None:
+        options.after(run.path(RUN_JSON).parent, config)
     _write_record(detections, config, run, record)
 
 

@@ -1,0 +1,166 @@
+"""The filter on the road: its arithmetic against dense matrices, and vehicles without their future."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from road_scenes import HEIGHT, WIDTH, camera
+from scipy.linalg import expm
+
+from jeat_graph.cli.main import main
+from jeat_graph.config.reading import load_config
+from jeat_graph.filters.measurement import MEASUREMENT
+from jeat_graph.road.box_kernel import kernel_camera
+from jeat_graph.road.causal import CalibrationShare, RoadFilter, RoadFilterConfig, road_model
+from jeat_graph.road.cuboid import sides
+from jeat_graph.road.road_state import AY, STATES, VX, VY, X, Y, predict, update
+
+SIZE = np.array([4.4, 1.8, 1.5])
+
+
+def _model():
+    return road_model(RoadFilterConfig(), camera(), load_config("highway"))
+
+
+def _covariance(rng: np.random.Generator) -> np.ndarray:
+    A = rng.standard_normal((STATES, STATES))
+    return A @ A.T + np.eye(STATES)
+
+
+def test_prediction_is_the_linear_model() -> None:
+    """Against the matrix exponential of the model, over a step so short that its second order tells."""
+    rng, model, dt = np.random.default_rng(0), _model(), 0.02
+    A = np.zeros((STATES, STATES))
+    A[X, VX] = A[Y, VY] = A[VY, AY] = 1.0
+    A[VX, VX], A[AY, AY] = -1.0 / model.lateral_s, -1.0 / model.acceleration_s
+    F = expm(A * dt)
+    m, P = rng.standard_normal(STATES), _covariance(rng)
+    got_m, got_P = m.copy(), P.copy()
+    predict(got_m, got_P, dt, model)
+    np.testing.assert_allclose(got_m, F @ m, atol=1e-9)
+    noise = got_P - F @ P @ F.T
+    spectral = np.zeros((STATES, STATES))
+    spectral[AY, AY] = 2.0 * model.acceleration_std**2 / model.acceleration_s
+    spectral[VX, VX] = 2.0 * model.lateral_std**2 / model.lateral_s
+    block = np.block([[-A, spectral], [np.zeros_like(A), A.T]])
+    lifted = expm(block * dt)
+    Q = lifted[STATES:, STATES:].T @ lifted[:STATES, STATES:]
+    np.testing.assert_allclose(noise, Q, atol=2e-4)
+    assert np.linalg.eigvalsh(got_P).min() > 0
+
+
+def test_a_box_updates_as_the_dense_formula() -> None:
+    rng, model, cam = np.random.default_rng(1), _model(), camera()
+    m = np.array([3.0, 0.2, 32.0, -20.0, 0.1, *SIZE])
+    P = 0.01 * _covariance(rng)
+    box, slope = sides(cam, m[[X, Y]][None], np.array([np.arctan2(0.2, -20.0)]), SIZE)
+    left, top, right, bottom = box[0]
+    expected = np.array([(left + right) / 2, (top + bottom) / 2, np.log(right - left), np.log(bottom - top)])
+    J = slope[0]
+    H5 = np.stack(
+        [(J[0] + J[2]) / 2, (J[1] + J[3]) / 2, (J[2] - J[0]) / (right - left), (J[3] - J[1]) / (bottom - top)]
+    )
+    H = np.zeros((4, STATES))
+    H[:, [X, Y, 5, 6, 7]] = H5
+    R = np.array([1.0, 1.5, 4e-4, 5e-4])
+    z = expected + 0.3 * np.sqrt(R) * rng.standard_normal(4)
+    K = P @ H.T @ np.linalg.inv(H @ P @ H.T + np.diag(R))
+    got_m, got_P = m.copy(), P.copy()
+    assert update(got_m, got_P, z, R, np.zeros(2, dtype=np.int64), model, kernel_camera(cam))
+    np.testing.assert_allclose(got_m, m + K @ (z - expected), rtol=1e-8)
+    np.testing.assert_allclose(got_P, P - K @ H @ P, rtol=1e-7, atol=1e-12)
+
+
+def _log(rng: np.random.Generator, noise: float, number: int = 1, speed: float = -22.0) -> np.ndarray:
+    t = np.arange(0.0, 1.6, 0.02)
+    xy = np.c_[np.full(len(t), 3.0), 60.0 + speed * t]
+    box, _ = sides(camera(), xy, np.zeros(len(t)), SIZE)
+    box = box + noise * rng.standard_normal(box.shape)
+    rows = np.zeros(len(t), dtype=MEASUREMENT)
+    rows["t"], rows["track_id"], rows["sensor"] = t, number, 1
+    rows["z"] = (box[:, :2] + box[:, 2:]) / 2.0
+    extent = box[:, 2:] - box[:, :2]
+    rows["log_size"] = np.log(extent)
+    rows["r"] = max(noise, 0.3) ** 2 / 2.0
+    rows["size_var"] = 2.0 * max(noise, 0.3) ** 2 / extent**2
+    rows["scale"] = 1.0
+    return rows
+
+
+def _follow(rows: np.ndarray) -> list[tuple[float, float, float, float]]:
+    road, found = RoadFilter(camera(), load_config("highway")), []
+    for k in range(len(rows)):
+        states = road.step(float(rows["t"][k]), rows[k : k + 1], np.array([rows["track_id"][k]]))
+        columns = road.columns([states])
+        if len(states.t):
+            found.append(
+                tuple(float(columns[name][0]) for name in ("y", "speed_kmh", "var_speed_kmh", "var_y"))
+            )
+    return found
+
+
+def test_a_vehicle_is_where_it_is_and_as_fast_as_it_drives() -> None:
+    found = _follow(_log(np.random.default_rng(2), 0.7))
+    y, kmh, var, var_y = found[-1]
+    assert y == pytest.approx(60.0 - 22.0 * 1.58, abs=4.0 * np.sqrt(var_y))
+    assert kmh == pytest.approx(79.2, abs=4.0 * np.sqrt(var))
+    assert np.sqrt(var) < 5.0
+
+
+def test_the_past_does_not_depend_on_the_future() -> None:
+    rows = _log(np.random.default_rng(3), 0.7)
+    assert _follow(rows[:40]) == _follow(rows)[: len(_follow(rows[:40]))]
+
+
+def test_stated_errors_are_about_what_they_are() -> None:
+    """Over many drives the speed's error in its stated standard deviation is of size one."""
+    nees = []
+    for seed in range(30):
+        _, kmh, var, _ = _follow(_log(np.random.default_rng(seed), 0.7))[-1]
+        nees.append((kmh - 79.2) ** 2 / var)
+    assert 0.1 < np.mean(nees) < 1.6
+
+
+def test_a_vehicle_cut_off_by_the_edge_has_no_state_yet() -> None:
+    rows = _log(np.random.default_rng(4), 0.3)[:1]
+    rows["z"][0, 1] = HEIGHT - np.exp(rows["log_size"][0, 1]) / 2.0
+    road = RoadFilter(camera(), load_config("highway"))
+    assert not len(road.step(0.0, rows, np.array([1])).t)
+
+
+def test_calibration_share_is_that_of_the_place() -> None:
+    from dataclasses import replace
+
+    spread = np.zeros((12, 12))
+    spread[11, 11] = 0.08**2  # the height: all lengths on the road go with it
+    share = CalibrationShare(replace(camera(), covariance=spread))
+    place = camera().to_road(np.array([[WIDTH / 2.0, HEIGHT / 2.0]]))
+    var, relative = share.at(place)
+    assert np.sqrt(relative[0]) == pytest.approx(0.01, rel=0.05)
+    assert np.sqrt(var[0, 1]) == pytest.approx(0.01 * place[0, 1], rel=0.15)
+    assert not CalibrationShare(camera()).at(place)[0].any()
+
+
+def test_track_with_a_camera_writes_the_tables_of_the_road(tmp_path: Path) -> None:
+    sim, run = tmp_path / "sim", tmp_path / "run"
+    assert main(["simulate", "day-sparse", "--out", str(sim), "--duration", "4", "--seed", "2"]) == 0
+    track = ["track", str(sim / "detections.csv"), "--config", "highway", "--out", str(run)]
+    assert main([*track, "--camera", str(sim / "camera.yaml")]) == 0
+    tables = {}
+    for kind in ("causal", "smoothed"):
+        with (run / f"road_{kind}.csv").open() as file:
+            tables[kind] = list(csv.DictReader(file))
+        assert {"x", "y", "speed_kmh", "heading_deg", "acceleration", "var_speed_kmh"} <= set(tables[kind][0])
+    with (run / "causal.csv").open() as file:
+        seen = {(float(r["t"]), r["track_id"]) for r in csv.DictReader(file)}
+    known = [(float(r["t"]), r["track_id"]) in seen for r in tables["causal"]]
+    assert np.mean(known) > 0.99
+    assert "road_causal.csv" in (run / "run.json").read_text()
+    again = [run.joinpath(f"road_{kind}.csv").read_bytes() for kind in tables]
+    assert main([*track, "--camera", str(sim / "camera.yaml")]) == 0
+    assert again == [run.joinpath(f"road_{kind}.csv").read_bytes() for kind in tables]
+    assert main(track) == 0
+    assert not (run / "road_causal.csv").exists()
