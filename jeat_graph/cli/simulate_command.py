@@ -23,7 +23,10 @@ _SEGMENTS = 1
 _FRAMES = 100
 _SIZE = (640, 384)
 # Arguments that only mean something with pictures, by the name of the attribute.
-_PICTURE_ONLY = ("segments", "frames", "size", "workers", "video", "compression", "split", "imaging")
+_PICTURE_ONLY = (
+    *("segments", "frames", "size", "workers", "video", "compression", "split", "imaging"),
+    *("world", "event_camera"),
+)
 _CARLA_ONLY = ("carla_host", "carla_port")
 
 
@@ -40,10 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--density", choices=_DENSITIES, help="traffic density (default: the scenario's)")
     parser.add_argument(
         "--sensors",
-        choices=("detections", "pictures", "carla"),
+        choices=("detections", "pictures", "rgb", "events", "carla"),
         default="detections",
-        help="detections (default); pictures: RGB frames and events of the built-in renderer; carla: those "
-        "of a running CARLA server (experimental)",
+        help="detections (default); pictures: RGB frames and events of the built-in renderer; rgb, events: "
+        "one of them without the other's cost; carla: those of a running CARLA server (experimental)",
     )
     parser.add_argument(
         "--verify",
@@ -61,12 +64,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--segments", type=counting, metavar="N", help=f"how many (default {_SEGMENTS}; the full set: 500)"
     )
     pictures.add_argument(
-        "--frames", type=counting, metavar="N", help=f"RGB frames a segment (default {_FRAMES})"
+        "--frames-per-segment",
+        "--frames",
+        dest="frames",
+        type=counting,
+        metavar="N",
+        help=f"RGB frames a segment (default {_FRAMES}; for training 20, and more segments)",
+    )
+    pictures.add_argument(
+        "--world",
+        choices=("fixed", "varied"),
+        help="fixed (default): the scenario's road and camera in all segments; varied: for each segment a "
+        "camera, road, surroundings, vehicles, light and traffic of its own",
+    )
+    pictures.add_argument(
+        "--event-camera",
+        choices=("davis346", "imx636", "iebcs", "ideal"),
+        help="whose noise the event camera has (default davis346)",
     )
     pictures.add_argument("--size", type=_size, metavar="WxH", help="of the pictures (default 640x384)")
     pictures.add_argument("--workers", type=counting, metavar="K", help="processes (default: one a core)")
     pictures.add_argument(
-        "--video", choices=("mp4", "lossless", "png"), help="how frames are stored (default mp4, lossy)"
+        "--video",
+        choices=("mp4", "lossless", "png"),
+        help="how frames are stored (default mp4, which is lossy, and png with --world varied)",
     )
     pictures.add_argument(
         "--compression",
@@ -96,7 +117,7 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError("SCENARIO and --out DIR are needed (or --verify DIR)")
     unfit = [*(_PICTURE_ONLY if args.sensors == "detections" else ("duration",))]
     unfit += [] if args.sensors == "carla" else _CARLA_ONLY
-    unfit += ["imaging", "workers"] if args.sensors == "carla" else []
+    unfit += ["imaging", "workers", "world", "event_camera"] if args.sensors == "carla" else []
     for name in unfit:
         if getattr(args, name) is not None:
             flag = "--" + name.replace("_", "-")
@@ -135,7 +156,7 @@ def _pictures(args: argparse.Namespace, scenario: Scenario) -> int:
     from jeat_graph.simulation.scenario import scenario_to_yaml
 
     given = {
-        "video": args.video,
+        "video": args.video or ("png" if args.world == "varied" else None),
         "compression": args.compression,
         "shares": args.split,
     }
@@ -177,7 +198,10 @@ def _renderer(args: argparse.Namespace, scenario: Scenario, frames: int) -> Sour
     if args.size is not None or "width" not in (tree.get("render") or {}):
         width, height = args.size or _SIZE
         tree["render"] = {**(tree.get("render") or {}), "width": width, "height": height}
-    return partial(RenderedSource, scenario, load_imaging(tree), args.seed, frames)
+    if args.event_camera is not None:
+        tree["evt"] = {**(tree.get("evt") or {}), "sensor": args.event_camera}
+    world = args.world or "fixed"
+    return partial(RenderedSource, scenario, load_imaging(tree), args.seed, frames, world, args.sensors)
 
 
 def _carla_source(args: argparse.Namespace, scenario: Scenario, frames: int) -> SourceFactory:

@@ -160,6 +160,9 @@ class EventWriter(PiecewiseWriter):
         self._file.create_dataset("ms_to_idx", data=index, track_times=False)
         self._file.create_dataset("t_offset", data=np.int64(0), track_times=False)
         self._file.attrs["width"], self._file.attrs["height"] = self._size_px
+        # RVT's preprocessing looks for the size here, and takes 1280 x 720 for granted where it is not.
+        for name, size in zip(("width", "height"), self._size_px, strict=True):
+            self._file.create_dataset(f"events/{name}", data=np.uint16(size), track_times=False)
         self._file.attrs["duration_us"] = np.int64(self._duration_us)
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.events import EventArray
 
 
@@ -19,7 +19,7 @@ class FrameTruth:
 
     Attributes:
         object_id: (K,) identity, unique within the segment, from 1.
-        class_name: (K,) text: car, suv, van, truck.
+        class_name: (K,) text: car, suv, van, truck, bus, motorcycle, pickup.
         boxes: (K, 4) left, top, width, height (px) of the eight projected corners, clipped to the picture.
         visible: (K,) fraction of the vehicle's projected pixels that nothing nearer covers and that lie
             within the picture, from the depth buffer.
@@ -27,6 +27,7 @@ class FrameTruth:
         size: (K, 3) length, width, height (m).
         pose: (K, 6) x, y, z of the box's centre (m), roll, pitch, yaw (rad), in the camera file's world axes.
         velocity: (K, 3) m/s, same axes.
+        ignore: (K,) true where a detector is not asked for the vehicle, for it is far or small.
     """
 
     object_id: IntArray
@@ -37,6 +38,11 @@ class FrameTruth:
     size: FloatArray
     pose: FloatArray
     velocity: FloatArray
+    ignore: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+    def __post_init__(self) -> None:
+        if not len(self.ignore):
+            object.__setattr__(self, "ignore", np.zeros(len(self.object_id), dtype=bool))
 
     def __len__(self) -> int:
         return len(self.object_id)
@@ -68,6 +74,9 @@ class SegmentSource(Protocol):
 
     def calibration(self) -> dict[str, Any]:
         """Return the camera's calibration as plain values, for a YAML file."""
+
+    def calibration_of(self, index: int) -> dict[str, Any]:
+        """Return the calibration of segment `index`; cameras may differ between segments."""
 
     def settings(self) -> dict[str, Any]:
         """Return all settings as plain values, for a YAML file; with the index they define a segment."""

@@ -94,6 +94,10 @@ class CarlaSource:
             "carla": plain(dataclasses.asdict(self.config)),
         }
 
+    def calibration_of(self, index: int) -> dict[str, Any]:
+        """Return the calibration of segment `index`: one camera serves all of them."""
+        return self.calibration()
+
     def calibration(self) -> dict[str, Any]:
         """Return the camera's calibration as plain values; needs the server, whose map places the camera."""
         _, camera, _ = self._mount()

@@ -16,6 +16,7 @@
         vehicles.csv         visible fraction, size, 3D pose and velocity, row by row beside gt.csv
         boxes.npy            truth as a Prophesee/DSEC box array
         coco.json            truth as COCO
+        camera.yaml          calibration, where it is not that of the whole set
         segment.json         counts and checksums
 """
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.atomic import open_atomic
@@ -19,6 +20,7 @@ from jeat_graph.io.hashing import sha256_of
 from jeat_graph.io.video_writer import FrameWriter
 from jeat_graph.simulation.dataset.disk import FULL, check_disk, disk_is_full
 from jeat_graph.simulation.dataset.layout import (
+    CAMERA,
     EVENTS,
     SEGMENT_JSON,
     partial_folder,
@@ -77,7 +79,11 @@ def write_segment(
 def _fill(
     source: SegmentSource, index: int, folder: Path, protocol: Protocol, on_frame: Callable[[], object]
 ) -> dict[str, Any]:
-    place = source.calibration().get("position_m")
+    calibration = source.calibration_of(index)
+    place = calibration.get("position_m")
+    if calibration != source.calibration():
+        with open_atomic(folder / CAMERA) as file:
+            file.write(yaml.safe_dump(calibration, sort_keys=False))
     truth = SegmentTruth(None if place is None else np.asarray(place, dtype=np.float64), protocol.min_visible)
     counts = {"frames": 0, "events": 0, "positive": 0}
     by_motion: int | None = 0

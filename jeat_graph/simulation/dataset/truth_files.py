@@ -76,7 +76,7 @@ class SegmentTruth:
         row_t, ids = t_us[frame] / _US_PER_S, rows["object_id"].astype(np.int64)
         boxes = round_decimals(rows["boxes"], _DIGITS)
         visible = round_decimals(rows["visible"], _DIGITS)
-        ignore = visible < self._min_visible
+        ignore = (visible < self._min_visible) | rows["ignore"].astype(bool)
         pose = round_decimals(rows["pose"], _DIGITS)
         distance = None
         if self._camera_m is not None:

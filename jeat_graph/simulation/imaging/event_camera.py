@@ -44,10 +44,9 @@ class EventCamera:
     """
 
     def __init__(
-        self, renderer: Renderer, config: ImagingConfig, seed: int, segment_seed: int, scale: float,
-        start_us: int = 0,
-    ) -> None:  # fmt: skip
-        """Start with pixels that have settled at what they see then.
+        self, renderer: Renderer, config: ImagingConfig, seed: int, segment_seed: int, scale: float
+    ) -> None:
+        """Start at time 0, with pixels that have settled at what they see then.
 
         Args:
             renderer: of the scene.
@@ -55,14 +54,13 @@ class EventCamera:
             seed: of the camera; its pixels' mismatch is the same for all segments.
             segment_seed: of the segment's noise.
             scale: takes luminance to the linear level of the picture (`carla` mode only).
-            start_us: when (µs); may be negative.
         """
         self.renderer = renderer
         self.config = config
         height, width = renderer.background.lux.shape
         self._width = width
         self._static = np.ascontiguousarray(renderer.background.whole @ LUMINANCE)
-        first = (renderer.picture(1e-6 * start_us) @ LUMINANCE).ravel()
+        first = (renderer.picture(0.0) @ LUMINANCE).ravel()
         rng = stream(segment_seed, "evt.noise")
         self._carla = config.evt.mode == "carla"
         self._model: Any
@@ -79,8 +77,8 @@ class EventCamera:
         self._quiet = np.zeros(len(renderer.tiles), dtype=np.bool_)
         self._glowing = np.zeros(len(renderer.tiles), dtype=np.bool_)
         self._light = np.zeros((len(renderer.tiles), TILE, GLOW + 1))
-        self._begin(start_us)
-        self._now_us = start_us
+        self._begin()
+        self._now_us = 0
         self._ticks = 0
         self.rendered = 0
 
@@ -100,12 +98,11 @@ class EventCamera:
         self._now_us = until_us
         return self._run(plan, times_us)
 
-    def _begin(self, start_us: int) -> None:
+    def _begin(self) -> None:
         """Take the light of beams and glow that there is at the beginning."""
         r = self.renderer
-        time_s = 1e-6 * start_us
-        plan = r.plan(time_s, time_s)
-        stage = r.stage(r.moments(np.array([time_s]), plan.look), plan.look, channels=1)
+        plan = r.plan(0.0, 0.0)
+        stage = r.stage(r.moments(np.zeros(1), plan.look), plan.look, channels=1)
         light_all(r.tiles, plan.boxes, plan.lit, stage, self._glowing, self._light)
 
     def _run(self, plan: Plan, times_us: FloatArray) -> EventArray:

@@ -13,7 +13,8 @@ from jeat_graph.simulation.imaging.optics import Optics
 from jeat_graph.simulation.imaging.tiles import View
 
 LAMPS = 7
-NONE, HEAD, TAIL, BRAKE, MARKER, FLASHER = range(6)
+NONE, HEAD, TAIL, BRAKE, MARKER = range(5)
+STRENGTH = 3  # column of a lamp's strength, after across, height and kind
 # Across (of the width), height (m), kind and strength of the lamps that every vehicle has.
 COMMON_LAMPS = (
     (-0.39, LAMP_HEIGHT_M, HEAD, 1.0),
@@ -69,7 +70,7 @@ def light_lamps(out: Moments, j: int, v: int, brake: float, look: Look, view: Vi
         at[1] = fy * (rotation[1, 0] * dx + rotation[1, 1] * dy + rotation[1, 2] * dz) / Z + cy
         at[2] = Z
         at[3] = math.sqrt((_LAMP_SIGMA_M * fx / Z) ** 2 + 0.25)
-        power *= look.lamps[v, k, 3]
+        power *= look.lamps[v, k, STRENGTH]
         for c in range(3):
             tint = lights.head_tint[c] if kind == HEAD else lights.tail_tint[c]
             at[LAMP_FLUX + c] = out.fade[j, v] * power * fx * fy / distance2 * tint

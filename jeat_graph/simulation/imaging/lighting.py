@@ -11,6 +11,7 @@ from numba import njit
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.simulation.imaging.config import RenderConfig
 from jeat_graph.simulation.imaging.smooth import clamp01
+from jeat_graph.simulation.world.bend import bend_points
 from jeat_graph.simulation.world.scene import Scene
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB primaries (ITU-R BT.709)
@@ -97,8 +98,10 @@ def lights_of(scene: Scene, config: RenderConfig) -> Lights:
     light = scene.light.config
     day = light.ambient_lux >= config.headlights_below_lux
     share = config.sun_share if day else 0.0
+    low = math.exp(-config.sun_altitude_deg / 9.0) if day else 0.0  # how reddish a low sun is
     altitude, azimuth = math.radians(config.sun_altitude_deg), math.radians(config.sun_azimuth_deg)
     lamps = scene.light.lamps(_FAR_LAMPS_M)
+    lamps[:, 0], lamps[:, 1] = bend_points(lamps[:, 0], lamps[:, 1], scene.road.config.curvature_per_m)
     y = np.linspace(10.0, 120.0, 50)
     there = float(np.median(scene.light.illuminance(np.full_like(y, 6.0), y)))
     reach = (config.headlight_candela * LAMP_HEIGHT_M / max(_BEAM_SHARE * there, 1e-12)) ** (1.0 / 3.0)
@@ -123,7 +126,7 @@ def lights_of(scene: Scene, config: RenderConfig) -> Lights:
         brake_candela=config.brakelight_candela,
         parking_candela=config.parking_candela,
         sky_tint=_tint(0.85, 0.95, 1.25) if day else _tint(0.7, 0.9, 1.3),
-        sun_tint=_tint(1.05, 1.0, 0.9),
+        sun_tint=_tint(1.05 + 0.6 * low, 1.0, 0.9 - 0.5 * low),
         lamp_tint=_tint(1.0, 0.78, 0.45),
         head_tint=_tint(1.0, 1.0, 0.95),
         tail_tint=_tint(1.0, 0.06, 0.04),

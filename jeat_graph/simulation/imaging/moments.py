@@ -119,5 +119,8 @@ def line_up(states: VehicleStates, number: IntArray, times: FloatArray, far_m: f
     # Vehicles come out of the distance gradually: one that appeared at once would be a burst of events.
     away = np.hypot(states.pose[:, 0], states.pose[:, 1])
     out.fade[at] = np.clip((far_m - away) / _FADE_M, 0.0, 1.0)[known]
-    out.brake[at] = np.clip((-ahead - 0.6) / 0.8, 0.0, 1.0)[known]
+    # Who stands in a lane has a foot on the brake.
+    speed = np.hypot(states.velocity[:, 0], states.velocity[:, 1])
+    held = np.where(states.parked, 0.0, np.clip(1.5 - speed, 0.0, 1.0))
+    out.brake[at] = np.maximum(np.clip((-ahead - 0.6) / 0.8, 0.0, 1.0), held)[known]
     return out

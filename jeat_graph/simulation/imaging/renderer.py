@@ -6,22 +6,19 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.simulation.imaging.appearance import appearance_of
 from jeat_graph.simulation.imaging.background import Background, make_background
 from jeat_graph.simulation.imaging.config import RenderConfig
-from jeat_graph.simulation.imaging.lamps import COMMON_LAMPS
 from jeat_graph.simulation.imaging.lighting import lights_of
 from jeat_graph.simulation.imaging.moments import Look, Moments, line_up
 from jeat_graph.simulation.imaging.optics import optics_of
-from jeat_graph.simulation.imaging.paint import PALETTE
 from jeat_graph.simulation.imaging.painter import light_tile, paint_tile, take_ground
 from jeat_graph.simulation.imaging.plan import Plan, make_plan, who_touches
 from jeat_graph.simulation.imaging.projection import project_moments
-from jeat_graph.simulation.imaging.shapes import PARTS, shape_of
 from jeat_graph.simulation.imaging.stage import Setting, Stage, make_setting
 from jeat_graph.simulation.imaging.tiles import TILE_W, tile_raster, view_of
 from jeat_graph.simulation.streams import stream
 from jeat_graph.simulation.world.scene import Scene, VehicleStates
-from jeat_graph.simulation.world.vehicles import KIND_NAMES
 
 _NEAR_M = -25.0
 
@@ -36,8 +33,8 @@ class Renderer:
         tiles: (T, 2) first row and column of each tile.
     """
 
-    def __init__(self, scene: Scene, config: RenderConfig, seed: int) -> None:
-        """Render the static picture, and give each vehicle a colour by `seed`."""
+    def __init__(self, scene: Scene, config: RenderConfig, seed: int, varied: bool = False) -> None:
+        """Render the static picture, and give each vehicle its looks by `seed`, `varied` or one a kind."""
         self.scene = scene
         self.config = config
         self.lights = lights_of(scene, config)
@@ -46,10 +43,7 @@ class Renderer:
         self.background: Background = make_background(scene, self.lights, self.optics, config)
         self.tiles = tile_raster(scene.camera.width, scene.camera.height)
         self._settings: dict[int, Setting] = {}
-        rng = stream(seed, "paint")
-        total = max(1, len(scene.fleet) + len(scene.parked_fleet))
-        palette = np.array(PALETTE)
-        self._colours = palette[rng.integers(0, len(palette), total)] * rng.uniform(0.85, 1.15, (total, 1))
+        self._appearance = appearance_of(scene, stream(seed, "paint"), varied)
 
     def plan(
         self, start_s: float, end_s: float, duration_s: float | None = None, step_px: float | None = None
@@ -101,19 +95,20 @@ class Renderer:
 
     def _look(self, states: VehicleStates) -> tuple[Look, IntArray]:
         number, first = np.unique(states.object_id, return_index=True)
+        looks = self._appearance
+        which = (number - 1) % len(looks.colour)
+        parked, lit = states.parked[first], looks.lit[which]
         look = Look(
             kind=states.kind[first],
             size=states.size[first],
-            colour=self._colours[(number - 1) % len(self._colours)],
+            colour=looks.colour[which],
             salt=100 + number,
             way=states.direction[first],
-            parked=states.parked[first],
+            parked=parked,
             number=number,
-            shape=np.stack([shape_of(KIND_NAMES[k], 0) for k in states.kind[first]])
-            if len(first)
-            else np.zeros((0, PARTS, 9)),
-            lamps=np.tile(np.array(COMMON_LAMPS), (len(first), 1, 1)),
-            beams=~states.parked[first],
+            shape=looks.shape[which],
+            lamps=looks.lamps[which] * lit[:, None, None],
+            beams=~parked & lit,
         )
         return look, first.astype(np.int64)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from jeat_graph.config.section_tree import plain
 from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.errors import ConfigError
+from jeat_graph.data.events import EventArray
 from jeat_graph.simulation.imaging.config import ImagingConfig
 from jeat_graph.simulation.imaging.event_camera import EventCamera
 from jeat_graph.simulation.imaging.renderer import Renderer
@@ -21,15 +23,27 @@ from jeat_graph.simulation.imaging.visibility import buffers
 from jeat_graph.simulation.scenario import Scenario
 from jeat_graph.simulation.segment import SegmentStep
 from jeat_graph.simulation.streams import stream
+from jeat_graph.simulation.variety import vary
 from jeat_graph.simulation.world.camera import Camera
 from jeat_graph.simulation.world.scene import Scene
+from jeat_graph.simulation.world.surroundings import FIXED
+
+_BEFORE = 2  # periods before the first frame, so that it has all the events of its own before it
+WORLDS = ("fixed", "varied")
+SENSORS = ("pictures", "rgb", "events")
 
 
 class RenderedSource:
     """Pictures of a simulated highway; a `SegmentSource`."""
 
     def __init__(
-        self, scenario: Scenario, imaging: ImagingConfig | None = None, seed: int = 0, frames: int = 100
+        self,
+        scenario: Scenario,
+        imaging: ImagingConfig | None = None,
+        seed: int = 0,
+        frames: int = 100,
+        world: str = "fixed",
+        sensors: str = "pictures",
     ) -> None:
         """Prepare; nothing is rendered yet.
 
@@ -38,14 +52,21 @@ class RenderedSource:
             imaging: renderer and cameras.
             seed: of all segments.
             frames: RGB frames a segment.
+            world: `fixed`, the same road and camera in all segments, or `varied`, one a segment.
+            sensors: `pictures` for both; `rgb` leaves events out, `events` makes black pictures.
 
         Raises:
-            ConfigError: a negative seed, or no frames.
+            ConfigError: a negative seed, no frames, or no such world or sensors.
         """
         if seed < 0:
             raise ConfigError(f"seed: must not be negative, got {seed}")
         if frames < 1:
             raise ConfigError(f"frames: must be at least 1, got {frames}")
+        if world not in WORLDS:
+            raise ConfigError(f"world: must be one of {', '.join(WORLDS)}, not {world!r}")
+        if sensors not in SENSORS:
+            raise ConfigError(f"sensors: must be one of {', '.join(SENSORS)}, not {sensors!r}")
+        self.world, self.sensors = world, sensors
         self.scenario = scenario
         self.imaging = imaging or ImagingConfig()
         self.seed = seed
@@ -69,54 +90,70 @@ class RenderedSource:
             "source": "rendered",
             "seed": self.seed,
             "frames": self.frames,
+            "world": self.world,
+            "sensors": self.sensors,
             "scenario": plain(dataclasses.asdict(self.scenario)),
             "imaging": plain(dataclasses.asdict(self.imaging)),
         }
 
+    def calibration_of(self, index: int) -> dict[str, Any]:
+        """Return the calibration of segment `index`, which has a camera of its own in varied worlds."""
+        return self.scene(index).camera.to_dict()
+
     def scene(self, index: int) -> Scene:
-        """Build the scene of segment `index`, with traffic of its own."""
-        s = self.scenario
-        duration = (self.frames + 1) / self.imaging.rgb.rate_hz + 1.0
-        return Scene.build(
-            self._segment_seed(index), duration, s.road, s.fleet, s.traffic, s.light, self.camera_config
-        )
+        """Build the scene of segment `index`, with traffic of its own, and a world where they vary."""
+        return self._build(index)[0]
+
+    def _build(self, index: int) -> tuple[Scene, ImagingConfig, Scenario]:
+        s, imaging, around = self.scenario, self.imaging, FIXED
+        if self.world == "varied":
+            # Each light has worlds and traffic of its own, so that a net cannot learn one from the other.
+            light = f"{s.light.ambient_lux:g}.{s.light.lamp_candela:g}.{s.light.lit_share:g}"
+            s, imaging, around = vary(stream(self.seed, f"segment.{index}.world.{light}"), s, imaging)
+        seed = self._segment_seed(index)
+        duration = (self.frames + _BEFORE) / imaging.rgb.rate_hz + 1.0
+        camera = scaled_camera(s.camera, imaging.render.width, imaging.render.height)
+        scene = Scene.build(seed, duration, s.road, s.fleet, s.traffic, s.light, camera)
+        return replace(scene, around=around), imaging, s
 
     def frame_times_us(self, index: int) -> IntArray:
-        """Times of the frames of segment `index` (µs): the nominal ones with jitter, ascending."""
+        """Times of the frames of a segment (µs): nominal ones with jitter, the first after two periods."""
         config = self.imaging.rgb
         period = 1.0 / config.rate_hz
         rng = stream(self.seed, f"segment.{index}.clock")
         jitter = np.clip(config.jitter_s * rng.standard_normal(self.frames), -0.4 * period, 0.4 * period)
-        return np.round(1e6 * (period * np.arange(1, self.frames + 1) + jitter)).astype(np.int64)
+        return np.round(1e6 * (period * np.arange(_BEFORE, _BEFORE + self.frames) + jitter)).astype(np.int64)
 
     def segment(self, index: int) -> Iterator[SegmentStep]:
         """Yield the frames of segment `index`."""
-        scene = self.scene(index)
-        seed = self._segment_seed(index)
-        config = self.imaging
-        renderer = Renderer(scene, config.render, seed)
+        scene, config, scenario = self._build(index)
+        seed, camera = self._segment_seed(index), scene.camera
+        renderer = Renderer(scene, config.render, seed, varied=self.world == "varied")
         exposure = choose_exposure(config.rgb, renderer.background.whole)
         scale = exposure.scale(config.rgb)
-        event_camera = EventCamera(renderer, config, self.seed, seed, scale)
+        times_us = self.frame_times_us(index)
+        eye = None
+        if self.sensors != "rgb":
+            eye = EventCamera(renderer, config, self.seed, seed, scale)
         noise = stream(seed, "rgb.noise")
         ground = renderer.background
-        least = self.scenario.truth.min_side_px * self.camera.width / self.scenario.camera.width
-        for t_us in self.frame_times_us(index):
+        least = scenario.truth.min_side_px * camera.width / scenario.camera.width
+        black = np.zeros((camera.height, camera.width, 3), dtype=np.uint8)
+        for t_us in times_us:
             time = np.array([1e-6 * t_us])
-            events = event_camera.advance(int(t_us))
-            radiance = expose(renderer, float(time[0]), exposure.time_s, config.rgb.readout_s)
-            charge = electrons(radiance, exposure.time_s, config.rgb, noise)
+            events = EventArray.empty(labelled=True) if eye is None else eye.advance(int(t_us))
+            rgb = black
+            if self.sensors != "events":
+                radiance = expose(renderer, float(time[0]), exposure.time_s, config.rgb.readout_s)
+                charge = electrons(radiance, exposure.time_s, config.rgb, noise)
+                rgb = develop(charge, exposure.gain, config.rgb)
             look = renderer.plan(float(time[0]), float(time[0])).look
             moments = renderer.moments(time, look)
             _, _, visible = buffers(moments, look, ground.front_depth, ground.front_cover)
-            states = scene.states_at(time, far_m=self.scenario.truth.horizon_m)
+            states = scene.states_at(time, far_m=config.render.far_m)
             seen = visible[np.searchsorted(look.number, states.object_id)]
-            yield SegmentStep(
-                t_us=int(t_us),
-                rgb=develop(charge, exposure.gain, config.rgb),
-                events=events,
-                truth=frame_truth(states, self.camera, seen, least),
-            )
+            truth = frame_truth(states, camera, seen, least, scenario.truth.range_m)
+            yield SegmentStep(t_us=int(t_us), rgb=rgb, events=events, truth=truth)
 
     def _segment_seed(self, index: int) -> int:
         return int(stream(self.seed, f"segment.{index}").integers(0, 2**62))

@@ -11,26 +11,33 @@ from jeat_graph.simulation.world.camera import Camera
 from jeat_graph.simulation.world.scene import VehicleStates
 from jeat_graph.simulation.world.vehicles import KIND_NAMES
 
+_LEAST_PX = 1.0  # what is smaller is no box
 
-def frame_truth(states: VehicleStates, camera: Camera, visible: FloatArray, min_side_px: float) -> FrameTruth:
-    """Make the truth of one time.
+
+def frame_truth(
+    states: VehicleStates, camera: Camera, visible: FloatArray, min_side_px: float, range_m: float
+) -> FrameTruth:
+    """Make the truth of one time. What can be seen but is not asked for is there, marked `ignore`.
 
     Args:
         states: N vehicles at that time.
         camera: the camera.
         visible: (N,) fraction of each vehicle that can be seen.
-        min_side_px: vehicles whose clipped box is thinner or lower are left out.
+        min_side_px: vehicles whose clipped box is thinner or lower are `ignore`.
+        range_m: vehicles farther from the camera are `ignore`.
 
     Returns:
         Vehicles by ascending id. Yaw is the direction of the vehicle's front, from +x towards +y.
     """
     projected = project_boxes(states, camera)
     extent = projected.clipped[:, 2:] - projected.clipped[:, :2]
-    keep = np.flatnonzero((extent >= min_side_px).all(axis=1))
+    keep = np.flatnonzero((extent >= _LEAST_PX).all(axis=1) & (visible > 0.0))
     rows = keep[np.argsort(states.object_id[keep])]
     front = states.pose[rows, 2] + np.where(states.direction[rows] < 0, np.pi, 0.0)
     yaw = np.pi / 2.0 - front
     zero = np.zeros(len(rows))
+    centre = np.column_stack([states.pose[rows, :2], states.size[rows, 2] / 2.0])
+    distance = np.linalg.norm(centre - camera.position, axis=1)
     return FrameTruth(
         object_id=states.object_id[rows],
         class_name=KIND_NAMES[states.kind[rows]],
@@ -48,4 +55,5 @@ def frame_truth(states: VehicleStates, camera: Camera, visible: FloatArray, min_
             ]
         ),
         velocity=np.column_stack([states.velocity[rows, :2], zero]),
+        ignore=(extent[rows] < min_side_px).any(axis=1) | (distance > range_m),
     )

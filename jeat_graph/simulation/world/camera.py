@@ -30,6 +30,7 @@ class CameraConfig:
     offset_m: float = number(1.0, "m", "place across the road, right of the median", low=-50.0, high=50.0)
     pitch_deg: float = number(14.0, "deg", "downward tilt", 0.0, 89.0)
     yaw_deg: float = number(0.0, "deg", "turn to the right", -60.0, 60.0)
+    roll_deg: float = number(0.0, "deg", "turn about the line of sight, clockwise as seen", -30.0, 30.0)
 
     def __post_init__(self) -> None:
         check(self)
@@ -68,6 +69,9 @@ class Camera:
         up = np.array([0.0, 0.0, 1.0])
         forward = math.cos(pitch) * ahead - math.sin(pitch) * up
         down = -math.sin(pitch) * ahead - math.cos(pitch) * up
+        if config.roll_deg:
+            cos, sin = math.cos(math.radians(config.roll_deg)), math.sin(math.radians(config.roll_deg))
+            right, down = cos * right + sin * down, cos * down - sin * right
         return Camera(
             width=config.width,
             height=config.height,

@@ -17,6 +17,8 @@ STANDSTILL_GAP_M = 2.5
 COMFORT_BRAKE = 2.5
 HARDEST_BRAKE = 8.0
 SAFE_BRAKE = 2.0
+STOP_BRAKE = 4.5  # m/s², of who stops in a lane
+_STOP_FROM_M, _STOP_MARGIN_M = 10.0, 20.0  # they stop within view
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +81,12 @@ def idm_acceleration(
     held = (wanted / np.maximum(gap, 0.1)) ** 2
     out: FloatArray = np.maximum(acceleration * (free - held), -HARDEST_BRAKE)
     return out
+
+
+def who_stops(rng: np.random.Generator, y: FloatArray, view_m: float, count: int) -> IntArray:
+    """Pick at most `count` of the vehicles at `y` (V,) along the road (m), in view, to stop in a lane."""
+    seen = np.flatnonzero((y > _STOP_FROM_M) & (y < view_m - _STOP_MARGIN_M))
+    return rng.permutation(seen)[:count]
 
 
 def distances_ahead(s: FloatArray, ring_m: float) -> FloatArray:

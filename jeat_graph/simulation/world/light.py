@@ -22,6 +22,7 @@ class LightConfig:
         3.0, "lux", "what oncoming headlights add to a vehicle's visibility, at 50 m"
     )
     taillight_lux: float = number(1.2, "lux", "what tail lights and the own beam on the road add, at 50 m")
+    lit_share: float = number(1.0, "1", "share of vehicles that have their lights on in the dark", 0.0, 1.0)
     parked_lux: float = number(1.5, "lux", "what a parked vehicle's flashers add, at 50 m")
 
     def __post_init__(self) -> None:

@@ -19,6 +19,10 @@ class RoadConfig:
     median_m: float = number(4.0, "m", "width of the median between the directions")
     shoulder_m: float = number(3.0, "m", "width of the paved shoulder outside the outer lane", 2.6)
 
+    curvature_per_m: float = number(
+        0.0, "1/m", "of the road's middle, positive for a bend to the right (pictures only)", -0.005, 0.005
+    )
+
     def __post_init__(self) -> None:
         check(self)
 

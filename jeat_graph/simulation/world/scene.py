@@ -8,10 +8,12 @@ import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.simulation.streams import stream
+from jeat_graph.simulation.world.bend import bend_motion
 from jeat_graph.simulation.world.camera import Camera, CameraConfig
 from jeat_graph.simulation.world.light import Light, LightConfig
 from jeat_graph.simulation.world.parking import park
 from jeat_graph.simulation.world.road import Road, RoadConfig
+from jeat_graph.simulation.world.surroundings import FIXED, Surroundings
 from jeat_graph.simulation.world.traffic import Traffic, TrafficConfig, simulate_traffic
 from jeat_graph.simulation.world.vehicles import Fleet, FleetConfig, draw_fleet
 
@@ -90,6 +92,7 @@ class Scene:
         parked_fleet: the P parked vehicles.
         parked_pose: (P, 3) their x, y (m) and heading (rad).
         traffic_config: settings the traffic was made with.
+        around: what the surroundings look like.
     """
 
     road: Road
@@ -100,6 +103,7 @@ class Scene:
     parked_fleet: Fleet
     parked_pose: FloatArray
     traffic_config: TrafficConfig
+    around: Surroundings = FIXED
 
     @staticmethod
     def build(
@@ -122,7 +126,7 @@ class Scene:
             fleet=driving,
             traffic=simulate_traffic(stream(seed, "traffic"), driving, lanes, traffic, duration_s),
             parked_fleet=standing,
-            parked_pose=park(stream(seed, "parked"), standing, lanes),
+            parked_pose=park(stream(seed, "parked"), standing, lanes, *traffic.parked_m),
             traffic_config=traffic,
         )
 
@@ -166,6 +170,9 @@ class Scene:
         frames = np.concatenate([frame, p_frame])
         order = np.lexsort((every, frames))
         parked_way = np.where(self.parked_pose[p, 0] > 0.0, 1, -1)
+        pose, velocity, acceleration = bend_motion(
+            pose, velocity, acceleration, self.road.config.curvature_per_m
+        )
         return VehicleStates(
             frame=frames[order],
             object_id=(1 + every + total * np.concatenate([lap_no[at], np.zeros(len(p), dtype=np.int64)]))[

@@ -16,11 +16,13 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.simulation.world.following import (
     STANDSTILL_GAP_M,
+    STOP_BRAKE,
     Drivers,
     Flow,
     distances_ahead,
     follow,
     lane_change_gain,
+    who_stops,
 )
 from jeat_graph.simulation.world.paths import Paths
 from jeat_graph.simulation.world.road import Road
@@ -28,6 +30,7 @@ from jeat_graph.simulation.world.vehicles import KIND_NAMES, KINDS, Fleet
 
 DENSITIES = ("sparse", "normal", "dense")
 _WARM_UP_S = 15.0
+_STOP_BEFORE_S = 8.0  # the start of the recording, when vehicles that stop begin to brake
 _MARGIN_S = 1.0  # paths reach this much before time zero and past the end
 
 
@@ -40,6 +43,9 @@ class TrafficConfig:
     vehicles_normal: float = number(20.0, "vehicles", "driving vehicles within view_m, normal traffic")
     vehicles_dense: float = number(34.0, "vehicles", "driving vehicles within view_m, dense traffic")
     parked: int = number(2, "vehicles", "vehicles parked on the shoulders within view", 0, 12)
+    parked_m: tuple[float, float] = number((28.0, 120.0), "m", "from where to where along the road", -20.0)
+    stopped: int = number(0, "vehicles", "vehicles that stop in their lane within view", 0, 8)
+    stop_s: tuple[float, float] = number((5.0, 60.0), "s", "for how long they stand, shortest and longest")
     view_m: float = number(150.0, "m", "length of road that the counts refer to", open_low=True)
     ring_m: float = number(420.0, "m", "length of the ring, of which the camera sees a part", 300.0)
     behind_m: float = number(130.0, "m", "how much of the ring lies behind the gantry", 30.0)
@@ -110,6 +116,7 @@ def simulate_traffic(
     start = -_MARGIN_S - _WARM_UP_S
     steps = math.ceil((duration_s + _MARGIN_S - start) / dt)
     decide_every = max(1, round(0.25 / dt))
+    stop_at = round((_WARM_UP_S + _MARGIN_S - _STOP_BEFORE_S) / dt) if config.stopped else -1
 
     may_use = _lanes_of(fleet, road)
     occupied = np.zeros((count, road.num_lanes), dtype=bool)
@@ -133,7 +140,14 @@ def simulate_traffic(
             follow(v, ahead, occupied[:, from_lane].T, drivers),
             follow(v, ahead, occupied[:, last_lane].T, drivers),
         )
+        if k == stop_at:
+            y = (road.direction[last_lane] * s + config.behind_m) % config.ring_m - config.behind_m
+            who = who_stops(rng, y, config.view_m, config.stopped)
+            brake_end[who] = now + rng.uniform(*config.stop_s, len(who))
+            brake[who] = STOP_BRAKE
         startled = rng.random(count) < config.brake_rate_hz * dt
+        if config.stopped:
+            startled &= now >= brake_end
         brake_end = np.where(startled, now + rng.uniform(0.5, 2.0, count), brake_end)
         brake = np.where(startled, rng.uniform(*config.brake_m_s2, count), brake)
         target = np.where(now < brake_end, np.minimum(wish, -brake), wish)

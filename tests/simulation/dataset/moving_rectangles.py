@@ -40,6 +40,9 @@ class MovingRectangles:
     def calibration(self) -> dict[str, Any]:
         return {"width": 64, "height": 48, "fx": 50.0, "position_m": [0.0, 0.0, 5.0]}
 
+    def calibration_of(self, index: int) -> dict[str, Any]:
+        return self.calibration()
+
     def settings(self) -> dict[str, Any]:
         return {"source": "rectangles", "seed": self.seed, "frames": self.frames, "vehicles": self.vehicles}
 

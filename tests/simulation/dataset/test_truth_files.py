@@ -88,7 +88,8 @@ def test_the_annotations_of_a_split_are_those_of_its_segments(tmp_path: Path, ma
         for key, per_segment in (("images", 4), ("annotations", 8)):
             assert len({entry["id"] for entry in tree[key]}) == per_segment * len(names)
         assert {a["image_id"] for a in tree["annotations"]} <= {i["id"] for i in tree["images"]}
-        assert [c["name"] for c in tree["categories"]] == ["car", "suv", "van", "truck"]
+        classes = ["car", "suv", "van", "truck", "bus", "motorcycle", "pickup"]
+        assert [c["name"] for c in tree["categories"]] == classes
 
 
 def test_poses_and_velocities_stand_row_by_row_beside_the_table(segment: Path, steps) -> None:

@@ -15,6 +15,7 @@ from jeat_graph.simulation.world.camera import Camera
 from jeat_graph.simulation.world.light import Light, LightConfig
 from jeat_graph.simulation.world.road import Road, RoadConfig
 from jeat_graph.simulation.world.scene import VehicleStates
+from jeat_graph.simulation.world.surroundings import FIXED, Surroundings
 from jeat_graph.simulation.world.vehicles import Fleet
 
 DAY = LightConfig()
@@ -34,7 +35,7 @@ class FewVehicles:
     road: Road
     fleet: Fleet
     parked_fleet: Fleet
-    along: int = 1
+    around: Surroundings = FIXED
 
     def states_at(self, times: Any, far_m: float, near_m: float = -15.0) -> VehicleStates:
         rows = np.asarray(self.rows, dtype=np.float64).reshape(-1, 7)
@@ -62,7 +63,9 @@ def renderer_of(
     """Renderer of a few vehicles."""
     camera = Camera.mounted(scaled_camera(load_scenario("day").camera, width, height))
     nobody = Fleet(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
-    scene: Any = FewVehicles(rows, Light(light), camera, Road.build(RoadConfig()), nobody, nobody)
+    table = np.asarray(rows, dtype=np.float64).reshape(-1, 7)
+    fleet = Fleet(table[:, 0].astype(np.int64), table[:, 4:])
+    scene: Any = FewVehicles(rows, Light(light), camera, Road.build(RoadConfig()), fleet, nobody)
     return Renderer(scene, RenderConfig(width=width, height=height, **render), seed=0)
 
 
