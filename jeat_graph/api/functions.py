@@ -194,6 +194,7 @@ def calibrate(
     Raises:
         JeatGraphError: what a file or the data have wrong.
     """
+    from jeat_graph.calibration.procedure import calibrate_with_truth, calibrate_without_truth
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.latency import at_measurement
 
@@ -201,18 +202,13 @@ def calibrate(
     start = fit_input(as_config(base, image), Detections.concatenate(recordings))[0]
     recordings = [at_measurement(one, start) for one in recordings]
     if truth is None:
-        from jeat_graph.calibration.blind import calibrate_blind
-
-        return calibrate_blind(recordings, start)
-    from jeat_graph.calibration.supervised import calibrate as fit
-    from jeat_graph.calibration.tune import tune
+        return calibrate_without_truth(recordings, start).config
 
     truths = [t if isinstance(t, GroundTruth) else read_truth(t) for t in _as_list(truth)]
     if len(truths) != len(recordings):
         raise DataError(f"{len(recordings)} recordings and {len(truths)} truths given; give one for each")
     pairs = list(zip(recordings, truths, strict=True))
-    config = fit(pairs, start)
-    return tune(config, pairs)[0] if tuned else config
+    return calibrate_with_truth(pairs, start, tuned=tuned).config
 
 
 def simulate(

@@ -98,16 +98,14 @@ def fold_config(job: tuple[Path, str]) -> Config:
     Args:
         job: folder of the data and the sequence left out.
     """
+    from jeat_graph.calibration.procedure import calibrate_with_truth
     from jeat_graph.calibration.rounding import rounded
-    from jeat_graph.calibration.supervised import calibrate
-    from jeat_graph.calibration.tune import tune
 
     folder, left_out = job
     training = [(r.detections, r.truth) for r in kitti(folder) if r.name != left_out]
     width, height = KITTI_IMAGE
     base = load_config("default", [f"image.width={width}", f"image.height={height}"])
-    config, _ = tune(calibrate(training, base), training)
-    return rounded(config)
+    return rounded(calibrate_with_truth(training, base).config)
 
 
 def in_processes(

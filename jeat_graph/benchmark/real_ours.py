@@ -74,15 +74,13 @@ def _without_memory(config: Config) -> Config:
 def _calibrated(
     row: OursOnSet, one: RealSet, left_out: int, seen: Sequence[Detections], base: Config
 ) -> Config:
-    from jeat_graph.calibration.blind import calibrate_blind
-    from jeat_graph.calibration.supervised import calibrate
-    from jeat_graph.calibration.tune import tune
+    from jeat_graph.calibration.procedure import calibrate_with_truth, calibrate_without_truth
 
     others = [k for k in range(len(seen)) if k != left_out]
     if row.how == BLIND:
-        return calibrate_blind([seen[k] for k in others], base)
+        return calibrate_without_truth([seen[k] for k in others], base).config
     pairs = [(seen[k], one.recordings[k].truth) for k in others]
-    return tune(calibrate(pairs, base), pairs)[0]
+    return calibrate_with_truth(pairs, base).config
 
 
 def both_tables(config: Config, detections: Detections) -> tuple[Trajectories, Trajectories]:

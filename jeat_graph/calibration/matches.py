@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
 from jeat_graph.association.boxes import occluded_fraction
 from jeat_graph.association.overlap import pairwise_covered, pairwise_iou
+from jeat_graph.config.schema import ImageConfig
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.eval.frames import IGNORE_COVERED, match
+from jeat_graph.filters.cut_boxes import WHOLE, cut_of
 
 # A detection is of a vehicle if it overlaps its true box by at least this IoU.
 MATCH_IOU = 0.5
@@ -59,6 +61,26 @@ class SensorMatches:
             f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(SensorMatches)[1:]
         }
         return SensorMatches(scans=sum(p.scans for p in parts), **columns)
+
+    def only_whole(self, image: ImageConfig) -> SensorMatches:
+        """Leave out of the correct detections those that the picture's edge cuts: they have no centre.
+
+        Args:
+            image: its size, and how near to its edge a side lies there.
+        """
+        far = self.box[:, :2] + self.box[:, 2:]
+        whole = np.array(
+            [
+                all(
+                    cut_of(low[k], high[k], (image.width, image.height)[k], image.edge_px) == WHOLE
+                    for k in range(2)
+                )
+                for low, high in zip(self.box[:, :2], far, strict=True)
+            ],
+            dtype=bool,
+        )
+        rows = {name: getattr(self, name)[whole] for name in ("residual", "side", "key", "t", "box")}
+        return replace(self, **rows)
 
 
 def match_sensor(detections: Detections, truth: GroundTruth, sensor: str, sequence: int = 0) -> SensorMatches:

@@ -37,6 +37,11 @@ def calibrate_sensor(matches: SensorMatches, rate_hz: float) -> SensorConfig:
     sigma_y, rho_y = fit_noise(centred[:, 1] * matches.side[:, 1], matches.side[:, 1])
     # One floor for both axes; each axis' own part goes with its side.
     sigma = float(max(np.sqrt(0.5 * (sigma_x**2 + sigma_y**2)), 0.1))
+    # The shape is that of the bulk; the scale is that of all, for the filter has no other word for the tails.
+    bulk = np.hypot(sigma, np.array([rho_x, rho_y]) * matches.side)
+    tails = np.sqrt(np.mean((centred[:, :2] * matches.side / bulk) ** 2, axis=0))
+    sigma = float(max(sigma * np.sqrt(np.mean(tails**2)), 0.1))
+    rho_x, rho_y = float(min(rho_x * tails[0], 1.0)), float(min(rho_y * tails[1], 1.0))
     spread = np.hypot(sigma, np.array([rho_x, rho_y]) * matches.side)
     share, memory = fit_memory(centred[:, :2] * matches.side / spread, matches.key, matches.t)
     p_detect, blind = fit_detection(matches.seen, matches.speed, matches.visible)
@@ -49,8 +54,8 @@ def calibrate_sensor(matches: SensorMatches, rate_hz: float) -> SensorConfig:
         rho_y=rho_y,
         correlated_share=share,
         memory_s=memory,
-        sigma_log_width=float(max(robust_std(centred[:, 2]), 0.005)),
-        sigma_log_height=float(max(robust_std(centred[:, 3]), 0.005)),
+        sigma_log_width=float(max(np.sqrt(np.mean(centred[:, 2] ** 2)), 0.005)),
+        sigma_log_height=float(max(np.sqrt(np.mean(centred[:, 3] ** 2)), 0.005)),
         bias=(float(bias[0]), float(bias[1]), float(bias[2]), float(bias[3])),
         p_detect=float(np.clip(p_detect, 0.05, 0.99)),
         clutter_per_scan=float((false.sum() + 0.5) / matches.scans),

@@ -13,7 +13,7 @@ from jeat_graph.calibration.measured import measured_tracks
 from jeat_graph.calibration.motion import fit_motion, fit_size
 from jeat_graph.calibration.rates import scan_rate
 from jeat_graph.calibration.sensor import calibrate_sensor
-from jeat_graph.config.schema import BirthConfig, Config, InputConfig, SensorConfig
+from jeat_graph.config.schema import BirthConfig, Config, ImageConfig, InputConfig, SensorConfig
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
@@ -46,7 +46,7 @@ def calibrate(recordings: Sequence[Recording], base: Config | None = None) -> Co
             for sequence, (detections, truth) in enumerate(recordings)
             if name in detections.sensors
         ]
-        matches[name] = SensorMatches.pool(parts)
+        matches[name] = SensorMatches.pool(parts).only_whole(ImageConfig() if base is None else base.image)
         found = calibrate_sensor(matches[name], scan_rate([d for d, _ in recordings], name))
         sensors[name] = replace(found, tempering=_tempering(base, name), **_delays(base, name))
     config = (

@@ -12,7 +12,7 @@ from jeat_graph.cli.progress import stages
 from jeat_graph.data.errors import ConfigError, DataError
 
 if TYPE_CHECKING:
-    from jeat_graph.calibration.tune import Choice
+    from jeat_graph.calibration.procedure import Calibration
     from jeat_graph.config.schema import Config
     from jeat_graph.data.detections import Detections
     from jeat_graph.data.trajectories import GroundTruth
@@ -35,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Calibrate, write the configuration, and print what was estimated."""
+    from jeat_graph.calibration.rounding import rounded
     from jeat_graph.config.reading import load_config
     from jeat_graph.io.atomic import check_writable
     from jeat_graph.io.config_io import save_config
@@ -53,14 +54,15 @@ def run(args: argparse.Namespace) -> int:
     recordings = [at_measurement(read_many([path], **reading(args)), base) for path in args.detections]
     beside = None if args.image else _size_beside(args.detections)
     base = with_image(base, recordings, args.image or beside)
-    choices: tuple[Choice, ...] = ()
     if args.gt:
         truths = [read_truth(path, rate_hz=args.rate) for path in args.gt]
-        config, choices = _with_truth(list(zip(recordings, truths, strict=True)), base, not args.no_tune)
+        found = _with_truth(list(zip(recordings, truths, strict=True)), base, not args.no_tune)
     else:
-        config = _without_truth(recordings, base)
-    save_config(config, args.out, comment=describe(args, config, choices))
-    sys.stdout.write("\n".join(table.render("text") for table in summary(config, choices)))
+        found = _without_truth(recordings, base)
+    _say_lags(found)
+    config = rounded(found.config)
+    save_config(config, args.out, comment=describe(args, config, found))
+    sys.stdout.write("\n".join(table.render("text") for table in summary(config, found)))
     print(f"written: {args.out}", file=sys.stderr)
     return 0
 
@@ -110,48 +112,51 @@ def with_image(base: Config, recordings: list[Detections], size: tuple[int, int]
     return base
 
 
-def _with_truth(
-    recordings: list[tuple[Detections, GroundTruth]], base: Config, tuned: bool
-) -> tuple[Config, tuple[Choice, ...]]:
+def _with_truth(recordings: list[tuple[Detections, GroundTruth]], base: Config, tuned: bool) -> Calibration:
     from tqdm import tqdm
 
-    from jeat_graph.calibration.rounding import rounded
-    from jeat_graph.calibration.supervised import calibrate
-    from jeat_graph.calibration.tune import knobs, tune
+    from jeat_graph.calibration.procedure import calibrate_with_truth, steps_with_truth
 
     print("estimating sensors and motion from matched detections", file=sys.stderr)
-    with stages("calibrate", 1) as stage:
-        stage("estimating")
-        config = calibrate(recordings, base)
     if not tuned:
-        return rounded(config), ()
-    passes = 2
-    with tqdm(
-        total=passes * len(knobs(config)), desc="tuning", unit="setting", disable=None, file=sys.stderr
-    ) as bar:
+        with stages("calibrate", 1) as stage:
+            stage("estimating")
+            return calibrate_with_truth(recordings, base, tuned=False)
+    steps = steps_with_truth(base)
+    with tqdm(total=steps, desc="tuning", unit="setting", disable=None, file=sys.stderr) as bar:
 
         def advance(line: str) -> None:
             bar.set_postfix_str(line, refresh=False)
             bar.update()
 
-        config, choices = tune(config, recordings, passes=passes, progress=advance)
-    return rounded(config), choices
+        return calibrate_with_truth(recordings, base, progress=advance)
 
 
-def _without_truth(recordings: list[Detections], base: Config) -> Config:
-    from jeat_graph.calibration.blind import calibrate_blind
-    from jeat_graph.calibration.rounding import rounded
+def _without_truth(recordings: list[Detections], base: Config) -> Calibration:
+    from jeat_graph.calibration.procedure import calibrate_without_truth
 
     print(
-        "no --gt: noise and motion from what confirmed tracks take in; precision by score cannot be known",
+        "no --gt: noise, motion and precision by score cannot be known, and stay as in the base",
         file=sys.stderr,
     )
     with stages("calibrate", 1) as stage:
         stage("estimating")
-        return rounded(calibrate_blind(recordings, base))
+        return calibrate_without_truth(recordings, base)
 
 
-def describe(args: argparse.Namespace, config: Config, choices: tuple[Choice, ...]) -> str:
+def _say_lags(found: Calibration) -> None:
+    """Tell of sensors whose clock is off; their latency is in the configuration."""
+    for lag in found.lags:
+        if lag.found:
+            late = f"{abs(lag.lag_s) * 1e3:.0f} ms {'late' if lag.lag_s > 0 else 'early'}"
+            print(
+                f"sensor {lag.sensor!r} is {late} (± {lag.std_s * 1e3:.1f} ms): "
+                "taken off its times from now on (sensors.*.latency_s)",
+                file=sys.stderr,
+            )
+
+
+def describe(args: argparse.Namespace, config: Config, found: Calibration) -> str:
     """Comment at the head of the file: where each part comes from."""
     from jeat_graph.config.reading import load_config
     from jeat_graph.version import __version__
@@ -159,17 +164,18 @@ def describe(args: argparse.Namespace, config: Config, choices: tuple[Choice, ..
     names = ", ".join(Path(p).parent.name + "/" + Path(p).name for p in args.detections)
     lines = [f"Made by jeat-graph calibrate {__version__} from {len(args.detections)} recording(s):", names]
     if args.gt:
+        base = [choice.part for choice in found.parts if not choice.kept]
         lines += [
-            "sensors (but tempering), motion, size, births: from detections matched with the truth.",
-            "chosen by tracking these recordings: " + ", ".join(c.name for c in choices) + "."
-            if choices
+            "sensors (but tempering), motion, size, births: from detections matched with the truth"
+            + (f", but {', '.join(base)}: as in the base, which did better." if base else "."),
+            "chosen by tracking these recordings: " + ", ".join(c.name for c in found.choices) + "."
+            if found.choices
             else "tempering, lifecycle and output: not tuned (--no-tune), as in the base configuration.",
         ]
     else:
         lines += [
-            "sensors (but tempering), motion, size: without truth, from innovations of confirmed tracks.",
-            "bias is unknown without truth and set to zero, precision by score stays as in the base;",
-            "p_detect is an upper bound.",
+            "p_detect (an upper bound), clutter, blind speed: without truth, by what confirmed tracks took.",
+            "noise, motion and precision by score are unknown without truth and stay as in the base.",
         ]
     picture = f"the base configuration {Path(args.config).name}"
     if args.image or config.image != load_config(args.config).image:
@@ -178,8 +184,8 @@ def describe(args: argparse.Namespace, config: Config, choices: tuple[Choice, ..
     return "\n".join(lines)
 
 
-def summary(config: Config, choices: tuple[Choice, ...]) -> list[Table]:
-    """Tables of what was estimated: one row a sensor; motion and size; what tuning chose."""
+def summary(config: Config, found: Calibration) -> list[Table]:
+    """Tables of what was estimated: one row a sensor; motion and size; what was kept and what was chosen."""
     from jeat_graph.eval.tables import Table
 
     sensors: list[dict[str, Cell]] = [
@@ -189,6 +195,8 @@ def summary(config: Config, choices: tuple[Choice, ...]) -> list[Table]:
             "sigma_px": s.sigma_px,
             "rho_x": s.rho_x,
             "rho_y": s.rho_y,
+            "rho_size": s.rho_size,
+            "late (ms)": 1e3 * s.latency_s,
             "share": s.correlated_share,
             "memory (s)": s.memory_s if s.correlated_share else None,
             "sigma_ln_w": s.sigma_log_width,
@@ -201,7 +209,7 @@ def summary(config: Config, choices: tuple[Choice, ...]) -> list[Table]:
         }
         for name, s in sorted(config.sensors.items())
     ]
-    digits = dict.fromkeys(("rho_x", "rho_y", "sigma_ln_w", "sigma_ln_h"), 4)
+    digits = dict.fromkeys(("rho_x", "rho_y", "rho_size", "sigma_ln_w", "sigma_ln_h"), 4)
     m = config.motion
     motion: dict[str, Cell] = {
         "jerk_per_size": m.jerk_per_size,
@@ -215,9 +223,15 @@ def summary(config: Config, choices: tuple[Choice, ...]) -> list[Table]:
         Table.from_records(sensors, title="Sensors", digits=digits),
         Table.from_records([motion], title="Motion"),
     ]
-    if choices:
+    if found.parts:
+        parts: list[dict[str, Cell]] = [
+            {"part": c.part, "gain on recordings left out": c.gain, "kept": "yes" if c.kept else "no"}
+            for c in found.parts
+        ]
+        tables.append(Table.from_records(parts, title="Estimates against the base, (MOTA+IDF1+HOTA)/3"))
+    if found.choices:
         rows: list[dict[str, Cell]] = [
-            {"setting": c.name, "value": c.value, "(MOTA+IDF1+HOTA)/3": c.score} for c in choices
+            {"setting": c.name, "value": c.value, "(MOTA+IDF1+HOTA)/3": c.score} for c in found.choices
         ]
         tables.append(Table.from_records(rows, title="Chosen by tracking", digits={"value": 3}))
     return tables
