@@ -59,5 +59,5 @@ def motion_visibility(mean: FloatArray, blind_speed: float) -> float:
     """
     if blind_speed <= 0.0:
         return 1.0
-    speed2 = mean[0, 1] ** 2 + mean[1, 1] ** 2
+    speed2 = mean[0, 1] * mean[0, 1] + mean[1, 1] * mean[1, 1]
     return 1.0 - math.exp(-speed2 / (blind_speed * blind_speed))

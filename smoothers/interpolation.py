@@ -50,7 +50,7 @@ def bridge(since: float, span: float, jerk: float) -> tuple[FloatArray, FloatArr
     Lambda = transition(s) - _product(Psi, _WHOLE)
     Sigma = Q - _product(Psi, across.T)
     units = (1.0, 1.0 / span, 1.0 / (span * span))
-    density = jerk * jerk * span**5
+    density = jerk * jerk * span * span * span * span * span
     for i in range(3):
         for j in range(3):
             Lambda[i, j] *= units[i] / units[j]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,7 +48,7 @@ def _sizes_at(t: FloatArray, mean: FloatArray, query: FloatArray) -> FloatArray:
         if query[i] <= t[0] or query[i] >= t[last]:
             edge = 0 if query[i] <= t[0] else last
             for axis in range(2):
-                out[i, axis] = np.exp(mean[edge, axis, 0] + (query[i] - t[edge]) * mean[edge, axis, 1])
+                out[i, axis] = math.exp(mean[edge, axis, 0] + (query[i] - t[edge]) * mean[edge, axis, 1])
             continue
         span = t[right] - t[right - 1]
         s = (query[i] - t[right - 1]) / span
@@ -55,11 +56,11 @@ def _sizes_at(t: FloatArray, mean: FloatArray, query: FloatArray) -> FloatArray:
             a, b = mean[right - 1, axis], mean[right, axis]
             # The conditional mean of a constant-velocity (white-acceleration) prior is the cubic Hermite
             # polynomial of its two ends (Barfoot, State Estimation for Robotics, ch. 3.4).
-            out[i, axis] = np.exp(
-                (1 + 2 * s) * (1 - s) ** 2 * a[0]
-                + s * (1 - s) ** 2 * span * a[1]
-                + s**2 * (3 - 2 * s) * b[0]
-                + s**2 * (s - 1) * span * b[1]
+            out[i, axis] = math.exp(
+                (1 + 2 * s) * (1 - s) * (1 - s) * a[0]
+                + s * (1 - s) * (1 - s) * span * a[1]
+                + s * s * (3 - 2 * s) * b[0]
+                + s * s * (s - 1) * span * b[1]
             )
     return out
 

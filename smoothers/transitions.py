@@ -13,6 +13,8 @@ tells the size of a state to the compiler, which then unrolls the loops.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 
@@ -46,7 +48,7 @@ def motion_matrices(dt: FloatArray, jerk: FloatArray) -> tuple[FloatArray, Float
 def error_steps(dt: float, correlation_time: FloatArray, phi: FloatArray, var: FloatArray) -> None:
     """Fill transition factors `phi` (B,) and noise variances `var` (B,) of the error states."""
     for b in range(len(correlation_time)):
-        less = np.expm1(-dt / correlation_time[b])
+        less = math.expm1(-dt / correlation_time[b])
         phi[b] = 1.0 + less
         var[b] = -less * (2.0 + less)
 

@@ -14,7 +14,10 @@ import numpy as np
 from jeat_graph.data.boxes import LARGEST_PX, SMALLEST_PX
 
 REFUSED_SHARE = 0.15
-BURST = 300
+#: Boxes of a burst, and how many in a hundred scans are one.
+BURST, LARGE_BURST, BURST_SHARE = 300, 2000, 0.03
+#: Bounds of boxes that are still within the bounds when rounded to 32 bits.
+BOUNDS_32 = np.array([[-LARGEST_PX, -LARGEST_PX, 2 * SMALLEST_PX, 2 * SMALLEST_PX], [0.99 * LARGEST_PX] * 4])
 
 
 class Step(NamedTuple):
@@ -24,8 +27,8 @@ class Step(NamedTuple):
     bad: bool
 
 
-def stream(seed: int, sensors: tuple[str, ...], length: int) -> list[Step]:
-    """Make a stream of `length` steps."""
+def stream(seed: int, sensors: tuple[str, ...], length: int, burst: int = BURST) -> list[Step]:
+    """Make a stream of `length` steps, with now and then a burst of so many boxes."""
     rng = np.random.default_rng(seed)
     place, speed = rng.uniform(100, 900, (5, 2)), rng.normal(0, 80, (5, 2))
     t = float(rng.choice([0.0, -3.5, 1.7e9]))
@@ -37,7 +40,7 @@ def stream(seed: int, sensors: tuple[str, ...], length: int) -> list[Step]:
         sensor = str(rng.choice(sensors))
         if len(steps) and rng.random() < REFUSED_SHARE:
             steps.append(Step(refused(rng, t, before, sensor), bad=True))
-        boxes = seen(rng, place)
+        boxes = seen(rng, place, burst)
         scores = rng.choice([0.0, 1.0, 0.5, rng.random()], len(boxes))
         steps.append(Step((t, sensor, *laid_out(rng, boxes, scores)), bad=False))
     return steps[:length]
@@ -55,7 +58,7 @@ def later(rng: np.random.Generator, t: float) -> float:
     return t + float(rng.choice([2.0, 60.0, 3600.0]))
 
 
-def seen(rng: np.random.Generator, place: np.ndarray) -> np.ndarray:
+def seen(rng: np.random.Generator, place: np.ndarray, burst: int) -> np.ndarray:
     """Boxes (M, 4) of the vehicles and of what is not there."""
     found = place[rng.random(len(place)) < 0.8]
     boxes = np.column_stack([found + rng.normal(0, 2, found.shape), np.full((len(found), 2), [60.0, 40.0])])
@@ -64,8 +67,8 @@ def seen(rng: np.random.Generator, place: np.ndarray) -> np.ndarray:
         return boxes[:0]
     if kind < 0.10:
         return np.concatenate([boxes, boxes])
-    if kind < 0.13:
-        wild = np.column_stack([rng.uniform(-200, 1500, (BURST, 2)), rng.lognormal(3, 1, (BURST, 2))])
+    if kind < 0.10 + BURST_SHARE:
+        wild = np.column_stack([rng.uniform(-200, 1500, (burst, 2)), rng.lognormal(3, 1, (burst, 2))])
         return np.concatenate([boxes, wild])
     if kind < 0.20:
         big, small = LARGEST_PX, SMALLEST_PX
@@ -76,16 +79,26 @@ def seen(rng: np.random.Generator, place: np.ndarray) -> np.ndarray:
 
 def laid_out(rng: np.random.Generator, boxes: np.ndarray, scores: np.ndarray) -> tuple[Any, Any]:
     """The same numbers in another form."""
-    form = rng.integers(5)
-    if form == 0:
-        return boxes.tolist(), scores.tolist()
-    if form == 1:
-        return np.asfortranarray(boxes), scores[::-1][::-1]
-    if form == 2:
-        return boxes.astype(">f8"), scores.astype(">f8")
-    if form == 3:
-        return np.repeat(boxes, 2, axis=0)[::2], scores
-    return boxes, scores
+    forms = [
+        lambda: (boxes.tolist(), scores.tolist()),
+        lambda: (np.asfortranarray(boxes), scores[::-1][::-1]),
+        lambda: (boxes.astype(">f8"), scores.astype(">f8")),
+        lambda: (np.repeat(boxes, 2, axis=0)[::2], np.repeat(scores, 3)[::3]),
+        lambda: (np.clip(boxes, BOUNDS_32[0], BOUNDS_32[1]).astype(np.float32), scores.astype(np.float32)),
+        lambda: (boxes.astype(np.longdouble), scores.astype(np.float16)),
+        lambda: (np.maximum(np.rint(boxes), [-np.inf, -np.inf, 1, 1]).astype(np.int64), scores > 0.5),
+        lambda: (boxes.astype(object), tuple(scores.tolist())),
+        lambda: (read_only(boxes), read_only(scores)),
+        lambda: (boxes, scores),
+    ]
+    return forms[int(rng.integers(len(forms)))]()
+
+
+def read_only(values: np.ndarray) -> np.ndarray:
+    """A copy that nobody can write to."""
+    copy = values.copy()
+    copy.flags.writeable = False
+    return copy
 
 
 def refused(rng: np.random.Generator, t: float, before: float, sensor: str) -> tuple[Any, ...]:
@@ -105,5 +118,10 @@ def refused(rng: np.random.Generator, t: float, before: float, sensor: str) -> t
         (t, sensor, [[1.0, 2.0, 3.0]], [0.5]),
         (t, sensor, good, [0.5, 0.5]),
         (t, sensor, [["a", "b", "c", "d"]], [0.5]),
+        (float("inf"), sensor, good, [0.5]),
+        (t, sensor, [[10.0, 10.0, 5.0, 5.0 + 1j]], [0.5]),
+        (t, sensor, good, [-1e-300]),
+        (t, sensor, [[1, 2, 3, 4], [5, 6, 7]], [0.5, 0.5]),
+        (t, sensor, np.zeros((1, 4, 1)) + 5.0, [0.5]),
     ]
     return choices[int(rng.integers(len(choices)))]

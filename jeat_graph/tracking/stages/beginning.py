@@ -85,7 +85,7 @@ def first_view(batch: Batch, j: int, sensors: SensorArrays) -> Measured:
         cut = batch.cut[j, axis]
         if cut != WHOLE:
             log_size[axis] += FIRST_LOG_GROWTH
-            log_size_var[axis] += FIRST_LOG_GROWTH_STD**2
+            log_size_var[axis] += FIRST_LOG_GROWTH_STD * FIRST_LOG_GROWTH_STD
             half_var = centre_from_side(HIGH_CUT, 0.0, log_size[axis], log_size_var[axis])[1]
             if cut != BOTH_CUT:
                 z[axis], _ = centre_from_side(cut, batch.side[j, axis], log_size[axis], 0.0)
@@ -155,8 +155,10 @@ def start_track(
     side = math.sqrt(batch.boxes[j, 2] * batch.boxes[j, 3])
     velocity_std = motion.velocity_std_px + motion.velocity_std_per_size * side
     acceleration_std = motion.acceleration_std_px + motion.acceleration_std_per_size * side
-    velocity_var, acceleration_var = np.full(2, velocity_std**2), np.full(2, acceleration_std**2)
-    rate_var = model.settings.size.rate_std**2
+    # Products, not powers: compiled and plain code then round alike.
+    velocity_var = np.full(2, velocity_std * velocity_std)
+    acceleration_var = np.full(2, acceleration_std * acceleration_std)
+    rate_var = model.settings.size.rate_std * model.settings.size.rate_std
     view = first_view(batch, j, sensors)
     white, coloured_std, error = view.white, view.coloured_std, sensors.error[s]
     mean, cov = tracks.mean[i], tracks.cov[i]
