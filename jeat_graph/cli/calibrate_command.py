@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from jeat_graph.data.detections import Detections
     from jeat_graph.data.trajectories import GroundTruth
     from jeat_graph.eval.tables import Cell, Table
+    from jeat_graph.runs.beside import Facts
 
 HELP = "Estimate sensors and motion from recordings, with or without truth, and write a configuration."
 
@@ -30,6 +31,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_config(parser, settings=False)
     add_image(parser)
     add_reading(parser)
+    add(
+        "--frames",
+        metavar="VIDEO|DIR",
+        help="pictures of one of the recordings: tell the picture's size and the frame rate of all",
+    )
     add("--no-tune", action="store_true", help="do not choose the rest by tracking the recordings")
 
 
@@ -41,6 +47,7 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.io.config_io import save_config
     from jeat_graph.io.detections_io import read_many
     from jeat_graph.io.truth_io import read_truth
+    from jeat_graph.runs.beside import facts_beside, facts_of_frames
     from jeat_graph.runs.latency import at_measurement
 
     if args.gt and len(args.gt) != len(args.detections):
@@ -51,8 +58,11 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(f"--out {args.out}: the name of a configuration must end in .yaml")
     check_writable(args.out)
     base = load_config(args.config)
+    shown = None if args.frames is None else facts_of_frames(args.frames)
+    if shown is not None and args.rate is None and not any(facts_beside([path]) for path in args.detections):
+        args.rate = shown.rate_hz
     recordings = [at_measurement(read_many([path], **reading(args)), base) for path in args.detections]
-    beside = None if args.image else _size_beside(args.detections)
+    beside = None if args.image else _size_beside(args.detections, shown)
     base = with_image(base, recordings, args.image or beside)
     if args.gt:
         truths = [read_truth(path, rate_hz=args.rate) for path in args.gt]
@@ -67,10 +77,10 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _size_beside(paths: list[str]) -> tuple[int, int] | None:
+def _size_beside(paths: list[str], shown: Facts | None) -> tuple[int, int] | None:
     from jeat_graph.runs.beside import facts_beside
 
-    facts = facts_beside(paths)
+    facts = facts_beside(paths) if shown is None else shown
     if facts is None or facts.size_px is None:
         return None
     print(f"picture of {facts.size_px[0]} x {facts.size_px[1]} px, as {facts.origin} says", file=sys.stderr)

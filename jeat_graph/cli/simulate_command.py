@@ -86,8 +86,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     pictures.add_argument("--workers", type=counting, metavar="K", help="processes (default: one a core)")
     pictures.add_argument(
         "--video",
-        choices=("mp4", "lossless", "png"),
-        help="how frames are stored (default mp4, which is lossy, and png with --world varied)",
+        choices=("mp4", "webm", "lossless", "png"),
+        help="how frames are stored: mp4 (default; quick, lossy, not for browsers), webm (browsers play it; "
+        "ten times slower to write), lossless, png (default with --world varied)",
     )
     pictures.add_argument(
         "--compression",

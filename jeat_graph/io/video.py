@@ -26,7 +26,7 @@ from jeat_graph.io.decoders import Decoder, PictureDecoder, RgbImage, VideoDecod
 
 __all__ = ["FRAME_TIMES", "VIDEO_FILES", "FrameSource", "RgbImage", "open_frames", "quietly"]
 
-VIDEO_FILES = {"mp4": "frames.mp4", "lossless": "frames.avi", "png": "frames"}
+VIDEO_FILES = {"mp4": "frames.mp4", "webm": "frames.webm", "lossless": "frames.avi", "png": "frames"}
 FRAME_TIMES = "frames.csv"
 #: Files in which DSEC lists the times of a folder of pictures (µs).
 DSEC_TIMES = ("timestamps.txt", "image_timestamps.txt")

@@ -164,4 +164,9 @@ def recorded_inputs(
         if sha256_of(place) != described["sha256"]:
             raise DataError("has changed since the run; track it again", file)
         found.append(str(place) if prefix is None else f"{prefix}={place}")
+    if "images" in record:
+        images = find_input(reading["images"], record["images"], folder)
+        if images is None or sha256_of(images) != record["images"]["sha256"]:
+            raise DataError("list of images is not there any more, or has changed", reading["images"])
+        reading["images"] = str(images)
     return config, at_measurement(read_many(found, **reading), config)

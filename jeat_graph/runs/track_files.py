@@ -98,6 +98,7 @@ class TrackRequest:
             "overrides": list(self.overrides),
             "inputs": describe_inputs(self.files),
             "reading": {"detections": list(self.detections), **self._reading()},
+            **({} if self.images is None else {"images": describe_inputs([self.images])[0]}),
         }
 
     def _reading(self) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """The command `jeat-graph calibrate`."""
 
+import numpy as np
 import pytest
 
 from jeat_graph.cli.main import main
@@ -45,6 +46,23 @@ def test_the_size_of_the_picture_is_taken_over(files, tmp_path):
     assert main(["calibrate", d, "--gt", g, "--image", "1300x730", "--no-tune", "--out", str(out)]) == 0
     image = load_config(out).image
     assert (image.width, image.height) == (1300.0, 730.0)
+
+
+def test_a_video_says_the_size_of_the_picture_and_the_rate(files, tmp_path):
+    from jeat_graph.io.video_writer import FrameWriter
+
+    with FrameWriter(tmp_path, "lossless", (1300, 730), 25.0) as writer:
+        for k in range(3):
+            writer.append(40_000 * k, np.zeros((730, 1300, 3), dtype=np.uint8))
+    (tmp_path / "frames.csv").unlink()
+    lines = [f"{k + 1},-1,{100 + 4 * k},200,60,40,0.9,-1,-1,-1\n" for k in range(60)]
+    (tmp_path / "det.txt").write_text("".join(lines))
+    out = tmp_path / "config.yaml"
+    video = ["--frames", str(tmp_path / "frames.avi")]
+    assert main(["calibrate", str(tmp_path / "det.txt"), *video, "--out", str(out)]) == 0
+    found = load_config(out)
+    assert (found.image.width, found.image.height) == (1300.0, 730.0)
+    assert found.sensors["rgb"].rate_hz == pytest.approx(25.0, rel=0.02)
 
 
 def test_boxes_beyond_the_base_picture_need_a_size(files, tmp_path, capsys):

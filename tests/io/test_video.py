@@ -38,13 +38,14 @@ def test_lossless_frames_come_back_bit_for_bit(tmp_path: Path, video: str) -> No
             assert np.array_equal(source.frame(k), frame)
 
 
-def test_mp4_frames_come_back_in_their_colours(tmp_path: Path) -> None:
-    with open_frames(write(tmp_path, "mp4", [RED] * 3)) as source:
+@pytest.mark.parametrize("video", ["mp4", "webm"])
+def test_lossy_frames_come_back_in_their_colours(tmp_path: Path, video: str) -> None:
+    with open_frames(write(tmp_path, video, [RED] * 3)) as source:
         assert len(source) == 3
         assert np.abs(source.frame(2).astype(int) - RED).mean() < 6
 
 
-@pytest.mark.parametrize("video", ["mp4", "lossless", "png"])
+@pytest.mark.parametrize("video", ["mp4", "webm", "lossless", "png"])
 def test_the_same_frames_give_the_same_bytes(tmp_path: Path, video: str) -> None:
     folders = [write(tmp_path / name, video, pictures(3)) for name in "ab"]
     files = [{p.name: p.read_bytes() for p in folder.rglob("*") if p.is_file()} for folder in folders]
@@ -131,5 +132,5 @@ def test_a_frame_of_another_size_is_refused(tmp_path: Path) -> None:
 
 
 def test_an_unknown_kind_of_video_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="mp4, lossless, png"):
+    with pytest.raises(ConfigError, match="mp4, webm, lossless, png"):
         FrameWriter(tmp_path, "gif", SIZE, 20.0)

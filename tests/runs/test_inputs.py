@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 
 import pytest
 
+from jeat_graph.cli.main import main
 from jeat_graph.runs.inputs import describe_inputs, find_input
 
 
@@ -48,3 +50,25 @@ def test_nothing_is_found_where_there_is_nothing(scene):
     home, record = scene
     (home / "data" / "det.csv").unlink()
     assert find_input(record["path"], record, home / "out" / "run") is None
+
+
+def test_a_list_of_images_is_found_where_the_run_was_moved(tmp_path, monkeypatch, capsys):
+    home = tmp_path / "scene"
+    home.mkdir()
+    monkeypatch.chdir(home)
+    images = [{"id": 7 + k, "timestamp": k / 20, "file_name": f"{k}.jpg"} for k in range(30)]
+    boxes = [
+        {"image_id": 7 + k, "bbox": [100 + 4 * k, 200, 60, 40], "score": 0.9, "category_id": 1}
+        for k in range(30)
+    ]
+    (home / "images.json").write_text(json.dumps({"images": images}))
+    (home / "results.json").write_text(json.dumps(boxes))
+    assert main(["track", "results.json", "--images", "images.json", "--out", "run"]) == 0
+    monkeypatch.chdir(tmp_path)
+    shutil.move(home, tmp_path / "elsewhere")
+    compare = ["compare", "elsewhere/run", "--no-plots", "--out", "comparison"]
+    assert main(compare) == 0
+    (tmp_path / "elsewhere" / "images.json").write_text("{}")
+    capsys.readouterr()
+    assert main(compare) == 2
+    assert "list of images" in capsys.readouterr().err

@@ -10,7 +10,6 @@ The FFmpeg that comes with OpenCV has no encoder for H.264; MPEG-4 part 2, which
 
 from __future__ import annotations
 
-import re
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
@@ -19,12 +18,9 @@ from typing import Any, Self
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.atomic import atomic_path
 from jeat_graph.io.video import RgbImage, count_frames, quietly
+from jeat_graph.io.webm import settle_webm
 
 CODECS = {".mp4": "vp09", ".webm": "VP80"}
-# Number of the track in WebM, random there: element TrackUID (0x73C5, or 0x63C5 where a tag refers to it) of
-# eight bytes. It stands before the first picture.
-_TRACK_UID = re.compile(rb"([\x73\x63]\xc5\x88).{8}", re.DOTALL)
-_WEBM_HEAD_BYTES = 4096
 
 
 class MovieWriter:
@@ -73,7 +69,8 @@ class MovieWriter:
         if error is None:
             try:
                 self._check()
-                self._settle()
+                if self._path.suffix.lower() == ".webm":
+                    settle_webm(self._temporary)
             except BaseException as bad:
                 self._stack.__exit__(type(bad), bad, None)
                 raise
@@ -93,16 +90,6 @@ class MovieWriter:
             raise DataError(
                 f"only {there} of {self._count} pictures could be written; is the disk full?", self._path
             )
-
-    def _settle(self) -> None:
-        """Give WebM's track the number 1 instead of a random one."""
-        if self._path.suffix.lower() != ".webm":
-            return
-        with self._temporary.open("r+b") as file:
-            head = file.read(_WEBM_HEAD_BYTES)
-            settled = _TRACK_UID.sub(lambda found: found[1] + (1).to_bytes(8, "big"), head, count=2)
-            file.seek(0)
-            file.write(settled)
 
 
 def write_png(path: str | Path, rgb: RgbImage) -> None:

@@ -231,8 +231,11 @@ def test_a_movie_has_each_frame_at_the_frames_own_rate(segment, tmp_path):
     frames, rate = read_movie(out)
     assert frames.shape == (10, HEIGHT, 2 * WIDTH, 3)
     assert rate == pytest.approx(20.0)
-    for k in range(10):
-        assert frames[k, 60:80, 100:150].mean() == pytest.approx(20 + 10 * k, abs=4.9)
+    # OpenCV's way to the film's colours and back truncates: of any grey, whatever the codec, it takes 3, 1
+    # and 4 levels off red, green and blue. The frames are 10 levels apart.
+    seen = frames[:, 60:80, 100:150].mean(axis=(1, 2))
+    shown = 20.0 + 10.0 * np.arange(10)[:, None] - [3.0, 1.0, 4.0]
+    assert np.abs(seen - shown).max() < 1.5
 
 
 def test_rate_start_and_end_choose_the_times(run, tmp_path):
