@@ -80,7 +80,8 @@ def config_from_dict(tree: Mapping[str, Any]) -> Config:
     for f in dataclasses.fields(Config):
         if f.name != "sensors" and f.name in tree:
             parts[f.name] = build(hints[f.name], tree[f.name], f.name + ".")
-    if "image" in tree and "input" in parts:
+    sized = {"width", "height"} & set(tree.get("image") or {})
+    if sized and "input" in parts:
         parts["input"] = dataclasses.replace(parts["input"], picture="given")
     return Config(**parts)
 
@@ -92,7 +93,8 @@ def config_to_dict(config: Config) -> dict[str, Any]:
     """
     tree: dict[str, Any] = plain(dataclasses.asdict(config))
     if config.input.picture == "seen":
-        del tree["image"]
+        for side in ("width", "height"):
+            del tree["image"][side]
     return tree
 
 
