@@ -257,3 +257,11 @@ def test_a_section_is_accepted_exactly_if_each_value_is_within_its_bounds(rate, 
     else:
         assert good
         check(noise)
+
+
+def test_what_is_said_of_the_picture_beside_its_size_leaves_the_size_to_be_seen():
+    seen = load_config("default", ["image.edge_px=2"])
+    assert seen.input.picture == "seen"
+    again = config_from_dict(config_to_dict(seen))
+    assert (again.image.edge_px, again.input.picture) == (2.0, "seen")
+    assert load_config("default", ["image.width=1920"]).input.picture == "given"
