@@ -15,6 +15,7 @@ _KINDS = {
     "ablation": "from the paper's tracker to the default, one change a row",
     "smoothing": "what smoothing gains over the causal estimates",
     "real": "real detectors that nothing was made for, and simulated odd ones",
+    "road": "place and speed on the road, simulated and against laser gates, and whether intervals hold",
     "speed": "time per step, against others",
     "endurance": "a day of input through the live path: memory, latency and counts, hour by hour",
     "events": "noise of the event cameras, what tames it, and what vehicles give",

@@ -36,6 +36,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--max-gap", type=positive, metavar="S", help="join no smoothed rows further apart than this")
     add("--breakdown", action="store_true", help="also by motion and distance, and waiting times")
     add("--detections", **_MANY, metavar="FILE", help="also AP of the detections of each RUN")
+    add(
+        "--road",
+        **_MANY,
+        metavar="FILE",
+        help="truth of each RUN on the road (gt_road.csv): also errors in m and km/h of its road tables",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -68,6 +74,9 @@ def run(args: argparse.Namespace) -> int:
             result["breakdown"] = [
                 dict(zip(table.columns, row, strict=True)) for table in extra for row in table.rows
             ]
+        if args.road:
+            table, result["road"] = _on_the_road(args)
+            tables.append(table)
         if args.detections:
             stage("detections")
             table, values = _detections(args, [one.truth for one in runs])
@@ -80,6 +89,22 @@ def run(args: argparse.Namespace) -> int:
         if args.format == "text" and "nees" in tables[0].columns:
             print("nees: of the position, 2 where the covariances are right (ANEES of `compare`: 1)")
     return 0
+
+
+def _on_the_road(args: argparse.Namespace) -> tuple[Table, dict[str, dict[str, float | int]]]:
+    """Scores of the tables of the road, by table and, of several runs, by run."""
+    from jeat_graph.eval.road import judge_road_run
+    from jeat_graph.eval.tables import Cell, Table
+
+    if len(args.road) != len(args.runs):
+        raise DataError(f"{len(args.runs)} RUN and {len(args.road)} --road given; give one for each")
+    values = {
+        kind if len(args.runs) == 1 else f"{run} {kind}": scores
+        for run, truth in zip(args.runs, args.road, strict=True)
+        for kind, scores in judge_road_run(run, truth).items()
+    }
+    records: list[dict[str, Cell]] = [{"table": kind, **scores} for kind, scores in values.items()]
+    return Table.from_records(records, title="On the road, 20 to 100 m (nees: 1 where honest)"), values
 
 
 def _detections(

@@ -1,0 +1,171 @@
+"""Tracks on the road against truth in metres: errors of place and speed, and whether their intervals hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from jeat_graph.config.fields import check, number
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.errors import DataError
+from jeat_graph.io.tables import read_table
+
+_TRUE = ("x", "y", "speed_kmh")
+_ESTIMATED = (*_TRUE, "var_x", "var_y", "var_speed_kmh")
+_Z95 = 1.959963984540054
+
+
+@dataclass(frozen=True)
+class RoadJudging:
+    """Which rows count, and which true vehicle a track is taken for."""
+
+    near_m: float = number(20.0, "m", "nearest place along the road that counts")
+    far_m: float = number(100.0, "m", "farthest place along the road that counts", open_low=True)
+    gate_across_m: float = number(1.5, "m", "a track is at a vehicle that is so near across", open_low=True)
+    gate_along_m: float = number(8.0, "m", "and so near along the road", open_low=True)
+    least_share: float = number(0.5, "1", "share of a track's rows that have to be at its vehicle", 0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+@dataclass(frozen=True, eq=False)
+class RoadRows:
+    """Rows of some vehicles on the road, by identity and then time.
+
+    Attributes:
+        t: (N,) time (s).
+        identity: (N,) of the track or the true vehicle.
+        values: (N, 3) x, y (m), speed (km/h); of tracks (N, 6), with their variances.
+    """
+
+    t: FloatArray
+    identity: IntArray
+    values: FloatArray
+
+    def each(self) -> list[RoadRows]:
+        """The rows of each vehicle."""
+        cuts = np.flatnonzero(np.diff(self.identity)) + 1
+        parts = np.split(np.arange(len(self.t)), cuts) if len(self.t) else []
+        return [RoadRows(self.t[p], self.identity[p], self.values[p]) for p in parts]
+
+
+def read_road_truth(path: str | Path) -> RoadRows:
+    """Read `t, object_id, x, y, speed_kmh`, such as the simulator's `gt_road.csv`.
+
+    Raises:
+        DataError: names the file, the line and what is wrong.
+    """
+    return _read(path, "object_id", _TRUE)
+
+
+def read_road_tracks(path: str | Path) -> RoadRows:
+    """Read a table of the road with its variances (`road.csv`, `road_causal.csv`, `road_smoothed.csv`).
+
+    Raises:
+        DataError: names the file, the line and what is wrong.
+    """
+    return _read(path, "track_id", _ESTIMATED)
+
+
+def _read(path: str | Path, identity: str, columns: tuple[str, ...]) -> RoadRows:
+    table = read_table(path, ("t", identity, *columns))
+    t, ids = table.number("t"), table.whole(identity)
+    values = np.stack([table.number(name) for name in columns], axis=1)
+    order = np.lexsort((t, ids))
+    return RoadRows(t[order], ids[order], values[order])
+
+
+@dataclass(frozen=True, eq=False)
+class RoadErrors:
+    """Errors of rows that count.
+
+    Attributes:
+        error: (N, 3) across, along (m), speed (km/h): estimate less truth.
+        var: (N, 3) variances as stated.
+        tracks: how many tracks they are of.
+    """
+
+    error: FloatArray
+    var: FloatArray
+    tracks: int
+
+    def scores(self) -> dict[str, float | int]:
+        """Root mean squares, normalised squares and the shares of 95 % intervals that hold."""
+        if not len(self.error):
+            return {"rows": 0, "tracks": 0}
+        rmse = np.sqrt((self.error**2).mean(axis=0))
+        normalised = self.error**2 / self.var
+        held = 100.0 * (np.abs(self.error) <= _Z95 * np.sqrt(self.var)).mean(axis=0)
+        return {
+            "across_rmse_m": float(rmse[0]),
+            "along_rmse_m": float(rmse[1]),
+            "speed_rmse_kmh": float(rmse[2]),
+            "speed_median_kmh": float(np.median(np.abs(self.error[:, 2]))),
+            "speed_bias_kmh": float(self.error[:, 2].mean()),
+            # Two coordinates: one where the covariances are right.
+            "nees": float(normalised[:, :2].mean()),
+            "speed_nees": float(normalised[:, 2].mean()),
+            "across_held": float(held[0]),
+            "along_held": float(held[1]),
+            "speed_held": float(held[2]),
+            "rows": len(self.error),
+            "tracks": self.tracks,
+        }
+
+
+def judge_road(tracks: RoadRows, truth: RoadRows, config: RoadJudging) -> RoadErrors:
+    """Compare tracks with the true vehicles that they are at for most of their time.
+
+    Truth is interpolated to the tracks' times. Which vehicle a track is taken for is decided over its whole
+    life; all of its rows then count, those far off too.
+
+    Args:
+        tracks: estimates with variances.
+        truth: of the same recording.
+        config: which rows count.
+
+    Raises:
+        DataError: truth without rows.
+    """
+    vehicles = truth.each()
+    if not vehicles:
+        raise DataError("the truth on the road has no rows")
+    gate = np.array([config.gate_across_m, config.gate_along_m])
+    errors, variances, count = [np.zeros((0, 3))], [np.zeros((0, 3))], 0
+    for track in tracks.each():
+        best: tuple[int, FloatArray, FloatArray] | None = None
+        for one in vehicles:
+            during = (track.t >= one.t[0]) & (track.t <= one.t[-1])
+            if not during.any():
+                continue
+            true = np.stack([np.interp(track.t[during], one.t, column) for column in one.values.T], axis=1)
+            near = (np.abs(true[:, :2] - track.values[during, :2]) < gate).all(axis=1).sum()
+            if near > config.least_share * len(track.t) and (best is None or near > best[0]):
+                best = int(near), true, track.values[during]
+        if best is None:
+            continue
+        _, true, found = best
+        counts = (true[:, 1] >= config.near_m) & (true[:, 1] <= config.far_m)
+        errors.append((found[:, :3] - true)[counts])
+        variances.append(found[counts, 3:])
+        count += bool(counts.any())
+    return RoadErrors(np.concatenate(errors), np.concatenate(variances), count)
+
+
+def judge_road_run(
+    run: str | Path, truth: str | Path, config: RoadJudging | None = None
+) -> dict[str, dict[str, float | int]]:
+    """Scores by table of a folder that holds tables of the road, or of one table.
+
+    Raises:
+        DataError: there is no table of a road, or a file is not valid.
+    """
+    path, names = Path(run), ("road_causal.csv", "road_smoothed.csv", "road.csv")
+    files = [path / name for name in names if (path / name).is_file()] if path.is_dir() else [path]
+    if not files:
+        raise DataError("holds no table of a road: track with --camera, or use jeat-graph road", run)
+    true, settings = read_road_truth(truth), config or RoadJudging()
+    return {file.stem: judge_road(read_road_tracks(file), true, settings).scores() for file in files}
