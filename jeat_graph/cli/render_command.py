@@ -32,8 +32,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="run directory or table of tracks; or a simulated segment, which brings its own frames, events "
         "and truth",
     )
-    add("--frames", metavar="VIDEO|DIR", help="video or folder of pictures to draw on")
-    add("--events", metavar="FILE.h5", help="events (DSEC layout) to draw on; beside the frames if both")
+    add("--frames", metavar="VIDEO|DIR", help="video, folder of pictures or AEDAT4 file to draw on")
+    add(
+        "--events",
+        metavar="FILE",
+        help="events (RAW, DAT, AEDAT, HDF5) to draw on; beside the frames if both",
+    )
     add("--gt", metavar="FILE", help="truth, drawn as thin outlines")
     add(
         "--out",

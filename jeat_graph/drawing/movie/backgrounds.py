@@ -9,7 +9,7 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.events import EventArray
 from jeat_graph.drawing.palette import BRIGHTER, DARK, DARKER
-from jeat_graph.io.events_dsec import EventFile
+from jeat_graph.io.events.stretches import Stretches
 from jeat_graph.io.video import FrameSource, RgbImage
 
 # Events of one pixel at which its colour has come two thirds of the way (1 − 1/e).
@@ -78,13 +78,17 @@ class EventBackground:
 
     name = "events"
 
-    def __init__(self, source: EventFile, window_s: float) -> None:
+    def __init__(self, source: Stretches, window_s: float) -> None:
         self.size_px = source.size_px or _DSEC_SIZE
         self._source = source
         self._window_us = max(round(window_s * _US_PER_S), 1)
         offset = source.t_offset_us
         self._offset_us = offset
-        self.span_s = (offset / _US_PER_S, (offset + source.duration_us) / _US_PER_S)
+
+    @property
+    def span_s(self) -> tuple[float, float]:
+        """First and last time of the recording (s)."""
+        return self._offset_us / _US_PER_S, (self._offset_us + self._source.duration_us) / _US_PER_S
 
     def image(self, t: float) -> RgbImage:
         """Return the events of the window that ends with time `t` (s)."""

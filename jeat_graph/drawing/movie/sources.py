@@ -81,7 +81,7 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
     Raises:
         DataError: a file is missing or not valid, or nothing lies in the asked times.
     """
-    from jeat_graph.io.events_dsec import EventFile
+    from jeat_graph.io.events.stretches import open_stretches
     from jeat_graph.io.scans_io import read_instants
     from jeat_graph.io.truth_io import read_truth
     from jeat_graph.io.video import open_frames
@@ -96,7 +96,7 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
     rate_hz = request.rate_hz or _rate_of(frames) or DEFAULT_RATE_HZ
     if request.events is not None:
         window_s = request.window_s if request.window_s is not None else 1.0 / rate_hz
-        events = EventBackground(stack.enter_context(EventFile(request.events)), window_s)
+        events = EventBackground(stack.enter_context(open_stretches(request.events)), window_s)
     times = _times(request, _span(frames, events, tables, truth), frames, rate_hz)
 
     backgrounds: list[Background] = [one for one in (frames, events) if one is not None]
