@@ -15,9 +15,29 @@ def add_detecting(parser: argparse._ActionsContainer) -> None:
     """Declare what a detector is, and how it looks; `--frames` and `--events` are the command's own."""
     add = parser.add_argument
     add(
+        "--detector-frames",
+        default="motion",
+        metavar="NAME|FILE.onnx",
+        help="what finds vehicles in frames: motion (default; what moves before a camera that stands "
+        "still), or a network",
+    )
+    add(
+        "--detector-events",
+        default="motion",
+        metavar="NAME|FILE.onnx",
+        help="what finds vehicles in events: motion (default), or a network",
+    )
+    add(
         "--detection-config",
         metavar="FILE",
-        help="YAML with settings of the detectors `motion` (sections frames, events)",
+        help="YAML with settings of the detectors (sections frames, events, model_frames, model_events)",
+    )
+    add(
+        "--detection-set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change one of these settings, say model_frames.layout=yolov8; may be given many times",
     )
     add("--event-rate", type=positive, metavar="HZ", help="scans of the events per second (default: 50)")
     add(
@@ -46,12 +66,14 @@ def detect_request(args: argparse.Namespace) -> DetectRequest:
     from jeat_graph.detection.detecting import DetectRequest
     from jeat_graph.detection.settings import load_settings
 
-    settings = load_settings(args.detection_config)
+    settings = load_settings(args.detection_config, args.detection_set)
     if args.event_rate is not None:
         settings = replace(settings, events=replace(settings.events, rate_hz=args.event_rate))
     return DetectRequest(
         frames=args.frames,
         events=args.events,
+        detector_frames=args.detector_frames,
+        detector_events=args.detector_events,
         rate_hz=args.rate,
         event_size_px=args.event_size,
         events_later_s=args.event_delay,

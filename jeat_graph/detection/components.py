@@ -49,7 +49,12 @@ def linked(marks: npt.NDArray[Any], link_px: int) -> tuple[int, npt.NDArray[np.i
 
 
 def measured(
-    count: int, labels: npt.NDArray[np.int32], marks: npt.NDArray[Any], *, keep_empty: bool = False
+    count: int,
+    labels: npt.NDArray[np.int32],
+    marks: npt.NDArray[Any],
+    trim_share: float = 0.0,
+    *,
+    keep_empty: bool = False,
 ) -> Components:
     """Measure groups by their marked pixels.
 
@@ -57,9 +62,13 @@ def measured(
         count: number of groups.
         labels: (H, W) group of each pixel, 0 for none.
         marks: (H, W) weight of each pixel; 0 where it is not marked.
+        trim_share: columns at the left and right of a group that have fewer marked pixels than this share of
+            its fullest column are not of its box, and so for rows: thin shadows, and noise.
         keep_empty: also return groups without a marked pixel, with boxes of no size, so that rows are groups.
     """
     corners, weight, pixels = _measure(count, labels, marks)
+    if trim_share > 0.0:
+        _trim(labels, marks, corners, trim_share)
     found = (pixels > 0) | keep_empty
     corners[pixels == 0] = 0
     corners = corners[found].astype(np.float64)
@@ -106,3 +115,35 @@ def _measure(count: int, labels: Any, marks: Any) -> tuple[Any, Any, Any]:
                 weight[k] += mark
                 pixels[k] += 1
     return corners, weight, pixels
+
+
+@numba.njit(cache=True)
+def _trim(labels: Any, marks: Any, corners: Any, share: float) -> None:
+    """Take thin ends off the corners (M, 4), from each side up to the first full enough column or row."""
+    count = len(corners)
+    start = np.zeros((count + 1, 2), dtype=np.int64)
+    for k in range(count):
+        start[k + 1, 0] = start[k, 0] + max(corners[k, 2] - corners[k, 0], 0)
+        start[k + 1, 1] = start[k, 1] + max(corners[k, 3] - corners[k, 1], 0)
+    columns = np.zeros(start[count, 0], dtype=np.int64)
+    rows = np.zeros(start[count, 1], dtype=np.int64)
+    height, width = labels.shape
+    for row in range(height):
+        for column in range(width):
+            if labels[row, column] > 0 and marks[row, column] > 0:
+                k = labels[row, column] - 1
+                columns[start[k, 0] + column - corners[k, 0]] += 1
+                rows[start[k, 1] + row - corners[k, 1]] += 1
+    for k in range(count):
+        for axis, filled in ((0, columns), (1, rows)):
+            low, high = start[k, axis], start[k + 1, axis]
+            if high <= low:
+                continue
+            least = share * filled[low:high].max()
+            first, last = low, high - 1
+            while filled[first] < least:
+                first += 1
+            while filled[last] < least:
+                last -= 1
+            corners[k, axis + 2] = corners[k, axis] + last - low + 1
+            corners[k, axis] += first - low

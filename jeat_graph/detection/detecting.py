@@ -14,11 +14,14 @@ import numpy as np
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.events import EventArray
+from jeat_graph.detection.binned import BinnedDetector
 from jeat_graph.detection.event_detector import EventDetector
 from jeat_graph.detection.picture_detector import PictureDetector
 from jeat_graph.detection.settings import DetectionSettings
 
 FRAMES_SENSOR, EVENTS_SENSOR = "rgb", "evt"
+#: The detectors without weights, by the name that `--detector-frames` and `--detector-events` take.
+MOTION = "motion"
 _US_PER_S = 1e6
 
 
@@ -29,14 +32,18 @@ class DetectRequest:
     Attributes:
         frames: a video, a folder of pictures, or an AEDAT 4 file; or None.
         events: a file of events; or None.
+        detector_frames: `motion`, or an ONNX file.
+        detector_events: `motion`, or an ONNX file.
         rate_hz: frames per second where neither the video nor a table beside it says.
         event_size_px: width and height of the event camera's picture, where the file does not say.
         events_later_s: what to add to the times of the events for the clock of the frames (s).
-        settings: of the detectors without weights.
+        settings: of the detectors.
     """
 
     frames: str | Path | None = None
     events: str | Path | None = None
+    detector_frames: str = MOTION
+    detector_events: str = MOTION
     rate_hz: float | None = None
     event_size_px: tuple[int, int] | None = None
     events_later_s: float = 0.0
@@ -115,6 +122,12 @@ def _picture_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str]
     say(f"frames: {len(source)} of {width} x {height} px, {request.frames}")
     if source.missing:
         say(f"{request.frames}: damaged or cut off: {source.missing} frames cannot be decoded")
+    if request.detector_frames != MOTION:
+        from jeat_graph.detection.models.pictures import ModelPictureDetector
+
+        model = ModelPictureDetector(request.detector_frames, FRAMES_SENSOR, request.settings.model_frames)
+        say(model.description)
+        return (model(frame, t) for t, frame in source)
     detector = PictureDetector(FRAMES_SENSOR, request.settings.frames)
     _prime(detector, source, request)
     found = (detector(frame, t) for t, frame in source)
@@ -141,7 +154,18 @@ def _event_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str], 
         raise DataError("does not say the size of its picture; give it with --event-size WxH", request.events)
     width, height = reader.size_px
     say(f"events: {reader.format_name} of {width} x {height} px, {request.events}")
-    detector = EventDetector(reader.size_px, EVENTS_SENSOR, request.settings.events)
+    settings = request.settings
+    detector: BinnedDetector
+    if request.detector_events != MOTION:
+        from jeat_graph.detection.models.events import ModelEventDetector
+
+        model = ModelEventDetector(
+            request.detector_events, reader.size_px, EVENTS_SENSOR, settings.events, settings.model_events
+        )
+        say(model.description)
+        detector = model
+    else:
+        detector = EventDetector(reader.size_px, EVENTS_SENSOR, settings.events)
     later_us = reader.t_offset_us + round(request.events_later_s * _US_PER_S)
 
     def scans() -> Iterator[Scan]:

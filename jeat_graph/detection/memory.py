@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numba
 import numpy as np
 import numpy.typing as npt
 
@@ -19,8 +20,6 @@ _SAME_IOU = 0.3
 _INSIDE = 0.5
 # and holds a part of it from this share on.
 _TOUCHED = 0.08
-# Free space between the pieces of one cloud, as a share of its longer side.
-_MOST_GAP = 0.5
 # Share of a new velocity in its running mean.
 _NEW_SHARE = 0.3
 
@@ -71,9 +70,9 @@ class CloudMemory:
         if len(expected) and len(y):
             places = np.stack([x, y], axis=1).astype(np.float64) + 0.5
             cloud = self._assign(cloud, places, expected)
-        names, number = np.unique(cloud, return_inverse=True)
-        out[y, x] = number.reshape(-1) + 1
-        return len(names), out
+        there = np.bincount(cloud) > 0
+        out[y, x] = np.cumsum(there)[cloud]
+        return int(there.sum()), out
 
     def _assign(self, cloud: IntArray, places: FloatArray, expected: FloatArray) -> IntArray:
         """Name the cloud of each marked pixel (P,): as before, or a new name for each remembered box.
@@ -89,7 +88,7 @@ class CloudMemory:
         near = _shares(cloud, places, _grown(expected, self._link_px))
         pieces: dict[int, list[int]] = {}
         new = cloud.copy()
-        for m in np.unique(cloud):
+        for m in np.flatnonzero(np.bincount(cloud)):
             touched = self._apart(np.flatnonzero(old & (share[m] >= _TOUCHED)))
             if len(touched) > 1:
                 rows = np.flatnonzero(cloud == m)
@@ -100,9 +99,8 @@ class CloudMemory:
                 fit = np.where(old & (near[m] >= _INSIDE), share[m] + near[m], -1.0)
                 pieces.setdefault(int(np.argmax(fit)), []).append(int(m))
         for k, names in pieces.items():
-            # A dark body fires at its ends only: the gap within it is a part of its length.
-            widest = max(2.0 * self._link_px, _MOST_GAP * float(expected[k, 2:].max()))
-            _join(new, places, list(dict.fromkeys(names)), widest)
+            # A dark body fires at its ends only: pieces may be far apart, but within what it was.
+            _join(new, places, list(dict.fromkeys(names)), expected[k, 2:] + 2.0 * self._link_px)
         return new
 
     def remember(self, boxes: FloatArray) -> None:
@@ -147,34 +145,66 @@ def _common(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.asarray(np.prod(np.clip(high - low, 0.0, None), axis=2))
 
 
-def _join(cloud: IntArray, places: FloatArray, names: list[int], widest_px: float) -> None:
-    """Give the first name to all pieces that lie near one that has it already."""
-    reach = {name: _extent(places[cloud == name]) for name in names if (cloud == name).any()}
-    joined = list(reach)[:1]
-    found = True
-    while found:
-        waiting = [name for name in reach if name not in joined]
-        close = [n for n in waiting if any(_gap(reach[n], reach[j]) < widest_px for j in joined)]
-        joined += close
-        found = bool(close)
-    for name in joined[1:]:
-        cloud[cloud == name] = joined[0]
+def _join(cloud: IntArray, places: FloatArray, names: list[int], most_px: FloatArray) -> None:
+    """Give the first name to the pieces, largest first, as long as all of them together are not too large.
+
+    Args:
+        cloud: (P,) name of each pixel; changed.
+        places: (P, 2) of the pixels (px).
+        names: of the pieces; the first comes first whatever its size.
+        most_px: (2,) width and height that they may have together (px).
+    """
+    size = {name: int((cloud == name).sum()) for name in names}
+    names = [name for name in names if size[name]]
+    whole = None
+    for name in sorted(names, key=lambda name: (name != names[0], -size[name])):
+        part = _extent(places[cloud == name])
+        if whole is None:
+            whole = part
+            continue
+        low = np.minimum(whole[:2], part[:2])
+        both = np.concatenate([low, np.maximum(whole[:2] + whole[2:], part[:2] + part[2:]) - low])
+        if (both[2:] <= most_px).all():
+            cloud[cloud == name] = names[0]
+            whole = both
 
 
 def _shares(cloud: IntArray, places: FloatArray, boxes: FloatArray) -> FloatArray:
     """Share of each cloud's pixels that lie in each box (K, 4): rows by the name of the cloud."""
-    low, high = boxes[:, :2], boxes[:, :2] + boxes[:, 2:]
-    inside = np.asarray(((places[:, None] >= low) & (places[:, None] <= high)).all(axis=2))
-    count = np.bincount(cloud)
-    sums = [np.bincount(cloud, inside[:, k], minlength=len(count)) for k in range(len(boxes))]
-    return np.asarray(np.stack(sums, axis=1) / np.maximum(count, 1)[:, None])
+    names = int(cloud.max()) + 1
+    inside, count = _count_inside(cloud, places, boxes, names)
+    return np.asarray(inside / np.maximum(count, 1)[:, None])
 
 
-def _nearest(places: FloatArray, boxes: FloatArray) -> IntArray:
+@numba.njit(cache=True)
+def _count_inside(cloud: IntArray, places: FloatArray, boxes: FloatArray, names: int) -> tuple[Any, Any]:
+    """Pixels of each cloud in each box (names, K), and of each cloud (names,)."""
+    inside = np.zeros((names, len(boxes)), dtype=np.int64)
+    count = np.zeros(names, dtype=np.int64)
+    for k in range(len(cloud)):
+        x, y, name = places[k, 0], places[k, 1], cloud[k]
+        count[name] += 1
+        for j in range(len(boxes)):
+            dx, dy = x - boxes[j, 0], y - boxes[j, 1]
+            if 0.0 <= dx <= boxes[j, 2] and 0.0 <= dy <= boxes[j, 3]:
+                inside[name, j] += 1
+    return inside, count
+
+
+@numba.njit(cache=True)
+def _nearest(places: FloatArray, boxes: FloatArray) -> Any:
     """Return which box each place belongs to: distances in halves of a box, so that 1 is its edge."""
-    centre, half = _centres(boxes), np.maximum(boxes[:, 2:] / 2.0, 1.0)
-    apart = np.abs(places[:, None] - centre[None]) / half[None]
-    return np.asarray(apart.max(axis=2).argmin(axis=1), dtype=np.int64)
+    out = np.zeros(len(places), dtype=np.int64)
+    for k in range(len(places)):
+        least = np.inf
+        for j in range(len(boxes)):
+            half_x, half_y = max(boxes[j, 2] / 2.0, 1.0), max(boxes[j, 3] / 2.0, 1.0)
+            dx = abs(places[k, 0] - boxes[j, 0] - boxes[j, 2] / 2.0) / half_x
+            dy = abs(places[k, 1] - boxes[j, 1] - boxes[j, 3] / 2.0) / half_y
+            if max(dx, dy) < least:
+                least = max(dx, dy)
+                out[k] = j
+    return out
 
 
 def _extent(places: FloatArray) -> FloatArray:
@@ -186,10 +216,3 @@ def _iou(a: FloatArray, b: FloatArray) -> FloatArray:
     common = _common(a, b)
     areas = np.prod(a[:, 2:], axis=1)[:, None] + np.prod(b[:, 2:], axis=1)[None]
     return np.asarray(common / np.maximum(areas - common, 1.0))
-
-
-def _gap(a: FloatArray, b: FloatArray) -> float:
-    """Free space between two boxes along rows or columns, whichever is more (px)."""
-    low = np.maximum(a[:2], b[:2])
-    high = np.minimum(a[:2] + a[2:], b[:2] + b[2:])
-    return float((low - high).max())

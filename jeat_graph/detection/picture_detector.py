@@ -53,7 +53,7 @@ class PictureDetector:
         self._adapted_s = -math.inf
         self._last_s = -math.inf
         self._memory: CloudMemory | None = None
-        self._link_px = 1
+        self._link_px = self._near_px = 2
 
     @property
     def ready(self) -> bool:
@@ -79,7 +79,9 @@ class PictureDetector:
         self._noise = _SIGMA_PER_MAD * mad
         self._most_noise = _MOST_NOISE * float(np.median(self._noise)) + 1.0
         height, width = self._background.shape
-        self._link_px = max(1, round(self.settings.link_share * math.hypot(width, height)))
+        diagonal = math.hypot(width, height)
+        self._link_px = max(2, round(self.settings.link_share * diagonal))
+        self._near_px = max(2, round(self.settings.near_share * diagonal))
 
     def __call__(self, frame: RgbImage, t: float) -> Scan | None:
         """Return what moves in a picture.
@@ -110,7 +112,7 @@ class PictureDetector:
         if marks is None:
             return None
         if self._memory is None and math.isfinite(step_s):
-            self._memory = CloudMemory(self._link_px, max(1, round(self.settings.apart_s / step_s)))
+            self._memory = CloudMemory(self._near_px, max(1, round(self.settings.apart_s / step_s)))
         found = self._groups(marks)
         scores = 1.0 - np.exp(-found.pixels / self.settings.certain_pixels)
         return Scan(t, self.sensor, found.boxes, scores)
@@ -153,7 +155,7 @@ class PictureDetector:
         count, labels = linked(marks, self._link_px)
         if self._memory is not None:
             count, labels = self._memory.relabel(labels, marks)
-        found = measured(count, labels, marks)
+        found = measured(count, labels, marks, settings.trim_share)
         large = (found.boxes[:, 2:] >= settings.least_side_px).all(axis=1)
         found = found.take(large & (found.pixels >= settings.least_pixels))
         found = found.take(without_inner(found, settings.inside_share))

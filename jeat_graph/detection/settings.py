@@ -1,19 +1,35 @@
-"""Settings of the detectors that need no weights, from YAML with the sections `frames` and `events`."""
+"""Settings of detectors, from YAML: `frames`, `events`, and of networks `model_frames`, `model_events`."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from jeat_graph.config.fields import Section, number
-from jeat_graph.config.section_tree import build, read_tree
+from jeat_graph.config.section_tree import build, merge, read_tree
+from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.data.errors import ConfigError
+from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.noise import NoiseSettings
 
 _SAME = 1e-6
 _LINK = (
-    "what is closer belongs together, as a share of the picture's diagonal: 5 px at 346 x 260, 9 px at "
-    "640 x 384, 18 px at 1280 x 720"
+    "pixels across a smaller gap belong together, as a share of the picture's diagonal, at least 2 px: 9 px "
+    "at 640 x 384, 18 px at 1280 x 720"
+)
+_LINK_EVENTS = (
+    "pixels across a gap of less than this, divided by the mean number of events in a pixel that has any, "
+    "belong together: where events are few, holes in a vehicle are wide; at least 2 px, at most near_share"
+)
+_NEAR = (
+    "pieces lie where one was a moment ago if they are no farther out, as a share of the diagonal: 5 px at "
+    "346 x 260, 9 px at 640 x 384, 18 px at 1280 x 720"
+)
+_TRIM = (
+    "columns and rows at the ends of a group with fewer pixels than this share of its fullest one are not of "
+    "its box"
 )
 _INSIDE = "a group is part of a heavier one if this share of its box lies in the other's"
 _APART = "two groups that run together stay two if they were there, and moved apart, for so long"
@@ -27,9 +43,11 @@ class EventSettings(Section):
     window_s: float = number(0.04, "s", "events of so long are linked", open_low=True)
     extent_s: float = number(0.02, "s", "a box reaches as far as the newest events of so long", open_low=True)
     bin_s: float = number(0.005, "s", "length of a bin; the other times are whole multiples of it", 1e-4, 1.0)
-    link_share: float = number(0.012, "1", _LINK, 0.0, 0.2)
+    link_events: float = number(10.0, "px", _LINK_EVENTS, 0.1)
+    near_share: float = number(0.012, "1", _NEAR, 0.0, 0.2)
     least_events: int = number(12, "1", "a cloud of fewer events in the window is none", 1)
     least_side_px: float = number(3.0, "px", "a cloud that is narrower or lower is none", 1.0)
+    trim_share: float = number(0.2, "1", _TRIM, 0.0, 0.9)
     inside_share: float = number(0.6, "1", _INSIDE, 0.0, 1.0)
     apart_s: float = number(0.1, "s", _APART)
     certain_events: float = number(40.0, "1", "at so many events a score reaches 1 - 1/e", open_low=True)
@@ -81,6 +99,7 @@ class PictureSettings(Section):
     )
     least_contrast: float = number(12.0, "grey levels", "and by at least this, of 255", 0.0, 255.0)
     link_share: float = number(0.012, "1", _LINK, 0.0, 0.2)
+    near_share: float = number(0.012, "1", _NEAR, 0.0, 0.2)
     least_pixels: int = number(12, "px", "a group of fewer pixels is none", 1)
     least_side_px: float = number(4.0, "px", "a group that is narrower or lower is none", 1.0)
     most_share: float = number(
@@ -90,6 +109,7 @@ class PictureSettings(Section):
         0.01,
         1.0,
     )
+    trim_share: float = number(0.2, "1", _TRIM, 0.0, 0.9)
     inside_share: float = number(0.6, "1", _INSIDE, 0.0, 1.0)
     apart_s: float = number(0.2, "s", _APART)
     certain_pixels: float = number(
@@ -99,19 +119,33 @@ class PictureSettings(Section):
 
 @dataclass(frozen=True)
 class DetectionSettings:
-    """Settings of both detectors."""
+    """Settings of both detectors, and of the networks that may take their place."""
 
     frames: PictureSettings = field(default_factory=PictureSettings)
     events: EventSettings = field(default_factory=EventSettings)
+    model_frames: ModelSettings = field(default_factory=ModelSettings)
+    model_events: ModelSettings = field(default_factory=ModelSettings)
 
 
-def load_settings(path: str | Path | None = None) -> DetectionSettings:
+def load_settings(path: str | Path | None = None, changes: Sequence[str] = ()) -> DetectionSettings:
     """Read the settings from a YAML file; what it does not name keeps its default.
+
+    Args:
+        path: the file, or None.
+        changes: `section.key=value` texts over it.
 
     Raises:
         ConfigError: no such file, unknown key (with the nearest known one) or bad value.
     """
     tree = {} if path is None else read_tree(str(path), (), str, "detection file")
+    for text in changes:
+        key, equals, value = text.partition("=")
+        if not equals or not key.strip():
+            raise ConfigError(f"{text!r}: must read section.key=value")
+        inner: Any = load_yaml(value)
+        for step in reversed(key.strip().split(".")):
+            inner = {step: inner}
+        tree = merge(tree, inner)
     out = build(DetectionSettings, tree, "")
     assert isinstance(out, DetectionSettings)
     return out

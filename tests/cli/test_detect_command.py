@@ -122,11 +122,11 @@ def test_a_real_street_from_one_file(tmp_path):
     pytest.importorskip("aedat", reason="pip install 'jeat-graph[aedat4]'")
     assert main(["track", "--frames", str(STREET), "--events", str(STREET), "--out", str(tmp_path)]) == 0
     table = pd.read_csv(tmp_path / "smoothed.csv")
-    # Three cars: near and white all the time, far and white all the time, dark from the shadow at 1.3 s.
+    # Three cars: near and white all the time, far and white all the time, dark from the shadow at 1.2 s.
     lives = table.groupby("track_id").t.agg(["min", "max"])
     long = lives[lives["max"] - lives["min"] > 1.0]
     assert len(long) == 3
-    assert sorted(long["min"].round(1)) == [0.0, 0.0, 1.3]
+    assert sorted(long["min"].round(1)) == [0.0, 0.0, 1.2]
     assert (long["max"] > 2.3).all()
     # The parked van does not move, so nobody sees it.
     assert not ((table.x - 170).abs() + (table.y - 171).abs() < 10).any()

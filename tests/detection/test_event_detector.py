@@ -98,8 +98,10 @@ def test_settings_are_checked_and_named(tmp_path):
     with pytest.raises(ConfigError, match=r"rate_hz: 30 gives 0.0333333 s, no whole number of bins"):
         EventSettings(rate_hz=30.0)
     file = tmp_path / "d.yaml"
-    file.write_text("events: {link_shar: 0.02}\n", encoding="utf-8")
-    with pytest.raises(ConfigError, match=r"unknown key events.link_shar; did you mean events.link_share\?"):
+    file.write_text("events: {link_event: 5}\n", encoding="utf-8")
+    with pytest.raises(
+        ConfigError, match=r"unknown key events.link_event; did you mean events.link_events\?"
+    ):
         load_settings(file)
     file.write_text("events: {window_s: 0.03}\nframes: {sigmas: 5}\n", encoding="utf-8")
     found = load_settings(file)

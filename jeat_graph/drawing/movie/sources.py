@@ -96,7 +96,9 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
     rate_hz = request.rate_hz or _rate_of(frames) or DEFAULT_RATE_HZ
     if request.events is not None:
         window_s = request.window_s if request.window_s is not None else 1.0 / rate_hz
-        events = EventBackground(stack.enter_context(open_stretches(request.events)), window_s)
+        stretches = open_stretches(request.events)
+        stack.callback(stretches.close)
+        events = EventBackground(stretches, window_s)
     times = _times(request, _span(frames, events, tables, truth), frames, rate_hz)
 
     backgrounds: list[Background] = [one for one in (frames, events) if one is not None]

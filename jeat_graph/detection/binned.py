@@ -1,0 +1,123 @@
+"""Events, piece by piece, into bins and windows: what detectors of events have in common."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jeat_graph.data.detections import Scan
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.events import EventArray
+from jeat_graph.detection.noise import NoiseFilter
+from jeat_graph.detection.settings import EventSettings
+from jeat_graph.detection.windows import EventBins
+
+_US_PER_S = 1e6
+
+
+class BinnedDetector:
+    """Turns events into scans, one each step; what a scan holds, `_look` says.
+
+    Args:
+        size_px: width and height of the picture.
+        sensor: name of the sensor in the scans.
+        rate_hz: scans per second.
+        bins: the window.
+        filled_bins: bins that must be full before the first scan.
+        settings: noise, and the longest gap.
+    """
+
+    def __init__(
+        self,
+        size_px: tuple[int, int],
+        sensor: str,
+        rate_hz: float,
+        bins: EventBins,
+        filled_bins: int,
+        settings: EventSettings,
+    ) -> None:
+        self.size_px, self.sensor = size_px, sensor
+        self._bins = bins
+        self._step_bins = round(_US_PER_S / (rate_hz * bins.bin_us))
+        self._filled_bins = filled_bins
+        self._longest_gap_us = settings.longest_gap_s * _US_PER_S
+        self._noise = NoiseFilter(size_px, settings.noise)
+        self._rest = EventArray.empty()
+        self._last_us: int | None = None
+        self._until_scan = 0
+
+    def push(self, events: EventArray) -> list[Scan]:
+        """Take events that follow those before, and return the scans that they complete.
+
+        Args:
+            events: any number, of any length of time.
+
+        Raises:
+            DataError: they begin before the last ones.
+        """
+        if not len(events):
+            return []
+        first_us, last_us = int(events.t_us[0]), int(events.t_us[-1])
+        if self._last_us is None:
+            self._begin(first_us)
+        elif first_us < self._last_us:
+            raise DataError(f"events begin at {first_us} µs, before the last ones at {self._last_us} µs")
+        self._last_us = last_us
+        signal = self._noise.keep(EventArray.trusted(events.t_us, events.x, events.y, events.polarity))
+        waiting = _joined(self._rest, signal)
+        times = waiting.t_us
+        scans: list[Scan] = []
+        first = 0
+        # A bin is complete when an event behind it is there.
+        while self._bins.end_us + self._bins.bin_us <= last_us:
+            next_us = int(times[first]) if first < len(times) else last_us
+            if next_us - self._bins.end_us > self._longest_gap_us:
+                self._begin(next_us)
+                continue
+            end = int(np.searchsorted(times, self._bins.end_us + self._bins.bin_us))
+            scans += self._advance(waiting.take(slice(first, end)))
+            first = end
+        self._rest = waiting.take(slice(first, None))
+        return scans
+
+    def finish(self) -> list[Scan]:
+        """Return the scan of the last, incomplete bin, if one is due; nothing may be pushed afterwards."""
+        if not len(self._rest):
+            return []
+        rest, self._rest = self._rest, EventArray.empty()
+        return self._advance(rest)
+
+    def _look(self) -> Scan:
+        """Return the scan of the window as it is."""
+        raise NotImplementedError
+
+    def _emptied(self) -> None:
+        """Forget what was before: a new recording begins, or time has leapt."""
+
+    def _begin(self, first_us: int) -> None:
+        """Let scans end at whole multiples of a step, whatever the first event's time."""
+        number = first_us // self._bins.bin_us
+        self._bins.skip_to(number * self._bins.bin_us)
+        self._until_scan = self._step_bins - number % self._step_bins
+        while self._until_scan < self._filled_bins:  # nothing is said of a window that is not full
+            self._until_scan += self._step_bins
+        self._emptied()
+
+    def _advance(self, events: EventArray) -> list[Scan]:
+        self._bins.advance(events)
+        self._until_scan -= 1
+        if self._until_scan:
+            return []
+        self._until_scan = self._step_bins
+        return [self._look()]
+
+
+def _joined(a: EventArray, b: EventArray) -> EventArray:
+    """Put two arrays together that follow one another."""
+    if not len(a):
+        return b
+    return EventArray.trusted(
+        np.concatenate([a.t_us, b.t_us]),
+        np.concatenate([a.x, b.x]),
+        np.concatenate([a.y, b.y]),
+        np.concatenate([a.polarity, b.polarity]),
+    )

@@ -1,0 +1,1 @@
+"""Networks from ONNX files: what they want, what they say, and how they are run."""

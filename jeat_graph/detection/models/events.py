@@ -1,0 +1,139 @@
+"""A network of the user's that finds vehicles in windows of events, with or without a memory of its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.detections import Scan
+from jeat_graph.data.errors import DataError
+from jeat_graph.detection.binned import BinnedDetector
+from jeat_graph.detection.models.choosing import choose, class_names, wanted_classes
+from jeat_graph.detection.models.engine import open_engine
+from jeat_graph.detection.models.layouts import decode, is_raw
+from jeat_graph.detection.models.model_settings import ModelSettings
+from jeat_graph.detection.models.onnx_head import OnnxHead, Port, read_onnx_head
+from jeat_graph.detection.models.pictures import class_count, layout_of
+from jeat_graph.detection.settings import EventSettings
+from jeat_graph.detection.windows import EventBins
+
+_US_PER_S = 1e6
+
+
+class ModelEventDetector(BinnedDetector):
+    """Turns events, given piece by piece, into scans by a network from an ONNX file.
+
+    Its first input is the stacked histogram (1, 2 x bins, height, width) of `windows.EventBins`; a picture
+    that is smaller is filled up with zeros at the right and below. Further inputs are its memory: each has an
+    output of the same shape, in the same order, which is given back with the next window; it begins with
+    zeros.
+
+    Args:
+        path: the ONNX file.
+        size_px: width and height of the camera's picture.
+        sensor: name of the sensor in the scans.
+        times: rate and bins of the windows.
+        settings: how the network is read.
+
+    Attributes:
+        description: one line that says what was recognised.
+
+    Raises:
+        ConfigError: a backend that is not installed, or a class that is not known.
+        DataError: no ONNX file, or one that does not fit.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        size_px: tuple[int, int],
+        sensor: str = "evt",
+        times: EventSettings | None = None,
+        settings: ModelSettings | None = None,
+    ) -> None:
+        times = times or EventSettings()
+        self._settings = settings or ModelSettings()
+        self._path = Path(path)
+        head = read_onnx_head(path)
+        self._input = _window_input(head, self._path)
+        bins = (self._input.shape[1] or 0) // 2
+        super().__init__(size_px, sensor, times.rate_hz, EventBins(size_px, bins, times.bin_s), bins, times)
+        width, height = size_px
+        self._side = (self._input.shape[3] or width, self._input.shape[2] or height)
+        if width > self._side[0] or height > self._side[1]:
+            raise DataError(
+                f"takes windows of {self._side[0]} x {self._side[1]} px; the camera has {width} x {height}",
+                path,
+            )
+        self._memory, outputs = _memory(head, self._path)
+        self._layout = layout_of(outputs, self._side, head.notes, self._settings.layout, self._path)
+        self._unsure = self._layout == "yolox" and self._settings.layout == "auto"
+        self._outputs = [port.name for port in outputs]
+        names = class_names(head.notes)
+        count = class_count(self._layout, outputs) or (len(names) or None)
+        self._wanted, words = wanted_classes(self._settings.classes, None if not names else count, names)
+        self._engine = open_engine(path, head, self._settings.backend, self._settings.threads)
+        self._state: dict[str, npt.NDArray[Any]] = {}
+        kept = f", {len(self._memory)} states kept" if self._memory else ""
+        self.description = (
+            f"{self._path.name}: layout {self._layout}, windows of {bins} bins of {times.bin_s:g} s in "
+            f"{self._side[0]} x {self._side[1]} px{kept}, {words}, run by {self._engine.name}"
+        )
+
+    def _emptied(self) -> None:
+        self._state = {}
+
+    def _look(self) -> Scan:
+        width, height = self.size_px
+        window = np.zeros(
+            (1, self._input.shape[1] or 0, self._side[1], self._side[0]), dtype=self._input.kind
+        )
+        window[0, :, :height, :width] = self._bins.stack()
+        inputs = {self._input.name: window}
+        for given, _ in self._memory:
+            empty = np.zeros([side or 1 for side in given.shape], dtype=given.kind)
+            inputs[given.name] = self._state.get(given.name, empty)
+        outputs = self._engine.run(inputs)
+        self._state = {given.name: outputs[returned] for given, returned in self._memory}
+        wanted = {name: outputs[name] for name in self._outputs}
+        if self._unsure:
+            (only,) = wanted.values()
+            self._layout = "yolox-raw" if is_raw(only[0], self._side) else "yolox"
+            self._unsure = False
+        found = decode(self._layout, wanted, self._side)
+        corners, scores, _ = choose(found, self._wanted, self._settings.score, self._settings.overlap)
+        corners = np.clip(corners, 0.0, [width, height, width, height])
+        inside = _with_area(corners)
+        return Scan.from_xyxy(self._bins.end_us / _US_PER_S, self.sensor, corners[inside], scores[inside])
+
+
+def _with_area(corners: FloatArray) -> npt.NDArray[np.bool_]:
+    return np.asarray((corners[:, 2:] - corners[:, :2] > 0.0).all(axis=1))
+
+
+def _window_input(head: OnnxHead, path: Path) -> Port:
+    first = head.inputs[0]
+    channels = first.shape[1] if len(first.shape) == 4 else None
+    if not channels or channels % 2:
+        shapes = ", ".join(f"{port.name} {list(port.shape)}" for port in head.inputs)
+        raise DataError(
+            f"takes {shapes}; a detector of events takes [1, 2 x bins, height, width] first", path
+        )
+    return first
+
+
+def _memory(head: OnnxHead, path: Path) -> tuple[list[tuple[Port, str]], tuple[Port, ...]]:
+    """Pair inputs and outputs of a network's memory, and return what other outputs there are."""
+    pairs: list[tuple[Port, str]] = []
+    left = list(head.outputs)
+    for given in head.inputs[1:]:
+        match = next((port for port in left if port.shape == given.shape), None)
+        if match is None:
+            raise DataError(f"takes {given.name} {list(given.shape)} and gives nothing like it back", path)
+        left.remove(match)
+        pairs.append((given, match.name))
+    return pairs, tuple(left)

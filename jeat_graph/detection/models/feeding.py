@@ -1,0 +1,103 @@
+"""From a picture to a network's input, and from boxes in that input back to the picture."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.detection.models.model_settings import ModelSettings
+from jeat_graph.io.decoders import RgbImage
+
+_IMAGENET_MEAN, _IMAGENET_STD = (123.675, 116.28, 103.53), (58.395, 57.12, 57.375)
+
+
+class Feed(NamedTuple):
+    """How pictures become input.
+
+    Attributes:
+        rgb: whether red comes first; else blue.
+        fit: `letterbox`, `letterbox-centre` or `stretch`.
+        scale: a grey level is multiplied by it,
+        mean: then this is taken off, in the order of the colours,
+        std: and it is divided by this.
+        pad: grey level of letterboxes.
+    """
+
+    rgb: bool
+    fit: str
+    scale: float
+    mean: tuple[float, ...]
+    std: tuple[float, ...]
+    pad: float
+
+    def __str__(self) -> str:
+        order = "RGB" if self.rgb else "BGR"
+        shift = f", mean {list(self.mean)}, std {list(self.std)}" if any(self.mean) else ""
+        return f"{order}, {self.fit}, scale {self.scale:.4g}{shift}"
+
+
+class Placed(NamedTuple):
+    """Where the picture lies in the input: x = scale_x · picture + left (px), and so for y."""
+
+    scale_x: float
+    scale_y: float
+    left: float
+    top: float
+
+    def back(self, corners: FloatArray) -> FloatArray:
+        """Return corners (M, 4) in px of the picture."""
+        shift = np.array([self.left, self.top, self.left, self.top])
+        return np.asarray(
+            (corners - shift) / np.array([self.scale_x, self.scale_y, self.scale_x, self.scale_y])
+        )
+
+
+def usual_feed(layout: str, settings: ModelSettings) -> Feed:
+    """Return how networks of a layout are usually fed, with what the settings say instead.
+
+    YOLOX and NanoDet were trained on BGR of 0 to 255, the others on RGB of 0 to 1.
+    """
+    plain = layout in ("yolox", "yolox-raw", "nanodet")
+    fit = {"yolox": "letterbox", "yolox-raw": "letterbox", "nanodet": "stretch"}
+    fit |= {"detr": "stretch", "detr-softmax": "stretch", "boxes": "stretch"}
+    mean: tuple[float, ...] = (0.0, 0.0, 0.0)
+    std: tuple[float, ...] = (1.0, 1.0, 1.0)
+    scale = 1.0 if plain else 1.0 / 255.0
+    if layout == "nanodet":
+        mean, std = _IMAGENET_MEAN[::-1], _IMAGENET_STD[::-1]
+    elif layout == "detr-softmax":
+        mean = tuple(m / 255.0 for m in _IMAGENET_MEAN)
+        std = tuple(s / 255.0 for s in _IMAGENET_STD)
+    return Feed(
+        rgb=not plain if settings.color == "auto" else settings.color == "rgb",
+        fit=fit.get(layout, "letterbox-centre") if settings.fit == "auto" else settings.fit,
+        scale=scale if settings.scale is None else settings.scale,
+        mean=settings.mean or mean,
+        std=settings.std or std,
+        pad=settings.pad,
+    )
+
+
+def place(frame: RgbImage, side: tuple[int, int], feed: Feed) -> tuple[npt.NDArray[np.float32], Placed]:
+    """Turn a picture (H, W, 3) into input (1, 3, height, width) of the given side (width, height, px)."""
+    import cv2
+
+    height, width = frame.shape[:2]
+    if feed.fit == "stretch":
+        at = Placed(side[0] / width, side[1] / height, 0.0, 0.0)
+        canvas: Any = cv2.resize(frame, side)
+    else:
+        scale = min(side[0] / width, side[1] / height)
+        inner = max(round(width * scale), 1), max(round(height * scale), 1)
+        spare = (side[0] - inner[0], side[1] - inner[1]) if feed.fit == "letterbox-centre" else (0, 0)
+        left, top = spare[0] // 2, spare[1] // 2
+        at = Placed(inner[0] / width, inner[1] / height, float(left), float(top))
+        canvas = np.full((side[1], side[0], 3), feed.pad, dtype=np.uint8)
+        canvas[top : top + inner[1], left : left + inner[0]] = cv2.resize(frame, inner)
+    ordered = canvas if feed.rgb else canvas[..., ::-1]
+    mean, std = np.array(feed.mean, dtype=np.float32), np.array(feed.std, dtype=np.float32)
+    values = (ordered.astype(np.float32) * np.float32(feed.scale) - mean) / std
+    return np.ascontiguousarray(values.transpose(2, 0, 1)[None]), at

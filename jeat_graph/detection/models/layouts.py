@@ -1,0 +1,279 @@
+"""What the outputs of a detector mean: recognised by names and shapes, and turned into boxes and scores.
+
+==============  ==================================================  ==========================================
+layout          outputs                                             boxes
+==============  ==================================================  ==========================================
+`yolox`         [1, N, 5 + C], N one a cell of strides 8, 16, 32    centre and size (px), objectness, classes
+`yolox-raw`     the same                                            offsets in cells, logarithms of sizes
+`yolov5`        [1, N, 5 + C], N three a cell (YOLOv5, v7)          as `yolox`
+`yolov8`        [1, 4 + C, N], or transposed (YOLOv8, v9, 11)       centre and size (px), classes
+`end-to-end`    [1, K, 6] (YOLOv10, YOLO26)                         corners (px), score, class
+`detr`          `logits` [1, K, C], `pred_boxes` [1, K, 4]          centre and size, in shares of the picture
+`detr-softmax`  the same with a class for "nothing", the last       the same
+`boxes`         `labels`, `boxes`, `scores` (D-FINE, RT-DETR)       left, top, right, bottom
+`nanodet`       classes [1, n, C] and distances [1, n, 4 R] each    distributions of distances to the sides
+                stride, or all in one [1, N, C + 4 R]               from the middle of the cell, in strides
+==============  ==================================================  ==========================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.errors import DataError
+from jeat_graph.detection.models.onnx_head import Port
+
+_STRIDES = (8, 16, 32)
+_MORE_STRIDES = (8, 16, 32, 64)
+_COCO = 80
+_COCO_RAW = 91
+#: Bins of NanoDet's distances.
+_BINS = (8, 16)
+
+
+class Found(NamedTuple):
+    """Boxes in the network's input.
+
+    Attributes:
+        corners: (M, 4) left, top, right, bottom (px of the input; of the picture where `of_picture`).
+        scores: (M,) 0 to 1.
+        classes: (M,) number of the class.
+        distinct: whether no two boxes are of one thing, so that none are to be suppressed.
+    """
+
+    corners: FloatArray
+    scores: FloatArray
+    classes: IntArray
+    distinct: bool
+
+
+def recognise(outputs: Sequence[Port], side: tuple[int, int], notes: Mapping[str, str]) -> str | None:
+    """Return the layout of a network's outputs, or None if it is none that is known.
+
+    `yolox` may turn out to be `yolox-raw`: the values tell (`is_raw`).
+
+    Args:
+        outputs: what the file says of them.
+        side: width and height of the input (px).
+        notes: of the file; YOLO exports tell the number of classes there.
+    """
+    names = {port.name.lower() for port in outputs}
+    shapes = [tuple(n for n in port.shape) for port in outputs]
+    if {"logits", "pred_boxes"} <= names:
+        return "detr-softmax" if _last(outputs, "logits") == _COCO_RAW + 1 else "detr"
+    if {"dets", "labels"} <= names:
+        return "detr"
+    if {"boxes", "scores"} <= names:
+        return "boxes"
+    if len(outputs) in (6, 8) and all(len(shape) == 3 for shape in shapes):
+        return "nanodet"
+    if len(outputs) != 1 or len(shapes[0]) != 3:
+        return None
+    _, first, second = shapes[0]
+    if second == 6 and (first is None or first <= 1000):
+        return "end-to-end"
+    cells = _cell_count(side, _STRIDES)
+    if first is not None and second is not None and second in (cells, _cell_count(side, _MORE_STRIDES)):
+        return "yolov8"
+    if first == 3 * cells or first == 3 * _cell_count(side, _MORE_STRIDES):
+        return "yolov5"
+    if second in tuple(_COCO + 4 * bins for bins in _BINS):
+        return "nanodet"
+    if first == cells:
+        return "yolov8" if second == 4 + (_class_count(notes) or _COCO) else "yolox"
+    if second is None or (first is not None and first < second):
+        return "yolov8"
+    return None
+
+
+def decode(layout: str, outputs: Mapping[str, npt.NDArray[Any]], side: tuple[int, int]) -> Found:
+    """Turn outputs into boxes.
+
+    Args:
+        layout: one of this module's table.
+        outputs: by name, in the order of the file.
+        side: width and height of the input (px).
+
+    Raises:
+        DataError: the outputs are not of that layout.
+    """
+    try:
+        return _DECODERS[layout](outputs, side)
+    except (ValueError, IndexError, KeyError, StopIteration) as error:
+        shapes = ", ".join(f"{name} {list(value.shape)}" for name, value in outputs.items())
+        raise DataError(f"the network's outputs {shapes} are not of the layout {layout}: {error}") from None
+
+
+def is_raw(rows: npt.NDArray[Any], side: tuple[int, int]) -> bool:
+    """Whether YOLOX's boxes (N, 4) are still offsets in cells: then they do not lie where their cells do."""
+    places, strides = cells(side, _STRIDES)
+    if len(rows) != len(places):
+        return False
+    decoded = np.median(np.abs(rows[:, :2] / strides[:, None] - places - 0.5))
+    return bool(np.median(np.abs(rows[:, :2] - 0.5)) < decoded or (rows[:, 2:4] < 0).any())
+
+
+def cells(side: tuple[int, int], strides: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+    """Column and row of each cell (N, 2), and its stride (N,), row by row, the finest stride first."""
+    places, steps = [], []
+    for stride in strides:
+        width, height = -(-side[0] // stride), -(-side[1] // stride)
+        row, column = np.mgrid[:height, :width]
+        places.append(np.stack([column, row], axis=-1).reshape(-1, 2))
+        steps.append(np.full(width * height, float(stride)))
+    return np.concatenate(places).astype(np.float64), np.concatenate(steps)
+
+
+def _yolox(outputs: Mapping[str, Any], side: tuple[int, int]) -> Found:
+    return _with_objectness(_rows(outputs))
+
+
+def _yolox_raw(outputs: Mapping[str, Any], side: tuple[int, int]) -> Found:
+    rows = _rows(outputs).copy()
+    places, strides = cells(side, _STRIDES)
+    rows[:, :2] = (rows[:, :2] + places) * strides[:, None]
+    rows[:, 2:4] = np.exp(rows[:, 2:4]) * strides[:, None]
+    return _with_objectness(rows)
+
+
+def _yolov8(outputs: Mapping[str, Any], side: tuple[int, int]) -> Found:
+    rows = _rows(outputs)
+    if rows.shape[0] < rows.shape[1]:
+        rows = rows.T
+    return _best(_from_centre(rows[:, :4]), _squashed(rows[:, 4:]), distinct=False)
+
+
+def _end_to_end(outputs: Mapping[str, Any], side: tuple[int, int]) -> Found:
+    rows = _rows(outputs)
+    return Found(rows[:, :4], rows[:, 4], rows[:, 5].astype(np.int64), True)
+
+
+def _detr(outputs: Mapping[str, Any], side: tuple[int, int]) -> Found:
+    return _best(*_queries(outputs, side, softmax=False), distinct=True)
+
+
+def _detr_softmax(outputs: Mapping[str, Any], side: tuple[int, int]) -> Found:
+    return _best(*_queries(outputs, side, softmax=True), distinct=True)
+
+
+def _boxes(outputs: Mapping[str, Any], side: tuple[int, int]) -> Found:
+    low = {name.lower(): np.asarray(value, dtype=np.float64) for name, value in outputs.items()}
+    corners = low["boxes"].reshape(-1, 4)
+    if len(corners) and corners.max() <= 2.0:  # shares of the picture
+        corners = corners * np.array([*side, *side], dtype=np.float64)
+    labels = low["labels"].reshape(-1) if "labels" in low else np.zeros(len(corners))
+    return Found(corners, low["scores"].reshape(-1), labels.astype(np.int64), True)
+
+
+def _nanodet(outputs: Mapping[str, Any], side: tuple[int, int]) -> Found:
+    arrays = [np.asarray(value, dtype=np.float64)[0] for value in outputs.values()]
+    if len(arrays) == 1:
+        bins = next(b for b in _BINS if arrays[0].shape[1] - 4 * b >= 1 and _fits(len(arrays[0]), side))
+        classes, distances = arrays[0][:, : -4 * bins], arrays[0][:, -4 * bins :]
+    else:
+        half = len(arrays) // 2
+        # Grouped by kind, or in pairs: the two kinds differ in their last side.
+        kinds = sorted({array.shape[1] for array in arrays})
+        named = [(name.lower(), array) for name, array in zip(outputs, arrays, strict=True)]
+        is_distance = ["dis" in name or "reg" in name for name, _ in named]
+        if sum(is_distance) != half:
+            is_distance = [array.shape[1] == min(kinds) for array in arrays]
+        picked = [
+            [a for a, d in zip(arrays, is_distance, strict=True) if d is kind] for kind in (False, True)
+        ]
+        classes, distances = (np.concatenate(sorted(group, key=len, reverse=True)) for group in picked)
+    strides = _STRIDES if len(classes) == _cell_count(side, _STRIDES) else _MORE_STRIDES
+    places, steps = cells(side, strides)
+    parts = distances.reshape(len(distances), 4, -1)
+    shares = np.exp(parts - parts.max(axis=2, keepdims=True))
+    reach = (shares * np.arange(parts.shape[2])).sum(axis=2) / shares.sum(axis=2) * steps[:, None]
+    centre = (places + 0.5) * steps[:, None]
+    corners = np.column_stack([centre - reach[:, :2], centre + reach[:, 2:]])
+    return _best(corners, _squashed(classes), distinct=False)
+
+
+_DECODERS = {
+    "yolox": _yolox,
+    "yolox-raw": _yolox_raw,
+    "yolov5": _yolox,
+    "yolov8": _yolov8,
+    "end-to-end": _end_to_end,
+    "detr": _detr,
+    "detr-softmax": _detr_softmax,
+    "boxes": _boxes,
+    "nanodet": _nanodet,
+}
+
+
+LAYOUT_NAMES = tuple(_DECODERS)
+
+
+def _rows(outputs: Mapping[str, Any]) -> FloatArray:
+    """Return the one output without its batch."""
+    (only,) = outputs.values()
+    rows = np.asarray(only, dtype=np.float64)
+    if rows.ndim != 3 or rows.shape[0] != 1:
+        raise ValueError("one output of three sides, the first 1, is needed")
+    return np.asarray(rows[0])
+
+
+def _with_objectness(rows: FloatArray) -> Found:
+    if rows.shape[1] < 5:
+        raise ValueError("a row needs a box and an objectness")
+    objectness = _squashed(rows[:, 4:5])
+    classes = _squashed(rows[:, 5:]) if rows.shape[1] > 5 else np.ones((len(rows), 1))
+    return _best(_from_centre(rows[:, :4]), objectness * classes, distinct=False)
+
+
+def _queries(
+    outputs: Mapping[str, Any], side: tuple[int, int], softmax: bool
+) -> tuple[FloatArray, FloatArray]:
+    low = {name.lower(): np.asarray(value, dtype=np.float64)[0] for name, value in outputs.items()}
+    logits = low["logits"] if "logits" in low else low["labels"]
+    boxes = low["pred_boxes"] if "pred_boxes" in low else low["dets"]
+    if softmax:
+        shares = np.exp(logits - logits.max(axis=1, keepdims=True))
+        scores = (shares / shares.sum(axis=1, keepdims=True))[:, :-1]
+    else:
+        scores = 1.0 / (1.0 + np.exp(-logits))
+    return _from_centre(boxes) * np.array([*side, *side], dtype=np.float64), scores
+
+
+def _from_centre(boxes: FloatArray) -> FloatArray:
+    half = boxes[:, 2:4] / 2.0
+    return np.column_stack([boxes[:, :2] - half, boxes[:, :2] + half])
+
+
+def _squashed(values: FloatArray) -> FloatArray:
+    """Return probabilities: the values, or their logistic function where they cannot be any."""
+    if values.size and (values.min() < 0.0 or values.max() > 1.0 + 1e-3):
+        return np.asarray(1.0 / (1.0 + np.exp(-np.clip(values, -60.0, 60.0))))
+    return values
+
+
+def _best(corners: FloatArray, scores: FloatArray, *, distinct: bool) -> Found:
+    """Keep the best class of each row."""
+    best = scores.argmax(axis=1)
+    return Found(corners, scores[np.arange(len(scores)), best], best.astype(np.int64), distinct)
+
+
+def _cell_count(side: tuple[int, int], strides: Sequence[int]) -> int:
+    return sum((-(-side[0] // s)) * (-(-side[1] // s)) for s in strides)
+
+
+def _fits(count: int, side: tuple[int, int]) -> bool:
+    return count in (_cell_count(side, _STRIDES), _cell_count(side, _MORE_STRIDES))
+
+
+def _last(outputs: Sequence[Port], name: str) -> int | None:
+    return next((port.shape[-1] for port in outputs if port.name.lower() == name and port.shape), None)
+
+
+def _class_count(notes: Mapping[str, str]) -> int | None:
+    text = notes.get("names", "")
+    return text.count(":") or None

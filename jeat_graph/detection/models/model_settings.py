@@ -1,0 +1,60 @@
+"""How a network of the user's is fed and read; what is left open is recognised from its file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from jeat_graph.config.fields import Section, choice, number
+
+LAYOUTS = (
+    "auto",
+    "yolox",
+    "yolox-raw",
+    "yolov5",
+    "yolov8",
+    "end-to-end",
+    "detr",
+    "detr-softmax",
+    "boxes",
+    "nanodet",
+)
+
+
+@dataclass(frozen=True)
+class ModelSettings(Section):
+    """A network from an ONNX file."""
+
+    layout: str = choice("auto", LAYOUTS, "what its outputs mean; auto: by their names and shapes")
+    backend: str = choice(
+        "auto", ("auto", "opencv", "onnxruntime"), "what runs it; auto: onnxruntime if installed, else OpenCV"
+    )
+    threads: int = number(0, "1", "threads that run it; 0: as many as the backend takes", 0, 1024)
+    color: str = choice("auto", ("auto", "bgr", "rgb"), "order of the colours that it was trained with")
+    fit: str = choice(
+        "auto",
+        ("auto", "letterbox", "letterbox-centre", "stretch"),
+        "how a picture gets its size: filled up at the right and below, on all sides, or stretched",
+    )
+    scale: float | None = number(
+        None, "1", "a grey level of 0 to 255 is multiplied by it; null: as usual for the layout"
+    )
+    mean: tuple[float, ...] = number(
+        (), "grey levels", "taken off each colour, in its order; empty: as usual", -1e4
+    )
+    std: tuple[float, ...] = number((), "grey levels", "then divided by; empty: as usual", open_low=True)
+    pad: float = number(114.0, "grey levels", "what letterboxes are filled with", 0.0, 255.0)
+    width: int = number(0, "px", "of the network's input where its file leaves it open; 0: 640", 0, 8192)
+    height: int = number(0, "px", "of the network's input where its file leaves it open; 0: 640", 0, 8192)
+    classes: tuple[str, ...] = ()
+    score: float = number(0.1, "1", "detections below are left out; the tracker weighs the others", 0.0, 1.0)
+    overlap: float = number(
+        0.65, "1", "of two boxes that overlap by more (IoU) the better one stays", 0.0, 1.0
+    )
+
+    @property
+    def open_side(self) -> tuple[int, int]:
+        """Width and height where the file leaves them open (px)."""
+        return self.width or _OPEN_SIDE, self.height or _OPEN_SIDE
+
+
+_OPEN_SIDE = 640
