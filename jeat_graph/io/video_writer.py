@@ -89,7 +89,7 @@ class FrameWriter:
         if self._video == "png":
             _write_png(self._target / f"{len(self._times):06d}.png", cv2.imencode(".png", bgr)[1])
         else:
-            self._sink.write(bgr)
+            quietly(lambda: self._sink.write(bgr))
         self._times.append(t_us)
 
 

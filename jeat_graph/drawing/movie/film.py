@@ -80,7 +80,8 @@ class MovieWriter:
         """Add a frame (H, W, 3)."""
         import cv2
 
-        self._sink.write(cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR))
+        picture = cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR)
+        quietly(lambda: self._sink.write(picture))  # a full disk is told of once, at the end
         self._count += 1
 
     def _check(self) -> None:
