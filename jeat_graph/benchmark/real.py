@@ -1,8 +1,8 @@
 """`jeat-graph benchmark real`: real detectors that nothing here was made for, and simulated odd ones.
 
-Every set of real recordings is tracked as it comes, after blind calibration and after calibration with truth
-on the set's other recordings; both tables are judged, and so are the peers, with their defaults and tuned on
-the judged recordings themselves.
+Every set of real recordings is tracked as it comes, after blind calibration and after calibration with truth,
+each half of a set with what the other half gives; both tables are judged, and so are the peers, with their
+defaults and tuned on the judged recordings themselves.
 """
 
 from __future__ import annotations

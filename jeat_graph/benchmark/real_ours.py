@@ -15,6 +15,7 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.runs.declaring import fit_input
+from jeat_graph.runs.latency import at_measurement
 
 _MATCH_IOU = 0.5
 _EDGE_PX = 5.0
@@ -30,7 +31,7 @@ class OursOnSet:
     Attributes:
         row: its name.
         sensors: what it is given.
-        how: `DEFAULT`, `BLIND` or `TRUTH`; calibration is on the other recordings of the set.
+        how: `DEFAULT`, `BLIND` or `TRUTH`; calibration is on the other half of the set's recordings.
         changes: `key=value` texts over the preset.
         white: whether the sensors' errors are taken to have no memory.
     """
@@ -63,7 +64,8 @@ def configs_for(row: OursOnSet, one: RealSet) -> list[Config]:
         fitted = [fit_input(base, detections)[0] for detections in seen]
         return [_without_memory(config) for config in fitted] if row.white else fitted
     whole = fit_input(base, Detections.concatenate(seen))[0]
-    return [_calibrated(row, one, k, seen, whole) for k in range(len(seen))]
+    halves = [_calibrated(row, one, half, seen, whole) for half in range(2)]
+    return [halves[k % 2] for k in range(len(seen))]
 
 
 def _without_memory(config: Config) -> Config:
@@ -71,12 +73,11 @@ def _without_memory(config: Config) -> Config:
     return replace(config, sensors=sensors)
 
 
-def _calibrated(
-    row: OursOnSet, one: RealSet, left_out: int, seen: Sequence[Detections], base: Config
-) -> Config:
+def _calibrated(row: OursOnSet, one: RealSet, half: int, seen: Sequence[Detections], base: Config) -> Config:
+    """Calibrate for every other recording (from number `half` on) from those in between."""
     from jeat_graph.calibration.procedure import calibrate_with_truth, calibrate_without_truth
 
-    others = [k for k in range(len(seen)) if k != left_out]
+    others = [k for k in range(len(seen)) if k % 2 != half]
     if row.how == BLIND:
         return calibrate_without_truth([seen[k] for k in others], base).config
     pairs = [(seen[k], one.recordings[k].truth) for k in others]
@@ -97,6 +98,11 @@ def both_tables(config: Config, detections: Detections) -> tuple[Trajectories, T
 def judge_row(row: OursOnSet, one: RealSet) -> dict[str, Any]:
     """Track a set and judge both tables, pooled and recording by recording."""
     configs = configs_for(row, one)
+    recordings = tuple(
+        replace(r, detections=at_measurement(r.detections, c))
+        for c, r in zip(configs, one.recordings, strict=True)
+    )
+    one = replace(one, recordings=recordings)
     tables = [both_tables(c, r.only(row.sensors)) for c, r in zip(configs, one.recordings, strict=True)]
     return {
         "set": one.name,
