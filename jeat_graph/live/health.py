@@ -2,7 +2,7 @@
 
 A silent sensor needs no help in the tracker: only a scan that found nothing counts as a miss, and no scan
 says nothing. One that delivers rubbish loses its weight by itself: the running estimates of its clutter and
-of its noise rise. What is done here is to notice, and to say so.
+of its noise rise, and that of its trust falls. What is done here is to notice, and to say so.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from jeat_graph.tracking.sensor_state import SensorState
 SILENT, BACK, RUBBISH, WELL = "silent", "back", "rubbish", "well"
 #: So many times the configured clutter, or the greatest noise scale, is rubbish; half of it is well again.
 CLUTTER_FACTOR, NOISE_FACTOR, AGAIN = 10.0, 4.0, 0.5
+#: So is a sensor that the others bear out so little (factor on its evidence); twice that is well again.
+LEAST_TRUST = 0.05
 
 
 class Event(NamedTuple):
@@ -92,12 +94,17 @@ class SensorHealth:
         events = []
         for name in self.last:
             state, declared = states[name], self._config.sensors[name].clutter_per_scan
-            worst = max(state.clutter / (CLUTTER_FACTOR * declared), state.noise_scale / NOISE_FACTOR)
+            worst = max(
+                state.clutter / (CLUTTER_FACTOR * declared),
+                state.noise_scale / NOISE_FACTOR,
+                LEAST_TRUST / max(state.trust, 1e-9),
+            )
             if worst >= 1.0 and name not in self.rubbish:
                 self.rubbish.append(name)
                 text = (
                     f"sensor {name!r} delivers rubbish: {state.clutter:.3g} false boxes a scan ({declared:g} "
-                    f"declared), noise variance {state.noise_scale:.3g} times that declared; it weighs less"
+                    f"declared), noise variance {state.noise_scale:.3g} times that declared, trust "
+                    f"{state.trust:.2g}; it weighs less"
                 )
                 events.append(Event(now, name, RUBBISH, text))
             elif worst < AGAIN and name in self.rubbish:

@@ -164,7 +164,7 @@ class Session:
             self.ends.warn(text)
 
     def summary(self) -> dict[str, Any]:
-        """The record of the session: version, configuration, counts, how late each sensor's scans came."""
+        """The record of the session: version, configuration, counts, lateness, what was learnt."""
         lateness = {name: one._asdict() for name, one in self.live.lateness.summary().items()}
         return {
             "version": __version__,
@@ -174,6 +174,7 @@ class Session:
             "duplicates": self.duplicates,
             "steps_taken_again": self.live.replayed,
             "lateness": lateness,
+            "learnt": {name: one._asdict() for name, one in self.live.tracker.sensor_states().items()},
         }
 
     def summary_lines(self) -> list[str]:

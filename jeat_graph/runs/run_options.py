@@ -52,6 +52,7 @@ class RunRecord:
         timings: seconds by stage, and time per step; the only part that differs from run to run.
         warnings: one line each.
         smoother: what the smoother did, None without one.
+        learnt: what had been learnt of each sensor by the end (`tracking/sensor_state.py`).
     """
 
     source: dict[str, Any] = field(default_factory=dict)
@@ -59,3 +60,4 @@ class RunRecord:
     timings: dict[str, float] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
     smoother: dict[str, Any] | None = None
+    learnt: dict[str, Any] = field(default_factory=dict)

@@ -161,6 +161,7 @@ class RunSteps:
         record.timings["step_median_ms"] = round(1e3 * float(np.median(step_s)), 4)
         record.timings["step_p99_ms"] = round(1e3 * float(np.quantile(step_s, 0.99)), 4)
         record.counts |= {"tracks_born": self._tracker.num_born, "tracks_reported": len(self._reported)}
+        record.learnt = {name: one._asdict() for name, one in self._tracker.sensor_states().items()}
         record.counts["causal_rows"] = self._rows["causal"]
         if self._smooths:
             record.counts["smoothed_rows"] = self._rows["smoothed"]

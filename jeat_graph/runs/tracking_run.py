@@ -94,6 +94,7 @@ def _write_record(detections: Detections, config: Config, run: RunDirectory, rec
         },
         "duration_s": float(detections.scan_t[-1] - detections.scan_t[0]),
         "smoother": record.smoother,
+        "learnt": record.learnt,
         "files": {path.name: {"sha256": sha256_of(path)} for path in sorted(folder.iterdir())},
         "warnings": record.warnings,
         "timings": record.timings,

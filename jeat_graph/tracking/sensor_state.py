@@ -13,11 +13,13 @@ class SensorState(NamedTuple):
     Attributes:
         clutter: expected false boxes in a scan.
         p_detect: mean probability that it detects a confirmed track.
+        trust: factor on the weight of its evidence, as far as the other sensors bear it out, in (0, 1].
         noise_scale: mean factor on its noise variance over the confirmed tracks (paper eq. 5), 1 without any.
     """
 
     clutter: float
     p_detect: float
+    trust: float
     noise_scale: float
 
 
@@ -28,6 +30,7 @@ def sensor_states(now: Snapshot, sensors: tuple[str, ...]) -> dict[str, SensorSt
         name: SensorState(
             float(now.scene.clutter[s]),
             float(now.scene.p_detect[s]),
+            float(now.scene.trust[s]),
             float(scale[:, s].mean()) if len(scale) else 1.0,
         )
         for s, name in enumerate(sensors)

@@ -71,6 +71,8 @@ class Scene(NamedTuple):
             seconds of a track.
         agreed: (S,) those of them on tracks that another sensor has seen.
         trust: (S,) what the ratio of the two says of the sensor: factor on its evidence, in (0, 1].
+        fruitless: (S,) recent mean number, a scan, of each sensor's detections on tracks that ended without
+            having been confirmed, and that no other sensor saw.
     """
 
     clutter: FloatArray
@@ -80,6 +82,7 @@ class Scene(NamedTuple):
     claims: FloatArray
     agreed: FloatArray
     trust: FloatArray
+    fruitless: FloatArray
 
 
 def start_scene(clutter: FloatArray, p_detect: FloatArray, undetected: float, trust: float) -> Scene:
@@ -100,6 +103,7 @@ def start_scene(clutter: FloatArray, p_detect: FloatArray, undetected: float, tr
         claims=np.zeros(num_sensors),
         agreed=np.zeros(num_sensors),
         trust=np.full(num_sensors, trust),
+        fruitless=np.zeros(num_sensors),
     )
 
 

@@ -56,7 +56,7 @@ def step(
     learn_scene(tracks, n, dt, batch, association, p_detect, scene, model)
     count_misses(tracks, n, batch, association, p_detect, settings)
     confirm(tracks, n, batch.t, settings)
-    n = remove_ended(tracks, n, batch.t, settings)
+    n = remove_ended(tracks, n, batch.t, scene, model)
     n, next_id = give_birth(tracks, n, next_id, batch, association, scene, model, log)
     # Vehicles that this batch could have shown and did not are rarer from now on.
     for s in range(len(batch.present)):

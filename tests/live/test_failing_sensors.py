@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
 
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Scan
@@ -83,6 +85,65 @@ def test_a_sensor_whose_clutter_rises_tenfold_loses_weight_and_is_named():
     assert [(event.what, event.sensor) for event in events] == [("rubbish", "evt")]
     assert "weighs less" in events[0].text
     assert {1, 2, 3} <= set(table.track_id.tolist())
+
+
+def with_rubbish(scan, kind, count, score, fixed, rng):
+    """A scan with false boxes: anywhere, another place each time, or always at the same places."""
+    anywhere, near = rng.uniform(*FIELD, (count, 2)), fixed + rng.normal(0.0, 0.5, fixed.shape)
+    places = near if kind == "standing" else anywhere
+    boxes = np.column_stack([places, np.full((count, 2), 30.0)])
+    return replace(
+        scan,
+        boxes=np.concatenate([scan.boxes, boxes]),
+        scores=np.concatenate([scan.scores, np.full(count, score)]),
+    )
+
+
+FIELD = ((0.0, 0.0), (1200.0, 680.0))
+
+
+def test_rubbish_with_good_scores_loses_weight_is_named_and_harms_no_track(full):
+    """Whichever sensor, however many, wherever: the scores say vehicle, the tracks come to nothing."""
+
+    @settings(max_examples=40 if full else 3, deadline=None, phases=(Phase.generate,))
+    @given(
+        st.sampled_from(("evt", "rgb")),
+        st.sampled_from(("anywhere", "standing")),
+        st.integers(12, 25),
+        st.floats(0.8, 0.99),
+        st.integers(0, 2**31),
+    )
+    def holds(sensor, kind, count, score, seed):
+        config = load_config("default", ["smoother.engine=none"])
+        rng, health, tracker, events = np.random.default_rng(seed), SensorHealth(config), Tracker(config), []
+        fixed = rng.uniform(*FIELD, (count, 2))
+        before = tracker.sensor_states()[sensor]
+        for k, scan in enumerate(scans_of(16.0)):
+            if scan.sensor == sensor and scan.t > 3.0:
+                scan = with_rubbish(scan, kind, count, score, fixed, rng)
+            table = tracker.step(scan)
+            health.saw([scan], scan.t)
+            if k % 20 == 0:
+                events += health.judge(tracker.sensor_states(), scan.t)
+        after = tracker.sensor_states()[sensor]
+        assert after.clutter > 10.0 * before.clutter or after.trust < 0.05 * before.trust
+        assert (events[0].what, events[0].sensor) == ("rubbish", sensor)
+        assert {1, 2, 3} <= set(table.track_id.tolist())
+        assert len(table) <= 4
+
+    holds()
+
+
+def test_as_long_as_scores_are_right_what_comes_to_nothing_changes_nothing():
+    """The guard against wrong scores is asleep: clutter follows the scores alone."""
+    tracker = Tracker(load_config("default", ["smoother.engine=none"]))
+    rng = np.random.default_rng(0)
+    for scan in scans_of(8.0):
+        tracker.step(with_rubbish(scan, "anywhere", 1, 0.3, np.zeros((1, 2)), rng))
+    scene = tracker.snapshot().scene
+    declared = tracker.config.sensors["evt"].clutter_per_scan
+    assert (scene.fruitless <= 10.0 * declared).all()
+    assert (scene.clutter < 10.0 * declared).all()
 
 
 def test_a_sensor_whose_boxes_are_far_off_gets_a_greater_noise():

@@ -9,9 +9,10 @@ from numba import njit
 
 from jeat_graph.association.boxes import clip_boxes, track_boxes, visible_fraction
 from jeat_graph.association.merging import find_duplicates
-from jeat_graph.config.kernel_form import Settings
+from jeat_graph.config.kernel_form import Model, Settings
 from jeat_graph.tracking.compaction import keep_rows
-from jeat_graph.tracking.state import TrackArrays
+from jeat_graph.tracking.stages.learning import scan_weight
+from jeat_graph.tracking.state import Scene, TrackArrays
 
 
 @njit(cache=True)
@@ -31,8 +32,9 @@ def confirm(tracks: TrackArrays, n: int, t: float, settings: Settings) -> None:
 
 
 @njit(cache=True)
-def remove_ended(tracks: TrackArrays, n: int, t: float, settings: Settings) -> int:
+def remove_ended(tracks: TrackArrays, n: int, t: float, scene: Scene, model: Model) -> int:
     """Remove tracks that are over, out of the picture, or duplicates; return the number left, in order."""
+    settings = model.settings
     boxes = track_boxes(tracks.mean[:n], tracks.size_mean[:n])
     image, lifecycle, merge = settings.image, settings.lifecycle, settings.merge
     remove = np.zeros(n, dtype=np.bool_)
@@ -67,8 +69,18 @@ def remove_ended(tracks: TrackArrays, n: int, t: float, settings: Settings) -> i
         # A state that overflowed (a coasting track on wild input) must not survive as NaN.
         broken = not (math.isfinite(x) and math.isfinite(y))
         if remove[i] or gap > most or doubted or broken or (lifecycle.leave_picture and outside):
+            if not (tracks.confirmed[i] or remove[i] or outside or broken):
+                _count_fruitless(tracks.hits[i], tracks.seen_by[i], scene, model)
             continue
         rows[kept] = i
         kept += 1
     keep_rows(tracks, rows[:kept])
     return kept
+
+
+@njit(cache=True)
+def _count_fruitless(hits: int, seen_by: int, scene: Scene, model: Model) -> None:
+    """Put the detections of a track that came to nothing down to the one sensor that saw it, in place."""
+    for s in range(len(scene.fruitless)):
+        if seen_by == 1 << s:
+            scene.fruitless[s] += scan_weight(s, model) * hits

@@ -15,12 +15,22 @@ from jeat_graph.tracking.state import Scene, TrackArrays
 
 # Share of a sensor's configured clutter below which no estimate goes: without any, one detection were proof.
 _LEAST_CLUTTER = 0.1
+# What a sensor's scores say of its false boxes holds until so many times its configured clutter have been
+# seen to come to nothing: then the scores are wrong, and what has been seen counts.
+_GROSS = 10.0
 # A few tracks say less of a sensor than many; ten count in full.
 _LOOK_WEIGHT = 0.1
 # A track of so many detections has lasted; before that, others have hardly had the time to see it.
 _LASTING_HITS = 4
 # What is known of a sensor beforehand weighs as much as so many seconds of a track.
 _PRIOR_CLAIMS = 5.0
+
+
+@njit(cache=True)
+def scan_weight(s: int, model: Model) -> float:
+    """Weight of one scan of sensor `s` in what is learnt of the scene; 0 where nothing is."""
+    memory_s = model.settings.lifecycle.scene_memory_s
+    return min(model.sensors.period_s[s] / memory_s, 1.0) if memory_s > 0.0 else 0.0
 
 
 @njit(cache=True)
@@ -107,7 +117,8 @@ def learn_scene(
     """Follow each present sensor's clutter and P_D, and the vehicles that wait to be detected, in place.
 
     Clutter is what probably was no vehicle; P_D the share of the looks at confirmed tracks that found them,
-    each weighed by how visible the track was.
+    each weighed by how visible the track was. A sensor that delivers rubbish with good scores is known by
+    its tracks, which come to nothing.
     """
     sensors, settings = model.sensors, model.settings
     lifecycle, present = settings.lifecycle, batch.present
@@ -136,9 +147,12 @@ def learn_scene(
         for j in range(len(taken)):
             if not taken[j] and batch.sensor[j] == s:
                 false += 1.0 - batch.precision[j]
-        weight = min(sensors.period_s[s] / lifecycle.scene_memory_s, 1.0)
+        weight = scan_weight(s, model)
         least = _LEAST_CLUTTER * sensors.clutter_per_scan[s]
         scene.clutter[s] = max(scene.clutter[s] + weight * (false - scene.clutter[s]), least)
+        scene.fruitless[s] *= 1.0 - weight
+        if scene.fruitless[s] > _GROSS * sensors.clutter_per_scan[s]:
+            scene.clutter[s] = max(scene.clutter[s], scene.fruitless[s])
         share = scene.p_detect[s] + weight * min(_LOOK_WEIGHT * looks, 1.0) * (
             hits / max(looks, 1e-9) - scene.p_detect[s]
         )
