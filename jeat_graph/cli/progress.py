@@ -1,10 +1,16 @@
-"""A progress bar over the stages of a command, for work that has no loop of its own to count."""
+"""A progress bar over the stages of a command, for work that has no loop of its own to count.
+
+Within a stage the time goes on, so that one can tell work from a standstill.
+"""
 
 from __future__ import annotations
 
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+
+_TICK_S = 0.5
 
 
 @contextmanager
@@ -31,4 +37,18 @@ def stages(command: str, total: int) -> Iterator[Callable[[str], None]]:
             begun += 1
             bar.set_description_str(f"{command}: {name}")
 
-        yield begin
+        over = threading.Event()
+
+        def tick() -> None:
+            while not over.wait(_TICK_S):
+                bar.refresh()
+
+        ticking = threading.Thread(target=tick, daemon=True)
+        if not hidden:
+            ticking.start()
+        try:
+            yield begin
+        finally:
+            over.set()
+            if not hidden:
+                ticking.join()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import sys
+import time
 
 from jeat_graph.cli.progress import stages
 
@@ -32,3 +33,16 @@ def test_a_terminal_sees_each_stage_and_how_far_it_is(monkeypatch):
 
 def test_a_pipe_sees_nothing(monkeypatch):
     assert shown(monkeypatch, io.StringIO()) == ""
+
+
+def test_the_time_goes_on_within_a_stage(monkeypatch):
+    monkeypatch.setattr("jeat_graph.cli.progress._TICK_S", 0.01)
+    stream = Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    with stages("eval", 1) as stage:
+        stage("judging")
+        drawn = stream.getvalue().count("judging")
+        end = time.monotonic() + 10.0
+        while stream.getvalue().count("judging") < drawn + 3:
+            assert time.monotonic() < end, "nothing moves"
+            time.sleep(0.01)
