@@ -6,7 +6,7 @@
 #   make licences   list the licences of everything installed with the package
 #   make fuzz    the long form of the tests that damage files, streams and processes (an hour)
 #   make live    the long form of the tests of live use: kills, brokers, late data (half an hour)
-#   make lint    style, format and docstrings
+#   make lint    style, format, docstrings, and known weaknesses of what is installed
 #   make types   type-check the built package
 #   make bounds  run the numerical tests with the oldest versions allowed of what is needed
 #   make build   build the wheel (in dist/)
@@ -55,11 +55,12 @@ live: $(VENV)/.test $(VENV)/.compiled
 fuzz: $(VENV)/.test $(VENV)/.compiled
 	@JEAT_GRAPH_FULL=1 $(BIN)/python -m pytest -n 2 tests/fuzz
 
-lint: $(VENV)/.lint
+lint: $(VENV)/.lint $(VENV)/.run
 	@$(BIN)/ruff check
 	@$(BIN)/ruff format --check
 	@$(BIN)/interrogate --quiet jeat_graph filters association smoothers eval configs || \
 		$(BIN)/interrogate -v jeat_graph filters association smoothers eval configs
+	@$(BIN)/python .ci/audit.py
 
 # The folders at the top of the repository become one package only when it is built, so that is what is checked.
 types: build/.installed
