@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from jeat_graph.data.errors import JeatGraphError, OtherRunError
+from jeat_graph.live.recording_road import drive_on_road, known_vehicles, run_tables
 from jeat_graph.runs.track_files import TrackRequest
 
 DONE, KEPT, FAILED = "done", "kept", "failed"
@@ -62,13 +63,16 @@ def run_job(job: Job) -> Outcome:
     """
     try:
         out = Path(job.request.out)
+        vehicles = None if job.camera is None else known_vehicles(out, job.camera)
         known = _finished(job.request)
-        if known is not None:
-            return _on_road(_outcome(job.name, KEPT, known), job)
+        if known is not None and (job.camera is None or vehicles is not None):
+            return _outcome(job.name, KEPT, known, vehicles)
         for folder in out.glob(_STAGING):  # of a worker that was killed here
             shutil.rmtree(folder, ignore_errors=True)
-        _track(job.request)
-        return _on_road(_outcome(job.name, DONE, _record_of(out)), job)
+        _track(job)
+        if job.camera is not None:
+            vehicles = drive_on_road(out, job.camera)
+        return _outcome(job.name, DONE, _record_of(out), vehicles)
     except (JeatGraphError, OSError) as error:
         return Outcome(job.name, FAILED, {}, error=_one_line(str(error)))
     except Exception as error:  # one recording's trouble must not be the others'
@@ -76,28 +80,21 @@ def run_job(job: Job) -> Outcome:
         return Outcome(job.name, FAILED, {}, error=what, trace=traceback.format_exc())
 
 
-def _track(request: TrackRequest) -> None:
+def _track(job: Job) -> None:
     """Track, on from where a worker died if it is the same run; the batch has a progress bar over all."""
     from jeat_graph.config.reading import load_config
     from jeat_graph.runs.track_files import track_files
 
+    request = job.request
     # Where smoothing has a process of its own, a recording begins anew.
     resumes = not load_config(request.config, request.overrides).smoother.worker
     options = replace(request.options, progress=False, resume=resumes)
+    if job.camera is not None:
+        options = replace(options, diagnostics=True, after=run_tables(job.camera))
     try:
         track_files(replace(request, options=options))
     except OtherRunError:
         track_files(replace(request, options=replace(options, resume=False)))
-
-
-def _on_road(outcome: Outcome, job: Job) -> Outcome:
-    """Add the vehicles on the road, where there is a camera."""
-    from jeat_graph.live.recording_road import drive_on_road
-
-    if job.camera is None:
-        return outcome
-    vehicles = drive_on_road(Path(job.request.out), job.camera)
-    return replace(outcome, counts=outcome.counts | {"vehicles": vehicles})
 
 
 def _finished(request: TrackRequest) -> dict[str, Any] | None:
@@ -158,12 +155,13 @@ def _record_of(out: Path) -> dict[str, Any]:
     return content if isinstance(content, dict) else {}
 
 
-def _outcome(name: str, status: str, record: dict[str, Any]) -> Outcome:
+def _outcome(name: str, status: str, record: dict[str, Any], vehicles: int | None) -> Outcome:
     counts = record.get("counts", {})
+    on_road = {} if vehicles is None else {"vehicles": vehicles}
     return Outcome(
         name,
         status,
-        {key: int(counts[key]) for key in _COUNTS if key in counts},
+        {key: int(counts[key]) for key in _COUNTS if key in counts} | on_road,
         len(record.get("warnings", [])),
     )
 

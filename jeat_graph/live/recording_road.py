@@ -3,16 +3,35 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
+from jeat_graph.config.schema import Config
 from jeat_graph.version import __version__
 
 #: Folder beside the tables of a run, and the file in it that says what it was made from, written last.
 ROAD, SOURCE = "road", "source.json"
 
 
+def known_vehicles(run: Path, camera_file: str) -> int | None:
+    """Return how many vehicles of a run have a speed, None if it was not made with this camera, or changed.
+
+    Args:
+        run: the run directory.
+        camera_file: the calibrated camera.
+
+    Raises:
+        DataError: the camera cannot be read.
+    """
+    source = run / ROAD / SOURCE
+    if not source.is_file():
+        return None
+    known = json.loads(source.read_text(encoding="utf-8"))
+    return int(known["vehicles"]) if known | _origin(run, camera_file) == known else None
+
+
 def drive_on_road(run: Path, camera_file: str) -> int:
-    """Write what `jeat-graph road RUN --camera FILE --out RUN/road` writes; kept where nothing has changed.
+    """Write what `jeat-graph road RUN --camera FILE --out RUN/road` writes.
 
     Args:
         run: the run directory, complete.
@@ -25,19 +44,31 @@ def drive_on_road(run: Path, camera_file: str) -> int:
         JeatGraphError: the camera, or a file of the run, is not valid.
     """
     from jeat_graph.io.atomic import open_atomic
+
+    vehicles = _write_road(run, camera_file)
+    with open_atomic(run / ROAD / SOURCE) as file:
+        json.dump(_origin(run, camera_file) | {"vehicles": vehicles}, file)
+    return vehicles
+
+
+def run_tables(camera_file: str) -> Callable[[Path, Config], object]:
+    """Return what writes the road's tables of a run beside its own, as `track --camera` does.
+
+    Raises:
+        JeatGraphError: the camera is not valid.
+    """
+    from jeat_graph.road.camera_file import read_camera
+    from jeat_graph.road.run_tables import write_run_tables
+
+    camera = read_camera(camera_file)
+    return lambda folder, config: write_run_tables(folder, config, camera)
+
+
+def _origin(run: Path, camera_file: str) -> dict[str, str]:
     from jeat_graph.io.hashing import sha256_of
     from jeat_graph.runs.directory import RUN_JSON
 
-    origin = {"version": __version__, "camera": sha256_of(camera_file), "run": sha256_of(run / RUN_JSON)}
-    source = run / ROAD / SOURCE
-    if source.is_file():
-        known = json.loads(source.read_text(encoding="utf-8"))
-        if known | origin == known:
-            return int(known["vehicles"])
-    vehicles = _write_road(run, camera_file)
-    with open_atomic(source) as file:
-        json.dump(origin | {"vehicles": vehicles}, file)
-    return vehicles
+    return {"version": __version__, "camera": sha256_of(camera_file), "run": sha256_of(run / RUN_JSON)}
 
 
 def _write_road(run: Path, camera_file: str) -> int:

@@ -92,6 +92,10 @@ def test_with_a_camera_each_run_has_its_speeds_on_the_road(tmp_path, simulated):
     assert main(["road", str(road.parent), *camera, "--out", str(tmp_path / "road")]) == 0
     for file in (tmp_path / "road").iterdir():
         assert (road / file.name).read_bytes() == file.read_bytes(), file.name
+    track = ["track", str(folder / "detections.csv"), *camera, "--out", str(tmp_path / "track")]
+    assert main(track) == 0
+    for name in ("causal.csv", "smoothed.csv", "road_causal.csv", "road_smoothed.csv"):
+        assert (road.parent / name).read_bytes() == (tmp_path / "track" / name).read_bytes()
     made = {file: file.stat().st_mtime_ns for file in road.iterdir()}
     assert main(["batch", str(path), "--out", str(out), "--workers", "1"]) == 1
     assert {file: file.stat().st_mtime_ns for file in road.iterdir()} == made
