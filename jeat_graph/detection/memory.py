@@ -86,22 +86,28 @@ class CloudMemory:
         base = int(cloud.max()) + 1
         share = _shares(cloud, places, expected)
         near = _shares(cloud, places, _grown(expected, self._link_px))
+        touch = old & (share >= _TOUCHED)
         pieces: dict[int, list[int]] = {}
         new = cloud.copy()
-        for m in np.flatnonzero(np.bincount(cloud)):
-            touched = self._apart(np.flatnonzero(old & (share[m] >= _TOUCHED)))
+        divided = np.zeros(base, dtype=bool)
+        for m in np.flatnonzero(touch.sum(axis=1) > 1).tolist():
+            touched = self._apart(np.flatnonzero(touch[m]))
             if len(touched) > 1:
                 rows = np.flatnonzero(cloud == m)
                 new[rows] = base + touched[_nearest(places[rows], expected[touched])]
+                divided[m] = True
                 for k in touched.tolist():
                     pieces.setdefault(k, []).insert(0, base + k)
-            elif (old & (near[m] >= _INSIDE)).any():
-                fit = np.where(old & (near[m] >= _INSIDE), share[m] + near[m], -1.0)
-                pieces.setdefault(int(np.argmax(fit)), []).append(int(m))
+        fit = np.where(old & (near >= _INSIDE), share + near, -1.0)
+        for m in np.flatnonzero(~divided & (fit.max(axis=1) > 0.0)).tolist():
+            pieces.setdefault(int(fit[m].argmax()), []).append(m)
+        extents, sizes = _extents(new, places, base + len(expected))
+        table = np.arange(base + len(expected))
         for k, names in pieces.items():
             # A dark body fires at its ends only: pieces may be far apart, but within what it was.
-            _join(new, places, list(dict.fromkeys(names)), expected[k, 2:] + 2.0 * self._link_px)
-        return new
+            most_px = expected[k, 2:] + 2.0 * self._link_px
+            _join(table, list(dict.fromkeys(names)), extents, sizes, most_px)
+        return np.asarray(table[new])
 
     def remember(self, boxes: FloatArray) -> None:
         """Keep the boxes (M, 4) of this step for the next."""
@@ -145,28 +151,45 @@ def _common(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.asarray(np.prod(np.clip(high - low, 0.0, None), axis=2))
 
 
-def _join(cloud: IntArray, places: FloatArray, names: list[int], most_px: FloatArray) -> None:
+def _join(
+    table: IntArray, names: list[int], extents: FloatArray, sizes: IntArray, most_px: FloatArray
+) -> None:
     """Give the first name to the pieces, largest first, as long as all of them together are not too large.
 
     Args:
-        cloud: (P,) name of each pixel; changed.
-        places: (P, 2) of the pixels (px).
+        table: new name of each name; changed.
         names: of the pieces; the first comes first whatever its size.
+        extents: (names, 4) left, top, right, bottom of each (px).
+        sizes: (names,) pixels of each.
         most_px: (2,) width and height that they may have together (px).
     """
-    size = {name: int((cloud == name).sum()) for name in names}
-    names = [name for name in names if size[name]]
+    names = [name for name in names if sizes[name]]
     whole = None
-    for name in sorted(names, key=lambda name: (name != names[0], -size[name])):
-        part = _extent(places[cloud == name])
+    for name in sorted(names, key=lambda name: (name != names[0], -sizes[name])):
+        part = extents[name]
         if whole is None:
             whole = part
             continue
-        low = np.minimum(whole[:2], part[:2])
-        both = np.concatenate([low, np.maximum(whole[:2] + whole[2:], part[:2] + part[2:]) - low])
-        if (both[2:] <= most_px).all():
-            cloud[cloud == name] = names[0]
+        both = np.concatenate([np.minimum(whole[:2], part[:2]), np.maximum(whole[2:], part[2:])])
+        if (both[2:] - both[:2] <= most_px).all():
+            table[name] = names[0]
             whole = both
+
+
+@numba.njit(cache=True)
+def _extents(cloud: IntArray, places: FloatArray, names: int) -> tuple[Any, Any]:
+    """Left, top, right, bottom (names, 4) of the pixels of each cloud (px), and their number (names,)."""
+    extents = np.empty((names, 4))
+    extents[:, :2] = np.inf
+    extents[:, 2:] = -np.inf
+    sizes = np.zeros(names, dtype=np.int64)
+    for k in range(len(cloud)):
+        name = cloud[k]
+        sizes[name] += 1
+        for axis in range(2):
+            extents[name, axis] = min(extents[name, axis], places[k, axis] - 0.5)
+            extents[name, axis + 2] = max(extents[name, axis + 2], places[k, axis] + 0.5)
+    return extents, sizes
 
 
 def _shares(cloud: IntArray, places: FloatArray, boxes: FloatArray) -> FloatArray:
@@ -205,11 +228,6 @@ def _nearest(places: FloatArray, boxes: FloatArray) -> Any:
                 least = max(dx, dy)
                 out[k] = j
     return out
-
-
-def _extent(places: FloatArray) -> FloatArray:
-    low = places.min(axis=0) - 0.5
-    return np.concatenate([low, places.max(axis=0) + 0.5 - low])
 
 
 def _iou(a: FloatArray, b: FloatArray) -> FloatArray:
