@@ -186,7 +186,11 @@ def _pictures(args: argparse.Namespace, scenario: Scenario) -> int:
     splits = ", ".join(f"{len(names)} {name}" for name, names in manifest["splits"].items())
     print(f"segments: {manifest['segments']} ({splits})")
     print(f"frames: {totals['frames']}, events: {totals['events']}, {totals['bytes'] / 1e6:.1f} MB")
-    print(f"truth: {totals['boxes']} boxes, {totals['ignored']} of them hidden")
+    print(f"truth: {totals['boxes']} boxes, {totals['ignored']} of them hidden or far")
+    asked = max(1, totals["boxes"] - totals["ignored"])
+    print(
+        f"contrast-to-noise below 2 in the RGB pictures: {100 * totals['faint'] / asked:.1f} % of the others"
+    )
     print(f"wrote {args.out}")
     return 0
 

@@ -28,6 +28,10 @@ class FrameTruth:
         pose: (K, 6) x, y, z of the box's centre (m), roll, pitch, yaw (rad), in the camera file's world axes.
         velocity: (K, 3) m/s, same axes.
         ignore: (K,) true where a detector is not asked for the vehicle, for it is far or small.
+        tight: (K, 4) left, top, width, height (px) of the outline of the body, clipped to the picture; the
+            boxes of the corners are larger. The boxes themselves where it is not known.
+        contrast: (K,) contrast-to-noise of the pixels that are seen against what is around them in the RGB
+            picture; not a number where it is not known.
     """
 
     object_id: IntArray
@@ -39,10 +43,16 @@ class FrameTruth:
     pose: FloatArray
     velocity: FloatArray
     ignore: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    tight: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
+    contrast: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         if not len(self.ignore):
             object.__setattr__(self, "ignore", np.zeros(len(self.object_id), dtype=bool))
+        if not len(self.tight):
+            object.__setattr__(self, "tight", self.boxes)
+        if not len(self.contrast):
+            object.__setattr__(self, "contrast", np.full(len(self.object_id), np.nan))
 
     def __len__(self) -> int:
         return len(self.object_id)

@@ -55,6 +55,7 @@ def vary(
         Scenario, settings of renderer and cameras, and surroundings of this segment.
     """
     road = _road(rng, scenario.road)
+    imaging = _air(rng, imaging)
     around = _surroundings(rng, road)
     day = scenario.light.ambient_lux >= _DAYLIGHT_LUX
     light, imaging = (_daylight if day else _night)(rng, scenario.light, imaging)
@@ -138,7 +139,7 @@ def _daylight(
 ) -> tuple[LightConfig, ImagingConfig]:
     """Any time from dusk to noon: light by the sun's altitude, clear or cloudy."""
     altitude = float(np.clip(rng.uniform(-6.0, 62.0), -5.0, 62.0))
-    cloudy = rng.random() < 0.4
+    cloudy = rng.random() < 0.4 or imaging.render.fog_m > 0.0
     # Clear-sky illuminance by altitude: twilight falls by e in about 1.1°, daylight grows with the sine.
     clear = 700.0 * math.exp(altitude / 1.1) if altitude < 0.0 else 700.0 + 1.2e5 * _sine(altitude) ** 1.2
     lux = clear * float(rng.uniform(0.15, 0.4) if cloudy else 1.0)
@@ -151,6 +152,13 @@ def _daylight(
     )
     imaging = replace(imaging, render=render)
     return replace(light, ambient_lux=max(lux, 8.0)), imaging
+
+
+def _air(rng: np.random.Generator, imaging: ImagingConfig) -> ImagingConfig:
+    """Fog or rain in one of six segments, and the corners of a lens."""
+    fog = float(np.exp(rng.uniform(math.log(120.0), math.log(900.0)))) if rng.random() < 0.16 else 0.0
+    vignetting = float(rng.uniform(0.0, 0.9))
+    return replace(imaging, render=replace(imaging.render, fog_m=fog, vignetting=vignetting))
 
 
 def _sine(degrees: float) -> float:

@@ -28,7 +28,7 @@ from jeat_graph.simulation.dataset.protocol import SPLITS
 from jeat_graph.simulation.world.vehicles import KIND_NAMES
 from jeat_graph.version import __version__
 
-_COUNTS = ("frames", "events", "boxes", "ignored", "vehicles", "bytes")
+_COUNTS = ("frames", "events", "boxes", "ignored", "vehicles", "faint", "bytes")
 
 
 def read_json(path: Path) -> dict[str, Any]:

@@ -21,6 +21,9 @@ from jeat_graph.simulation.world.vehicles import KIND_NAMES
 
 _US_PER_S = 1e6
 _DIGITS = 6  # of all columns in text
+_TIGHT = ("tight_left", "tight_top", "tight_width", "tight_height")
+_CONTRAST_DIGITS = 2
+_FAINT = 2.0  # contrast-to-noise below which a vehicle hardly stands out
 _SIZE = ("length_m", "width_m", "height_m")
 _POSE = ("x_m", "y_m", "z_m", "roll_rad", "pitch_rad", "yaw_rad")
 _VELOCITY = ("vx_mps", "vy_mps", "vz_mps")
@@ -68,7 +71,7 @@ class SegmentTruth:
             video: as in `Protocol`, for the names of the pictures in `coco.json`.
 
         Returns:
-            Counts: boxes, of which ignored, and vehicles.
+            Counts: boxes, of which ignored, vehicles, and boxes that are asked for but hardly stand out.
         """
         t_us = self.times_us()
         frame = np.repeat(np.arange(len(t_us)), [len(truth) for truth in self._frames])
@@ -96,6 +99,8 @@ class SegmentTruth:
         )
         columns: dict[str, Any] = {"t": row_t, "object_id": ids, "class": rows["class_name"]}
         columns["visible"] = visible
+        columns |= _named(_TIGHT, rows["tight"])
+        columns["contrast"] = round_decimals(rows["contrast"], _CONTRAST_DIGITS)
         columns |= _named(_SIZE, rows["size"]) | _named(_POSE, pose) | _named(_VELOCITY, rows["velocity"])
         write_columns(columns, folder / VEHICLES)
         kind = np.argmax(rows["class_name"][:, None] == KIND_NAMES, axis=1)
@@ -109,7 +114,12 @@ class SegmentTruth:
             coco_annotations(index, frame, boxes, kind, ids, visible, ignore),
             coco_categories(KIND_NAMES),
         )
-        return {"boxes": len(ids), "ignored": int(ignore.sum()), "vehicles": len(np.unique(ids))}
+        return {
+            "boxes": len(ids),
+            "ignored": int(ignore.sum()),
+            "vehicles": len(np.unique(ids)),
+            "faint": int((rows["contrast"][asked] < _FAINT).sum()),
+        }
 
     def _column(self, name: str) -> np.typing.NDArray[Any]:
         parts = [getattr(truth, name) for truth in self._frames]

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.simulation.imaging.air import airlight, corner_gain, ground_distance
 from jeat_graph.simulation.imaging.config import RenderConfig
 from jeat_graph.simulation.imaging.landscape import landscape_of
 from jeat_graph.simulation.imaging.lighting import LUMINANCE, Lights
@@ -34,7 +35,8 @@ class Background(NamedTuple):
         front_cover: (H, W) their coverage of the pixel.
         front_depth: (H, W) along the optical axis (m); infinite where there is none.
         glow: (H, W, 3) what the lens scatters from the lamps.
-        whole: (H, W, 3) the picture without vehicles.
+        gain: (H, W) part of the light that the lens lets through to each pixel.
+        whole: (H, W, 3) the picture without vehicles, as it reaches the pixels.
     """
 
     back: FloatArray
@@ -46,17 +48,19 @@ class Background(NamedTuple):
     front_cover: FloatArray
     front_depth: FloatArray
     glow: FloatArray
+    gain: FloatArray
     whole: FloatArray
 
 
 # Of a pixel of the packed picture: light of the ground (lux), its place x, y (m), cover and depth of what
-# stands in front, its place x, y (m); from PACKED on, in each channel: radiance of the back, albedo over π in
-# headlights, radiance of the front times cover, its albedo likewise, glow.
-LUX, PLACE, COVER, DEPTH, WALL, PACKED = 0, 1, 3, 4, 5, 7
+# stands in front, its place x, y (m), part of the light that the lens lets through; from PACKED on, in each
+# channel: radiance of the back, albedo over π in headlights, radiance of the front times cover, its albedo
+# likewise, glow.
+LUX, PLACE, COVER, DEPTH, WALL, GAIN, PACKED = 0, 1, 3, 4, 5, 7, 8
 
 
 def pack(background: Background, lights: Lights, view: View, channels: int) -> FloatArray:
-    """Lay the static picture flat, (H, W, 7 + 5 C), in three channels or in luminance alone."""
+    """Lay the static picture flat, (H, W, 8 + 5 C), in three channels or in luminance alone."""
     b = background
     height, width = b.lux.shape
     tint = lights.head_tint / math.pi
@@ -72,7 +76,7 @@ def pack(background: Background, lights: Lights, view: View, channels: int) -> F
         for k in range(2)
     ]
     flat = [b.lux[..., None], b.place, b.front_cover[..., None], b.front_depth[..., None]]
-    return np.concatenate([*flat, np.stack(wall, axis=2), *planes], axis=2)
+    return np.concatenate([*flat, np.stack(wall, axis=2), b.gain[..., None], *planes], axis=2)
 
 
 def make_background(scene: Scene, lights: Lights, optics: Optics, config: RenderConfig) -> Background:
@@ -80,13 +84,22 @@ def make_background(scene: Scene, lights: Lights, optics: Optics, config: Render
     camera = scene.camera
     land = landscape_of(scene.road.config, scene.around)
     layers = trace(view_of(camera), land, lights)
-    back, _, _, _, front, _, cover, _ = layers
-    glow = _lamp_glow(camera, lights, optics)
-    whole = back * (1.0 - cover[..., None]) + front + glow
-    return Background(*layers, glow, whole)
+    back, albedo, place, lux, front, front_albedo, cover, depth = layers
+    view = view_of(camera)
+    beta = lights.beta
+    glow = _lamp_glow(camera, lights, optics, beta)
+    if beta > 0.0:
+        air = airlight(lights)
+        clear = np.exp(-beta * ground_distance(place, lux, view))[..., None]
+        back, albedo = back * clear + air * (1.0 - clear), albedo * clear
+        clear = np.exp(-beta * np.where(np.isfinite(depth), depth, 0.0))[..., None]
+        front, front_albedo = front * clear + cover[..., None] * air * (1.0 - clear), front_albedo * clear
+    gain = corner_gain(view, config.vignetting)
+    whole = (back * (1.0 - cover[..., None]) + front + glow) * gain[..., None]
+    return Background(back, albedo, place, lux, front, front_albedo, cover, depth, glow, gain, whole)
 
 
-def _lamp_glow(camera: Camera, lights: Lights, optics: Optics) -> FloatArray:
+def _lamp_glow(camera: Camera, lights: Lights, optics: Optics, beta: float) -> FloatArray:
     """Light of the lamps themselves: their discs and the glow about them."""
     out = np.zeros((camera.height, camera.width, 3))
     if not len(lights.lamps):
@@ -97,7 +110,9 @@ def _lamp_glow(camera: Camera, lights: Lights, optics: Optics) -> FloatArray:
         if z < 3.0 or not (-200 < u < camera.width + 200 and -200 < v < camera.height + 200):
             continue
         # A pixel's solid angle turns intensity over distance squared into radiance summed over pixels.
-        flux = _LAMP_STRAY * lights.lamp_candela / distance2 * camera.fx * camera.fy
+        flux = (
+            math.exp(-beta * float(z)) * _LAMP_STRAY * lights.lamp_candela / distance2 * camera.fx * camera.fy
+        )
         sigma = math.hypot(_LAMP_SIGMA_M * camera.fx / z, 0.5)
         splat_glow(out, float(u), float(v), sigma, flux * lights.lamp_tint, optics)
     return out

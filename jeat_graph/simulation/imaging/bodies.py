@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.simulation.imaging.air import through
 from jeat_graph.simulation.imaging.layers import GLOW, Canvas, insert, meets
 from jeat_graph.simulation.imaging.moments import (
     BOX,
@@ -31,6 +32,8 @@ from jeat_graph.simulation.imaging.optics import Optics, core_at, glow_at
 from jeat_graph.simulation.imaging.paint import Body, paint
 from jeat_graph.simulation.imaging.smooth import clamp01
 from jeat_graph.simulation.imaging.stage import (
+    AIR,
+    BETA,
     SKIN_COLOUR,
     SKIN_KIND,
     SKIN_SALT,
@@ -58,7 +61,7 @@ def add_body(
         fade: of the vehicle.
         skin: (8,) of the vehicle (see `stage`).
         camera: (18,) of the stage.
-        scene: (12,) of the stage.
+        scene: (16,) of the stage.
         canvas: where to.
     """
     if body[SIDES] == 0.0 or not meets(body[BOX : BOX + 4], tile.row, tile.column):
@@ -142,8 +145,15 @@ def add_body(
                 continue
             cover *= fade
             scale = cover / (total * math.pi)
-            p = r * TILE_W + c
-            insert(canvas.filled, canvas.value, p, depth, cover, red * scale, green * scale, blue * scale)
+            clear = through(depth, scene[BETA])
+            scale *= clear
+            haze = cover * (1.0 - clear)
+            red, green, blue = (
+                red * scale + haze * scene[AIR],
+                green * scale + haze * scene[AIR + 1],
+                blue * scale + haze * scene[AIR + 2],
+            )
+            insert(canvas.filled, canvas.value, r * TILE_W + c, depth, cover, red, green, blue)
 
 
 @njit(cache=True)

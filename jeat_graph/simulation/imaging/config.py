@@ -43,6 +43,10 @@ class RenderConfig:
         0.1,
         8.0,
     )
+    fog_m: float = number(0.0, "m", "distance at which contrast has fallen to 2 % (fog, rain); 0: clear air")
+    vignetting: float = number(
+        0.0, "1", "share of the fourth power of the cosine by which light falls to the corners", 0.0, 1.0
+    )
     far_m: float = number(230.0, "m", "vehicles beyond are not drawn", 30.0)
 
     def __post_init__(self) -> None:

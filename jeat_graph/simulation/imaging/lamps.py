@@ -70,7 +70,7 @@ def light_lamps(out: Moments, j: int, v: int, brake: float, look: Look, view: Vi
         at[1] = fy * (rotation[1, 0] * dx + rotation[1, 1] * dy + rotation[1, 2] * dz) / Z + cy
         at[2] = Z
         at[3] = math.sqrt((_LAMP_SIGMA_M * fx / Z) ** 2 + 0.25)
-        power *= look.lamps[v, k, STRENGTH]
+        power *= look.lamps[v, k, STRENGTH] * math.exp(-lights.beta * Z)
         for c in range(3):
             tint = lights.head_tint[c] if kind == HEAD else lights.tail_tint[c]
             at[LAMP_FLUX + c] = out.fade[j, v] * power * fx * fy / distance2 * tint

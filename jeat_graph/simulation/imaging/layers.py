@@ -22,7 +22,7 @@ class Canvas(NamedTuple):
         filled: (P,) bodies and lights over each pixel.
         value: (P, LAYERS, 2 + C) their depth, cover and colour times cover, the farthest first.
         shade: (P, 2) part of the sky's and of the sun's light that vehicles leave the ground.
-        ground: (P, 7 + 5 C) the tile's part of `Background.packed`.
+        ground: (P, 8 + 5 C) the tile's part of `Background.packed`.
         light: (P, 2 + C) light of beams (lux) and glow (cd/m²) over the tile.
         out: (P, C) what was painted (cd/m²).
     """
@@ -41,7 +41,7 @@ def make_canvas(channels: int) -> Canvas:
         filled=np.zeros(TILE, dtype=np.int64),
         value=np.zeros((TILE, LAYERS, 2 + channels)),
         shade=np.ones((TILE, 2)),
-        ground=np.zeros((TILE, 7 + 5 * channels)),
+        ground=np.zeros((TILE, 8 + 5 * channels)),
         light=np.zeros((TILE, 2 + channels)),
         out=np.zeros((TILE, channels)),
     )

@@ -17,6 +17,7 @@ from jeat_graph.simulation.world.scene import Scene
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB primaries (ITU-R BT.709)
 LAMP_HEIGHT_M = 0.65  # of headlights above the road
 _FAR_LAMPS_M = 400.0
+_KOSCHMIEDER = 3.912  # ln 50: contrast falls to 2 % at the visual range (Koschmieder 1924)
 _FLOOR_CD_M2 = 0.005  # what a pixel's dark current is worth
 # A beam is drawn as far as it adds this fraction of the light that is there anyway, and no farther.
 _BEAM_SHARE, _BEAM_MIN_M, _BEAM_MAX_M = 0.005, 6.0, 90.0
@@ -29,6 +30,13 @@ def _tint(red: float, green: float, blue: float) -> FloatArray:
     return out
 
 
+def _sky_tint(day: bool, share: float) -> FloatArray:
+    """Blue under a clear sky, grey under clouds, for cameras that have found their white."""
+    if day and share == 0.0:
+        return _tint(0.97, 1.0, 1.06)
+    return _tint(0.85, 0.95, 1.25) if day else _tint(0.7, 0.9, 1.3)
+
+
 class Lights(NamedTuple):
     """Lights of one scene.
 
@@ -38,6 +46,7 @@ class Lights(NamedTuple):
         sun: (3,) direction towards the sun.
         lamps: (L, 3) places of the street lamps (m).
         lamp_candela: intensity of one lamp (cd).
+        beta: extinction of the air (1/m).
         on: whether vehicles have their lights on.
         beam_candela: peak of a vehicle's low beams (cd).
         beam_stray: share of it above the cut-off.
@@ -58,6 +67,7 @@ class Lights(NamedTuple):
     sun: FloatArray
     lamps: FloatArray
     lamp_candela: float
+    beta: float
     on: bool
     beam_candela: float
     beam_stray: float
@@ -117,7 +127,8 @@ def lights_of(scene: Scene, config: RenderConfig) -> Lights:
         ),
         lamps=lamps,
         lamp_candela=light.lamp_candela,
-        on=not day,
+        beta=_KOSCHMIEDER / config.fog_m if config.fog_m > 0.0 else 0.0,
+        on=not day or config.fog_m > 0.0,
         beam_candela=config.headlight_candela,
         beam_stray=config.headlight_stray,
         beam_range_m=min(max(reach, _BEAM_MIN_M), _BEAM_MAX_M),
@@ -125,7 +136,7 @@ def lights_of(scene: Scene, config: RenderConfig) -> Lights:
         tail_candela=config.taillight_candela,
         brake_candela=config.brakelight_candela,
         parking_candela=config.parking_candela,
-        sky_tint=_tint(0.85, 0.95, 1.25) if day else _tint(0.7, 0.9, 1.3),
+        sky_tint=_sky_tint(day, share),
         sun_tint=_tint(1.05 + 0.6 * low, 1.0, 0.9 - 0.5 * low),
         lamp_tint=_tint(1.0, 0.78, 0.45),
         head_tint=_tint(1.0, 1.0, 0.95),

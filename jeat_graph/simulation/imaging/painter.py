@@ -8,7 +8,7 @@ from __future__ import annotations
 from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.simulation.imaging.background import COVER, DEPTH, LUX, PACKED
+from jeat_graph.simulation.imaging.background import COVER, DEPTH, GAIN, LUX, PACKED
 from jeat_graph.simulation.imaging.bodies import add_body, add_glow, add_lamps
 from jeat_graph.simulation.imaging.layers import GLOW, ON_GROUND, ON_WALL, Canvas, meets
 from jeat_graph.simulation.imaging.road_light import cast_beams, cast_shadow
@@ -119,4 +119,4 @@ def compose(tile: Tile, shaded: bool, sun: float, light: FloatArray, canvas: Can
                         waiting = False
                     if not last:
                         level = level * (1.0 - value[p, n, 1]) + value[p, n, 2 + k]
-                out[p, k] = level + ground[p, glow + k] + light[p, GLOW + k]
+                out[p, k] = (level + ground[p, glow + k] + light[p, GLOW + k]) * ground[p, GAIN]

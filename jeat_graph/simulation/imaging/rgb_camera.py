@@ -22,7 +22,6 @@ from jeat_graph.simulation.imaging.stage import Stage
 from jeat_graph.simulation.imaging.tiles import TILE_H, TILE_W
 
 _POISSON_BELOW_E = 60.0
-_EASE = 2.0  # a mean over time needs half the samples that events do
 
 
 @dataclass(frozen=True)
@@ -54,8 +53,7 @@ def choose_exposure(config: RGBConfig, static: FloatArray) -> Exposure:
 def expose(renderer: Renderer, time_s: float, exposure_s: float, readout_s: float) -> FloatArray:
     """Mean radiance (H, W, 3) of each pixel over its exposure (cd/m²)."""
     begin, end = time_s - 0.5 * (exposure_s + readout_s), time_s + 0.5 * (exposure_s + readout_s)
-    step_px = _EASE * renderer.config.max_step_px
-    plan = renderer.plan(begin, end, duration_s=exposure_s, step_px=step_px)
+    plan = renderer.plan(begin, end, duration_s=exposure_s)
     # Samples in the middle of equal parts of the exposure, on one raster for all rows.
     part = exposure_s / plan.most
     extra = int(np.ceil(readout_s / part - 1e-9))

@@ -87,7 +87,7 @@ def cast_beams(
         pose: (V, 4) of all.
         fade: (V,) of all.
         skin: (V, 8) of all.
-        scene: (12,) of the stage.
+        scene: (16,) of the stage.
         ground: (P, …) of the canvas.
         light: (P, …) of the canvas; changed.
     """

@@ -14,11 +14,12 @@ from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.events import EventArray
 from jeat_graph.simulation.imaging.config import ImagingConfig
+from jeat_graph.simulation.imaging.contrast import contrast_to_noise, tight_boxes
 from jeat_graph.simulation.imaging.event_camera import EventCamera
 from jeat_graph.simulation.imaging.renderer import Renderer
 from jeat_graph.simulation.imaging.rgb_camera import choose_exposure, develop, electrons, expose
 from jeat_graph.simulation.imaging.scaling import scaled_camera
-from jeat_graph.simulation.imaging.truth import frame_truth
+from jeat_graph.simulation.imaging.truth import Views, frame_truth
 from jeat_graph.simulation.imaging.visibility import buffers
 from jeat_graph.simulation.scenario import Scenario
 from jeat_graph.simulation.segment import SegmentStep
@@ -149,10 +150,17 @@ class RenderedSource:
                 rgb = develop(charge, exposure.gain, config.rgb)
             look = renderer.plan(float(time[0]), float(time[0])).look
             moments = renderer.moments(time, look)
-            _, _, visible = buffers(moments, look, ground.front_depth, ground.front_cover)
+            _, instance, visible = buffers(moments, look, ground.front_depth, ground.front_cover)
+            tight = tight_boxes(moments, self.size_px)
+            contrast = np.full(len(look.number), np.nan)
+            if self.sensors != "events":
+                contrast = contrast_to_noise(
+                    radiance, instance, look.number, tight, exposure.time_s, config.rgb
+                )
             states = scene.states_at(time, far_m=config.render.far_m)
-            seen = visible[np.searchsorted(look.number, states.object_id)]
-            truth = frame_truth(states, camera, seen, least, scenario.truth.range_m)
+            row = np.searchsorted(look.number, states.object_id)
+            views = Views(visible[row], tight[row], contrast[row])
+            truth = frame_truth(states, camera, views, least, scenario.truth.range_m)
             yield SegmentStep(t_us=int(t_us), rgb=rgb, events=events, truth=truth)
 
     def _segment_seed(self, index: int) -> int:

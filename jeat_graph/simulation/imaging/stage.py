@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.simulation.imaging.air import airlight
 from jeat_graph.simulation.imaging.background import Background, pack
 from jeat_graph.simulation.imaging.layers import Canvas, make_canvas
 from jeat_graph.simulation.imaging.lighting import Lights
@@ -15,7 +16,18 @@ from jeat_graph.simulation.imaging.optics import Optics
 from jeat_graph.simulation.imaging.tiles import View
 
 # Of the flat numbers of a scene, for the kernels.
-SKY_LUX, SUN_LUX, SUN, BEAM_RANGE, BEAM_PEAK, BEAM_STRAY, LIGHTS_ON, SKY_TINT = 0, 1, 2, 5, 6, 7, 8, 9
+SKY_LUX, SUN_LUX, SUN, BEAM_RANGE, BEAM_PEAK, BEAM_STRAY, LIGHTS_ON, SKY_TINT, BETA, AIR = (
+    0,
+    1,
+    2,
+    5,
+    6,
+    7,
+    8,
+    9,
+    12,
+    13,
+)
 # Of the flat numbers of a vehicle: size, colour, kind, salt.
 SKIN_COLOUR, SKIN_KIND, SKIN_SALT = 3, 6, 7
 
@@ -24,11 +36,11 @@ class Stage(NamedTuple):
     """All that a tile is painted from, in few arrays: handing tables to a function has its price.
 
     Attributes:
-        packed: (H, W, 7 + 5 C) the static picture.
+        packed: (H, W, 8 + 5 C) the static picture.
         moments: the V vehicles at J times.
         skin: (V, 8) their size, colour, kind, salt.
         camera: (18,) fx, fy, cx, cy, width, height, eye (3), rotation (9).
-        scene: (12,) light of sky and sun, headlights.
+        scene: (16,) light of sky and sun, headlights, fog.
         optics: glow of the lens.
         canvas: room to work.
     """
@@ -65,6 +77,8 @@ def make_setting(
         *(lights.sky_lux, lights.sun_lux, *lights.sun),
         *(lights.beam_range_m, lights.beam_candela, lights.beam_stray, float(lights.on)),
         *lights.sky_tint,
+        lights.beta,
+        *airlight(lights),
     ]
     return Setting(
         packed=pack(background, lights, view, channels),

@@ -15,7 +15,7 @@ from jeat_graph.simulation.imaging.rays import LEAST_M, box_hit, road_place, wal
 from jeat_graph.simulation.imaging.smooth import clamp01, value_noise
 from jeat_graph.simulation.imaging.tiles import View
 
-_SAMPLES = 4  # a pixel is sampled this many times each way: it is done once, so it may cost
+_SAMPLES = 3  # a pixel is sampled this many times each way: it is done once, so it may cost
 _POLE_RADIUS_M, _POST_M = 0.11, 4.0
 _TREES_FAR_M, _MAX_GROUND_M = 650.0, 3000.0
 _UNDER_BRIDGE = 0.2  # part of the light that is left below a bridge

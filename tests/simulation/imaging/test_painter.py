@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from jeat_graph.simulation.imaging.air import airlight
 from jeat_graph.simulation.imaging.lighting import LUMINANCE
 from jeat_graph.simulation.imaging.moments import BOX, HULL, SIDES
 from jeat_graph.simulation.imaging.smooth import clamp01
@@ -115,3 +116,25 @@ def test_a_vehicle_hides_what_is_behind_it() -> None:
     inside = np.all([s[0] * columns + s[1] * rows + s[2] >= 1.0 for s in outline], axis=0)
     assert inside.sum() > 100
     np.testing.assert_array_equal(both.picture(0.0)[inside], alone[inside])
+
+
+def test_fog_takes_contrast_away_by_the_law_of_koschmieder() -> None:
+    white, black = (renderer_of([CAR], DAY, fog_m=fog, headlights_below_lux=0.0) for fog in (0.0, 60.0))
+    clear, foggy = white.picture(0.0) @ LUMINANCE, black.picture(0.0) @ LUMINANCE
+    moments = white.moments(np.array([0.0]), white.plan(0.0, 0.0).look)
+    body = moments.body[0, 0, 1]
+    rows, columns = np.mgrid[0:112, 0:192] + 0.5
+    inside = np.all([s[0] * columns + s[1] * rows + s[2] >= 1.0 for s in outline_of(body)], axis=0)
+    # The body is 37.8 to 42.2 m away; at 60 m contrast is 2 %.
+    left = 0.02 ** (39.0 / 60.0)
+    air = airlight(black.lights) @ LUMINANCE
+    expected = clear[inside].mean() * left + air * (1.0 - left)
+    assert foggy[inside].mean() == pytest.approx(expected, rel=0.03)
+
+
+def test_corners_are_darker_by_the_fourth_power_of_the_cosine() -> None:
+    plain, dark = (renderer_of([], DAY, vignetting=v) for v in (0.0, 1.0))
+    ratio = dark.picture(0.0)[0, 0] / plain.picture(0.0)[0, 0]
+    lens = plain.view.lens
+    across, down = (0.5 - lens[2]) / lens[0], (0.5 - lens[3]) / lens[1]
+    np.testing.assert_allclose(ratio, (1.0 + across**2 + down**2) ** -2, rtol=1e-9)
