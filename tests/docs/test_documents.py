@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from jeat_graph.cli.main import COMMANDS, build_parser, main
+from jeat_graph.config.reading import load_config
+from jeat_graph.tracking.tracker import Tracker
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted(p for p in (ROOT / "docs").rglob("*.md") if "_build" not in p.parts)]
@@ -94,3 +96,37 @@ def test_links_lead_to_files(page):
 
 def test_the_readme_is_short():
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 150
+
+
+def test_settings_that_the_short_answers_name_exist():
+    from dataclasses import fields
+
+    from jeat_graph.config.schema import Config
+
+    text = (ROOT / "docs" / "questions.md").read_text(encoding="utf-8")
+    known = load_config("default")
+    sections = {f.name for f in fields(Config)}
+    named = [
+        key.split(".") for key in re.findall(r"`([a-z_]+\.[a-z_]+)`", text) if key.split(".")[0] in sections
+    ]
+    assert len(named) >= 5
+    for section, setting in named:
+        assert hasattr(getattr(known, section), setting), f"{section}.{setting}"
+
+
+def test_what_the_short_answers_say_of_dying_tracks_is_so():
+    ends = {}
+    for gap in (0.5, 1.0):
+        config = load_config(
+            "default", [f"lifecycle.max_gap_confirmed_s={gap}", "lifecycle.delete_existence=0"]
+        )
+        tracker = Tracker(config, image=(1920, 1080))
+        for k in range(20):
+            tracker.step((k / 20, "rgb", [[600 + 3 * k, 300, 80, 60]], [0.95]))
+        for k in range(20, 60):
+            tracker.step((k / 20, "rgb", [], []))
+            if tracker.num_tracks == 0:
+                ends[gap] = k / 20 - 0.95
+                break
+    assert ends[0.5] == pytest.approx(0.5, abs=0.051)
+    assert ends[1.0] == pytest.approx(1.0, abs=0.051)
