@@ -15,7 +15,7 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 from jeat_graph.road.box_kernel import kernel_camera
 from jeat_graph.road.camera import RoadCamera
-from jeat_graph.road.causal_kernel import advance, forget, states_at
+from jeat_graph.road.causal_kernel import forget, step_road
 from jeat_graph.road.fleet import CLASSES
 from jeat_graph.road.results import columns_of_states
 from jeat_graph.road.road_state import AY, LENGTH, STATES, STRIPS, VX, VY, RoadModel, RoadState, X, Y
@@ -120,11 +120,10 @@ class RoadFilter:
         """
         if int(self._state.count[0]) + len(rows) > len(self._state.track_id):
             self._state = _grown(self._state, len(rows))
-        advance(self._state, t, rows, self._model, self._camera)
+        known, mean, cov = step_road(self._state, t, rows, ids, self._model, self._camera)
         self._steps += 1
         if self._steps % _FORGET_EVERY == 0:
             forget(self._state, t, self._silence_s)
-        known, mean, cov = states_at(self._state, t, ids, self._model)
         return RoadStates(np.full(len(known), t), ids[known], mean, cov)
 
     def columns(self, steps: Sequence[RoadStates]) -> dict[str, npt.NDArray[Any]]:

@@ -278,6 +278,15 @@ def states_at(
 
 
 @njit(cache=True)
+def step_road(
+    state: RoadState, t: float, rows: RecordArray, ids: IntArray, model: RoadModel, camera: KernelCamera
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """`advance`, then `states_at`: one call, for handing the state over costs as much as some boxes."""
+    advance(state, t, rows, model, camera)
+    return states_at(state, t, ids, model)
+
+
+@njit(cache=True)
 def forget(state: RoadState, t: float, silence_s: float) -> None:
     """Remove tracks without a box for longer than `silence_s`, in place."""
     kept = 0

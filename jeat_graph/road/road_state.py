@@ -180,10 +180,13 @@ def update(
         distance = innovation * innovation / S
         if distance > model.gate:  # a doubtful box counts less, smoothly
             S += R[channel] * (distance / model.gate - 1.0)
+        inverse = 1.0 / S
         for r in range(STATES):
-            m[r] += gain[r] * innovation / S
-            for c in range(STATES):
-                P[r, c] -= gain[r] * gain[c] / S
+            share = gain[r] * inverse
+            m[r] += share * innovation
+            for c in range(r, STATES):
+                P[r, c] -= share * gain[c]
+                P[c, r] = P[r, c]
     for c in range(3):
         m[LENGTH + c] = max(m[LENGTH + c], LEAST_SIZE[c])
     return True
