@@ -36,7 +36,7 @@ def fit_input(config: Config, detections: Detections) -> tuple[Config, list[str]
         notes.append(
             f"the picture is taken for {config.image.width:g} x {config.image.height:g} px, as far as the "
             "boxes reach "
-            "(--set image.width=W --set image.height=H)"
+            "(--image WxH says otherwise)"
         )
     return config, notes
 

@@ -61,7 +61,9 @@ class InputWatch:
         if step < LONGEST_STEP_S or declared is None or declared.rate_hz * step < 2.0:
             return
         unit = likely_unit(step)
-        guess = f"are the times in {unit}? They must be in s" if unit else "are the times in s?"
+        guess = "are the times in s?"
+        if unit is not None:
+            guess = f"are the times in {unit}? They must be in s (on the command line: --time-unit {unit})"
         self._say("step", f"sensor {sensor!r} has a median step of {step:.6g} s: {guess}")
 
     def _judge_boxes(self, boxes: FloatArray) -> None:
