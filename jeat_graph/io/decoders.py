@@ -163,3 +163,23 @@ def quietly(call: Any) -> Any:
         return call()
     finally:
         cv2.utils.logging.setLogLevel(level)
+
+
+def without_a_word(call: Any) -> Any:
+    """Call as `quietly`, with what is written to the process's stderr meanwhile thrown away.
+
+    OpenCV says there, whatever its level of logging, that it does not know the name of VP8 in WebM, which it
+    then writes all the same.
+    """
+    try:
+        saved = os.dup(2)
+    except OSError:  # the process has no stderr
+        return quietly(call)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        return quietly(call)
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)
+        os.close(nowhere)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.io.atomic import atomic_path
+from jeat_graph.io.decoders import without_a_word
 from jeat_graph.io.video import FRAME_TIMES, VIDEO_FILES, RgbImage, quietly
 from jeat_graph.io.webm import settle_webm
 
@@ -101,7 +102,7 @@ def _open_sink(path: Path, codec: str, rate_hz: float, size_px: tuple[int, int])
     import cv2
 
     code = cv2.VideoWriter.fourcc(*codec)
-    sink = quietly(lambda: cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, rate_hz, size_px))
+    sink = without_a_word(lambda: cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, rate_hz, size_px))
     if not sink.isOpened():
         raise DataError(f"this build of OpenCV cannot write {codec} video; take --video png", path)
     return sink

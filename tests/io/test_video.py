@@ -134,3 +134,9 @@ def test_a_frame_of_another_size_is_refused(tmp_path: Path) -> None:
 def test_an_unknown_kind_of_video_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="mp4, webm, lossless, png"):
         FrameWriter(tmp_path, "gif", SIZE, 20.0)
+
+
+@pytest.mark.parametrize("video", ["mp4", "webm", "lossless", "png"])
+def test_nothing_is_said_on_stderr(tmp_path: Path, video: str, capfd: pytest.CaptureFixture[str]) -> None:
+    write(tmp_path, video, [RED] * 3)
+    assert capfd.readouterr().err == ""

@@ -17,6 +17,7 @@ from typing import Any, Self
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.atomic import atomic_path
+from jeat_graph.io.decoders import without_a_word
 from jeat_graph.io.video import RgbImage, count_frames, quietly
 from jeat_graph.io.webm import settle_webm
 
@@ -48,7 +49,7 @@ class MovieWriter:
         code = cv2.VideoWriter.fourcc(*CODECS[self._path.suffix.lower()])
         self._temporary = self._stack.enter_context(atomic_path(self._path))
         name = str(self._temporary)
-        self._sink = quietly(
+        self._sink = without_a_word(
             lambda: cv2.VideoWriter(name, cv2.CAP_FFMPEG, code, self._rate_hz, self._size_px)
         )
         if not self._sink.isOpened():
