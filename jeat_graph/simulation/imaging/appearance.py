@@ -67,7 +67,7 @@ def appearance_of(scene: Scene, rng: np.random.Generator, varied: bool) -> Appea
         dirt = rng.beta(1.2, 6.0, (count, 1))
         colour = colour * (1.0 - dirt) + dirt * np.array([0.16, 0.14, 0.11])
         variant = _variants(fleet, rng)
-        lamps = _lamps(fleet, rng)
+        lamps = _lamps(fleet, variant, rng)
     kinds = fleet.kind if len(fleet) else np.zeros(1, dtype=np.int64)
     shape = np.stack([shape_of(str(KIND_NAMES[k]), int(n)) for k, n in zip(kinds, variant, strict=True)])
     lit = rng.random(count) < scene.light.config.lit_share
@@ -86,7 +86,7 @@ def _variants(fleet: Fleet, rng: np.random.Generator) -> IntArray:
     return out
 
 
-def _lamps(fleet: Fleet, rng: np.random.Generator) -> FloatArray:
+def _lamps(fleet: Fleet, variant: IntArray, rng: np.random.Generator) -> FloatArray:
     """Lamps at heights and distances that differ by kind and vehicle; one in fifty does not work."""
     out = np.zeros((max(1, len(fleet)), LAMPS, 4))
     for v, kind in enumerate(fleet.kind):
@@ -100,7 +100,9 @@ def _lamps(fleet: Fleet, rng: np.random.Generator) -> FloatArray:
         else:
             rows += [(s * rng.uniform(0.36, 0.44), tail, TAIL, strength) for s in (-1, 1)]
             if name in ("truck", "bus"):
-                rows += [(s * 0.46, high - 0.12, MARKER, 1.0) for s in (-1, 1)]
+                # A tipper's rear is lower than its cab.
+                top = 0.7 * high if name == "truck" and variant[v] == 1 else high
+                rows += [(s * 0.46, top - 0.12, MARKER, 1.0) for s in (-1, 1)]
             elif rng.random() < 0.8:
                 rows.append((0.0, rng.uniform(0.62, 0.95) * high, BRAKE, 0.5))
         out[v, : len(rows)] = rows
