@@ -21,7 +21,11 @@ def load_yaml(text: str) -> Any:
     Raises:
         yaml.YAMLError: not valid YAML, nested too deeply, or more than `MOST_VALUES` by repetition.
     """
-    loader = yaml.SafeLoader(text)
+    try:
+        loader = yaml.SafeLoader(text)
+    except yaml.reader.ReaderError as error:
+        mark = yaml.Mark("", error.position, text.count("\n", 0, error.position), 0, None, 0)
+        raise yaml.MarkedYAMLError(problem=error.reason, problem_mark=mark) from None
     try:
         node = loader.get_single_node()
         if node is None:

@@ -74,3 +74,18 @@ def test_a_folder_that_others_can_write_to_is_not_trusted(tmp_path, monkeypatch)
 def test_where_the_code_is_kept_as_ever_nothing_is_said():
     if os.environ.get("NUMBA_CACHE_DIR") is None and os.access(Path(kernel_cache.__file__).parent, os.W_OK):
         assert kernel_cache.notice == ""
+
+
+def test_two_processes_that_compile_into_one_empty_folder_both_get_there(tmp_path):
+    (tmp_path / "cached.py").write_text(CACHED, encoding="utf-8")
+    script = "import cached; print(cached.twice(21), sum(cached.twice.stats.cache_hits.values()))"
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
+    both = [
+        subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True, env=environment)
+        for _ in range(2)
+    ]
+    assert [process.communicate(timeout=200)[0].split()[0] for process in both] == ["42", "42"]
+    third = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, env=environment, check=True
+    )
+    assert third.stdout.split() == ["42", "1"]  # compiled once, for all who come later

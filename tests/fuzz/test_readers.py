@@ -4,18 +4,27 @@ from __future__ import annotations
 
 import os
 import pickle
+import subprocess
+import sys
 
 import h5py
 import numpy as np
 import pytest
 
+from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Detections
-from jeat_graph.data.errors import DataError
+from jeat_graph.data.errors import DataError, JeatGraphError
+from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.detections_io import read_detections, write_detections
 from jeat_graph.io.events_dsec import EventFile
+from jeat_graph.io.scan_lines import read_batches
+from jeat_graph.io.trajectories_io import read_trajectories, write_trajectories
+from jeat_graph.io.truth_io import read_truth, write_truth
+from jeat_graph.live.manifest import read_manifest
+from jeat_graph.tracking.tracker import Tracker
 
 FULL = bool(os.environ.get("JEAT_GRAPH_FULL"))
-MUTATIONS = 5_000 if FULL else 150
+MUTATIONS = 5_000 if FULL else 100
 SEED = 7
 
 
@@ -94,6 +103,102 @@ def test_a_damaged_file_of_boxes_is_read_or_refused_in_one_line(tmp_path, name):
             assert np.isfinite(found.boxes).all()
     assert said
     assert not any("\n" in text for text in said)
+
+
+def truth(path):
+    rows = [f"{0.1 * k:.1f},{k % 3},{10 * k},20,30,40,car,{k % 2}\n" for k in range(12)]
+    path.write_text("t,object_id,left,top,width,height,class,ignore\n" + "".join(rows), encoding="utf-8")
+
+
+def trajectories(path):
+    found = Tracker("default").run(recording())
+    write_trajectories(Trajectories.concatenate(list(found)), path)
+
+
+def settings(path):
+    path.write_text(
+        "base: default\nimage: {width: 640, height: 480}\nmotion:\n  jerk_px: 20\n", encoding="utf-8"
+    )
+
+
+def manifest(path):
+    path.write_text("name,detections,config,rate\na,a.csv,default,25\nb,b.csv;c.csv,,\n", encoding="utf-8")
+
+
+def checkpoint(path):
+    tracker = Tracker("default")
+    list(tracker.run(recording()))
+    tracker.save(path)
+
+
+def scan_lines(path):
+    line = '{"t": %g, "sensor": "rgb", "boxes": [[1, 2, 30, 40]], "scores": [0.5]}\n'
+    path.write_text("".join(line % (0.1 * k) for k in range(12)), encoding="utf-8")
+
+
+def read_scan_lines(path):
+    with path.open("rb") as file:
+        return list(read_batches(file, str(path), joint=True, ordered=False))
+
+
+OTHERS = {
+    "gt.csv": (truth, read_truth),
+    "gt.parquet": (lambda path: write_truth(read_truth(made(path, "t.csv", truth)), path), read_truth),
+    "causal.csv": (trajectories, read_trajectories),
+    "c.yaml": (settings, load_config),
+    "m.csv": (manifest, read_manifest),
+    "state.npz": (checkpoint, Tracker.load),
+    "s.jsonl": (scan_lines, read_scan_lines),
+}
+
+
+def made(path, name, writer):
+    """Another file beside it, written."""
+    other = path.with_name(name)
+    writer(other)
+    return other
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_any_other_damaged_file_is_read_or_refused_in_one_line(tmp_path, name):
+    rng = np.random.default_rng(SEED)
+    path = tmp_path / name
+    writer, reader = OTHERS[name]
+    writer(path)
+    good = path.read_bytes()
+    reader(path)
+    said: list[str] = []
+    for _ in range(MUTATIONS):
+        path.write_bytes(mutated(good, rng))
+        try:
+            reader(path)
+        except JeatGraphError as error:
+            said.append(str(error))
+    assert said
+    assert not any("\n" in text for text in said)
+
+
+@pytest.mark.skipif(not FULL, reason="a file of a gigabyte; make fuzz reads it")
+@pytest.mark.parametrize("name", ["d.csv", "d.json", "det.txt"])
+def test_a_line_of_a_gigabyte_is_one_line_in_bounded_memory(tmp_path, name):
+    path, mib = tmp_path / name, 2**20
+    with path.open("wb") as file:
+        file.write(b"t,sensor,left,top,width,height,score\n" if name == "d.csv" else b"")
+        for _ in range(1024):
+            file.write(b"1" * mib)
+    script = (
+        "import resource, sys; from jeat_graph.io.detections_io import read_detections\n"
+        "try: read_detections(sys.argv[1], rate_hz=10.0)\n"
+        "except Exception as error: print(type(error).__name__, len(str(error)))\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, path], capture_output=True, text=True, timeout=600, check=True
+    )
+    error, size, resident_mib = done.stdout.split()
+    assert error == "DataError"
+    assert int(size) < 1000
+    assert int(resident_mib) < 6 * 1024
 
 
 def test_a_damaged_event_file_is_read_or_refused_in_one_line(tmp_path):
