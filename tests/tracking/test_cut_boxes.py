@@ -12,9 +12,9 @@ CAR = np.array([120.0, 60.0])
 SPEED, RATE = 150.0, 10.0
 
 
-def crossing(edge_px, speed=SPEED, noise=0.5):
+def crossing(edge_px, speed=SPEED, noise=0.5, engine="rts", fetch=False):
     """Track a car of 120 px that drives through a picture of 400 px; the detector cuts its boxes."""
-    config = load_config("default", (f"image.edge_px={edge_px}", "smoother.engine=rts"))
+    config = load_config("default", (f"image.edge_px={edge_px}", f"smoother.engine={engine}"))
     tracker = Tracker(config, image=(WIDTH, HEIGHT))
     rng, causal, shown = np.random.default_rng(0), [], {}
     for k in range(int((WIDTH + 2 * CAR[0]) / speed * RATE)):
@@ -28,6 +28,8 @@ def crossing(edge_px, speed=SPEED, noise=0.5):
             boxes, scores = np.array([[low, 70.0, high - low, CAR[1]]]), np.array([0.95])
             shown[t] = (centre, low, high)
         causal.append(tracker.step((t, "rgb", boxes, scores)))
+        if fetch and k % 7 == 0:
+            tracker.smoothed()
     return Trajectories.concatenate([c for c in causal if len(c)]), tracker.finish(), shown
 
 
@@ -76,3 +78,21 @@ def test_variance_of_a_cut_box_owns_up_to_the_unknown_size(tracked):
     # What a first sliver belongs to may be anything; from a third of it on the size is guessed well enough.
     a_third = np.array([shown[float(t)][2] - shown[float(t)][1] > 40.0 for t in causal.t])
     assert ratio[a_third].max() < 9.0
+
+
+# With a lag the size of the first sliver is a guess for ever: a tenth of the car.
+@pytest.mark.parametrize(("engine", "off"), [("rts", 8.0), ("fixed-lag-rts", 12.0), ("fixed-lag", 12.0)])
+def test_smoothed_boxes_end_where_what_shows_does(engine, off):
+    _, smoothed, shown = crossing(3.0, engine=engine)
+    assert len(smoothed) >= len(shown) - 2
+    for t, box in zip(smoothed.t, smoothed.boxes, strict=True):
+        _, low, high = shown[float(t)]
+        assert box[0] == pytest.approx(low, abs=off)
+        assert box[0] + box[2] == pytest.approx(high, abs=off)
+
+
+@pytest.mark.parametrize("engine", ["rts", "full"])
+def test_a_look_in_between_changes_nothing(engine):
+    once, looked = (crossing(3.0, engine=engine, fetch=fetch)[1] for fetch in (False, True))
+    assert np.array_equal(once.boxes, looked.boxes)
+    assert np.array_equal(once.mean, looked.mean)

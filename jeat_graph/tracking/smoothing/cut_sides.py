@@ -18,10 +18,31 @@ from jeat_graph.smoothers.size import SmoothedSize
 # Variance of ln size that leaves it to the whole boxes: a factor of e² to either side.
 _OPEN_LOG_VAR = 4.0
 
+# That with which the size that the filter knew stands for a cut box's, where there is no hindsight: the sizes
+# that it turned into centres and those of the rows must be the same, or the side that shows would be off.
+_FILTERED_LOG_VAR = 0.01
+
 
 def any_cut(rows: RecordArray) -> bool:
     """Whether the edge of the picture cut any box of some records (M,)."""
     return bool((rows["cut"] != WHOLE).any())
+
+
+def sizes_as_filtered(rows: RecordArray) -> RecordArray:
+    """Let the size with which the filter placed a cut box stand for it; for smoothers with a lag.
+
+    Args:
+        rows: (M,) records of one track.
+
+    Returns:
+        (M,) records.
+    """
+    cut = (rows["cut"] != WHOLE) & (rows["birth"] == 0)[:, None]
+    if not cut.any():
+        return rows
+    out = rows.copy()
+    out["size_var"] = np.where(cut, _FILTERED_LOG_VAR, rows["size_var"])
+    return out
 
 
 def sizes_by_parts(rows: RecordArray) -> RecordArray:

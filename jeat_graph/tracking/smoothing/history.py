@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 
 import numpy as np
@@ -13,11 +14,19 @@ from jeat_graph.smoothers.engine import TrackSmoother, make_smoother
 from jeat_graph.smoothers.measurements import concatenate_measurements
 from jeat_graph.smoothers.track_data import COINCIDENT_S, SmoothedTrack
 from jeat_graph.tracking.classes import Votes
-from jeat_graph.tracking.smoothing.cut_sides import any_cut, place_by_sides, sizes_by_parts
+from jeat_graph.tracking.smoothing.cut_sides import (
+    any_cut,
+    place_by_sides,
+    sizes_as_filtered,
+    sizes_by_parts,
+)
 from jeat_graph.tracking.smoothing.observation_times import BELIEVED, ObservationTimes
 from jeat_graph.tracking.smoothing.priors import ErrorStates, prior_of, size_prior_of
 from jeat_graph.tracking.smoothing.rows import rows_of
 from jeat_graph.tracking.smoothing.sizes import SizeWindow
+
+#: Engines that solve for a track once it has ended; only with these can fragments be stitched.
+WHOLE = ("full", "rts")
 
 
 class TrackHistory:
@@ -51,6 +60,7 @@ class TrackHistory:
         self._config = config
         self._errors = errors
         self._keep = keep
+        self._whole = config.smoother.engine in WHOLE
         self._sizes: SizeWindow | None = None
         self._waiting = -1  # measurements that the smoother has not had; the birth does not count
         self._fed = 0  # pieces of `measurements` that it has had
@@ -101,13 +111,13 @@ class TrackHistory:
         if not self.confirmed or self._fed == len(self.measurements):
             return
         rows = concatenate_measurements(self.measurements[self._fed :])
+        rows = sizes_by_parts(rows) if self._whole else sizes_as_filtered(rows)
         if self._sizes is None:
-            rows = sizes_by_parts(rows)
             self._sizes = SizeWindow(size_prior_of(rows[0]), self._config.size.rate_density)
             self._sizes.append(rows[1:])
         else:
             self._sizes.append(rows)
-        if any_cut(rows):
+        if self._whole and any_cut(rows):
             rows = place_by_sides(rows, self._sizes.smooth(), self._config)
         if self.smoother is None:
             settings = self._config.smoother
@@ -136,6 +146,12 @@ class TrackHistory:
 
     def current(self) -> tuple[list[Trajectories], list[Trajectories]]:
         """Take in all that waits; return the rows that are final then, as `departed`, and all others."""
+        if self._whole:
+            # What cut boxes say depends on all that follows: nothing is taken in for good before the end.
+            draft = copy.copy(self)
+            draft.measurements, draft._observed = list(self.measurements), list(self._observed)
+            draft.feed()
+            return [], [] if draft.smoother is None else draft._rows(draft.smoother.current(), np.inf)
         self.feed()
         if self.smoother is None:
             return [], []

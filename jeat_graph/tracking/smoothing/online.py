@@ -12,15 +12,12 @@ from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.smoothers.engine import load_engine
 from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
-from jeat_graph.tracking.smoothing.history import TrackHistory
+from jeat_graph.tracking.smoothing.history import WHOLE, TrackHistory
 from jeat_graph.tracking.smoothing.priors import ErrorStates
 from jeat_graph.tracking.smoothing.recorder import Packet
 from jeat_graph.tracking.smoothing.shares import HANDING, Share, cost_of_solving, split
 from jeat_graph.tracking.smoothing.stitched import stitch_histories
 from jeat_graph.tracking.smoothing.waiting import WaitingRows
-
-#: Engines that solve for a track once it has ended; only with these can fragments be stitched.
-WHOLE = ("full", "rts")
 
 
 class TrackSmoothers:

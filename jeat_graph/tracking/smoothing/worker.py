@@ -23,8 +23,9 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.smoothing.behind import COUNTS
+from jeat_graph.tracking.smoothing.history import WHOLE
 from jeat_graph.tracking.smoothing.journal import PACKETS_PER_STATE, Journal
-from jeat_graph.tracking.smoothing.online import WHOLE, TrackSmoothers
+from jeat_graph.tracking.smoothing.online import TrackSmoothers
 from jeat_graph.tracking.smoothing.outbox import Outbox
 from jeat_graph.tracking.smoothing.recorder import StepRecorder
 from jeat_graph.tracking.smoothing.waiting import WaitingRows
