@@ -30,8 +30,8 @@ def consistency(tracks: Sequence[MeasuredTrack]) -> tuple[dict[str, Any], Table]
     innovations: list[Innovations] = []
     ratio: list[FloatArray] = []
     for track in tracks:
-        filtered, _, full, surprise = states_at(track.data, track.data.t, [])
-        innovations.append(surprise)
+        filtered, _, full, innovation = states_at(track.data, track.data.t, [])
+        innovations.append(innovation)
         ratio.append(_disagreement(filtered, full))
     nis = np.concatenate([one.nis() for one in innovations]) if innovations else np.zeros(0)
     low, high = chi2_bounds(len(nis), 2)

@@ -48,7 +48,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Crossing:
+class LineCrossing:
     """One track that crossed one line.
 
     Attributes:
@@ -69,7 +69,7 @@ class Crossing:
     vehicle_class: str = ""
 
 
-def crossings(table: Trajectories, line: Line, classes: dict[int, str] | None = None) -> list[Crossing]:
+def crossings(table: Trajectories, line: Line, classes: dict[int, str] | None = None) -> list[LineCrossing]:
     """Find the tracks that cross a line.
 
     Args:
@@ -93,7 +93,7 @@ def crossings(table: Trajectories, line: Line, classes: dict[int, str] | None = 
             t, direction, probability = one
             track = int(ids[start])
             name = (classes or {}).get(track, "")
-            found.append(Crossing(line.name, track, t, direction, probability, name))
+            found.append(LineCrossing(line.name, track, t, direction, probability, name))
     return sorted(found, key=lambda c: (c.t, c.track_id))
 
 
@@ -157,7 +157,7 @@ class Count:
     high: int
 
 
-def count(found: Sequence[Crossing], edges: FloatArray) -> list[Count]:
+def count(found: Sequence[LineCrossing], edges: FloatArray) -> list[Count]:
     """Count crossings by line, direction, class and interval.
 
     Args:

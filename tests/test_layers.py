@@ -264,3 +264,13 @@ def test_layers_ascend():
     low = "data.errors filters.motion smoothers.rts data.detections config.schema io.csv_text tracking.step"
     high = "eval.metrics runs.directory drawing.palette benchmark.speed cli.main __main__"
     assert all(layer(one) < layer(next_one) for one, next_one in pairwise(f"{low} {high}".split()))
+
+
+def test_no_two_classes_share_a_name():
+    homes: dict[str, list[str]] = {}
+    for module in modules():
+        for node in tree(module).body:
+            if isinstance(node, ast.ClassDef):
+                homes.setdefault(node.name, []).append(module)
+    assert homes, "there are classes"
+    assert {name: where for name, where in homes.items() if len(where) > 1} == {}

@@ -13,7 +13,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Scan
-from jeat_graph.io.scan_lines import Batch
+from jeat_graph.io.scan_lines import ScanBatch
 from jeat_graph.live.messages import ScanMessage
 
 RATES_HZ = {"evt": 100.0, "rgb": 20.0}
@@ -37,7 +37,7 @@ def messages(last: int, vehicles: int, seed: int, first: int = 0) -> Iterator[Sc
     """
     for second in range(first, last):
         for k, scan in enumerate(arriving(second, vehicles, seed)):
-            yield ScanMessage(Batch([scan], [0]), _SOURCE, _NUMBERS * second + k)
+            yield ScanMessage(ScanBatch([scan], [0]), _SOURCE, _NUMBERS * second + k)
 
 
 def arriving(second: int, vehicles: int, seed: int) -> list[Scan]:

@@ -12,7 +12,7 @@ from jeat_graph.config.schema import Config, SensorConfig
 
 
 @dataclass(frozen=True)
-class Step:
+class Change:
     """One row of the ablation.
 
     Attributes:
@@ -27,7 +27,7 @@ class Step:
 
 
 STEPS = (
-    Step(
+    Change(
         "+ scale-aware noise and motion",
         (
             "sensors.*.sigma_px",
@@ -43,8 +43,8 @@ STEPS = (
         # What the likelihood of the innovations finds best as long as nothing is known of perspective.
         {"motion.jerk_per_size": 2.0, "motion.jerk_per_growth": 0.0},
     ),
-    Step("+ size in the gate", ("association.size_gate", "association.gate_probability")),
-    Step(
+    Change("+ size in the gate", ("association.size_gate", "association.gate_probability")),
+    Change(
         "+ likelihood as cost",
         (
             "association.cost",
@@ -56,19 +56,19 @@ STEPS = (
         ),
         {"lifecycle.hidden_prior": 0.0},
     ),
-    Step("+ one slot a sensor", ("association.method", "association.second_pass", "association.priority")),
-    Step("+ no duplicate births, merging", ("birth.max_overlap", "merge")),
-    Step(
+    Change("+ one slot a sensor", ("association.method", "association.second_pass", "association.priority")),
+    Change("+ no duplicate births, merging", ("birth.max_overlap", "merge")),
+    Change(
         "+ existence probability, births weighed",
         ("lifecycle", "birth", "sensors.*.tempering"),
         {"lifecycle.hidden_prior": 0.0, "lifecycle.p_detect_weight": 0.0, "lifecycle.leave_picture": False},
     ),
-    Step("+ output rules", ("output", "smoother", "lifecycle.leave_picture")),
-    Step("+ blindness of the event camera", ("sensors.*.blind_speed",)),
-    Step("+ P_D of each track, hidden vehicles", ("lifecycle.hidden_prior", "lifecycle.p_detect_weight")),
-    Step("+ standing tracks", ("standing",)),
-    Step("+ errors with memory", ("sensors.*.correlated_share", "sensors.*.memory_s")),
-    Step("+ jerk by perspective", ("motion",)),
+    Change("+ output rules", ("output", "smoother", "lifecycle.leave_picture")),
+    Change("+ blindness of the event camera", ("sensors.*.blind_speed",)),
+    Change("+ P_D of each track, hidden vehicles", ("lifecycle.hidden_prior", "lifecycle.p_detect_weight")),
+    Change("+ standing tracks", ("standing",)),
+    Change("+ errors with memory", ("sensors.*.correlated_share", "sensors.*.memory_s")),
+    Change("+ jerk by perspective", ("motion",)),
 )
 
 
@@ -87,7 +87,7 @@ def start(paper: Config, target: Config) -> Config:
     )
 
 
-def rows(paper: Config, target: Config, steps: Sequence[Step] = STEPS) -> list[tuple[str, Config]]:
+def rows(paper: Config, target: Config, steps: Sequence[Change] = STEPS) -> list[tuple[str, Config]]:
     """All configurations from `start(paper, target)` to `target`, each with its name.
 
     The last one takes whatever is left, so it equals the target exactly.

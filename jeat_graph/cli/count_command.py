@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     edges[-1] = max(edges[-1], np.nextafter(last, np.inf))
     counts = counting.count(found, edges)
     if args.crossings:
-        write_columns(_columns(found, counting.Crossing), args.crossings)
+        write_columns(_columns(found, counting.LineCrossing), args.crossings)
     if args.out:
         write_columns(_columns(counts, counting.Count), args.out)
         print(f"wrote {args.out}: {len(found)} crossings ({kind} tracks)", file=sys.stderr)

@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.road.road_page import write_road_page
     from jeat_graph.road.sources import boxes_of, contact_pixels, only_points, run_table
     from jeat_graph.road.speeds import ContactConfig
-    from jeat_graph.road.traffic import TrafficConfig, count_columns, headway_columns
+    from jeat_graph.road.traffic import SummaryConfig, count_columns, headway_columns
 
     out = Path(args.out)
     if out.exists() and not out.is_dir():
@@ -90,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
             )
     result = summarise(vehicles, camera, marks, contact, LaneConfig(), sized)
     write_result(result, out)
-    traffic = TrafficConfig() if args.interval is None else TrafficConfig(interval_s=args.interval)
+    traffic = SummaryConfig() if args.interval is None else SummaryConfig(interval_s=args.interval)
     write_columns(count_columns(result, traffic), out / "counts.csv")
     write_columns(headway_columns(result, traffic), out / "headways.csv")
     write_road_page(result, camera, traffic, Path(args.source).name or str(args.source), out / "road.html")

@@ -19,7 +19,7 @@ _COLUMNS = ("t", "sensor", "left", "top", "width", "height", "score")
 _CLASS = "class"  # a column that may be there
 
 
-class Batch(NamedTuple):
+class ScanBatch(NamedTuple):
     """Scans of one time, to be taken jointly.
 
     Attributes:
@@ -43,7 +43,7 @@ def read_batches(
     joint: bool = False,
     ordered: bool = True,
     bad: Callable[[DataError], object] | None = None,
-) -> Iterator[Batch]:
+) -> Iterator[ScanBatch]:
     """Read scans as their lines arrive.
 
     A line of JSON is one scan, `{"t": 0.05, "sensor": "rgb", "boxes": [[l, t, w, h], …], "scores": [s, …]}`,
@@ -107,7 +107,7 @@ def _decode(line: bytes, name: str, number: int) -> str:
 
 def _json_batches(
     text: str, number: int, numbered: Iterator[tuple[int, bytes]], name: str, trying: _Trying
-) -> Iterator[Batch]:
+) -> Iterator[ScanBatch]:
     first = trying(_json_batch, text, name, number)
     if first is not None:
         yield first
@@ -118,7 +118,7 @@ def _json_batches(
             yield batch
 
 
-def _json_batch(text: str, name: str, number: int) -> Batch:
+def _json_batch(text: str, name: str, number: int) -> ScanBatch:
     try:
         content = json.loads(text)
     except (ValueError, RecursionError) as error:
@@ -127,7 +127,7 @@ def _json_batch(text: str, name: str, number: int) -> Batch:
     return batch_of(content, name, number)
 
 
-def batch_of(content: Any, name: str, number: int) -> Batch:
+def batch_of(content: Any, name: str, number: int) -> ScanBatch:
     """Make a batch of a scan, or a list of scans of one time, that was read from JSON or the like.
 
     Args:
@@ -144,7 +144,7 @@ def batch_of(content: Any, name: str, number: int) -> Batch:
     scans = [_scan_of(item, name, number) for item in items]
     if any(scan.t != scans[0].t for scan in scans):
         raise DataError("the scans of one line must have one and the same t", name, number)
-    return _in_order(Batch(scans, [number] * len(scans)))
+    return _in_order(ScanBatch(scans, [number] * len(scans)))
 
 
 def _scan_of(item: Any, name: str, number: int) -> Scan:
@@ -208,7 +208,7 @@ def _csv_columns(header: str, name: str, at: int) -> dict[str, int]:
 
 def _csv_batches(
     place: dict[str, int], numbered: Iterator[tuple[int, bytes]], name: str, trying: _Trying
-) -> Iterator[Batch | None]:
+) -> Iterator[ScanBatch | None]:
     """Yield a batch of one scan for each run of rows of one sensor and time, None where a line is empty."""
     rows: list[_Row] = []
     first = 0
@@ -259,23 +259,23 @@ def _csv_row(text: str, place: dict[str, int], name: str, number: int) -> _Row:
     return row
 
 
-def _scan_of_rows(rows: list[_Row], line: int) -> Batch:
+def _scan_of_rows(rows: list[_Row], line: int) -> ScanBatch:
     found = [row for row in rows if row.box is not None]
     boxes, scores = [row.box for row in found], [row.score for row in found]
     kinds = None if rows[0].kind is None else np.array([row.kind for row in found], dtype=np.str_)
-    return Batch([Scan(rows[0].t, rows[0].sensor, boxes, scores, kinds)], [line])  # type: ignore[arg-type]
+    return ScanBatch([Scan(rows[0].t, rows[0].sensor, boxes, scores, kinds)], [line])  # type: ignore[arg-type]
 
 
-def _joined(parts: Iterable[Batch | None], name: str, ordered: bool) -> Iterator[Batch]:
+def _joined(parts: Iterable[ScanBatch | None], name: str, ordered: bool) -> Iterator[ScanBatch]:
     """Hold scans back until a later time is seen, or an empty line of CSV; sensors in alphabetical order."""
-    held: Batch | None = None
+    held: ScanBatch | None = None
     for part in parts:
         if held is None or part is None:
             if held is not None:
                 yield _in_order(held)
             held = part
         elif part.t == held.t:
-            held = Batch(held.scans + part.scans, held.lines + part.lines)
+            held = ScanBatch(held.scans + part.scans, held.lines + part.lines)
         elif part.t > held.t:
             yield _in_order(held)
             held = part
@@ -288,6 +288,6 @@ def _joined(parts: Iterable[Batch | None], name: str, ordered: bool) -> Iterator
         yield _in_order(held)
 
 
-def _in_order(batch: Batch) -> Batch:
+def _in_order(batch: ScanBatch) -> ScanBatch:
     order = sorted(range(len(batch.scans)), key=lambda k: batch.scans[k].sensor)
-    return Batch([batch.scans[k] for k in order], [batch.lines[k] for k in order])
+    return ScanBatch([batch.scans[k] for k in order], [batch.lines[k] for k in order])

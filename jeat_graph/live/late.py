@@ -34,7 +34,7 @@ POLICIES = (REWIND, SKIP, REFUSE)
 
 
 @dataclass
-class Step:
+class TakenStep:
     """A step that may still be taken again.
 
     Attributes:
@@ -91,7 +91,7 @@ class LiveTracker:
         self.tracker = tracker
         self.policy = policy
         self.lateness = LatenessCounter(tracker.sensor_names)
-        self.steps: list[Step] = []
+        self.steps: list[TakenStep] = []
         self.replayed = 0
         self._again_until: float | None = None  # after a restart: time of the newest scan that was known then
         self._newest: list[str] = []  # where nothing is taken again: sensors of the scans at the newest time
@@ -174,7 +174,7 @@ class LiveTracker:
         for scans in state["steps"]:
             before = live.tracker.snapshot()
             taken = live.tracker.take_in(scans)
-            live.steps.append(Step(scans[0].t, scans, before, taken))
+            live.steps.append(TakenStep(scans[0].t, scans, before, taken))
         live._again_until = live.tracker.time
         return live, state["more"]
 
@@ -255,7 +255,7 @@ class LiveTracker:
             scans = self.steps[k].scans + scans
             del self.steps[k]
         # As files are read: the order of arrival must not show.
-        self.steps.insert(k, Step(t, sorted(scans, key=lambda scan: scan.sensor), before, None))
+        self.steps.insert(k, TakenStep(t, sorted(scans, key=lambda scan: scan.sensor), before, None))
         for step in self.steps[k:]:
             if step is not self.steps[k]:
                 step.before = self.tracker.snapshot()

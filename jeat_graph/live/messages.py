@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jeat_graph.data.errors import DataError, JeatGraphError
-from jeat_graph.io.scan_lines import Batch, batch_of
+from jeat_graph.io.scan_lines import ScanBatch, batch_of
 
 VERSION = 1
 ENCODINGS = ("json", "msgpack")
@@ -33,7 +33,7 @@ class ScanMessage(NamedTuple):
         seq: its number among the messages of that source, or None.
     """
 
-    batch: Batch
+    batch: ScanBatch
     source: str
     seq: int | None
 

@@ -84,9 +84,9 @@ def _write_road(run: Path, camera_file: str) -> int:
     from jeat_graph.road.road_page import write_road_page
     from jeat_graph.road.sources import boxes_of
     from jeat_graph.road.speeds import ContactConfig
-    from jeat_graph.road.traffic import TrafficConfig, count_columns, headway_columns
+    from jeat_graph.road.traffic import SummaryConfig, count_columns, headway_columns
 
-    camera, out, traffic = read_camera(camera_file), run / ROAD, TrafficConfig()
+    camera, out, traffic = read_camera(camera_file), run / ROAD, SummaryConfig()
     sized = follow_boxes(boxes_of(run, camera, BoxConfig()), camera, CuboidConfig())
     vehicles = [one.vehicle for one in sized]
     marks = RoadMarks({}, {})

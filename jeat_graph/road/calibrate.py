@@ -38,7 +38,7 @@ _LANE_WIDTHS_M = 1.75  # width of the strips in which tracks share what is wrong
 
 
 @dataclass(frozen=True, eq=False)
-class Calibration:
+class CameraCalibration:
     """A calibrated camera and how well the evidence agrees with it.
 
     Attributes:
@@ -56,7 +56,7 @@ class Calibration:
     common_acceleration: float
 
 
-def calibrate(problem: Problem, zone: str = "") -> Calibration:
+def calibrate(problem: Problem, zone: str = "") -> CameraCalibration:
     """Find the camera that all the evidence, weighed by its errors, agrees with best.
 
     Args:
@@ -85,7 +85,7 @@ def calibrate(problem: Problem, zone: str = "") -> Calibration:
     return _with_origin_below(calibration, map_axes)
 
 
-def _with_lanes_as_wide(calibration: Calibration) -> Calibration:
+def _with_lanes_as_wide(calibration: CameraCalibration) -> CameraCalibration:
     """Set the height by the lanes alone: what is believed of accelerations makes every scene look smaller."""
     camera, problem, w = calibration.camera, calibration.problem, calibration.weighting
     assert problem.tracks is not None
@@ -113,7 +113,7 @@ def _along(camera: RoadCamera, problem: Problem) -> float:
     return float(np.median(np.arctan2(vectors[:, 0], vectors[:, 1]))) if len(vectors) else 0.0
 
 
-def _with_origin_below(calibration: Calibration, map_axes: Georeference) -> Calibration:
+def _with_origin_below(calibration: CameraCalibration, map_axes: Georeference) -> CameraCalibration:
     """Move the origin to the road below the camera, which the map then has to say where it is."""
     camera, points = calibration.camera, calibration.problem.points
     assert points is not None
@@ -128,7 +128,7 @@ def _with_origin_below(calibration: Calibration, map_axes: Georeference) -> Cali
     return replace(calibration, camera=camera, problem=replace(calibration.problem, points=moved))
 
 
-def _solve(problem: Problem) -> Calibration:
+def _solve(problem: Problem) -> CameraCalibration:
     """Solve with the road's y axis along the road.
 
     In turn: robust weights of the tracks' points and the size of every kind of error from the residuals,
@@ -169,7 +169,7 @@ def _solve(problem: Problem) -> Calibration:
             break
     camera = replace(camera, covariance=(covariance + covariance.T) / 2.0)
     used = weighting.node_weight.max(axis=1, initial=0.0) > 0.1
-    return Calibration(camera, problem, weighting, used, acceleration)
+    return CameraCalibration(camera, problem, weighting, used, acceleration)
 
 
 def _count(problem: Problem, w: Weighting) -> int:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from jeat_graph.road.calibrate import Calibration
+from jeat_graph.road.calibrate import CameraCalibration
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.residuals import length_errors
 from jeat_graph.road.speeds import Z95
@@ -60,7 +60,7 @@ def speed_share(camera: RoadCamera, x: float, y: float) -> float:
     return math.sqrt(max(float(difference @ camera.covariance @ difference), 0.0)) / float(y + reach - near)
 
 
-def calibration_lines(calibration: Calibration) -> list[str]:
+def calibration_lines(calibration: CameraCalibration) -> list[str]:
     """The camera, then how well each kind of evidence agrees with it."""
     camera, problem, w = calibration.camera, calibration.problem, calibration.weighting
     lines = camera_lines(camera)

@@ -18,21 +18,21 @@ from jeat_graph.road.report import camera_lines
 from jeat_graph.road.results import RoadResult
 from jeat_graph.road.road_drawings import histogram_svg, lane_colour, plan_svg, time_space_svg
 from jeat_graph.road.speeds import Speed
-from jeat_graph.road.traffic import TrafficConfig, count_columns, headway_columns, speed_summary
+from jeat_graph.road.traffic import SummaryConfig, count_columns, headway_columns, speed_summary
 
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 _MOST_ROWS = 400
 
 
 def write_road_page(
-    result: RoadResult, camera: RoadCamera, config: TrafficConfig, name: str, path: str | Path
+    result: RoadResult, camera: RoadCamera, config: SummaryConfig, name: str, path: str | Path
 ) -> None:
     """Write the page; the same result gives the same bytes."""
     with open_atomic(path) as file:
         file.write(render_road_page(result, camera, config, name))
 
 
-def render_road_page(result: RoadResult, camera: RoadCamera, config: TrafficConfig, name: str) -> str:
+def render_road_page(result: RoadResult, camera: RoadCamera, config: SummaryConfig, name: str) -> str:
     """Make the page.
 
     Args:
@@ -72,7 +72,7 @@ def _header(result: RoadResult, name: str) -> str:
     return f'<header><h1>{escape(name)}</h1><p class="quiet">{escape(" · ".join(facts))}</p></header>'
 
 
-def _lanes(result: RoadResult, config: TrafficConfig) -> str:
+def _lanes(result: RoadResult, config: SummaryConfig) -> str:
     if not result.vehicles:
         return "<p>No vehicle was seen on the road.</p>"
     records: list[dict[str, Cell]] = []
@@ -131,7 +131,7 @@ def _drawings(result: RoadResult) -> str:
     )
 
 
-def _counts(result: RoadResult, config: TrafficConfig) -> str:
+def _counts(result: RoadResult, config: SummaryConfig) -> str:
     columns = count_columns(result, config)
     if not len(columns["line"]):
         return ""
@@ -141,7 +141,7 @@ def _counts(result: RoadResult, config: TrafficConfig) -> str:
     return f"<h2>Counts</h2>{table}"
 
 
-def _headways(result: RoadResult, config: TrafficConfig) -> str:
+def _headways(result: RoadResult, config: SummaryConfig) -> str:
     columns = headway_columns(result, config)
     if not len(columns["line"]):
         return ""

@@ -22,7 +22,7 @@ ALL = "all"
 
 
 @dataclass(frozen=True)
-class TrafficConfig:
+class SummaryConfig:
     """How traffic is summed up."""
 
     interval_s: float = number(300.0, "s", "length of an interval of the counts", open_low=True)
@@ -58,7 +58,7 @@ def passages(result: RoadResult) -> list[Passage]:
     return [Passage(row[0], lane, row[1], row[2]) for row, lane in zip(rows, lanes, strict=True)]
 
 
-def count_columns(result: RoadResult, config: TrafficConfig) -> dict[str, npt.NDArray[Any]]:
+def count_columns(result: RoadResult, config: SummaryConfig) -> dict[str, npt.NDArray[Any]]:
     """Rows of `counts.csv`: line, lane (or all) and class (or all) in each interval with any vehicle.
 
     The intervals of the speeds are for the vehicles that were there: by noise of each and by the calibration,
@@ -90,7 +90,7 @@ _SPEEDS = ("mean_kmh", "mean_low_kmh", "mean_high_kmh", "p85_kmh", "p85_low_kmh"
 
 
 def _count_row(
-    key: tuple[str, int, str, str], group: Sequence[Passage], config: TrafficConfig
+    key: tuple[str, int, str, str], group: Sequence[Passage], config: SummaryConfig
 ) -> dict[str, Any]:
     line, k, lane, kind = key
     start = k * config.interval_s
@@ -106,7 +106,7 @@ def _count_row(
     }
 
 
-def speed_summary(speeds: Sequence[Any], config: TrafficConfig) -> tuple[float, ...]:
+def speed_summary(speeds: Sequence[Any], config: SummaryConfig) -> tuple[float, ...]:
     """Mean and 85th percentile of speeds (km/h), each with the ends of its 95 % interval.
 
     Args:
@@ -128,7 +128,7 @@ def speed_summary(speeds: Sequence[Any], config: TrafficConfig) -> tuple[float, 
     return mean, max(mean - half, 0.0), mean + half, p85, max(p85 - spread, 0.0), p85 + spread
 
 
-def headway_columns(result: RoadResult, config: TrafficConfig) -> dict[str, npt.NDArray[Any]]:
+def headway_columns(result: RoadResult, config: SummaryConfig) -> dict[str, npt.NDArray[Any]]:
     """Rows of `headways.csv`: each vehicle that follows another over a line in its lane.
 
     Headways are from front to front where sizes are known, else from point to point; gaps, from the rear of

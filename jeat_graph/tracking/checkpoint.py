@@ -36,7 +36,7 @@ from jeat_graph.tracking.smoothing.shares import Share
 from jeat_graph.tracking.smoothing.sizes import SizeWindow
 from jeat_graph.tracking.smoothing.waiting import WaitingRows
 from jeat_graph.tracking.snapshot import Snapshot
-from jeat_graph.tracking.state import Scene, TrackArrays
+from jeat_graph.tracking.state import SceneState, TrackArrays
 from jeat_graph.tracking.step_record import StepRecord
 from jeat_graph.version import __version__
 
@@ -49,7 +49,7 @@ _PLAIN = (
     ObservationTimes,
     Prior,
     Scan,
-    Scene,
+    SceneState,
     SizeWindow,
     SmoothedTrack,
     Snapshot,

@@ -9,13 +9,13 @@ from jeat_graph.association.boxes import track_boxes, visible_fraction
 from jeat_graph.config.kernel_form import Model
 from jeat_graph.config.schema import ImageConfig, OutputConfig
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.tracking.state import Scene, TrackArrays
+from jeat_graph.tracking.state import SceneState, TrackArrays
 
 # A sensor of less than this share of the greatest trust is not waited for.
 _TRUSTED = 0.5
 
 
-def longest_gap_s(scene: Scene, model: Model) -> float:
+def longest_gap_s(scene: SceneState, model: Model) -> float:
     """Time since its last update up to which a track is reported (s).
 
     In scans of the sensor that needs most time: one that finds one vehicle in two has to be given more of

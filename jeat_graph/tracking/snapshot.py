@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from jeat_graph.tracking.classes import ClassTally
-from jeat_graph.tracking.state import Scene, TrackArrays
+from jeat_graph.tracking.state import SceneState, TrackArrays
 
 
 class Snapshot(NamedTuple):
@@ -22,17 +22,19 @@ class Snapshot(NamedTuple):
     t: float | None
     next_id: int
     tracks: TrackArrays
-    scene: Scene
+    scene: SceneState
     classes: ClassTally | None = None
 
     @staticmethod
-    def of(t: float | None, next_id: int, tracks: TrackArrays, num_tracks: int, scene: Scene) -> Snapshot:
+    def of(
+        t: float | None, next_id: int, tracks: TrackArrays, num_tracks: int, scene: SceneState
+    ) -> Snapshot:
         """Copy the first `num_tracks` rows, and the scene."""
         return Snapshot(
             t,
             next_id,
             TrackArrays._make(array[:num_tracks].copy() for array in tracks),
-            Scene._make(array.copy() for array in scene),
+            SceneState._make(array.copy() for array in scene),
         )
 
     @property
@@ -40,7 +42,7 @@ class Snapshot(NamedTuple):
         """Number of living tracks N."""
         return len(self.tracks.track_id)
 
-    def copy_to(self, tracks: TrackArrays, scene: Scene) -> None:
+    def copy_to(self, tracks: TrackArrays, scene: SceneState) -> None:
         """Write the copy into arrays of at least N rows, and into a scene."""
         for source, target in zip(self.tracks, tracks, strict=True):
             target[: len(source)] = source

@@ -59,7 +59,7 @@ class TrackArrays(NamedTuple):
     seen_by: IntArray
 
 
-class Scene(NamedTuple):
+class SceneState(NamedTuple):
     """What is learnt of the scene as a whole.
 
     Attributes:
@@ -85,7 +85,7 @@ class Scene(NamedTuple):
     fruitless: FloatArray
 
 
-def start_scene(clutter: FloatArray, p_detect: FloatArray, undetected: float, trust: float) -> Scene:
+def start_scene(clutter: FloatArray, p_detect: FloatArray, undetected: float, trust: float) -> SceneState:
     """Return what is held of a scene before the first scan.
 
     Args:
@@ -95,7 +95,7 @@ def start_scene(clutter: FloatArray, p_detect: FloatArray, undetected: float, tr
         trust: in each sensor.
     """
     num_sensors = len(clutter)
-    return Scene(
+    return SceneState(
         clutter=clutter.copy(),
         p_detect=p_detect.copy(),
         undetected=np.array([undetected]),

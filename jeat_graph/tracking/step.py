@@ -12,7 +12,7 @@ from jeat_graph.tracking.stages.ending import confirm, remove_ended
 from jeat_graph.tracking.stages.learning import count_misses, learn_scene, learn_trust
 from jeat_graph.tracking.stages.predicting import current_p_detect, expect_detections, predict_all
 from jeat_graph.tracking.stages.updating import take_second_views, update_matched
-from jeat_graph.tracking.state import Scene, TrackArrays
+from jeat_graph.tracking.state import SceneState, TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog
 
 
@@ -23,7 +23,7 @@ def step(
     next_id: int,
     dt: float,
     arrivals: Arrivals,
-    scene: Scene,
+    scene: SceneState,
     model: Model,
     log: UpdateLog,
 ) -> tuple[int, int]:

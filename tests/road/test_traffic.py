@@ -17,7 +17,7 @@ from jeat_graph.road.points_road import summarise
 from jeat_graph.road.results import RoadResult, Size
 from jeat_graph.road.road_page import render_road_page
 from jeat_graph.road.speeds import ContactConfig, Speed, Vehicle, interval
-from jeat_graph.road.traffic import TrafficConfig, count_columns, headway_columns, speed_summary
+from jeat_graph.road.traffic import SummaryConfig, count_columns, headway_columns, speed_summary
 
 LENGTH = 4.0
 
@@ -54,7 +54,7 @@ def test_without_lines_all_are_counted_where_most_come_by() -> None:
 
 
 def test_counts_by_lane_class_and_interval() -> None:
-    columns = count_columns(_result(), TrafficConfig(interval_s=30.0))
+    columns = count_columns(_result(), SummaryConfig(interval_s=30.0))
     rows = [
         (lane, kind, start, count)
         for lane, kind, start, count in zip(
@@ -70,7 +70,7 @@ def test_counts_by_lane_class_and_interval() -> None:
 
 
 def test_headways_are_from_front_to_front_and_gaps_from_rear_to_front() -> None:
-    columns = headway_columns(_result(), TrafficConfig())
+    columns = headway_columns(_result(), SummaryConfig())
     first = (columns["track_id"] == 1) & (columns["ahead_id"] == 0)
     at = float(columns["t"][first][0])  # of the line, which need not be at 50 m
     y = 50.0 + 21.0 * (at - 13.0)
@@ -85,7 +85,7 @@ def test_headways_are_from_front_to_front_and_gaps_from_rear_to_front() -> None:
 
 def test_intervals_of_the_mean_add_noise_and_keep_calibration() -> None:
     speeds = [interval(v, 1.0, 0.5) for v in np.linspace(80.0, 120.0, 100)]
-    mean, low, high, p85, p85_low, p85_high = speed_summary(speeds, TrafficConfig())
+    mean, low, high, p85, p85_low, p85_high = speed_summary(speeds, SummaryConfig())
     assert mean == pytest.approx(100.0)
     assert high - mean == pytest.approx(1.96 * np.hypot(0.1, 0.5), rel=1e-3)
     assert mean - low == pytest.approx(high - mean)
@@ -95,7 +95,7 @@ def test_intervals_of_the_mean_add_noise_and_keep_calibration() -> None:
 
 def test_the_calibrations_share_does_not_average_away() -> None:
     few, many = ([Speed(90.0, 2.0, 0.7, 0.0, 0.0)] * n for n in (1, 400))
-    widths = [np.subtract(*speed_summary(s, TrafficConfig())[2:0:-1]) for s in (few, many)]
+    widths = [np.subtract(*speed_summary(s, SummaryConfig())[2:0:-1]) for s in (few, many)]
     assert widths[1] == pytest.approx(2 * 1.96 * 0.7, rel=0.02)
     assert widths[0] > 2.5 * widths[1]
 
@@ -118,7 +118,7 @@ class _Ids(HTMLParser):
 
 
 def test_the_page_holds_everything_and_asks_for_nothing() -> None:
-    page = render_road_page(_result(), camera(), TrafficConfig(), "<road> & co")
+    page = render_road_page(_result(), camera(), SummaryConfig(), "<road> & co")
     parser = _Ids()
     parser.feed(page)
     assert parser.open == []
@@ -128,11 +128,11 @@ def test_the_page_holds_everything_and_asks_for_nothing() -> None:
     assert len(re.findall(r'class="way"', page)) == 12
     for lane in ("slow", "fast"):
         assert f"Lane {lane}" in page
-    assert page == render_road_page(_result(), camera(), TrafficConfig(), "<road> & co")
+    assert page == render_road_page(_result(), camera(), SummaryConfig(), "<road> & co")
 
 
 def test_a_road_without_vehicles_has_a_page_too() -> None:
     none = summarise([], camera(), RoadMarks({}, {}), ContactConfig(), LaneConfig())
-    assert "No vehicle" in render_road_page(none, camera(), TrafficConfig(), "empty")
-    assert len(count_columns(none, TrafficConfig())["line"]) == 0
-    assert len(headway_columns(none, TrafficConfig())["line"]) == 0
+    assert "No vehicle" in render_road_page(none, camera(), SummaryConfig(), "empty")
+    assert len(count_columns(none, SummaryConfig())["line"]) == 0
+    assert len(headway_columns(none, SummaryConfig())["line"]) == 0

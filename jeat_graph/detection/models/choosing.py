@@ -9,7 +9,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import ConfigError
-from jeat_graph.detection.models.layouts import Found
+from jeat_graph.detection.models.layouts import DecodedBoxes
 
 #: Vehicles among the 80 classes of COCO, and in its own numbering up to 90.
 _COCO_80 = {2: "car", 3: "motorcycle", 5: "bus", 7: "truck"}
@@ -64,7 +64,7 @@ def wanted_classes(
 
 
 def choose(
-    found: Found, wanted: frozenset[int] | None, score: float, overlap: float
+    found: DecodedBoxes, wanted: frozenset[int] | None, score: float, overlap: float
 ) -> tuple[FloatArray, FloatArray, IntArray]:
     """Return corners (M, 4), scores (M,) and classes (M,) of what is left.
 

@@ -39,7 +39,7 @@ class Feed(NamedTuple):
         return f"{order}, {self.fit}, scale {self.scale:.4g}{shift}"
 
 
-class Placed(NamedTuple):
+class Letterbox(NamedTuple):
     """Where the picture lies in the input: x = scale_x · picture + left (px), and so for y."""
 
     scale_x: float
@@ -81,20 +81,20 @@ def usual_feed(layout: str, settings: ModelSettings) -> Feed:
     )
 
 
-def place(frame: RgbImage, side: tuple[int, int], feed: Feed) -> tuple[npt.NDArray[np.float32], Placed]:
+def place(frame: RgbImage, side: tuple[int, int], feed: Feed) -> tuple[npt.NDArray[np.float32], Letterbox]:
     """Turn a picture (H, W, 3) into input (1, 3, height, width) of the given side (width, height, px)."""
     import cv2
 
     height, width = frame.shape[:2]
     if feed.fit == "stretch":
-        at = Placed(side[0] / width, side[1] / height, 0.0, 0.0)
+        at = Letterbox(side[0] / width, side[1] / height, 0.0, 0.0)
         canvas: Any = cv2.resize(frame, side)
     else:
         scale = min(side[0] / width, side[1] / height)
         inner = max(round(width * scale), 1), max(round(height * scale), 1)
         spare = (side[0] - inner[0], side[1] - inner[1]) if feed.fit == "letterbox-centre" else (0, 0)
         left, top = spare[0] // 2, spare[1] // 2
-        at = Placed(inner[0] / width, inner[1] / height, float(left), float(top))
+        at = Letterbox(inner[0] / width, inner[1] / height, float(left), float(top))
         canvas = np.full((side[1], side[0], 3), feed.pad, dtype=np.uint8)
         canvas[top : top + inner[1], left : left + inner[0]] = cv2.resize(frame, inner)
     ordered = canvas if feed.rgb else canvas[..., ::-1]

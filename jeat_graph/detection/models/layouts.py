@@ -36,7 +36,7 @@ _COCO_RAW = 91
 _BINS = (8, 16)
 
 
-class Found(NamedTuple):
+class DecodedBoxes(NamedTuple):
     """Boxes in the network's input.
 
     Attributes:
@@ -91,7 +91,7 @@ def recognise(outputs: Sequence[Port], side: tuple[int, int], notes: Mapping[str
     return None
 
 
-def decode(layout: str, outputs: Mapping[str, npt.NDArray[Any]], side: tuple[int, int]) -> Found:
+def decode(layout: str, outputs: Mapping[str, npt.NDArray[Any]], side: tuple[int, int]) -> DecodedBoxes:
     """Turn outputs into boxes.
 
     Args:
@@ -129,11 +129,11 @@ def cells(side: tuple[int, int], strides: Sequence[int]) -> tuple[FloatArray, Fl
     return np.concatenate(places).astype(np.float64), np.concatenate(steps)
 
 
-def _yolox(outputs: Mapping[str, Any], side: tuple[int, int]) -> Found:
+def _yolox(outputs: Mapping[str, Any], side: tuple[int, int]) -> DecodedBoxes:
     return _with_objectness(_rows(outputs))
 
 
-def _yolox_raw(outputs: Mapping[str, Any], side: tuple[int, int]) -> Found:
+def _yolox_raw(outputs: Mapping[str, Any], side: tuple[int, int]) -> DecodedBoxes:
     rows = _rows(outputs).copy()
     places, strides = cells(side, _STRIDES)
     rows[:, :2] = (rows[:, :2] + places) * strides[:, None]
@@ -141,36 +141,36 @@ def _yolox_raw(outputs: Mapping[str, Any], side: tuple[int, int]) -> Found:
     return _with_objectness(rows)
 
 
-def _yolov8(outputs: Mapping[str, Any], side: tuple[int, int]) -> Found:
+def _yolov8(outputs: Mapping[str, Any], side: tuple[int, int]) -> DecodedBoxes:
     rows = _rows(outputs)
     if rows.shape[0] < rows.shape[1]:
         rows = rows.T
     return _best(_from_centre(rows[:, :4]), _squashed(rows[:, 4:]), distinct=False)
 
 
-def _end_to_end(outputs: Mapping[str, Any], side: tuple[int, int]) -> Found:
+def _end_to_end(outputs: Mapping[str, Any], side: tuple[int, int]) -> DecodedBoxes:
     rows = _rows(outputs)
-    return Found(rows[:, :4], rows[:, 4], rows[:, 5].astype(np.int64), True)
+    return DecodedBoxes(rows[:, :4], rows[:, 4], rows[:, 5].astype(np.int64), True)
 
 
-def _detr(outputs: Mapping[str, Any], side: tuple[int, int]) -> Found:
+def _detr(outputs: Mapping[str, Any], side: tuple[int, int]) -> DecodedBoxes:
     return _best(*_queries(outputs, side, softmax=False), distinct=True)
 
 
-def _detr_softmax(outputs: Mapping[str, Any], side: tuple[int, int]) -> Found:
+def _detr_softmax(outputs: Mapping[str, Any], side: tuple[int, int]) -> DecodedBoxes:
     return _best(*_queries(outputs, side, softmax=True), distinct=True)
 
 
-def _boxes(outputs: Mapping[str, Any], side: tuple[int, int]) -> Found:
+def _boxes(outputs: Mapping[str, Any], side: tuple[int, int]) -> DecodedBoxes:
     low = {name.lower(): np.asarray(value, dtype=np.float64) for name, value in outputs.items()}
     corners = low["boxes"].reshape(-1, 4)
     if len(corners) and corners.max() <= 2.0:  # shares of the picture
         corners = corners * np.array([*side, *side], dtype=np.float64)
     labels = low["labels"].reshape(-1) if "labels" in low else np.zeros(len(corners))
-    return Found(corners, low["scores"].reshape(-1), labels.astype(np.int64), True)
+    return DecodedBoxes(corners, low["scores"].reshape(-1), labels.astype(np.int64), True)
 
 
-def _nanodet(outputs: Mapping[str, Any], side: tuple[int, int]) -> Found:
+def _nanodet(outputs: Mapping[str, Any], side: tuple[int, int]) -> DecodedBoxes:
     arrays = [np.asarray(value, dtype=np.float64)[0] for value in outputs.values()]
     if len(arrays) == 1:
         bins = next(b for b in _BINS if arrays[0].shape[1] - 4 * b >= 1 and _fits(len(arrays[0]), side))
@@ -222,7 +222,7 @@ def _rows(outputs: Mapping[str, Any]) -> FloatArray:
     return np.asarray(rows[0])
 
 
-def _with_objectness(rows: FloatArray) -> Found:
+def _with_objectness(rows: FloatArray) -> DecodedBoxes:
     if rows.shape[1] < 5:
         raise ValueError("a row needs a box and an objectness")
     objectness = _squashed(rows[:, 4:5])
@@ -256,10 +256,10 @@ def _squashed(values: FloatArray) -> FloatArray:
     return values
 
 
-def _best(corners: FloatArray, scores: FloatArray, *, distinct: bool) -> Found:
+def _best(corners: FloatArray, scores: FloatArray, *, distinct: bool) -> DecodedBoxes:
     """Keep the best class of each row."""
     best = scores.argmax(axis=1)
-    return Found(corners, scores[np.arange(len(scores)), best], best.astype(np.int64), distinct)
+    return DecodedBoxes(corners, scores[np.arange(len(scores)), best], best.astype(np.int64), distinct)
 
 
 def _cell_count(side: tuple[int, int], strides: Sequence[int]) -> int:

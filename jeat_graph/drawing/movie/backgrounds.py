@@ -19,7 +19,7 @@ _TOLERANCE_S = 1e-6
 _DSEC_SIZE = (640, 480)  # of event files that do not say
 
 
-class Background(Protocol):
+class FilmBackground(Protocol):
     """Pictures by time.
 
     Attributes:

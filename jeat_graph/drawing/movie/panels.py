@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.drawing.movie.backgrounds import Background
+from jeat_graph.drawing.movie.backgrounds import FilmBackground
 from jeat_graph.drawing.movie.marks import Canvas, draw_causal, draw_names, draw_smoothed
 from jeat_graph.drawing.movie.moments import TracksAt, TruthAt
 from jeat_graph.drawing.palette import IGNORED_BOX, TEXT, TRUE_BOX
@@ -34,7 +34,7 @@ class Movie:
     """
 
     times: FloatArray
-    backgrounds: Sequence[Background]
+    backgrounds: Sequence[FilmBackground]
     field_px: tuple[float, float]
     panel_px: tuple[int, int]
     causal: TracksAt | None = None
@@ -52,7 +52,7 @@ class Movie:
         panels = [self._panel(background, k) for background in self.backgrounds]
         return panels[0] if len(panels) == 1 else np.concatenate(panels, axis=1)
 
-    def _panel(self, background: Background, k: int) -> RgbImage:
+    def _panel(self, background: FilmBackground, k: int) -> RgbImage:
         import cv2
 
         t = float(self.times[k])

@@ -14,8 +14,8 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.data.rates import median_rate_hz
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.drawing.movie.backgrounds import (
-    Background,
     EventBackground,
+    FilmBackground,
     PlainBackground,
     VideoBackground,
 )
@@ -101,7 +101,7 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
         events = EventBackground(stretches, window_s)
     times = _times(request, _span(frames, events, tables, truth), frames, rate_hz)
 
-    backgrounds: list[Background] = [one for one in (frames, events) if one is not None]
+    backgrounds: list[FilmBackground] = [one for one in (frames, events) if one is not None]
     configured = _configured_size(request.run)
     field, warnings = _field(configured, backgrounds, tables, truth)
     if not backgrounds:
@@ -255,7 +255,7 @@ def _configured_size(run: Path) -> tuple[float, float] | None:
 
 def _field(
     configured: tuple[float, float] | None,
-    backgrounds: list[Background],
+    backgrounds: list[FilmBackground],
     tables: dict[str, Trajectories],
     truth: GroundTruth | None,
 ) -> tuple[tuple[float, float], list[str]]:

@@ -85,7 +85,7 @@ def frame_truth(
     """
     seen = [(actor, snapshot.find(actor.actor_id)) for actor in actors]
     seen = [(actor, state) for actor, state in seen if state is not None]
-    rows = [_Row.of(actor, state) for actor, state in seen]
+    rows = [_ActorRow.of(actor, state) for actor, state in seen]
     place = np.array([row.corners for row in rows]).reshape(-1, 8, 3)
     centre = np.array([row.centre for row in rows]).reshape(-1, 3)
     velocity = np.array([row.velocity for row in rows]).reshape(-1, 3)
@@ -110,7 +110,7 @@ def frame_truth(
 
 
 @dataclass(frozen=True)
-class _Row:
+class _ActorRow:
     """State of one vehicle in plain numbers: m, m/s, m/s², rad, rad/s, in CARLA's world axes."""
 
     corners: FloatArray
@@ -122,13 +122,13 @@ class _Row:
     size: tuple[float, float, float]
 
     @staticmethod
-    def of(actor: Actor, state: Any) -> _Row:
+    def of(actor: Actor, state: Any) -> _ActorRow:
         transform = state.get_transform()
         corners = corners_of(actor.box, transform)
         rotation, extent = transform.rotation, actor.box.extent
         # Only the turn about the vertical: roll and pitch of a vehicle on a road shake, they do not turn.
         yaw_rate = math.radians(state.get_angular_velocity().z)
-        return _Row(
+        return _ActorRow(
             corners=corners,
             centre=corners.mean(axis=0),
             velocity=_vector(state.get_velocity()),

@@ -50,7 +50,7 @@ def connect(api: Any, host: str, port: int, timeout_s: float) -> Any:
     return client
 
 
-class Session:
+class CarlaSession:
     """What a segment needs of the world; made by `open_session`.
 
     Attributes:
@@ -78,7 +78,7 @@ class Session:
 @contextmanager
 def open_session(
     api: Any, client: Any, scenario: Scenario, config: CarlaConfig, seed: int
-) -> Iterator[Session]:
+) -> Iterator[CarlaSession]:
     """Prepare clock, weather and lights, and put settings, weather and lights back at the end.
 
     Args:
@@ -104,7 +104,7 @@ def open_session(
         traffic.set_synchronous_mode(True)
         traffic.set_random_device_seed(seed)
         _set_light(api, world, scenario, config, stack)
-        yield Session(api, world, traffic, stack)
+        yield CarlaSession(api, world, traffic, stack)
 
 
 def is_day(scenario: Scenario, config: CarlaConfig) -> bool:

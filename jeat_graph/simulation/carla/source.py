@@ -21,7 +21,7 @@ from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.simulation.carla.config import TOWN, CarlaConfig, set_attributes
 from jeat_graph.simulation.carla.geometry import Actor, camera_at, field_of_view_deg, frame_truth
-from jeat_graph.simulation.carla.session import Session, client_api, connect, is_day, open_session
+from jeat_graph.simulation.carla.session import CarlaSession, client_api, connect, is_day, open_session
 from jeat_graph.simulation.carla.streams import EventStream, TickStream, depth_of, rgb_of
 from jeat_graph.simulation.carla.traffic import (
     attribute,
@@ -145,7 +145,7 @@ class CarlaSource:
         return self._mounted
 
     def _spawn(
-        self, session: Session, rng: np.random.Generator, camera: Camera, road_z: float
+        self, session: CarlaSession, rng: np.random.Generator, camera: Camera, road_z: float
     ) -> list[Actor]:
         api, world, config = session.api, session.world, self.config
         blueprints = vehicle_blueprints(world.get_blueprint_library())
@@ -171,7 +171,7 @@ class CarlaSource:
         return actors
 
     def _record(
-        self, session: Session, transform: Any, camera: Camera, actors: list[Actor]
+        self, session: CarlaSession, transform: Any, camera: Camera, actors: list[Actor]
     ) -> Iterator[SegmentStep]:
         config, world = self.config, session.world
         rgb = TickStream(self._sensor(session, "rgb", transform), "RGB", config.timeout_s)
@@ -199,7 +199,7 @@ class CarlaSource:
             t_us = round((float(image.timestamp) - start_s) * _US_PER_S)
             waiting = tick, SegmentStep(t_us, rgb_of(image), EventArray.empty(), truth)
 
-    def _sensor(self, session: Session, kind: str, transform: Any) -> Any:
+    def _sensor(self, session: CarlaSession, kind: str, transform: Any) -> Any:
         blueprint = session.world.get_blueprint_library().find(f"sensor.camera.{kind}")
         shared = self.config.camera_attributes(self._fov_deg)
         own = self.config.dvs_attributes(self._fov_deg) if kind == "dvs" else shared

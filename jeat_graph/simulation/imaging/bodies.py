@@ -9,7 +9,7 @@ from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.simulation.imaging.air import through
-from jeat_graph.simulation.imaging.layers import GLOW, Canvas, insert, meets
+from jeat_graph.simulation.imaging.layers import GLOW, TileLayers, insert, meets
 from jeat_graph.simulation.imaging.moments import (
     BOX,
     FACE,
@@ -50,7 +50,7 @@ _GLASS_MIRROR = 0.10
 @njit(cache=True)
 def add_body(
     tile: Tile, body: FloatArray, pose: FloatArray, fade: float, skin: FloatArray, camera: FloatArray,
-    scene: FloatArray, canvas: Canvas,
+    scene: FloatArray, canvas: TileLayers,
 ) -> None:  # fmt: skip
     """Add one body of one vehicle: its cover of each pixel is the product of its outline's half-planes.
 

@@ -22,7 +22,7 @@ from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.simulation.imaging.config import CarlaEventConfig
-from jeat_graph.simulation.imaging.event_sink import Sink, put
+from jeat_graph.simulation.imaging.event_sink import EventSink, put
 from jeat_graph.simulation.imaging.pixel_random import normal, seeds
 
 _LEAST_THRESHOLD = 0.01  # CARLA's floor of a redrawn threshold
@@ -107,7 +107,7 @@ def look_at(
 @njit(cache=True)
 def carla_advance(
     pixels: IntArray, luminance: FloatArray, start: float, end: float, model: CarlaModel, state: CarlaState,
-    sink: Sink,
+    sink: EventSink,
 ) -> None:  # fmt: skip
     """Take pixels from the tick at `start` to that at `end`, and put their events.
 

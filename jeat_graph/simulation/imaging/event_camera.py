@@ -23,7 +23,7 @@ from jeat_graph.simulation.imaging.event_pixel import (
     make_state,
 )
 from jeat_graph.simulation.imaging.event_run import Interval, fill, light_all, run_physical, take
-from jeat_graph.simulation.imaging.event_sink import Sink, make_sink, to_events, with_room
+from jeat_graph.simulation.imaging.event_sink import EventSink, make_sink, to_events, with_room
 from jeat_graph.simulation.imaging.layers import GLOW
 from jeat_graph.simulation.imaging.lighting import LUMINANCE
 from jeat_graph.simulation.imaging.painter import light_tile, paint_tile, take_ground
@@ -124,8 +124,8 @@ class EventCamera:
 
 @njit(cache=True)
 def _run_carla(
-    work: Interval, stage: Stage, model: CarlaModel, state: CarlaState, sink: Sink, room: int
-) -> tuple[Sink, int]:
+    work: Interval, stage: Stage, model: CarlaModel, state: CarlaState, sink: EventSink, room: int
+) -> tuple[EventSink, int]:
     """Take all pixels from tick to tick, tile by tile; as `_run_physical`."""
     tiles, boxes, steps, lit, times_us, static, _, _, _ = work
     who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)

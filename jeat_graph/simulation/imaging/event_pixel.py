@@ -22,7 +22,7 @@ from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.simulation.imaging.config import EventCameraConfig
-from jeat_graph.simulation.imaging.event_sink import Sink, put
+from jeat_graph.simulation.imaging.event_sink import EventSink, put
 from jeat_graph.simulation.imaging.pixel_random import exponential, seeds, uniform
 
 _LEAST_THRESHOLD = 0.01
@@ -178,7 +178,7 @@ def shot_share(luminance: float, model: PixelModel) -> float:
 @njit(cache=True)
 def advance(
     pixels: IntArray, luminance: FloatArray, start: float, end: float, settled: bool, model: PixelModel,
-    state: PixelState, sink: Sink,
+    state: PixelState, sink: EventSink,
 ) -> None:  # fmt: skip
     """Take pixels from time `start` to `end`, and put their events.
 

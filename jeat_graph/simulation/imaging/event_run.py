@@ -11,7 +11,7 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.simulation.imaging.background import PACKED
 from jeat_graph.simulation.imaging.event_pixel import LUMINANCE as SEEN
 from jeat_graph.simulation.imaging.event_pixel import PixelModel, PixelState, advance, unsettled
-from jeat_graph.simulation.imaging.event_sink import Sink, with_room
+from jeat_graph.simulation.imaging.event_sink import EventSink, with_room
 from jeat_graph.simulation.imaging.layers import GLOW, ON_GROUND, ON_WALL, meets
 from jeat_graph.simulation.imaging.moments import Moments
 from jeat_graph.simulation.imaging.painter import light_tile, paint_tile, take_ground
@@ -145,8 +145,8 @@ def _key_lights(
 
 @njit(cache=True)
 def run_physical(
-    work: Interval, stage: Stage, model: PixelModel, state: PixelState, sink: Sink, room: int
-) -> tuple[Sink, int]:
+    work: Interval, stage: Stage, model: PixelModel, state: PixelState, sink: EventSink, room: int
+) -> tuple[EventSink, int]:
     """Take all pixels through an interval, tile by tile; returns the sink and how many tiles were painted."""
     tiles, boxes, steps, lit, times_us, static, quiet, glowing, light_now = work
     who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)

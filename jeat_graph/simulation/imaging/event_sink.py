@@ -12,7 +12,7 @@ from jeat_graph.data.arrays import BoolArray, IntArray
 from jeat_graph.data.events import EventArray
 
 
-class Sink(NamedTuple):
+class EventSink(NamedTuple):
     """Room for events; `used` (1,) of it is taken.
 
     Attributes:
@@ -31,9 +31,9 @@ class Sink(NamedTuple):
 
 
 @njit(cache=True)
-def make_sink(capacity: int) -> Sink:
+def make_sink(capacity: int) -> EventSink:
     """Make room for `capacity` events."""
-    return Sink(
+    return EventSink(
         np.zeros(1, dtype=np.int64),
         np.empty(capacity, dtype=np.int64),
         np.empty(capacity, dtype=np.int64),
@@ -43,7 +43,7 @@ def make_sink(capacity: int) -> Sink:
 
 
 @njit(cache=True)
-def with_room(sink: Sink, more: int) -> Sink:
+def with_room(sink: EventSink, more: int) -> EventSink:
     """Return the sink, or a larger copy if it has no room for `more` events."""
     used = sink.used[0]
     if used + more <= len(sink.t_us):
@@ -58,7 +58,7 @@ def with_room(sink: Sink, more: int) -> Sink:
 
 
 @njit(cache=True)
-def put(sink: Sink, t_us: float, pixel: int, brighter: bool, by_motion: bool) -> None:
+def put(sink: EventSink, t_us: float, pixel: int, brighter: bool, by_motion: bool) -> None:
     """Add an event at the nearest microsecond; whoever calls has made room."""
     n = sink.used[0]
     if n < len(sink.t_us):
@@ -69,7 +69,7 @@ def put(sink: Sink, t_us: float, pixel: int, brighter: bool, by_motion: bool) ->
         sink.used[0] = n + 1
 
 
-def to_events(sink: Sink, width: int) -> EventArray:
+def to_events(sink: EventSink, width: int) -> EventArray:
     """Sort the events by time; those of one time keep the order of their pixels' tiles."""
     used = int(sink.used[0])
     order = np.argsort(sink.t_us[:used], kind="stable")

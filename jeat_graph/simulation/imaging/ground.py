@@ -15,7 +15,7 @@ LINE_M = 0.18
 _TAPER_M = 40.0  # over which a ramp's lane widens
 
 
-class Layout(NamedTuple):
+class GroundLayout(NamedTuple):
     """Cross-section of the road as numbers, and its surface.
 
     Attributes:
@@ -51,11 +51,11 @@ class Layout(NamedTuple):
     salt: int
 
 
-def layout_of(road: RoadConfig, look: Surroundings) -> Layout:
+def layout_of(road: RoadConfig, look: Surroundings) -> GroundLayout:
     """Lay out the cross-section."""
     inner = road.median_m / 2.0
     outer = inner + road.lane_width_m * road.lanes_per_direction
-    return Layout(
+    return GroundLayout(
         road.lanes_per_direction,
         road.lane_width_m,
         inner,
@@ -74,7 +74,7 @@ def layout_of(road: RoadConfig, look: Surroundings) -> Layout:
 
 
 @njit(cache=True)
-def ramp_width(x: float, y: float, layout: Layout) -> float:
+def ramp_width(x: float, y: float, layout: GroundLayout) -> float:
     """How much wider the pavement is beside a ramp (m)."""
     begin, end = layout.ramp
     if x < 0.0 or y < begin or y > end:
@@ -83,7 +83,7 @@ def ramp_width(x: float, y: float, layout: Layout) -> float:
 
 
 @njit(cache=True)
-def ground_albedo(x: float, y: float, layout: Layout) -> tuple[float, float, float]:
+def ground_albedo(x: float, y: float, layout: GroundLayout) -> tuple[float, float, float]:
     """Albedo (red, green, blue) of the ground at a place; value noise at several scales is the texture.
 
     Args:

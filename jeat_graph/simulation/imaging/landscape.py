@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.simulation.imaging.ground import Layout, layout_of
+from jeat_graph.simulation.imaging.ground import GroundLayout, layout_of
 from jeat_graph.simulation.world.bend import bend_points
 from jeat_graph.simulation.world.road import RoadConfig
 from jeat_graph.simulation.world.surroundings import Surroundings
@@ -51,7 +51,7 @@ class Landscape(NamedTuple):
         country: trees, hills and clouds.
     """
 
-    layout: Layout
+    layout: GroundLayout
     curvature: float
     walls: FloatArray
     boxes: FloatArray
@@ -107,7 +107,9 @@ def _at(y: float, curvature: float) -> tuple[float, float, float, float]:
     return float(px[0]), float(py[0]), float(np.sin(curvature * y)), float(np.cos(curvature * y))
 
 
-def _gantry(y: float, layout: Layout, road: RoadConfig, around: Surroundings) -> list[tuple[float, ...]]:
+def _gantry(
+    y: float, layout: GroundLayout, road: RoadConfig, around: Surroundings
+) -> list[tuple[float, ...]]:
     """A bridge of trusses with signs over the lanes that drive away, and its legs."""
     at = _at(y, road.curvature_per_m)
     steel, end = (0.28, 0.29, 0.30), layout.paved + 0.9
@@ -125,7 +127,7 @@ def _gantry(y: float, layout: Layout, road: RoadConfig, around: Surroundings) ->
     return boxes
 
 
-def _bridge(y: float, layout: Layout, around: Surroundings) -> list[tuple[float, ...]]:
+def _bridge(y: float, layout: GroundLayout, around: Surroundings) -> list[tuple[float, ...]]:
     """A road across: deck, parapet and piers."""
     at = _at(y, layout.curvature)
     low, wide, half = _CLEARANCE_M, around.bridge_wide_m, layout.paved + 30.0

@@ -15,7 +15,7 @@ LAYERS = 12  # bodies and lights over one pixel; more are left out, and nobody w
 ON_GROUND, ON_WALL, GLOW = 0, 1, 2
 
 
-class Canvas(NamedTuple):
+class TileLayers(NamedTuple):
     """Room to work in, for the P pixels of a tile in C channels (3, or 1 for luminance alone).
 
     Attributes:
@@ -35,9 +35,9 @@ class Canvas(NamedTuple):
     out: FloatArray
 
 
-def make_canvas(channels: int) -> Canvas:
+def make_canvas(channels: int) -> TileLayers:
     """Make room for one tile."""
-    return Canvas(
+    return TileLayers(
         filled=np.zeros(TILE, dtype=np.int64),
         value=np.zeros((TILE, LAYERS, 2 + channels)),
         shade=np.ones((TILE, 2)),

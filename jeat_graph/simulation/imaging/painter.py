@@ -10,7 +10,7 @@ from numba import njit
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.simulation.imaging.background import COVER, DEPTH, GAIN, LUX, PACKED
 from jeat_graph.simulation.imaging.bodies import add_body, add_glow, add_lamps
-from jeat_graph.simulation.imaging.layers import GLOW, ON_GROUND, ON_WALL, Canvas, meets
+from jeat_graph.simulation.imaging.layers import GLOW, ON_GROUND, ON_WALL, TileLayers, meets
 from jeat_graph.simulation.imaging.road_light import cast_beams, cast_shadow
 from jeat_graph.simulation.imaging.shapes import PARTS
 from jeat_graph.simulation.imaging.stage import LIGHTS_ON, SUN_LUX, Stage
@@ -84,7 +84,7 @@ def paint_tile(tile: Tile, j: int, who: IntArray, counts: IntArray, stage: Stage
 
 
 @njit(cache=True)
-def compose(tile: Tile, shaded: bool, sun: float, light: FloatArray, canvas: Canvas) -> None:
+def compose(tile: Tile, shaded: bool, sun: float, light: FloatArray, canvas: TileLayers) -> None:
     """Lay everything over the ground, from far to near.
 
     Args:

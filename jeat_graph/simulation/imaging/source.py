@@ -19,7 +19,7 @@ from jeat_graph.simulation.imaging.event_camera import EventCamera
 from jeat_graph.simulation.imaging.renderer import Renderer
 from jeat_graph.simulation.imaging.rgb_camera import choose_exposure, develop, electrons, expose
 from jeat_graph.simulation.imaging.scaling import scaled_camera
-from jeat_graph.simulation.imaging.truth import Views, frame_truth
+from jeat_graph.simulation.imaging.truth import ImageViews, frame_truth
 from jeat_graph.simulation.imaging.visibility import buffers
 from jeat_graph.simulation.scenario import Scenario
 from jeat_graph.simulation.segment import SegmentStep
@@ -159,7 +159,7 @@ class RenderedSource:
                 )
             states = scene.states_at(time, far_m=config.render.far_m)
             row = np.searchsorted(look.number, states.object_id)
-            views = Views(visible[row], tight[row], contrast[row])
+            views = ImageViews(visible[row], tight[row], contrast[row])
             truth = frame_truth(states, camera, views, least, scenario.truth.range_m)
             yield SegmentStep(t_us=int(t_us), rgb=rgb, events=events, truth=truth)
 

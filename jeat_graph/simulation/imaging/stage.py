@@ -9,7 +9,7 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.simulation.imaging.air import airlight
 from jeat_graph.simulation.imaging.background import Background, pack
-from jeat_graph.simulation.imaging.layers import Canvas, make_canvas
+from jeat_graph.simulation.imaging.layers import TileLayers, make_canvas
 from jeat_graph.simulation.imaging.lighting import Lights
 from jeat_graph.simulation.imaging.moments import Look, Moments
 from jeat_graph.simulation.imaging.optics import Optics
@@ -51,7 +51,7 @@ class Stage(NamedTuple):
     camera: FloatArray
     scene: FloatArray
     optics: Optics
-    canvas: Canvas
+    canvas: TileLayers
 
 
 class Setting(NamedTuple):
@@ -61,7 +61,7 @@ class Setting(NamedTuple):
     camera: FloatArray
     scene: FloatArray
     optics: Optics
-    canvas: Canvas
+    canvas: TileLayers
 
     def stage(self, moments: Moments, look: Look) -> Stage:
         """Put the vehicles of some times on it."""

@@ -16,7 +16,7 @@ from jeat_graph.simulation.world.vehicles import KIND_NAMES
 _LEAST_PX = 1.0  # what is smaller is no box
 
 
-class Views(NamedTuple):
+class ImageViews(NamedTuple):
     """What a picture shows of N vehicles: part seen (N,), tight boxes (N, 4), contrast-to-noise (N,)."""
 
     visible: FloatArray
@@ -25,7 +25,7 @@ class Views(NamedTuple):
 
 
 def frame_truth(
-    states: VehicleStates, camera: Camera, views: Views, min_side_px: float, range_m: float
+    states: VehicleStates, camera: Camera, views: ImageViews, min_side_px: float, range_m: float
 ) -> FrameTruth:
     """Make the truth of one time. What can be seen but is not asked for is there, marked `ignore`.
 

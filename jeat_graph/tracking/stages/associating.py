@@ -17,7 +17,7 @@ from jeat_graph.config.kernel_form import Model
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.predicting import Expectation
-from jeat_graph.tracking.state import Scene, TrackArrays
+from jeat_graph.tracking.state import SceneState, TrackArrays
 
 
 class Association(NamedTuple):
@@ -41,7 +41,7 @@ def associate(
     batch: Batch,
     expectation: Expectation,
     p_detect: FloatArray,
-    scene: Scene,
+    scene: SceneState,
     model: Model,
 ) -> Association:
     """Associate a batch with the first `n` tracks, predicted to its time; nothing counts as taken yet."""

@@ -27,7 +27,7 @@ from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.ending import confirm
 from jeat_graph.tracking.stages.predicting import jerk_of, split_noise
 from jeat_graph.tracking.stages.updating import update_track
-from jeat_graph.tracking.state import Scene, TrackArrays
+from jeat_graph.tracking.state import SceneState, TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog, log_birth, log_update
 
 
@@ -38,7 +38,7 @@ def give_birth(
     next_id: int,
     batch: Batch,
     association: Association,
-    scene: Scene,
+    scene: SceneState,
     model: Model,
     log: UpdateLog,
 ) -> tuple[int, int]:
@@ -120,7 +120,7 @@ def shown_boxes(tracks: TrackArrays, n: int, settings: Settings) -> FloatArray:
 
 
 @njit(cache=True)
-def birth_existence(batch: Batch, scene: Scene, model: Model) -> FloatArray:
+def birth_existence(batch: Batch, scene: SceneState, model: Model) -> FloatArray:
     """Probability (M,) that a detection which no track took is of a vehicle not tracked before.
 
     u P_D LR(score) / (u P_D LR(score) + λ): u vehicles in the scene are expected to have no track yet, and

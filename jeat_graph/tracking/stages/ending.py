@@ -12,7 +12,7 @@ from jeat_graph.association.merging import find_duplicates
 from jeat_graph.config.kernel_form import Model, Settings
 from jeat_graph.tracking.compaction import keep_rows
 from jeat_graph.tracking.stages.learning import scan_weight
-from jeat_graph.tracking.state import Scene, TrackArrays
+from jeat_graph.tracking.state import SceneState, TrackArrays
 
 
 @njit(cache=True)
@@ -32,7 +32,7 @@ def confirm(tracks: TrackArrays, n: int, t: float, settings: Settings) -> None:
 
 
 @njit(cache=True)
-def remove_ended(tracks: TrackArrays, n: int, t: float, scene: Scene, model: Model) -> int:
+def remove_ended(tracks: TrackArrays, n: int, t: float, scene: SceneState, model: Model) -> int:
     """Remove tracks that are over, out of the picture, or duplicates; return the number left, in order."""
     settings = model.settings
     boxes = track_boxes(tracks.mean[:n], tracks.size_mean[:n])
@@ -79,7 +79,7 @@ def remove_ended(tracks: TrackArrays, n: int, t: float, scene: Scene, model: Mod
 
 
 @njit(cache=True)
-def _count_fruitless(hits: int, seen_by: int, scene: Scene, model: Model) -> None:
+def _count_fruitless(hits: int, seen_by: int, scene: SceneState, model: Model) -> None:
     """Put the detections of a track that came to nothing down to the one sensor that saw it, in place."""
     for s in range(len(scene.fruitless)):
         if seen_by == 1 << s:

@@ -11,7 +11,7 @@ from jeat_graph.data.arrays import FloatArray
 from jeat_graph.filters.existence import existence_after_miss, hidden_after_miss
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.associating import Association
-from jeat_graph.tracking.state import Scene, TrackArrays
+from jeat_graph.tracking.state import SceneState, TrackArrays
 
 # Share of a sensor's configured clutter below which no estimate goes: without any, one detection were proof.
 _LEAST_CLUTTER = 0.1
@@ -65,7 +65,7 @@ def count_misses(
 
 @njit(cache=True)
 def learn_trust(
-    tracks: TrackArrays, n: int, batch: Batch, association: Association, scene: Scene, model: Model
+    tracks: TrackArrays, n: int, batch: Batch, association: Association, scene: SceneState, model: Model
 ) -> None:
     """Follow how far each present sensor is borne out by the others, in place.
 
@@ -111,7 +111,7 @@ def learn_scene(
     batch: Batch,
     association: Association,
     p_detect: FloatArray,
-    scene: Scene,
+    scene: SceneState,
     model: Model,
 ) -> None:
     """Follow each present sensor's clutter and P_D, and the vehicles that wait to be detected, in place.

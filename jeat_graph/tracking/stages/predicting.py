@@ -16,7 +16,7 @@ from jeat_graph.filters.existence import motion_visibility
 from jeat_graph.filters.jerk import track_jerk
 from jeat_graph.filters.kalman import predict, predict_size
 from jeat_graph.filters.noise import base_variance
-from jeat_graph.tracking.state import Scene, TrackArrays
+from jeat_graph.tracking.state import SceneState, TrackArrays
 
 # A small rest remains: what should be invisible is still taken if it is detected.
 _LEAST_VISIBLE = 1e-5
@@ -56,7 +56,7 @@ def most_trusted(seen_by: int, trust: FloatArray) -> float:
 
 
 @njit(cache=True)
-def predict_all(tracks: TrackArrays, n: int, dt: float, scene: Scene, model: Model) -> None:
+def predict_all(tracks: TrackArrays, n: int, dt: float, scene: SceneState, model: Model) -> None:
     """Predict motion, size and existence of the first `n` tracks by `dt` seconds, in place."""
     tracks.used[:n] = 0
     if dt <= 0.0:

@@ -30,7 +30,7 @@ from jeat_graph.filters.standing import (
 from jeat_graph.tracking.batch import Batch, Measured
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.predicting import Expectation, expect_detections, jerk_of
-from jeat_graph.tracking.state import Scene, TrackArrays
+from jeat_graph.tracking.state import SceneState, TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog, log_innovation, log_update
 
 
@@ -151,7 +151,7 @@ def update_matched(
     batch: Batch,
     expectation: Expectation,
     association: Association,
-    scene: Scene,
+    scene: SceneState,
     model: Model,
     log: UpdateLog,
 ) -> None:
