@@ -68,6 +68,7 @@ STEPS = (
     Change("+ P_D of each track, hidden vehicles", ("lifecycle.hidden_prior", "lifecycle.p_detect_weight")),
     Change("+ standing tracks", ("standing",)),
     Change("+ errors with memory", ("sensors.*.correlated_share", "sensors.*.memory_s")),
+    Change("+ boxes cut by the picture's edge", ("image.edge_px",)),
     Change("+ jerk by perspective", ("motion",)),
 )
 
@@ -82,9 +83,8 @@ def start(paper: Config, target: Config) -> Config:
         name: replace(paper.sensors.get(name, generic), rate_hz=sensor.rate_hz)
         for name, sensor in target.sensors.items()
     }
-    return replace(
-        paper, sensors=sensors, image=target.image, association=replace(paper.association, priority=())
-    )
+    image = replace(target.image, edge_px=paper.image.edge_px)
+    return replace(paper, sensors=sensors, image=image, association=replace(paper.association, priority=()))
 
 
 def rows(paper: Config, target: Config, steps: Sequence[Change] = STEPS) -> list[tuple[str, Config]]:

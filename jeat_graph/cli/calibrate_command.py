@@ -101,7 +101,8 @@ def with_image(base: Config, recordings: list[Detections], size: tuple[int, int]
     from dataclasses import replace
 
     if size is not None:
-        return replace(base, image=replace(base.image, width=float(size[0]), height=float(size[1])))
+        image = replace(base.image, width=float(size[0]), height=float(size[1]))
+        return replace(base, image=image, input=replace(base.input, picture="given"))
     if base.input.picture == "seen":
         from jeat_graph.runs.declaring import fit_picture
 

@@ -84,7 +84,7 @@ def test_without_clipping_a_box_keeps_its_part_outside_the_picture():
 
 def test_a_vehicle_of_which_too_little_is_in_the_picture_is_not_reported():
     inside = (1255.0, 100.0, 40.0, 30.0)  # 25 of its 40 px
-    keep = ["lifecycle.leave_picture=false"]
+    keep = ["lifecycle.leave_picture=false", "image.edge_px=0"]
     assert len(follow([*keep, "output.min_visible=0.6"], box=inside)[1]) == 1
     assert len(follow([*keep, "output.min_visible=0.65"], box=inside)[1]) == 0
 
@@ -92,7 +92,7 @@ def test_a_vehicle_of_which_too_little_is_in_the_picture_is_not_reported():
 def test_a_track_whose_centre_leaves_the_picture_ends():
     for leave, alive in (("true", 0), ("false", 1)):
         tracker, _, _ = follow(
-            [f"lifecycle.leave_picture={leave}"],
+            [f"lifecycle.leave_picture={leave}", "image.edge_px=0"],
             box=(1230.0, 100.0, 40.0, 30.0),
             velocity=(100.0, 0.0),
             steps=10,
