@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import os
 import signal
 import sys
+import threading
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,6 +16,7 @@ from typing import Any
 
 #: Signals that ask a process to end; each ends a command as Ctrl-C does, so that it can tidy up.
 _ENDS = ("SIGTERM", "SIGHUP")
+_AGAIN_S = 0.01
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
@@ -59,11 +62,23 @@ def in_good_order(command: str) -> Iterator[None]:
     Raises:
         Terminated: within the block, where a signal came.
     """
+    came: list[int] = []
 
     def on_signal(number: int, _: FrameType | None) -> None:
         # A second one must not interrupt the tidying up.
         signal.signal(number, signal.SIG_IGN)
+        came.append(number)
         raise Terminated(number)
+
+    def on_unraisable(unraisable: Any) -> None:
+        # It came while Python ran a callback, from which no exception gets out: once more, when that is over.
+        if isinstance(unraisable.exc_value, Terminated):
+            signal.signal(came[0], on_signal)
+            again = threading.Timer(_AGAIN_S, os.kill, (os.getpid(), came[0]))
+            again.daemon = True
+            again.start()
+        else:
+            before(unraisable)
 
     def show(message: Any, *_: Any, **__: Any) -> None:
         print(f"jeat-graph {command}: warning: {one_line(message)}", file=sys.stderr)
@@ -77,4 +92,12 @@ def in_good_order(command: str) -> Iterator[None]:
                 with contextlib.suppress(ValueError):  # only the main thread may set handlers
                     signal.signal(number, on_signal)
                     stack.callback(signal.signal, number, signal.SIG_DFL)
-        yield
+        before, sys.unraisablehook = sys.unraisablehook, on_unraisable
+        stack.callback(setattr, sys, "unraisablehook", before)
+        try:
+            yield
+        except Exception as error:
+            # A library that was interrupted may answer with an error of its own: an import, by half a module.
+            if came:
+                raise Terminated(came[0]) from error
+            raise

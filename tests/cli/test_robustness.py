@@ -61,6 +61,39 @@ def test_a_signal_to_end_ends_in_good_order_and_the_handlers_are_as_before():
     assert signal.getsignal(signal.SIGTERM) == before
 
 
+@posix
+def test_a_signal_that_a_library_turns_into_an_error_of_its_own_still_ends_in_good_order():
+    def a_library_s_import():
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        except BaseException:
+            raise AttributeError("partially initialized module") from None
+
+    with pytest.raises(Terminated) as end, in_good_order("track"):
+        a_library_s_import()
+    assert end.value.number == signal.SIGTERM
+
+
+@posix
+def test_a_signal_that_comes_within_a_callback_ends_what_follows_it(capsys):
+    class Callback:
+        def __del__(self):
+            signal.raise_signal(signal.SIGTERM)
+
+    def command():
+        Callback()
+        time.sleep(60)  # it never takes as long
+
+    with pytest.raises(Terminated), in_good_order("track"):
+        command()
+    assert capsys.readouterr().err == ""
+
+
+def test_an_error_without_a_signal_stays_what_it_is():
+    with pytest.raises(ZeroDivisionError), in_good_order("track"):
+        raise ZeroDivisionError
+
+
 def test_a_sensor_s_name_does_not_reach_the_terminal_as_it_is(tmp_path):
     path = tmp_path / "d.csv"
     path.write_text(HEADER + "0,r\x1b[2Jgb,1,2,3,4,.5\n", encoding="utf-8")
