@@ -12,28 +12,53 @@ import stat
 import tempfile
 from pathlib import Path
 
+from jeat_graph.config.stale_kernels import drop_stale
+
 _VARIABLE = "NUMBA_CACHE_DIR"
+_PARTS = ("filters", "association", "smoothers", "eval")
 #: What the command line says of it in one line; empty where the code is kept where it always is.
 notice = ""
 
 
 def choose_cache() -> None:
-    """Point the compiler to a folder that can be written, before any of the package's code is compiled."""
+    """Point the compiler to a folder that can be written, before any of the package's code is compiled.
+
+    What the folder holds of an earlier state of the package is thrown away.
+    """
     global notice
-    if os.environ.get(_VARIABLE) or os.environ.get("NUMBA_CACHE_LOCATOR_CLASSES"):
+    if os.environ.get("NUMBA_CACHE_LOCATOR_CLASSES"):
         return
-    if _takes_files(Path(__file__).parent / "__pycache__") or _takes_files(_user_cache()):
+    if os.environ.get(_VARIABLE):
+        drop_stale(_package(), Path(os.environ[_VARIABLE]))
         return
-    folder = _temporary_folder()
-    if folder is not None:
+    if _takes_files(Path(__file__).parent / "__pycache__"):
+        drop_stale(_package())
+        return
+    folder = _user_cache()
+    if _takes_files(folder):
+        drop_stale(_package(), folder)
+        return
+    temporary = _temporary_folder()
+    if temporary is not None:
         from numba.core import config
 
-        os.environ[_VARIABLE] = str(folder)  # for processes that this one starts
-        config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
-        notice = f"neither the installation nor a home can be written: compiled code is kept in {folder}"
+        os.environ[_VARIABLE] = str(temporary)  # for processes that this one starts
+        config.CACHE_DIR = str(temporary)  # type: ignore[attr-defined]
+        notice = f"neither the installation nor a home can be written: compiled code is kept in {temporary}"
+        drop_stale(_package(), temporary)
         return
     notice = "no folder can be written: the tracker is compiled anew in each run; set NUMBA_CACHE_DIR"
     _compile_without_cache()
+
+
+def _package() -> dict[str, Path]:
+    """Return the folders of the package; in a checkout some of its parts lie beside it."""
+    root = Path(__file__).parents[1]
+    folders = {"jeat_graph": root}
+    for part in _PARTS:
+        if not (root / part).is_dir() and (root.parent / part).is_dir():
+            folders[f"jeat_graph.{part}"] = root.parent / part
+    return folders
 
 
 def _user_cache() -> Path:
