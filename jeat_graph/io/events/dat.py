@@ -12,6 +12,7 @@ Source: https://docs.prophesee.ai/stable/data/file_formats/dat.html
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
@@ -21,25 +22,24 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.events.reader import Triggers
-from jeat_graph.io.events.words import (
-    BACKWARDS,
+from jeat_graph.io.events.decoding import (
+    CLOCK_BITS,
     FILLED,
     HIGH,
     JUMP_US,
-    JUMPS,
     LAST,
-    OUTSIDE,
-    PREVIOUS,
     UNKNOWN,
     WRAPS,
     Columns,
+    Decode,
     Limits,
-    WordReader,
-    wraps,
+    is_kept,
+    put_event,
+    turns_of_clock,
 )
+from jeat_graph.io.events.reader import Triggers
+from jeat_graph.io.events.words import WordReader
 
-TIME_BITS = 32
 EVENT_BYTES = 8
 PIXELS, PIXELS_12, EDGES = 0, 12, 14
 
@@ -74,11 +74,18 @@ class DatReader(WordReader):
 
 @numba.njit(cache=True)
 def _decode(
-    words: npt.NDArray[np.uint64], state: IntArray, out: Columns, limits: Limits, x_bits: int, y_bits: int
+    words: npt.NDArray[np.uint64],
+    state: IntArray,
+    out: Columns,
+    triggers: Triggers,
+    limits: Limits,
+    x_bits: int,
+    y_bits: int,
 ) -> int:
+    """Decode words until they, or the room, end; see `decoding.Decode`."""
     n, turns = state[FILLED], state[WRAPS]
-    last, previous, low = state[LAST], state[PREVIOUS], state[HIGH]
-    time = turns << TIME_BITS
+    last, low = state[LAST], state[HIGH]
+    time = turns << CLOCK_BITS
     used = len(words)
     for k in range(len(words)):
         if n == len(out.t):
@@ -92,40 +99,19 @@ def _decode(
         if polarity > 1:
             state[UNKNOWN] += 1
             continue
-        if x >= limits.width or y >= limits.height:
-            state[OUTSIDE] += 1
+        if not is_kept(x, y, True, limits, state):
             continue
-        if new < low:
-            if wraps(low, new, 1 << TIME_BITS):
-                turns += 1
-                time = turns << TIME_BITS
-            else:
-                state[BACKWARDS] += 1
-        elif low >= 0 and new - low > JUMP_US:
-            state[JUMPS] += 1
+        if not low <= new <= low + JUMP_US:
+            turns = turns_of_clock(new, low, turns, state)
+            time = turns << CLOCK_BITS
         low = new
         last = max(time + new, last)
-        out.t[n] = last
-        out.x[n] = x
-        out.y[n] = y
-        out.p[n] = polarity
-        n += 1
+        n = put_event(out, n, last, x, y, polarity)
     state[FILLED], state[WRAPS] = n, turns
-    state[LAST], state[PREVIOUS], state[HIGH] = last, previous, low
+    state[LAST], state[HIGH] = last, low
     return used
 
 
-@numba.njit(cache=True)
-def decode(
-    words: npt.NDArray[np.uint64], state: IntArray, out: Columns, triggers: Triggers, limits: Limits
-) -> int:
-    """Decode events of version 2; see `words.Decode`."""
-    return int(_decode(words, state, out, limits, 14, 14))
-
-
-@numba.njit(cache=True)
-def decode_first(
-    words: npt.NDArray[np.uint64], state: IntArray, out: Columns, triggers: Triggers, limits: Limits
-) -> int:
-    """Decode events of version 1, of cameras of 304 x 240 px; see `words.Decode`."""
-    return int(_decode(words, state, out, limits, 9, 8))
+decode: Decode = partial(_decode, x_bits=14, y_bits=14)
+#: Of version 1, of cameras of 304 x 240 px.
+decode_first: Decode = partial(_decode, x_bits=9, y_bits=8)

@@ -15,22 +15,18 @@ Source: https://docs.prophesee.ai/stable/data/encoding_formats/evt2.html
 from __future__ import annotations
 
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numba
 import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import IntArray
-from jeat_graph.io.events.reader import Triggers
-from jeat_graph.io.events.words import (
+from jeat_graph.io.events.decoding import (
     BACKWARDS,
     FILLED,
     HIGH,
-    JUMP_US,
-    JUMPS,
     LAST,
-    OUTSIDE,
     PREVIOUS,
     TRIGGERS,
     UNKNOWN,
@@ -38,13 +34,17 @@ from jeat_graph.io.events.words import (
     WRAPS,
     Columns,
     Limits,
-    WordReader,
-    wraps,
+    is_kept,
+    put_edge,
+    put_event,
+    turns_of_counter,
 )
+from jeat_graph.io.events.reader import Triggers
+from jeat_graph.io.events.words import WordReader
 
 HIGH_BITS, LOW_BITS = 28, 6
-_SIDE = 0x7FF
-_TIME, _TRIGGER, _OTHERS = 8, 10, 14
+SIDE = 0x7FF
+TIME, EDGE, OTHERS = 8, 10, 14
 
 
 class Evt2Reader(WordReader):
@@ -57,14 +57,46 @@ class Evt2Reader(WordReader):
 
 
 @numba.njit(cache=True)
+def upper_time(state: IntArray) -> int:
+    """Return the time (µs) without the low bits, which events and edges have; negative if none is known."""
+    return int(((state[WRAPS] << HIGH_BITS) + state[HIGH]) << LOW_BITS)
+
+
+@numba.njit(cache=True)
+def lower_time(word: Any) -> int:
+    """Return the low bits of the time (µs) of an event or edge."""
+    return int((word >> 22) & 0x3F)
+
+
+@numba.njit(cache=True)
+def take_other(word: Any, triggers: Triggers, state: IntArray) -> bool:
+    """Take a word that is no event into the state; False if it is an edge and there is no room for it."""
+    kind = word >> 28
+    if kind == TIME:
+        new = word & 0xFFFFFFF
+        state[WRAPS] = turns_of_counter(new, state[HIGH], state[WRAPS], (HIGH_BITS, LOW_BITS), state)
+        state[HIGH] = new
+    elif kind == EDGE:
+        if state[HIGH] < 0:
+            state[UNTIMED] += 1
+        elif state[TRIGGERS] == len(triggers.t_us):
+            return False
+        else:
+            edge = (upper_time(state) + lower_time(word), (word >> 8) & 0x1F, word & 1)
+            state[TRIGGERS] = put_edge(triggers, state[TRIGGERS], *edge)
+    elif kind < OTHERS:
+        state[UNKNOWN] += 1
+    return True
+
+
+@numba.njit(cache=True)
 def decode(
     words: npt.NDArray[np.uint32], state: IntArray, out: Columns, triggers: Triggers, limits: Limits
 ) -> int:
-    """Decode words until they, or the room, end; see `words.Decode`."""
-    n, m = state[FILLED], state[TRIGGERS]
-    high, turns = state[HIGH], state[WRAPS]
+    """Decode words until they, or the room, end; see `decoding.Decode`."""
+    n = state[FILLED]
     last, previous = state[LAST], state[PREVIOUS]
-    time = ((turns << HIGH_BITS) + high) << LOW_BITS
+    time = upper_time(state)
     used = len(words)
     for k in range(len(words)):
         word = np.int64(words[k])
@@ -73,46 +105,19 @@ def decode(
             if n == len(out.t):
                 used = k
                 break
-            x = (word >> 11) & _SIDE
-            y = word & _SIDE
-            if high < 0:
-                state[UNTIMED] += 1
-                continue
-            if x >= limits.width or y >= limits.height:
-                state[OUTSIDE] += 1
-                continue
-            t = time + ((word >> 22) & 0x3F)
-            if t < previous:
-                state[BACKWARDS] += 1
-            previous = t
-            last = max(t, last)
-            out.t[n] = last
-            out.x[n] = x
-            out.y[n] = y
-            out.p[n] = kind
-            n += 1
-        elif kind == _TIME:
-            new = word & 0xFFFFFFF
-            if wraps(high, new, 1 << HIGH_BITS):
-                turns += 1
-            elif high >= 0 and new - high > JUMP_US >> LOW_BITS:
-                state[JUMPS] += 1
-            high = new
-            time = ((turns << HIGH_BITS) + high) << LOW_BITS
-        elif kind == _TRIGGER:
-            if high < 0:
-                state[UNTIMED] += 1
-                continue
-            if m == len(triggers.t_us):
-                used = k
-                break
-            triggers.t_us[m] = time + ((word >> 22) & 0x3F)
-            triggers.channel[m] = (word >> 8) & 0x1F
-            triggers.value[m] = word & 1
-            m += 1
-        elif kind < _OTHERS:
-            state[UNKNOWN] += 1
-    state[FILLED], state[TRIGGERS] = n, m
-    state[HIGH], state[WRAPS] = high, turns
-    state[LAST], state[PREVIOUS] = last, previous
+            x = (word >> 11) & SIDE
+            y = word & SIDE
+            if is_kept(x, y, time >= 0, limits, state):
+                t = time + lower_time(word)
+                if t < previous:
+                    state[BACKWARDS] += 1
+                previous = t
+                last = max(t, last)
+                n = put_event(out, n, last, x, y, kind)
+        elif take_other(word, triggers, state):
+            time = upper_time(state)
+        else:
+            used = k
+            break
+    state[FILLED], state[LAST], state[PREVIOUS] = n, last, previous
     return used

@@ -17,6 +17,7 @@ Source: https://docs.prophesee.ai/stable/data/encoding_formats/evt21.html
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
@@ -25,33 +26,25 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import IntArray
-from jeat_graph.io.events.reader import Triggers
-from jeat_graph.io.events.words import (
+from jeat_graph.io.events.decoding import (
     BACKWARDS,
     FILLED,
-    HIGH,
-    JUMP_US,
-    JUMPS,
     LAST,
     MOST_OF_A_WORD,
-    OUTSIDE,
     PREVIOUS,
-    TRIGGERS,
-    UNKNOWN,
-    UNTIMED,
-    WRAPS,
     Columns,
+    Decode,
     Limits,
-    WordReader,
-    wraps,
+    is_kept,
+    put_event,
 )
+from jeat_graph.io.events.evt2 import EDGE, OTHERS, SIDE, TIME, lower_time, take_other, upper_time
+from jeat_graph.io.events.reader import Triggers
+from jeat_graph.io.events.words import WordReader
 
-HIGH_BITS, LOW_BITS = 28, 6
-_SIDE = 0x7FF
-_TIME, _TRIGGER, _OTHERS = 8, 10, 14
 _HALF = 32
 _LOOKED_AT_BYTES = 1 << 16
-_KNOWN_TYPES = (0, 1, _TIME, _TRIGGER, _OTHERS, 15)
+_KNOWN_TYPES = (0, 1, TIME, EDGE, OTHERS, 15)
 
 
 class Evt21Reader(WordReader):
@@ -80,7 +73,7 @@ def _looks_swapped(data: bytes) -> bool:
     """Whether the types stand in the first half of each word: more of them are known there, or times."""
     halves = np.frombuffer(data[: len(data) // 8 * 8], np.uint32).reshape(-1, 2) >> 28
     known = np.isin(halves, _KNOWN_TYPES).sum(axis=0)
-    times = (halves == _TIME).sum(axis=0)
+    times = (halves == TIME).sum(axis=0)
     first, second = (known + times).tolist()
     return bool(first > second)
 
@@ -94,10 +87,10 @@ def _decode(
     limits: Limits,
     swapped: bool,
 ) -> int:
-    n, m = state[FILLED], state[TRIGGERS]
-    high, turns = state[HIGH], state[WRAPS]
+    """Decode words till they or the room end (see `decoding.Decode`); the upper halves are words of EVT2."""
+    n = state[FILLED]
     last, previous = state[LAST], state[PREVIOUS]
-    time = ((turns << HIGH_BITS) + high) << LOW_BITS
+    time = upper_time(state)
     used = len(words)
     for k in range(len(words)):
         low_half = np.int64(words[k] & np.uint64(0xFFFFFFFF))
@@ -109,66 +102,27 @@ def _decode(
             if n + MOST_OF_A_WORD > len(out.t):
                 used = k
                 break
-            x = (word >> 11) & _SIDE
-            y = word & _SIDE
-            t = time + ((word >> 22) & 0x3F)
-            if high >= 0 and low_half and y < limits.height:
+            x = (word >> 11) & SIDE
+            y = word & SIDE
+            if time >= 0 and low_half and y < limits.height:
+                t = time + lower_time(word)
                 if t < previous:
                     state[BACKWARDS] += 1
                 previous = t
                 last = max(t, last)
             while low_half:
-                if low_half & 1:
-                    if high < 0:
-                        state[UNTIMED] += 1
-                    elif x >= limits.width or y >= limits.height:
-                        state[OUTSIDE] += 1
-                    else:
-                        out.t[n] = last
-                        out.x[n] = x
-                        out.y[n] = y
-                        out.p[n] = kind
-                        n += 1
+                if low_half & 1 and is_kept(x, y, time >= 0, limits, state):
+                    n = put_event(out, n, last, x, y, kind)
                 low_half >>= 1
                 x += 1
-        elif kind == _TIME:
-            new = word & 0xFFFFFFF
-            if wraps(high, new, 1 << HIGH_BITS):
-                turns += 1
-            elif high >= 0 and new - high > JUMP_US >> LOW_BITS:
-                state[JUMPS] += 1
-            high = new
-            time = ((turns << HIGH_BITS) + high) << LOW_BITS
-        elif kind == _TRIGGER:
-            if high < 0:
-                state[UNTIMED] += 1
-                continue
-            if m == len(triggers.t_us):
-                used = k
-                break
-            triggers.t_us[m] = time + ((word >> 22) & 0x3F)
-            triggers.channel[m] = (word >> 8) & 0x1F
-            triggers.value[m] = word & 1
-            m += 1
-        elif kind < _OTHERS:
-            state[UNKNOWN] += 1
-    state[FILLED], state[TRIGGERS] = n, m
-    state[HIGH], state[WRAPS] = high, turns
-    state[LAST], state[PREVIOUS] = last, previous
+        elif take_other(word, triggers, state):
+            time = upper_time(state)
+        else:
+            used = k
+            break
+    state[FILLED], state[LAST], state[PREVIOUS] = n, last, previous
     return used
 
 
-@numba.njit(cache=True)
-def decode(
-    words: npt.NDArray[np.uint64], state: IntArray, out: Columns, triggers: Triggers, limits: Limits
-) -> int:
-    """Decode words with their lower half first; see `words.Decode`."""
-    return int(_decode(words, state, out, triggers, limits, False))
-
-
-@numba.njit(cache=True)
-def decode_swapped(
-    words: npt.NDArray[np.uint64], state: IntArray, out: Columns, triggers: Triggers, limits: Limits
-) -> int:
-    """Decode words with their upper half first; see `words.Decode`."""
-    return int(_decode(words, state, out, triggers, limits, True))
+decode: Decode = partial(_decode, swapped=False)
+decode_swapped: Decode = partial(_decode, swapped=True)

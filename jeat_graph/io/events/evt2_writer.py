@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numba
@@ -10,17 +11,10 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import IntArray
 from jeat_graph.io.events.evt2 import HIGH_BITS, LOW_BITS
+from jeat_graph.io.events.raw_header import raw_header
 from jeat_graph.io.events.word_writer import Layout, WordWriter
 
 _TIME_WORD = 8 << 28
-
-
-def header(size_px: tuple[int, int]) -> bytes:
-    """Return the header of a file."""
-    width, height = size_px
-    return (
-        f"% evt 2.0\n% format EVT2;height={height};width={width}\n% geometry {width}x{height}\n% end\n"
-    ).encode("ascii")
 
 
 @numba.njit(cache=True)
@@ -61,4 +55,5 @@ class Evt2Writer(WordWriter):
     """Writes EVT 2.0; gaps of more than 4 h 46 min lose that much."""
 
     def __init__(self, path: str | Path, size_px: tuple[int, int]) -> None:
-        super().__init__(path, size_px, Layout(header, np.uint32, 1 << 11, encode))
+        layout = Layout(partial(raw_header, "2.0"), np.uint32, 1 << 11, encode)
+        super().__init__(path, size_px, layout)

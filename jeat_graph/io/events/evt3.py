@@ -26,18 +26,14 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import IntArray
-from jeat_graph.io.events.reader import Triggers
-from jeat_graph.io.events.words import (
+from jeat_graph.io.events.decoding import (
     BACKWARDS,
     BASE,
     FILLED,
     HIGH,
-    JUMP_US,
-    JUMPS,
     LAST,
     LOW,
     MOST_OF_A_WORD,
-    OUTSIDE,
     POLARITY,
     PREVIOUS,
     ROW,
@@ -47,9 +43,13 @@ from jeat_graph.io.events.words import (
     WRAPS,
     Columns,
     Limits,
-    WordReader,
-    wraps,
+    is_kept,
+    put_edge,
+    put_event,
+    turns_of_counter,
 )
+from jeat_graph.io.events.reader import Triggers
+from jeat_graph.io.events.words import WordReader
 
 HIGH_BITS, LOW_BITS = 12, 12
 _SIDE, _BITS = 0x7FF, 0xFFF
@@ -70,7 +70,7 @@ class Evt3Reader(WordReader):
 def decode(
     words: npt.NDArray[np.uint16], state: IntArray, out: Columns, triggers: Triggers, limits: Limits
 ) -> int:
-    """Decode words until they, or the room, end; see `words.Decode`."""
+    """Decode words until they, or the room, end; see `decoding.Decode`."""
     n, m = state[FILLED], state[TRIGGERS]
     high, low, turns = state[HIGH], state[LOW], state[WRAPS]
     row, base, polarity = state[ROW], state[BASE], state[POLARITY]
@@ -86,16 +86,8 @@ def decode(
                 used = k
                 break
             x = word & _SIDE
-            if not ready:
-                state[UNTIMED] += 1
-            elif x >= limits.width or row >= limits.height:
-                state[OUTSIDE] += 1
-            else:
-                out.t[n] = last
-                out.x[n] = x
-                out.y[n] = row
-                out.p[n] = (word >> 11) & 1
-                n += 1
+            if is_kept(x, row, ready, limits, state):
+                n = put_event(out, n, last, x, row, (word >> 11) & 1)
         elif kind == ROW_WORD:
             row = word & _SIDE
             ready = high >= 0
@@ -106,7 +98,7 @@ def decode(
                 if time < previous:
                     state[BACKWARDS] += 1
                 previous = time
-                last = max(last, time)
+                last = max(time, last)
         elif kind == FIRST:
             base = word & _SIDE
             polarity = (word >> 11) & 1
@@ -119,33 +111,21 @@ def decode(
             x = base
             base += width
             while bits:
-                if bits & 1:
-                    if not ready:
-                        state[UNTIMED] += 1
-                    elif x >= limits.width or row >= limits.height:
-                        state[OUTSIDE] += 1
-                    else:
-                        out.t[n] = last
-                        out.x[n] = x
-                        out.y[n] = row
-                        out.p[n] = polarity
-                        n += 1
+                if bits & 1 and is_kept(x, row, ready, limits, state):
+                    n = put_event(out, n, last, x, row, polarity)
                 bits >>= 1
                 x += 1
         elif kind == TIME_HIGH:
             new = word & _BITS
             if new != high:
-                if wraps(high, new, 1 << HIGH_BITS):
-                    turns += 1
-                elif high >= 0 and new - high > JUMP_US >> LOW_BITS:
-                    state[JUMPS] += 1
+                turns = turns_of_counter(new, high, turns, (HIGH_BITS, LOW_BITS), state)
                 high = new
                 low = 0  # the low bits follow; events before them lie at the beginning of these 4 ms
                 time = ((turns << HIGH_BITS) + high) << LOW_BITS
                 if time < previous:
                     state[BACKWARDS] += 1
                 previous = time
-                last = max(last, time)
+                last = max(time, last)
                 ready = row >= 0
         elif kind == _TRIGGER:
             if high < 0:
@@ -154,10 +134,7 @@ def decode(
             if m == len(triggers.t_us):
                 used = k
                 break
-            triggers.t_us[m] = time
-            triggers.channel[m] = (word >> 8) & 0xF
-            triggers.value[m] = word & 1
-            m += 1
+            m = put_edge(triggers, m, time, (word >> 8) & 0xF, word & 1)
         elif kind < _OTHERS and kind != CONTINUED_4:
             state[UNKNOWN] += 1
     state[FILLED], state[TRIGGERS] = n, m

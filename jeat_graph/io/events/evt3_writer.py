@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numba
@@ -20,6 +21,7 @@ from jeat_graph.io.events.evt3 import (
     TIME_HIGH,
     TIME_LOW,
 )
+from jeat_graph.io.events.raw_header import raw_header
 from jeat_graph.io.events.word_writer import Layout, WordWriter
 
 _BITS = 0xFFF
@@ -27,14 +29,6 @@ _LEAST_RUN = 4  # a group costs two words, an event one
 _MOST_WORDS = 8  # of one step, the words of a time that moves on apart
 _SPAN_12, _SPAN_8 = 12, 8
 _HIGH, _LOW, _ROW = 0, 1, 2
-
-
-def header(size_px: tuple[int, int]) -> bytes:
-    """Return the header of a file."""
-    width, height = size_px
-    return (
-        f"% evt 3.0\n% format EVT3;height={height};width={width}\n% geometry {width}x{height}\n% end\n"
-    ).encode("ascii")
 
 
 @numba.njit(cache=True)
@@ -108,4 +102,5 @@ class Evt3Writer(WordWriter):
     """Writes EVT 3.0."""
 
     def __init__(self, path: str | Path, size_px: tuple[int, int]) -> None:
-        super().__init__(path, size_px, Layout(header, np.uint16, 1 << 11, encode))
+        layout = Layout(partial(raw_header, "3.0"), np.uint16, 1 << 11, encode)
+        super().__init__(path, size_px, layout)

@@ -67,6 +67,14 @@ def read_raw_header(file: BinaryIO, path: Path) -> RawHeader:
     return RawHeader(encoding, _size(keys, options, path), options, keys, "\n".join(lines))
 
 
+def raw_header(version: str, size_px: tuple[int, int]) -> bytes:
+    """Return the header of a file of EVT `version`, 2.0 or 3.0."""
+    width, height = size_px
+    name = _VERSIONS[version]
+    lines = (f"evt {version}", f"format {name};height={height};width={width}", f"geometry {width}x{height}")
+    return "".join(f"% {line}\n" for line in (*lines, "end")).encode("ascii")
+
+
 def _is_text(line: bytes) -> bool:
     """Whether a line may be of a header: events may begin with the byte of `%` too."""
     return all(byte >= 0x20 or byte in b"\t\r\n" for byte in line)

@@ -6,68 +6,37 @@ from block to block. A format that is not what its header says shows by words th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
+from jeat_graph.io.events.decoding import (
+    BACKWARDS,
+    FILLED,
+    JUMPS,
+    MOST_OF_A_WORD,
+    OUTSIDE,
+    TRIGGERS,
+    UNKNOWN,
+    UNTIMED,
+    Columns,
+    Decode,
+    Limits,
+    empty_state,
+)
 from jeat_graph.io.events.reader import PIECE_ROWS, EventReader, Triggers
 
 BLOCK_BYTES = 1 << 20
-#: A time that steps ahead by more than this (µs) is remarked on: a camera's clock does not do so.
-JUMP_US = 10_000_000
-#: So many events one word may stand for.
-MOST_OF_A_WORD = 32
 #: Words beyond this share that a format does not have: the file is of another one. Of random 16-bit words 31
 #: % have types that EVT3 leaves free, the rarest case of another format read as this one.
 _MOST_WRONG = 0.05
 _TRIGGER_ROWS = 1 << 12
 _NO_LIMIT = 1 << 16
-
-# Places of the state that a loop keeps from block to block (int64).
-FILLED, TRIGGERS, LAST, PREVIOUS, HIGH, WRAPS, LOW, ROW, BASE, POLARITY = range(10)
-OUTSIDE, BACKWARDS, UNKNOWN, UNTIMED, JUMPS = range(10, 15)
-STATE_SIZE = 15
-
-
-class Columns(NamedTuple):
-    """Room for events: t_us (N,) int64, x, y (N,) uint16, polarity (N,) uint8."""
-
-    t: IntArray
-    x: npt.NDArray[np.uint16]
-    y: npt.NDArray[np.uint16]
-    p: npt.NDArray[np.uint8]
-
-
-class Limits(NamedTuple):
-    """First column and row outside the picture (px)."""
-
-    width: int
-    height: int
-
-
-#: (words, state, events, triggers, limits) -> words that were used: all, unless the room is full.
-Decode = Callable[[Any, IntArray, Columns, Triggers, Limits], int]
-
-
-@numba.njit(cache=True)
-def wraps(old: Any, new: Any, full: int) -> bool:
-    """Tell a counter of `full` values that began again from one that stepped back by a fault."""
-    quarter = full // 4
-    return bool(old >= full - quarter and new < quarter)
-
-
-def empty_state() -> IntArray:
-    """Return the state before the first word: no time and no row is known."""
-    state = np.zeros(STATE_SIZE, dtype=np.int64)
-    state[HIGH] = state[ROW] = state[LAST] = state[PREVIOUS] = -1
-    return state
 
 
 class WordReader(EventReader):
