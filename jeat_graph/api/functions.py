@@ -147,27 +147,14 @@ def compare(
     Raises:
         JeatGraphError: what a file or the configuration has wrong.
     """
-    import numpy as np
-
-    from jeat_graph.eval.compare import LAGS_S
-    from jeat_graph.eval.compare import compare as compared
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.latency import at_measurement
-    from jeat_graph.tracking.records import record_tracks
+    from jeat_graph.runs.measured import compare_run, track_measured
 
     recording = detections if isinstance(detections, Detections) else read_detections(detections)
     objects = truth if isinstance(truth, GroundTruth) or truth is None else read_truth(truth)
     settings = fit_input(as_config(config), recording)[0]
-    recording = at_measurement(recording, settings)
-    records, causal = record_tracks(settings, recording)
-    return compared(
-        records,
-        settings.sensor_names,
-        truth=objects,
-        causal=causal,
-        instants=np.unique(recording.scan_t),
-        lags_s=lags_s or LAGS_S,
-    )
+    return compare_run(track_measured(settings, at_measurement(recording, settings)), objects, lags_s)
 
 
 def calibrate(

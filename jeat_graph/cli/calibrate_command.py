@@ -98,11 +98,10 @@ def with_image(base: Config, recordings: list[Detections], size: tuple[int, int]
     Raises:
         ConfigError: no size is given and boxes lie beyond the base configuration's picture.
     """
-    from dataclasses import replace
-
     if size is not None:
-        image = replace(base.image, width=float(size[0]), height=float(size[1]))
-        return replace(base, image=image, input=replace(base.input, picture="given"))
+        from jeat_graph.config.reading import as_config
+
+        return as_config(base, size)
     if base.input.picture == "seen":
         from jeat_graph.runs.declaring import fit_picture
 

@@ -47,12 +47,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Read or track again, compare, print the tables, write `compare.json` and the pictures."""
     from jeat_graph.drawing.comparison import write_plots
-    from jeat_graph.eval.compare import LAGS_S, compare
     from jeat_graph.eval.tables import to_json
     from jeat_graph.io.atomic import check_writable, open_atomic
     from jeat_graph.io.truth_io import read_truth
     from jeat_graph.runs.beside import rate_of_truth
-    from jeat_graph.runs.measured import measured_run
+    from jeat_graph.runs.measured import compare_run, measured_run
 
     folder = Path(args.run_directory)
     out = folder if args.out is None else Path(args.out)
@@ -69,14 +68,7 @@ def run(args: argparse.Namespace) -> int:
     measured = measured_run(folder, args.detections, progress=sys.stderr.isatty())
     with stages("compare", 1) as stage:
         stage("smoothing at all lags")
-        comparison = compare(
-            measured.tracks,
-            measured.sensors,
-            truth=truth,
-            causal=measured.causal,
-            instants=measured.instants,
-            lags_s=args.lags or LAGS_S,
-        )
+        comparison = compare_run(measured, truth, args.lags)
     print("\n".join(table.render() for table in comparison.tables), end="")
     with open_atomic(out / "compare.json") as file:
         file.write(to_json(comparison.values))

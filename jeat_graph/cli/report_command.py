@@ -73,9 +73,8 @@ def _compare(args: argparse.Namespace) -> tuple[ComparedRun | None, str | None]:
         return None, "Filter against smoother was left out (--no-compare)."
     from jeat_graph.data.errors import DataError
     from jeat_graph.drawing.page.figures import compared_run
-    from jeat_graph.eval.compare import compare
     from jeat_graph.io.truth_io import read_truth
-    from jeat_graph.runs.measured import measured_run
+    from jeat_graph.runs.measured import compare_run, measured_run
 
     folder = Path(args.run_directory)
     if not folder.is_dir():
@@ -87,11 +86,4 @@ def _compare(args: argparse.Namespace) -> tuple[ComparedRun | None, str | None]:
             raise
         return None, f"Filter against smoother is not shown: {error}."
     truth = None if args.gt is None else read_truth(args.gt, rate_hz=args.rate)
-    comparison = compare(
-        measured.tracks,
-        measured.sensors,
-        truth=truth,
-        causal=measured.causal,
-        instants=measured.instants,
-    )
-    return compared_run(comparison), None
+    return compared_run(compare_run(measured, truth)), None

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import DataError
 
@@ -82,10 +82,8 @@ def with_picture(config: Config, overrides: Sequence[str], facts: Facts | None) 
     known = config.input.picture == "given"
     if known and (width, height) == (config.image.width, config.image.height):
         return config, []
-    image = replace(config.image, width=float(width), height=float(height))
-    given = replace(config.input, picture="given")
     note = f"picture of {width} x {height} px, as {facts.origin} says"
-    return replace(config, image=image, input=given), [note]
+    return as_config(config, facts.size_px), [note]
 
 
 def rate_of_truth(run: str | Path, truth: str | Path, rate_hz: float | None) -> float | None:

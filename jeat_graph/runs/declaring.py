@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config, InputConfig, SensorConfig
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.rates import median_rate_hz
@@ -46,9 +47,8 @@ def fit_picture(config: Config, recordings: Sequence[Detections]) -> Config:
     reach = [(d.boxes[:, :2] + d.boxes[:, 2:]).max(axis=0) for d in recordings if len(d)]
     if not reach:
         return config
-    width, height = (float(max(math.ceil(v), 1)) for v in np.max(reach, axis=0))
-    image = replace(config.image, width=width, height=height)
-    return replace(config, image=image, input=replace(config.input, picture="given"))
+    width, height = (max(math.ceil(v), 1) for v in np.max(reach, axis=0))
+    return as_config(config, (width, height))
 
 
 def _declare_sensors(config: Config, detections: Detections) -> tuple[Config, list[str]]:

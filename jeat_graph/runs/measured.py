@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -15,12 +15,15 @@ from jeat_graph.data.arrays import FloatArray, RecordArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.measured_track import MeasuredTrack
-from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.io.hashing import sha256_of
 from jeat_graph.io.scans_io import read_instants
 from jeat_graph.runs.directory import MEASUREMENTS, RUN_JSON
 from jeat_graph.runs.inputs import find_input
 from jeat_graph.runs.latency import at_measurement
+
+if TYPE_CHECKING:
+    from jeat_graph.eval.compare import Comparison
 
 
 class MeasuredRun(NamedTuple):
@@ -50,14 +53,47 @@ def measured_run(folder: Path, moved: list[str] | None = None, *, progress: bool
     Raises:
         DataError: there is no run, or a file of it, or an input, is missing or has changed since.
     """
-    from jeat_graph.tracking.records import record_tracks
-
     record = _read_record(folder)
     if moved is None and MEASUREMENTS in record["files"]:
         return _kept(folder, record)
     config, detections = recorded_inputs(folder, record, moved)
+    return track_measured(config, detections, progress=progress)
+
+
+def track_measured(config: Config, detections: Detections, *, progress: bool = False) -> MeasuredRun:
+    """Track a recording, and keep all that its confirmed tracks took in.
+
+    Args:
+        config: of this recording.
+        detections: the recording, at the times of measurement.
+        progress: whether to show a progress bar on stderr.
+    """
+    from jeat_graph.tracking.records import record_tracks
+
     tracks, causal = record_tracks(config, detections, progress=progress)
     return MeasuredRun(tracks, causal, np.unique(detections.scan_t), config.sensor_names)
+
+
+def compare_run(
+    run: MeasuredRun, truth: GroundTruth | None = None, lags_s: Sequence[float] | None = None
+) -> Comparison:
+    """Compare the filter with smoothers on a run.
+
+    Args:
+        run: with its measurements.
+        truth: true boxes with motion; without them only consistency is judged.
+        lags_s: lags (s), 0 is the filter; those of `eval.compare` if not given.
+    """
+    from jeat_graph.eval.compare import LAGS_S, compare
+
+    return compare(
+        run.tracks,
+        run.sensors,
+        truth=truth,
+        causal=run.causal,
+        instants=run.instants,
+        lags_s=lags_s or LAGS_S,
+    )
 
 
 def measurement_rows(folder: Path, *, progress: bool = False) -> tuple[RecordArray, Config]:
