@@ -28,9 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure (or read an earlier result), print and write."""
-    result = common.earlier(args.source, "ablation") if args.source else measure(args)
-    common.publish(args, "ablation", result, tables(result))
-    return 0
+    return common.measure_or_read(args, "ablation", measure, tables)
 
 
 def measure(args: argparse.Namespace) -> dict[str, Any]:

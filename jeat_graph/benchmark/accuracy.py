@@ -55,9 +55,7 @@ def run(args: argparse.Namespace) -> int:
         result = {"benchmark": "peer-search", **provenance({}, {}), "search": found}
         common.publish(args, "peer-search", result, shown)
         return 0
-    result = common.earlier(args.source, "accuracy") if args.source else measure(args)
-    common.publish(args, "accuracy", result, tables(result))
-    return 0
+    return common.measure_or_read(args, "accuracy", measure, tables)
 
 
 def search(args: argparse.Namespace, names: Sequence[str]) -> dict[str, dict[str, dict[str, Any]]]:

@@ -1,11 +1,11 @@
-"""What the benchmarks of accuracy and ablation share: arguments, tables, files."""
+"""What the benchmarks share: arguments, tables, files."""
 
 from __future__ import annotations
 
 import argparse
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,19 +24,68 @@ QUICK_SEEDS = (0,)
 QUICK_DURATION_S = 8.0
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of both benchmarks."""
+#: What an argument takes, of those that several benchmarks have and each explains in its own words.
+_OPTIONAL: Mapping[str, dict[str, Any]] = {
+    "data": {"metavar": "DIR"},
+    "seeds": {"nargs": "+", "type": natural, "metavar": "N"},
+    "scenarios": {"nargs": "+", "metavar": "NAME"},
+    "duration": {"type": positive, "metavar": "S"},
+    "quick": {"action": "store_true"},
+}
+
+
+def declare(parser: argparse.ArgumentParser, name: str, texts: Mapping[str, str]) -> None:
+    """Declare the arguments that every benchmark has, and of `_OPTIONAL` those that it has a text for.
+
+    Args:
+        parser: of the benchmark.
+        name: of the files that it writes.
+        texts: help of its optional arguments, by their names.
+    """
     add = parser.add_argument
-    add("--out", metavar="DIR", help="write NAME.json and NAME.md there")
-    add("--data", metavar="DIR", help="folder that holds kitti/ (../shared/data)")
-    add("--seeds", nargs="+", type=natural, metavar="N", help="of the simulated recordings (0 1 2 3 4)")
-    add("--scenarios", nargs="+", metavar="NAME", help=f"simulated scenarios ({' '.join(SCENARIOS)})")
-    add("--duration", type=positive, metavar="S", help=f"of a simulated recording ({DURATION_S:g})")
-    add("--quick", action="store_true", help="one seed, 8 s, no real data: to see that it runs")
+    add("--out", metavar="DIR", help=f"write {name}.json and {name}.md there")
+    for option, text in texts.items():
+        add(f"--{option}", help=text, **_OPTIONAL[option])
     add("--jobs", type=counting, metavar="N", help="processes (as many as there are processors)")
-    add("--folds", metavar="JSON", help="take the leave-one-out configurations from an earlier result")
     add("--readme", metavar="FILE", help="renew the tables between the markers of this Markdown file")
     add("--from", dest="source", metavar="JSON", help="render the tables of an earlier result; run nothing")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of accuracy, ablation and smoothing."""
+    texts = {
+        "data": "folder that holds kitti/ (../shared/data)",
+        "seeds": "of the simulated recordings (0 1 2 3 4)",
+        "scenarios": f"simulated scenarios ({' '.join(SCENARIOS)})",
+        "duration": f"of a simulated recording ({DURATION_S:g})",
+        "quick": "one seed, 8 s, no real data: to see that it runs",
+    }
+    declare(parser, "NAME", texts)
+    parser.add_argument(
+        "--folds", metavar="JSON", help="take the leave-one-out configurations from an earlier result"
+    )
+
+
+def measure_or_read(
+    args: argparse.Namespace,
+    name: str,
+    measure: Callable[[argparse.Namespace], dict[str, Any]],
+    tables: Callable[[Mapping[str, Any]], Mapping[str, Table]],
+) -> int:
+    """Run a benchmark, or read what it found earlier (`--from`), then print and write its tables.
+
+    Args:
+        args: of the command.
+        name: of the benchmark.
+        measure: runs it.
+        tables: makes tables, by the names of their markers, of what it found.
+
+    Returns:
+        The exit code.
+    """
+    result = earlier(args.source, name) if args.source else measure(args)
+    publish(args, name, result, tables(result))
+    return 0
 
 
 def settings(args: argparse.Namespace) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from jeat_graph.benchmark.event_noise import BASELINE, measure_noise
 from jeat_graph.benchmark.event_rates import SPEEDS, measure_rates
 from jeat_graph.benchmark.judging import in_processes
 from jeat_graph.benchmark.provenance import provenance
-from jeat_graph.config.argument_types import counting, drawn_size, natural, positive
+from jeat_graph.config.argument_types import counting, drawn_size, positive
 from jeat_graph.config.section_tree import plain
 from jeat_graph.simulation.imaging.config import load_imaging
 
@@ -26,25 +26,21 @@ _SCENARIOS = ("day", "night", "night-nolight")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the benchmark's arguments."""
+    common.declare(
+        parser, "events", {"seeds": "of the segments (0)", "scenarios": f"({' '.join(_SCENARIOS)})"}
+    )
+    parser.set_defaults(seeds=[0], scenarios=_SCENARIOS)
     add = parser.add_argument
-    add("--out", metavar="DIR", help="write events.json and events.md there")
-    add("--seeds", nargs="+", type=natural, default=[0], metavar="N", help="of the segments (0)")
-    add("--scenarios", nargs="+", default=_SCENARIOS, metavar="NAME", help=f"({' '.join(_SCENARIOS)})")
     add("--frames", type=counting, default=30, metavar="N", help="of each segment, 20 a second (30)")
     add("--size", type=drawn_size, default=(640, 384), metavar="WxH", help="picture (640x384)")
     add("--tick", type=positive, default=100.0, metavar="HZ", help="rate of CARLA's ticks (100)")
     add("--sigma", type=positive, default=0.1, metavar="S", help="σ_C that the first measure sets to 0 (0.1)")
     add("--grain", type=positive, default=0.5, metavar="DN", help="flicker of CARLA's picture, std (0.5)")
-    add("--jobs", type=counting, metavar="N", help="processes (as many as there are processors)")
-    add("--readme", metavar="FILE", help="renew the tables between the markers of this Markdown file")
-    add("--from", dest="source", metavar="JSON", help="render the tables of an earlier result; run nothing")
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure (or read an earlier result), print and write."""
-    result = common.earlier(args.source, "events") if args.source else measure(args)
-    common.publish(args, "events", result, tables(result))
-    return 0
+    return common.measure_or_read(args, "events", measure, tables)
 
 
 def measure(args: argparse.Namespace) -> dict[str, Any]:

@@ -22,7 +22,6 @@ from jeat_graph.benchmark.provenance import provenance
 from jeat_graph.benchmark.real_ours import OursOnSet, judge_row, rows_of
 from jeat_graph.benchmark.real_sets import RealSet, real_sets
 from jeat_graph.benchmark.robustness import PRESETS, judge_variation, variations
-from jeat_graph.config.argument_types import counting, natural, positive
 from jeat_graph.config.reading import load_config
 
 if TYPE_CHECKING:
@@ -36,27 +35,24 @@ _QUICK_DURATION_S = 6.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the benchmark's arguments."""
+    texts = {
+        "data": "folder that holds kitti/, kitti-pedestrian/, tud/ (../shared/data)",
+        "seeds": "of the simulated recordings (0 1)",
+        "duration": f"of a simulated one ({_ROBUSTNESS_DURATION_S:g})",
+        "quick": "two recordings a set, 6 s of simulation, nothing calibrated",
+    }
+    common.declare(parser, "real", texts)
     add = parser.add_argument
-    add("--out", metavar="DIR", help="write real.json and real.md there")
-    add("--data", metavar="DIR", help="folder that holds kitti/, kitti-pedestrian/, tud/ (../shared/data)")
     add("--peers", metavar="JSON", help="keep the other trackers' scores in this file from run to run")
     add("--no-peers", action="store_true", help="leave the other trackers out")
     add("--tuned", action="store_true", help="search the others' parameters too, on what is judged (slow)")
     add("--no-calibrate", action="store_true", help="leave the calibrated rows out (they take minutes)")
     add("--no-robustness", action="store_true", help="leave the simulated detectors out")
-    add("--seeds", nargs="+", type=natural, metavar="N", help="of the simulated recordings (0 1)")
-    add("--duration", type=positive, metavar="S", help=f"of a simulated one ({_ROBUSTNESS_DURATION_S:g})")
-    add("--quick", action="store_true", help="two recordings a set, 6 s of simulation, nothing calibrated")
-    add("--jobs", type=counting, metavar="N", help="processes (as many as there are processors)")
-    add("--readme", metavar="FILE", help="renew the tables between the markers of this Markdown file")
-    add("--from", dest="source", metavar="JSON", help="render the tables of an earlier result; run nothing")
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure (or read an earlier result), print and write."""
-    result = common.earlier(args.source, "real") if args.source else measure(args)
-    common.publish(args, "real", result, tables(result))
-    return 0
+    return common.measure_or_read(args, "real", measure, tables)
 
 
 def measure(args: argparse.Namespace) -> dict[str, Any]:

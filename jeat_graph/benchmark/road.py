@@ -20,7 +20,6 @@ from jeat_graph.benchmark import common
 from jeat_graph.benchmark.judging import in_processes
 from jeat_graph.benchmark.provenance import provenance
 from jeat_graph.benchmark.road_real import LENGTH_SETS, find_brno, judge_camera, speed_scores
-from jeat_graph.config.argument_types import counting, natural, positive
 from jeat_graph.config.reading import load_config
 
 if TYPE_CHECKING:
@@ -36,22 +35,18 @@ _SPREAD = {"log_f": 0.005, "turn_x": 0.001, "turn_y": 0.001, "turn_z": 0.003, "z
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the benchmark's arguments."""
-    add = parser.add_argument
-    add("--out", metavar="DIR", help="write road.json and road.md there")
-    add("--data", metavar="DIR", help="folder that holds brno/ (../shared/data)")
-    add("--seeds", nargs="+", type=natural, metavar="N", help="of the simulated recordings (21 22)")
-    add("--duration", type=positive, metavar="S", help=f"of a simulated recording ({_DURATION_S:g})")
-    add("--quick", action="store_true", help="one seed, 6 s, few real vehicles: to see that it runs")
-    add("--jobs", type=counting, metavar="N", help="processes (as many as there are processors)")
-    add("--readme", metavar="FILE", help="renew the tables between the markers of this Markdown file")
-    add("--from", dest="source", metavar="JSON", help="render the tables of an earlier result; run nothing")
+    texts = {
+        "data": "folder that holds brno/ (../shared/data)",
+        "seeds": "of the simulated recordings (21 22)",
+        "duration": f"of a simulated recording ({_DURATION_S:g})",
+        "quick": "one seed, 6 s, few real vehicles: to see that it runs",
+    }
+    common.declare(parser, "road", texts)
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure (or read an earlier result), print and write."""
-    result = common.earlier(args.source, "road") if args.source else measure(args)
-    common.publish(args, "road", result, tables(result))
-    return 0
+    return common.measure_or_read(args, "road", measure, tables)
 
 
 def measure(args: argparse.Namespace) -> dict[str, Any]:
