@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from html import escape
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.drawing.page.document import table_html
+from jeat_graph.drawing.page.head import beside, page_head
 from jeat_graph.eval.tables import Cell, Table
 from jeat_graph.io.atomic import open_atomic
 from jeat_graph.road.camera import RoadCamera
@@ -20,7 +20,6 @@ from jeat_graph.road.road_drawings import histogram_svg, lane_colour, plan_svg, 
 from jeat_graph.road.speeds import Speed
 from jeat_graph.road.traffic import SummaryConfig, count_columns, headway_columns, speed_summary
 
-_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 _MOST_ROWS = 400
 
 
@@ -41,16 +40,8 @@ def render_road_page(result: RoadResult, camera: RoadCamera, config: SummaryConf
         config: how traffic is summed up.
         name: what it is about.
     """
-    style = files("jeat_graph.drawing.page").joinpath("page.css").read_text(encoding="utf-8")
-    style += files(__package__).joinpath("road_page.css").read_text(encoding="utf-8")
-    title = f"{name}: the road of jeat-graph"
     parts = [
-        "<!doctype html>",
-        '<html lang="en"><head><meta charset="utf-8">',
-        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">',
-        '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        f"<title>{escape(title)}</title>",
-        f"<style>\n{style}</style></head><body>",
+        page_head(f"{name}: the road of jeat-graph", beside(__package__, "road_page.css")),
         _header(result, name),
         "<main>",
         _lanes(result, config),

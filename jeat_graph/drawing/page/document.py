@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from html import escape
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from jeat_graph.drawing.page.figures import ComparedRun
+from jeat_graph.drawing.page.head import beside, page_head
 from jeat_graph.drawing.page.plane import map_svg
 from jeat_graph.drawing.page.summary import (
     ERRORS_TITLE,
@@ -24,9 +24,6 @@ from jeat_graph.drawing.page.timelines import MOST_TRACKS, timelines
 from jeat_graph.eval.tables import Table
 from jeat_graph.runs.recorded import RunData
 
-# The browser itself refuses whatever this page might ask of a network.
-_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
-
 
 def render_page(data: RunData, compared: ComparedRun | None = None, not_compared: str | None = None) -> str:
     """Make the page; the same run gives the same bytes.
@@ -39,12 +36,7 @@ def render_page(data: RunData, compared: ComparedRun | None = None, not_compared
     name = Path(data.name).name or data.name
     title = f"{name}: tracks of jeat-graph"
     parts = [
-        "<!doctype html>",
-        '<html lang="en"><head><meta charset="utf-8">',
-        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">',
-        '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        f"<title>{escape(title)}</title>",
-        f"<style>\n{_beside('page.css')}</style></head><body>",
+        page_head(title, scripts=True),
         _header(data, name),
         "<main>",
         _notes(data, not_compared),
@@ -54,15 +46,10 @@ def render_page(data: RunData, compared: ComparedRun | None = None, not_compared
         _list(data),
         _details(data),
         "</main>",
-        f"<script>\n{_beside('page.js')}</script>" if len(data.track_ids()) else "",
+        f"<script>\n{beside(__package__, 'page.js')}</script>" if len(data.track_ids()) else "",
         "</body></html>",
     ]
     return "\n".join(part for part in parts if part) + "\n"
-
-
-def _beside(name: str) -> str:
-    """Read a file that stands beside this module."""
-    return files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 
 def _header(data: RunData, name: str) -> str:
