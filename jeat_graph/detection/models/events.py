@@ -8,16 +8,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError
 from jeat_graph.detection.binned import BinnedDetector
-from jeat_graph.detection.models.choosing import choose, class_names, wanted_classes
 from jeat_graph.detection.models.engine import open_engine
-from jeat_graph.detection.models.layouts import decode, is_raw
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.models.onnx_head import OnnxHead, Port, read_onnx_head
-from jeat_graph.detection.models.pictures import class_count, layout_of
+from jeat_graph.detection.models.output_reader import OutputReader, scan_within
 from jeat_graph.detection.settings import EventSettings
 from jeat_graph.detection.windows import EventBins
 
@@ -70,18 +67,15 @@ class ModelEventDetector(BinnedDetector):
                 path,
             )
         self._memory, outputs = _memory(head, self._path)
-        self._layout = layout_of(outputs, self._side, head.notes, self._settings.layout, self._path)
-        self._unsure = self._layout == "yolox" and self._settings.layout == "auto"
-        self._outputs = [port.name for port in outputs]
-        names = class_names(head.notes)
-        count = class_count(self._layout, outputs) or (len(names) or None)
-        self._wanted, words = wanted_classes(self._settings.classes, None if not names else count, names)
+        self._outputs = OutputReader(outputs, self._side, head.notes, self._settings, self._path, coco=False)
+        self._read = [port.name for port in outputs]
         self._engine = open_engine(path, head, self._settings.backend, self._settings.threads)
         self._state: dict[str, npt.NDArray[Any]] = {}
         kept = f", {len(self._memory)} states kept" if self._memory else ""
         self.description = (
-            f"{self._path.name}: layout {self._layout}, windows of {bins} bins of {times.bin_s:g} s in "
-            f"{self._side[0]} x {self._side[1]} px{kept}, {words}, run by {self._engine.name}"
+            f"{self._path.name}: layout {self._outputs.layout}, windows of {bins} bins of {times.bin_s:g} s "
+            f"in {self._side[0]} x {self._side[1]} px{kept}, {self._outputs.words}, "
+            f"run by {self._engine.name}"
         )
 
     def _emptied(self) -> None:
@@ -99,20 +93,8 @@ class ModelEventDetector(BinnedDetector):
             inputs[given.name] = self._state.get(given.name, empty)
         outputs = self._engine.run(inputs)
         self._state = {given.name: outputs[returned] for given, returned in self._memory}
-        wanted = {name: outputs[name] for name in self._outputs}
-        if self._unsure:
-            (only,) = wanted.values()
-            self._layout = "yolox-raw" if is_raw(only[0], self._side) else "yolox"
-            self._unsure = False
-        found = decode(self._layout, wanted, self._side)
-        corners, scores, _ = choose(found, self._wanted, self._settings.score, self._settings.overlap)
-        corners = np.clip(corners, 0.0, [width, height, width, height])
-        inside = _with_area(corners)
-        return Scan.from_xyxy(self._bins.end_us / _US_PER_S, self.sensor, corners[inside], scores[inside])
-
-
-def _with_area(corners: FloatArray) -> npt.NDArray[np.bool_]:
-    return np.asarray((corners[:, 2:] - corners[:, :2] > 0.0).all(axis=1))
+        corners, scores = self._outputs.read({name: outputs[name] for name in self._read})
+        return scan_within(self._bins.end_us / _US_PER_S, self.sensor, corners, scores, self.size_px)
 
 
 def _window_input(head: OnnxHead, path: Path) -> Port:

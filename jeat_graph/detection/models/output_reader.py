@@ -1,0 +1,117 @@
+"""Turns a network's outputs into boxes: in the layout that they have, of the classes that are wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.detections import Scan
+from jeat_graph.data.errors import DataError
+from jeat_graph.detection.models.choosing import choose, class_names, wanted_classes
+from jeat_graph.detection.models.layouts import LAYOUT_NAMES, decode, is_raw, recognise
+from jeat_graph.detection.models.model_settings import ModelSettings
+from jeat_graph.detection.models.onnx_head import Port
+
+_COCO = 80
+
+
+class OutputReader:
+    """Reads the outputs of one network.
+
+    Args:
+        outputs: what the file says of them.
+        side: width and height of the network's input (px).
+        notes: of the file.
+        settings: how the network is read.
+        path: the ONNX file.
+        coco: whether classes without names may be those of COCO.
+
+    Attributes:
+        layout: that of the outputs.
+        words: says which classes are kept.
+
+    Raises:
+        ConfigError: a class that is not known.
+        DataError: the layout is not recognised.
+    """
+
+    def __init__(
+        self,
+        outputs: tuple[Port, ...],
+        side: tuple[int, int],
+        notes: Mapping[str, str],
+        settings: ModelSettings,
+        path: Path,
+        *,
+        coco: bool,
+    ) -> None:
+        self._side = side
+        self._settings = settings
+        self.layout = layout_of(outputs, side, notes, settings.layout, path)
+        # Whether YOLOX's outputs are raw is seen in the first of them.
+        self._unsure = self.layout == "yolox" and settings.layout == "auto"
+        names = class_names(notes)
+        count = class_count(self.layout, outputs) or (len(names) or None)
+        self._wanted, self.words = wanted_classes(settings.classes, count if names or coco else None, names)
+
+    def read(self, outputs: dict[str, npt.NDArray[Any]]) -> tuple[FloatArray, FloatArray]:
+        """Return corners (M, 4) in the network's input (px) and scores (M,) of what is to be kept.
+
+        Raises:
+            DataError: the outputs are not of the layout.
+        """
+        if self._unsure:
+            (only,) = outputs.values()
+            self.layout = "yolox-raw" if is_raw(only[0], self._side) else "yolox"
+            self._unsure = False
+        found = decode(self.layout, outputs, self._side)
+        corners, scores, _ = choose(found, self._wanted, self._settings.score, self._settings.overlap)
+        return corners, scores
+
+
+def scan_within(
+    t: float, sensor: str, corners: FloatArray, scores: FloatArray, size_px: tuple[int, int]
+) -> Scan:
+    """Return a scan of what of each box lies in the picture; boxes beside it are left out."""
+    corners = np.clip(corners, 0.0, [*size_px, *size_px])
+    inside = (corners[:, 2:] - corners[:, :2] > 0.0).all(axis=1)
+    return Scan.from_xyxy(t, sensor, corners[inside], scores[inside])
+
+
+def layout_of(
+    outputs: tuple[Port, ...], side: tuple[int, int], notes: Mapping[str, str], asked: str, path: Path
+) -> str:
+    """Return the layout that the user asks for, or the one that is recognised.
+
+    Raises:
+        DataError: none is recognised.
+    """
+    found = asked if asked != "auto" else recognise(outputs, side, notes)
+    if found is None:
+        shapes = ", ".join(f"{port.name} {list(port.shape)}" for port in outputs)
+        raise DataError(
+            f"has outputs of no layout that is known: {shapes}; say which with layout: one of "
+            f"{', '.join(LAYOUT_NAMES)}",
+            path,
+        )
+    return found
+
+
+def class_count(layout: str, outputs: tuple[Port, ...]) -> int | None:
+    """Return how many classes the outputs have room for, where their shapes tell."""
+    shapes = [port.shape for port in outputs]
+    if layout in ("yolox", "yolox-raw", "yolov5") and shapes[0][2] is not None:
+        return shapes[0][2] - 5
+    if layout == "yolov8":
+        sides = [side for side in shapes[0][1:] if side is not None]
+        return min(sides) - 4 if sides else None
+    if layout in ("detr", "detr-softmax"):
+        return next((port.shape[-1] for port in outputs if port.name.lower() in ("logits", "labels")), None)
+    if layout == "nanodet":
+        return next((shape[2] for shape in shapes if len(outputs) > 1), None) if len(shapes) > 1 else _COCO
+    return _COCO if layout == "boxes" else None
