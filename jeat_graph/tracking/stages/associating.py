@@ -6,7 +6,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from jeat_graph.association.costs import likelihood_cost, log_evidence
 from jeat_graph.association.densities import Likelihood
@@ -16,6 +15,7 @@ from jeat_graph.association.methods import JOINT, SLOTS
 from jeat_graph.config.kernel_form import Model
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.tracking.batch import Batch
+from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.stages.predicting import Expectation
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
@@ -34,7 +34,7 @@ class Association(NamedTuple):
     taken: IntArray
 
 
-@njit(cache=True)
+@inner
 def associate(
     tracks: TrackArrays,
     n: int,

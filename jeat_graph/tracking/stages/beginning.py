@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from jeat_graph.association.births import choose_births
 from jeat_graph.association.boxes import clip_boxes, track_boxes
@@ -25,13 +24,14 @@ from jeat_graph.filters.prior import write_prior, write_size_prior
 from jeat_graph.tracking.batch import Batch, Measured
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.ending import confirm
+from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.stages.predicting import jerk_of, split_noise
 from jeat_graph.tracking.stages.updating import update_track
 from jeat_graph.tracking.state import SceneState, TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog, log_birth, log_update
 
 
-@njit(cache=True)
+@inner
 def give_birth(
     tracks: TrackArrays,
     n: int,
@@ -70,7 +70,7 @@ def give_birth(
     return n + len(parents), next_id + len(parents)
 
 
-@njit(cache=True)
+@inner
 def first_view(batch: Batch, j: int, sensors: SensorArrays) -> Measured:
     """Say what detection `j` measures where no track's size is known; one that is cut may be much larger."""
     s = batch.sensor[j]
@@ -93,7 +93,7 @@ def first_view(batch: Batch, j: int, sensors: SensorArrays) -> Measured:
     return Measured(z, log_size, white, coloured_std, log_size_var)
 
 
-@njit(cache=True)
+@inner
 def second_view(tracks: TrackArrays, i: int, batch: Batch, j: int, sensors: SensorArrays) -> Measured:
     """Say what detection `j` measures of track `i`, which another sensor's detection has just begun."""
     own = first_view(batch, j, sensors)
@@ -111,7 +111,7 @@ def second_view(tracks: TrackArrays, i: int, batch: Batch, j: int, sensors: Sens
     return own
 
 
-@njit(cache=True)
+@inner
 def shown_boxes(tracks: TrackArrays, n: int, settings: Settings) -> FloatArray:
     """Boxes (n, 4) of the first `n` tracks; where boxes may be cut, the part in the picture."""
     boxes = track_boxes(tracks.mean[:n], tracks.size_mean[:n])
@@ -119,7 +119,7 @@ def shown_boxes(tracks: TrackArrays, n: int, settings: Settings) -> FloatArray:
     return clip_boxes(boxes, image.width, image.height) if image.edge_px > 0.0 else boxes
 
 
-@njit(cache=True)
+@inner
 def birth_existence(batch: Batch, scene: SceneState, model: Model) -> FloatArray:
     """Probability (M,) that a detection which no track took is of a vehicle not tracked before.
 
@@ -139,7 +139,7 @@ def birth_existence(batch: Batch, scene: SceneState, model: Model) -> FloatArray
     return out
 
 
-@njit(cache=True)
+@inner
 def start_track(
     tracks: TrackArrays,
     i: int,

@@ -11,6 +11,7 @@ from jeat_graph.association.boxes import clip_boxes, track_boxes, visible_fracti
 from jeat_graph.association.merging import find_duplicates
 from jeat_graph.config.kernel_form import Model, Settings
 from jeat_graph.tracking.compaction import keep_rows
+from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.stages.learning import scan_weight
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
@@ -31,7 +32,7 @@ def confirm(tracks: TrackArrays, n: int, t: float, settings: Settings) -> None:
             tracks.existence[i] = 1.0 if tracks.confirmed[i] else 0.5
 
 
-@njit(cache=True)
+@inner
 def remove_ended(tracks: TrackArrays, n: int, t: float, scene: SceneState, model: Model) -> int:
     """Remove tracks that are over, out of the picture, or duplicates; return the number left, in order."""
     settings = model.settings
@@ -78,7 +79,7 @@ def remove_ended(tracks: TrackArrays, n: int, t: float, scene: SceneState, model
     return kept
 
 
-@njit(cache=True)
+@inner
 def _count_fruitless(hits: int, seen_by: int, scene: SceneState, model: Model) -> None:
     """Put the detections of a track that came to nothing down to the one sensor that saw it, in place."""
     for s in range(len(scene.fruitless)):

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from jeat_graph.config.kernel_form import Model, Settings
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.filters.existence import existence_after_miss, hidden_after_miss
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.associating import Association
+from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
 # Share of a sensor's configured clutter below which no estimate goes: without any, one detection were proof.
@@ -26,14 +25,14 @@ _LASTING_HITS = 4
 _PRIOR_CLAIMS = 5.0
 
 
-@njit(cache=True)
+@inner
 def scan_weight(s: int, model: Model) -> float:
     """Weight of one scan of sensor `s` in what is learnt of the scene; 0 where nothing is."""
     memory_s = model.settings.lifecycle.scene_memory_s
     return min(model.sensors.period_s[s] / memory_s, 1.0) if memory_s > 0.0 else 0.0
 
 
-@njit(cache=True)
+@inner
 def count_misses(
     tracks: TrackArrays,
     n: int,
@@ -63,7 +62,7 @@ def count_misses(
             )
 
 
-@njit(cache=True)
+@inner
 def learn_trust(
     tracks: TrackArrays, n: int, batch: Batch, association: Association, scene: SceneState, model: Model
 ) -> None:
@@ -103,7 +102,7 @@ def learn_trust(
         scene.trust[s] = (agreed / (scene.claims[s] + _PRIOR_CLAIMS)) ** lifecycle.disagreement
 
 
-@njit(cache=True)
+@inner
 def learn_scene(
     tracks: TrackArrays,
     n: int,

@@ -16,6 +16,7 @@ from jeat_graph.filters.existence import motion_visibility
 from jeat_graph.filters.jerk import track_jerk
 from jeat_graph.filters.kalman import predict, predict_size
 from jeat_graph.filters.noise import base_variance
+from jeat_graph.tracking.stages.inner import inlined, inner
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
 # A small rest remains: what should be invisible is still taken if it is detected.
@@ -24,7 +25,7 @@ _LEAST_VISIBLE = 1e-5
 _MOST_LOG_SIZE = 12.0
 
 
-@njit(cache=True, forceinline=True)
+@inlined
 def jerk_of(tracks: TrackArrays, i: int, settings: Settings) -> float:
     """Root spectral density of the jerk of track `i` now (px/s^2.5)."""
     factor = settings.standing.jerk_factor if tracks.standing[i] else 1.0
@@ -37,7 +38,7 @@ def jerk_of(tracks: TrackArrays, i: int, settings: Settings) -> float:
     )
 
 
-@njit(cache=True)
+@inner
 def most_trusted(seen_by: int, trust: FloatArray) -> float:
     """Greatest trust among the sensors that have seen a track.
 
@@ -85,7 +86,7 @@ def predict_all(tracks: TrackArrays, n: int, dt: float, scene: SceneState, model
                 tracks.hidden[i, s] += relax * (usual - tracks.hidden[i, s])
 
 
-@njit(cache=True)
+@inner
 def current_p_detect(tracks: TrackArrays, n: int, present: BoolArray, model: Model) -> FloatArray:
     """Probability (n, S) that each sensor detects each track now; 0 for sensors that did not look.
 
@@ -106,7 +107,7 @@ def current_p_detect(tracks: TrackArrays, n: int, present: BoolArray, model: Mod
     return out
 
 
-@njit(cache=True)
+@inner
 def detection_variance(tracks: TrackArrays, i: int, s: int, axis: int, sensors: SensorArrays) -> float:
     """Variance (px²) of a detection of sensor `s` on track `i`, one axis, at weight 1: s · R_base(size)."""
     side = math.exp(min(tracks.size_mean[i, axis, 0], _MOST_LOG_SIZE))
@@ -116,7 +117,7 @@ def detection_variance(tracks: TrackArrays, i: int, s: int, axis: int, sensors: 
     return float(tracks.scale[i, s] * base)
 
 
-@njit(cache=True)
+@inner
 def split_noise(variance: float, s: int, sensors: SensorArrays) -> tuple[float, float]:
     """Split the noise of sensor `s`: white variance (px²), standard deviation of the coloured part (px)."""
     share = sensors.correlated_share[s]
@@ -139,7 +140,7 @@ class Expectation(NamedTuple):
     coloured_std: FloatArray
 
 
-@njit(cache=True)
+@inner
 def expect_detections(tracks: TrackArrays, n: int, sensors: SensorArrays) -> Expectation:
     """Say where each sensor would find each of the first `n` tracks, and with what noise."""
     shape = (n, len(sensors.sigma_px), 2)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from jeat_graph.config.kernel_form import Model, SensorArrays, Settings
 from jeat_graph.data.arrays import FloatArray
@@ -29,12 +28,13 @@ from jeat_graph.filters.standing import (
 )
 from jeat_graph.tracking.batch import Batch, Measured
 from jeat_graph.tracking.stages.associating import Association
+from jeat_graph.tracking.stages.inner import inlined, inner
 from jeat_graph.tracking.stages.predicting import Expectation, expect_detections, jerk_of
 from jeat_graph.tracking.state import SceneState, TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog, log_innovation, log_update
 
 
-@njit(cache=True)
+@inner
 def measured_by(
     tracks: TrackArrays, i: int, batch: Batch, j: int, expectation: Expectation, sensors: SensorArrays
 ) -> Measured:
@@ -61,7 +61,7 @@ def measured_by(
     return Measured(z, log_size, white, coloured_std, log_size_var)
 
 
-@njit(cache=True, forceinline=True)
+@inlined
 def judge_standing(
     tracks: TrackArrays, i: int, t: float, z: FloatArray, R: FloatArray, settings: Settings
 ) -> None:
@@ -84,7 +84,7 @@ def judge_standing(
     update_rest_point(tracks.rest_point[i], tracks.rest_var[i], z, R)
 
 
-@njit(cache=True, forceinline=True)
+@inlined
 def update_track(
     tracks: TrackArrays,
     i: int,
@@ -144,7 +144,7 @@ def update_track(
     tracks.seen_by[i] |= 1 << s
 
 
-@njit(cache=True)
+@inner
 def update_matched(
     tracks: TrackArrays,
     n: int,
@@ -177,7 +177,7 @@ def update_matched(
             tracks.p_detect[i, s] = min(p, lifecycle.p_detect_max)
 
 
-@njit(cache=True)
+@inner
 def take_second_views(
     tracks: TrackArrays,
     n: int,
@@ -206,7 +206,8 @@ def take_second_views(
             if s == first:
                 continue
             best = model.settings.association.gate_bound
-            chosen = -1
+            # Not the literal -1, for which all that follows would be compiled a second time.
+            chosen = np.int64(-1)
             for j in leftover:
                 if taken[j] or batch.sensor[j] != s:
                     continue
@@ -217,7 +218,7 @@ def take_second_views(
                     d2 += y * y / (expectation.var[i, s, axis] + R)
                 if d2 <= best:
                     best = d2
-                    chosen = int(j)
+                    chosen = j
             if chosen >= 0:
                 measured = measured_by(tracks, i, batch, chosen, expectation, model.sensors)
                 update_track(tracks, i, batch, chosen, measured, model, log)
