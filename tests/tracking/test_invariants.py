@@ -122,7 +122,6 @@ def test_the_presets_smoothers_take_any_scans_too(preset, recording):
 @pytest.mark.parametrize("preset", PRESETS)
 def test_what_is_drawn_is_more_than_empty_tables(preset):
     """The invariants above would hold for a tracker that never reports anything."""
-
     # By age and hits, as in the paper, few of such short recordings confirm a track.
     by_existence = CONFIGS[preset].lifecycle.method == "existence"
 
