@@ -1,6 +1,9 @@
 """What all tests share."""
 
+from __future__ import annotations
+
 import os
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -16,3 +19,20 @@ settings.load_profile("jeat-graph")
 def full() -> bool:
     """Whether the long form of the tests is asked for."""
     return os.environ.get("JEAT_GRAPH_FULL", "") not in ("", "0")
+
+
+@pytest.fixture(scope="session")
+def dying():
+    """Make the environment of processes that end at a chosen change to files (`dying/sitecustomize.py`)."""
+
+    def environment(below: Path, at: int = 0, by: int = 9, **more: object) -> dict[str, str]:
+        """Where changes count, the number of the fatal one, and the signal; `once`, `log`, `name`."""
+        paths = [str(Path(__file__).parent / "dying"), os.environ.get("PYTHONPATH", "")]
+        fate = {"below": below, "at": at, "by": int(by), **more}
+        return {
+            **os.environ,
+            "PYTHONPATH": os.pathsep.join(filter(None, paths)),
+            **{f"DYING_{key.upper()}": str(value) for key, value in fate.items()},
+        }
+
+    return environment

@@ -8,6 +8,7 @@ has random numbers of its own: whoever goes on in the middle meets what one who 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 
@@ -47,6 +48,7 @@ def arriving(second: int, vehicles: int, seed: int) -> list[Scan]:
     return [scan for _, scan in sorted(here, key=lambda item: item[0])]
 
 
+@lru_cache(maxsize=1)  # what arrives in a second was made in it or in the one before
 def _made_in(second: int, vehicles: int, seed: int) -> list[tuple[float, Scan]]:
     """The scans of one second's pictures and events, and when each arrives (s)."""
     whole, rng = np.random.default_rng(seed), np.random.default_rng((seed, second))

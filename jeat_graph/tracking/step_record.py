@@ -60,8 +60,9 @@ def record_step(
     """
     ids = tracks.track_id[:n].copy()
     held = np.zeros(n, dtype=np.bool_)
-    held[np.searchsorted(ids, reported)] = True
-    held &= tracks.standing[:n]
+    if len(reported):
+        held[np.searchsorted(ids, reported)] = True
+        held &= tracks.standing[:n]
     return StepRecord(
         t,
         births,

@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
-import signal
-import threading
-import time
 from pathlib import Path
 
 import pytest
@@ -193,48 +189,17 @@ def test_a_worker_that_dies_costs_no_other_job_and_a_deadly_job_only_itself(tmp_
     assert tries == {f"j{k}": 2 if k in (2, 4) else 1 for k in range(7)}
 
 
-def descendants(pid: int) -> dict[int, str]:
-    """Processes below one of ours, by number, with their command lines."""
-    children: dict[int, list[int]] = {}
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            parent = int(stat.read_text().rsplit(")", 1)[1].split()[1])
-        except OSError:
-            continue
-        children.setdefault(parent, []).append(int(stat.parent.name))
-    found, to_do = {}, [pid]
-    while to_do:
-        for child in children.get(to_do.pop(), []):
-            to_do.append(child)
-            try:
-                found[child] = Path(f"/proc/{child}/cmdline").read_bytes().replace(b"\0", b" ").decode()
-            except OSError:
-                continue
-    return found
-
-
-def kill_at_work(runs: Path, killed: list[str]) -> None:
-    """Wait until a run has been begun, and kill the worker of Ray that is at it."""
-    while not killed:
-        time.sleep(0.01)
-        begun = [folder.parent.name for folder in runs.glob("*/.unfinished-*")]
-        workers = [pid for pid, line in descendants(os.getpid()).items() if line.startswith("ray::run_job")]
-        if begun and workers:
-            os.kill(workers[0], signal.SIGKILL)
-            killed.append(begun[0])
-
-
-def test_on_ray_a_killed_worker_costs_nothing_and_the_bytes_are_those_of_a_series(manifest, tmp_path, full):
+def test_on_ray_a_killed_worker_costs_nothing_and_the_bytes_are_those_of_a_series(
+    manifest, tmp_path, full, monkeypatch, dying
+):
     pytest.importorskip("ray", reason="Ray is not installed")
-    if not Path("/proc/self/stat").exists():
-        pytest.skip("finds the worker's process in /proc")
     path, out = manifest(64 if full else 3), tmp_path / "out"
-    killed: list[str] = []
-    killer = threading.Thread(target=kill_at_work, args=(out / "runs", killed), daemon=True)
-    killer.start()
+    killed = tmp_path / "killed"
+    # The first worker that has something of a run in its folder is killed.
+    for name, value in dying(out / "runs", at=2, once=killed, name=".unfinished-").items():
+        monkeypatch.setenv(name, value)
     assert main(["batch", str(path), "--out", str(out), "--engine", "ray", "--workers", "2"]) == 0
-    killer.join(timeout=1.0)
-    assert killed, "no worker was killed, so nothing was shown"
+    assert killed.exists(), "no worker was killed, so nothing was shown"
     assert all(row["status"] in ("done", "kept") for row in rows_of(out))
     assert not list((out / "runs").glob("*/.unfinished-*"))
     in_series(path, tmp_path / "series")

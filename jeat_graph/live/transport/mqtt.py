@@ -98,14 +98,26 @@ class MqttSource:
         self._client.on_connect = self._on_connect
         self._client.on_disconnect = self._on_disconnect
         self._client.on_message = self._on_message
-        self._client.on_subscribe = lambda *_: self._settled.set()
+        self._client.on_subscribe = self._on_subscribe
+        self._refused = ""
         properties = _properties(PacketTypes.CONNECT)
         properties.SessionExpiryInterval = SESSION_S
         properties.ReceiveMaximum = self.most_open
         _connect(address, self._client, properties)
+        # Until the broker has answered, it gives what is published to nobody.
+        if not self._settled.wait(_CONNECT_S) or self._refused:
+            self._client.disconnect()
+            self._client.loop_stop()
+            raise JeatGraphError(
+                f"{address}: {self._refused or 'the broker does not answer the subscription'}"
+            )
 
     def _on_connect(self, client: Any, data: Any, flags: Any, reason: Any, properties: Any) -> None:
         client.subscribe(self._topic, _QOS)
+
+    def _on_subscribe(self, client: Any, data: Any, number: int, reasons: Any, properties: Any) -> None:
+        self._refused = next((str(reason) for reason in reasons if reason.is_failure), "")
+        self._settled.set()
 
     def _on_disconnect(self, client: Any, data: Any, flags: Any, reason: Any, properties: Any) -> None:
         self._session += 1
@@ -160,20 +172,29 @@ class MqttSink:
         self._sent = self._confirmed = 0
         self._change = threading.Condition()
         self._refused = ""
+        self._lost = False  # since the connection was lost nothing has been confirmed
         self._client = _client(address.option("client", ""), manual_ack=False)
         self._client.on_publish = self._on_publish
+        self._client.on_disconnect = self._on_disconnect
         _connect(address, self._client, _properties(PacketTypes.CONNECT))
 
     def _on_publish(self, client: Any, data: Any, number: int, reason: Any, properties: Any) -> None:
         with self._change:
             self._confirmed += 1
+            self._lost = False
             if reason.is_failure:
                 self._refused = str(reason)
             self._change.notify_all()
 
+    def _on_disconnect(self, client: Any, data: Any, flags: Any, reason: Any, properties: Any) -> None:
+        with self._change:
+            self._lost = True
+
     def send(self, message: bytes) -> None:
-        """Publish; waits while too many are on their way."""
-        self._wait(self._most - 1)
+        """Publish; waits while too many are on their way, or while those before a lost connection are."""
+        # The client sends what was not confirmed again only once the broker has greeted it, and what is new
+        # as soon as there is a connection: what is new would come first.
+        self._wait(self._most - 1, in_order=True)
         self._client.publish(self._topic, message, _QOS)
         self._sent += 1
 
@@ -181,9 +202,11 @@ class MqttSink:
         """Wait until all are acknowledged."""
         self._wait(0)
 
-    def _wait(self, most: int) -> None:
+    def _wait(self, most: int, in_order: bool = False) -> None:
         with self._change:
-            self._change.wait_for(lambda: self._sent - self._confirmed <= most)
+            self._change.wait_for(
+                lambda: self._sent - self._confirmed <= (0 if in_order and self._lost else most)
+            )
             if self._refused:
                 raise JeatGraphError(f"{self._topic}: the broker refused tracks: {self._refused}")
 

@@ -83,21 +83,21 @@ class ObservationTimes:
         if not len(self):
             return np.zeros(0)
         seen = np.isfinite(self.existence)
-        odds = _log_odds(np.where(seen, self.existence, 0.5))
-        gone = known | (np.maximum.accumulate(np.where(seen, self.existence, 0.0)) >= BELIEVED)
+        # The recursion is over numbers of Python's own: those taken out of an array one by one cost thrice.
+        there = seen.tolist()
+        odds = _log_odds(np.where(seen, self.existence, 0.5)).tolist()
+        gone = (known | (np.maximum.accumulate(np.where(seen, self.existence, 0.0)) >= BELIEVED)).tolist()
+        change = [-math.expm1(-step / lifetime_s) for step in np.diff(self.t).tolist()]
         later = 0.0  # ln of what the future says for presence against absence
-        out = np.empty(len(self))
+        said = [0.0] * len(self)
         gained = 0.0
         for k in range(len(self) - 1, -1, -1):
             if k + 1 < len(self):
-                change = -math.expm1(-(self.t[k + 1] - self.t[k]) / lifetime_s)
-                later = _passed(later + gained, change, change * (RETURNS if gone[k] else 1.0))
-            out[k] = odds[k] + later if seen[k] else later
-            if k > 0 and seen[k] and seen[k - 1]:
-                before = _predicted(odds[k - 1], -math.expm1(-(self.t[k] - self.t[k - 1]) / lifetime_s))
-                gained = odds[k] - before
-            else:
-                gained = 0.0
+                later = _passed(later + gained, change[k], change[k] * (RETURNS if gone[k] else 1.0))
+            said[k] = odds[k] + later if there[k] else later
+            both = k > 0 and there[k] and there[k - 1]
+            gained = odds[k] - _predicted(odds[k - 1], change[k - 1]) if both else 0.0
+        out = np.array(said)
         if not seen.all():
             # Between two fragments the vehicle was there if it was at their ends.
             out[~seen] = np.minimum(_held(out, seen), _held(out[::-1], seen[::-1])[::-1])[~seen]

@@ -21,7 +21,7 @@ class MovingRectangles:
     """Vehicles of 10 x 6 px at 40 px/s, one a row of the picture.
 
     `fail_at` is the segment in which the source breaks down after two frames; with `dies`, its whole process.
-    `pause_s` is the time that a frame takes.
+    `wait_at` is the segment in which it says so after two frames, and waits for whoever ends the process.
     """
 
     seed: int = 0
@@ -31,7 +31,7 @@ class MovingRectangles:
     with_labels: bool = True
     fail_at: int | None = None
     dies: bool = False
-    pause_s: float = 0.0
+    wait_at: int | None = None
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -50,7 +50,9 @@ class MovingRectangles:
         rng = np.random.default_rng([self.seed, index])
         start = rng.uniform(0.0, 30.0, self.vehicles)
         for k in range(self.frames):
-            time.sleep(self.pause_s)
+            if index == self.wait_at and k == 2:
+                print("waiting", flush=True)
+                time.sleep(1e6)
             if index == self.fail_at and k == 2:
                 if self.dies:
                     os._exit(9)
@@ -100,5 +102,5 @@ if __name__ == "__main__":
     from jeat_graph.simulation.dataset.protocol import Protocol
     from jeat_graph.simulation.dataset.recording import record_dataset
 
-    factory = partial(MovingRectangles, pause_s=0.05)
+    factory = partial(MovingRectangles, wait_at=int(sys.argv[3]))
     record_dataset(factory, sys.argv[1], Protocol(int(sys.argv[2]), video="png"))
