@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-NOTICE = "compiling the tracker for this machine, once (half a minute; on a busy machine two to three) …"
+NOTICE = "compiling the tracker for this machine, once (one to two minutes; on a busy machine more) …"
 _said = False
 
 
