@@ -42,6 +42,27 @@ def kernel_camera(camera: RoadCamera) -> KernelCamera:
 
 
 @njit(cache=True)
+def _corner(
+    camera: KernelCamera, x: float, y: float, sin: float, cos: float, size: FloatArray, k: int
+) -> tuple[float, float, float, float, float]:
+    """Corner k of a cuboid as the camera sees it.
+
+    Returns:
+        Where it is along and across the cuboid (±1/2), and what it is right of, below and before the camera
+        (m).
+    """
+    R, position = camera.rotation, camera.position
+    a = -0.5 if k & 2 == 0 else 0.5
+    b = -0.5 if k & 1 == 0 else 0.5
+    px = x + a * size[0] * sin + b * size[1] * cos - position[0]
+    py = y + a * size[0] * cos - b * size[1] * sin - position[1]
+    pz = (size[2] if k >= 4 else 0.0) - position[2]
+    X = R[0, 0] * px + R[0, 1] * py + R[0, 2] * pz
+    Y = R[1, 0] * px + R[1, 1] * py + R[1, 2] * pz
+    return a, b, X, Y, R[2, 0] * px + R[2, 1] * py + R[2, 2] * pz
+
+
+@njit(cache=True)
 def cuboid_sides(
     camera: KernelCamera,
     x: float,
@@ -65,22 +86,16 @@ def cuboid_sides(
     Returns:
         Whether the whole cuboid is in front of the camera.
     """
-    R, position, lens = camera.rotation, camera.position, camera.lens
+    R, lens = camera.rotation, camera.lens
     sin, cos = math.sin(heading), math.cos(heading)
     which = np.zeros(4, dtype=np.int64)
     side[0] = side[1] = np.inf
     side[2] = side[3] = -np.inf
     for k in range(8):
-        a = -0.5 if k & 2 == 0 else 0.5
-        b = -0.5 if k & 1 == 0 else 0.5
-        px = x + a * size[0] * sin + b * size[1] * cos - position[0]
-        py = y + a * size[0] * cos - b * size[1] * sin - position[1]
-        pz = (size[2] if k >= 4 else 0.0) - position[2]
-        Z = R[2, 0] * px + R[2, 1] * py + R[2, 2] * pz
+        _, _, X, Y, Z = _corner(camera, x, y, sin, cos, size, k)
         if Z < _NEAR_M:
             return False
-        n0 = (R[0, 0] * px + R[0, 1] * py + R[0, 2] * pz) / Z
-        n1 = (R[1, 0] * px + R[1, 1] * py + R[1, 2] * pz) / Z
+        n0, n1 = X / Z, Y / Z
         r2 = n0 * n0 + n1 * n1
         gain = 1.0 + lens[4] * r2 + lens[5] * r2 * r2
         u, v = n0 * gain * lens[0] + lens[2], n1 * gain * lens[1] + lens[3]
@@ -94,14 +109,8 @@ def cuboid_sides(
             side[3], which[3] = v, k
     for s in range(4):
         k, axis = which[s], s % 2
-        a = -0.5 if k & 2 == 0 else 0.5
-        b = -0.5 if k & 1 == 0 else 0.5
-        px = x + a * size[0] * sin + b * size[1] * cos - position[0]
-        py = y + a * size[0] * cos - b * size[1] * sin - position[1]
-        pz = (size[2] if k >= 4 else 0.0) - position[2]
-        Z = R[2, 0] * px + R[2, 1] * py + R[2, 2] * pz
-        n0 = (R[0, 0] * px + R[0, 1] * py + R[0, 2] * pz) / Z
-        n1 = (R[1, 0] * px + R[1, 1] * py + R[1, 2] * pz) / Z
+        a, b, X, Y, Z = _corner(camera, x, y, sin, cos, size, k)
+        n0, n1 = X / Z, Y / Z
         r2 = n0 * n0 + n1 * n1
         gain = 1.0 + lens[4] * r2 + lens[5] * r2 * r2
         bend = 2.0 * lens[4] + 4.0 * lens[5] * r2
