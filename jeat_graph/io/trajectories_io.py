@@ -131,7 +131,7 @@ def read_trajectories(
     """Read a table of the contract (CSV, Parquet), or a MOTChallenge or KITTI result.
 
     A result has boxes only. Its mean is then the box's centre with velocity and acceleration 0, its variances
-    are NaN (see `has_motion`), and no sensor is named. Its confidence is the existence where it is in [0, 1];
+    are NaN, and no sensor is named. Its confidence is the existence where it is in [0, 1];
     any other value (MOTChallenge writes -1 for unknown) counts as 1.
 
     Args:
@@ -159,11 +159,6 @@ def read_trajectories(
         found = _read_contract(table)
     _check(table, found)
     return found
-
-
-def has_motion(table: Trajectories) -> bool:
-    """Tell whether a table holds estimates of motion, rather than boxes only (then all variances are NaN)."""
-    return bool(np.isfinite(table.var).any())
 
 
 def _read_contract(table: FileTable) -> Trajectories:

@@ -19,7 +19,6 @@ from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.io.scan_lines import ScanBatch, batch_of
 
 VERSION = 1
-ENCODINGS = ("json", "msgpack")
 _KEYS = ("v", "source", "seq", "scans")
 _FIRST_OF_TEXT = b" \t\r\n{[\xef"
 
@@ -76,7 +75,7 @@ def encode_tracks(line: str, seq: int, answered: ScanMessage | None, encoding: s
         line: the tracks as a line of JSON (`io/track_lines.json_line`).
         seq: number of this message among those that go out.
         answered: the message that it answers, if it does.
-        encoding: one of `ENCODINGS`.
+        encoding: `json` or `msgpack`.
     """
     head: dict[str, Any] = {"v": VERSION, "seq": seq}
     if answered is not None and answered.seq is not None:

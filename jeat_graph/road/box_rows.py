@@ -26,9 +26,6 @@ class BoxConfig:
         0.1, "1", "share of a smoothed box's variance which is new in every box", 0.0, 1.0
     )
     memory_s: float = number(1.0, "s", "how long the rest of it persists", open_low=True)
-    size_white_share: float = number(
-        0.5, "1", "share of a detected size's variance which is new in every box", 0.0, 1.0
-    )
     bin_s: float = number(0.06, "s", "a sensor's boxes this close together are taken as their mean")
     most_boxes: int = number(600, "boxes", "of longer tracks the bins are wider", 8)
     edge_px: float = number(2.0, "px", "a side this near the picture's edge is cut off by it")

@@ -15,8 +15,6 @@ from jeat_graph.road.camera import RoadCamera
 _A = np.array([-0.5, -0.5, 0.5, 0.5] * 2)
 _B = np.array([-0.5, 0.5, -0.5, 0.5] * 2)
 _TOP = np.repeat([0.0, 1.0], 4)
-#: Unknowns that a side depends on, in the order of the Jacobian's last axis.
-UNKNOWNS = ("x", "y", "length", "width", "height")
 
 
 def corners(xy: FloatArray, heading: FloatArray, size: FloatArray) -> FloatArray:
@@ -52,8 +50,8 @@ def sides(
         size: (3,) or (N, 3) length, width, height (m).
 
     Returns:
-        Left, top, right, bottom (N, 4) in px, and their derivatives (N, 4, 5) with respect to `UNKNOWNS`. NaN
-        where a corner is not in front of the camera.
+        Left, top, right, bottom (N, 4) in px, and their derivatives (N, 4, 5) with respect to x, y,
+        length, width and height. NaN where a corner is not in front of the camera.
     """
     place = corners(xy, heading, size)
     pixel, depth = camera.project(place)

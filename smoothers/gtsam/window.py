@@ -62,7 +62,3 @@ class GtsamWindow:
         if not np.isfinite(vectors).all():
             raise RuntimeError("GTSAM gave a mean that is not finite")
         return unscale_mean(vectors, reference)
-
-    def factor_slots(self) -> int:
-        """Return how many factor slots GTSAM holds; it must not grow with the length of the track."""
-        return int(self._smoother.getFactors().size())

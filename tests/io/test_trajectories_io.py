@@ -18,7 +18,6 @@ from jeat_graph.io.frame_results import write_kitti, write_motchallenge
 from jeat_graph.io.trajectories_io import (
     COLUMNS,
     TrajectoryWriter,
-    has_motion,
     read_trajectories,
     write_trajectories,
 )
@@ -39,6 +38,11 @@ def table(n: int, seed: int = 0, sensors: tuple[str, ...] = ("rgb", "evt")) -> T
         used=rng.integers(0, 1 << len(sensors), n),
         sensors=sensors,
     )
+
+
+def has_motion(table: Trajectories) -> bool:
+    """Whether a table holds estimates of motion, rather than boxes only."""
+    return bool(np.isfinite(table.var).any())
 
 
 def simple(*rows: tuple[float, int, float], existence: float = 0.5) -> Trajectories:

@@ -26,7 +26,6 @@ from jeat_graph.data.events import EventArray
 from jeat_graph.io.events.evt3 import Evt3Reader
 from jeat_graph.io.events.reader import PIECE_ROWS, EventReader
 
-MAGIC = b"#ROSBAG V2.0"
 _ARRAYS = ("dvs_msgs", "prophesee_event_msgs")
 _PACKETS = "event_camera_msgs"
 _US_PER_S, _NS_PER_US = 1_000_000, 1000
@@ -63,7 +62,6 @@ class RosbagReader(EventReader):
     def __init__(self, path: Path, size_px: tuple[int, int] | None) -> None:
         super().__init__(path, size_px)
         self._bag, self._topic = _open(path)
-        self._given = size_px
         try:
             first = next(self._messages(), None)
             if first is not None:

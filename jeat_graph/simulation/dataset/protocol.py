@@ -12,8 +12,7 @@ from jeat_graph.io.events_dsec_writer import compression_filter
 from jeat_graph.io.video import VIDEO_FILES
 
 SPLITS = ("train", "val", "test")
-FULL_SET = 500  # segments of the full set (paper, "Dataset setup")
-FRAMES_PER_SEGMENT = 100  # likewise
+FRAMES_PER_SEGMENT = 100  # as in the full set of 500 segments (paper, "Dataset setup")
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 
