@@ -224,7 +224,7 @@ class _Day:
         for message in messages(math.ceil(load.hours * 3600.0), load.vehicles, load.seed, first):
             duplicates = session.duplicates
             begin = time.perf_counter()
-            session.take(message)
+            session.accept(message)
             if session.duplicates == duplicates:
                 self._took.add(time.perf_counter() - begin)
             if message.batch.t >= length * (len(self.periods) + 1):

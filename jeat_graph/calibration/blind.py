@@ -89,7 +89,7 @@ def _fit(config: Config, data: TrackedDetections) -> Config:
         old, taken = config.sensors[name], data.taken[s]
         if taken.sum() < _MIN_LENGTH:
             raise DataError(f"confirmed tracks took almost nothing of sensor {name!r}; calibrate with --gt")
-        p_detect, blind = fit_detection(data.looks[s], data.speed[s], data.visible[s])
+        p_detect, blind = fit_detection(data.detected[s], data.speed[s], data.visible[s])
         sensors[name] = replace(
             old,
             sigma_px=float(np.clip(noise[s, 0], 0.1, 100.0)),

@@ -1,4 +1,4 @@
-"""The correct detections of all sensors, joined into one track an object."""
+"""Joins the correct detections of all sensors into one track for each object."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ class TrackedDetections:
         track: (K,) number of its track, ascending.
         sensor: (K,) index into the configuration's sensor names.
         box: (K, 4) the detection (px).
-        looks: per sensor (L,), for each confirmed track at each scan in its life, whether it was detected.
+        detected: per sensor (L,), for each confirmed track at each scan in its life, whether it was detected.
         speed: per sensor (L,), the track's image speed then (px/s).
         visible: per sensor (L,), the part of the track's box that no nearer track hides.
         score: per sensor (D,), scores of all detections.
@@ -40,7 +40,7 @@ class TrackedDetections:
     track: IntArray
     sensor: IntArray
     box: FloatArray
-    looks: tuple[BoolArray, ...]
+    detected: tuple[BoolArray, ...]
     speed: tuple[FloatArray, ...]
     visible: tuple[FloatArray, ...]
     score: tuple[FloatArray, ...]
@@ -63,7 +63,7 @@ def follow(recordings: Sequence[Detections], config: Config) -> TrackedDetection
     )
     names = config.sensor_names
     cols: dict[str, list[FloatArray]] = {name: [] for name in ("t", "track", "sensor", "box")}
-    looks: list[list[BoolArray]] = [[] for _ in names]
+    detected: list[list[BoolArray]] = [[] for _ in names]
     speed: list[list[FloatArray]] = [[] for _ in names]
     visible: list[list[FloatArray]] = [[] for _ in names]
     score: list[list[FloatArray]] = [[] for _ in names]
@@ -88,7 +88,7 @@ def follow(recordings: Sequence[Detections], config: Config) -> TrackedDetection
                 scan = detections.scan(int(k))
                 got = np.zeros(len(scan), dtype=bool)
                 rows = np.arange(lo, hi)
-                looks[s].append(bit[rows])
+                detected[s].append(bit[rows])
                 speed[s].append(np.hypot(table.mean[rows, 2], table.mean[rows, 3]))
                 visible[s].append(1.0 - occluded_fraction(table.boxes[rows], table.existence[rows]))
                 rows = rows[bit[rows]]
@@ -113,7 +113,7 @@ def follow(recordings: Sequence[Detections], config: Config) -> TrackedDetection
         track=flat["track"][order].astype(np.int64),
         sensor=flat["sensor"][order].astype(np.int64),
         box=flat["box"][order],
-        looks=tuple(np.concatenate(x) if x else np.zeros(0, dtype=bool) for x in looks),
+        detected=tuple(np.concatenate(x) if x else np.zeros(0, dtype=bool) for x in detected),
         speed=tuple(np.concatenate(x) if x else np.zeros(0) for x in speed),
         visible=tuple(np.concatenate(x) if x else np.zeros(0) for x in visible),
         score=tuple(np.concatenate(x) if x else np.zeros(0) for x in score),

@@ -207,7 +207,7 @@ def _take(
     from jeat_graph.live.inputs import in_seconds
 
     try:
-        session.take(in_seconds(message, unit), place)
+        session.accept(in_seconds(message, unit), place)
     except (UnknownSensorError, TimeOrderError) as error:
         name, _, line = place.removesuffix(": ").rpartition(":")
         trouble = DataError(str(error), name, int(line))

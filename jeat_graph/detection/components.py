@@ -1,4 +1,4 @@
-"""Boxes around what belongs together: pixels that are marked and lie near one another."""
+"""Finds boxes around what belongs together: pixels that are marked and lie near one another."""
 
 from __future__ import annotations
 

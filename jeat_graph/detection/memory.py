@@ -1,4 +1,4 @@
-"""What groups of pixels were a step ago: it tells two vehicles that pass each other from one.
+"""Compares groups of pixels with those of the step before, so that vehicles that pass each other stay two.
 
 A cloud that covers two clouds of a moment ago, which moved differently, is both of them: its pixels go to the
 nearer one. Clouds that lie together where one was a moment ago are pieces of it.

@@ -1,4 +1,4 @@
-"""Noise of an event camera: events that stand alone, and pixels that fire all the time.
+"""Leaves out the noise of an event camera: events that stand alone, and pixels that fire all the time.
 
 An edge that moves fires in several neighbouring pixels within a few milliseconds; noise fires in single ones.
 An event with no other in the eight pixels around it within the last `support_s` is *background activity*. A

@@ -96,7 +96,7 @@ class Session:
         self._told = 0
         self._interval = None if live.time is None else live.time // every_s
 
-    def take(self, message: ScanMessage, place: str = "") -> None:
+    def accept(self, message: ScanMessage, place: str = "") -> None:
         """Take in a message of scans.
 
         Args:

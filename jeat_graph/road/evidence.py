@@ -1,4 +1,4 @@
-"""What a calibration is made from: measured lengths, surveyed points, vehicles' tracks, and mild beliefs."""
+"""What a calibration is made from: measured lengths, surveyed points, vehicles' tracks, and weak priors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Kinds of vehicles and how large they are: what is believed of a vehicle before it has been seen."""
+"""Kinds of vehicles and how large they are: the prior of a vehicle's length, width and height."""
 
 from __future__ import annotations
 

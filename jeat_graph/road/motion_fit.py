@@ -1,4 +1,4 @@
-"""One vehicle's motion on the road from where it was seen, with an error that is honest about its memory.
+"""One vehicle's motion on the road from where it was seen; its variances count errors that persist.
 
 The motion along and across the road is a constant acceleration plus random jerks at evenly spaced knots, a
 linear model with a Gaussian prior. What is seen is wrong by white noise and by an error that persists for a

@@ -1,4 +1,4 @@
-"""The one least-squares problem of a calibration: every kind of evidence as residuals in sigmas."""
+"""The least-squares problem of a calibration: residuals of all evidence over their standard deviations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What people take home: the tables of the road, the vehicles' speeds and their crossings of lines."""
+"""Results on the road, ready to be written: states, speeds, and crossings of lines."""
 
 from __future__ import annotations
 

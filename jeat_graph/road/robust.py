@@ -1,4 +1,4 @@
-"""Points that do not belong to a vehicle: found by motions through few points that most others agree with."""
+"""Finds points that do not belong to a vehicle: those off a motion with which most agree (RANSAC)."""
 
 from __future__ import annotations
 

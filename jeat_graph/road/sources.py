@@ -1,4 +1,4 @@
-"""Where the vehicles' points come from: a table of points, or the boxes of a run."""
+"""Reads what the road is made from: a table of points in the picture, or the boxes of a run."""
 
 from __future__ import annotations
 

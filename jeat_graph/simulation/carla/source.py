@@ -179,17 +179,17 @@ class CarlaSource:
         events = EventStream(self._sensor(session, "dvs", transform))
         # The first pictures: the event camera takes its own as reference, and time begins.
         tick = world.tick()
-        start_s = float(rgb.take(tick).timestamp)
-        depth.take(tick)
+        start_s = float(rgb.of_tick(tick).timestamp)
+        depth.of_tick(tick)
         events.begin(round(start_s * _NS_PER_S), tick + 1)
         waiting: tuple[int, SegmentStep] | None = None
         for _ in range(self.frames + 1):  # one more, for the events of the last frame to arrive
             for _ in range(config.ticks_per_frame):
                 tick = world.tick()
-                image, depth_image = rgb.take(tick), depth.take(tick)
+                image, depth_image = rgb.of_tick(tick), depth.of_tick(tick)
             if waiting is not None:
                 at, step = waiting
-                yield dataclasses.replace(step, events=events.take(at, step.t_us))
+                yield dataclasses.replace(step, events=events.until_tick(at, step.t_us))
             snapshot = world.get_snapshot()
             if snapshot.frame != tick:
                 raise DataError(

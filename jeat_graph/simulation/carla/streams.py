@@ -39,7 +39,7 @@ class TickStream:
         self._timeout_s = timeout_s
         sensor.listen(self._queue.put)
 
-    def take(self, tick: int) -> Any:
+    def of_tick(self, tick: int) -> Any:
         """Return the data of a tick; those of earlier ticks are dropped.
 
         Raises:
@@ -78,11 +78,11 @@ class EventStream:
         """Drop all before `first_tick`; times count from `start_ns` (ns)."""
         self._start_ns, self._first_tick, self._done_tick = start_ns, first_tick, first_tick - 1
 
-    def take(self, last_tick: int, t_us: int) -> EventArray:
+    def until_tick(self, last_tick: int, t_us: int) -> EventArray:
         """Return, without waiting, the events of the ticks since the call before, up to `last_tick`.
 
         Args:
-            last_tick: last tick to take.
+            last_tick: the last of these ticks.
             t_us: time of that tick (µs); an event may lie beyond by rounding, and is put there.
 
         Raises:

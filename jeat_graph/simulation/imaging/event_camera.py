@@ -22,7 +22,7 @@ from jeat_graph.simulation.imaging.event_pixel import (
     make_model,
     make_state,
 )
-from jeat_graph.simulation.imaging.event_run import Interval, fill, light_all, run_physical, take
+from jeat_graph.simulation.imaging.event_run import Interval, fill, light_all, read_luminance, run_physical
 from jeat_graph.simulation.imaging.event_sink import EventSink, make_sink, to_events, with_room
 from jeat_graph.simulation.imaging.layers import GLOW
 from jeat_graph.simulation.imaging.lighting import LUMINANCE
@@ -126,7 +126,7 @@ class EventCamera:
 def _run_carla(
     work: Interval, stage: Stage, model: CarlaModel, state: CarlaState, sink: EventSink, room: int
 ) -> tuple[EventSink, int]:
-    """Take all pixels from tick to tick, tile by tile; as `_run_physical`."""
+    """Take all pixels from tick to tick, tile by tile; as `run_physical`."""
     tiles, boxes, steps, lit, times_us, static, _, _, _ = work
     who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)
     counts = np.zeros(3, dtype=np.int64)
@@ -143,7 +143,7 @@ def _run_carla(
             if steps[n] > 0 or lit[n] > 0:
                 light_tile(tile, j, who, counts, stage, canvas.light)
                 paint_tile(tile, j, who, counts, stage, canvas.light)
-                take(canvas.out, tile, luminance)
+                read_luminance(canvas.out, tile, luminance)
                 rendered += 1
             carla_advance(pixels[:count], luminance[:count], times_us[j], times_us[j + 1], model, state, sink)
     return sink, rendered

@@ -84,7 +84,7 @@ def fill(row0: int, column0: int, static: FloatArray, pixels: IntArray, luminanc
 
 
 @njit(cache=True)
-def take(patch: FloatArray, tile: Tile, luminance: FloatArray) -> None:
+def read_luminance(patch: FloatArray, tile: Tile, luminance: FloatArray) -> None:
     """Luminance of a painted tile, in the order of `_fill`."""
     count = 0
     for r in range(tile.rows):
@@ -208,7 +208,7 @@ def run_physical(
                             share = place - low
                             light[:] = keys[low] + share * (keys[low + 1] - keys[low])
                         paint_tile(tile, here * stride - 1, who, counts, stage, light)
-                        take(canvas.out, tile, seen[top])
+                        read_luminance(canvas.out, tile, seen[top])
                         rendered += 1
                     painted[top] = True
                 if here - done > 1 and _differ(seen[top, :count], pixels, model, state):

@@ -1,4 +1,4 @@
-"""Where the pixels' kernels put their events."""
+"""A buffer that grows, for the events that compiled code makes pixel by pixel."""
 
 from __future__ import annotations
 

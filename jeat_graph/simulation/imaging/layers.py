@@ -1,4 +1,4 @@
-"""Room to work in for one tile: what lies over each of its pixels, sorted by depth."""
+"""Buffers of one tile of the picture: what lies over each of its pixels, sorted by depth."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Segments from our own renderer."""
+"""Makes the pictures, events and truth of a segment with the built-in renderer."""
 
 from __future__ import annotations
 
