@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
@@ -224,12 +223,11 @@ def read_run(path: PathLike) -> Run:
         DataError: there is no run, or a file of it is not valid.
     """
     from jeat_graph.eval.load import read_tables
+    from jeat_graph.runs.directory import read_record
 
     folder = Path(path)
     tables = read_tables(folder)
-    file = folder / "run.json"
-    record = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
-    return Run(tables.get("causal"), tables.get("smoothed"), record)
+    return Run(tables.get("causal"), tables.get("smoothed"), read_record(folder))
 
 
 def _as_list(values: Any) -> list[Any]:

@@ -11,6 +11,7 @@ from typing import Any
 
 from jeat_graph.data.errors import JeatGraphError, OtherRunError
 from jeat_graph.live.recording_road import drive_on_road, known_vehicles, run_tables
+from jeat_graph.runs.directory import read_record
 from jeat_graph.runs.track_files import TrackRequest
 
 DONE, KEPT, FAILED = "done", "kept", "failed"
@@ -72,7 +73,7 @@ def run_job(job: Job) -> Outcome:
         _track(job)
         if job.camera is not None:
             vehicles = drive_on_road(out, job.camera)
-        return _outcome(job.name, DONE, _record_of(out), vehicles)
+        return _outcome(job.name, DONE, read_record(out), vehicles)
     except (JeatGraphError, OSError) as error:
         return Outcome(job.name, FAILED, {}, error=_one_line(str(error)))
     except Exception as error:  # one recording's trouble must not be the others'
@@ -100,13 +101,12 @@ def _track(job: Job) -> None:
 def _finished(request: TrackRequest) -> dict[str, Any] | None:
     """The record of the run if it is there, whole, and what this request would make; else None."""
     from jeat_graph.io.hashing import sha256_of
-    from jeat_graph.runs.directory import RUN_JSON
     from jeat_graph.version import __version__
 
     out = Path(request.out)
-    if not (out / RUN_JSON).is_file():
+    record = read_record(out)
+    if not record:
         return None
-    record = _record_of(out)
     wanted = json.loads(json.dumps(request.source()))
     same = (
         record.get("version") == __version__
@@ -146,13 +146,6 @@ def _hashes(inputs: Any) -> list[str]:
 def _settings(reading: Any) -> dict[str, Any]:
     """How the files were read, but for their paths: a moved recording is the same recording."""
     return {k: v for k, v in reading.items() if k != "detections"} if isinstance(reading, dict) else {}
-
-
-def _record_of(out: Path) -> dict[str, Any]:
-    from jeat_graph.runs.directory import RUN_JSON
-
-    content = json.loads((out / RUN_JSON).read_text(encoding="utf-8"))
-    return content if isinstance(content, dict) else {}
 
 
 def _outcome(name: str, status: str, record: dict[str, Any], vehicles: int | None) -> Outcome:

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -13,6 +12,7 @@ from typing import NamedTuple
 from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import DataError
+from jeat_graph.runs.directory import read_record
 
 # Rates of two files of one recording may differ in their last digits: 29.97 and 30 do not, 25 and 30 do.
 _SAME_RATE = 0.02
@@ -119,9 +119,8 @@ def rate_of_truth(run: str | Path, truth: str | Path, rate_hz: float | None) -> 
 def recorded_rate(run: str | Path) -> float | None:
     """Return the frame rate (Hz) by which a run's input was read, None where none was needed or known."""
     try:
-        record = json.loads((Path(run) / "run.json").read_text(encoding="utf-8"))
-        rate = record["reading"]["rate_hz"]
-    except (OSError, ValueError, KeyError, TypeError):
+        rate = read_record(Path(run))["reading"]["rate_hz"]
+    except (DataError, KeyError, TypeError):
         return None
     return float(rate) if isinstance(rate, int | float) and rate > 0.0 else None
 

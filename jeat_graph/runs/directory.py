@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import tempfile
 from collections.abc import Iterable
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.locking import hold_folder, remove_folders
@@ -25,6 +26,27 @@ TABLES = ("causal", "smoothed")
 SUFFIXES = {"csv": ".csv", "parquet": ".parquet", "motchallenge": ".mot.txt", "kitti": ".kitti.txt"}
 _TABLE_FILES = (kind + suffix for kind in TABLES for suffix in SUFFIXES.values())
 RUN_FILES = (*_TABLE_FILES, SCANS, DIAGNOSTICS, MEASUREMENTS, ROAD_CAUSAL, ROAD_SMOOTHED, RUN_JSON)
+
+
+def read_record(folder: Path) -> dict[str, Any]:
+    """Return what a run's `run.json` says; nothing where there is none.
+
+    Raises:
+        DataError: it cannot be read, or is no record.
+    """
+    path = folder / RUN_JSON
+    if not path.is_file():
+        return {}
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DataError(f"cannot be read: {error.strerror or error}", path) from None
+    except (ValueError, RecursionError) as error:
+        line = error.lineno if isinstance(error, json.JSONDecodeError) else None
+        raise DataError("is not JSON; it should be the record of a run", path, line) from None
+    if not isinstance(content, dict):
+        raise DataError("is not the record of a run", path)
+    return content
 
 
 class RunDirectory:

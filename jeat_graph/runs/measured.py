@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -18,7 +17,7 @@ from jeat_graph.data.measured_track import MeasuredTrack
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.io.hashing import sha256_of
 from jeat_graph.io.scans_io import read_instants
-from jeat_graph.runs.directory import MEASUREMENTS, RUN_JSON
+from jeat_graph.runs.directory import MEASUREMENTS, RUN_JSON, read_record
 from jeat_graph.runs.inputs import find_input
 from jeat_graph.runs.latency import at_measurement
 
@@ -53,7 +52,7 @@ def measured_run(folder: Path, moved: list[str] | None = None, *, progress: bool
     Raises:
         DataError: there is no run, or a file of it, or an input, is missing or has changed since.
     """
-    record = _read_record(folder)
+    record = _complete_record(folder)
     if moved is None and MEASUREMENTS in record["files"]:
         return _kept(folder, record)
     config, detections = recorded_inputs(folder, record, moved)
@@ -109,7 +108,7 @@ def measurement_rows(folder: Path, *, progress: bool = False) -> tuple[RecordArr
     from jeat_graph.io.measurements_io import read_measurements
     from jeat_graph.tracking.records import record_measurements
 
-    record = _read_record(folder)
+    record = _complete_record(folder)
     if MEASUREMENTS in record["files"]:
         config = _config_of(folder, record)
         _unchanged(folder / MEASUREMENTS, record)
@@ -139,19 +138,19 @@ def _kept(folder: Path, record: dict[str, Any]) -> MeasuredRun:
     return MeasuredRun(tracks, read_trajectories(table), read_instants(folder), config.sensor_names)
 
 
-def _read_record(folder: Path) -> dict[str, Any]:
+def _complete_record(folder: Path) -> dict[str, Any]:
     """Return `run.json`, with all that is needed of it."""
     path = folder / RUN_JSON
+    record = read_record(folder)
+    if not record:
+        raise DataError(f"is missing or empty; is {folder} a run?", path)
     try:
-        content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        if not isinstance(content["inputs"], list) or not isinstance(content["config"], dict):
+        if not isinstance(record["inputs"], list) or not isinstance(record["config"], dict):
             raise TypeError
-        _ = dict(content["reading"])["detections"], dict(content["files"])
-    except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror or error}; is {folder} a run?", path) from None
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        _ = dict(record["reading"])["detections"], dict(record["files"])
+    except (ValueError, KeyError, TypeError):
         raise DataError(_NO_RECORD, path) from None
-    return content
+    return record
 
 
 _NO_RECORD = "is not the record of a run by this version of `jeat-graph track`"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,9 +11,9 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.diagnostics import Diagnostics
-from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.eval.judge import Judgement
+from jeat_graph.runs.directory import DIAGNOSTICS, read_record
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +96,7 @@ def load_run_data(run: str | Path, truth: str | Path | None = None, rate_hz: flo
     else:
         read = {kind: read_trajectories(path, rate_hz=rate_hz) for kind, path in files.items()}
         causal, smoothed = read.get("causal"), read.get("smoothed")
-    record = _read_record(folder / "run.json") if folder.is_dir() else {}
+    record = read_record(folder) if folder.is_dir() else {}
     diagnostics = _read_diagnostics(folder)
     data = RunData(
         name=str(run),
@@ -121,24 +120,8 @@ _SINGLE = (
 _NO_TRUTH = "No truth was given (--gt FILE): there are no scores."
 
 
-def _read_record(path: Path) -> dict[str, Any]:
-    if not path.is_file():
-        return {}
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror or error}", path) from None
-    except (ValueError, RecursionError) as error:
-        line = error.lineno if isinstance(error, json.JSONDecodeError) else None
-        raise DataError("is not JSON; it should be the record of a run", path, line) from None
-    if not isinstance(content, dict):
-        raise DataError("is not the record of a run", path)
-    return content
-
-
 def _read_diagnostics(folder: Path) -> Diagnostics | None:
     from jeat_graph.io.diagnostics_io import read_diagnostics
-    from jeat_graph.runs.directory import DIAGNOSTICS
 
     path = folder / DIAGNOSTICS
     return read_diagnostics(path) if folder.is_dir() and path.is_file() else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.runs.directory import RUN_JSON, RunDirectory
+from jeat_graph.runs.directory import RUN_JSON, RunDirectory, read_record
 
 
 def write(folder, **content):
@@ -63,3 +63,19 @@ def test_the_place_of_a_run_is_no_file(tmp_path):
 def test_files_are_written_within_the_with_block_only(tmp_path):
     with pytest.raises(RuntimeError, match="must be entered"):
         RunDirectory(tmp_path).path("causal.csv")
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ('{\n"version": \n', r"run\.json:\d: .*is not JSON"),
+        ("[" * 100_000, "is not JSON"),
+        ("[]", "is not the record of a run"),
+        (b"\xff\xfe", "is not JSON"),
+    ],
+)
+def test_a_broken_record_is_refused_by_name(tmp_path, content, message):
+    assert read_record(tmp_path) == {}
+    (tmp_path / RUN_JSON).write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(DataError, match=message):
+        read_record(tmp_path)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +20,7 @@ from jeat_graph.drawing.movie.backgrounds import (
 )
 from jeat_graph.drawing.movie.moments import TRAIL_S, TracksAt, TruthAt
 from jeat_graph.drawing.movie.panels import Movie
+from jeat_graph.runs.directory import RUN_JSON, read_record
 from jeat_graph.simulation.dataset.layout import EVENTS, SEGMENTS, TRUTH
 
 DEFAULT_RATE_HZ = 25.0
@@ -243,14 +243,14 @@ def _absent(
 
 def _configured_size(run: Path) -> tuple[float, float] | None:
     """Picture that a run was configured for, None if it does not say."""
-    path = run / "run.json"
-    if not path.is_file():
+    record = read_record(run)
+    if not record:
         return None
     try:
-        image = json.loads(path.read_text(encoding="utf-8"))["config"]["image"]
+        image = record["config"]["image"]
         return float(image["width"]), float(image["height"])
-    except (OSError, ValueError, KeyError, TypeError):
-        raise DataError("is not the record of a run", path) from None
+    except (ValueError, KeyError, TypeError):
+        raise DataError("is not the record of a run", run / RUN_JSON) from None
 
 
 def _field(
