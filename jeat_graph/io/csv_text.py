@@ -18,19 +18,11 @@ from typing import Any
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.limits import check_file, free_memory
+from jeat_graph.io.not_tables import what_it_is
 
 _BOM = b"\xef\xbb\xbf"
 _WIDE_BOMS = (b"\xff\xfe", b"\xfe\xff")
 _GZIP = b"\x1f\x8b"
-#: First bytes of what is no text, and what to do about it.
-_OTHERS = {
-    _GZIP: "is compressed with gzip; give it a name that ends in .gz, or unpack it",
-    b"PK\x03\x04": "is a zip archive or an Excel workbook; unpack it, or save it as CSV",
-    b"BZh": "is compressed with bzip2; unpack it",
-    b"\xfd7zXZ": "is compressed with xz; unpack it",
-    b"\x28\xb5\x2f\xfd": "is compressed with zstd; unpack it",
-    b"\x89HDF": "is an HDF5 file, not text",
-}
 _SOMETHING = re.compile(rb"\S")
 _NO_LINE_END = re.compile(rb"[^\r\n]")
 #: How a column is read where all its fields allow it: as numbers, or as text of which there are few kinds.
@@ -63,9 +55,9 @@ def read_text(path: str | Path) -> bytes:
     data = read_bytes(path)
     if Path(path).suffix.lower() == ".gz" and data.startswith(_GZIP):
         data = _unpacked(data, path)
-    for magic, text in _OTHERS.items():
-        if data.startswith(magic):
-            raise DataError(text, path)
+    other = what_it_is(data)
+    if other is not None:
+        raise DataError(other, path)
     if data.startswith(_WIDE_BOMS):
         raise DataError("is UTF-16; save it as UTF-8", path)
     data = data.removeprefix(_BOM)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.io.not_tables import HEAD_BYTES, what_it_is
 
 RgbImage = npt.NDArray[np.uint8]
 
@@ -81,6 +82,16 @@ class PictureDecoder(Decoder):
         return np.asarray(picture, dtype=np.uint8)
 
 
+def _hint(path: Path) -> str:
+    """Where events are taken for pictures, the option that takes them."""
+    try:
+        with path.open("rb") as file:
+            other = what_it_is(file.read(HEAD_BYTES))
+    except OSError:
+        return ""
+    return "; events go to --events" if other is not None and "--events" in other else ""
+
+
 class VideoDecoder(Decoder):
     """Frames of a video file."""
 
@@ -90,7 +101,7 @@ class VideoDecoder(Decoder):
         self._path = path
         self._capture = quietly(lambda: cv2.VideoCapture(str(path), cv2.CAP_FFMPEG))
         if not self._capture.isOpened():
-            raise DataError("is not a video that can be read", path)
+            raise DataError(f"is not a video that can be read{_hint(path)}", path)
         self._next = 0
         self._count: int | None = None
 

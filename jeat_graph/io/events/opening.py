@@ -13,6 +13,7 @@ from jeat_graph.io.events.reader import EventReader
 FORMATS = (
     "EVT2, EVT2.1 and EVT3 (.raw), DAT, AEDAT 2 and 4, HDF5 of DSEC and of Prophesee, ROS bags with events"
 )
+_GZIP = b"\x1f\x8b"
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 #: First bytes of what is often taken for events, or is events of a kind that is not read.
 _OTHERS = (
@@ -23,7 +24,6 @@ _OTHERS = (
     (b"RIFF", "an AVI video"),
     (b"\x89PNG", "a PNG picture"),
     (b"\xff\xd8\xff", "a JPEG picture"),
-    (b"\x1f\x8b", "compressed by gzip; unpack it first"),
     (b"SQLite format 3", "a data base; give the folder of the ROS 2 bag"),
     (b"\x89MCAP0", "an MCAP file; give the folder of the ROS 2 bag"),
 )
@@ -84,6 +84,8 @@ def _open(place: Path, file: BinaryIO, start: bytes, size_px: tuple[int, int] | 
         return _open_prophesee(place, file, size_px)
     if start[4:8] == b"ftyp":
         raise DataError(f"is an MP4 video, no file of events ({FORMATS})", place)
+    if start.startswith(_GZIP):
+        raise DataError("is compressed with gzip; unpack it first", place)
     for magic, name in _OTHERS:
         if start.startswith(magic):
             raise DataError(f"is {name}, no file of events that is read ({FORMATS})", place)

@@ -16,7 +16,7 @@ OTHERS = {
     b"\x93NUMPY\x01\x00": "is a NumPy array",
     b"\x00\x00\x00\x20ftypisom": "is an MP4 video",
     b"\x1a\x45\xdf\xa3": "is a Matroska or WebM video",
-    b"\x1f\x8b\x08": "is compressed by gzip",
+    b"\x1f\x8b\x08": "is compressed with gzip",
     b"#!AER-DAT3.1\r\n": "is AEDAT 3.1, which is not read",
     b"#!AER-DAT2.0\r\n\x00": "does not say which camera recorded it",
     b"% evt 4.0\n% end\n": "is raw data of the encoding 'EVT 4.0'",

@@ -1,0 +1,53 @@
+"""Says what a file is that was taken for a table of text, and which option takes it."""
+
+from __future__ import annotations
+
+_EVENTS = "is a file of events, no table; `detect` and `track` take it as --events"
+_VIDEO = "is a video, no table; `detect` and `track` take it as --frames"
+_PICTURE = "is a picture, no table; `detect` and `track` take a folder of them as --frames"
+#: First bytes of what is no text, and what to do about it.
+_STARTS = {
+    b"\x1f\x8b": "is compressed with gzip; give it a name that ends in .gz, or unpack it",
+    b"PK\x03\x04": "is a zip archive or an Excel workbook; unpack it, or save it as CSV",
+    b"BZh": "is compressed with bzip2; unpack it",
+    b"\xfd7zXZ": "is compressed with xz; unpack it",
+    b"\x28\xb5\x2f\xfd": "is compressed with zstd; unpack it",
+    b"\x89HDF": "is an HDF5 file, not text; if it holds events, `detect` and `track` take it as --events",
+    b"#!AER-DAT": _EVENTS,
+    b"#ROSBAG": _EVENTS,
+    b"\x1a\x45\xdf\xa3": _VIDEO,
+    b"RIFF": _VIDEO,
+    b"\x89PNG": _PICTURE,
+    b"\xff\xd8\xff": _PICTURE,
+}
+#: RAW and DAT of Prophesee begin with lines of text.
+_PROPHESEE = b"%"
+#: So many bytes tell what a file is.
+HEAD_BYTES = 16_384
+
+
+def what_it_is(data: bytes) -> str | None:
+    """Say what bytes are that are no text, and what to do about it; None where that is not known.
+
+    Args:
+        data: the first bytes of a file, or all.
+    """
+    for start, text in _STARTS.items():
+        if data.startswith(start):
+            return text
+    if data[4:8] == b"ftyp":
+        return _VIDEO
+    if data.startswith(_PROPHESEE) and not _is_text(data[:HEAD_BYTES]):
+        return _EVENTS
+    return None
+
+
+def _is_text(head: bytes) -> bool:
+    """Whether bytes can be text, but for a character that is cut off at their end."""
+    if b"\0" in head:
+        return False
+    try:
+        head[:-4].decode("utf-8")
+    except UnicodeDecodeError:
+        return False
+    return True
