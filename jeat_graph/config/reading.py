@@ -42,23 +42,33 @@ def load_config(name_or_path: str | Path = "default", overrides: Iterable[str] =
     return config_from_dict(tree)
 
 
-def as_config(config: Config | str | Path, image: tuple[float, float] | None = None) -> Config:
+def as_config(config: Config | str | Path, image: tuple[float, float] | str | None = None) -> Config:
     """Return a configuration, loaded if it is named, with another size of the picture if one is given.
 
     Args:
         config: a configuration, the name of a preset, or the path of a YAML file.
-        image: width and height of the picture (px).
+        image: width and height of the picture (px), also as text such as "1920x1080".
 
     Raises:
-        ConfigError: as `load_config`; or a size that is not positive.
+        ConfigError: as `load_config`; or what is given is no size, or not positive.
     """
     found = config if isinstance(config, Config) else load_config(config)
     if image is None:
         return found
-    width, height = image
+    width, height = _sides(image)
     size = dataclasses.replace(found.image, width=float(width), height=float(height))
     given = dataclasses.replace(found.input, picture="given")
     return dataclasses.replace(found, image=size, input=given)
+
+
+def _sides(image: object) -> tuple[float, float]:
+    """Width and height of a picture, however they are given."""
+    try:
+        sides: Any = image.lower().split("x") if isinstance(image, str) else image
+        width, height = (float(side) for side in sides)
+        return width, height
+    except (TypeError, ValueError):
+        raise ConfigError(f"image must be (width, height) in px, not {image!r}") from None
 
 
 def config_from_dict(tree: Mapping[str, Any]) -> Config:

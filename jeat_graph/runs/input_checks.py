@@ -12,6 +12,7 @@ from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError, UnknownSensorError
 from jeat_graph.io.time_units import unit_question
 from jeat_graph.runs.declaring import LEAST_SCANS, scan_rate_hz
+from jeat_graph.tracking.input_watch import CORNERS, look_like_corners
 
 # A box at the edge may have its centre outside; a recording of another picture size has far more of them.
 MOST_OUTSIDE = 0.05
@@ -99,6 +100,8 @@ def _check_picture(detections: Detections, config: Config, names: str) -> list[s
         f"{names}: {count} of {total} box centres lie outside the picture of {width:g} x {height:g} px "
         f"(they reach from {low[0]:.0f}, {low[1]:.0f} to {high[0]:.0f}, {high[1]:.0f})"
     )
+    if count > MOST_OUTSIDE * total and look_like_corners(boxes, width, height):
+        raise DataError(f"{names}: {CORNERS}")
     if count > MOST_OUTSIDE * total:
         raise DataError(f"{found}; give the picture's size: --image WIDTHxHEIGHT")
     return [found]

@@ -21,6 +21,36 @@ STEP_SCANS = 6
 _MOST_OUTSIDE = 0.05
 # Detectors let boxes reach over the edge by a little.
 _OVER_EDGE = 1.1
+# Scatter of the sizes without the corners, over that of the corners, where the one are part of the other.
+_FOLLOWS = 0.5
+
+
+#: What is said of boxes that are no left, top, width, height.
+CORNERS = (
+    "boxes look like x1, y1, x2, y2, taken for left, top, width, height: name the columns so, or convert "
+    "them (in Python Scan.from_xyxy)"
+)
+
+
+def look_like_corners(boxes: FloatArray, width: float, height: float) -> bool:
+    """Whether boxes are most likely two corners each, taken for a corner and a size.
+
+    Every size is then larger than its corner, and the boxes reach far over the picture; or, where the picture
+    is as large as they reach, the sizes follow the corners wherever these go.
+
+    Args:
+        boxes: (M, 4) as they were given.
+        width: of the picture (px).
+        height: of the picture (px).
+    """
+    corner, size = boxes[:, :2], boxes[:, 2:]
+    if not len(boxes) or not (size > corner).all():
+        return False
+    if ((corner + size).max(axis=0) > (_OVER_EDGE * width, _OVER_EDGE * height)).any():
+        return True
+    if len(boxes) < FIRST_BOXES:
+        return False
+    return bool(((size - corner).std(axis=0) < _FOLLOWS * corner.std(axis=0)).all())
 
 
 class InputWatch:
@@ -69,15 +99,10 @@ class InputWatch:
     def _judge_boxes(self, boxes: FloatArray) -> None:
         width, height = self._config.image.width, self._config.image.height
         far = boxes[:, :2] + boxes[:, 2:]
-        over = bool((far[:, 0].max() > _OVER_EDGE * width) or (far[:, 1].max() > _OVER_EDGE * height))
         if far.max() <= 1.5:
             self._say("shares", "all boxes lie in [0, 1]: they must be in px, not in shares of the picture")
-        elif over and (boxes[:, 2:] > boxes[:, :2]).all():
-            self._say(
-                "corners",
-                "boxes look like x1, y1, x2, y2, taken for left, top, width, height: convert them (in Python "
-                "Scan.from_xyxy)",
-            )
+        elif look_like_corners(boxes, width, height):
+            self._say("corners", CORNERS)
         else:
             centre = boxes[:, :2] + 0.5 * boxes[:, 2:]
             outside = int(((centre < 0.0) | (centre > (width, height))).any(axis=1).sum())

@@ -44,7 +44,7 @@ class Tracker(SmoothedTracks):
 
     Args:
         config: sensors and settings, from `load_config`; or the name of a preset, or of a YAML file.
-        image: width and height of the picture (px), if not those of the configuration.
+        image: width and height of the picture (px), also as "1920x1080", if not those of the configuration.
         diagnostics: take down how well each detection fitted its track, for `last_updates`.
 
     Example:
@@ -59,7 +59,7 @@ class Tracker(SmoothedTracks):
         self,
         config: Config | str | Path = "default",
         *,
-        image: tuple[float, float] | None = None,
+        image: tuple[float, float] | str | None = None,
         diagnostics: bool = False,
     ) -> None:
         config = as_config(config, image)

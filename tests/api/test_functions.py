@@ -11,7 +11,7 @@ import pytest
 
 import jeat_graph
 from jeat_graph import Scan, Tracker, evaluate, load_config, read_run, simulate, track
-from jeat_graph.data.errors import DataError
+from jeat_graph.data.errors import ConfigError, DataError
 
 
 @pytest.fixture(scope="module")
@@ -102,3 +102,13 @@ def test_a_recording_calibrates_a_configuration(night):
 
 def test_one_override_may_stand_alone():
     assert load_config("highway", "image.width=1920").image.width == 1920.0
+
+
+def test_the_size_of_the_picture_may_be_written_as_on_the_command_line():
+    assert Tracker("default", image="1920x1080").config.image == Tracker(image=(1920, 1080)).config.image
+
+
+@pytest.mark.parametrize("size", ["large", "1920", (1920,), 1920, (1, 2, 3), ("a", "b")])
+def test_what_is_no_size_of_a_picture_is_said_to_be_none(size):
+    with pytest.raises(ConfigError, match="image must be"):
+        Tracker("default", image=size)

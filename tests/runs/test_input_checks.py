@@ -29,3 +29,14 @@ def test_times_in_other_units_are_refused_with_a_question(step, unit):
 def test_a_sensor_that_is_declared_to_be_so_slow_is_believed():
     config = load_config("default", ["sensors.rgb.rate_hz=0.025"])
     assert check_detections(recording(40.0), config, "det") == []
+
+
+def test_corners_taken_for_sizes_are_named_before_the_size_of_the_picture():
+    x, y = np.linspace(300.0, 1100.0, 30), np.linspace(200.0, 650.0, 30)
+    corners = np.column_stack([x, y, x + 80.0, y + 60.0])
+    rows = Detections.from_rows(
+        np.arange(30) * 0.05, np.full(30, "rgb"), corners, np.full(30, 0.9), np.zeros(30, dtype=bool), None
+    )
+    config = load_config("default", ["image.width=1280", "image.height=720"])
+    with pytest.raises(DataError, match="det: boxes look like x1, y1, x2, y2"):
+        check_detections(rows, config, "det")

@@ -10,7 +10,7 @@ import pytest
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import InputWarning
-from jeat_graph.tracking.input_watch import STEP_SCANS, InputWatch
+from jeat_graph.tracking.input_watch import STEP_SCANS, InputWatch, look_like_corners
 
 BOX = (300.0, 200.0, 60.0, 40.0)
 
@@ -65,3 +65,29 @@ def test_a_sensor_declared_as_slow_is_believed():
 
 def test_a_few_scans_are_no_ground_for_a_word():
     assert seen(BOX, 50.0, scans=STEP_SCANS - 1) == []
+
+
+def corners_of(count: int) -> np.ndarray:
+    """Corners (M, 4) of vehicles that drive from the upper left to the lower right."""
+    x, y = np.linspace(100.0, 900.0, count), np.linspace(90.0, 500.0, count)
+    return np.column_stack([x, y, x + np.linspace(60.0, 120.0, count), y + np.linspace(40.0, 90.0, count)])
+
+
+def test_corners_are_known_where_the_picture_is_as_large_as_they_reach():
+    corners = corners_of(40)
+    reach = (corners[:, :2] + corners[:, 2:]).max(axis=0)
+    assert look_like_corners(corners, *reach)
+    sizes = corners.copy()
+    sizes[:, 2:] -= sizes[:, :2]
+    assert not look_like_corners(sizes, 1280.0, 720.0)
+
+
+def test_one_vehicle_in_the_corner_of_the_picture_is_no_slip():
+    rng = np.random.default_rng(0)
+    boxes = np.array([20.0, 10.0, 300.0, 200.0]) + rng.normal(0.0, 2.0, (60, 4))
+    assert not look_like_corners(boxes, 330.0, 220.0)
+
+
+def test_few_boxes_are_no_ground_for_a_word_about_corners():
+    assert not look_like_corners(corners_of(5), 2000.0, 2000.0)
+    assert not look_like_corners(np.zeros((0, 4)), 2000.0, 2000.0)
