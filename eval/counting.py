@@ -57,7 +57,7 @@ class LineCrossing:
         t: time of the crossing (s), by linear interpolation between rows.
         direction: `left` or `right` (see `Line`).
         probability: that a vehicle really crossed: that it exists, and that it began on one side and ended on
-            the other, given the uncertainty of its position.
+            the other, given the uncertainty of its position; NaN where the table does not know that.
         vehicle_class: class of the track, empty where unknown.
     """
 
@@ -141,8 +141,9 @@ class Count:
         t_from: begin of the interval (s).
         t_to: its end (s).
         count: tracks that crossed.
-        expected: expected number of vehicles, the sum of the crossings' probabilities.
-        low: with `high` the 95 % interval of the number of vehicles among these tracks.
+        expected: expected number of vehicles, the sum of the crossings' probabilities; NaN if not known.
+        low: with `high` the 95 % interval of the number of vehicles among these tracks: none to all of them
+            where the probabilities are not known.
         high: see `low`.
     """
 
@@ -181,8 +182,11 @@ def count(found: Sequence[LineCrossing], edges: FloatArray) -> list[Count]:
 def count_interval(probability: Sequence[float], tails: float = TAILS) -> tuple[int, int]:
     """Interval that holds the number of successes of independent trials with probability 1 − `tails` or more.
 
-    The distribution (Poisson binomial) is exact: one convolution a trial.
+    The distribution (Poisson binomial) is exact: one convolution a trial. Of probabilities that are not known
+    (NaN) nothing follows but 0 to all.
     """
+    if np.isnan(probability).any():
+        return 0, len(probability)
     pmf = np.ones(1)
     for p in probability:
         pmf = np.convolve(pmf, [1.0 - p, p])

@@ -153,15 +153,19 @@ def _check_rate(rate_hz: float, truth: GroundTruth, path: Path) -> None:
         )
 
 
-def read_tables(path: Path) -> dict[str, Trajectories]:
+def read_tables(path: Path, rate_hz: float | None = None) -> dict[str, Trajectories]:
     """Read the tables of a run by kind, as `tables_of` finds them.
+
+    Args:
+        path: run directory or table.
+        rate_hz: frame rate of a table that counts frames.
 
     Raises:
         DataError: as `tables_of`; or a table is not valid.
     """
     from jeat_graph.io.trajectories_io import read_trajectories
 
-    return {kind: read_trajectories(file) for kind, file in tables_of(path).items()}
+    return {kind: read_trajectories(file, rate_hz=rate_hz) for kind, file in tables_of(path).items()}
 
 
 def _motchallenge_rate(truth: Path, any_will_do: bool) -> float:

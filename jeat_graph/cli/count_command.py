@@ -78,12 +78,18 @@ def run(args: argparse.Namespace) -> int:
                 "from (s)": round(c.t_from, 3),
                 "to (s)": round(c.t_to, 3),
                 "vehicles": c.count,
-                "95 %": f"{c.low} … {c.high}",
+                "95 %": None if np.isnan(c.expected) else f"{c.low} … {c.high}",
             }
             for c in counts
         ]
         print(Table.from_records(records).render() if records else "no track crosses a line")
+        if any(np.isnan(c.expected) for c in counts):
+            _say("no interval: the table has no variances of position (`track` writes them)")
     return 0
+
+
+def _say(text: str) -> None:
+    print(f"jeat-graph count: {text}", file=sys.stderr)
 
 
 def _line(text: str, number: int) -> Line:

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jeat_graph.config.argument_types import positive
+from jeat_graph.cli.options import add_output_rate, add_rate
 from jeat_graph.data.errors import DataError
 
 if TYPE_CHECKING:
@@ -38,9 +38,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--only", choices=("causal", "smoothed"), help="which table (default: smoothed, if there)"
     )
     parser.add_argument("--track", type=int, metavar="ID", help="the track, for tum")
-    parser.add_argument(
-        "--frames-per-second", type=positive, metavar="HZ", help="of the video, or of the road's frames"
+    add_output_rate(
+        parser,
+        "frames per second of the video or of the road's frames (default: as the run's input; roads: 25)",
+        "--frames-per-second",
     )
+    add_rate(parser)
     parser.add_argument(
         "--camera", metavar="CAMERA.yaml", help="with its place on the map, for sumo and geojson"
     )
@@ -61,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     if args.only and args.only not in files:
         raise DataError(f"{args.source}: there is no {args.only} table")
     kinds = [args.only] if args.only else list(files) if args.to == "rerun" else [list(files)[-1]]
-    tables = {kind: read_trajectories(files[kind]) for kind in kinds}
+    tables = {kind: read_trajectories(files[kind], rate_hz=args.rate) for kind in kinds}
     table = tables[kinds[-1]]
     if args.to == "rerun":
         from jeat_graph.drawing.rerun_log import log_run
@@ -79,13 +82,13 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _write_ottrk(args: argparse.Namespace, frames: Trajectories) -> None:
+def _write_ottrk(args: argparse.Namespace, frames: Trajectories, rate_hz: float) -> None:
     from jeat_graph.io.ottrk import OttrkVideo, write_ottrk
     from jeat_graph.runs.recorded import load_run_data
 
-    width, height = load_run_data(args.source).size_px()
+    width, height = load_run_data(args.source, None, args.rate).size_px()
     name = args.video or f"{Path(args.source).resolve().name}.mp4"
-    video = OttrkVideo(name, int(width), int(height), args.frames_per_second, args.start)
+    video = OttrkVideo(name, int(width), int(height), rate_hz, args.start)
     write_ottrk(frames, args.out, video)
 
 
@@ -96,7 +99,7 @@ def _export_road(args: argparse.Namespace) -> int:
     from jeat_graph.road.exports.highd import write_highd
     from jeat_graph.road.exports.sumo import write_fcd
 
-    frames = read_road_frames(args.source, args.frames_per_second or _ROAD_RATE_HZ)
+    frames = read_road_frames(args.source, args.output_rate or _ROAD_RATE_HZ)
     camera = None if args.camera is None else read_camera(args.camera)
     if args.to == "highd":
         write_highd(frames, args.out)
@@ -117,19 +120,20 @@ def _at_frames(args: argparse.Namespace, table: Trajectories, kind: Kind) -> Non
     from jeat_graph.io.coco_tracks import write_coco_tracks
     from jeat_graph.io.cvat import write_cvat
     from jeat_graph.io.scans_io import read_instants
+    from jeat_graph.runs.beside import recorded_rate
     from jeat_graph.runs.frame_export import at_frames
     from jeat_graph.runs.recorded import load_run_data
 
-    rate_hz = args.frames_per_second
+    rate_hz = args.output_rate or args.rate or recorded_rate(args.source)
     if rate_hz is None:
-        raise DataError(f"--to {args.to} counts frames: give their rate with --frames-per-second HZ")
+        raise DataError(f"--to {args.to} counts frames: give their rate with --output-rate HZ")
     instants = read_instants(Path(args.source))
     frames = at_frames(table, kind, np.unique(table.t) if instants is None else instants, rate_hz)
     if args.to == "cvat":
         write_cvat(frames, args.out, rate_hz)
         return
     if args.to == "ottrk":
-        _write_ottrk(args, frames)
+        _write_ottrk(args, frames, rate_hz)
         return
-    width, height = load_run_data(args.source).size_px()
+    width, height = load_run_data(args.source, None, args.rate).size_px()
     write_coco_tracks(frames, args.out, rate_hz, (round(width), round(height)))

@@ -12,6 +12,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from typing import Any
 
 from jeat_graph.config.argument_types import picture_size, positive
@@ -79,7 +80,27 @@ def add_output_rate(parser: argparse.ArgumentParser, text: str, *old_names: str)
     """
     parser.add_argument("--output-rate", type=positive, metavar="HZ", help=text)
     for name in old_names:
-        parser.add_argument(name, dest="output_rate", type=positive, help=argparse.SUPPRESS)
+        add_old_name(parser, name, "--output-rate")
+
+
+class _OldName(argparse.Action):
+    """Takes an option under the name it had before, and says how it is called now."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        value: Any,
+        name: str | None = None,
+    ) -> None:
+        print(f"{parser.prog}: warning: {name} is called {self.const} now", file=sys.stderr)
+        setattr(namespace, self.dest, value)
+
+
+def add_old_name(parser: argparse.ArgumentParser, old: str, new: str) -> None:
+    """Declare the name that an option with a number had before: understood, not shown, and warned of."""
+    dest = new.removeprefix("--").replace("-", "_")
+    parser.add_argument(old, dest=dest, const=new, type=positive, action=_OldName, help=argparse.SUPPRESS)
 
 
 def add_reading(parser: argparse.ArgumentParser) -> None:

@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jeat_graph.cli.options import add_classes, add_output_rate, add_rate
+from jeat_graph.cli.options import add_classes, add_old_name, add_output_rate, add_rate
 from jeat_graph.cli.terminal import one_line
 from jeat_graph.config.argument_types import drawn_size, not_negative, positive
 from jeat_graph.data.errors import DataError
@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--size", type=drawn_size, metavar="WxH", help="size of each picture (default: the recording's)")
     add_classes(parser, "draw only tracks that are of one of these classes then")
     add_rate(parser)
-    add("--frame-rate", dest="rate", type=positive, help=argparse.SUPPRESS)
+    add_old_name(parser, "--frame-rate", "--rate")
     add(
         "--labels",
         choices=("all", "thin", "none"),

@@ -5,12 +5,15 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from jeat_graph.cli.options import add_rate
+
 HELP = "open a run in the viewer rerun (extra `rerun`): boxes, uncertainty and sensors on timelines"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument("source", metavar="RUN", help="run directory or trajectory table")
+    add_rate(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -20,5 +23,5 @@ def run(args: argparse.Namespace) -> int:
 
     rerun_module()
     path = Path(args.source)
-    log_run(read_tables(path), path.resolve().name)
+    log_run(read_tables(path, args.rate), path.resolve().name)
     return 0

@@ -107,7 +107,7 @@ def test_render_draws_one_class_only(run, tmp_path):
 
 
 def test_cvat_and_coco_have_the_classes_as_labels(run, tmp_path):
-    rate = ["--frames-per-second", "20"]
+    rate = ["--output-rate", "20"]
     assert main(["export", str(run / "run"), "--to", "cvat", *rate, "--out", str(tmp_path / "t.zip")]) == 0
     with zipfile.ZipFile(tmp_path / "t.zip") as archive:
         labels = archive.read("gt/labels.txt").decode().splitlines()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -53,3 +54,17 @@ def test_a_line_that_is_none_is_one_clear_line(run, text, capsys):
     error = capsys.readouterr().err
     assert error.startswith("jeat-graph count: ")
     assert error.count("\n") == 1
+
+
+def test_a_result_without_variances_has_no_interval(tmp_path, capsys):
+    result, out = tmp_path / "result.txt", tmp_path / "counts.csv"
+    result.write_text("".join(f"{k},1,{10 * k},40,10,20,1,-1,-1,-1\n" for k in range(1, 11)))
+    command = ["count", str(result), "--rate", "10", "--line", "50,0,50,100"]
+    assert main(command) == 0
+    shown = capsys.readouterr()
+    assert shown.out.rstrip().endswith("1     –")
+    assert "no interval: the table has no variances" in shown.err
+    assert main([*command, "--out", str(out)]) == 0
+    (row,) = pd.read_csv(out).to_dict("records")
+    assert (row["count"], row["low"], row["high"]) == (1, 0, 1)
+    assert np.isnan(row["expected"])

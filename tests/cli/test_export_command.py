@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import zipfile
 
 import numpy as np
@@ -33,7 +34,7 @@ def run(tmp_path):
 
 def test_cvat_gets_frames_counted_from_one_and_its_labels(run, tmp_path):
     out = tmp_path / "tracks.zip"
-    assert main(["export", str(run), "--to", "cvat", "--frames-per-second", "10", "--out", str(out)]) == 0
+    assert main(["export", str(run), "--to", "cvat", "--output-rate", "10", "--out", str(out)]) == 0
     with zipfile.ZipFile(out) as archive:
         assert sorted(archive.namelist()) == ["gt/gt.txt", "gt/labels.txt"]
         rows = [line.split(",") for line in archive.read("gt/gt.txt").decode().splitlines()]
@@ -43,8 +44,29 @@ def test_cvat_gets_frames_counted_from_one_and_its_labels(run, tmp_path):
     ]
     assert rows[0][2:] == ["95.000", "25.000", "10.000", "10.000", "1", "1", "0.900"]
     first = out.read_bytes()
-    assert main(["export", str(run), "--to", "cvat", "--frames-per-second", "10", "--out", str(out)]) == 0
+    assert main(["export", str(run), "--to", "cvat", "--output-rate", "10", "--out", str(out)]) == 0
     assert out.read_bytes() == first
+
+
+def test_a_result_that_counts_frames_has_its_rate_once(tmp_path, capsys):
+    result, out = tmp_path / "smoothed.txt", tmp_path / "tracks.json"
+    result.write_text("1,3,10,20,30,40,1,-1,-1,-1\n2,3,11,20,30,40,1,-1,-1,-1\n")
+    command = ["export", str(result), "--to", "coco", "--out", str(out)]
+    assert main(command) == 2
+    assert "give the frame rate with --rate" in capsys.readouterr().err
+    assert main([*command, "--rate", "25"]) == 0
+    assert [round(a["bbox"][0]) for a in json.loads(out.read_text())["annotations"]] == [10, 11]
+
+
+def test_the_rate_comes_by_itself_from_a_run_whose_input_counted_frames(tmp_path):
+    rows = [f"{k},-1,{10 + k},20,30,40,0.9,-1,-1,-1\n" for k in range(1, 31)]
+    (tmp_path / "det.txt").write_text("".join(rows))
+    run, out = tmp_path / "run", tmp_path / "tracks.zip"
+    assert main(["track", str(tmp_path / "det.txt"), "--rate", "10", "--out", str(run)]) == 0
+    assert main(["export", str(run), "--to", "cvat", "--out", str(out)]) == 0
+    with zipfile.ZipFile(out) as archive:
+        frames = [int(line.split(",")[0]) for line in archive.read("gt/gt.txt").decode().splitlines()]
+    assert frames[-1] == 30
 
 
 def test_a_trajectory_of_the_tum_format_has_unit_quaternions(run, tmp_path):
@@ -72,7 +94,7 @@ def test_rerun_gets_boxes_and_plots(run, tmp_path):
     [
         (["--to", "tum"], "--track"),
         (["--to", "tum", "--track", "99"], "no track 99"),
-        (["--to", "cvat"], "--frames-per-second"),
+        (["--to", "cvat"], "--output-rate HZ"),
         (["--to", "tum", "--track", "3", "--only", "smoothed"], "no smoothed"),
     ],
 )

@@ -16,9 +16,11 @@ NEEDED = {
     "compare": ["run"],
     "count": ["run", "--line", "0,0,1,1"],
     "eval": ["run", "--gt", "gt.csv"],
+    "export": ["run", "--to", "cvat", "--out", "f.zip"],
     "render": ["run", "--out", "f.mp4"],
     "report": ["run", "--out", "p.html"],
     "stream": [],
+    "view": ["run"],
     "track": ["d.csv", "--out", "run"],
     "batch": ["m.csv", "--out", "runs"],
 }
@@ -28,17 +30,32 @@ def parse(command: str, *more: str) -> argparse.Namespace:
     return build_parser(command).parse_args([command, *NEEDED[command], *more])
 
 
-@pytest.mark.parametrize("command", ["track", "eval", "compare", "calibrate", "render", "report", "count"])
+@pytest.mark.parametrize(
+    "command", ["track", "eval", "compare", "calibrate", "render", "report", "count", "export", "view"]
+)
 def test_rate_is_that_of_the_input(command):
     args = parse(command, "--rate", "29.97")
     assert args.rate == 29.97
     assert getattr(args, "output_rate", None) is None
 
 
-@pytest.mark.parametrize("command", ["track", "render"])
+@pytest.mark.parametrize("command", ["track", "render", "export"])
 def test_output_rate_is_that_of_what_is_written(command):
     args = parse(command, "--output-rate", "50")
     assert (args.rate, args.output_rate) == (None, 50.0)
+
+
+@pytest.mark.parametrize(
+    ("command", "old", "new"),
+    [
+        ("track", "--frame-rate", "--output-rate"),
+        ("render", "--frame-rate", "--rate"),
+        ("export", "--frames-per-second", "--output-rate"),
+    ],
+)
+def test_a_name_of_before_is_told_how_it_is_called_now(command, old, new, capsys):
+    parse(command, old, "50")
+    assert capsys.readouterr().err == f"jeat-graph {command}: warning: {old} is called {new} now\n"
 
 
 def test_names_of_before_are_still_understood_and_not_shown():
@@ -106,7 +123,7 @@ def test_a_warning_of_the_library_is_one_line_that_names_the_command(capsys, mon
     assert capsys.readouterr().err == "jeat-graph count: warning: first second\n"
 
 
-@pytest.mark.parametrize("kind", ["accuracy", "speed", "smoothing"])
+@pytest.mark.parametrize("kind", ["accuracy", "speed", "smoothing", "events"])
 def test_a_quick_benchmark_never_replaces_published_tables(kind, capsys, tmp_path):
     from jeat_graph.cli.main import main
 

@@ -78,7 +78,7 @@ def _export(road: Path, target: str, name: str, *more: str) -> Path:
 
 
 def test_sumo_gets_front_bumpers_at_even_steps(road: Path) -> None:
-    tree = ElementTree.parse(_export(road, "sumo", "fcd.xml", "--frames-per-second", "10")).getroot()
+    tree = ElementTree.parse(_export(road, "sumo", "fcd.xml", "--output-rate", "10")).getroot()
     assert tree.tag == "fcd-export"
     steps = list(tree)
     times = [float(step.attrib["time"]) for step in steps]
@@ -94,7 +94,7 @@ def test_sumo_gets_front_bumpers_at_even_steps(road: Path) -> None:
 
 def test_sumos_own_reader_reads_it(road: Path) -> None:
     sumolib = pytest.importorskip("sumolib")
-    out = _export(road, "sumo", "again.xml", "--frames-per-second", "10")
+    out = _export(road, "sumo", "again.xml", "--output-rate", "10")
     seen = [
         (float(step.time), one.id, float(one.x))
         for step in sumolib.xml.parse(str(out), "timestep")
@@ -114,7 +114,7 @@ def test_on_the_map_sumo_gets_easting_and_northing(road: Path) -> None:
 
 
 def test_highd_has_its_columns_and_who_is_around_whom(road: Path) -> None:
-    folder = _export(road, "highd", "highd", "--frames-per-second", "25")
+    folder = _export(road, "highd", "highd", "--output-rate", "25")
     with (folder / "01_tracks.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert list(rows[0]) == HIGHD
