@@ -35,11 +35,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--size", type=drawn_size, default=(640, 384), metavar="WxH", help="picture (640x384)")
     add("--tick", type=positive, default=100.0, metavar="HZ", help="rate of CARLA's ticks (100)")
     add("--sigma", type=positive, default=0.1, metavar="S", help="σ_C that the first measure sets to 0 (0.1)")
+    add("--quick", action="store_true", help="one scenario, 6 small pictures: to see that it runs")
     add("--grain", type=positive, default=0.5, metavar="DN", help="flicker of CARLA's picture, std (0.5)")
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure (or read an earlier result), print and write."""
+    if args.quick:
+        args.scenarios, args.seeds, args.frames, args.size = _SCENARIOS[1:2], args.seeds[:1], 6, (160, 96)
     return common.measure_or_read(args, "events", measure, tables)
 
 

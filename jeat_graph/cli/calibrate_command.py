@@ -63,7 +63,8 @@ def run(args: argparse.Namespace) -> int:
         args.rate = shown.rate_hz
     recordings = [at_measurement(read_many([path], **reading(args)), base) for path in args.detections]
     beside = None if args.image else _size_beside(args.detections, shown)
-    base = with_image(base, recordings, args.image or beside)
+    picture = _picture_from(args, base, beside)
+    base = with_image(base, recordings, args.image or (None if beside is None else beside.size_px))
     if args.gt:
         truths = [read_truth(path, rate_hz=args.rate) for path in args.gt]
         found = _with_truth(list(zip(recordings, truths, strict=True)), base, not args.no_tune)
@@ -71,20 +72,31 @@ def run(args: argparse.Namespace) -> int:
         found = _without_truth(recordings, base)
     _say_lags(found)
     config = rounded(found.config)
-    save_config(config, args.out, comment=describe(args, config, found))
+    save_config(config, args.out, comment=describe(args, picture, found))
     sys.stdout.write("\n".join(table.render("text") for table in summary(config, found)))
     print(f"written: {args.out}", file=sys.stderr)
     return 0
 
 
-def _size_beside(paths: list[str], shown: Facts | None) -> tuple[int, int] | None:
+def _size_beside(paths: list[str], shown: Facts | None) -> Facts | None:
     from jeat_graph.runs.beside import facts_beside
 
     facts = facts_beside(paths) if shown is None else shown
     if facts is None or facts.size_px is None:
         return None
     print(f"picture of {facts.size_px[0]} x {facts.size_px[1]} px, as {facts.origin} says", file=sys.stderr)
-    return facts.size_px
+    return facts
+
+
+def _picture_from(args: argparse.Namespace, base: Config, beside: Facts | None) -> str:
+    """Say where the size of the picture comes from."""
+    if args.image:
+        return "--image"
+    if beside is not None:
+        return Path(beside.origin).name
+    if base.input.picture == "seen":
+        return "the boxes, as far as they reach"
+    return f"the base configuration {Path(args.config).name}"
 
 
 def with_image(base: Config, recordings: list[Detections], size: tuple[int, int] | None) -> Config:
@@ -166,9 +178,8 @@ def _say_lags(found: Calibration) -> None:
             )
 
 
-def describe(args: argparse.Namespace, config: Config, found: Calibration) -> str:
+def describe(args: argparse.Namespace, picture: str, found: Calibration) -> str:
     """Comment at the head of the file: where each part comes from."""
-    from jeat_graph.config.reading import load_config
     from jeat_graph.version import __version__
 
     names = ", ".join(Path(p).parent.name + "/" + Path(p).name for p in args.detections)
@@ -187,9 +198,6 @@ def describe(args: argparse.Namespace, config: Config, found: Calibration) -> st
             "p_detect (an upper bound), clutter, blind speed: without truth, by what confirmed tracks took.",
             "noise, motion and precision by score are unknown without truth and stay as in the base.",
         ]
-    picture = f"the base configuration {Path(args.config).name}"
-    if args.image or config.image != load_config(args.config).image:
-        picture = "--image" if args.image else "seqinfo.ini"
     lines += [f"image: from {picture}; all else from the base configuration {Path(args.config).name}."]
     return "\n".join(lines)
 

@@ -44,6 +44,7 @@ def test_the_size_of_the_picture_is_taken_over(files, tmp_path):
     out = tmp_path / "config.yaml"
     d, g = files[0]
     assert main(["calibrate", d, "--gt", g, "--image", "1300x730", "--no-tune", "--out", str(out)]) == 0
+    assert "# image: from --image;" in out.read_text()
     image = load_config(out).image
     assert (image.width, image.height) == (1300.0, 730.0)
 

@@ -191,17 +191,18 @@ def _times(
         return np.array([request.at_s])
     start = span[0] if request.start_s is None else request.start_s
     end = span[1] if request.end_s is None else request.end_s
-    if end < start:
-        raise DataError(f"--end {end:g} s lies before the start, {start:g} s")
+    if end < start and request.end_s is not None:
+        raise DataError(f"--end {end:.10g} s lies before the start, {start:.10g} s")
     if frames is not None and request.rate_hz is None:
         times = frames.times_s[(frames.times_s >= start - 1e-6) & (frames.times_s <= end + 1e-6)]
     else:
-        times = start + np.arange(int((end - start) * rate_hz + 1e-6) + 1) / rate_hz
+        times = start + np.arange(max(int((end - start) * rate_hz + 1e-6) + 1, 0)) / rate_hz
         times = times[(times >= span[0] - 1e-6) & (times <= span[1] + 1e-6)]
     if not len(times):
         raise DataError(
-            f"there is nothing to draw from {start:g} s to {end:g} s; the recording lasts from {span[0]:g} s "
-            f"to {span[1]:g} s"
+            f"there is nothing to draw from {start:.10g} s"
+            + ("" if request.end_s is None else f" to {end:.10g} s")
+            + f"; the recording lasts from {span[0]:.10g} s to {span[1]:.10g} s"
         )
     return np.asarray(times, dtype=np.float64)
 
@@ -232,8 +233,8 @@ def _absent(
         if t.max() < times[0] - _APART_S or t.min() > times[-1] + _APART_S
     }
     lines = [
-        f"{kind} lasts from {t.min():.6g} s to {t.max():.6g} s, the pictures from {times[0]:.6g} s to "
-        f"{times[-1]:.6g} s"
+        f"{kind} lasts from {t.min():.10g} s to {t.max():.10g} s, the pictures from {times[0]:.10g} s to "
+        f"{times[-1]:.10g} s"
         for kind, t in outside.items()
     ]
     if outside and outside.keys() >= tables.keys() and len(times) > 1:
