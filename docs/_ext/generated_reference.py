@@ -11,6 +11,23 @@ from typing import Any, get_type_hints
 from sphinx.application import Sphinx
 
 _WIDTH = 96
+#: Columns of the page of settings.
+_PRESETS = ("default", "paper")
+#: The sensor whose values stand for all.
+_SENSOR = "rgb"
+#: Bounds above that keep numbers finite and mean nothing else.
+_NO_BOUND = 1e9
+_ABOUT_SETTINGS = """# Configuration
+
+Every setting, made from the schema in `jeat_graph/config`, with its values in two presets. `jeat-graph`
+takes the preset `default` if it is told nothing else. A setting is written `section.name=value` with `--set`,
+or as a tree in a YAML file for `--config`; `base: NAME` there takes the rest from a preset.
+
+Where the values come from: those of `default` were chosen over
+[real and simulated recordings](../guides/real-detectors.md); those of `paper` stand in the paper, or are
+marked as ours in its file where the paper leaves them open; `highway` and `kitti` were calibrated on the
+simulator and on KITTI. The [method](../method.md) has the equations.
+"""
 
 
 def commands_page() -> str:
@@ -54,26 +71,27 @@ def _help(parser: argparse.ArgumentParser) -> str:
 
 
 def configuration_page() -> str:
-    """Write every setting with its unit, default, bounds and meaning as Markdown."""
+    """Write every setting with its meaning, values, unit and bounds as Markdown."""
+    from jeat_graph.config.reading import load_config
     from jeat_graph.config.schema import Config
 
-    out = [
-        "# Configuration\n\nEvery setting, made from the schema in `jeat_graph/config`. A setting is written"
-        " `section.name=value` with `--set`, or as a tree in a YAML file; `base: NAME` takes the rest from a"
-        " preset. Defaults are those of the schema; presets change some of them.\n"
-    ]
+    out = [_ABOUT_SETTINGS]
+    presets = [load_config(name) for name in _PRESETS]
     hints = get_type_hints(Config)
     for f in dataclasses.fields(Config):
         kind = hints[f.name]
         section = kind if dataclasses.is_dataclass(kind) else _value_of_mapping(kind)
         if section is None:
             continue
-        title = f"{f.name}.NAME" if section is not kind else f.name
+        values = [getattr(preset, f.name) for preset in presets]
+        title, note = f.name, ""
+        if section is not kind:
+            title, note = f"{f.name}.NAME", f" The values are those of the sensor `{_SENSOR}`."
+            values = [value[_SENSOR] for value in values]
         about = (section.__doc__ or "").strip().split("\n\n")[0]
-        out.append(
-            f"## {title}\n\n{about}\n\n| setting | default | unit | range | meaning |\n|---|---|---|---|---|"
-        )
-        out += [_row(title, item) for item in dataclasses.fields(section)]
+        head = f"| setting | meaning | {' | '.join(f'`{name}`' for name in _PRESETS)} | unit | range |"
+        out.append(f"## {title}\n\n{about}{note}\n\n{head}\n|---|---|{'---|' * len(_PRESETS)}---|---|")
+        out += [_row(title, item, values) for item in dataclasses.fields(section)]
         out.append("")
     return "\n".join(out)
 
@@ -84,19 +102,36 @@ def _value_of_mapping(kind: Any) -> Any:
     return candidates[0] if candidates else None
 
 
-def _row(section: str, item: dataclasses.Field[Any]) -> str:
+def _row(section: str, item: dataclasses.Field[Any], sections: list[Any]) -> str:
+    """A row of a setting; `sections` are that part of the presets."""
     meta = item.metadata
-    default = item.default if item.default is not dataclasses.MISSING else item.default_factory()  # type: ignore[misc]
+    values = [getattr(one, item.name) for one in sections]
     if "options" in meta:
         span = ", ".join(f"`{option}`" for option in meta["options"])
     elif "low" in meta:
-        high = "∞" if meta["high"] == float("inf") else f"{meta['high']:g}"
-        span = f"{'(' if meta.get('open_low') else '['}{meta['low']:g}, {high}{')' if high == '∞' else ']'}"
+        span = _span(meta["low"], meta["high"], bool(meta.get("open_low")))
     else:
-        span = "true, false" if isinstance(default, bool) else ""
-    shown = f"`{str(default).lower() if isinstance(default, bool) else default}`"
-    cells = [f"`{section}.{item.name}`", shown, meta.get("unit", ""), span, meta.get("doc", "")]
+        span = "true, false" if isinstance(values[0], bool) else ""
+    unit = "" if meta.get("unit") == "1" else meta.get("unit", "")
+    cells = [f"`{section}.{item.name}`", meta.get("doc", ""), *map(_shown, values), unit, span]
     return "| " + " | ".join(str(cell).replace("|", "\\|") for cell in cells) + " |"
+
+
+def _span(low: float, high: float, above: bool) -> str:
+    """Bounds in words: an upper one that nothing reaches is none."""
+    if high >= _NO_BOUND:
+        return f"{'>' if above else '≥'} {low:g}"
+    return f"{f'above {low:g}' if above else f'{low:g}'} to {high:g}"
+
+
+def _shown(value: Any) -> str:
+    if value is None or value == ():
+        return "none"
+    if isinstance(value, float) and value >= _NO_BOUND:
+        return "no bound"
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
+    return f"`{value:.15g}`" if isinstance(value, float) else f"`{value}`"
 
 
 def _write(app: Sphinx) -> None:

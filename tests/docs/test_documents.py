@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
+import importlib.util
 import re
 import shlex
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -130,3 +133,62 @@ def test_what_the_short_answers_say_of_dying_tracks_is_so():
                 break
     assert ends[0.5] == pytest.approx(0.5, abs=0.051)
     assert ends[1.0] == pytest.approx(1.0, abs=0.051)
+
+
+@pytest.mark.parametrize(
+    ("asked", "answer"),
+    [
+        ("tracks die sooner", "lifecycle.max_gap_confirmed_s"),
+        ("unit sigma_px", "px: the standard deviation"),
+        ("one camera", "jeat-graph track rgb=det.txt"),
+        ("existence", "probability that there is a vehicle"),
+        ("how late smoothed row", "smoother.lag_s"),
+        ("picture size", "--image 1920x1080"),
+        ("nees", "2 in `eval`"),
+    ],
+)
+def test_the_short_answers_have_what_newcomers_search_for(asked, answer):
+    rows = (ROOT / "docs" / "questions.md").read_text(encoding="utf-8").splitlines()
+    mine = [row for row in rows if answer in row]
+    assert mine
+    assert all(word in mine[0].lower() for word in asked.split())
+
+
+def test_the_search_puts_the_short_answers_first():
+    """The page that the scorer lifts is there, and the settings of the site name the scorer."""
+    scorer = (ROOT / "docs" / "_static" / "scorer.js").read_text(encoding="utf-8")
+    (page,) = re.findall(r'docname === "(\w+)"', scorer)
+    assert page == "questions"
+    assert (ROOT / "docs" / f"{page}.md").is_file()
+    assert '"scorer.js"' in (ROOT / "docs" / "conf.py").read_text(encoding="utf-8")
+
+
+def test_every_extra_is_in_the_guide_to_installing():
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    text = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
+    rows = " ".join(row.split("|")[1] for row in text.splitlines() if row.startswith("| `"))
+    assert set(extras["optional-dependencies"]) == set(re.findall(r"`(\w+)`", rows))
+
+
+def test_the_page_of_settings_has_what_a_run_takes_without_being_told():
+    """The generated page shows the values of the preset `default`, with unit and meaning."""
+    spec = importlib.util.spec_from_file_location("pages", ROOT / "docs" / "_ext" / "generated_reference.py")
+    pytest.importorskip("sphinx", reason="pip install 'jeat-graph[docs]'")
+    assert spec is not None
+    assert spec.loader is not None
+    pages = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(pages)
+    text = pages.configuration_page()
+    known = load_config("default")
+    row = next(line for line in text.splitlines() if line.startswith("| `sensors.NAME.sigma_px`"))
+    assert f"| `{known.sensors['rgb'].sigma_px:g}` |" in row
+    assert "| px |" in row
+    rows = re.findall(r"^\| `(\w+)\.(?:NAME\.)?(\w+)` \| (.*?) \|", text, flags=re.MULTILINE)
+    sections = {f.name: getattr(known, f.name) for f in dataclasses.fields(known)}
+    expected = {
+        (section, f.name)
+        for section, value in sections.items()
+        for f in dataclasses.fields(value["rgb"] if isinstance(value, dict) else value)
+    }
+    assert {(section, setting) for section, setting, _ in rows} == expected
+    assert all(meaning for _, _, meaning in rows)
