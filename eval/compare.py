@@ -8,6 +8,7 @@ from typing import Any
 
 from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.measured_track import MeasuredTrack
+from jeat_graph.data.progress import portion
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.consistency import consistency
 from jeat_graph.eval.samples import (
@@ -22,6 +23,9 @@ from jeat_graph.eval.tables import Cell, Table
 
 #: Lags of the curve (s).
 LAGS_S = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0)
+
+# Share of the work that judging without truth is, where there is truth too.
+_CONSISTENCY = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,11 +70,13 @@ def compare(
     """
     lags = tuple(sorted(set(lags_s)))
     values: dict[str, Any] = {"tracks": len(tracks), "sensors": list(sensors)}
-    values["consistency"], table = consistency(tracks)
+    with portion(0.0, _CONSISTENCY):
+        values["consistency"], table = consistency(tracks)
     tables = [table]
     samples = None
     if truth is not None and causal is not None and truth.motion is not None:
-        samples = collect_samples(tracks, truth, causal, lags, instants=instants, iou=iou)
+        with portion(_CONSISTENCY, 1.0):
+            samples = collect_samples(tracks, truth, causal, lags, instants=instants, iou=iou)
         if len(samples):
             errors = {name: errors_of(samples, name) for name in samples.states}
             values["errors"] = errors

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from jeat_graph.data.progress import portion, told
 from jeat_graph.eval.breakdown import by_distance, by_motion, confirmation_latency, recovery_times
 from jeat_graph.eval.frames import Frames, Kind, build_frames
 from jeat_graph.eval.kinematics import KinematicErrors, kinematic_errors
@@ -61,22 +62,24 @@ def judge_runs(
     """
     kinds: tuple[Kind, ...] = ("causal", "smoothed")
     out: dict[str, Judgement] = {}
-    for kind in kinds:
+    for kind in told(kinds):
         sequences = []
-        for run in runs:
-            table = run.causal if kind == "causal" else run.smoothed
-            if table is not None:
-                frames = build_frames(
-                    run.truth,
-                    table,
-                    kind=kind,
-                    max_age_s=max_age_s,
-                    max_gap_s=max_gap_s,
-                    instants=run.instants,
-                )
-                sequences.append(frames)
+        with portion(0.0, 0.4):
+            for run in told(runs):
+                table = run.causal if kind == "causal" else run.smoothed
+                if table is not None:
+                    frames = build_frames(
+                        run.truth,
+                        table,
+                        kind=kind,
+                        max_age_s=max_age_s,
+                        max_gap_s=max_gap_s,
+                        instants=run.instants,
+                    )
+                    sequences.append(frames)
         if sequences:
-            scores = score_frames(sequences, iou=iou)
+            with portion(0.4, 0.8):
+                scores = score_frames(sequences, iou=iou)
             out[kind] = Judgement(kind, scores, kinematic_errors(sequences, iou=iou), tuple(sequences))
     return out
 

@@ -17,7 +17,7 @@ TOP = ("filters", "association", "smoothers", "eval", "configs")
 #: Low to high: a module imports from its own layer and from those before it. The first name that fits
 #: counts; "" is the package itself, as its users import it.
 LAYERS = (
-    ("version", "data.arrays", "data.errors"),
+    ("version", "data.arrays", "data.errors", "data.progress"),
     ("filters", "association"),
     ("smoothers",),
     ("data",),

@@ -37,6 +37,7 @@ from jeat_graph.config.schema import Config, InputConfig, MotionConfig, SensorCo
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.progress import portion, told
 
 _MIN_LENGTH = 5
 # A detector's errors persist over neighbouring scans; one detection a sensor and period is taken as
@@ -68,8 +69,10 @@ def calibrate_blind(recordings: Sequence[Detections], base: Config, rounds: int 
     }
     association = replace(base.association, priority=())
     config = replace(base, sensors=sensors, association=association, input=InputConfig())
-    for _ in range(rounds):
-        config = _fit(config, follow(recordings, config))
+    for _ in told(range(rounds)):
+        with portion(0.0, 0.5):
+            followed = follow(recordings, config)
+        config = _fit(config, followed)
     return config
 
 

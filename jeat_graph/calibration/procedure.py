@@ -15,6 +15,7 @@ from jeat_graph.calibration.tune import Choice, Recording, knobs, tune
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.progress import portion, told
 from jeat_graph.runs.declaring import fit_input
 from jeat_graph.runs.latency import at_measurement
 
@@ -71,7 +72,7 @@ def calibrate_with_truth(
     pairs: list[Recording] = list(recordings)
     lags: list[Lag] = []
     clocks = base
-    for _ in range(_ROUNDS):
+    for _ in told(range(_ROUNDS), 2 * _ROUNDS):
         new = _lags_with_truth(pairs, base)
         lags = _added(lags, new)
         shifted = with_lags(_on_time(base), new)
@@ -99,7 +100,7 @@ def calibrate_without_truth(recordings: Sequence[Detections], base: Config) -> C
     base = _declared(base, recordings)
     lags: list[Lag] = []
     clocks, seen = base, list(recordings)
-    for _ in range(_ROUNDS):
+    for _ in told(range(_ROUNDS), 2 * _ROUNDS):
         periods = [1.0 / base.sensors[name].rate_hz for name in base.sensor_names]
         try:
             new = lags_between(follow(seen, base), base.sensor_names, periods)
@@ -111,7 +112,8 @@ def calibrate_without_truth(recordings: Sequence[Detections], base: Config) -> C
             break
         seen = [at_measurement(detections, shifted) for detections in seen]
         clocks = _with_latencies(clocks, shifted)
-    config = with_parts(base, calibrate_blind(seen, base), _WITHOUT_TRUTH)
+    with portion(0.5, 1.0):
+        config = with_parts(base, calibrate_blind(seen, base), _WITHOUT_TRUTH)
     return Calibration(_with_latencies(_on_time(config), clocks), tuple(lags))
 
 

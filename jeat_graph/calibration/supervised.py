@@ -16,6 +16,7 @@ from jeat_graph.calibration.sensor import calibrate_sensor
 from jeat_graph.config.schema import BirthConfig, Config, ImageConfig, InputConfig, SensorConfig
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.progress import told
 from jeat_graph.data.trajectories import GroundTruth
 
 Recording = tuple[Detections, GroundTruth]
@@ -40,7 +41,7 @@ def calibrate(recordings: Sequence[Recording], base: Config | None = None) -> Co
         raise DataError("the recordings hold no scan")
     matches: dict[str, SensorMatches] = {}
     sensors: dict[str, SensorConfig] = {}
-    for name in names:
+    for name in told(names):
         parts = [
             match_sensor(detections, truth, name, sequence)
             for sequence, (detections, truth) in enumerate(recordings)

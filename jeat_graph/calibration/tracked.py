@@ -12,6 +12,7 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.progress import portion, told
 from jeat_graph.tracking.whole import track
 
 _MIN_ROWS = 50
@@ -70,8 +71,9 @@ def follow(recordings: Sequence[Detections], config: Config) -> TrackedDetection
     taken: list[list[BoolArray]] = [[] for _ in names]
     scans = [0] * len(names)
     first_track = 0
-    for detections in recordings:
-        table = track(eager, detections)
+    for detections in told(recordings):
+        with portion(0.0, 0.6):
+            table = track(eager, detections)
         sure = table.existence >= config.lifecycle.confirm_existence
         kept = np.isin(table.track_id, np.unique(table.track_id[sure]))
         table = table.take(kept)

@@ -65,8 +65,9 @@ def run(args: argparse.Namespace) -> int:
             "only consistency is judged",
             file=sys.stderr,
         )
-    measured = measured_run(folder, args.detections, progress=sys.stderr.isatty())
-    with stages("compare", 1) as stage:
+    with stages("compare", 2) as stage:
+        stage("reading, or tracking again")
+        measured = measured_run(folder, args.detections)
         stage("smoothing at all lags")
         comparison = compare_run(measured, truth, args.lags)
     print("\n".join(table.render() for table in comparison.tables), end="")

@@ -1,6 +1,6 @@
-"""A progress bar over the stages of a command, for work that has no loop of its own to count.
+"""A progress bar over the stages of a command, and over the work within each, as far as that tells of itself.
 
-Within a stage the time goes on, so that one can tell work from a standstill.
+Where a stage tells nothing the time goes on, so that one can tell work from a standstill.
 """
 
 from __future__ import annotations
@@ -9,6 +9,8 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+
+from jeat_graph.data.progress import heard
 
 _TICK_S = 0.5
 
@@ -19,7 +21,7 @@ def stages(command: str, total: int) -> Iterator[Callable[[str], None]]:
 
     Args:
         command: name of the command.
-        total: number of stages.
+        total: number of stages; each is an equal part of the bar.
 
     Yields:
         A function to be called with the name of each stage when it begins.
@@ -27,7 +29,7 @@ def stages(command: str, total: int) -> Iterator[Callable[[str], None]]:
     from tqdm import tqdm
 
     begun = 0
-    form = "{desc} {percentage:3.0f}%|{bar}| {n_fmt}/{total_fmt} [{elapsed}]"
+    form = "{desc} {percentage:3.0f}%|{bar}| [{elapsed}]"
     hidden = not sys.stderr.isatty()
     with tqdm(total=total, desc=command, bar_format=form, disable=hidden, leave=False) as bar:
 
@@ -37,6 +39,9 @@ def stages(command: str, total: int) -> Iterator[Callable[[str], None]]:
             begun += 1
             bar.set_description_str(f"{command}: {name}")
 
+        def advance(share: float) -> None:
+            bar.n = min(max(begun - 1, 0) + share, total)
+
         over = threading.Event()
 
         def tick() -> None:
@@ -44,11 +49,13 @@ def stages(command: str, total: int) -> Iterator[Callable[[str], None]]:
                 bar.refresh()
 
         ticking = threading.Thread(target=tick, daemon=True)
-        if not hidden:
-            ticking.start()
-        try:
+        if hidden:
             yield begin
+            return
+        ticking.start()
+        try:
+            with heard(advance):
+                yield begin
         finally:
             over.set()
-            if not hidden:
-                ticking.join()
+            ticking.join()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from jeat_graph.cli.options import add_rate
 from jeat_graph.cli.progress import stages
 from jeat_graph.cli.terminal import one_line
+from jeat_graph.data.progress import portion
 
 if TYPE_CHECKING:
     from jeat_graph.drawing.page.figures import ComparedRun
@@ -80,10 +81,12 @@ def _compare(args: argparse.Namespace) -> tuple[ComparedRun | None, str | None]:
     if not folder.is_dir():
         return None, "Filter against smoother is not shown: that needs a run directory with its inputs."
     try:
-        measured = measured_run(folder, args.detections, progress=sys.stderr.isatty())
+        with portion(0.0, 0.3):
+            measured = measured_run(folder, args.detections)
     except DataError as error:
         if args.detections is not None:
             raise
         return None, f"Filter against smoother is not shown: {error}."
     truth = None if args.gt is None else read_truth(args.gt, rate_hz=args.rate)
-    return compared_run(compare_run(measured, truth)), None
+    with portion(0.3, 1.0):
+        return compared_run(compare_run(measured, truth)), None

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.progress import told
 from jeat_graph.drawing.palette import AXES, FILTER, FULL, GRID, LAGGED, TRUTH
 from jeat_graph.eval.compare import Comparison
 from jeat_graph.eval.samples import Samples, lag_name
@@ -58,13 +59,14 @@ def write_plots(comparison: Comparison, folder: str | Path) -> list[Path]:
     plt.switch_backend("agg")
     try:
         with mpl.rc_context(_STYLE):
-            figures = {
-                "trajectories": _trajectories(plt, samples),
-                "error-over-time": _error_over_time(plt, samples, comparison.lags_s),
-                "rmse-against-lag": _rmse_against_lag(plt, comparison),
+            figures: dict[str, Callable[[], Figure]] = {
+                "trajectories": lambda: _trajectories(plt, samples),
+                "error-over-time": lambda: _error_over_time(plt, samples, comparison.lags_s),
+                "rmse-against-lag": lambda: _rmse_against_lag(plt, comparison),
             }
-            for name, figure in figures.items():
-                for suffix in (".png", ".svg"):
+            for name, draw in told(figures.items()):
+                figure = draw()
+                for suffix in told((".png", ".svg")):
                     path = Path(folder) / (name + suffix)
                     with atomic_path(path) as temporary:
                         figure.savefig(temporary, metadata={"Date": None} if suffix == ".svg" else None)

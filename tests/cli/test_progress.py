@@ -5,8 +5,21 @@ from __future__ import annotations
 import io
 import sys
 import time
+from collections.abc import Callable
 
+import pytest
+
+from jeat_graph.cli.main import main
 from jeat_graph.cli.progress import stages
+from jeat_graph.config.reading import load_config
+from jeat_graph.data.progress import heard, told
+from jeat_graph.eval.compare import compare
+from jeat_graph.eval.judge import judge_runs
+from jeat_graph.eval.load import load_run
+from jeat_graph.io.detections_io import read_detections
+from jeat_graph.io.truth_io import read_truth
+from jeat_graph.runs.measured import measured_run
+from jeat_graph.tracking.tracker import Tracker
 
 
 class Terminal(io.StringIO):
@@ -14,6 +27,14 @@ class Terminal(io.StringIO):
 
     def isatty(self) -> bool:
         return True
+
+
+def wait_until(happened: Callable[[], bool]) -> None:
+    """Wait for something that another thread does."""
+    end = time.monotonic() + 100.0
+    while not happened():
+        assert time.monotonic() < end, "nothing moves"
+        time.sleep(0.005)
 
 
 def shown(monkeypatch, stream: io.StringIO) -> str:
@@ -28,7 +49,65 @@ def test_a_terminal_sees_each_stage_and_how_far_it_is(monkeypatch):
     text = shown(monkeypatch, Terminal())
     assert "eval: reading   0%" in text
     assert "eval: judging  50%" in text
-    assert "1/2" in text
+
+
+def test_the_percentage_moves_within_a_stage(monkeypatch):
+    stream = Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setattr("jeat_graph.cli.progress._TICK_S", 0.001)
+    with stages("eval", 2) as stage:
+        stage("reading")
+        stage("judging")
+        for k in told(range(4)):
+            if k == 2:
+                wait_until(lambda: "eval: judging  75%" in stream.getvalue())
+    assert "100%" not in stream.getvalue().split("judging  75%")[0]
+
+
+def test_track_has_a_bar_for_the_smoothing_at_the_end(recording, tmp_path, monkeypatch):
+    stream = Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    assert main(["track", str(recording / "detections.csv"), "--out", str(tmp_path / "run")]) == 0
+    assert "smooth:   0%" in stream.getvalue()
+
+
+@pytest.mark.parametrize("smoother", ["fixed-lag", "rts"])
+def test_a_tracker_tells_how_many_tracks_it_has_smoothed(smoother, recording):
+    tracker = Tracker(load_config("highway", [f"smoother.engine={smoother}"]))
+    for _ in tracker.run(read_detections(recording / "detections.csv")):
+        pass
+    shares: list[float] = []
+    with heard(shares.append):
+        tracker.finish()
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    assert len(set(shares)) > 15  # of the tracks that live to the end, with `rts` of all
+    assert shares[1] < 0.1
+
+
+def moves(work: Callable[[], object]) -> list[float]:
+    """What a piece of work tells of its progress."""
+    shares: list[float] = []
+    with heard(shares.append):
+        work()
+    assert shares == sorted(shares)
+    return sorted(set(shares))
+
+
+def test_judging_and_comparing_tell_how_far_they_are(recording, tmp_path):
+    run = tmp_path / "run"
+    truth = str(recording / "gt.csv")
+    assert main(["track", str(recording / "detections.csv"), "--out", str(run), "--config", "highway"]) == 0
+    assert len(moves(lambda: judge_runs([load_run(run, truth)]))) >= 6
+    measured = measured_run(run)
+    known = read_truth(truth)
+    compared = moves(
+        lambda: compare(
+            measured.tracks, measured.sensors, truth=known, causal=measured.causal, lags_s=(0.0, 0.1)
+        )
+    )
+    assert len(compared) > len(measured.tracks)
+    assert len(moves(lambda: measured_run(run))) >= 60  # tracked again: as many as there were steps
 
 
 def test_a_pipe_sees_nothing(monkeypatch):
@@ -42,7 +121,4 @@ def test_the_time_goes_on_within_a_stage(monkeypatch):
     with stages("eval", 1) as stage:
         stage("judging")
         drawn = stream.getvalue().count("judging")
-        end = time.monotonic() + 100.0
-        while stream.getvalue().count("judging") < drawn + 3:
-            assert time.monotonic() < end, "nothing moves"
-            time.sleep(0.01)
+        wait_until(lambda: stream.getvalue().count("judging") >= drawn + 3)

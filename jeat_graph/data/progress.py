@@ -1,0 +1,113 @@
+"""How far long work has come: loops tell it, whoever waits hears it, and nothing in between needs to know.
+
+A loop over pieces of about equal work says `for piece in told(pieces)`. Who wants to know says
+`with heard(report)` around the work; without that, `told` only passes the pieces on. Loops within loops add
+up: what the inner one tells is a share of the outer one's piece.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import NamedTuple, TypeVar
+
+T = TypeVar("T")
+
+
+class _Listener:
+    """Who waits, as long as he does.
+
+    Args:
+        report: is called with the share that is done (0 to 1).
+    """
+
+    def __init__(self, report: Callable[[float], object]) -> None:
+        self.report = report
+        self.waits = True
+
+
+class _Span(NamedTuple):
+    """What the present piece is of the whole: its begin and end, as shares."""
+
+    listener: _Listener
+    begin: float
+    end: float
+
+    def part(self, begin: float, end: float) -> _Span:
+        """Return a part of it, by shares of its own."""
+        width = self.end - self.begin
+        return _Span(self.listener, self.begin + begin * width, self.begin + end * width)
+
+    def enter(self) -> None:
+        """Make it the present piece, if anybody still waits: a loop may end later than that."""
+        if self.listener.waits:
+            _span.set(self)
+
+    def tell(self, share: float) -> None:
+        """Tell how much of the whole is done."""
+        if self.listener.waits:
+            self.listener.report(share)
+
+
+_span: ContextVar[_Span | None] = ContextVar("span", default=None)
+
+
+@contextmanager
+def heard(report: Callable[[float], object]) -> Iterator[None]:
+    """Let `report` be called with the share that is done (0 to 1), as the work in the block goes on.
+
+    Only work in the same thread is heard.
+    """
+    listener = _Listener(report)
+    token = _span.set(_Span(listener, 0.0, 1.0))
+    try:
+        yield
+    finally:
+        listener.waits = False
+        _span.reset(token)
+
+
+def told(pieces: Iterable[T], count: int | None = None) -> Iterator[T]:
+    """Pass pieces of work on, and tell how many are done.
+
+    Args:
+        pieces: of about equal work.
+        count: how many there are; must be given where they have no length.
+    """
+    span = _span.get()
+    number = count if count is not None else len(pieces) if isinstance(pieces, Collection) else 0
+    if span is None or not span.listener.waits or not number:
+        yield from pieces
+        return
+    try:
+        for k, piece in enumerate(pieces):
+            part = span.part(min(k, number - 1) / number, min(k + 1, number) / number)
+            span.tell(part.begin)
+            part.enter()
+            yield piece
+    finally:
+        span.enter()
+    span.tell(span.end)
+
+
+@contextmanager
+def portion(begin: float, end: float) -> Iterator[None]:
+    """Let the work in the block be a portion of the present piece, say its first third.
+
+    Args:
+        begin: share of the piece that is done before.
+        end: share that is done after it.
+    """
+    span = _span.get()
+    if span is None or not span.listener.waits:
+        yield
+        return
+    mine = span.part(begin, end)
+    span.tell(mine.begin)
+    mine.enter()
+    try:
+        yield
+    finally:
+        span.enter()
+    span.tell(mine.end)
