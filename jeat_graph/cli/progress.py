@@ -6,13 +6,10 @@ Where a stage tells nothing the time goes on, so that one can tell work from a s
 from __future__ import annotations
 
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from jeat_graph.data.progress import heard
-
-_TICK_S = 0.5
+from jeat_graph.data.progress import heard, ticking
 
 
 @contextmanager
@@ -42,20 +39,9 @@ def stages(command: str, total: int) -> Iterator[Callable[[str], None]]:
         def advance(share: float) -> None:
             bar.n = min(max(begun - 1, 0) + share, total)
 
-        over = threading.Event()
-
-        def tick() -> None:
-            while not over.wait(_TICK_S):
-                bar.refresh()
-
-        ticking = threading.Thread(target=tick, daemon=True)
-        if hidden:
-            yield begin
-            return
-        ticking.start()
-        try:
-            with heard(advance):
+        with ticking(bar):
+            if hidden:
                 yield begin
-        finally:
-            over.set()
-            ticking.join()
+            else:
+                with heard(advance):
+                    yield begin

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from jeat_graph.config.argument_types import counting, drawn_size
 from jeat_graph.data.errors import ConfigError
+from jeat_graph.data.progress import ticking
 
 if TYPE_CHECKING:
     from jeat_graph.simulation.dataset.workers import SourceFactory
@@ -154,7 +155,9 @@ def _pictures(args: argparse.Namespace, scenario: Scenario) -> int:
     from jeat_graph.simulation.dataset.protocol import Protocol
     from jeat_graph.simulation.dataset.recording import record_dataset
     from jeat_graph.simulation.dataset.workers import available_cores
+    from jeat_graph.simulation.imaging.renderer import paint_all
     from jeat_graph.simulation.scenario import scenario_to_yaml
+    from jeat_graph.tracking.notice import notice_if_cold
 
     given = {
         "video": args.video or ("png" if args.world == "varied" else None),
@@ -173,7 +176,12 @@ def _pictures(args: argparse.Namespace, scenario: Scenario) -> int:
     workers = 1 if carla else min(args.workers or available_cores(), protocol.segments)
     total = protocol.segments * frames
     quiet = not sys.stderr.isatty()
-    with tqdm(total=total, desc="simulate", unit=" frames", disable=quiet, leave=False) as bar:
+    if not carla:
+        notice_if_cold(paint_all, "the renderer")
+    with (
+        tqdm(total=total, desc="simulate", unit=" frames", disable=quiet, leave=False) as bar,
+        ticking(bar),
+    ):
         manifest = record_dataset(
             factory,
             args.out,

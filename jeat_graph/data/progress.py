@@ -7,12 +7,44 @@ up: what the inner one tells is a share of the outer one's piece.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
 T = TypeVar("T")
+_TICK_S = 0.5
+
+
+class Bar(Protocol):
+    """What is needed of a progress bar."""
+
+    disable: bool | None
+
+    def refresh(self) -> object:
+        """Draw it again."""
+
+
+@contextmanager
+def ticking(bar: Bar) -> Iterator[None]:
+    """Draw a bar again and again: its clock goes on where the work tells nothing, as while it is compiled."""
+    if bar.disable:
+        yield
+        return
+    over = threading.Event()
+
+    def tick() -> None:
+        while not over.wait(_TICK_S):
+            bar.refresh()
+
+    thread = threading.Thread(target=tick, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
 
 
 class _Listener:

@@ -54,7 +54,7 @@ def test_a_terminal_sees_each_stage_and_how_far_it_is(monkeypatch):
 def test_the_percentage_moves_within_a_stage(monkeypatch):
     stream = Terminal()
     monkeypatch.setattr(sys, "stderr", stream)
-    monkeypatch.setattr("jeat_graph.cli.progress._TICK_S", 0.001)
+    monkeypatch.setattr("jeat_graph.data.progress._TICK_S", 0.001)
     with stages("eval", 2) as stage:
         stage("reading")
         stage("judging")
@@ -115,7 +115,7 @@ def test_a_pipe_sees_nothing(monkeypatch):
 
 
 def test_the_time_goes_on_within_a_stage(monkeypatch):
-    monkeypatch.setattr("jeat_graph.cli.progress._TICK_S", 0.01)
+    monkeypatch.setattr("jeat_graph.data.progress._TICK_S", 0.01)
     stream = Terminal()
     monkeypatch.setattr(sys, "stderr", stream)
     with stages("eval", 1) as stage:

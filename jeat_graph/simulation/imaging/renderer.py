@@ -90,7 +90,7 @@ class Renderer:
         plan = self.plan(time_s, time_s)
         out = self.background.whole.copy()
         stage = self.stage(self.moments(np.array([time_s]), plan.look), plan.look)
-        _paint_all(out, self.tiles, plan.boxes, stage)
+        paint_all(out, self.tiles, plan.boxes, stage)
         return out
 
     def _look(self, states: VehicleStates) -> tuple[Look, IntArray]:
@@ -118,7 +118,7 @@ class Renderer:
 
 
 @njit(cache=True)
-def _paint_all(out: FloatArray, tiles: IntArray, boxes: FloatArray, stage: Stage) -> None:
+def paint_all(out: FloatArray, tiles: IntArray, boxes: FloatArray, stage: Stage) -> None:
     """Paint the tiles that vehicles touch, at the first of the moments, into a picture (H, W, C)."""
     who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)
     counts = np.zeros(3, dtype=np.int64)

@@ -13,6 +13,7 @@ from jeat_graph.io.events_dsec import EventFile
 from jeat_graph.io.video import open_frames
 from jeat_graph.simulation.dataset.manifest import read_json
 from jeat_graph.simulation.scenario import load_scenario
+from jeat_graph.tracking import notice
 
 SMALL = ("--sensors", "pictures", "--frames", "3", "--size", "64x48", "--workers", "1")
 
@@ -33,6 +34,14 @@ def test_the_set_has_the_segments_frames_and_size_asked_for(pictures: Path) -> N
         assert len(frames) == 3
     with EventFile(pictures / "segments" / "000000" / "events.h5") as events:
         assert events.size_px == (64, 48)
+
+
+def test_who_waits_for_the_renderer_to_be_compiled_is_told(tmp_path: Path, capsys, monkeypatch) -> None:
+    monkeypatch.setattr(notice, "_said", set())
+    monkeypatch.setattr(notice, "is_compiled", lambda _: False)
+    arguments = ["--segments", "1", "--seed", "3", *SMALL]
+    assert main(["simulate", "night", "--out", str(tmp_path / "set"), *arguments]) == 0
+    assert "jeat-graph: compiling the renderer for this machine, once" in capsys.readouterr().err
 
 
 def test_the_scenario_beside_it_can_be_simulated_again(pictures: Path) -> None:
