@@ -192,3 +192,14 @@ def test_the_page_of_settings_has_what_a_run_takes_without_being_told():
     }
     assert {(section, setting) for section, setting, _ in rows} == expected
     assert all(meaning for _, _, meaning in rows)
+
+
+def test_the_page_on_the_layout_names_every_folder_and_files_that_are_there():
+    text = (ROOT / "docs" / "design.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"^\| `([\w/]+?)/` \|", text, flags=re.MULTILINE))
+    tops = {"filters", "association", "smoothers", "eval", "configs"}
+    parts = {f"jeat_graph/{p.parent.name}" for p in (ROOT / "jeat_graph").glob("*/__init__.py")}
+    assert named == tops | parts
+    places = re.findall(r"^\| [^|`]+ \| `([\w/]+\.py)` \|", text, flags=re.MULTILINE)
+    assert len(places) >= 4
+    assert [place for place in places if not (ROOT / place).is_file()] == []
