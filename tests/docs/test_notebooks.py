@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -19,8 +20,14 @@ def test_there_are_three():
     ]
 
 
+def numbers(text: str) -> list[float]:
+    """All numbers in a text, in their order."""
+    return [float(found) for found in re.findall(r"-?\d+(?:\.\d+)?", text)]
+
+
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_every_cell_runs(path, tmp_path, monkeypatch):
+def test_every_cell_runs_and_prints_what_is_kept(path, tmp_path, monkeypatch, capsys):
+    """What is kept in the notebook is what it prints now, but for digits that hang on the machine."""
     pytest.importorskip("supervision")
     mpl = pytest.importorskip("matplotlib")
     mpl.use("Agg")
@@ -29,6 +36,10 @@ def test_every_cell_runs(path, tmp_path, monkeypatch):
     for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
         if cell["cell_type"] == "code":
             exec(compile("".join(cell["source"]), path.name, "exec"), space)
+            kept = ["".join(one["text"]) for one in cell["outputs"] if one["output_type"] == "stream"]
+            assert numbers(capsys.readouterr().out) == pytest.approx(
+                numbers("".join(kept)), rel=0.05, abs=0.1
+            )
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
