@@ -41,6 +41,23 @@ def jerk_density(
 
 
 @njit(cache=True)
+def common_growth(width: float, height: float) -> float:
+    """Rate of growth that both sides of a box share (1/s): what comes nearer grows in both.
+
+    A vehicle that turns, a walker's swinging arms or a box half hidden grow in one direction; that is not
+    perspective, and says nothing of how the motion will go on.
+
+    Args:
+        width: rate of ln width (1/s).
+        height: rate of ln height (1/s).
+    """
+    if width * height <= 0.0:
+        return 0.0
+    least = min(abs(width), abs(height))
+    return least if width > 0.0 else -least
+
+
+@njit(cache=True)
 def track_jerk(
     size_mean: FloatArray, jerk_px: float, jerk_per_size: float, jerk_per_growth: float, factor: float
 ) -> float:
@@ -55,5 +72,5 @@ def track_jerk(
     """
     # A runaway extrapolation of a size must not overflow, as in `association.boxes.track_boxes`.
     side = math.exp(min(0.5 * (size_mean[0, 0] + size_mean[1, 0]), _MOST_LOG_SIZE))
-    growth = 0.5 * (size_mean[0, 1] + size_mean[1, 1])
+    growth = common_growth(size_mean[0, 1], size_mean[1, 1])
     return factor * jerk_density(side, growth, jerk_px, jerk_per_size, jerk_per_growth)

@@ -14,7 +14,7 @@ from jeat_graph.config.schema import MotionConfig, SizeConfig
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.filters.coloured_noise import MOTION, expected, predict_errors, update_with_error
-from jeat_graph.filters.jerk import jerk_density
+from jeat_graph.filters.jerk import common_growth, jerk_density
 from jeat_graph.filters.kalman import predict, predict_size, update_block
 from jeat_graph.filters.motion import size_process_noise, size_transition
 
@@ -174,7 +174,7 @@ def growth_rates(
                     cov[0, side, 1, 1] = rate_std**2
                 continue
             predict_size(mean, cov, rate_density, dt)
-            out[k] = 0.5 * (mean[0, 0, 1] + mean[0, 1, 1])
+            out[k] = common_growth(mean[0, 0, 1], mean[0, 1, 1])
             for side in range(2):
                 update_block(mean[0, side], cov[0, side], log_size[k, side], var[k, side])
     return out

@@ -37,6 +37,9 @@ class MotionConfig(Section):
     velocity_std_per_size: float = number(3.0, "1/s", "std of a new track's velocity per px of box size")
     acceleration_std_px: float = number(1.0, "px/s²", "std of a new track's acceleration", open_low=True)
     acceleration_std_per_size: float = number(1.0, "1/s²", "the same per px of box size")
+    unseen_memory_s: float = number(
+        0.0, "s", "time constant with which acceleration and growth of an unseen track die away; 0: they stay"
+    )
 
 
 @dataclass(frozen=True)
@@ -80,6 +83,9 @@ class NoiseConfig(Section):
     scale_max: float = number(5.0, "1", "s_max of eq. 5", open_low=True)
     score_weighting: bool = flag(False, "divide R by max(score, score_floor)")
     score_floor: float = number(0.1, "1", "floor of the score in R", 0.001, 1.0)
+    hidden_growth: float = number(
+        0.0, "1", "growth of the error's std, as a share of it, where all of a vehicle is hidden by another"
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -5,12 +5,13 @@ from __future__ import annotations
 from numba import njit
 
 from jeat_graph.config.kernel_form import Model
+from jeat_graph.filters.noise import widen_hidden
 from jeat_graph.tracking.batch import Arrivals, prepare
 from jeat_graph.tracking.stages.associating import associate
 from jeat_graph.tracking.stages.beginning import give_birth
 from jeat_graph.tracking.stages.ending import confirm, remove_ended
 from jeat_graph.tracking.stages.learning import count_misses, learn_scene, learn_trust
-from jeat_graph.tracking.stages.predicting import current_p_detect, expect_detections, predict_all
+from jeat_graph.tracking.stages.predicting import current_p_detect, expect_detections, occlusion, predict_all
 from jeat_graph.tracking.stages.updating import take_second_views, update_matched
 from jeat_graph.tracking.state import SceneState, TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog
@@ -46,8 +47,10 @@ def step(
     log.count[0] = 0
     predict_all(tracks, n, dt, scene, model)
     batch = prepare(arrivals, model)
-    p_detect = current_p_detect(tracks, n, batch.present, model)
+    occluded = occlusion(tracks, n)
+    p_detect = current_p_detect(tracks, n, batch.present, occluded, model)
     expectation = expect_detections(tracks, n, model.sensors)
+    widen_hidden(expectation.white, expectation.coloured_std, occluded, settings.noise.hidden_growth)
     association = associate(tracks, n, batch, expectation, p_detect, scene, model)
     update_matched(tracks, n, batch, expectation, association, scene, model, log)
     if settings.association.second_views:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jeat_graph.filters.jerk import jerk_density, track_jerk
+from jeat_graph.filters.jerk import common_growth, jerk_density, track_jerk
 
 
 def test_without_growth_it_is_the_drivers_alone():
@@ -41,5 +41,26 @@ def test_beyond_a_growth_of_four_a_second_it_grows_no_more():
 def test_a_standing_track_has_a_part_of_it():
     size = np.array([[4.0, 0.3], [3.0, 0.1]])
     full = track_jerk(size, 1.0, 0.5, 2.0, 1.0)
-    assert full == pytest.approx(jerk_density(np.exp(3.5), 0.2, 1.0, 0.5, 2.0))
+    assert full == pytest.approx(jerk_density(np.exp(3.5), 0.1, 1.0, 0.5, 2.0))
     assert track_jerk(size, 1.0, 0.5, 2.0, 0.1) == pytest.approx(0.1 * full)
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "growth"),
+    [
+        (0.4, 0.4, 0.4),
+        (0.4, 0.1, 0.1),
+        (-0.2, -0.5, -0.2),
+        (0.4, -0.1, 0.0),
+        (-0.3, 0.2, 0.0),
+        (0.7, 0.0, 0.0),
+    ],
+)
+def test_only_what_both_sides_share_is_approach(width, height, growth):
+    assert common_growth(width, height) == growth
+    assert common_growth(height, width) == growth
+
+
+def test_a_walker_whose_arms_swing_is_not_taken_for_one_that_comes_near():
+    walks, swings = np.array([[4.0, 0.0], [5.0, 0.0]]), np.array([[4.0, 0.9], [5.0, -0.05]])
+    assert track_jerk(swings, 0.0, 1.0, 10.0, 1.0) == track_jerk(walks, 0.0, 1.0, 10.0, 1.0)

@@ -11,6 +11,7 @@ from numba import njit
 from jeat_graph.association.boxes import occluded_fraction, track_boxes, visible_fraction
 from jeat_graph.config.kernel_form import Model, SensorArrays, Settings
 from jeat_graph.data.arrays import BoolArray, FloatArray
+from jeat_graph.filters.coasting import forget
 from jeat_graph.filters.coloured_noise import expected, predict_errors
 from jeat_graph.filters.existence import motion_visibility
 from jeat_graph.filters.jerk import track_jerk
@@ -73,6 +74,12 @@ def predict_all(tracks: TrackArrays, n: int, dt: float, scene: SceneState, model
     if len(sensors.correlation_time_s):
         predict_errors(tracks.mean[:n], tracks.cov[:n], sensors.correlation_time_s, dt)
     predict_size(tracks.size_mean[:n], tracks.size_cov[:n], settings.size.rate_density, dt)
+    if settings.motion.unseen_memory_s > 0.0:
+        unseen = tracks.t_update[:n] < np.max(scene.last_look)
+        memory_s = settings.motion.unseen_memory_s
+        forget(
+            tracks.mean[:n], tracks.cov[:n], tracks.size_mean[:n], tracks.size_cov[:n], unseen, dt, memory_s
+        )
     lifecycle = settings.lifecycle
     if lifecycle.by_existence:
         survival = math.exp(-dt / lifecycle.lifetime_s)
@@ -87,7 +94,15 @@ def predict_all(tracks: TrackArrays, n: int, dt: float, scene: SceneState, model
 
 
 @inner
-def current_p_detect(tracks: TrackArrays, n: int, present: BoolArray, model: Model) -> FloatArray:
+def occlusion(tracks: TrackArrays, n: int) -> FloatArray:
+    """Fraction (n,) of each track's box that nearer tracks hide."""
+    return occluded_fraction(track_boxes(tracks.mean[:n], tracks.size_mean[:n]), tracks.existence[:n])
+
+
+@inner
+def current_p_detect(
+    tracks: TrackArrays, n: int, present: BoolArray, occluded: FloatArray, model: Model
+) -> FloatArray:
     """Probability (n, S) that each sensor detects each track now; 0 for sensors that did not look.
 
     The track's own running P_D times what is known of this moment: the part of the box inside the picture and
@@ -96,7 +111,6 @@ def current_p_detect(tracks: TrackArrays, n: int, present: BoolArray, model: Mod
     sensors, image = model.sensors, model.settings.image
     out = np.zeros((n, len(present)))
     boxes = track_boxes(tracks.mean[:n], tracks.size_mean[:n])
-    occluded = occluded_fraction(boxes, tracks.existence[:n])
     for i in range(n):
         inside = visible_fraction(boxes[i], image.width, image.height) * (1.0 - occluded[i])
         for s in range(len(present)):

@@ -1,0 +1,59 @@
+"""What is held of a track's motion while no sensor sees it: what changes quickly is soon forgotten.
+
+A constant acceleration, and a constant rate of growth, are good for the moments between two looks. Held for
+a second behind another vehicle, they throw a track across the picture: what the filter takes for them is
+half noise, and vehicles do not brake, nor people swing their arms, for that long. So while a track is not
+seen, both die away, and the velocity stays: the first-order model of Singer, "Estimating optimal tracking
+filter performance for manned maneuvering targets", IEEE T-AES 6(4), 1970, for just that time.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from jeat_graph.data.arrays import BoolArray, FloatArray
+
+_ACCELERATION, _RATE = 2, 1
+
+
+@njit(cache=True)
+def forget(
+    mean: FloatArray,
+    cov: FloatArray,
+    size_mean: FloatArray,
+    size_cov: FloatArray,
+    unseen: BoolArray,
+    dt: float,
+    memory_s: float,
+) -> None:
+    """Let acceleration and growth of the unseen tracks die away over `dt`, in place: a ← a exp(−Δ / τ).
+
+    The covariances are those of the scaled variables: what is smaller is also surer.
+
+    Args:
+        mean: (N, 2, 3 + B) per axis [p, v, a, …] (px, px/s, px/s²).
+        cov: (N, 2, 3 + B, 3 + B) covariance per axis.
+        size_mean: (N, 2, 2) ln width and ln height, each with its rate (1/s).
+        size_cov: (N, 2, 2, 2) covariance of each.
+        unseen: (N,) the tracks that this holds for.
+        dt: time step (s), >= 0.
+        memory_s: τ (s), > 0.
+    """
+    kept = math.exp(-dt / memory_s)
+    for i in range(len(unseen)):
+        if not unseen[i]:
+            continue
+        for axis in range(2):
+            _scale(mean[i, axis], cov[i, axis], _ACCELERATION, kept)
+            _scale(size_mean[i, axis], size_cov[i, axis], _RATE, kept)
+
+
+@njit(cache=True, forceinline=True)
+def _scale(mean: FloatArray, cov: FloatArray, k: int, factor: float) -> None:
+    """Scale component `k` of a block by a factor, in place."""
+    mean[k] *= factor
+    for j in range(len(mean)):
+        cov[k, j] *= factor
+        cov[j, k] *= factor
