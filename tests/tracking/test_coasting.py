@@ -8,7 +8,7 @@ _RATE_HZ = 25.0
 
 
 def walk(seed, unseen=(1.2, 1.9), duration=2.6):
-    """Scans of somebody who walks at constant speed, whose box swings, and who is out of sight for a while."""
+    """Scans of somebody who walks at constant speed, whose box swings; for a while he is out of sight."""
     rng = np.random.default_rng(seed)
     for k in range(int(duration * _RATE_HZ)):
         t = k / _RATE_HZ
