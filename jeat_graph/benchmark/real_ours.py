@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from jeat_graph.benchmark.real_sets import RealSet
 from jeat_graph.benchmark.recordings import JudgedRecording
 from jeat_graph.config.reading import load_config
@@ -16,10 +14,7 @@ from jeat_graph.data.detections import Detections
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.runs.declaring import fit_input
 from jeat_graph.runs.latency import at_measurement
-
-_MATCH_IOU = 0.5
-_EDGE_PX = 5.0
-_ELLIPSE_95 = -2.0 * np.log(0.05)  # χ² of 2 degrees of freedom
+from jeat_graph.tracking.whole import both_tables
 
 DEFAULT, BLIND, TRUTH = "default", "calibrated blindly", "calibrated with truth"
 
@@ -84,17 +79,6 @@ def _calibrated(row: OursOnSet, one: RealSet, half: int, seen: Sequence[Detectio
     return calibrate_with_truth(pairs, base).config
 
 
-def both_tables(config: Config, detections: Detections) -> tuple[Trajectories, Trajectories]:
-    """Track a recording and return its causal and its smoothed table."""
-    from jeat_graph.tracking.tracker import Tracker
-
-    engine = replace(config.smoother, engine="rts")
-    tracker = Tracker(replace(config, smoother=engine))
-    causal = [table for table in tracker.run(detections) if len(table)]
-    smoothed = tracker.finish()
-    return Trajectories.concatenate(causal or [Trajectories.empty(tracker.sensor_names)]), smoothed
-
-
 def judge_row(row: OursOnSet, one: RealSet) -> dict[str, Any]:
     """Track a set and judge both tables, pooled and recording by recording."""
     configs = configs_for(row, one)
@@ -136,26 +120,8 @@ def _scores(
 def _nees(
     recordings: Sequence[JudgedRecording], tables: Sequence[Trajectories], kind: Any
 ) -> dict[str, float]:
-    """Consistency of the position: mean of e² / var over both axes, and the share within 95 % ellipses.
+    """Consistency of the position, and the share of the errors within 95 % ellipses."""
+    from jeat_graph.eval.position_nees import position_nees
 
-    A consistent filter has 1 and .95. Only matched boxes that keep off the edges of the picture count: the
-    truth of a box that is cut is the part that shows.
-    """
-    from jeat_graph.eval.frames import build_frames
-    from jeat_graph.eval.matching import matched_entries
-
-    ratios = [np.zeros((0, 2))]
-    for r, table in zip(recordings, tables, strict=True):
-        frames = build_frames(r.truth, table, kind=kind)
-        truth, track = matched_entries(frames.iou, _MATCH_IOU)
-        box = frames.truth_boxes[truth]
-        width, height = (r.truth.boxes[:, :2] + r.truth.boxes[:, 2:]).max(axis=0)
-        far = box[:, :2] + box[:, 2:]
-        inside = (box[:, :2] > _EDGE_PX).all(axis=1) & (far[:, 0] < width - _EDGE_PX)
-        inside &= far[:, 1] < height - _EDGE_PX
-        error = frames.tracks.mean[track, :2] - (box[:, :2] + 0.5 * box[:, 2:])
-        ratios.append((error**2 / frames.tracks.var[track, :2])[inside])
-    total = np.concatenate(ratios).sum(axis=1)
-    if not len(total):
-        return {}
-    return {"anees": float(total.mean() / 2.0), "coverage": float(np.mean(total < _ELLIPSE_95))}
+    found = position_nees([(r.truth, table) for r, table in zip(recordings, tables, strict=True)], kind)
+    return {"anees": found.anees, "coverage": found.coverage} if found.matched else {}

@@ -59,7 +59,8 @@ def calibrate(recordings: Sequence[Recording], base: Config | None = None) -> Co
     size = fit_size(tracks.t, tracks.log_size, tracks.log_size_var, tracks.start)
     return replace(
         config,
-        motion=fit_motion(tracks, size),
+        # What holds while nothing is seen cannot be told from detections.
+        motion=replace(fit_motion(tracks, size), unseen_memory_s=config.motion.unseen_memory_s),
         size=size,
         birth=fit_births(config, matches, recordings),
         input=InputConfig(),

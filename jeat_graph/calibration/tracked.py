@@ -1,4 +1,4 @@
-"""Detections with the confirmed tracks that took them: what calibration goes by where there is no truth."""
+"""Detections with the confirmed tracks that took them: what clocks are compared by without truth."""
 
 from __future__ import annotations
 
@@ -7,16 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from jeat_graph.association.boxes import occluded_fraction
 from jeat_graph.config.schema import Config
-from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.progress import portion, told
 from jeat_graph.tracking.whole import track
 
 _MIN_ROWS = 50
-# Tracks are followed through gaps as long as this, so that the misses in them are counted.
+# Tracks are followed through gaps as long as this.
 _REPORT_GAP_S = 1.0
 
 
@@ -29,24 +28,12 @@ class TrackedDetections:
         track: (K,) number of its track, ascending.
         sensor: (K,) index into the configuration's sensor names.
         box: (K, 4) the detection (px).
-        detected: per sensor (L,), for each confirmed track at each scan in its life, whether it was detected.
-        speed: per sensor (L,), the track's image speed then (px/s).
-        visible: per sensor (L,), the part of the track's box that no nearer track hides.
-        score: per sensor (D,), scores of all detections.
-        taken: per sensor (D,), whether a confirmed track took it.
-        scans: per sensor, the number of scans.
     """
 
     t: FloatArray
     track: IntArray
     sensor: IntArray
     box: FloatArray
-    detected: tuple[BoolArray, ...]
-    speed: tuple[FloatArray, ...]
-    visible: tuple[FloatArray, ...]
-    score: tuple[FloatArray, ...]
-    taken: tuple[BoolArray, ...]
-    scans: tuple[int, ...]
 
 
 def follow(recordings: Sequence[Detections], config: Config) -> TrackedDetections:
@@ -64,12 +51,6 @@ def follow(recordings: Sequence[Detections], config: Config) -> TrackedDetection
     )
     names = config.sensor_names
     cols: dict[str, list[FloatArray]] = {name: [] for name in ("t", "track", "sensor", "box")}
-    detected: list[list[BoolArray]] = [[] for _ in names]
-    speed: list[list[FloatArray]] = [[] for _ in names]
-    visible: list[list[FloatArray]] = [[] for _ in names]
-    score: list[list[FloatArray]] = [[] for _ in names]
-    taken: list[list[BoolArray]] = [[] for _ in names]
-    scans = [0] * len(names)
     first_track = 0
     for detections in told(recordings):
         with portion(0.0, 0.6):
@@ -82,32 +63,22 @@ def follow(recordings: Sequence[Detections], config: Config) -> TrackedDetection
             if name not in detections.sensors:
                 continue
             own = np.flatnonzero(detections.scan_sensor == detections.sensors.index(name))
-            scans[s] += len(own)
             first = np.searchsorted(table.t, detections.scan_t[own])
             last = np.searchsorted(table.t, detections.scan_t[own], side="right")
             bit = (table.used >> s & 1).astype(bool)
             for k, lo, hi in zip(own, first, last, strict=True):
                 scan = detections.scan(int(k))
-                got = np.zeros(len(scan), dtype=bool)
                 rows = np.arange(lo, hi)
-                detected[s].append(bit[rows])
-                speed[s].append(np.hypot(table.mean[rows, 2], table.mean[rows, 3]))
-                visible[s].append(1.0 - occluded_fraction(table.boxes[rows], table.existence[rows]))
                 rows = rows[bit[rows]]
                 if len(rows) and len(scan):
                     j = _nearest(table.mean[rows, :2], table.boxes[rows, 2:], scan.boxes)
-                    got[j] = True
                     cols["t"].append(np.full(len(rows), scan.t))
                     cols["track"].append(first_track + number[rows])
                     cols["sensor"].append(np.full(len(rows), s))
                     cols["box"].append(scan.boxes[j])
-                score[s].append(scan.scores)
-                taken[s].append(got)
         first_track += int(number.max(initial=-1)) + 1
     if sum(len(c) for c in cols["t"]) < _MIN_ROWS:
-        raise DataError(
-            "the tracker could follow almost nothing; calibrate with --gt, or from a better --config"
-        )
+        raise DataError("the tracker could follow almost nothing")
     flat = {name: np.concatenate(parts) for name, parts in cols.items()}
     order = np.lexsort((flat["sensor"], flat["t"], flat["track"]))
     return TrackedDetections(
@@ -115,12 +86,6 @@ def follow(recordings: Sequence[Detections], config: Config) -> TrackedDetection
         track=flat["track"][order].astype(np.int64),
         sensor=flat["sensor"][order].astype(np.int64),
         box=flat["box"][order],
-        detected=tuple(np.concatenate(x) if x else np.zeros(0, dtype=bool) for x in detected),
-        speed=tuple(np.concatenate(x) if x else np.zeros(0) for x in speed),
-        visible=tuple(np.concatenate(x) if x else np.zeros(0) for x in visible),
-        score=tuple(np.concatenate(x) if x else np.zeros(0) for x in score),
-        taken=tuple(np.concatenate(x) if x else np.zeros(0, dtype=bool) for x in taken),
-        scans=tuple(scans),
     )
 
 

@@ -15,11 +15,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from jeat_graph.calibration.honesty import price
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.eval.metrics import evaluate
+from jeat_graph.eval.position_nees import position_nees
 from jeat_graph.tracking.whole import track
 
 Recording = tuple[Detections, GroundTruth]
@@ -119,11 +121,11 @@ def tune(
 
 
 def tracking_score(config: Config, recordings: Sequence[Recording]) -> float:
-    """Mean of MOTA, IDF1 and HOTA (per cent), pooled over recordings tracked with `config`."""
+    """Mean of MOTA, IDF1 and HOTA (per cent), less the price of untrue variances, pooled over recordings."""
     pairs = [(truth, track(config, detections)) for detections, truth in recordings]
     instants = [np.unique(detections.scan_t) for detections, _ in recordings]
     scores = evaluate(pairs, instants=instants)
-    return float(scores.MOTA + scores.IDF1 + scores.HOTA) / 3.0
+    return float(scores.MOTA + scores.IDF1 + scores.HOTA) / 3.0 - price(position_nees(pairs).anees)
 
 
 def knobs(config: Config) -> list[Knob]:

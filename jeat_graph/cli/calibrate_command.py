@@ -158,7 +158,7 @@ def _without_truth(recordings: list[Detections], base: Config) -> Calibration:
     from jeat_graph.calibration.procedure import calibrate_without_truth
 
     print(
-        "no --gt: noise, motion and precision by score cannot be known, and stay as in the base",
+        "no --gt: noise, reliability and motion cannot be known, and stay as in the base",
         file=sys.stderr,
     )
     with stages("calibrate", 1) as stage:
@@ -195,8 +195,8 @@ def describe(args: argparse.Namespace, picture: str, found: Calibration) -> str:
         ]
     else:
         lines += [
-            "p_detect (an upper bound), clutter, blind speed: without truth, by what confirmed tracks took.",
-            "noise, motion and precision by score are unknown without truth and stay as in the base.",
+            "which sensors there are, their rates and their clocks: from the recordings, without truth.",
+            "noise, reliability and motion cannot be known without truth and stay as in the base.",
         ]
     lines += [f"image: from {picture}; all else from the base configuration {Path(args.config).name}."]
     return "\n".join(lines)

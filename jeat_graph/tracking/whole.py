@@ -13,6 +13,19 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.tracker import Tracker
 
 
+def both_tables(config: Config, detections: Detections) -> tuple[Trajectories, Trajectories]:
+    """Track a recording and return its causal table and the smoothed one, of whole tracks.
+
+    Args:
+        config: sensors and settings.
+        detections: the recording.
+    """
+    tracker = Tracker(replace(config, smoother=replace(config.smoother, engine="rts")))
+    causal = [table for table in tracker.run(detections) if len(table)]
+    smoothed = tracker.finish()
+    return Trajectories.concatenate(causal or [Trajectories.empty(tracker.sensor_names)]), smoothed
+
+
 def track(config: Config, detections: Detections) -> Trajectories:
     """Track a recording from beginning to end and return the whole causal table.
 

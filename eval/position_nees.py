@@ -1,0 +1,57 @@
+"""Are the variances of positions true? Errors against the truth, in units of what the table says of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from jeat_graph.data.trajectories import GroundTruth, Trajectories
+from jeat_graph.eval.frames import Kind, build_frames
+from jeat_graph.eval.matching import matched_entries
+
+_MATCH_IOU = 0.5
+_EDGE_PX = 5.0
+_ELLIPSE_95 = -2.0 * np.log(0.05)  # χ² of 2 degrees of freedom
+
+
+class PositionNees(NamedTuple):
+    """Consistency of positions; NaN where nothing matched.
+
+    Attributes:
+        anees: mean of e² / var over both axes; 1 where the variances are true.
+        coverage: share of the errors within the 95 % ellipses.
+        matched: number of matched boxes.
+    """
+
+    anees: float
+    coverage: float
+    matched: int
+
+
+def position_nees(pairs: Sequence[tuple[GroundTruth, Trajectories]], kind: Kind = "causal") -> PositionNees:
+    """Judge the position's variances of tables against truth, pooled.
+
+    Only matched boxes that keep off the edges of the picture count: the truth of a box that is cut is the
+    part that shows. The picture is taken to reach as far as the truth does.
+
+    Args:
+        pairs: truth and table of each recording.
+        kind: how the tables are put beside the truth (`frames.build_frames`).
+    """
+    squares = [np.zeros((0, 2))]
+    for truth, table in pairs:
+        frames = build_frames(truth, table, kind=kind)
+        there, track = matched_entries(frames.iou, _MATCH_IOU)
+        box = frames.truth_boxes[there]
+        width, height = (truth.boxes[:, :2] + truth.boxes[:, 2:]).max(axis=0)
+        far = box[:, :2] + box[:, 2:]
+        inside = (box[:, :2] > _EDGE_PX).all(axis=1) & (far[:, 0] < width - _EDGE_PX)
+        inside &= far[:, 1] < height - _EDGE_PX
+        error = frames.tracks.mean[track, :2] - (box[:, :2] + 0.5 * box[:, 2:])
+        squares.append((error**2 / frames.tracks.var[track, :2])[inside])
+    total = np.concatenate(squares).sum(axis=1)
+    if not len(total):
+        return PositionNees(np.nan, np.nan, 0)
+    return PositionNees(float(total.mean() / 2.0), float(np.mean(total < _ELLIPSE_95)), len(total))
