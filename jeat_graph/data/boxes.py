@@ -22,7 +22,8 @@ def check_boxes(boxes: npt.ArrayLike, scores: npt.ArrayLike) -> tuple[FloatArray
         scores: (M,) detector confidence in [0, 1].
 
     Returns:
-        The boxes (M, 4) and scores (M,) as contiguous float64 arrays.
+        The boxes (M, 4) and scores (M,) as contiguous float64 arrays that can be written: for any other kind
+        compiled code would be made anew, which takes long.
 
     Raises:
         DataError: wrong shape, a value that is not finite, a size that is not positive, or a score
@@ -33,6 +34,8 @@ def check_boxes(boxes: npt.ArrayLike, scores: npt.ArrayLike) -> tuple[FloatArray
         s = np.ascontiguousarray(scores, dtype=np.float64)
     except (TypeError, ValueError):
         raise DataError("boxes must have shape (M, 4) and scores shape (M,), all of them numbers") from None
+    b = b if b.flags.behaved else b.copy()
+    s = s if s.flags.behaved else s.copy()
     if b.size == 0:
         b = b.reshape(0, 4)
     if b.ndim != 2 or b.shape[1] != 4:

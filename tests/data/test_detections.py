@@ -247,3 +247,27 @@ def test_supervision_and_detections_are_two_ways_to_say_one_thing():
     assert back.data["class_name"].tolist() == ["car"]
     nothing = Detections.from_supervision(sv.Detections.empty(), t=0.5)
     assert (nothing.num_scans, len(nothing)) == (1, 0)
+
+
+@pytest.mark.parametrize(
+    "kind", ["read-only", "unaligned", "reversed", "single precision", "other byte order"]
+)
+def test_arrays_of_any_kind_become_the_one_kind_that_the_kernels_are_compiled_for(kind):
+    """Tables and messages often give arrays that cannot be written; each other kind compiles for a minute."""
+    boxes, scores = np.array([[1.0, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.0]]), np.array([0.5, 0.25])
+
+    def other(values):
+        if kind == "read-only":
+            return np.frombuffer(values.tobytes()).reshape(values.shape)
+        if kind == "unaligned":
+            return np.frombuffer(bytearray(b"\0" + values.tobytes()), offset=1).reshape(values.shape)
+        if kind == "reversed":
+            return values[::-1]
+        return values.astype("<f4" if kind == "single precision" else ">f8")
+
+    expected = (boxes[::-1], scores[::-1]) if kind == "reversed" else (boxes, scores)
+    for found, wanted in zip(check_boxes(other(boxes), other(scores)), expected, strict=True):
+        np.testing.assert_array_equal(found, wanted)
+        assert (found.dtype, found.dtype.isnative) == (np.float64, True)
+        assert found.flags.c_contiguous
+        assert found.flags.behaved
