@@ -126,7 +126,6 @@ def _config(args: argparse.Namespace) -> Config:
     from jeat_graph.data.errors import ConfigError
 
     config = load_config(args.config, overrides(args))
-
     if args.checkpoint is not None and config.smoother.worker:
         raise ConfigError("--checkpoint does not go with smoother.worker: its state is in another process")
     if args.sink is not None and args.format == "csv":
@@ -178,11 +177,13 @@ def _warm_up(config: Config) -> None:
 def _take_all(
     session: Session, args: argparse.Namespace, interrupts: Interrupts, source: Source | None
 ) -> None:
+    from jeat_graph.io.stream_text import line_reader
     from jeat_graph.live.inputs import from_lines, from_source
 
     bad = _skip(session) if args.on_error == "skip" else None
     if source is None:
-        for message, place in from_lines(interrupts.lines(sys.stdin.buffer.readline), STDIN, args.joint, bad):
+        lines = interrupts.lines(line_reader(sys.stdin.buffer.readline))
+        for message, place in from_lines(lines, STDIN, args.joint, bad):
             _take(session, message, place, bad, args.time_unit)
         return
     since = 0

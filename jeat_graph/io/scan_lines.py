@@ -11,6 +11,7 @@ import numpy as np
 
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError
+from jeat_graph.io.stream_text import decode_line
 
 _KEYS = ("t", "sensor", "boxes", "scores")
 _CLASSES = "classes"  # may follow: names, one a box
@@ -69,7 +70,7 @@ def read_batches(
     numbered = enumerate(lines, start=1)
     trying = _Trying(bad)
     for number, line in numbered:
-        text = trying(_decode, line, name, number)
+        text = trying(decode_line, line, name, number)
         if not text:
             continue
         if text.startswith(("{", "[")):
@@ -98,13 +99,6 @@ class _Trying:
             return None
 
 
-def _decode(line: bytes, name: str, number: int) -> str:
-    try:
-        return line.decode("utf-8-sig" if number == 1 else "utf-8").strip()
-    except UnicodeDecodeError:
-        raise DataError("is not UTF-8", name, number) from None
-
-
 def _json_batches(
     text: str, number: int, numbered: Iterator[tuple[int, bytes]], name: str, trying: _Trying
 ) -> Iterator[ScanBatch]:
@@ -112,7 +106,7 @@ def _json_batches(
     if first is not None:
         yield first
     for after, line in numbered:
-        found = trying(_decode, line, name, after)
+        found = trying(decode_line, line, name, after)
         batch = trying(_json_batch, found, name, after) if found else None
         if batch is not None:
             yield batch
@@ -213,7 +207,7 @@ def _csv_batches(
     rows: list[_Row] = []
     first = 0
     for number, line in numbered:
-        text = trying(_decode, line, name, number)
+        text = trying(decode_line, line, name, number)
         row = trying(_csv_row, text, place, name, number) if text else None
         if row is None and text != "":
             continue  # it was bad

@@ -307,6 +307,21 @@ def test_late_scans_are_passed_over_if_asked(monkeypatch, capsys):
     assert "<stdin>:2" in err
 
 
+def test_a_line_that_never_ends_is_passed_over_in_bounded_memory(monkeypatch, capsys):
+    monkeypatch.setattr("jeat_graph.io.stream_text.LONGEST_LINE", 1000)
+    monkeypatch.setattr("jeat_graph.io.stream_text._REST", 64)
+    text = line(1.0) + "[" * 100_000 + "\n" + line(1.1)
+    code, out, err = stream(text, monkeypatch, capsys, "--on-error", "skip")
+    assert code == 0
+    assert [json.loads(text)["t"] for text in out.splitlines()] == [1.0, 1.1]
+    assert "<stdin>:2: is a line of more than 1000 bytes; passed over" in err
+    code, _, err = stream(text, monkeypatch, capsys)
+    assert (code, err.splitlines()[-1]) == (
+        2,
+        "jeat-graph stream: <stdin>:2: is a line of more than 1000 bytes",
+    )
+
+
 def test_smoothed_without_a_smoother_is_refused(monkeypatch, capsys, tmp_path):
     options = ("--smoothed", tmp_path / "s.csv", "--set", "smoother.engine=none")
     code, _, err = stream("", monkeypatch, capsys, *options)

@@ -201,6 +201,27 @@ def test_a_line_of_a_gigabyte_is_one_line_in_bounded_memory(tmp_path, name):
     assert int(resident_mib) < 6 * 1024
 
 
+@pytest.mark.skipif(not FULL, reason="a gigabyte through a pipe; make fuzz sends it")
+def test_stream_passes_over_a_line_of_a_gigabyte_in_bounded_memory():
+    script = (
+        "import resource, sys; from jeat_graph.cli.main import main\n"
+        "code = main(['stream', '--on-error', 'skip'])\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024, file=sys.stderr); sys.exit(code)"
+    )
+    line = b'{"t": %d, "sensor": "rgb", "boxes": [[1, 2, 30, 40]], "scores": [0.5]}\n'
+    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+    with subprocess.Popen([sys.executable, "-c", script], **pipes) as process:
+        process.stdin.write(line % 1)
+        for _ in range(1024):
+            process.stdin.write(b"1" * 2**20)
+        process.stdin.write(b"\n" + line % 2)
+        out, err = process.communicate(timeout=600)
+    assert process.returncode == 0
+    assert len(out.splitlines()) == 2
+    assert b"<stdin>:2: is a line of more than" in err
+    assert int(err.split()[-1]) < 700
+
+
 def test_a_damaged_event_file_is_read_or_refused_in_one_line(tmp_path):
     rng = np.random.default_rng(SEED)
     path = tmp_path / "e.h5"
