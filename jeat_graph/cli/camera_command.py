@@ -6,6 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
+from jeat_graph.cli.progress import stages
+from jeat_graph.config.argument_types import picture_size
 from jeat_graph.data.errors import DataError
 
 HELP = "calibrate a camera over a road from lengths, points and the vehicles' tracks, or show one"
@@ -26,23 +28,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--lengths", metavar="FILE", help="measured lengths: x1, y1, x2, y2 (px), metres, along or across")
     add("--points", metavar="FILE", help="surveyed points: x, y (px), east, north (m)")
     add("--zone", default="", metavar="UTM", help="UTM zone of the points, such as 33N, for maps")
-    add("--image", required=True, type=image_size, metavar="WxH", help="size of the picture in px")
+    add(
+        "--image",
+        type=picture_size,
+        metavar="WxH",
+        help="size of the picture in px (default: that of the run)",
+    )
     add("--out", required=True, metavar="CAMERA.yaml", help="the calibrated camera")
     show = actions.add_parser("show", help="say in words what a camera's file says").add_argument
     show("camera", metavar="CAMERA.yaml", help="the camera")
     show("--picture", metavar="FILE.png", help="draw the road's grid as the camera sees it")
     show("--frame", metavar="FILE", help="picture of the camera to draw it over")
-
-
-def image_size(text: str) -> tuple[int, int]:
-    """Read `1280x720`."""
-    try:
-        width, height = (int(part) for part in text.lower().split("x"))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"must be like 1280x720, got {text!r}") from None
-    if width < 1 or height < 1:
-        raise argparse.ArgumentTypeError("must be positive")
-    return width, height
 
 
 def run(args: argparse.Namespace) -> int:
@@ -58,6 +54,7 @@ def _calibrate(args: argparse.Namespace) -> int:
     from jeat_graph.road.report import calibration_lines
     from jeat_graph.road.residuals import Problem
     from jeat_graph.road.sources import contact_pixels
+    from jeat_graph.runs.beside import recorded_size
 
     if Path(args.out).suffix not in (".yaml", ".yml"):
         raise DataError("the name of a camera's file must end in .yaml", args.out)
@@ -66,15 +63,26 @@ def _calibrate(args: argparse.Namespace) -> int:
     config = CalibrationConfig()
     lengths = None if args.lengths is None else read_lengths(args.lengths)
     points = None if args.points is None else read_surveyed_points(args.points)
-    width, height = args.image
+    size = args.image or (None if args.tracks is None else recorded_size(args.tracks))
+    if size is None:
+        raise DataError("the size of the picture is not known: give --image WxH")
+    width, height = size
+    if not args.image:
+        print(
+            f"jeat-graph camera: picture of {width} x {height} px, as {args.tracks} says (--image WxH says "
+            "otherwise)",
+            file=sys.stderr,
+        )
     tracks = None
     if args.tracks is not None:
         table = contact_pixels(args.tracks)
-        tracks = thin(table.t, table.track_id, table.pixels, config, args.image)
+        tracks = thin(table.t, table.track_id, table.pixels, config, size)
         if not len(tracks):
             print(f"jeat-graph camera: {args.tracks}: no track is long enough to help", file=sys.stderr)
             tracks = None
-    calibration = calibrate(Problem(width, height, lengths, points, tracks, config), args.zone)
+    with stages("camera", 1) as stage:
+        stage("fitting")
+        calibration = calibrate(Problem(width, height, lengths, points, tracks, config), args.zone)
     lines = calibration_lines(calibration)
     write_camera(calibration.camera, args.out, lines)
     print("\n".join(lines))

@@ -111,7 +111,7 @@ def _say(text: str) -> None:
 def _bar(total: int) -> Any:
     from tqdm import tqdm
 
-    return tqdm(total=total, unit="vehicle", disable=not sys.stderr.isatty())
+    return tqdm(total=total, desc="road", unit="vehicle", disable=not sys.stderr.isatty(), leave=False)
 
 
 def _advance(bar: Any, done: int) -> None:

@@ -125,6 +125,16 @@ def recorded_rate(run: str | Path) -> float | None:
     return float(rate) if isinstance(rate, int | float) and rate > 0.0 else None
 
 
+def recorded_size(run: str | Path) -> tuple[int, int] | None:
+    """Return width and height (px) of the picture that a run was tracked with, None where it is not known."""
+    try:
+        image = read_record(Path(run))["config"]["image"]
+        size = round(image["width"]), round(image["height"])
+    except (DataError, KeyError, TypeError):
+        return None
+    return size if min(size) > 0 else None
+
+
 def _check_same(rate_hz: float, other_hz: float, origin: str) -> None:
     if abs(rate_hz / other_hz - 1.0) > _SAME_RATE:
         raise DataError(f"--rate {rate_hz:g} does not fit: {origin} says {other_hz:g} Hz; leave it out")

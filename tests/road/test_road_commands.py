@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import gzip
+import json
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from road_scenes import HEIGHT, WIDTH, camera, drives, lengths, see
 
 from jeat_graph.cli.main import main
+from jeat_graph.road.camera_file import read_camera
 
 BRNO = Path(__file__).parents[3] / "shared" / "data" / "brno"
 
@@ -133,6 +135,25 @@ def test_a_bad_length_is_named(
     assert f"{tmp_path / name}{says}" in message
     assert message.count("\n") == 1
     assert not out.exists()
+
+
+def test_the_size_of_the_picture_comes_from_the_run_or_has_to_be_given(
+    recording: tuple[Path, np.ndarray], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, _ = recording
+    run, cam = tmp_path / "run", tmp_path / "camera.yaml"
+    run.mkdir()
+    command = ["camera", "calibrate", "--run", str(run), "--lengths", str(folder / "lengths.csv")]
+    with gzip.open(folder / "points.csv.gz", "rt") as file:
+        (run / "smoothed.csv").write_text(file.read())
+    assert main([*command, "--out", str(cam)]) == 2
+    assert "the size of the picture is not known: give --image WxH" in capsys.readouterr().err
+    record = {"config": {"image": {"width": WIDTH, "height": HEIGHT}}}
+    (run / "run.json").write_text(json.dumps(record))
+    assert main([*command, "--out", str(cam)]) == 0
+    assert f"picture of {WIDTH} x {HEIGHT} px, as {run} says" in capsys.readouterr().err
+    camera = read_camera(cam)
+    assert (camera.width, camera.height) == (WIDTH, HEIGHT)
 
 
 @pytest.mark.skipif(not BRNO.is_dir(), reason="needs ../shared/data/brno beside the checkout")
