@@ -152,29 +152,38 @@ class TrajectoryViews:
         """
         return supervision_of(self.boxes, self.existence, self.classes, self.track_id)
 
-    def plot(self, kind: str = "picture", ax: Any = None) -> Any:
+    def plot(self, kind: str = "picture", ax: Any = None, picture: npt.ArrayLike | None = None) -> Any:
         """Draw the tracks with matplotlib.
 
         Args:
             kind: `picture` for the paths in the picture plane, `timeline` for the life of each track, `speed`
                 for the image speed over time.
             ax: axes to draw into; new ones by default.
+            picture: (H, W, 3) or (H, W) what to draw over, as matplotlib takes it (red, green, blue); then
+                the boxes of the table's last moment are drawn too, with their numbers.
 
         Returns:
             The axes.
 
         Raises:
-            DataError: no such kind.
+            DataError: no such kind, or a picture for another one than `picture`.
         """
         from matplotlib import pyplot as plt
 
         if kind not in ("picture", "timeline", "speed"):
             raise DataError(f"kind {kind!r}: there are picture, timeline and speed")
+        if picture is not None and kind != "picture":
+            raise DataError(f"kind {kind!r} goes over no picture")
         ax = plt.subplots()[1] if ax is None else ax
+        if picture is not None:
+            ax.imshow(picture, cmap="gray")
+            ax.autoscale(False)
         for track_id in np.unique(self.track_id):
             rows = self.of(int(track_id))
             if kind == "picture":
-                ax.plot(*rows.center.T, linewidth=1, label=str(track_id))
+                (path,) = ax.plot(*rows.center.T, linewidth=1, label=str(track_id))
+                if picture is not None:
+                    _draw_box(ax, rows.take(rows.t == self.t.max()), path.get_color())
             elif kind == "timeline":
                 ax.plot(rows.t, np.full(len(rows), track_id), linewidth=3)
             else:
@@ -228,3 +237,12 @@ class TrajectoryViews:
         note = f"{len(self)} rows, {tracks} tracks"
         header = "".join(f"<th>{name}</th>" for name in head)
         return f"<table><tr>{header}</tr>{''.join(rows)}</table><p>{note}</p>"
+
+
+def _draw_box(ax: Any, rows: TrajectoryViews, colour: str) -> None:
+    """Draw the box of one track, if it is there, with its number."""
+    from matplotlib.patches import Rectangle
+
+    for track_id, (left, top, width, height) in zip(rows.track_id, rows.boxes, strict=True):
+        ax.add_patch(Rectangle((left, top), width, height, fill=False, edgecolor=colour))
+        ax.text(left, top, str(track_id), color=colour, verticalalignment="bottom", clip_on=True)

@@ -133,3 +133,20 @@ def test_tables_with_and_without_classes_join(named, table):
     assert np.isnan(whole.class_probability[: len(table)]).all()
     with pytest.raises(DataError, match="both or neither"):
         replace(named, class_probability=None)
+
+
+def test_the_last_moment_s_boxes_are_drawn_over_a_picture_with_their_numbers(table):
+    axes = table.plot(picture=np.zeros((90, 160, 3), dtype=np.uint8))
+    now = table.t == table.t.max()
+    drawn = [(*patch.get_xy(), patch.get_width(), patch.get_height()) for patch in axes.patches]
+    assert sorted(drawn) == sorted(map(tuple, table.boxes[now].tolist()))
+    assert sorted(text.get_text() for text in axes.texts) == sorted(map(str, table.track_id[now].tolist()))
+    assert (axes.get_xlim(), axes.get_ylim()) == (
+        (-0.5, 159.5),
+        (89.5, -0.5),
+    )  # the picture, the right way up
+
+
+def test_curves_go_over_no_picture(table):
+    with pytest.raises(DataError, match="goes over no picture"):
+        table.plot("speed", picture=np.zeros((9, 16)))

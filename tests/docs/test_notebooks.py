@@ -48,3 +48,14 @@ def test_outputs_are_kept_and_small(path):
     assert any(cell.get("outputs") for cell in cells)
     assert not any(output["output_type"] == "error" for cell in cells for output in cell.get("outputs", []))
     assert path.stat().st_size < LARGEST_BYTES
+
+
+def test_five_lines_lead_from_a_detector_to_tracks_on_the_picture():
+    """Beside the line that is the user's own camera and detector."""
+    cells = json.loads(NOTEBOOKS[2].read_text(encoding="utf-8"))["cells"]
+    source = next(
+        "".join(c["source"]) for c in cells if "from jeat_graph import Tracker" in "".join(c["source"])
+    )
+    lines = [line for line in source.splitlines() if line.strip() and "picture_and_detections" not in line]
+    assert len(lines) == 5
+    assert lines[-1].startswith("tracks.plot(picture=picture)")
