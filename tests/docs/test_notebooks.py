@@ -27,7 +27,7 @@ def numbers(text: str) -> list[float]:
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_every_cell_runs_and_prints_what_is_kept(path, tmp_path, monkeypatch, capsys):
-    """What is kept in the notebook is about what it prints now: the tracker may have become a little better."""
+    """What is kept in the notebook is about what it prints now: the tracker may have become better."""
     pytest.importorskip("supervision")
     mpl = pytest.importorskip("matplotlib")
     mpl.use("Agg")
