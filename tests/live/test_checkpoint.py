@@ -165,5 +165,7 @@ def test_a_checkpoint_of_twenty_vehicles_is_small_and_costs_little(late, tmp_pat
             print(f"\n{max(sizes) / 1e6:.2f} MB at most, {ms[0]:.1f} ms at least, {ms[1]:.1f} ms median")
     assert len(tracker.causal()) == 20
     assert max(sizes) <= 1_000_000
-    # 5 ms where Python adds up so many numbers in one; a slower or busier machine gets as much more.
-    assert min(took) <= 0.005 * max(1.0, min(adding) / 0.001)
+    # 5 ms where Python adds up so many numbers in one; a slower or busier machine gets as much more. With
+    # others at work the caches are cold, which arrays feel and a sum does not: the short form allows twice.
+    most_s = 0.005 if full else 0.01
+    assert min(took) <= most_s * max(1.0, min(adding) / 0.001)

