@@ -19,6 +19,8 @@ PYTHON ?= $(firstword $(foreach name,$(PYTHONS),$(shell $(name) -c \
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
+# Without what GPUs need, which takes gigabytes; from PyTorch's own index.
+TORCH := torch==2.13.0+cpu
 SOURCES := $(shell find jeat_graph filters association smoothers eval -name '*.py')
 
 # Other kernels than this machine would choose: the oldest of OpenBLAS, none of NumPy's for newer processors, and
@@ -94,6 +96,8 @@ $(VENV)/.test: pyproject.toml $(VENV)/.run
 	@echo "make: installing what the tests need"
 	@$(PIP) --editable '.[test]'
 	@$(PIP) --no-deps 'trackers>=2.6,<3' norfair==2.3.0 'trackeval>=1.3,<2'
+	@$(PIP) --retries 0 --extra-index-url https://download.pytorch.org/whl/cpu $(TORCH) 2> /dev/null || \
+		echo "make: no PyTorch for processors to be had: the tests of training skip"
 	@touch $@
 
 $(VENV)/.docs: pyproject.toml $(VENV)/.run

@@ -31,6 +31,8 @@ myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
 myst_heading_anchors = 3
 nb_execution_mode = "off"  # a test runs the notebooks; their outputs are kept in them
 autodoc_member_order = "bysource"
+# Not needed to read what is written about it.
+autodoc_mock_imports = ["torch"]
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented_params"
 napoleon_google_docstring = True

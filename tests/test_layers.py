@@ -26,7 +26,7 @@ LAYERS = (
     ("tracking",),
     ("eval",),
     ("runs",),
-    ("calibration", "drawing", "simulation", "road", "detection", "live"),
+    ("calibration", "drawing", "simulation", "road", "detection", "training", "live"),
     ("api",),
     ("",),
     ("benchmark",),

@@ -22,6 +22,7 @@ COMMANDS = (
     "simulate",
     "events",
     "detect",
+    "train",
     "track",
     "stream",
     "batch",

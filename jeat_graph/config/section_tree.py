@@ -73,6 +73,29 @@ def merge(low: Mapping[str, Any], high: Mapping[str, Any]) -> dict[str, Any]:
     return out
 
 
+def tree_of_changes(changes: Sequence[str]) -> dict[str, Any]:
+    """Read `section.key=value` texts, the values as YAML; of two about one key the later counts.
+
+    Raises:
+        ConfigError: a text that has no key or no `=`, or a value that is not YAML.
+    """
+    tree: dict[str, Any] = {}
+    for text in changes:
+        key, equals, value = text.partition("=")
+        if not equals or not key.strip():
+            raise ConfigError(f"{text!r}: must read section.key=value")
+        try:
+            inner: Any = load_yaml(value)
+        except yaml.YAMLError as error:
+            raise ConfigError(
+                f"{text!r}: not valid YAML: {getattr(error, 'problem', None) or error}"
+            ) from None
+        for step in reversed(key.strip().split(".")):
+            inner = {step: inner}
+        tree = merge(tree, inner)
+    return tree
+
+
 def check_keys(tree: Mapping[str, Any], known: Sequence[str], where: str) -> None:
     """Refuse keys that do not exist, naming the nearest that does.
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from jeat_graph.config.fields import Section, number
-from jeat_graph.config.section_tree import build, merge, read_tree
-from jeat_graph.config.yaml_text import load_yaml
+from jeat_graph.config.section_tree import build, merge, read_tree, tree_of_changes
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.noise import NoiseSettings
@@ -138,14 +136,7 @@ def load_settings(path: str | Path | None = None, changes: Sequence[str] = ()) -
         ConfigError: no such file, unknown key (with the nearest known one) or bad value.
     """
     tree = {} if path is None else read_tree(str(path), (), str, "detection file")
-    for text in changes:
-        key, equals, value = text.partition("=")
-        if not equals or not key.strip():
-            raise ConfigError(f"{text!r}: must read section.key=value")
-        inner: Any = load_yaml(value)
-        for step in reversed(key.strip().split(".")):
-            inner = {step: inner}
-        tree = merge(tree, inner)
+    tree = merge(tree, tree_of_changes(changes))
     out = build(DetectionSettings, tree, "")
     assert isinstance(out, DetectionSettings)
     return out

@@ -1,0 +1,1 @@
+"""Networks of our own that find vehicles in pictures and in events, and their training; needs PyTorch."""

@@ -1,0 +1,106 @@
+"""What a step of the training is shown: the same for the same seed and step, whoever asks and when."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as AnySequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch import Tensor
+
+from jeat_graph.data.arrays import BoolArray, FloatArray
+from jeat_graph.training.data_sets import EventSegment, Picture
+from jeat_graph.training.event_samples import draw_sequence
+from jeat_graph.training.learning import Target
+from jeat_graph.training.picture_samples import cut_out, draw_window
+from jeat_graph.training.settings import NetSettings, TrainSettings
+
+#: Tell the random numbers of the order from those of the changes.
+_ORDER, _CHANGES = 0, 1
+
+
+class ShownBatch(NamedTuple):
+    """What is shown.
+
+    Attributes:
+        steps: inputs (B, C, H, W) of the windows in their order; of pictures one.
+        targets: of each step, of each of the B.
+    """
+
+    steps: list[Tensor]
+    targets: list[list[Target]]
+
+
+class Batches:
+    """Makes batches by their number, the next one while the last one is learned from.
+
+    Args:
+        members: pictures, or recordings of events.
+        net: what the network takes.
+        settings: of the training.
+    """
+
+    def __init__(
+        self,
+        members: AnySequence[Picture] | AnySequence[EventSegment],
+        net: NetSettings,
+        settings: TrainSettings,
+    ) -> None:
+        self._members, self._net, self._settings = members, net, settings
+        self._pool = ThreadPoolExecutor(1)
+        self._ahead: tuple[int, Future[ShownBatch]] | None = None
+
+    def close(self) -> None:
+        """End the thread that works ahead."""
+        self._pool.shutdown(cancel_futures=True)
+
+    @property
+    def per_epoch(self) -> float:
+        """Steps in which everything was seen once: each picture, or as much time as there is of events."""
+        if not isinstance(self._members[0], EventSegment):
+            return len(self._members) / self._settings.batch
+        seconds = sum(float(np.ptp(m.truth.times)) for m in self._members if isinstance(m, EventSegment))
+        mean_bins = (self._settings.least_step_bins + self._settings.most_step_bins) / 2.0
+        length = (self._net.bins + (self._settings.steps - 1) * mean_bins) * self._net.bin_s
+        return max(seconds / length, len(self._members)) / self._settings.batch
+
+    def get(self, step: int) -> ShownBatch:
+        """Return the batch of a step, and begin the next one."""
+        ready = (
+            self._ahead[1] if self._ahead and self._ahead[0] == step else self._pool.submit(self._make, step)
+        )
+        self._ahead = (step + 1, self._pool.submit(self._make, step + 1))
+        return ready.result()
+
+    def _make(self, step: int) -> ShownBatch:
+        size = self._settings.batch
+        parts = [self._one(step * size + k) for k in range(size)]
+        shown = [
+            torch.from_numpy(np.stack(arrays)).float() for arrays in zip(*(p[0] for p in parts), strict=True)
+        ]
+        targets = [list(step_targets) for step_targets in zip(*(p[1] for p in parts), strict=True)]
+        return ShownBatch(shown, targets)
+
+    def _one(self, number: int) -> tuple[list[npt.NDArray[np.generic]], list[Target]]:
+        seed, count = self._settings.seed, len(self._members)
+        order = np.random.default_rng([seed, _ORDER, number // count]).permutation(count)
+        member = self._members[int(order[number % count])]
+        rng = np.random.default_rng([seed, _CHANGES, number])
+        if isinstance(member, EventSegment):
+            drawn = draw_sequence(member, rng, self._net, self._settings)
+            return list(drawn.windows), [_target(*p) for p in zip(drawn.corners, drawn.ignored, strict=True)]
+        changes = self._settings.pictures
+        frame = member.load()
+        shares = (changes.zoom, changes.mirror_share, changes.on_box_share)
+        size_px = (frame.shape[1], frame.shape[0])
+        window = draw_window(rng, size_px, self._settings.crop_px, member.truth, shares)
+        return [cut_out(frame, window, rng, changes)], [_target(*window.boxes(member.truth))]
+
+
+def _target(corners: FloatArray, ignored: BoolArray) -> Target:
+    boxes = torch.from_numpy(corners.astype(np.float32))
+    flags = torch.from_numpy(ignored)
+    return Target(boxes[~flags], boxes[flags])

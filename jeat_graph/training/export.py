@@ -1,0 +1,90 @@
+"""The trained network as an ONNX file, in a layout that `detect` and `track` recognise, with its card inside.
+
+Output `boxes` (1, 5, N): middle and size in px of the input, and a score. Input `picture` (1, 3, H, W), red
+first, 0 to 1; or `events` (1, 2 x bins, H, W) counts and one state a level of the memory, which come back as
+outputs of the same shapes.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, cast
+
+import torch
+from torch import Tensor, nn
+
+from jeat_graph.data.errors import ConfigError
+from jeat_graph.io.atomic import atomic_path
+from jeat_graph.training.network import DetectionNet, cell_places, centred_boxes
+from jeat_graph.training.settings import EVENTS
+
+_OPSET = 17
+_CLASS = "vehicle"
+#: Under which names the notes stand in the file; `names` is where detectors have their classes.
+CARD, NAMES = "card", "names"
+
+
+class ServedNet(nn.Module):
+    """A trained network for pictures of one size, its rows turned into boxes.
+
+    Args:
+        net: trained.
+        side: width and height of the input (px), whole multiples of 16.
+    """
+
+    def __init__(self, net: DetectionNet, side: tuple[int, int]) -> None:
+        super().__init__()
+        self.net = net
+        places, strides = cell_places(side)
+        self.register_buffer("places", places)
+        self.register_buffer("strides", strides)
+
+    def forward(self, x: Tensor, *state: Tensor) -> tuple[Tensor, ...]:
+        """Return boxes and scores (1, 5, N), and the next states."""
+        rows, kept = self.net(x, state)
+        places, strides = self.get_buffer("places"), self.get_buffer("strides")
+        boxes = centred_boxes(rows, places, strides)
+        return (torch.cat([boxes, rows[..., 4:].sigmoid()], dim=-1).transpose(1, 2), *kept)
+
+
+def write_onnx(net: DetectionNet, side: tuple[int, int], card: Mapping[str, Any], path: Path) -> None:
+    """Write a network with its card.
+
+    Args:
+        net: trained.
+        side: width and height of its input (px), whole multiples of 16.
+        card: what is to be known of it: data, settings, how good it is.
+        path: the file.
+
+    Raises:
+        ConfigError: the package `onnx` is not installed.
+    """
+    try:
+        import onnx
+    except ImportError:
+        raise ConfigError("writing ONNX needs pip install 'jeat-graph[train]'") from None
+    served = ServedNet(net, side).to("cpu").eval()
+    kind = net.settings.kind
+    inputs = (torch.zeros(1, net.settings.channels, side[1], side[0]), *net.to("cpu").empty_state(1, side))
+    states = range(len(inputs) - 1)
+    buffer = io.BytesIO()
+    with warnings.catch_warnings():
+        # This exporter needs nothing but PyTorch; the newer one, which it announces, needs more packages.
+        warnings.simplefilter("ignore")
+        torch.onnx.export(
+            served,
+            inputs,
+            cast(Any, buffer),  # takes open files, too
+            dynamo=False,
+            opset_version=_OPSET,
+            input_names=["events" if kind == EVENTS else "picture", *(f"state_{k}" for k in states)],
+            output_names=["boxes", *(f"next_state_{k}" for k in states)],
+        )
+    model = onnx.load_from_string(buffer.getvalue())
+    onnx.helper.set_model_props(model, {NAMES: str({0: _CLASS}), CARD: json.dumps(card, sort_keys=True)})
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(model.SerializeToString(deterministic=True))

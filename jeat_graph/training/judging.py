@@ -1,0 +1,182 @@
+"""How good a network is on pictures or events that it did not learn from: average precision, COCO style."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import torch
+
+from jeat_graph.data.arrays import BoolArray, FloatArray
+from jeat_graph.data.events import EventArray
+from jeat_graph.detection.models.choosing import choose
+from jeat_graph.detection.models.feeding import place, usual_feed
+from jeat_graph.detection.models.layouts import decode
+from jeat_graph.detection.models.model_settings import ModelSettings
+from jeat_graph.eval.detection_ap import average_precision, match_greedily
+from jeat_graph.io.events_dsec import EventFile
+from jeat_graph.training.data_sets import EventSegment, Picture
+from jeat_graph.training.event_samples import asked_for, windows_of
+from jeat_graph.training.network import DetectionNet, cell_places, centred_boxes
+from jeat_graph.training.settings import TrainSettings, padded
+from jeat_graph.training.truth_at import TrueBoxes
+
+#: How the outputs are laid out, one of those in `detection.models.layouts`.
+LAYOUT = "yolov8"
+#: Scores below count for nothing.
+_LEAST_SCORE = 0.01
+#: Classes of sizes, by the square root of the area (px): the paper's half that is small, and COCO's limit.
+SIZES = {"below 12 px": (0.0, 12.0), "12 to 32 px": (12.0, 32.0), "above 32 px": (32.0, np.inf)}
+#: Windows are judged every 20 ms.
+_STEP_BINS = 4
+_US = 1e6
+
+
+class Precision(NamedTuple):
+    """Average precision in per cent, and of how many boxes; NaN where there are none."""
+
+    ap50: float
+    ap: float
+    boxes: int
+
+
+class Looked(NamedTuple):
+    """What was found in one picture or window, and what is there.
+
+    Attributes:
+        source: name of the data set.
+        corners: (M, 4) found.
+        scores: (M,).
+        truth: what is there.
+    """
+
+    source: str
+    corners: FloatArray
+    scores: FloatArray
+    truth: TrueBoxes
+
+
+def judge(
+    net: DetectionNet,
+    members: Sequence[Picture] | Sequence[EventSegment],
+    side: tuple[int, int],
+    settings: TrainSettings,
+    most: int,
+) -> dict[str, Precision]:
+    """Judge a network.
+
+    Args:
+        net: left in the mode for use.
+        members: pictures, or recordings of events.
+        side: width and height that pictures are brought to (px).
+        settings: of the training.
+        most: at most so many pictures or windows, evenly chosen.
+
+    Returns:
+        Precision of `all`, of each data set, and of each class of sizes.
+    """
+    net.eval()
+    pictures = [m for m in members if isinstance(m, Picture)]
+    segments = [m for m in members if isinstance(m, EventSegment)]
+    looks = (
+        list(_pictures(net, _evenly(pictures, most), side))
+        if pictures
+        else list(_windows(net, segments, settings, max(most // max(len(segments), 1), 1)))
+    )
+    found = {"all": precision_of(looks)}
+    for source in dict.fromkeys(look.source for look in looks):
+        found[source] = precision_of([look for look in looks if look.source == source])
+    for name, (low, high) in SIZES.items():
+        found[name] = precision_of(looks, low, high)
+    return found
+
+
+def precision_of(looks: Sequence[Looked], low: float = 0.0, high: float = np.inf) -> Precision:
+    """Average precision over pictures, of boxes with √area from `low` to below `high` (px)."""
+    scores: list[FloatArray] = [np.zeros(0)]
+    hits: list[BoolArray] = [np.zeros((10, 0), dtype=bool)]
+    outs: list[BoolArray] = [np.zeros((10, 0), dtype=bool)]
+    count = 0
+    for look in looks:
+        truth = look.truth.corners
+        ignored = look.truth.ignored | ~_between(truth, low, high)
+        order = np.argsort(-look.scores, kind="stable")
+        corners = look.corners[order]
+        hit, out = match_greedily(_boxes(corners), _boxes(truth), ignored)
+        scores.append(look.scores[order])
+        hits.append(hit)
+        outs.append(out | (~hit & ~_between(corners, low, high)[None]))
+        count += int((~ignored).sum())
+    ap, _ = average_precision(np.concatenate(scores), np.hstack(hits), np.hstack(outs), count)
+    return Precision(100.0 * float(ap[0]), 100.0 * float(ap.mean()), count)
+
+
+def _between(corners: FloatArray, low: float, high: float) -> BoolArray:
+    side = np.sqrt((corners[:, 2:] - corners[:, :2]).prod(axis=1))
+    return np.asarray((side >= low) & (side < high))
+
+
+def _boxes(corners: FloatArray) -> FloatArray:
+    return np.column_stack([corners[:, :2], corners[:, 2:] - corners[:, :2]])
+
+
+def _evenly(members: Sequence[Picture], most: int) -> list[Picture]:
+    chosen = np.unique(np.linspace(0, len(members) - 1, min(most, len(members))).round().astype(int))
+    return [members[k] for k in chosen.tolist()]
+
+
+@torch.no_grad()
+def _pictures(net: DetectionNet, pictures: Sequence[Picture], side: tuple[int, int]) -> Iterator[Looked]:
+    reader = _Reader(net, side)
+    feed = usual_feed(LAYOUT, ModelSettings())
+    for picture in pictures:
+        values, at = place(picture.load(), side, feed)
+        rows, _ = net(torch.from_numpy(values).to(reader.device))
+        corners, scores = reader.read(rows)
+        yield Looked(picture.source, at.back(corners), scores, picture.truth)
+
+
+@torch.no_grad()
+def _windows(
+    net: DetectionNet, segments: Sequence[EventSegment], settings: TrainSettings, most: int
+) -> Iterator[Looked]:
+    shape = net.settings
+    bin_us = round(shape.bin_s * _US)
+    for segment in segments:
+        with EventFile(segment.path) as file:
+            first_us = max(segment.truth.times[0] * _US - shape.bins * bin_us, 0.0)
+            first_us = int(first_us) // bin_us * bin_us
+            count = int((segment.truth.times[-1] * _US - first_us) // bin_us - shape.bins) // _STEP_BINS + 1
+            ends = [(shape.bins + k * _STEP_BINS) * bin_us for k in range(min(count, most))]
+            if not ends:
+                continue
+            events = file.between(first_us, first_us + ends[-1])
+            size_px = file.size_px or settings.crop_px
+        own = EventArray.trusted(events.t_us - first_us, events.x, events.y, events.polarity)
+        side = padded(size_px)
+        reader = _Reader(net, side)
+        state = tuple(one.to(reader.device) for one in net.empty_state(1, side))
+        for end, window in zip(ends, windows_of(own, side, shape, ends), strict=True):
+            rows, state = net(torch.from_numpy(window[None]).float().to(reader.device), state)
+            corners, scores = reader.read(rows)
+            begin, now = first_us / _US, (first_us + end) / _US
+            yield Looked(segment.source, corners, scores, asked_for(segment, begin, now, settings.still_px_s))
+
+
+class _Reader:
+    """Turns the network's rows into boxes just as its ONNX file is read."""
+
+    def __init__(self, net: DetectionNet, side: tuple[int, int]) -> None:
+        self.device = next(net.parameters()).device
+        self._side = side
+        self._places, self._strides = (part.to(self.device) for part in cell_places(side))
+
+    def read(self, rows: torch.Tensor) -> tuple[FloatArray, FloatArray]:
+        """Return corners (M, 4) and scores (M,)."""
+        boxes = centred_boxes(rows, self._places, self._strides)
+        table = torch.cat([boxes, rows[..., 4:].sigmoid()], dim=-1).transpose(1, 2).cpu().numpy()
+        corners, scores, _ = choose(
+            decode(LAYOUT, {"boxes": table}, self._side), None, _LEAST_SCORE, ModelSettings().overlap
+        )
+        return corners, scores

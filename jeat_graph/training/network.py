@@ -1,0 +1,141 @@
+"""The network: one family for pictures and for events, anchor-free, at strides of 4, 8 and 16 px.
+
+A backbone of CSP blocks, a pyramid that carries what the coarse levels know to the fine ones, and one head
+for all levels. For each cell it says where the middle of a vehicle is, how large it is, and how sure that is.
+For events a memory (ConvGRU) at strides 8 and 16 keeps vehicles that have stopped.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor, nn
+
+from jeat_graph.training.blocks import ConvBlock, ConvGru, CspBlock
+from jeat_graph.training.settings import COARSEST, STRIDES, NetSettings
+
+#: Numbers of a cell: two of the middle, two of the size, one of the class.
+ROW = 5
+_MEMORY_STRIDES = STRIDES[1:]
+#: Share of the cells with a vehicle that the first weights expect: so the many empty ones do not drown them.
+_PRIOR = 0.01
+#: A box is first about e cells wide: 11, 22 and 43 px.
+_FIRST_SIZE = 1.0
+_LOG_SIZE = (-3.0, 5.0)
+#: Events of a pixel in a bin above this say no more; then they are brought to about 1.
+_MOST_COUNT, _COUNT_SCALE = 8.0, 0.5
+
+
+class DetectionNet(nn.Module):
+    """Finds vehicles.
+
+    Args:
+        settings: what it looks like.
+
+    Attributes:
+        settings: the same.
+        state_channels: channels of each state, fine to coarse; empty without a memory.
+    """
+
+    def __init__(self, settings: NetSettings) -> None:
+        super().__init__()
+        self.settings = settings
+        w = settings.width
+        fine, middle, coarse, shared = 2 * w, 3 * w, 4 * w, 2 * w
+        self.stem = ConvBlock(settings.channels, w, 3, 2)
+        self.to_4 = nn.Sequential(ConvBlock(w, fine, 3, 2), CspBlock(fine, fine))
+        self.to_8 = nn.Sequential(ConvBlock(fine, middle, 3, 2), CspBlock(middle, middle))
+        self.to_16 = nn.Sequential(ConvBlock(middle, coarse, 3, 2), CspBlock(coarse, coarse, 2))
+        self.state_channels = (middle, coarse) if settings.has_memory else ()
+        self.memory = nn.ModuleList(ConvGru(channels) for channels in self.state_channels)
+        self.lateral = nn.ModuleList(ConvBlock(given, shared, 1) for given in (fine, middle, coarse))
+        self.merge = nn.ModuleList(ConvBlock(shared, shared) for _ in range(2))
+        self.tower = nn.Conv2d(shared, shared, 3, padding=1, bias=False)
+        self.tower_norm = nn.ModuleList(nn.BatchNorm2d(shared) for _ in STRIDES)
+        self.row = nn.Conv2d(shared, ROW, 1)
+        nn.init.normal_(self.row.weight, std=0.01)
+        prior = -math.log((1 - _PRIOR) / _PRIOR)
+        self.row.bias = nn.Parameter(torch.tensor([0.0, 0.0, _FIRST_SIZE, _FIRST_SIZE, prior]))
+
+    def empty_state(self, batch: int, side: tuple[int, int]) -> tuple[Tensor, ...]:
+        """Return states of nothing seen, (batch, C, height/stride, width/stride) each, fine to coarse.
+
+        Args:
+            batch: how many sequences.
+            side: width and height of the input (px), whole multiples of 16.
+        """
+        like = self.row.weight
+        return tuple(
+            torch.zeros(batch, channels, side[1] // s, side[0] // s, device=like.device, dtype=like.dtype)
+            for channels, s in zip(self.state_channels, _MEMORY_STRIDES, strict=False)
+        )
+
+    def forward(self, x: Tensor, state: Sequence[Tensor] = ()) -> tuple[Tensor, tuple[Tensor, ...]]:
+        """Look at a batch.
+
+        Args:
+            x: (B, 3, H, W) red, green, blue of 0 to 1, or (B, 2 x bins, H, W) counts of events.
+            state: of the windows before; for a network without a memory none.
+
+        Returns:
+            Rows (B, N, 5), fine level first, row by row: middle (cells from the cell's own), size (logarithm,
+            in cells) and logit; and the next state.
+        """
+        if self.settings.has_memory:
+            x = torch.clamp(x, max=_MOST_COUNT) * _COUNT_SCALE
+        fine = self.to_4(self.stem(x))
+        middle = self.to_8(fine)
+        kept: tuple[Tensor, ...] = ()
+        if self.settings.has_memory:
+            middle = self.memory[0](middle, state[0])
+        coarse = self.to_16(middle)
+        if self.settings.has_memory:
+            coarse = self.memory[1](coarse, state[1])
+            kept = (middle, coarse)
+        low = self.lateral[2](coarse)
+        mid = self.merge[1](self.lateral[1](middle) + _doubled(low))
+        top = self.merge[0](self.lateral[0](fine) + _doubled(mid))
+        rows = []
+        for level, features in enumerate((top, mid, low)):
+            seen = torch.relu(self.tower_norm[level](self.tower(features)))
+            rows.append(self.row(seen).flatten(2))
+        return torch.cat(rows, dim=2).transpose(1, 2), kept
+
+
+def _doubled(x: Tensor) -> Tensor:
+    return nn.functional.interpolate(x, scale_factor=2.0, mode="nearest")
+
+
+def cell_places(side: tuple[int, int]) -> tuple[Tensor, Tensor]:
+    """Return column and row (N, 2) and stride (N,) of each cell, in the order of the network's rows.
+
+    Args:
+        side: width and height of the input (px), whole multiples of 16.
+
+    Raises:
+        ValueError: they are not.
+    """
+    if side[0] % COARSEST or side[1] % COARSEST:
+        raise ValueError(f"{side} are no whole multiples of {COARSEST}")
+    places, strides = [], []
+    for stride in STRIDES:
+        width, height = side[0] // stride, side[1] // stride
+        row, column = torch.meshgrid(torch.arange(height), torch.arange(width), indexing="ij")
+        places.append(torch.stack([column, row], dim=-1).reshape(-1, 2).float())
+        strides.append(torch.full((width * height,), float(stride)))
+    return torch.cat(places), torch.cat(strides)
+
+
+def centred_boxes(rows: Tensor, places: Tensor, strides: Tensor) -> Tensor:
+    """Turn rows (B, N, 5) into middle and size (B, N, 4) in px of the input."""
+    middle = (places + 0.5 + rows[..., :2]) * strides[:, None]
+    size = torch.exp(torch.clamp(rows[..., 2:4], *_LOG_SIZE)) * strides[:, None]
+    return torch.cat([middle, size], dim=-1)
+
+
+def corners_of(boxes: Tensor) -> Tensor:
+    """Turn middle and size (…, 4) into left, top, right, bottom."""
+    half = boxes[..., 2:] / 2.0
+    return torch.cat([boxes[..., :2] - half, boxes[..., :2] + half], dim=-1)

@@ -1,0 +1,206 @@
+"""From folders of data to a network in a file: what `jeat-graph train` does."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import torch
+import yaml
+
+from jeat_graph.data.errors import ConfigError, DataError
+from jeat_graph.io.hashing import sha256_of
+from jeat_graph.training.coco_pictures import read_coco_pictures
+from jeat_graph.training.data_sets import (
+    EventSegment,
+    Picture,
+    read_event_segments,
+    read_pictures,
+    split_by_segment,
+)
+from jeat_graph.training.export import write_onnx
+from jeat_graph.training.judging import Precision, judge
+from jeat_graph.training.log_files import draw_log, write_log
+from jeat_graph.training.settings import FRAMES, NetSettings, TrainSettings, padded
+from jeat_graph.training.trainer import Trainer, TrainingJob
+from jeat_graph.version import __version__
+
+_JSON = ".json"
+_MANIFEST, _SETTINGS = "manifest.json", "settings.yaml"
+_ALL = 1_000_000
+
+
+@dataclass(frozen=True)
+class TrainRequest:
+    """What is to be trained.
+
+    Attributes:
+        data: data sets to learn from: folders as `simulate` writes them, for pictures also COCO files.
+        out: the ONNX file; log, plot and checkpoint stand beside it.
+        net: what the network looks like.
+        settings: how it learns.
+        tested: data sets to judge the finished network by; nothing is learned from them.
+        pictures: where the names in COCO files begin, if not beside them.
+        side: width and height of the network's input (px); None: the first picture's, rounded up.
+        device: `auto`, `cpu` or `cuda`.
+    """
+
+    data: tuple[Path, ...]
+    out: Path
+    net: NetSettings = field(default_factory=NetSettings)
+    settings: TrainSettings = field(default_factory=TrainSettings)
+    tested: tuple[Path, ...] = ()
+    pictures: Path | None = None
+    side: tuple[int, int] | None = None
+    device: str = "auto"
+
+
+@dataclass(frozen=True)
+class Trained:
+    """What came out.
+
+    Attributes:
+        files: written, the network first.
+        card: what stands in the network's file.
+    """
+
+    files: tuple[Path, ...]
+    card: dict[str, Any]
+
+
+def train(
+    request: TrainRequest,
+    say: Callable[[str], object] = lambda _: None,
+    on_progress: Callable[[float, str], object] = lambda *_: None,
+) -> Trained:
+    """Train a network and write it; a training that was killed goes on where it was.
+
+    With `epochs`, the same request gives the same bytes on the same machine, killed in between or not.
+
+    Args:
+        request: what to do.
+        say: called with what was found out.
+        on_progress: called after each step with the share that is done, and a few words.
+
+    Raises:
+        ConfigError: no GPU where one is asked for.
+        DataError: data that cannot be read, or do not fit.
+        OtherRunError: the checkpoint beside `out` is of another training.
+    """
+    log, plot = request.out.with_suffix(".csv"), request.out.with_suffix(".png")
+    checkpoint = request.out.with_suffix(".checkpoint")
+    device = _device(request.device)
+    members = _read(request, request.data)
+    split = split_by_segment(members, request.data)
+    side = request.side or _side(members[0])
+    if side != padded(side):
+        raise ConfigError(f"--size: {side[0]}x{side[1]} must be whole multiples of 16 px")
+    unit = "pictures" if request.net.kind == FRAMES else "recordings"
+    say(f"{len(split.learned)} {unit} to learn from, {len(split.judged)} to judge by; {split.note}")
+    tests = _read(request, request.tested) if request.tested else []
+    shown = {str(path.resolve()) for path in request.data} & {str(path.resolve()) for path in request.tested}
+    if shown:
+        raise DataError("is learned from; it cannot be the test as well", sorted(shown)[0])
+    about = {
+        "version": __version__,
+        "kind": request.net.kind,
+        "net": asdict(request.net),
+        "settings": asdict(request.settings),
+        "side": list(side),
+        "data": [_described(path) for path in request.data],
+    }
+    identity = json.dumps(about, sort_keys=True)
+    request.out.parent.mkdir(parents=True, exist_ok=True)
+    trainer = Trainer(TrainingJob(request.net, request.settings, split, side, device, checkpoint, identity))
+    if trainer.step:
+        say(f"goes on from step {trainer.step} of {checkpoint}")
+    count = sum(p.numel() for p in trainer.net.parameters())
+    say(f"network of {count} parameters, input {side[0]} x {side[1]} px, on {device}")
+    trainer.run(on_progress)
+    card = {**about, "parameters": count, "steps": trainer.step, "split": split.note}
+    card["judged"] = _table(judge(trainer.average, split.judged, side, request.settings, _ALL))
+    if tests:
+        say(f"judging by {len(tests)} {unit} of {', '.join(path.name for path in request.tested)}")
+        card["tested_on"] = [_described(path) for path in request.tested]
+        card["tested"] = _table(judge(trainer.average, tests, side, request.settings, _ALL))
+    write_log(trainer.log, log)
+    draw_log(trainer.log, plot)
+    write_onnx(trainer.average, side, card, request.out)
+    checkpoint.unlink(missing_ok=True)
+    return Trained((request.out, log, plot), card)
+
+
+def _read(request: TrainRequest, paths: Sequence[Path]) -> Any:
+    """Return pictures or recordings of all data sets.
+
+    Raises:
+        DataError: a data set is not what it should be, or two have one name.
+    """
+    found: list[Any] = []
+    for path in paths:
+        if request.net.kind != FRAMES:
+            found += read_event_segments(path)
+        elif path.suffix.lower() == _JSON:
+            found += read_coco_pictures(path, request.pictures)
+        else:
+            found += read_pictures(path)
+    names = Counter(path.stem for path in paths)
+    name, times = names.most_common(1)[0]
+    if times > 1:
+        raise DataError(f"{times} data sets are called {name}; their results could not be told apart", name)
+    return found
+
+
+def _side(member: Picture | EventSegment) -> tuple[int, int]:
+    """Return the width and height (px) that hold the first picture."""
+    if isinstance(member, Picture):
+        height, width = member.load().shape[:2]
+        return padded((width, height))
+    from jeat_graph.io.events_dsec import EventFile
+
+    with EventFile(member.path) as file:
+        if file.size_px is None:
+            raise DataError("does not say the size of its picture; give it with --size WxH", member.path)
+        return padded(file.size_px)
+
+
+def _device(asked: str) -> str:
+    if asked == "auto":
+        return "cuda" if torch.cuda.is_available() else "cpu"
+    if asked == "cuda" and not torch.cuda.is_available():
+        raise ConfigError("--device cuda: PyTorch finds no GPU here")
+    return asked
+
+
+def _described(path: Path) -> dict[str, Any]:
+    """Return what a data set is: its name, its checksum, and seed and world of a simulated one."""
+    if path.is_file():
+        return {"name": path.name, "sha256": sha256_of(path)}
+    found: dict[str, Any] = {"name": path.name}
+    for name in (_MANIFEST, _SETTINGS):
+        if (path / name).is_file():
+            found[f"sha256 of {name}"] = sha256_of(path / name)
+    if (path / _SETTINGS).is_file():
+        try:
+            tree = yaml.safe_load((path / _SETTINGS).read_text(encoding="utf-8"))
+            source = tree["source"]
+            found |= {key: source[key] for key in ("source", "seed", "world", "frames") if key in source}
+        except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError):
+            raise DataError("cannot be read", path / _SETTINGS) from None
+    return found
+
+
+def _table(found: dict[str, Precision]) -> dict[str, dict[str, float | int | None]]:
+    """Return precisions as the card has them: to a hundredth of a per cent, null where there are no boxes."""
+    return {
+        name: {
+            "AP50": round(one.ap50, 2) if one.boxes else None,
+            "AP": round(one.ap, 2) if one.boxes else None,
+            "boxes": one.boxes,
+        }
+        for name, one in found.items()
+    }

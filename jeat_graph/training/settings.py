@@ -1,0 +1,112 @@
+"""Settings of a training: the network, what it is shown, and how it learns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from jeat_graph.config.fields import Section, choice, number
+from jeat_graph.data.errors import ConfigError
+
+FRAMES, EVENTS = "frames", "events"
+KINDS = (FRAMES, EVENTS)
+#: Channels of the first layer by the name of a size.
+WIDTHS = {"tiny": 8, "small": 16, "medium": 32, "large": 48}
+_COLOURS = 3
+
+
+@dataclass(frozen=True)
+class NetSettings(Section):
+    """What a network looks like."""
+
+    kind: str = choice(FRAMES, KINDS, "what it looks at; one of events has a memory")
+    width: int = number(32, "1", "channels of its first layer; the others follow", 2, 512)
+    bins: int = number(10, "1", "bins of a window of events; each has two polarities", 1, 100)
+    bin_s: float = number(0.005, "s", "length of a bin", 1e-4, 1.0)
+
+    @property
+    def channels(self) -> int:
+        """Channels of the input."""
+        return _COLOURS if self.kind == FRAMES else 2 * self.bins
+
+    @property
+    def has_memory(self) -> bool:
+        """Whether states are carried from window to window."""
+        return self.kind == EVENTS
+
+
+@dataclass(frozen=True)
+class PictureChanges(Section):
+    """How pictures are changed so that the network sees more than there is."""
+
+    mirror_share: float = number(0.5, "1", "so many are mirrored", 0.0, 1.0)
+    zoom: float = number(1.6, "1", "sizes are drawn from 1/zoom to zoom, evenly in the logarithm", 1.0, 8.0)
+    on_box_share: float = number(
+        0.7, "1", "so many cut-outs lie about a vehicle, the others anywhere", 0.0, 1.0
+    )
+    exposure: float = number(1.8, "1", "light is multiplied by 1/exposure to exposure", 1.0, 16.0)
+    gamma: float = number(1.3, "1", "and put to a power of 1/gamma to gamma", 1.0, 4.0)
+    noise: float = number(8.0, "grey levels", "noise of up to this deviation is added", 0.0, 128.0)
+
+
+@dataclass(frozen=True)
+class EventChanges(Section):
+    """How events are changed so that the network sees more than there is."""
+
+    mirror_share: float = number(0.5, "1", "so many sequences are mirrored", 0.0, 1.0)
+    zoom: float = number(1.4, "1", "sizes are drawn from 1/zoom to zoom, evenly in the logarithm", 1.0, 8.0)
+    on_box_share: float = number(
+        0.7, "1", "so many cut-outs lie about a vehicle, the others anywhere", 0.0, 1.0
+    )
+    drop_share: float = number(0.5, "1", "up to this share of the events is left out", 0.0, 0.99)
+    time_scale: float = number(1.4, "1", "time runs slower or faster by up to this", 1.0, 4.0)
+    noise_hz_px: float = number(0.2, "Hz/px", "up to so many events from nowhere are added", 0.0, 100.0)
+
+
+@dataclass(frozen=True)
+class TrainSettings(Section):
+    """How a network learns."""
+
+    crop_px: tuple[int, int] = (320, 192)
+    batch: int = number(8, "1", "cut-outs, or sequences, a step", 1, 4096)
+    epochs: float = number(
+        30.0, "1", "times that all pictures, or as much time of events, are seen", open_low=True
+    )
+    minutes: float | None = number(None, "min", "train for so long instead of `epochs`", open_low=True)
+    seed: int = number(0, "1", "of first weights, order and changes", 0, 2**31)
+    learning_rate: float = number(2e-3, "1", "the highest, of AdamW", 0.0, 1.0, open_low=True)
+    final_share: float = number(0.02, "1", "share of it at the end of the cosine", 0.0, 1.0)
+    warm_up_share: float = number(0.03, "1", "share of the training in which the rate rises", 0.0, 0.5)
+    weight_decay: float = number(0.02, "1", "of AdamW", 0.0, 1.0)
+    clip: float = number(10.0, "1", "longest gradient", open_low=True)
+    average_steps: float = number(500.0, "1", "steps that the averaged weights go back", 1.0)
+    steps: int = number(8, "1", "windows of a sequence of events", 1, 1000)
+    back: int = number(4, "1", "windows through which a gradient goes back", 1, 1000)
+    least_step_bins: int = number(2, "bins", "shortest step from window to window (10 ms)", 1, 1000)
+    most_step_bins: int = number(10, "bins", "longest (50 ms)", 1, 1000)
+    still_px_s: float = number(
+        3.0, "px/s", "who has been slower since a sequence began left no events and is not asked for"
+    )
+    judge_every: float = number(
+        0.1, "1", "share of the training between two looks at what it has learned", 0.001, 1.0
+    )
+    judged: int = number(300, "1", "at most so many pictures or windows are judged then", 1)
+    pictures: PictureChanges = field(default_factory=PictureChanges)
+    events: EventChanges = field(default_factory=EventChanges)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if any(side % COARSEST or side < COARSEST for side in self.crop_px):
+            raise ConfigError(f"crop_px: {self.crop_px} must be whole multiples of {COARSEST} px")
+        if self.least_step_bins > self.most_step_bins:
+            raise ConfigError("least_step_bins: must not be more than most_step_bins")
+
+
+#: Strides at which vehicles are looked for (px): half of those far away are smaller than 12 px.
+STRIDES = (4, 8, 16)
+COARSEST = STRIDES[-1]
+
+
+def padded(size_px: tuple[int, int]) -> tuple[int, int]:
+    """Return the smallest width and height (px) that the network takes and that hold a picture."""
+    width, height = (-(-side // COARSEST) * COARSEST for side in size_px)
+    return width, height

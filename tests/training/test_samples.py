@@ -1,0 +1,193 @@
+"""What networks are shown: changed pictures and events, with boxes that lie where the changed things are."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="training needs PyTorch, the extra `train`")
+
+from jeat_graph.data.errors import DataError  # noqa: E402
+from jeat_graph.data.trajectories import GroundTruth  # noqa: E402
+from jeat_graph.training.batches import Batches  # noqa: E402
+from jeat_graph.training.coco_pictures import read_coco_pictures  # noqa: E402
+from jeat_graph.training.data_sets import (  # noqa: E402
+    read_event_segments,
+    read_pictures,
+    split_by_segment,
+)
+from jeat_graph.training.event_samples import draw_sequence  # noqa: E402
+from jeat_graph.training.judging import Looked, precision_of  # noqa: E402
+from jeat_graph.training.picture_samples import CutOut, cut_out, draw_window  # noqa: E402
+from jeat_graph.training.settings import (  # noqa: E402
+    EventChanges,
+    NetSettings,
+    PictureChanges,
+    TrainSettings,
+)
+from jeat_graph.training.truth_at import TrueBoxes, TruthByTime  # noqa: E402
+
+from .small_sets import FRAMES, SIZE, write_segment  # noqa: E402
+
+NO_CHANGE = PictureChanges(mirror_share=0.0, zoom=1.0, exposure=1.0, gamma=1.0, noise=0.0)
+
+
+def one_box(*corners):
+    return TrueBoxes(np.array([corners], dtype=float), np.array([False]), np.array([1]))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_boxes_stay_on_what_they_are_about(seed):
+    """A bright box in a dark picture: after any cut-out its pixels end where the moved box does."""
+    rng = np.random.default_rng(seed)
+    frame = np.zeros((96, 128, 3), dtype=np.uint8)
+    frame[30:70, 40:100] = 255
+    truth = one_box(40.0, 30.0, 100.0, 70.0)
+    window = draw_window(rng, (128, 96), (64, 48), truth, (1.6, 0.5, 1.0))
+    (corners,), _ = window.boxes(truth)
+    values = cut_out(frame, window, rng, NO_CHANGE).mean(axis=0)
+    rows, columns = np.nonzero(values > 0.6)
+    # The pad is grey (0.45), and interpolation blurs an edge over a pixel.
+    found = [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]
+    np.testing.assert_allclose(found, corners, atol=1.01)
+
+
+def test_boxes_that_are_mostly_cut_off_are_not_asked_for():
+    window = CutOut((64, 48), 1.0, -90.0, 0.0, False)
+    corners, ignored = window.boxes(one_box(40.0, 10.0, 100.0, 30.0))
+    np.testing.assert_allclose(corners, [[0.0, 10.0, 10.0, 30.0]])
+    assert ignored.tolist() == [True]
+    _, ignored = window._replace(left=-50.0).boxes(one_box(40.0, 10.0, 100.0, 30.0))
+    assert ignored.tolist() == [False]
+    assert len(window._replace(left=-101.0).boxes(one_box(40.0, 10.0, 100.0, 30.0))[0]) == 0
+
+
+def test_truth_between_two_frames_lies_between_their_boxes():
+    truth = TruthByTime(
+        GroundTruth(
+            t=np.array([0.0, 0.0, 0.1, 0.1]),
+            object_id=np.array([1, 2, 1, 3]),
+            boxes=np.array([[0.0, 0, 10, 10], [50, 0, 5, 5], [8, 4, 12, 10], [90, 0, 5, 5]]),
+            motion=None,
+            ignore=np.zeros(4, dtype=bool),
+            classes=None,
+            distance=None,
+            frames=np.array([0.0, 0.1]),
+        )
+    )
+    found = truth.at(0.025)
+    np.testing.assert_allclose(found.corners[0], [2.0, 1.0, 12.5, 11.0])
+    assert found.object_id.tolist() == [1, 2, 3]
+    assert found.ignored.tolist() == [False, True, True]
+    assert truth.at(0.1).ignored.tolist() == [False, False]
+    assert truth.moving(0.0, 0.1, 50.0) == {1}
+    assert truth.moving(0.0, 0.1, 150.0) == set()
+
+
+def test_events_lie_in_the_boxes_of_the_moment(small_set):
+    """Mirrored, scaled and at another speed: most events of the newest bins are in the boxes of then."""
+    settings = TrainSettings(
+        crop_px=(64, 48), steps=3, most_step_bins=4, events=EventChanges(noise_hz_px=0.0, drop_share=0.3)
+    )
+    net = NetSettings(kind="events")
+    for seed in range(6):
+        segment = read_event_segments(small_set)[seed % 2]
+        drawn = draw_sequence(segment, np.random.default_rng(seed), net, settings)
+        assert drawn.windows.shape == (3, 20, 48, 64)
+        for window, corners in zip(drawn.windows, drawn.corners, strict=True):
+            rows, columns = np.nonzero(window[-4:].sum(axis=0))
+            inside = np.zeros(len(rows), dtype=bool)
+            for left, top, right, bottom in corners:
+                inside |= (
+                    (columns >= left - 1.5)
+                    & (columns < right + 1.5)
+                    & (rows >= top - 1.5)
+                    & (rows < bottom + 1.5)
+                )
+            assert len(rows) > 5
+            assert inside.mean() > 0.95
+
+
+def test_a_batch_is_the_same_whoever_asks_and_when(small_set):
+    members = read_pictures(small_set)
+    settings = TrainSettings(crop_px=(32, 32), batch=2, seed=9)
+    a, b = (Batches(members, NetSettings(), settings) for _ in range(2))
+    for step in (0, 1, 2):
+        a.get(step)
+    late, direct = a.get(3), b.get(3)
+    assert torch.equal(late.steps[0], direct.steps[0])
+    assert all(torch.equal(x.boxes, y.boxes) for x, y in zip(late.targets[0], direct.targets[0], strict=True))
+    assert not torch.equal(direct.steps[0], b.get(4).steps[0])
+    a.close()
+    b.close()
+
+
+def test_no_segment_is_both_learned_from_and_judged(tmp_path):
+    for segment in range(3):
+        write_segment(tmp_path / "set" / "segments" / f"{segment:06d}", segment)
+    members = read_pictures(tmp_path / "set")
+    assert len(members) == 3 * FRAMES
+    split = split_by_segment(members, [tmp_path / "set"])
+    assert {m.group for m in split.learned}.isdisjoint({m.group for m in split.judged})
+    (tmp_path / "set" / "val.txt").write_text("segments/000000\n", encoding="utf-8")
+    (tmp_path / "set" / "test.txt").write_text("segments/000002\n", encoding="utf-8")
+    split = split_by_segment(members, [tmp_path / "set"])
+    assert {m.group[-1] for m in split.learned} == {"1"}
+    assert {m.group[-1] for m in split.judged} == {"0"}
+
+
+def coco(tmp_path, **changes):
+    """A COCO file of one picture with a car, a crowd and a person."""
+    import cv2
+
+    (tmp_path / "images").mkdir(exist_ok=True)
+    cv2.imwrite(str(tmp_path / "images" / "a.png"), np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
+    tree = {
+        "images": [{"id": 7, "file_name": "a.png", "width": SIZE[0], "height": SIZE[1]}],
+        "categories": [{"id": 1, "name": "person"}, {"id": 3, "name": "car"}],
+        "annotations": [
+            {"image_id": 7, "category_id": 3, "bbox": [1, 2, 10, 5]},
+            {"image_id": 7, "category_id": 3, "bbox": [30, 2, 10, 5], "iscrowd": 1},
+            {"image_id": 7, "category_id": 1, "bbox": [20, 20, 3, 9]},
+        ],
+    } | changes
+    path = tmp_path / "instances.json"
+    path.write_text(json.dumps(tree), encoding="utf-8")
+    return path
+
+
+def test_of_a_coco_file_vehicles_are_taken(tmp_path):
+    (picture,) = read_coco_pictures(coco(tmp_path))
+    np.testing.assert_allclose(picture.truth.corners, [[1, 2, 11, 7], [30, 2, 40, 7]])
+    assert picture.truth.ignored.tolist() == [False, True]
+    assert picture.load().shape == (SIZE[1], SIZE[0], 3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"images": [{"id": 1, "file_name": "b.png"}]}, "names the picture b.png, which is not in"),
+        ({"images": []}, "lists no images"),
+        ({"annotations": [{"image_id": 7, "bbox": [1, 2, 3]}]}, "annotation 1 needs image_id and a bbox"),
+        ({"annotations": 5}, "must have a list of `annotations`"),
+    ],
+)
+def test_a_coco_file_that_is_wrong_is_refused_by_name(tmp_path, changes, words):
+    with pytest.raises(DataError, match=re.escape(words)):
+        read_coco_pictures(coco(tmp_path, **changes))
+
+
+def test_precision_by_size_leaves_out_what_is_of_other_sizes():
+    truth = TrueBoxes(
+        np.array([[0.0, 0, 8, 8], [50.0, 50, 90, 90]]), np.zeros(2, dtype=bool), np.array([1, 2])
+    )
+    found = np.array([[50.0, 50, 90, 90], [20.0, 20, 28, 28], [0.0, 0, 8, 8]])
+    looks = [Looked("a", found, np.array([0.9, 0.8, 0.7]), truth)]
+    assert precision_of(looks, 32.0).ap50 == pytest.approx(100.0)
+    # Of the small ones the first is false, the second true: precision 1/2 at every recall.
+    assert precision_of(looks, 0.0, 12.0).ap50 == pytest.approx(50.0)
+    assert precision_of(looks).boxes == 2
+    assert np.isnan(precision_of(looks, 12.0, 32.0).ap50)
