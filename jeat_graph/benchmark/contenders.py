@@ -74,17 +74,17 @@ def ours(default: Config, paper: Config, label: str, sensors: Sequence[str]) -> 
 
     joint, sequential = "joint", f"sequential, {order[0]} first"
     return [
-        Ours(f"{label}, {both}", default, association="default, one slot a sensor"),
+        Ours(f"{label}, {both}", default, association="ours, one slot a sensor"),
         *(Ours(f"{label}, {name}", default, (name,)) for name in sensors),
         Ours(
             f"{label}, {both}, joint as in the paper",
             associated(default, "joint"),
-            association=f"default, {joint}",
+            association=f"ours, {joint}",
         ),
         Ours(
             f"{label}, {both}, sequential",
             associated(default, "sequential"),
-            association=f"default, {sequential}",
+            association=f"ours, {sequential}",
         ),
         Ours(f"paper, {both}", paper, association=f"paper, {joint}"),
         Ours(

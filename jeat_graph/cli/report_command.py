@@ -88,5 +88,7 @@ def _compare(args: argparse.Namespace) -> tuple[ComparedRun | None, str | None]:
             raise
         return None, f"Filter against smoother is not shown: {error}."
     truth = None if args.gt is None else read_truth(args.gt, rate_hz=args.rate)
-    with portion(0.3, 1.0):
-        return compared_run(compare_run(measured, truth)), None
+    with portion(0.3, 0.8):
+        comparison = compare_run(measured, truth)
+    with portion(0.8, 1.0):
+        return compared_run(comparison), None

@@ -11,6 +11,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.diagnostics import Diagnostics
+from jeat_graph.data.progress import portion
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.eval.judge import Judgement
 from jeat_graph.runs.directory import DIAGNOSTICS, read_record
@@ -90,8 +91,10 @@ def load_run_data(run: str | Path, truth: str | Path | None = None, rate_hz: flo
     files = tables_of(folder)
     judged: dict[str, Judgement] = {}
     if truth is not None:
-        one = load_run(run, truth, rate_hz=rate_hz)
-        judged = judge_runs([one])
+        with portion(0.0, 0.4):
+            one = load_run(run, truth, rate_hz=rate_hz)
+        with portion(0.4, 1.0):
+            judged = judge_runs([one])
         causal, smoothed = one.causal, one.smoothed
     else:
         read = {kind: read_trajectories(path, rate_hz=rate_hz) for kind, path in files.items()}

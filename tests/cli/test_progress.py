@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+import argparse
 import io
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
+from jeat_graph.cli import report_command
 from jeat_graph.cli.main import main
 from jeat_graph.cli.progress import stages
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.progress import heard, told
+from jeat_graph.drawing.page.document import render_page
 from jeat_graph.eval.compare import compare
-from jeat_graph.eval.judge import judge_runs
-from jeat_graph.eval.load import load_run
 from jeat_graph.io.detections_io import read_detections
 from jeat_graph.io.truth_io import read_truth
 from jeat_graph.runs.measured import measured_run
+from jeat_graph.runs.recorded import load_run_data
 from jeat_graph.tracking.tracker import Tracker
 
 
@@ -98,7 +101,8 @@ def test_judging_and_comparing_tell_how_far_they_are(recording, tmp_path):
     run = tmp_path / "run"
     truth = str(recording / "gt.csv")
     assert main(["track", str(recording / "detections.csv"), "--out", str(run), "--config", "highway"]) == 0
-    assert len(moves(lambda: judge_runs([load_run(run, truth)]))) >= 6
+    assert len(moves(lambda: load_run_data(run, truth))) >= 8
+    assert len(moves(lambda: render_page(load_run_data(run)))) > 10  # as many as there are tracks
     measured = measured_run(run)
     known = read_truth(truth)
     compared = moves(
@@ -108,6 +112,14 @@ def test_judging_and_comparing_tell_how_far_they_are(recording, tmp_path):
     )
     assert len(compared) > len(measured.tracks)
     assert len(moves(lambda: measured_run(run))) >= 60  # tracked again: as many as there were steps
+    assert len(moves(lambda: _compare(run, truth))) > len(measured.tracks)  # as `report` does it
+
+
+def _compare(run: Path, truth: str) -> object:
+    arguments = argparse.Namespace(
+        no_compare=False, run_directory=str(run), detections=None, gt=truth, rate=None
+    )
+    return report_command._compare(arguments)
 
 
 def test_a_pipe_sees_nothing(monkeypatch):
