@@ -19,7 +19,8 @@ PYTHON ?= $(firstword $(foreach name,$(PYTHONS),$(shell $(name) -c \
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
-# Without what GPUs need, which takes gigabytes; from PyTorch's own index.
+# The build without what GPUs need, which takes gigabytes. Where pip does not find it by itself, give PIP_EXTRA_INDEX_URL
+# the address of PyTorch's index for processors.
 TORCH := torch==2.13.0+cpu
 SOURCES := $(shell find jeat_graph filters association smoothers eval -name '*.py')
 
@@ -96,7 +97,7 @@ $(VENV)/.test: pyproject.toml $(VENV)/.run
 	@echo "make: installing what the tests need"
 	@$(PIP) --editable '.[test]'
 	@$(PIP) --no-deps 'trackers>=2.6,<3' norfair==2.3.0 'trackeval>=1.3,<2'
-	@$(PIP) --retries 0 --extra-index-url https://download.pytorch.org/whl/cpu $(TORCH) 2> /dev/null || \
+	@$(PIP) $(TORCH) 2> /dev/null || \
 		echo "make: no PyTorch for processors to be had: the tests of training skip"
 	@touch $@
 
