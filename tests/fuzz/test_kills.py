@@ -103,16 +103,10 @@ def is_whole(name: str, data: bytes) -> bool:
 def places(tmp_path_factory) -> dict[str, Path]:
     """Inputs of all commands: some rows of detections; in the long form recordings and a run."""
     folder = tmp_path_factory.mktemp("inputs")
-    names = {name: folder / name for name in ("recording", "run", "pictures", "manifest")}
+    names = {name: folder / name for name in ("recording", "run", "manifest")}
     if FULL:
-        call = [sys.executable, "-m", "jeat_graph.cli.main"]
-        small = ("--segments", "1", "--frames", "20", "--size", "160x96", "--workers", "1")
-        for arguments in (
-            ("simulate", "night", "--duration", "2", "--out", names["recording"]),
-            ("simulate", "night", "--sensors", "pictures", *small, "--out", names["pictures"]),
-            ("track", names["recording"] / "detections.csv", "--out", names["run"]),
-        ):
-            subprocess.run([*call, *map(str, arguments)], check=True, capture_output=True)
+        call("simulate", "night", "--duration", "2", "--out", names["recording"])
+        call("track", names["recording"] / "detections.csv", "--out", names["run"])
         rows = "".join(f"r{k},{names['recording'] / 'detections.csv'}\n" for k in range(2))
         names["manifest"].write_text("name,detections\n" + rows)
     else:
@@ -120,6 +114,20 @@ def places(tmp_path_factory) -> dict[str, Path]:
         rows = "".join(f"{k * 0.05:.2f},rgb,{100 + 2 * k},200,40,30,0.95\n" for k in range(60))
         (names["recording"] / "detections.csv").write_text("t,sensor,left,top,width,height,score\n" + rows)
     return names
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory) -> Path:
+    """A simulated set of pictures and events."""
+    folder = tmp_path_factory.mktemp("pictures")
+    small = ("--segments", "1", "--frames", "20", "--size", "160x96", "--workers", "1")
+    call("simulate", "night", "--sensors", "pictures", *small, "--out", folder)
+    return folder
+
+
+def call(*arguments: object) -> None:
+    command = [sys.executable, "-m", "jeat_graph.cli.main", *map(str, arguments)]
+    subprocess.run(command, check=True, capture_output=True)
 
 
 def check(left: Killed, whole: dict[str, bytes], number: int, varying: set[str]) -> None:
@@ -165,8 +173,10 @@ def moments(changes: int, takes_s: float) -> Iterator[tuple[dict[str, object], f
 @pytest.mark.skipif(not FULL, reason="minutes; make fuzz runs it")
 @pytest.mark.parametrize("name", COMMANDS)
 def test_any_command_killed_at_any_moment_leaves_whole_files_and_ends_the_same_when_repeated(
-    places, tmp_path, name, dying
+    places, tmp_path, name, dying, request
 ):
+    if any("{pictures}" in text for text in COMMANDS[name]):
+        places = {**places, "pictures": request.getfixturevalue("pictures")}
     command, log = Command(name, places, dying), tmp_path / "log"
     begin = time.monotonic()
     whole = command.run(tmp_path / "whole", log=log)
