@@ -150,7 +150,7 @@ def _plan(
         else:
             raise DataError(
                 f"is too short for a sequence: {(last_us - first_us) / _US:.3g} s with truth, and "
-                f"{length_us / _US:.3g} s are needed; make longer segments, or sequences of fewer --steps",
+                f"{length_us / _US:.3g} s are needed; make longer segments, or shorter sequences (--set steps=4)",
                 segment.path,
             )
 
