@@ -150,7 +150,8 @@ def _plan(
         else:
             raise DataError(
                 f"is too short for a sequence: {(last_us - first_us) / _US:.3g} s with truth, and "
-                f"{length_us / _US:.3g} s are needed; make longer segments, or shorter sequences (--set steps=4)",
+                f"{length_us / _US:.3g} s are needed; make longer segments, "
+                "or shorter sequences (--set steps=4)",
                 segment.path,
             )
 
