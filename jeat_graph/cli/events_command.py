@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 from jeat_graph.cli.terminal import one_line
 from jeat_graph.config.argument_types import picture_size
@@ -44,7 +45,8 @@ def run(args: argparse.Namespace) -> int:
         if args.todo == "info":
             from jeat_graph.detection.summary import summarise
 
-            found = summarise(reader)
+            with _bar() as bar:
+                found = summarise(reader, bar.update)
             print(json.dumps(found._asdict(), indent=2) if args.json else "\n".join(found.lines()))
             return 0
         out = Path(args.out)
@@ -58,12 +60,16 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _convert(reader: object, out: Path, fmt: str | None) -> int:
-    from tqdm import tqdm
-
     from jeat_graph.io.events.converting import convert
     from jeat_graph.io.events.reader import EventReader
 
     assert isinstance(reader, EventReader)
-    hidden = not sys.stderr.isatty()
-    with tqdm(desc="events", unit="ev", unit_scale=True, disable=hidden, leave=False) as bar:
+    with _bar() as bar:
         return convert(reader, out, fmt, bar.update)
+
+
+def _bar() -> Any:
+    """How many events have been read: how many there are, most formats do not say."""
+    from tqdm import tqdm
+
+    return tqdm(desc="events", unit="ev", unit_scale=True, disable=not sys.stderr.isatty(), leave=False)

@@ -14,6 +14,7 @@ import numpy as np
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.events import EventArray
+from jeat_graph.data.progress import told
 from jeat_graph.detection.binned import BinnedDetector
 from jeat_graph.detection.event_detector import EventDetector
 from jeat_graph.detection.picture_detector import PictureDetector
@@ -127,10 +128,10 @@ def _picture_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str]
 
         model = ModelPictureDetector(request.detector_frames, FRAMES_SENSOR, request.settings.model_frames)
         say(model.description)
-        return (model(frame, t) for t, frame in source)
+        return (model(frame, t) for t, frame in told(source, len(source)))
     detector = PictureDetector(FRAMES_SENSOR, request.settings.frames)
     _prime(detector, source, request)
-    found = (detector(frame, t) for t, frame in source)
+    found = (detector(frame, t) for t, frame in told(source, len(source)))
     return (scan for scan in found if scan is not None)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -63,8 +64,12 @@ class EventSummary(NamedTuple):
         ]
 
 
-def summarise(reader: EventReader) -> EventSummary:
+def summarise(reader: EventReader, advance: Callable[[int], object] = lambda _: None) -> EventSummary:
     """Read a file of events once and count.
+
+    Args:
+        reader: the file.
+        advance: called with the number of events that have been read since the last call.
 
     Raises:
         DataError: it cannot be read.
@@ -84,6 +89,7 @@ def summarise(reader: EventReader) -> EventSummary:
         on += int(np.count_nonzero(piece.polarity))
         counts += np.bincount(piece.y.astype(np.int64) * size[0] + piece.x, minlength=len(counts))
         noise.signal(piece)
+        advance(len(piece))
     picture = counts.reshape(size[1], size[0])
     duration_s = 0.0 if first is None or last is None else (last - first) / _US_PER_S
     known = reader.size_px is not None

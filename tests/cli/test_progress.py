@@ -9,17 +9,25 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from jeat_graph.cli import report_command
+from jeat_graph.cli.detect_command import detect_with_bar
 from jeat_graph.cli.main import main
 from jeat_graph.cli.progress import stages
 from jeat_graph.config.reading import load_config
+from jeat_graph.data.events import EventArray
 from jeat_graph.data.progress import heard, told
+from jeat_graph.detection.detecting import DetectRequest, detect_files
+from jeat_graph.detection.summary import summarise
 from jeat_graph.drawing.page.document import render_page
 from jeat_graph.eval.compare import compare
 from jeat_graph.io.detections_io import read_detections
+from jeat_graph.io.events.evt3_writer import Evt3Writer
+from jeat_graph.io.events.opening import open_events
 from jeat_graph.io.truth_io import read_truth
+from jeat_graph.io.video_writer import FrameWriter
 from jeat_graph.runs.measured import measured_run
 from jeat_graph.runs.recorded import load_run_data
 from jeat_graph.tracking.tracker import Tracker
@@ -134,3 +142,29 @@ def test_the_time_goes_on_within_a_stage(monkeypatch):
         stage("judging")
         drawn = stream.getvalue().count("judging")
         wait_until(lambda: stream.getvalue().count("judging") >= drawn + 3)
+
+
+def test_detecting_in_pictures_tells_how_many_have_been_looked_at(tmp_path, monkeypatch):
+    with FrameWriter(tmp_path, "lossless", (64, 48), 20.0) as writer:
+        for k in range(8):
+            writer.append(50_000 * k, np.full((48, 64, 3), 20 + k, dtype=np.uint8))
+    request = DetectRequest(frames=str(tmp_path / "frames.avi"))
+    assert moves(lambda: detect_files(request)) == pytest.approx([k / 8 for k in range(9)])
+    stream = Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    detect_with_bar(request, "detect")
+    assert "detect:   0%|" in stream.getvalue()
+
+
+def test_reading_a_file_of_events_shows_how_many_there_are(tmp_path, monkeypatch, capsys):
+    t = np.arange(0, 500_000, 100)
+    x = (t % 64).astype(np.uint16)
+    with Evt3Writer(tmp_path / "e.raw", (64, 48)) as writer:
+        writer.append(EventArray(t, x, x % 48, (x % 2).astype(np.uint8)))
+    with open_events(tmp_path / "e.raw") as reader:
+        seen: list[int] = []
+        assert summarise(reader, seen.append).events == sum(seen) == len(t)
+    stream = Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    assert main(["events", "info", str(tmp_path / "e.raw")]) == 0
+    assert "events: " in stream.getvalue()
