@@ -13,7 +13,7 @@ from jeat_graph.cli.detect_options import add_detecting, detect_request
 from jeat_graph.cli.options import add_rate
 from jeat_graph.cli.terminal import one_line
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.progress import heard, ticking
+from jeat_graph.data.progress import heard, ticking, write_line
 
 if TYPE_CHECKING:
     from jeat_graph.data.detections import Detections
@@ -61,7 +61,7 @@ def detect_with_bar(request: DetectRequest, command: str) -> Detections:
     from jeat_graph.detection.detecting import detect_files
 
     def say(text: str) -> None:
-        print(f"jeat-graph {command}: {one_line(text)}", file=sys.stderr)
+        write_line(f"jeat-graph {command}: {one_line(text)}")
 
     hidden = not sys.stderr.isatty()
     if request.frames is not None:

@@ -14,6 +14,8 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
+from jeat_graph.data.progress import write_line
+
 #: Signals that ask a process to end; each ends a command as Ctrl-C does, so that it can tidy up.
 _ENDS = ("SIGTERM", "SIGHUP")
 _AGAIN_S = 0.01
@@ -81,7 +83,7 @@ def in_good_order(command: str) -> Iterator[None]:
             before(unraisable)
 
     def show(message: Any, *_: Any, **__: Any) -> None:
-        print(f"jeat-graph {command}: warning: {one_line(message)}", file=sys.stderr)
+        write_line(f"jeat-graph {command}: warning: {one_line(message)}")
 
     with warnings.catch_warnings(), contextlib.ExitStack() as stack:
         warnings.showwarning = show

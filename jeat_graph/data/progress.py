@@ -7,6 +7,7 @@ up: what the inner one tells is a share of the outer one's piece.
 
 from __future__ import annotations
 
+import sys
 import threading
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
@@ -24,6 +25,15 @@ class Bar(Protocol):
 
     def refresh(self) -> object:
         """Draw it again."""
+
+
+def write_line(text: str) -> None:
+    """Write a line on stderr; a progress bar that stands there goes out of its way."""
+    tqdm = sys.modules.get("tqdm")
+    if tqdm is None:  # no bar was ever drawn
+        print(text, file=sys.stderr, flush=True)
+    else:
+        tqdm.tqdm.write(text, file=sys.stderr)
 
 
 @contextmanager

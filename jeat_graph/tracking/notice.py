@@ -6,6 +6,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from jeat_graph.data.progress import write_line
+
 NOTICE = "compiling {what} for this machine, once (one to two minutes; on a busy machine more) …"
 _said: set[str] = set()
 
@@ -37,4 +39,4 @@ def notice_if_cold(function: Any = None, what: str = "the tracker") -> None:
     if function is None:
         from jeat_graph.tracking.step import step as function
     if not is_compiled(function):
-        print(f"jeat-graph: {NOTICE.format(what=what)}", file=sys.stderr, flush=True)
+        write_line(f"jeat-graph: {NOTICE.format(what=what)}")

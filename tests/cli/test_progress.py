@@ -6,6 +6,7 @@ import argparse
 import io
 import sys
 import time
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,9 +17,10 @@ from jeat_graph.cli import report_command
 from jeat_graph.cli.detect_command import detect_with_bar
 from jeat_graph.cli.main import main
 from jeat_graph.cli.progress import stages
+from jeat_graph.cli.terminal import in_good_order
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.events import EventArray
-from jeat_graph.data.progress import heard, told
+from jeat_graph.data.progress import heard, told, write_line
 from jeat_graph.detection.detecting import DetectRequest, detect_files
 from jeat_graph.detection.summary import summarise
 from jeat_graph.drawing.page.document import render_page
@@ -168,3 +170,38 @@ def test_reading_a_file_of_events_shows_how_many_there_are(tmp_path, monkeypatch
     monkeypatch.setattr(sys, "stderr", stream)
     assert main(["events", "info", str(tmp_path / "e.raw")]) == 0
     assert "events: " in stream.getvalue()
+
+
+def on_screen(text: str) -> list[str]:
+    """Lines as a terminal shows them in the end: a carriage return goes back over the line."""
+    lines = []
+    for line in text.split("\n"):
+        shown = ""
+        for piece in line.split("\r"):
+            shown = piece + shown[len(piece) :]
+        lines.append(shown.rstrip())
+    return lines
+
+
+@pytest.mark.parametrize("loaded", [True, False])
+def test_what_is_said_while_a_bar_stands_there_has_a_line_of_its_own(loaded, monkeypatch):
+    stream = Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    if loaded:
+        with stages("eval", 1) as stage:
+            stage("judging")
+            write_line("jeat-graph eval: warning: first")
+    else:
+        monkeypatch.delitem(sys.modules, "tqdm")
+        write_line("jeat-graph eval: warning: first")
+    assert "jeat-graph eval: warning: first" in on_screen(stream.getvalue())
+
+
+def test_a_warning_of_the_library_goes_beside_the_bar_too(monkeypatch):
+    stream = Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    with in_good_order("track"), stages("track", 1) as stage:
+        stage("tracking")
+        warnings.simplefilter("always")
+        warnings.warn("boxes look odd", UserWarning, stacklevel=1)
+    assert "jeat-graph track: warning: boxes look odd" in on_screen(stream.getvalue())
