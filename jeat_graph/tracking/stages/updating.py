@@ -220,7 +220,7 @@ def take_second_views(
                     best = d2
                     chosen = j
             if chosen >= 0:
-                measured = measured_by(tracks, i, batch, chosen, expectation, model.sensors)
-                update_track(tracks, i, batch, chosen, measured, model, log)
+                measured = measured_by(tracks, i, batch, int(chosen), expectation, model.sensors)
+                update_track(tracks, i, batch, int(chosen), measured, model, log)
                 match[i, s] = chosen
                 taken[chosen] = 1
