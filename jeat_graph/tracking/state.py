@@ -73,6 +73,7 @@ class SceneState(NamedTuple):
         trust: (S,) what the ratio of the two says of the sensor: factor on its evidence, in (0, 1].
         fruitless: (S,) recent mean number, a scan, of each sensor's detections on tracks that ended without
             having been confirmed, and that no other sensor saw.
+        looked: (S,) scans full of confirmed tracks that `p_detect` rests on.
     """
 
     clutter: FloatArray
@@ -83,6 +84,7 @@ class SceneState(NamedTuple):
     agreed: FloatArray
     trust: FloatArray
     fruitless: FloatArray
+    looked: FloatArray
 
 
 def start_scene(clutter: FloatArray, p_detect: FloatArray, undetected: float, trust: float) -> SceneState:
@@ -104,6 +106,7 @@ def start_scene(clutter: FloatArray, p_detect: FloatArray, undetected: float, tr
         agreed=np.zeros(num_sensors),
         trust=np.full(num_sensors, trust),
         fruitless=np.zeros(num_sensors),
+        looked=np.zeros(num_sensors),
     )
 
 

@@ -19,6 +19,8 @@ _LEAST_CLUTTER = 0.1
 _GROSS = 10.0
 # A few tracks say less of a sensor than many; ten count in full.
 _LOOK_WEIGHT = 0.1
+# What is assumed of a sensor's P_D weighs as much as so many scans full of tracks.
+_PRIOR_SCANS = 10.0
 # A track of so many detections has lasted; before that, others have hardly had the time to see it.
 _LASTING_HITS = 4
 # What is known of a sensor beforehand weighs as much as so many seconds of a track.
@@ -152,7 +154,10 @@ def learn_scene(
         scene.fruitless[s] *= 1.0 - weight
         if scene.fruitless[s] > _GROSS * sensors.clutter_per_scan[s]:
             scene.clutter[s] = max(scene.clutter[s], scene.fruitless[s])
-        share = scene.p_detect[s] + weight * min(_LOOK_WEIGHT * looks, 1.0) * (
+        # At first a mean of all looks, of which what is assumed beforehand makes some; then one with memory.
+        full = min(_LOOK_WEIGHT * looks, 1.0)
+        scene.looked[s] += full
+        share = scene.p_detect[s] + full * max(weight, 1.0 / (_PRIOR_SCANS + scene.looked[s])) * (
             hits / max(looks, 1e-9) - scene.p_detect[s]
         )
         scene.p_detect[s] = min(max(share, lifecycle.p_detect_min), lifecycle.p_detect_max)
