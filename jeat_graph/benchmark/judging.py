@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean, stdev
@@ -14,6 +13,7 @@ from typing import Any, TypeVar
 from jeat_graph.benchmark.recordings import KITTI_IMAGE, JudgedRecording, kitti, simulated
 from jeat_graph.config.reading import load_config
 from jeat_graph.config.schema import Config
+from jeat_graph.data.processes import worker_pool
 
 METRICS = ("MOTA", "MOTP", "HOTA", "IDF1")
 COUNTS = ("FP", "FN", "IDSW")
@@ -125,7 +125,7 @@ def in_processes(
     bar: dict[str, Any] = {"total": len(jobs), "desc": label, "disable": None, "file": sys.stderr}
     if count == 1:
         return [function(job) for job in tqdm(jobs, **bar)]
-    with ProcessPoolExecutor(count) as pool:
+    with worker_pool(count) as pool:
         return list(tqdm(pool.map(function, jobs), **bar))
 
 

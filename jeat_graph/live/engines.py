@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import threading
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
 from jeat_graph.data.errors import JeatGraphError
+from jeat_graph.data.processes import end_with_parent
 
 ENGINES = ("local", "ray")
 _Job = TypeVar("_Job")
@@ -43,7 +41,7 @@ def run_local(
     context = get_context("spawn")  # fork would copy the threads' locks of other libraries
 
     def pool() -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(1, context, _end_with_parent)
+        return ProcessPoolExecutor(1, context, end_with_parent)
 
     pools: dict[int, ProcessPoolExecutor] = {}
     at_work: dict[Future[_Result], tuple[int, int, int]] = {}  # job's index, tries before, the worker
@@ -75,21 +73,6 @@ def run_local(
         for child in set(active_children()) - before:
             child.terminate()
             child.join()
-
-
-def _end_with_parent() -> None:
-    """Leave interrupts to the parent, and end when it ends, however that happens."""
-    from multiprocessing import parent_process
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = parent_process()
-    assert parent is not None
-
-    def watch() -> None:
-        parent.join()
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
 
 
 def run_on_ray(

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
-import threading
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from multiprocessing import connection
 from pathlib import Path
 from typing import Any
 
 from jeat_graph.data.errors import JeatGraphError
+from jeat_graph.data.processes import end_with_parent
 from jeat_graph.simulation.dataset.disk import check_disk
 from jeat_graph.simulation.dataset.protocol import Protocol
 from jeat_graph.simulation.dataset.segment_writer import write_segment
@@ -117,19 +115,10 @@ def _begin(factory: SourceFactory, root: Path, protocol: Protocol, counter: Any,
     import cv2
     import numba
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process deals with Ctrl-C
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    end_with_parent()
     cv2.setNumThreads(threads)
     numba.set_num_threads(min(threads, numba.get_num_threads()))
     _worker = _Worker(factory(), root, protocol, counter)
-
-
-def _end_with_parent() -> None:
-    """End this process when the one that made it is gone, however that ended: nobody wants its work."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        connection.wait([parent.sentinel])
-        os._exit(1)
 
 
 def _make(index: int) -> dict[str, Any]:
