@@ -37,14 +37,19 @@ def add_config(parser: argparse.ArgumentParser, default: str = "default", *, set
     add = parser.add_argument
     add("--config", default=default, metavar="NAME|FILE", help=f"preset or YAML file (default: {default})")
     if settings:
-        add(
-            "--set",
-            dest="overrides",
-            action="append",
-            default=[],
-            metavar="KEY=VALUE",
-            help="change one setting, say lifecycle.confirm_existence=0.9; may be given many times",
-        )
+        add_settings(parser, "lifecycle.confirm_existence=0.9")
+
+
+def add_settings(parser: argparse.ArgumentParser, example: str) -> None:
+    """Declare `--set` (`overrides`)."""
+    parser.add_argument(
+        "--set",
+        dest="overrides",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help=f"change one setting, say {example}; may be given many times",
+    )
 
 
 def add_image(parser: argparse.ArgumentParser) -> None:

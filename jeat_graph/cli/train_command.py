@@ -7,9 +7,11 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from jeat_graph.cli.options import add_settings
 from jeat_graph.cli.terminal import one_line
 from jeat_graph.config.argument_types import counting, natural, picture_size, positive
 from jeat_graph.data.errors import ConfigError
+from jeat_graph.data.progress import write_line
 
 if TYPE_CHECKING:
     from jeat_graph.training.procedure import TrainRequest
@@ -80,14 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="auto (default): a GPU if there is one",
     )
     add("--threads", type=counting, metavar="N", help="threads of PyTorch (default: its own choice)")
-    add(
-        "--set",
-        dest="overrides",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="change one setting, say learning_rate=0.001 or events.drop_share=0.3; may be given many times",
-    )
+    add_settings(parser, "learning_rate=0.001 or events.drop_share=0.3")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -107,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
         torch.set_num_threads(args.threads)
 
     def say(text: str) -> None:
-        print(f"jeat-graph train: {one_line(text)}", file=sys.stderr)
+        write_line(f"jeat-graph train: {one_line(text)}")
 
     form = "{desc} {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}] {postfix}"
     hidden = not sys.stderr.isatty()
