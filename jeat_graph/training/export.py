@@ -19,7 +19,7 @@ from torch import Tensor, nn
 
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.io.atomic import atomic_path
-from jeat_graph.training.network import DetectionNet, cell_places, centred_boxes
+from jeat_graph.training.network import DetectionNet, cell_places, served_boxes
 from jeat_graph.training.settings import EVENTS
 
 _OPSET = 17
@@ -46,9 +46,7 @@ class ServedNet(nn.Module):
     def forward(self, x: Tensor, *state: Tensor) -> tuple[Tensor, ...]:
         """Return boxes and scores (1, 5, N), and the next states."""
         rows, kept = self.net(x, state)
-        places, strides = self.get_buffer("places"), self.get_buffer("strides")
-        boxes = centred_boxes(rows, places, strides)
-        return (torch.cat([boxes, rows[..., 4:].sigmoid()], dim=-1).transpose(1, 2), *kept)
+        return (served_boxes(rows, self.get_buffer("places"), self.get_buffer("strides")), *kept)
 
 
 def write_onnx(net: DetectionNet, side: tuple[int, int], card: Mapping[str, Any], path: Path) -> None:

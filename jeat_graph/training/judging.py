@@ -10,6 +10,7 @@ import torch
 
 from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.events import EventArray
+from jeat_graph.data.interop import from_xyxy
 from jeat_graph.detection.models.choosing import choose
 from jeat_graph.detection.models.feeding import place, usual_feed
 from jeat_graph.detection.models.layouts import decode
@@ -18,7 +19,7 @@ from jeat_graph.eval.detection_ap import average_precision, match_greedily
 from jeat_graph.io.events_dsec import EventFile
 from jeat_graph.training.data_sets import EventSegment, Picture
 from jeat_graph.training.event_samples import asked_for, windows_of
-from jeat_graph.training.network import DetectionNet, cell_places, centred_boxes
+from jeat_graph.training.network import DetectionNet, cell_places, served_boxes
 from jeat_graph.training.settings import TrainSettings, padded
 from jeat_graph.training.truth_at import TrueBoxes
 
@@ -103,7 +104,7 @@ def precision_of(looks: Sequence[Looked], low: float = 0.0, high: float = np.inf
         ignored = look.truth.ignored | ~_between(truth, low, high)
         order = np.argsort(-look.scores, kind="stable")
         corners = look.corners[order]
-        hit, out = match_greedily(_boxes(corners), _boxes(truth), ignored)
+        hit, out = match_greedily(from_xyxy(corners), from_xyxy(truth), ignored)
         scores.append(look.scores[order])
         hits.append(hit)
         outs.append(out | (~hit & ~_between(corners, low, high)[None]))
@@ -115,10 +116,6 @@ def precision_of(looks: Sequence[Looked], low: float = 0.0, high: float = np.inf
 def _between(corners: FloatArray, low: float, high: float) -> BoolArray:
     side = np.sqrt((corners[:, 2:] - corners[:, :2]).prod(axis=1))
     return np.asarray((side >= low) & (side < high))
-
-
-def _boxes(corners: FloatArray) -> FloatArray:
-    return np.column_stack([corners[:, :2], corners[:, 2:] - corners[:, :2]])
 
 
 def _evenly(members: Sequence[Picture], most: int) -> list[Picture]:
@@ -174,8 +171,7 @@ class _Reader:
 
     def read(self, rows: torch.Tensor) -> tuple[FloatArray, FloatArray]:
         """Return corners (M, 4) and scores (M,)."""
-        boxes = centred_boxes(rows, self._places, self._strides)
-        table = torch.cat([boxes, rows[..., 4:].sigmoid()], dim=-1).transpose(1, 2).cpu().numpy()
+        table = served_boxes(rows, self._places, self._strides).cpu().numpy()
         corners, scores, _ = choose(
             decode(LAYOUT, {"boxes": table}, self._side), None, _LEAST_SCORE, ModelSettings().overlap
         )

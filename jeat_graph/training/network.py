@@ -135,6 +135,12 @@ def centred_boxes(rows: Tensor, places: Tensor, strides: Tensor) -> Tensor:
     return torch.cat([middle, size], dim=-1)
 
 
+def served_boxes(rows: Tensor, places: Tensor, strides: Tensor) -> Tensor:
+    """Turn rows (B, N, 5) into middle and size in px of the input, and score (B, 5, N), as ONNX files give."""
+    boxes = centred_boxes(rows, places, strides)
+    return torch.cat([boxes, rows[..., 4:].sigmoid()], dim=-1).transpose(1, 2)
+
+
 def corners_of(boxes: Tensor) -> Tensor:
     """Turn middle and size (…, 4) into left, top, right, bottom."""
     half = boxes[..., 2:] / 2.0

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.interop import to_xyxy
 from jeat_graph.data.trajectories import GroundTruth
 
 #: Two frames farther apart than this are not of one motion (s).
@@ -43,7 +44,7 @@ class TruthByTime:
         order = np.argsort(truth.t, kind="stable")
         self._start = np.searchsorted(truth.t[order], self.times - _SAME_S)
         self._end = np.searchsorted(truth.t[order], self.times + _SAME_S)
-        self._corners = np.column_stack([truth.boxes[:, :2], truth.boxes[:, :2] + truth.boxes[:, 2:]])[order]
+        self._corners = to_xyxy(truth.boxes)[order]
         self._ignored = truth.ignore[order]
         self._id = truth.object_id[order]
 
