@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from typing import Any
 
 
 def end_with_parent() -> None:
@@ -27,17 +28,21 @@ def end_with_parent() -> None:
 
 
 @contextmanager
-def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+def worker_pool(
+    workers: int, begin: Callable[..., object] = end_with_parent, given: tuple[Any, ...] = ()
+) -> Iterator[ProcessPoolExecutor]:
     """Give a pool of processes; after an error or an interrupt what still runs in it is ended.
 
     Args:
         workers: how many processes.
+        begin: what each does first; one of the caller's own says `end_with_parent` too.
+        given: what `begin` is given; may hold what processes share, of the context `spawn`.
     """
     from multiprocessing import active_children, get_context
 
     before = set(active_children())
     context = get_context("spawn")  # fork would copy the threads' locks of other libraries
-    pool = ProcessPoolExecutor(workers, context, end_with_parent)
+    pool = ProcessPoolExecutor(workers, context, begin, given)
     try:
         yield pool
         pool.shutdown()

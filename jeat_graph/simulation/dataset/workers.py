@@ -5,14 +5,14 @@ from __future__ import annotations
 import multiprocessing
 import os
 from collections.abc import Callable, Generator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from jeat_graph.data.errors import JeatGraphError
-from jeat_graph.data.processes import end_with_parent
+from jeat_graph.data.processes import end_with_parent, worker_pool
 from jeat_graph.simulation.dataset.disk import check_disk
 from jeat_graph.simulation.dataset.protocol import Protocol
 from jeat_graph.simulation.dataset.segment_writer import write_segment
@@ -79,35 +79,25 @@ def _in_processes(
     workers: int,
     on_frames: Callable[[int], object],
 ) -> Generator[dict[str, Any], None, None]:
-    context = multiprocessing.get_context("spawn")  # fork would copy the threads' locks of other libraries
-    counter = context.Value("q", 0)
+    counter = multiprocessing.get_context("spawn").Value("q", 0)
     threads = max(1, available_cores() // workers)
-    before = set(multiprocessing.active_children())
-    pool = ProcessPoolExecutor(
-        min(workers, len(indices)), context, _begin, (factory, root, protocol, counter, threads)
-    )
+    given = (factory, root, protocol, counter, threads)
     shown = 0
     try:
-        pending: set[Future[dict[str, Any]]] = {pool.submit(_make, index) for index in indices}
-        while pending:
-            done, pending = wait(pending, _POLL_S, FIRST_COMPLETED)
-            frames = int(counter.value)
-            on_frames(frames - shown)
-            shown = frames
-            for future in done:
-                yield future.result()
-        pool.shutdown()
+        with worker_pool(min(workers, len(indices)), _begin, given) as pool:
+            pending: set[Future[dict[str, Any]]] = {pool.submit(_make, index) for index in indices}
+            while pending:
+                done, pending = wait(pending, _POLL_S, FIRST_COMPLETED)
+                frames = int(counter.value)
+                on_frames(frames - shown)
+                shown = frames
+                for future in done:
+                    yield future.result()
     except BrokenProcessPool:
         check_disk(root)
         raise JeatGraphError(
             "a worker process died (out of memory?); what is done is kept, run again to go on"
         ) from None
-    finally:
-        # After an error, an interrupt, or when the caller has seen enough: do not wait for running segments.
-        pool.shutdown(wait=False, cancel_futures=True)
-        for child in set(multiprocessing.active_children()) - before:
-            child.terminate()
-            child.join()
 
 
 def _begin(factory: SourceFactory, root: Path, protocol: Protocol, counter: Any, threads: int) -> None:
