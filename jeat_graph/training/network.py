@@ -136,7 +136,7 @@ def centred_boxes(rows: Tensor, places: Tensor, strides: Tensor) -> Tensor:
 
 
 def served_boxes(rows: Tensor, places: Tensor, strides: Tensor) -> Tensor:
-    """Turn rows (B, N, 5) into middle and size in px of the input, and score (B, 5, N), as ONNX files give."""
+    """Turn rows (B, N, 5) into middle and size in px of the input, and score (B, 5, N), as ONNX has them."""
     boxes = centred_boxes(rows, places, strides)
     return torch.cat([boxes, rows[..., 4:].sigmoid()], dim=-1).transpose(1, 2)
 
