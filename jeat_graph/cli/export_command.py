@@ -14,9 +14,13 @@ if TYPE_CHECKING:
     from jeat_graph.data.trajectories import Trajectories
     from jeat_graph.eval.frames import Kind
 
-HELP = "write a run for other programs: CVAT, COCO, OTAnalytics, TUM, rerun; a road for SUMO, highD, maps"
+HELP = (
+    "write a run for other programs: CVAT, COCO, OTAnalytics, TUM, rerun; a road for SUMO, highD, maps; a "
+    "simulated set for RVT and DSEC-Detection"
+)
 ROAD_TARGETS = ("sumo", "highd", "geojson")
-TARGETS = ("cvat", "coco", "ottrk", "tum", "rerun", *ROAD_TARGETS)
+SET_TARGETS = ("rvt", "rvt-input", "dsec-det")
+TARGETS = ("cvat", "coco", "ottrk", "tum", "rerun", *ROAD_TARGETS, *SET_TARGETS)
 
 _ROAD_RATE_HZ = 25.0
 
@@ -24,7 +28,10 @@ _ROAD_RATE_HZ = 25.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument(
-        "source", metavar="RUN|ROAD", help="run directory or trajectory table; for roads, what `road` wrote"
+        "source",
+        metavar="RUN|ROAD|SET",
+        help="run directory or trajectory table; for roads, what `road` wrote; for rvt, rvt-input and "
+        "dsec-det, what `simulate --sensors pictures` wrote",
     )
     parser.add_argument("--to", choices=TARGETS, required=True, help="what reads it")
     parser.add_argument(
@@ -32,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         required=True,
         metavar="FILE",
         help=".zip (cvat), .json (coco), .ottrk, .txt (tum), .rrd (rerun), .xml (sumo), folder (highd), "
-        ".geojson",
+        ".geojson, folder (rvt, rvt-input, dsec-det)",
     )
     parser.add_argument(
         "--only", choices=("causal", "smoothed"), help="which table (default: smoothed, if there)"
@@ -55,6 +62,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Export."""
+    if args.to in SET_TARGETS:
+        return _export_set(args)
     if args.to in ROAD_TARGETS:
         return _export_road(args)
     from jeat_graph.eval.load import tables_of
@@ -110,6 +119,18 @@ def _export_road(args: argparse.Namespace) -> int:
     else:
         write_geojson(frames, camera, args.out)
     print(f"wrote {args.out}", file=sys.stderr)
+    return 0
+
+
+def _export_set(args: argparse.Namespace) -> int:
+    from tqdm import tqdm
+
+    from jeat_graph.simulation.layouts.writing import write_layout
+
+    with tqdm(desc="export", unit=" segments", disable=not sys.stderr.isatty(), leave=False) as bar:
+        written = write_layout(args.source, args.to, args.out, bar.update)
+    left = f"; {written.without_boxes} without boxes left out" if written.without_boxes else ""
+    print(f"wrote {args.out} ({written.segments} segments{left})", file=sys.stderr)
     return 0
 
 
