@@ -14,6 +14,8 @@ from jeat_graph.io.tables import read_table
 
 _TRUE = ("x", "y", "speed_kmh")
 _ESTIMATED = (*_TRUE, "var_x", "var_y", "var_speed_kmh")
+#: Of a row of a table of tracks that may be blank: a speed that is not known yet.
+_SPEED = ("speed_kmh", "var_speed_kmh")
 _Z95 = 1.959963984540054
 
 
@@ -38,7 +40,8 @@ class RoadRows:
     Attributes:
         t: (N,) time (s).
         identity: (N,) of the track or the true vehicle.
-        values: (N, 3) x, y (m), speed (km/h); of tracks (N, 6), with their variances.
+        values: (N, 3) x, y (m), speed (km/h); of tracks (N, 6), with their variances; a speed that is not
+            known yet is NaN.
     """
 
     t: FloatArray
@@ -67,13 +70,15 @@ def read_road_tracks(path: str | Path) -> RoadRows:
     Raises:
         DataError: names the file, the line and what is wrong.
     """
-    return _read(path, "track_id", _ESTIMATED)
+    return _read(path, "track_id", _ESTIMATED, _SPEED)
 
 
-def _read(path: str | Path, identity: str, columns: tuple[str, ...]) -> RoadRows:
+def _read(path: str | Path, identity: str, columns: tuple[str, ...], blank: tuple[str, ...] = ()) -> RoadRows:
     table = read_table(path, ("t", identity, *columns))
     t, ids = table.number("t"), table.whole(identity)
-    values = np.stack([table.number(name) for name in columns], axis=1)
+    values = np.stack(
+        [table.number(name, blank_ok=name in blank, nan_ok=name in blank) for name in columns], axis=1
+    )
     order = np.lexsort((t, ids))
     return RoadRows(t[order], ids[order], values[order])
 
@@ -83,7 +88,7 @@ class RoadErrors:
     """Errors of rows that count.
 
     Attributes:
-        error: (N, 3) across, along (m), speed (km/h): estimate less truth.
+        error: (N, 3) across, along (m), speed (km/h): estimate less truth; NaN where no speed is stated.
         var: (N, 3) variances as stated.
         tracks: how many tracks they are of.
     """
@@ -93,24 +98,32 @@ class RoadErrors:
     tracks: int
 
     def scores(self) -> dict[str, float | int]:
-        """Root mean squares, normalised squares and the shares of 95 % intervals that hold."""
+        """Root mean squares, normalised squares and the shares of 95 % intervals that hold.
+
+        Scores of the speed are over the rows that state one, whose share is `speed_known` (%).
+        """
         if not len(self.error):
             return {"rows": 0, "tracks": 0}
-        rmse = np.sqrt((self.error**2).mean(axis=0))
-        normalised = self.error**2 / self.var
-        held = 100.0 * (np.abs(self.error) <= _Z95 * np.sqrt(self.var)).mean(axis=0)
-        return {
-            "across_rmse_m": float(rmse[0]),
-            "along_rmse_m": float(rmse[1]),
-            "speed_rmse_kmh": float(rmse[2]),
-            "speed_median_kmh": float(np.median(np.abs(self.error[:, 2]))),
-            "speed_bias_kmh": float(self.error[:, 2].mean()),
+        place, place_var = self.error[:, :2], self.var[:, :2]
+        known = np.isfinite(self.error[:, 2])
+        speed, speed_var = self.error[known, 2], self.var[known, 2]
+        held = 100.0 * (np.abs(place) <= _Z95 * np.sqrt(place_var)).mean(axis=0)
+        rmse = np.sqrt((place**2).mean(axis=0))
+        scores: dict[str, float | int] = {"across_rmse_m": float(rmse[0]), "along_rmse_m": float(rmse[1])}
+        if known.any():
+            scores |= {
+                "speed_rmse_kmh": float(np.sqrt((speed**2).mean())),
+                "speed_median_kmh": float(np.median(np.abs(speed))),
+                "speed_bias_kmh": float(speed.mean()),
+                "speed_nees": float((speed**2 / speed_var).mean()),
+                "speed_held": float(100.0 * (np.abs(speed) <= _Z95 * np.sqrt(speed_var)).mean()),
+            }
+        return scores | {
             # Two coordinates: one where the covariances are right.
-            "nees": float(normalised[:, :2].mean()),
-            "speed_nees": float(normalised[:, 2].mean()),
+            "nees": float((place**2 / place_var).mean()),
             "across_held": float(held[0]),
             "along_held": float(held[1]),
-            "speed_held": float(held[2]),
+            "speed_known": float(100.0 * known.mean()),
             "rows": len(self.error),
             "tracks": self.tracks,
         }

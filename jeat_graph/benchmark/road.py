@@ -136,7 +136,7 @@ def simulated_table(rows: Sequence[Mapping[str, Any]]) -> Table:
     """One row a scenario, camera and table, seeds pooled by their rows."""
     from jeat_graph.eval.tables import Table
 
-    means = ("nees", "speed_nees", "across_held", "along_held", "speed_held")
+    means = ("nees", "speed_nees", "across_held", "along_held", "speed_held", "speed_known")
     squares = ("across_rmse_m", "along_rmse_m", "speed_rmse_kmh")
     records: list[dict[str, Cell]] = []
     for key in dict.fromkeys((r["scenario"], r["camera"], r["table"]) for r in rows):
@@ -150,6 +150,9 @@ def simulated_table(rows: Sequence[Mapping[str, Any]]) -> Table:
         record["speed_median_kmh"] = float(np.average([r["speed_median_kmh"] for r in own], weights=weight))
         record |= {name: float(np.average([r[name] for r in own], weights=weight)) for name in means}
         records.append(record)
-    digits = dict.fromkeys(("across_held", "along_held", "speed_held"), 1)
-    title = "Simulated highway, 20 to 100 m (nees: 1 where honest; held: % of the 95 % intervals)"
+    digits = dict.fromkeys(("across_held", "along_held", "speed_held", "speed_known"), 1)
+    title = (
+        "Simulated highway, 20 to 100 m (nees: 1 where honest; held: % of the 95 % intervals; known: % of "
+        "the rows that state a speed)"
+    )
     return Table.from_records(records, title=title, digits=digits)

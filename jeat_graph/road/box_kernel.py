@@ -88,7 +88,7 @@ def cuboid_sides(
     """
     R, lens = camera.rotation, camera.lens
     sin, cos = math.sin(heading), math.cos(heading)
-    which = np.zeros(4, dtype=np.int64)
+    left = top = right = bottom = 0
     side[0] = side[1] = np.inf
     side[2] = side[3] = -np.inf
     for k in range(8):
@@ -100,15 +100,15 @@ def cuboid_sides(
         gain = 1.0 + lens[4] * r2 + lens[5] * r2 * r2
         u, v = n0 * gain * lens[0] + lens[2], n1 * gain * lens[1] + lens[3]
         if u < side[0]:
-            side[0], which[0] = u, k
+            side[0], left = u, k
         if v < side[1]:
-            side[1], which[1] = v, k
+            side[1], top = v, k
         if u > side[2]:
-            side[2], which[2] = u, k
+            side[2], right = u, k
         if v > side[3]:
-            side[3], which[3] = v, k
+            side[3], bottom = v, k
     for s in range(4):
-        k, axis = which[s], s % 2
+        k, axis = (left, top, right, bottom)[s], s % 2
         a, b, X, Y, Z = _corner(camera, x, y, sin, cos, size, k)
         n0, n1 = X / Z, Y / Z
         r2 = n0 * n0 + n1 * n1

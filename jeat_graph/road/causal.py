@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,13 +15,24 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 from jeat_graph.road.box_kernel import kernel_camera
 from jeat_graph.road.camera import RoadCamera
-from jeat_graph.road.causal_kernel import forget, step_road
+from jeat_graph.road.causal_steps import forget, step_road
 from jeat_graph.road.fleet import CLASSES
 from jeat_graph.road.results import columns_of_states
-from jeat_graph.road.road_state import AY, LENGTH, STATES, STRIPS, VX, VY, RoadModel, RoadState, X, Y
+from jeat_graph.road.road_state import MODEL, ROAD_ROW, SPEED, STRIPS, TRACK, RoadState
 from jeat_graph.road.speeds import KMH
 from jeat_graph.road.taken_boxes import sensor_errors
 
+_OF_CONFIG = (
+    "speed_std",
+    "strip_std",
+    "acceleration_std",
+    "acceleration_s",
+    "lateral_std",
+    "lateral_s",
+    "edge_px",
+    "gate",
+    "pause",
+)
 _FIRST_CAPACITY = 64
 _FORGET_EVERY = 512  # steps
 _GRID = (24, 14)  # places of the picture at which the calibration's share is worked out
@@ -35,57 +46,38 @@ class RoadFilterConfig:
     strip_std: float = number(
         6.0, "m/s", "spread of a speed beyond those of the vehicles that drove there before", open_low=True
     )
-    acceleration_std: float = number(0.6, "m/s²", "spread of accelerations along the road", open_low=True)
+    acceleration_std: float = number(0.5, "m/s²", "spread of accelerations along the road", open_low=True)
     acceleration_s: float = number(4.0, "s", "how long an acceleration lasts", open_low=True)
-    lateral_std: float = number(0.5, "m/s", "spread of speeds across the road", open_low=True)
+    lateral_std: float = number(0.3, "m/s", "spread of speeds across the road", open_low=True)
     lateral_s: float = number(2.0, "s", "how long a motion across the road lasts", open_low=True)
     edge_px: float = number(2.0, "px", "a side this near the picture's edge is cut off by it")
     gate: float = number(9.0, "1", "squared residual / variance from which a box counts less", open_low=True)
+    pause: float = number(
+        0.15, "1", "share of a sensor's memory within which a further box of it is left out", 0.0, 1.0
+    )
+    known_kmh: float = number(
+        20.0, "km/h", "a speed that is less sure (standard deviation) is not known yet", open_low=True
+    )
     silence_s: float = number(10.0, "s", "a track without a box for longer is forgotten", open_low=True)
 
     def __post_init__(self) -> None:
         check(self)
 
 
-def road_model(config: RoadFilterConfig, camera: RoadCamera, sensors: Config) -> RoadModel:
-    """Return what compiled code takes: the fleet's mean size and how it varies, the sensors' memories."""
+def road_model(config: RoadFilterConfig, camera: RoadCamera) -> RecordArray:
+    """Return what compiled code takes: one record of `MODEL` (1,)."""
     share = np.array([one.share for one in CLASSES])
     mean = np.array([one.mean for one in CLASSES])
     middle = share @ mean
     off = mean - middle
     within = np.diag(share @ np.array([one.spread for one in CLASSES]) ** 2)
-    errors = sensor_errors(sensors)
-    return RoadModel(
-        middle,
-        np.einsum("k,ki,kj->ij", share, off, off) + within,
-        config.speed_std,
-        config.strip_std,
-        config.acceleration_std,
-        config.acceleration_s,
-        config.lateral_std,
-        config.lateral_s,
-        np.ascontiguousarray(errors.memory_s, dtype=np.float64),
-        np.ascontiguousarray(errors.coloured_share, dtype=np.float64),
-        config.edge_px,
-        config.gate,
-        np.array([camera.width, camera.height], dtype=np.float64),
-    )
-
-
-class RoadStates(NamedTuple):
-    """States of some tracks on the road.
-
-    Attributes:
-        t: (N,) time (s).
-        track_id: (N,) identity.
-        mean: (N, 8) x and its speed, y, its speed and acceleration, length, width, height (m, s).
-        cov: (N, 8, 8) covariance, by noise alone.
-    """
-
-    t: FloatArray
-    track_id: IntArray
-    mean: FloatArray
-    cov: FloatArray
+    model = np.zeros(1, dtype=MODEL)
+    model["size_mean"] = middle
+    model["size_cov"] = np.einsum("k,ki,kj->ij", share, off, off) + within
+    model["picture"] = camera.width, camera.height
+    for name in _OF_CONFIG:
+        model[name] = getattr(config, name)
+    return model
 
 
 class RoadFilter:
@@ -100,14 +92,16 @@ class RoadFilter:
     def __init__(
         self, camera: RoadCamera, sensors: Config, config: RoadFilterConfig = RoadFilterConfig()
     ) -> None:
-        self._model = road_model(config, camera, sensors)
+        self._model = road_model(config, camera)
+        errors = sensor_errors(sensors)
+        self._errors = np.stack([errors.memory_s, errors.coloured_share], axis=1)
         self._camera = kernel_camera(camera)
-        self._silence_s = config.silence_s
-        self._state = _allocate(_FIRST_CAPACITY, len(self._model.memory_s))
+        self._config = config
+        self._state = _allocate(_FIRST_CAPACITY, len(self._errors))
         self._steps = 0
         self._calibration = CalibrationShare(camera)
 
-    def step(self, t: float, rows: RecordArray, ids: IntArray) -> RoadStates:
+    def step(self, t: float, rows: RecordArray, ids: IntArray) -> RecordArray:
         """Take in one step.
 
         Args:
@@ -116,23 +110,33 @@ class RoadFilter:
             ids: (N,) the tracks that are reported now.
 
         Returns:
-            The states of those of them that stand on the road.
+            (K,) records of `road_state.ROAD_ROW`: the states of those of them that stand on the road.
         """
-        if int(self._state.count[0]) + len(rows) > len(self._state.track_id):
+        if int(self._state.count[0]) + len(rows) > len(self._state.track):
             self._state = _grown(self._state, len(rows))
-        known, mean, cov = step_road(self._state, t, rows, ids, self._model, self._camera)
+        found = np.empty(len(ids), dtype=ROAD_ROW)
+        count = step_road(self._state, t, rows, ids, self._model, self._errors, self._camera, found)
         self._steps += 1
         if self._steps % _FORGET_EVERY == 0:
-            forget(self._state, t, self._silence_s)
-        return RoadStates(np.full(len(known), t), ids[known], mean, cov)
+            forget(self._state, t, self._config.silence_s)
+        return found[:count]
 
-    def columns(self, steps: Sequence[RoadStates]) -> dict[str, npt.NDArray[Any]]:
-        """Columns of the table of the road of some steps, the calibration's share included."""
-        none = RoadStates(
-            np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros((0, STATES)), np.zeros((0, STATES, STATES))
-        )
-        joined = RoadStates(*(np.concatenate(parts) for parts in zip(none, *steps, strict=True)))
-        return _columns(joined, self._calibration)
+    def columns(self, steps: Sequence[RecordArray]) -> dict[str, npt.NDArray[Any]]:
+        """Columns of the table of the road of some steps, the calibration's share included.
+
+        Speed, heading and acceleration are NaN while the speed is not known (`RoadFilterConfig.known_kmh`).
+        """
+        # As bytes: NumPy compares the fields of all records with each other before it joins them.
+        rows = np.frombuffer(b"".join(step.tobytes() for step in steps), dtype=ROAD_ROW)
+        mean, var = rows["mean"].T.copy(), rows["var"].T.copy()
+        place_var, relative = self._calibration.at(rows["mean"][:, :2])
+        var[:2] += place_var.T
+        var[SPEED] += relative * mean[SPEED] ** 2
+        unknown = var[SPEED] > (self._config.known_kmh / KMH) ** 2
+        mean[SPEED : SPEED + 3, unknown] = var[SPEED : SPEED + 3, unknown] = np.nan
+        mean[SPEED] *= KMH
+        var[SPEED] *= KMH**2
+        return columns_of_states(rows["t"].copy(), rows["track_id"].copy(), mean, var)
 
 
 class CalibrationShare:
@@ -172,52 +176,10 @@ class CalibrationShare:
         return np.diagonal(self._place_cov[nearest], axis1=1, axis2=2), self._relative[nearest]
 
 
-def _columns(states: RoadStates, calibration: CalibrationShare) -> dict[str, npt.NDArray[Any]]:
-    t, ids, mean, cov = states
-    velocity = mean[:, [VX, VY]]
-    speed = np.hypot(*velocity.T)
-    unit = np.where(speed[:, None] > 0, velocity / np.maximum(speed, 1e-9)[:, None], [0.0, 1.0])
-    var_velocity = cov[:, [[VX], [VY]], [VX, VY]]
-    side = np.stack([unit[:, 1], -unit[:, 0]], axis=1)
-    place_var, relative = calibration.at(mean[:, [X, Y]])
-    var_speed = np.einsum("ni,nij,nj->n", unit, var_velocity, unit) + relative * speed**2
-    var_turn = np.einsum("ni,nij,nj->n", side, var_velocity, side) / np.maximum(speed, 1e-3) ** 2
-    sizes = range(LENGTH, LENGTH + 3)
-    return columns_of_states(
-        t,
-        ids,
-        np.stack(
-            [
-                mean[:, X],
-                mean[:, Y],
-                speed * KMH,
-                np.arctan2(velocity[:, 0], velocity[:, 1]),
-                mean[:, AY] * unit[:, 1],
-                *(mean[:, k] for k in sizes),
-            ]
-        ),
-        np.stack(
-            [
-                cov[:, X, X] + place_var[:, 0],
-                cov[:, Y, Y] + place_var[:, 1],
-                var_speed * KMH**2,
-                var_turn,
-                cov[:, AY, AY] * unit[:, 1] ** 2,
-                *(cov[:, k, k] for k in sizes),
-            ]
-        ),
-    )
-
-
 def _allocate(capacity: int, sensors: int) -> RoadState:
     return RoadState(
-        np.zeros(capacity, dtype=np.int64),
-        np.zeros((capacity, STATES)),
-        np.zeros((capacity, STATES, STATES)),
-        np.zeros(capacity),
+        np.zeros(capacity, dtype=TRACK),
         np.full((capacity, sensors), -math.inf),
-        np.zeros(capacity),
-        np.zeros(capacity, dtype=np.int64),
         np.zeros((STRIPS, 3)),
         np.zeros(1, dtype=np.int64),
     )
@@ -225,9 +187,7 @@ def _allocate(capacity: int, sensors: int) -> RoadState:
 
 def _grown(state: RoadState, more: int) -> RoadState:
     n = int(state.count[0])
-    larger = _allocate(max(2 * len(state.track_id), n + more), state.seen.shape[1])
-    for source, target in zip(state[:-2], larger[:-2], strict=True):
-        target[:n] = source[:n]
-    larger.strip[:] = state.strip
-    larger.count[0] = n
+    larger = _allocate(max(2 * len(state.track), n + more), state.seen.shape[1])
+    larger.track[:n], larger.seen[:n] = state.track[:n], state.seen[:n]
+    larger.strip[:], larger.count[0] = state.strip, n
     return larger

@@ -1,4 +1,4 @@
-"""Compiled steps of the filter on the road: boxes read, states begun, all tracks advanced at once."""
+"""Compiled beginnings of the filter on the road: boxes read, and states begun at them."""
 
 from __future__ import annotations
 
@@ -27,27 +27,27 @@ from jeat_graph.road.road_state import (
     STATES,
     VX,
     VY,
-    RoadModel,
-    RoadState,
+    Record,
     X,
     Y,
-    predict,
     strip_of,
-    tell_speed,
-    update,
 )
 
 _FIRST_STEPS = 4
 # A filter that takes a box for whole that is cut off believes in a vehicle that stands in the edge.
 _EDGE_SIGMAS, _EDGE_SHARE = 3.5, 0.4
-_FIRST_BOXES = 5  # of a track that have to be whole
-_TELLS_AFTER = 60  # boxes of a track after which its speed counts for its strip
 _ENOUGH = 3.0  # vehicles of a strip that tell how fast the next one will be
 
 
 @njit(cache=True)
 def read_box(
-    row: RecordArray, since_s: float, model: RoadModel, z: FloatArray, R: FloatArray, mode: IntArray
+    row: RecordArray,
+    since_s: float,
+    model: Record,
+    errors: FloatArray,
+    z: FloatArray,
+    R: FloatArray,
+    mode: IntArray,
 ) -> None:
     """Turn a record of the update log into channels, with white errors that tell as much as its own do.
 
@@ -57,14 +57,16 @@ def read_box(
         row: of `filters.measurement.MEASUREMENT`.
         since_s: time since the sensor's last box (s).
         model: what is believed of boxes.
+        errors: (S, 2) correlation time of each sensor's errors (s), share of the size's variance that
+            persists.
         z: (4,) filled: channels.
         R: (4,) filled: variances.
         mode: (2,) filled: what of each axis is measured.
     """
     s = row["sensor"]
-    forget = math.exp(-min(since_s, 1e3) / model.memory_s[s])
+    forget = math.exp(-min(since_s, 1e3) / errors[s, 0])
     factor = (1.0 + forget) / max(1.0 - forget, 1e-3)
-    share = model.coloured_share[s]
+    share = errors[s, 1]
     for axis in range(2):
         centre, extent = row["z"][axis], math.exp(row["log_size"][axis])
         size_var = row["size_var"][axis] * row["scale"]
@@ -73,9 +75,9 @@ def read_box(
         spread = math.sqrt(
             row["r"][axis] + row["coloured_std"][axis] ** 2 + 0.25 * extent * extent * size_var
         )
-        margin = model.edge_px + min(_EDGE_SIGMAS * spread, _EDGE_SHARE * extent)
+        margin = model["edge_px"] + min(_EDGE_SIGMAS * spread, _EDGE_SHARE * extent)
         low, high = centre - 0.5 * extent, centre + 0.5 * extent
-        sees_low, sees_high = low > margin, high < model.picture[axis] - margin
+        sees_low, sees_high = low > margin, high < model["picture"][axis] - margin
         z[axis], z[axis + 2] = centre, row["log_size"][axis]
         if sees_low and sees_high:
             mode[axis] = WHOLE
@@ -96,7 +98,7 @@ def begin(
     z: FloatArray,
     R: FloatArray,
     mode: IntArray,
-    model: RoadModel,
+    model: Record,
     camera: KernelCamera,
     strip: FloatArray,
 ) -> bool:
@@ -120,20 +122,20 @@ def begin(
     m[:] = 0.0
     P[:] = 0.0
     for a in range(3):
-        m[LENGTH + a] = model.size_mean[a]
+        m[LENGTH + a] = model["size_mean"][a]
         for b in range(3):
-            P[LENGTH + a, LENGTH + b] = model.size_cov[a, b]
-    ahead = 0.5 * model.size_mean[0] * dy / distance / distance * abs(dy)
+            P[LENGTH + a, LENGTH + b] = model["size_cov"][a, b]
+    ahead = 0.5 * model["size_mean"][0] * dy / distance / distance * abs(dy)
     m[X], m[Y] = position[0] + dx, position[1] + dy + ahead
     P[X, X] = (0.2 * distance) ** 2
     P[Y, Y] = (0.5 * distance) ** 2
-    P[VX, VX] = model.lateral_std**2
-    P[VY, VY] = model.speed_std**2
+    P[VX, VX] = model["lateral_std"] ** 2
+    P[VY, VY] = model["speed_std"] ** 2
     near = strip[strip_of(m[X])]
     if near[0] >= _ENOUGH:
         m[VY] = near[1]
-        P[VY, VY] = near[2] + model.strip_std**2
-    P[AY, AY] = model.acceleration_std**2
+        P[VY, VY] = near[2] + model["strip_std"] ** 2
+    P[AY, AY] = model["acceleration_std"] ** 2
     prior_m, prior_P = m.copy(), P.copy()
     for _ in range(_FIRST_STEPS):
         # Linearised anew about what the last pass found, each time from the prior.
@@ -174,126 +176,3 @@ def _update_about(
     for c in range(3):
         m[LENGTH + c] = max(m[LENGTH + c], LEAST_SIZE[c])
     return True
-
-
-@njit(cache=True)
-def find(state: RoadState, track_id: int) -> int:
-    """Row of a track, or minus one."""
-    n = state.count[0]
-    k = int(np.searchsorted(state.track_id[:n], track_id))
-    return k if k < n and state.track_id[k] == track_id else -1
-
-
-@njit(cache=True)
-def copy_row(state: RoadState, source: int, target: int) -> None:
-    """Copy one track's row over another's."""
-    state.track_id[target], state.t[target] = state.track_id[source], state.t[source]
-    state.updated[target], state.boxes[target] = state.updated[source], state.boxes[source]
-    state.mean[target], state.cov[target] = state.mean[source], state.cov[source]
-    state.seen[target] = state.seen[source]
-
-
-@njit(cache=True)
-def remove(state: RoadState, i: int) -> None:
-    """Remove one track, in place."""
-    for r in range(i, state.count[0] - 1):
-        copy_row(state, r + 1, r)
-    state.count[0] -= 1
-
-
-@njit(cache=True)
-def advance(state: RoadState, t: float, rows: RecordArray, model: RoadModel, camera: KernelCamera) -> None:
-    """Take in what one step of the tracker gave to its tracks, in place.
-
-    Args:
-        state: with room for as many new tracks as there are rows.
-        t: time of the step (s).
-        rows: (M,) records of `filters.measurement.MEASUREMENT`.
-        model: what is believed of vehicles and boxes.
-        camera: the camera.
-    """
-    z, R, mode = np.empty(CHANNELS), np.empty(CHANNELS), np.empty(2, dtype=np.int64)
-    for j in range(len(rows)):
-        row = rows[j]
-        s, identity = row["sensor"], row["track_id"]
-        i = find(state, identity)
-        if i < 0:
-            read_box(row, np.inf, model, z, R, mode)
-            n = state.count[0]
-            k = int(np.searchsorted(state.track_id[:n], identity))
-            if not begin(state.mean[n], state.cov[n], z, R, mode, model, camera, state.strip):
-                continue
-            if k < n:  # a track that is older than its first whole box
-                mean, cov = state.mean[n].copy(), state.cov[n].copy()
-                for r in range(n, k, -1):
-                    copy_row(state, r - 1, r)
-                state.mean[k], state.cov[k] = mean, cov
-            state.track_id[k], state.t[k], state.updated[k] = identity, t, t
-            state.seen[k] = -np.inf
-            state.seen[k, s] = t
-            state.boxes[k] = 1
-            state.count[0] = n + 1
-            continue
-        predict(state.mean[i], state.cov[i], t - state.t[i], model)
-        state.t[i] = t
-        read_box(row, t - state.seen[i, s], model, z, R, mode)
-        if state.boxes[i] < _FIRST_BOXES and (mode[0] != WHOLE or mode[1] != WHOLE):
-            remove(state, i)  # it may not have been whole at first either
-            continue
-        if update(state.mean[i], state.cov[i], z, R, mode, model, camera):
-            state.seen[i, s] = t
-            state.updated[i] = t
-            state.boxes[i] += 1
-            if state.boxes[i] == _TELLS_AFTER:
-                tell_speed(state.strip, state.mean[i, X], state.mean[i, VY])
-
-
-@njit(cache=True)
-def states_at(
-    state: RoadState, t: float, ids: IntArray, model: RoadModel
-) -> tuple[IntArray, FloatArray, FloatArray]:
-    """States of some tracks at a time.
-
-    Args:
-        state: of all tracks; those asked for are predicted to t in place.
-        t: time (s), not before theirs.
-        ids: (N,) identities.
-        model: what is believed of vehicles.
-
-    Returns:
-        Which of `ids` are known (K,), their means (K, 8) and covariances (K, 8, 8).
-    """
-    known = np.empty(len(ids), dtype=np.int64)
-    mean, cov = np.empty((len(ids), STATES)), np.empty((len(ids), STATES, STATES))
-    count = 0
-    for j in range(len(ids)):
-        i = find(state, ids[j])
-        if i < 0:
-            continue
-        predict(state.mean[i], state.cov[i], t - state.t[i], model)
-        state.t[i] = max(t, state.t[i])
-        known[count], mean[count], cov[count] = j, state.mean[i], state.cov[i]
-        count += 1
-    return known[:count], mean[:count], cov[:count]
-
-
-@njit(cache=True)
-def step_road(
-    state: RoadState, t: float, rows: RecordArray, ids: IntArray, model: RoadModel, camera: KernelCamera
-) -> tuple[IntArray, FloatArray, FloatArray]:
-    """`advance`, then `states_at`: one call, for handing the state over costs as much as some boxes."""
-    advance(state, t, rows, model, camera)
-    return states_at(state, t, ids, model)
-
-
-@njit(cache=True)
-def forget(state: RoadState, t: float, silence_s: float) -> None:
-    """Remove tracks without a box for longer than `silence_s`, in place."""
-    kept = 0
-    for i in range(state.count[0]):
-        if t - state.updated[i] > silence_s:
-            continue
-        if kept < i:
-            copy_row(state, i, kept)
-        kept += 1
-    state.count[0] = kept

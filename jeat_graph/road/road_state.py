@@ -9,12 +9,12 @@ white ones that tell as much in the long run, which costs one state less a senso
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 from jeat_graph.road.box_kernel import (
     CHANNELS,
     NEITHER,
@@ -25,9 +25,13 @@ from jeat_graph.road.box_kernel import (
     cuboid_sides,
 )
 
+#: A record of `MODEL`.
+Record = Any
 #: Components of the state.
 X, VX, Y, VY, AY, LENGTH, WIDTH, HEIGHT = range(8)
 STATES = 8
+#: Place of the speed in a row of a table of the road, before its heading and acceleration.
+SPEED = 2
 OF_UNKNOWN = np.array([X, Y, LENGTH, WIDTH, HEIGHT])
 #: Strips along the road, about the road below the camera: how many, and how wide (m).
 STRIPS, _STRIP_M = 60, 2.0
@@ -36,78 +40,85 @@ LEAST_SIZE = np.array([1.2, 0.4, 0.8])
 _LEAST_SPEED = 2.0
 
 
+#: One track on the road: its identity, how many boxes it took in, the time of the state and that of the
+#: last box (s), the state and its covariance. A record, for one array is handed over sooner than nine.
+TRACK = np.dtype(
+    [
+        ("track_id", np.int64),
+        ("boxes", np.int64),
+        ("t", np.float64),
+        ("updated", np.float64),
+        ("mean", np.float64, (STATES,)),
+        ("cov", np.float64, (STATES, STATES)),
+    ]
+)
+
+#: What is believed of vehicles and boxes, in one record for the same reason.
+#:
+#: size_mean, size_cov: length, width, height (m) of a vehicle not seen yet. speed_std: of the speed along the
+#: road (m/s); strip_std: of that of a vehicle where others drove before, beyond how theirs differ (m/s).
+#: acceleration_std, acceleration_s: spread of accelerations along the road (m/s²) and how long one lasts (s).
+#: lateral_std, lateral_s: the same of speeds across it (m/s, s). edge_px: a side this near the picture's edge
+#: is cut off by it. gate: squared distance a degree of freedom beyond which a box is believed less. pause:
+#: share of a sensor's memory within which a further box of it is left out. picture: width and height (px).
+MODEL = np.dtype(
+    [
+        ("size_mean", np.float64, (3,)),
+        ("size_cov", np.float64, (3, 3)),
+        ("speed_std", np.float64),
+        ("strip_std", np.float64),
+        ("acceleration_std", np.float64),
+        ("acceleration_s", np.float64),
+        ("lateral_std", np.float64),
+        ("lateral_s", np.float64),
+        ("edge_px", np.float64),
+        ("gate", np.float64),
+        ("pause", np.float64),
+        ("picture", np.float64, (2,)),
+    ]
+)
+
+
+#: A track at one time: x, y (m), speed (m/s), heading from y towards x (rad), acceleration along the way
+#: (m/s²), length, width, height (m), and their variances by noise alone.
+ROAD_ROW = np.dtype(
+    [
+        ("t", np.float64),
+        ("track_id", np.int64),
+        ("mean", np.float64, (STATES,)),
+        ("var", np.float64, (STATES,)),
+    ]
+)
+
+
 class RoadState(NamedTuple):
     """State of all tracks on the road, one row a track; rows beyond `count` are unused.
 
     Attributes:
-        track_id: (C,) identities, ascending.
-        mean: (C, 8) state.
-        cov: (C, 8, 8) covariance.
-        t: (C,) time of the state (s).
+        track: (C,) records of `TRACK`, by identity.
         seen: (C, S) time of each sensor's last box (s), minus infinity before the first.
-        updated: (C,) time of the last box (s).
-        boxes: (C,) how many were taken in.
         strip: (K, 3) of each strip along the road: vehicles that have told their speed along it, its mean
             (m/s) and its variance (m²/s²).
         count: (1,) rows in use.
     """
 
-    track_id: IntArray
-    mean: FloatArray
-    cov: FloatArray
-    t: FloatArray
+    track: RecordArray
     seen: FloatArray
-    updated: FloatArray
-    boxes: IntArray
     strip: FloatArray
     count: IntArray  # type: ignore[assignment]  # hides tuple.count, which nobody calls
 
 
-class RoadModel(NamedTuple):
-    """What is believed of vehicles and boxes.
-
-    Attributes:
-        size_mean: (3,) length, width, height (m) of a vehicle not seen yet.
-        size_cov: (3, 3) covariance.
-        speed_std: of the speed along the road (m/s).
-        strip_std: of that of a vehicle where others have driven before, beyond how theirs differ (m/s).
-        acceleration_std: of the acceleration along the road (m/s²).
-        acceleration_s: how long an acceleration lasts (s).
-        lateral_std: of the speed across the road (m/s).
-        lateral_s: how long a motion across it lasts (s).
-        memory_s: (S,) correlation time of each sensor's errors (s).
-        coloured_share: (S,) share of the size's variance that persists.
-        edge_px: a side this near the picture's edge is cut off by it (px).
-        gate: squared distance a degree of freedom beyond which a box is believed less.
-        picture: (2,) width and height (px).
-    """
-
-    size_mean: FloatArray
-    size_cov: FloatArray
-    speed_std: float
-    strip_std: float
-    acceleration_std: float
-    acceleration_s: float
-    lateral_std: float
-    lateral_s: float
-    memory_s: FloatArray
-    coloured_share: FloatArray
-    edge_px: float
-    gate: float
-    picture: FloatArray
-
-
 @njit(cache=True)
-def predict(m: FloatArray, P: FloatArray, dt: float, model: RoadModel) -> None:
+def predict(m: FloatArray, P: FloatArray, dt: float, model: Record) -> None:
     """Predict one state by dt (s), in place."""
     if dt <= 0.0:
         return
-    fade = math.exp(-dt / model.acceleration_s)
-    calm = math.exp(-dt / model.lateral_s)
+    fade = math.exp(-dt / model["acceleration_s"])
+    calm = math.exp(-dt / model["lateral_s"])
     h = 0.5 * dt * dt
-    to_speed = model.acceleration_s * (1.0 - fade)
-    to_place = model.acceleration_s * (dt - to_speed)
-    gain_x = model.lateral_s * (1.0 - calm)
+    to_speed = model["acceleration_s"] * (1.0 - fade)
+    to_place = model["acceleration_s"] * (dt - to_speed)
+    gain_x = model["lateral_s"] * (1.0 - calm)
     m[X] += gain_x * m[VX]
     m[VX] *= calm
     m[Y] += dt * m[VY] + to_place * m[AY]
@@ -125,12 +136,12 @@ def predict(m: FloatArray, P: FloatArray, dt: float, model: RoadModel) -> None:
         P[r, Y] += dt * P[r, VY] + to_place * P[r, AY]
         P[r, VY] += to_speed * P[r, AY]
         P[r, AY] *= fade
-    lateral = model.lateral_std**2 * (1.0 - calm * calm)
+    lateral = model["lateral_std"] ** 2 * (1.0 - calm * calm)
     P[VX, VX] += lateral
     P[X, X] += lateral * dt * dt / 3.0
     P[X, VX] += lateral * dt / 2.0
     P[VX, X] += lateral * dt / 2.0
-    q = 2.0 * model.acceleration_std**2 / model.acceleration_s
+    q = 2.0 * model["acceleration_std"] ** 2 / model["acceleration_s"]
     P[AY, AY] += q * dt
     P[VY, VY] += q * dt**3 / 3.0
     P[Y, Y] += q * dt**5 / 20.0
@@ -146,7 +157,7 @@ def update(
     z: FloatArray,
     R: FloatArray,
     mode: IntArray,
-    model: RoadModel,
+    model: Record,
     camera: KernelCamera,
 ) -> bool:
     """Take one box in, in place: its channels one after another, about one linearisation.
@@ -154,14 +165,15 @@ def update(
     Returns:
         False, with the state as it was, where the vehicle is not in front of the camera.
     """
-    side, slope = np.empty(4), np.empty((4, UNKNOWNS))
-    expected, J = np.empty(CHANNELS), np.empty((CHANNELS, UNKNOWNS))
+    # One piece of memory: asking for each of them costs as much as their arithmetic.
+    work = np.empty(2 * CHANNELS * (1 + UNKNOWNS) + 2 * STATES)
+    side, expected, start, gain = work[:4], work[4:8], work[8 : 8 + STATES], work[16 : 16 + STATES]
+    slope, J = work[24:44].reshape(4, UNKNOWNS), work[44:].reshape(CHANNELS, UNKNOWNS)
     heading = math.atan2(m[VX], m[VY]) if m[VX] ** 2 + m[VY] ** 2 > _LEAST_SPEED**2 else 0.0
     if not cuboid_sides(camera, m[X], m[Y], heading, m[LENGTH:], side, slope):
         return False
     box_channels(side, slope, mode, expected, J)
-    start = m.copy()
-    gain = np.empty(STATES)
+    start[:] = m
     for channel in range(CHANNELS):
         axis = channel % 2
         if mode[axis] == NEITHER or (channel >= 2 and mode[axis] != WHOLE):
@@ -178,8 +190,8 @@ def update(
         for c in range(UNKNOWNS):
             S += J[channel, c] * gain[OF_UNKNOWN[c]]
         distance = innovation * innovation / S
-        if distance > model.gate:  # a doubtful box counts less, smoothly
-            S += R[channel] * (distance / model.gate - 1.0)
+        if distance > model["gate"]:  # a doubtful box counts less, smoothly
+            S += R[channel] * (distance / model["gate"] - 1.0)
         inverse = 1.0 / S
         for r in range(STATES):
             share = gain[r] * inverse

@@ -17,7 +17,7 @@ from jeat_graph.io.trajectories_io import read_trajectories
 from jeat_graph.road.box_rows import BoxConfig
 from jeat_graph.road.boxes_road import follow_boxes
 from jeat_graph.road.camera import RoadCamera
-from jeat_graph.road.causal import RoadFilter, RoadFilterConfig, RoadStates
+from jeat_graph.road.causal import RoadFilter, RoadFilterConfig
 from jeat_graph.road.cuboid_fit import CuboidConfig
 from jeat_graph.road.results import empty_road_columns, road_columns
 from jeat_graph.road.taken_boxes import boxes_of_log, sensor_errors
@@ -65,7 +65,7 @@ def causal_pieces(
     instants = np.unique(np.concatenate([log["t"], at]))
     first, last = (np.searchsorted(log["t"], instants, side=side) for side in ("left", "right"))
     row, end = (np.searchsorted(at, instants, side=side) for side in ("left", "right"))
-    pieces, steps = [], list[RoadStates]()
+    pieces, steps = [], list[RecordArray]()
     for k, t in enumerate(instants.tolist()):
         steps.append(road.step(t, log[first[k] : last[k]], causal.track_id[row[k] : end[k]]))
         if len(steps) == _STEPS_AT_ONCE:

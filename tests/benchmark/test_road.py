@@ -38,7 +38,7 @@ def test_scores_of_speeds() -> None:
 
 def test_tables_pool_seeds_by_rows() -> None:
     names = ("nees", "speed_nees", "across_held", "along_held", "speed_held", "speed_median_kmh")
-    names += ("across_rmse_m", "along_rmse_m", "speed_rmse_kmh")
+    names += ("across_rmse_m", "along_rmse_m", "speed_rmse_kmh", "speed_known")
     one = {"scenario": "day", "camera": "exact", "table": "smoothed", "rows": 3, **dict.fromkeys(names, 1.0)}
     other = one | {"rows": 1, "speed_rmse_kmh": 3.0, "nees": 5.0}
     real = {"camera": "a", "lengths": "all", **speed_scores(np.array([0.5, -1.0]), np.ones(2))}

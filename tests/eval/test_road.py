@@ -62,3 +62,19 @@ def test_tables_of_a_folder(tmp_path: Path) -> None:
     scores = judge_road_run(tmp_path, tmp_path / "gt.csv")["road_causal"]
     assert scores["along_rmse_m"] == pytest.approx(0.3)
     assert scores["speed_nees"] == pytest.approx(1.0)
+
+
+def test_rows_that_do_not_know_their_speed_yet_count_for_the_place_alone(tmp_path: Path) -> None:
+    (tmp_path / "gt.csv").write_text("t,object_id,x,y,speed_kmh\n0,1,0,30,72\n1,1,0,50,72\n")
+    head = "t,track_id,x,y,speed_kmh,var_x,var_y,var_speed_kmh\n"
+    rows = "0.25,9,0.0,35.4,,0.01,0.04,\n0.5,9,0.0,40.3,75,0.01,0.09,9\n"
+    (tmp_path / "road_causal.csv").write_text(head + rows)
+    scores = judge_road_run(tmp_path, tmp_path / "gt.csv")["road_causal"]
+    assert scores["rows"] == 2
+    assert scores["speed_known"] == 50.0
+    assert scores["speed_rmse_kmh"] == pytest.approx(3.0)
+    assert scores["along_rmse_m"] == pytest.approx(np.sqrt((0.4**2 + 0.3**2) / 2))
+    (tmp_path / "road_causal.csv").write_text(head + "0.25,9,0.0,35.4,,0.01,0.04,\n")
+    scores = judge_road_run(tmp_path, tmp_path / "gt.csv")["road_causal"]
+    assert "speed_rmse_kmh" not in scores
+    assert scores["speed_known"] == 0.0

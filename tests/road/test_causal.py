@@ -15,6 +15,7 @@ from jeat_graph.config.reading import load_config
 from jeat_graph.filters.measurement import MEASUREMENT
 from jeat_graph.road.box_kernel import kernel_camera
 from jeat_graph.road.causal import CalibrationShare, RoadFilter, RoadFilterConfig, road_model
+from jeat_graph.road.causal_steps import road_terms
 from jeat_graph.road.cuboid import sides
 from jeat_graph.road.road_state import AY, STATES, VX, VY, X, Y, predict, update
 
@@ -22,7 +23,7 @@ SIZE = np.array([4.4, 1.8, 1.5])
 
 
 def _model():
-    return road_model(RoadFilterConfig(), camera(), load_config("highway"))
+    return road_model(RoadFilterConfig(), camera())[0]
 
 
 def _covariance(rng: np.random.Generator) -> np.ndarray:
@@ -35,7 +36,7 @@ def test_prediction_is_the_linear_model() -> None:
     rng, model, dt = np.random.default_rng(0), _model(), 0.02
     A = np.zeros((STATES, STATES))
     A[X, VX] = A[Y, VY] = A[VY, AY] = 1.0
-    A[VX, VX], A[AY, AY] = -1.0 / model.lateral_s, -1.0 / model.acceleration_s
+    A[VX, VX], A[AY, AY] = -1.0 / model["lateral_s"], -1.0 / model["acceleration_s"]
     F = expm(A * dt)
     m, P = rng.standard_normal(STATES), _covariance(rng)
     got_m, got_P = m.copy(), P.copy()
@@ -43,8 +44,8 @@ def test_prediction_is_the_linear_model() -> None:
     np.testing.assert_allclose(got_m, F @ m, atol=1e-9)
     noise = got_P - F @ P @ F.T
     spectral = np.zeros((STATES, STATES))
-    spectral[AY, AY] = 2.0 * model.acceleration_std**2 / model.acceleration_s
-    spectral[VX, VX] = 2.0 * model.lateral_std**2 / model.lateral_s
+    spectral[AY, AY] = 2.0 * model["acceleration_std"] ** 2 / model["acceleration_s"]
+    spectral[VX, VX] = 2.0 * model["lateral_std"] ** 2 / model["lateral_s"]
     block = np.block([[-A, spectral], [np.zeros_like(A), A.T]])
     lifted = expm(block * dt)
     Q = lifted[STATES:, STATES:].T @ lifted[:STATES, STATES:]
@@ -95,7 +96,7 @@ def _follow(rows: np.ndarray) -> list[tuple[float, float, float, float]]:
     for k in range(len(rows)):
         states = road.step(float(rows["t"][k]), rows[k : k + 1], np.array([rows["track_id"][k]]))
         columns = road.columns([states])
-        if len(states.t):
+        if len(states):
             found.append(
                 tuple(float(columns[name][0]) for name in ("y", "speed_kmh", "var_speed_kmh", "var_y"))
             )
@@ -110,9 +111,71 @@ def test_a_vehicle_is_where_it_is_and_as_fast_as_it_drives() -> None:
     assert np.sqrt(var) < 5.0
 
 
+def test_a_speed_is_stated_once_it_is_known() -> None:
+    """Before, the row has the place alone; from then on, a speed that is as good as it has to be."""
+    found = np.array(_follow(_log(np.random.default_rng(5), 0.7)))
+    known = np.isfinite(found[:, 1])
+    assert np.isfinite(found[:, 0]).all()
+    assert not known[0]
+    assert known[-1]
+    assert (np.diff(known.astype(int)) >= 0).all()
+    assert np.isnan(found[~known, 2]).all()
+    assert np.sqrt(found[known, 2].max()) <= RoadFilterConfig().known_kmh
+    assert np.abs(found[known, 1] - 79.2).max() < 3.0 * RoadFilterConfig().known_kmh
+
+
+def test_what_the_table_says_of_a_state_is_its_transform() -> None:
+    """Speed, heading and their variances against derivatives by central differences of the whole state."""
+    rng = np.random.default_rng(6)
+    m, P = np.array([3.0, 1.2, 32.0, -20.0, 0.7, *SIZE]), 0.01 * _covariance(rng)
+
+    def terms(state: np.ndarray) -> np.ndarray:
+        vx, vy = state[VX], state[VY]
+        speed = np.hypot(vx, vy)
+        return np.array([state[X], state[Y], speed, np.arctan2(vx, vy), state[AY] * vy / speed, *state[5:]])
+
+    slope = np.stack([(terms(m + e) - terms(m - e)) / 2e-5 for e in 1e-5 * np.eye(STATES)], axis=1)
+    slope[4, [VX, VY]] = 0.0  # an acceleration's direction counts as known
+    mean, var = np.empty(STATES), np.empty(STATES)
+    road_terms(m, P, mean, var)
+    np.testing.assert_allclose(mean, terms(m), rtol=1e-12)
+    np.testing.assert_allclose(var, np.diag(slope @ P @ slope.T), rtol=1e-6)
+
+
+def test_boxes_that_come_at_once_tell_nothing_new() -> None:
+    """Leaving out those within a share of their errors' memory changes little."""
+    rows = _log(np.random.default_rng(7), 0.7)
+    config = load_config("highway")
+    final = {}
+    for pause in (0.0, 0.15):
+        road = RoadFilter(camera(), config, RoadFilterConfig(pause=pause))
+        for k in range(len(rows)):
+            states = road.step(float(rows["t"][k]), rows[k : k + 1], rows["track_id"][k : k + 1])
+        final[pause] = states[0]
+    spread = np.sqrt(final[0.0]["var"])
+    assert (np.abs(final[0.15]["mean"] - final[0.0]["mean"]) < spread).all()
+    np.testing.assert_allclose(np.sqrt(final[0.15]["var"]), spread, rtol=0.2)
+
+
+def test_tracks_are_kept_in_order_whenever_they_begin() -> None:
+    """A track that is older than others but stands on the road later than they."""
+    road = RoadFilter(camera(), load_config("highway"))
+    logs = {n: _log(np.random.default_rng(n), 0.3, number=n) for n in (2, 7, 5)}
+    for k in range(2, 40):
+        rows = np.concatenate([logs[n][k : k + 1] for n in (2, 7, 5) if k >= n])
+        ids = np.array([9, 7, 2, 5])
+        states = road.step(0.02 * k, rows, ids)
+    assert states["track_id"].tolist() == [7, 2, 5]
+    alone = RoadFilter(camera(), load_config("highway"))
+    for k in range(5, 40):
+        one = alone.step(0.02 * k, logs[5][k : k + 1], np.array([5]))
+    assert one[0]["mean"].tobytes() == states[2]["mean"].tobytes()
+
+
 def test_the_past_does_not_depend_on_the_future() -> None:
     rows = _log(np.random.default_rng(3), 0.7)
-    assert _follow(rows[:40]) == _follow(rows)[: len(_follow(rows[:40]))]
+    early = _follow(rows[:40])
+    np.testing.assert_array_equal(early, _follow(rows)[: len(early)])
 
 
 def test_stated_errors_are_about_what_they_are() -> None:
@@ -128,7 +191,7 @@ def test_a_vehicle_cut_off_by_the_edge_has_no_state_yet() -> None:
     rows = _log(np.random.default_rng(4), 0.3)[:1]
     rows["z"][0, 1] = HEIGHT - np.exp(rows["log_size"][0, 1]) / 2.0
     road = RoadFilter(camera(), load_config("highway"))
-    assert not len(road.step(0.0, rows, np.array([1])).t)
+    assert not len(road.step(0.0, rows, np.array([1])))
 
 
 def test_calibration_share_is_that_of_the_place() -> None:

@@ -63,12 +63,17 @@ def read_road_frames(source: str | Path, rate_hz: float) -> RoadFrames:
             f"holds no table of a road ({', '.join(_TABLES)}): make one with jeat-graph road", source
         )
     table = read_table(found[0], ("t", "track_id", "x", "y", "speed_kmh", "heading_deg"))
-    t, ids = table.number("t"), table.whole("track_id")
-    columns = [table.number(name) if name in table else np.zeros(len(t)) for name in _MOTION]
-    sizes = [
-        np.nan_to_num(table.number(name, blank_ok=True, nan_ok=True)) if name in table else np.zeros(len(t))
-        for name in _SIZES
-    ]
+    # A causal row may not know its speed yet: other programs take none without.
+    known = np.isfinite(table.number("speed_kmh", blank_ok=True, nan_ok=True))
+
+    def read(name: str) -> FloatArray:
+        if name not in table:
+            return np.zeros(int(known.sum()))
+        return np.asarray(table.number(name, blank_ok=True, nan_ok=True)[known])
+
+    t, ids = table.number("t")[known], table.whole("track_id")[known]
+    columns = [read(name) for name in _MOTION]
+    sizes = [np.nan_to_num(read(name)) for name in _SIZES]
     lanes = _by_vehicle(folder / "speeds.csv") if folder.is_dir() else {}
     order = np.lexsort((t, ids))
     cuts = np.flatnonzero(np.diff(ids[order])) + 1
