@@ -45,7 +45,7 @@ def position_nees(pairs: Sequence[tuple[GroundTruth, Trajectories]], kind: Kind 
         frames = build_frames(truth, table, kind=kind)
         there, track = matched_entries(frames.iou, _MATCH_IOU)
         box = frames.truth_boxes[there]
-        width, height = (truth.boxes[:, :2] + truth.boxes[:, 2:]).max(axis=0)
+        width, height = (truth.boxes[:, :2] + truth.boxes[:, 2:]).max(axis=0, initial=0.0)
         far = box[:, :2] + box[:, 2:]
         inside = (box[:, :2] > _EDGE_PX).all(axis=1) & (far[:, 0] < width - _EDGE_PX)
         inside &= far[:, 1] < height - _EDGE_PX

@@ -2,7 +2,7 @@
 
 Matched detections give noise, reliability, motion and births that describe the recordings; whether a tracker
 does better with them is another question. Each half of the recordings is tracked with what the other half
-gives, and a part (say, the motion) for which the base configuration's own values do better there goes back to
+gives, and a part (say, the births) for which the base configuration's own values do better there goes back to
 them.
 """
 
@@ -11,15 +11,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from jeat_graph.calibration.supervised import calibrate
-from jeat_graph.calibration.tune import Recording, folds, shorten, tracking_score
+from jeat_graph.calibration.supervised import MatchedSensors, measure_sensors, with_sensors
+from jeat_graph.calibration.tune import folds, shorten
+from jeat_graph.calibration.verdict import Recording, better, judge
 from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import DataError
 
+_CENTRE, _SIZE, _BIRTHS = "noise and motion", "noise and growth of the size", "births"
 _SENSOR_PARTS = {
-    "noise of the centre": (
+    _CENTRE: (
         "sigma_px",
         "rho_x",
         "rho_y",
@@ -28,11 +28,11 @@ _SENSOR_PARTS = {
         "memory_s",
         "bias",
     ),
-    "noise of the size": ("sigma_log_width", "sigma_log_height"),
+    _SIZE: ("sigma_log_width", "sigma_log_height"),
     "reliability": ("p_detect", "clutter_per_scan", "precision", "score_precision", "blind_speed"),
 }
 #: The parts, in the order in which they are tried.
-PARTS = (*_SENSOR_PARTS, "motion", "births")
+PARTS = (*_SENSOR_PARTS, _BIRTHS)
 # A part goes only where the base does better by more than this (per cent): less is chance.
 _LEAST_GAIN = 0.2
 
@@ -53,28 +53,35 @@ class PartChoice:
     gain: float
 
 
-def with_parts(base: Config, calibrated: Config, parts: Sequence[str]) -> Config:
-    """Take some parts of a calibrated configuration and all else of the base.
+def with_parts(measured: MatchedSensors, parts: Sequence[str]) -> Config:
+    """Take some parts of what was estimated and all else of the base.
+
+    What only means something together stays together: motion is whatever noise does not explain, so large
+    errors with the motion that was fitted to small ones, or the other way round, describe nothing.
 
     Args:
-        base: the configuration that the calibration began with; a sensor that it does not declare is the
-            calibrated one.
-        calibrated: declares the sensors.
+        measured: what matched detections say; its base declares what is assumed of the sensors (one that it
+            does not declare is as measured).
         parts: some of `PARTS`.
     """
-    out = calibrated
+    base = measured.base
+    if base is None:
+        raise ValueError("there is no base to take parts of")
+    sensors = dict(measured.sensors)
     for part, names in _SENSOR_PARTS.items():
         if part not in parts:
             sensors = {
                 name: replace(s, **{f: getattr(base.sensors[name], f) for f in names})
                 if name in base.sensors
                 else s
-                for name, s in out.sensors.items()
+                for name, s in sensors.items()
             }
-            out = replace(out, sensors=sensors)
-    if "motion" not in parts:
-        out = replace(out, motion=base.motion, size=base.size)
-    if "births" not in parts:
+    out = with_sensors(measured, sensors)
+    if _SIZE not in parts:
+        out = replace(out, size=base.size)
+    if _CENTRE not in parts:
+        out = replace(out, motion=base.motion)
+    if _BIRTHS not in parts:
         out = replace(out, birth=base.birth)
     return out
 
@@ -86,7 +93,7 @@ def choose_parts(
     max_scans: int = 6000,
     progress: Callable[[str], None] | None = None,
 ) -> tuple[Config, tuple[PartChoice, ...]]:
-    """Calibrate, and keep of it what does better than the base on recordings left out.
+    """Calibrate, and keep of it what does not do worse than the base on recordings left out.
 
     Args:
         recordings: detections and truth.
@@ -101,31 +108,24 @@ def choose_parts(
     Raises:
         DataError: as `supervised.calibrate`.
     """
-    whole = calibrate(recordings, base)
+    whole = measure_sensors(recordings, base)
     parts = folds(shorten(recordings, max_scans))
     try:
-        halves = [calibrate(other, base) for other in reversed(parts)] if len(parts) == 2 else []
+        halves = [measure_sensors(other, base) for other in reversed(parts)] if len(parts) == 2 else []
+        now = judge([with_parts(half, PARTS) for half in halves], parts) if halves else None
     except DataError:
-        halves = []
-    if not halves:
-        return whole, ()
-
-    def score(kept: Sequence[str]) -> float:
-        found = [
-            tracking_score(with_parts(base, half, kept), mine)
-            for half, mine in zip(halves, parts, strict=True)
-        ]
-        return float(np.mean(found))
-
-    kept, now = list(PARTS), score(PARTS)
+        now = None
+    if now is None:
+        return with_parts(whole, PARTS), ()
+    kept = list(PARTS)
     choices = []
     for part in PARTS:
         without = [one for one in kept if one != part]
-        other = score(without)
-        gain = now - other
-        if gain < -_LEAST_GAIN:
+        other = judge([with_parts(half, without) for half in halves], parts)
+        gain = now.merit - other.merit
+        if better(other, now, _LEAST_GAIN):
             kept, now = without, other
         choices.append(PartChoice(part, part in kept, gain))
         if progress is not None:
             progress(part)
-    return with_parts(base, whole, kept), tuple(choices)
+    return with_parts(whole, kept), tuple(choices)

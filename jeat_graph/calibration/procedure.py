@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from jeat_graph.calibration.honesty import scale_noise
 from jeat_graph.calibration.matches import SensorMatches, match_sensor
+from jeat_graph.calibration.noise_scale import scale_noise
 from jeat_graph.calibration.offset import Lag, lags_between, lags_from_truth, with_lags
 from jeat_graph.calibration.parts import PARTS, PartChoice, choose_parts
 from jeat_graph.calibration.supervised import calibrate
 from jeat_graph.calibration.tracked import follow
-from jeat_graph.calibration.tune import Choice, Recording, knobs, shorten, tune
+from jeat_graph.calibration.tune import Choice, folds, knobs, shorten, tune
+from jeat_graph.calibration.verdict import Recording
 from jeat_graph.config.schema import Config, InputConfig
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
@@ -84,8 +85,8 @@ def calibrate_with_truth(
         return Calibration(_with_latencies(_on_time(calibrate(pairs, base)), clocks), tuple(lags))
     config, parts = choose_parts(pairs, base, progress=progress)
     config, choices = tune(config, pairs, passes=_PASSES, progress=progress)
-    config, factor, merit = scale_noise(config, shorten(pairs, _SCANS))
-    choices = (*choices, Choice(NOISE_FACTOR, factor, merit))
+    config, factor, verdict = scale_noise(config, folds(shorten(pairs, _SCANS)))
+    choices = (*choices, Choice(NOISE_FACTOR, factor, verdict.merit))
     if progress is not None:
         progress(NOISE_FACTOR)
     return Calibration(_with_latencies(_on_time(config), clocks), tuple(lags), parts, choices)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,20 +22,25 @@ from jeat_graph.data.trajectories import GroundTruth
 Recording = tuple[Detections, GroundTruth]
 
 
-def calibrate(recordings: Sequence[Recording], base: Config | None = None) -> Config:
-    """Estimate sensors and motion from recordings with truth.
+@dataclass(frozen=True, eq=False)
+class MatchedSensors:
+    """What matched detections say of each sensor, with the matches, from which all else is estimated.
 
-    Args:
-        recordings: detections and truth of each sequence; all are pooled.
-        base: configuration whose other settings (association, lifecycle, …) are kept; the defaults if not
-            given.
-
-    Returns:
-        A configuration that declares exactly the sensors that occur.
-
-    Raises:
-        DataError: too little that matches.
+    Attributes:
+        base: configuration whose other settings are kept; None: the defaults.
+        recordings: detections and truth of each sequence.
+        matches: by sensor.
+        sensors: estimates, by sensor; what detections cannot tell is the base's.
     """
+
+    base: Config | None
+    recordings: Sequence[Recording]
+    matches: Mapping[str, SensorMatches]
+    sensors: Mapping[str, SensorConfig]
+
+
+def measure_sensors(recordings: Sequence[Recording], base: Config | None = None) -> MatchedSensors:
+    """Estimate the sensors from recordings with truth; arguments and errors as of `calibrate`."""
     names = sorted({name for detections, _ in recordings for name in detections.sensors})
     if not names:
         raise DataError("the recordings hold no scan")
@@ -50,21 +55,53 @@ def calibrate(recordings: Sequence[Recording], base: Config | None = None) -> Co
         matches[name] = SensorMatches.pool(parts).only_whole(ImageConfig() if base is None else base.image)
         found = calibrate_sensor(matches[name], scan_rate([d for d, _ in recordings], name))
         sensors[name] = replace(found, tempering=_tempering(base, name), **_delays(base, name))
+    return MatchedSensors(base, recordings, matches, sensors)
+
+
+def with_sensors(measured: MatchedSensors, sensors: Mapping[str, SensorConfig]) -> Config:
+    """Estimate motion, size and births for given sensors: how large errors are says what is motion.
+
+    Args:
+        measured: matched detections.
+        sensors: what the tracker shall believe of them.
+
+    Raises:
+        DataError: too little that matches.
+    """
+    base = measured.base
     config = (
-        Config(sensors=sensors)
+        Config(sensors=dict(sensors))
         if base is None
-        else replace(base, sensors=sensors, association=replace(base.association, priority=()))
+        else replace(base, sensors=dict(sensors), association=replace(base.association, priority=()))
     )
-    tracks = measured_tracks(matches, sensors)
+    tracks = measured_tracks(measured.matches, sensors)
     size = fit_size(tracks.t, tracks.log_size, tracks.log_size_var, tracks.start)
     return replace(
         config,
         # What holds while nothing is seen cannot be told from detections.
         motion=replace(fit_motion(tracks, size), unseen_memory_s=config.motion.unseen_memory_s),
         size=size,
-        birth=fit_births(config, matches, recordings),
+        birth=fit_births(config, measured.matches, measured.recordings),
         input=InputConfig(),
     )
+
+
+def calibrate(recordings: Sequence[Recording], base: Config | None = None) -> Config:
+    """Estimate sensors and motion from recordings with truth.
+
+    Args:
+        recordings: detections and truth of each sequence; all are pooled.
+        base: configuration whose other settings (association, lifecycle, …) are kept; the defaults if not
+            given.
+
+    Returns:
+        A configuration that declares exactly the sensors that occur.
+
+    Raises:
+        DataError: too little that matches.
+    """
+    measured = measure_sensors(recordings, base)
+    return with_sensors(measured, measured.sensors)
 
 
 def fit_births(

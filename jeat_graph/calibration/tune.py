@@ -15,44 +15,34 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from jeat_graph.calibration.honesty import price
+from jeat_graph.calibration.verdict import Recording, Verdict, better, judge
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
-from jeat_graph.eval.metrics import evaluate
-from jeat_graph.eval.position_nees import position_nees
-from jeat_graph.tracking.whole import track
-
-Recording = tuple[Detections, GroundTruth]
 
 _TEMPERING = (0.07, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.55, 0.75, 1.0)
 # A neighbour on the grid counts half as much as the candidate itself.
 _NEIGHBOUR_WEIGHT = 0.5
 # What a change must gain (per cent) to be made: less than this is chance.
-_LEAST_GAIN = 0.05
+_LEAST_GAIN = 0.1
 
 
 @dataclass(frozen=True)
 class Knob:
     """One setting that is chosen by tracking.
 
-    A present value that is none of the candidates gives way to the best of them, even if it scores no less:
-    a time that the base configuration brings along was chosen for sensors of other rates.
-
     Attributes:
         name: what is set.
         values: candidates, in order.
         apply: config and value → config.
         ordered: whether neighbours in `values` are alike, so that their scores support each other.
-        optional: whether a present value that is none of the candidates may stay all the same.
     """
 
     name: str
     values: tuple[float, ...]
     apply: Callable[[Config, float], Config]
     ordered: bool = True
-    optional: bool = False
 
 
 @dataclass(frozen=True)
@@ -96,19 +86,19 @@ def tune(
     if not recordings:
         raise DataError("tuning needs at least one recording with truth")
     parts = folds(shorten(recordings, max_scans))
-    known: dict[str, tuple[float, ...]] = {}
+    known: dict[str, Verdict] = {}
 
-    def judge(candidate: Config) -> tuple[float, ...]:
+    def verdict(candidate: Config) -> Verdict:
         key = repr(candidate)
         if key not in known:
-            known[key] = tuple(tracking_score(candidate, part) for part in parts)
+            known[key] = judge([candidate] * len(parts), parts)
         return known[key]
 
     chosen: dict[str, Choice] = {}
     for _ in range(passes):
         before = config
         for knob in knobs(config):
-            config, choice = _turn(knob, config, judge)
+            config, choice = _turn(knob, config, verdict)
             if choice is not None:
                 chosen[knob.name] = choice
             if progress is not None:
@@ -118,14 +108,6 @@ def tune(
     if len(config.sensors) > 1:
         chosen.pop("tempering", None)  # each sensor's own has taken its place
     return config, tuple(chosen.values())
-
-
-def tracking_score(config: Config, recordings: Sequence[Recording]) -> float:
-    """Mean of MOTA, IDF1 and HOTA (per cent), less the price of untrue variances, pooled over recordings."""
-    pairs = [(truth, track(config, detections)) for detections, truth in recordings]
-    instants = [np.unique(detections.scan_t) for detections, _ in recordings]
-    scores = evaluate(pairs, instants=instants)
-    return float(scores.MOTA + scores.IDF1 + scores.HOTA) / 3.0 - price(position_nees(pairs).anees)
 
 
 def knobs(config: Config) -> list[Knob]:
@@ -142,7 +124,7 @@ def knobs(config: Config) -> list[Knob]:
             lambda c, v: replace(c, output=replace(c.output, max_gap_scans=v)),
             ordered=False,
         ),
-        Knob("tempering", _TEMPERING, _temper_all, optional=True),
+        Knob("tempering", _TEMPERING, _temper_all),
         Knob(
             "standing.enabled",
             (1.0, 0.0),
@@ -170,7 +152,6 @@ def knobs(config: Config) -> list[Knob]:
             "birth.max_overlap",
             (0.3, 0.5, 0.7),
             lambda c, v: replace(c, birth=replace(c.birth, max_overlap=v)),
-            optional=True,
         )
     )
     if len(config.sensors) > 1:
@@ -179,7 +160,6 @@ def knobs(config: Config) -> list[Knob]:
                 "lifecycle.disagreement",
                 (0.0, 2.0, 5.0, 10.0),
                 lambda c, v: replace(c, lifecycle=replace(c.lifecycle, disagreement=v)),
-                optional=True,
             )
         )
         out += [Knob(f"sensors.{n}.tempering", _TEMPERING, _temper_one(n)) for n in config.sensor_names]
@@ -255,32 +235,24 @@ def plateau(scores: Sequence[float]) -> list[float]:
     return [float(v) for v in total / weight]
 
 
-def _turn(
-    knob: Knob, config: Config, judge: Callable[[Config], tuple[float, ...]]
-) -> tuple[Config, Choice | None]:
-    """Choose the best value of one knob; the present setting stays where nothing is better on every fold.
+def _turn(knob: Knob, config: Config, verdict: Callable[[Config], Verdict]) -> tuple[Config, Choice | None]:
+    """Choose the best value of one knob; the present setting stays where nothing is better.
 
     The choice is None where the present setting, kept, is none of the knob's values.
     """
     candidates = [knob.apply(config, value) for value in knob.values]
-    by_fold = [judge(candidate) for candidate in candidates]
-    scores = [float(np.mean(one)) for one in by_fold]
-    merit = plateau(scores) if knob.ordered else scores
-    best = int(np.argmax(merit))
-    if config in candidates:
-        here = candidates.index(config)
-        if merit[best] < merit[here] + _LEAST_GAIN or not _wins(by_fold[best], by_fold[here]):
-            best = here
-    elif knob.optional:
-        now = judge(config)
-        if merit[best] < np.mean(now) + _LEAST_GAIN or not _wins(by_fold[best], now):
+    verdicts = [verdict(candidate) for candidate in candidates]
+    merits = [one.merit for one in verdicts]
+    stable = plateau(merits) if knob.ordered else merits
+    best = int(np.argmax(stable))
+    here = candidates.index(config) if config in candidates else None
+    now = verdict(config)
+    gain = stable[best] - (now.merit if here is None else stable[here])
+    if gain < _LEAST_GAIN or not better(verdicts[best], now, _LEAST_GAIN):
+        if here is None:
             return config, None
-    return candidates[best], Choice(knob.name, knob.values[best], scores[best])
-
-
-def _wins(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
-    """Whether scores are better on the whole and on no fold worse by more than chance."""
-    return all(a >= b - _LEAST_GAIN for a, b in zip(one, other, strict=True)) and sum(one) > sum(other)
+        best = here
+    return candidates[best], Choice(knob.name, knob.values[best], merits[best])
 
 
 def _temper_all(config: Config, value: float) -> Config:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from jeat_graph import load_config
-from jeat_graph.calibration.honesty import FACTORS, HONEST, price, scale_noise, with_noise
+from jeat_graph.calibration.honesty import HONEST, price
+from jeat_graph.calibration.noise_scale import FACTORS, scale_noise, with_noise
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.eval.position_nees import position_nees
@@ -39,7 +40,7 @@ def test_a_configuration_that_believes_its_detector_too_much_is_widened(recordin
     text = ", ".join(f"{k}: {v}" for k, v in white.items())
     config = load_config("default", (f"sensors.rgb={{{text}}}", "noise.adaptation_rate=0"))
     before = position_nees([(recording[1], both_tables(config, recording[0])[0])]).anees
-    found, factor, _ = scale_noise(config, [recording])
+    found, factor, _ = scale_noise(config, [[recording]])
     after = position_nees([(recording[1], both_tables(found, recording[0])[0])]).anees
     assert factor in FACTORS
     assert factor > 1.0

@@ -6,7 +6,7 @@ import pytest
 
 from jeat_graph.calibration import parts as module
 from jeat_graph.calibration.parts import PARTS, choose_parts, with_parts
-from jeat_graph.calibration.supervised import calibrate
+from jeat_graph.calibration.supervised import calibrate, measure_sensors, with_sensors
 from jeat_graph.config.reading import load_config
 from jeat_graph.runs.declaring import fit_input
 
@@ -17,34 +17,54 @@ def base(recordings):
 
 
 @pytest.fixture(scope="module")
-def calibrated(recordings, base):
-    return calibrate(recordings, base)
+def measured(recordings, base):
+    return measure_sensors(recordings, base)
 
 
-def test_all_parts_are_the_calibration_and_none_is_the_base(base, calibrated):
-    assert with_parts(base, calibrated, PARTS) == calibrated
-    none = with_parts(base, calibrated, ())
+def test_all_parts_are_the_calibration_and_none_is_the_base(recordings, base, measured):
+    assert with_parts(measured, PARTS) == calibrate(recordings, base)
+    none = with_parts(measured, ())
     assert (none.motion, none.size, none.birth) == (base.motion, base.size, base.birth)
     same = replace(none.sensors["rgb"], rate_hz=base.sensors["rgb"].rate_hz)
     assert same == base.sensors["rgb"]
 
 
-def test_each_part_is_one_thing(base, calibrated):
-    motion = with_parts(base, calibrated, ("motion",))
-    assert motion.motion == calibrated.motion
-    assert motion.sensors["rgb"].sigma_px == base.sensors["rgb"].sigma_px
-    noise = with_parts(base, calibrated, ("noise of the centre",))
-    assert noise.sensors["rgb"].sigma_px == calibrated.sensors["rgb"].sigma_px
-    assert noise.sensors["rgb"].sigma_log_width == base.sensors["rgb"].sigma_log_width
+def test_noise_and_the_motion_fitted_to_it_stay_together(base, measured):
+    centre = with_parts(measured, ("noise and motion",))
+    assert centre.sensors["rgb"].sigma_px == measured.sensors["rgb"].sigma_px
+    assert centre.motion != base.motion
+    assert centre.sensors["rgb"].sigma_log_width == base.sensors["rgb"].sigma_log_width
+    assert centre.size == base.size
+    size = with_parts(measured, ("noise and growth of the size",))
+    assert size.sensors["rgb"].sigma_px == base.sensors["rgb"].sigma_px
+    assert size.motion == base.motion
+    assert size.sensors["rgb"].sigma_log_width == measured.sensors["rgb"].sigma_log_width
+    assert size.size != base.size
+
+
+def test_motion_is_estimated_for_the_size_noise_that_stays(measured, base):
+    """The filter of the size tells how fast a vehicle comes near: how much of its motion is perspective."""
+    mixed = {
+        name: replace(
+            s,
+            sigma_log_width=base.sensors[name].sigma_log_width,
+            sigma_log_height=base.sensors[name].sigma_log_height,
+        )
+        for name, s in measured.sensors.items()
+    }
+    centre = with_parts(measured, ("noise and motion", "reliability"))
+    assert centre.motion == with_sensors(measured, mixed).motion
 
 
 def test_a_part_that_does_worse_on_the_other_half_goes_back_to_the_base(recordings, base, monkeypatch):
-    def spoilt(pairs, start):
-        config = calibrate(pairs, start)
+    def spoilt(measured, parts):
+        config = with_parts(measured, parts)
+        if "births" not in parts:
+            return config
         # A vehicle that turns up once in a million years: hardly a track is ever born.
         return replace(config, birth=replace(config.birth, arrival_rate_hz=1e-12, initial=1e-12))
 
-    monkeypatch.setattr(module, "calibrate", spoilt)
+    monkeypatch.setattr(module, "with_parts", spoilt)
     config, choices = choose_parts(recordings, base)
     assert config.birth == base.birth
     births = next(choice for choice in choices if choice.part == "births")

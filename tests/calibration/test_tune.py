@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.calibration.supervised import calibrate
-from jeat_graph.calibration.tune import folds, knobs, plateau, shorten, tracking_score, tune
+from jeat_graph.calibration.tune import folds, knobs, plateau, shorten, tune
+from jeat_graph.calibration.verdict import Verdict, judge
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.errors import DataError
 
@@ -33,6 +34,11 @@ def test_shortened_recordings_hold_the_beginning_of_each(recordings):
         assert truth.frame_times()[-1] == part.scan_t[-1]
 
 
+def merit(config, training):
+    parts = folds(training)
+    return judge([config] * len(parts), parts).merit
+
+
 @pytest.fixture(scope="module")
 def tuned(recordings):
     training = shorten(recordings, 300)
@@ -43,7 +49,7 @@ def tuned(recordings):
 
 def test_tuning_never_ends_below_its_start(tuned):
     training, start, (config, _) = tuned
-    assert tracking_score(config, training) >= tracking_score(start, training)
+    assert merit(config, training) >= merit(start, training)
 
 
 def test_a_harmful_setting_is_repaired(tuned):
@@ -51,7 +57,7 @@ def test_a_harmful_setting_is_repaired(tuned):
     training, start, (config, choices) = tuned
     assert config.output.max_gap_scans > 0.0
     assert {c.name for c in choices} <= {k.name for k in knobs(start)}
-    assert tracking_score(config, training) > tracking_score(start, training) + 0.5
+    assert merit(config, training) > merit(start, training) + 0.5
 
 
 def test_tuning_is_deterministic(tuned):
@@ -80,15 +86,26 @@ def test_a_setting_that_wins_on_one_half_only_is_not_chosen(recordings, monkeypa
     start = replace(load_config("highway"), output=replace(load_config("highway").output, max_gap_scans=0.5))
     calls = {"parts": 0}
 
-    def score(config, part):
+    def judged(configs, parts):
         calls["parts"] += 1
-        first_half = part[0][0].scan_t[0] == recordings[0][0].scan_t[0]
-        return 50.0 + (10.0 if first_half else -1.0) * (config.output.max_gap_scans - 0.5)
+        gain = configs[0].output.max_gap_scans - 0.5
+        accuracy = np.array([50.0 + 10.0 * gain, 50.0 - gain])
+        return Verdict(accuracy, np.ones(2), np.arange(2), 0.0)
 
-    monkeypatch.setattr(module, "tracking_score", score)
+    monkeypatch.setattr(module, "judge", judged)
     chosen, _ = tune(start, recordings[:1], passes=1)
     assert calls["parts"] > 2
     assert chosen.output.max_gap_scans == 0.5
+
+
+def test_a_value_that_the_base_brings_along_stays_where_no_other_does_better(recordings, monkeypatch):
+    from jeat_graph.calibration import tune as module
+
+    start = load_config("default")
+    monkeypatch.setattr(
+        module, "judge", lambda configs, parts: Verdict(np.full(2, 50.0), np.ones(2), np.arange(2), 0.0)
+    )
+    assert tune(start, recordings[:1], passes=1) == (start, tune(start, recordings[:1], passes=1)[1])
 
 
 def test_no_recording_is_refused():

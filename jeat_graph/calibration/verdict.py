@@ -1,0 +1,149 @@
+"""How well a configuration tracks, recording by recording, and whether one does better than another.
+
+A handful of recordings tells little: between two configurations that are as good as each other, scores
+differ by half a point and more. So a change counts as better only if it wins by more than its standard error
+over the recordings, wins on each half of them, and costs no accuracy for the sake of variances.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from jeat_graph.calibration.honesty import price
+from jeat_graph.config.schema import Config
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.trajectories import GroundTruth, Trajectories
+from jeat_graph.eval.frames import Kind
+from jeat_graph.eval.metrics import evaluate
+from jeat_graph.eval.position_nees import position_nees
+from jeat_graph.tracking.whole import both_tables, track
+
+Recording = tuple[Detections, GroundTruth]
+
+#: What a change may lose, in the mean or on one half (per cent), and still count as no worse.
+CHANCE = 0.05
+# Below three recordings their spread says nothing of its own accuracy.
+_LEAST_FOR_SPREAD = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """Accuracy and honesty of one configuration.
+
+    Attributes:
+        accuracy: (N,) (MOTA + IDF1 + HOTA) / 3 of each recording (per cent).
+        weight: (N,) number of true boxes of each.
+        fold: (N,) the half of the recordings to which it belongs.
+        charge: price of untrue variances (per cent).
+    """
+
+    accuracy: FloatArray
+    weight: FloatArray
+    fold: IntArray
+    charge: float
+
+    @property
+    def mean(self) -> float:
+        """Accuracy over all recordings, each true box counting the same (per cent)."""
+        return float(np.average(self.accuracy, weights=self.weight))
+
+    @property
+    def merit(self) -> float:
+        """Accuracy less the price of untrue variances (per cent)."""
+        return self.mean - self.charge
+
+
+def better(one: Verdict, other: Verdict, least: float) -> bool:
+    """Whether a configuration does better than another, by more than chance and on each half.
+
+    Accuracy comes first; truer variances count between configurations that are as accurate as each other.
+
+    Args:
+        one: of the configuration in question.
+        other: of the present one, on the same recordings.
+        least: what it must gain (per cent).
+    """
+    gain = one.accuracy - other.accuracy
+    for k in np.unique(one.fold):
+        mine = one.fold == k
+        if np.average(gain[mine], weights=one.weight[mine]) < -CHANCE:
+            return False
+    sure = max(least, standard_error(gain, one.weight))
+    more = one.mean - other.mean
+    return more >= sure or (more >= -CHANCE and one.merit - other.merit >= sure)
+
+
+def standard_error(gain: FloatArray, weight: FloatArray) -> float:
+    """Standard error of a weighted mean over recordings; 0 for fewer than three.
+
+    Args:
+        gain: (N,) of each recording.
+        weight: (N,) of each recording.
+    """
+    count = len(gain)
+    if count < _LEAST_FOR_SPREAD:
+        return 0.0
+    share = weight / weight.sum()
+    off = share * (gain - np.sum(share * gain))
+    return float(np.sqrt(np.sum(off**2) * count / (count - 1)))
+
+
+def judge(configs: Sequence[Config], folds: Sequence[Sequence[Recording]]) -> Verdict:
+    """Track each fold with a configuration of its own and judge the causal table.
+
+    Args:
+        configs: one for each fold.
+        folds: recordings with truth.
+    """
+    return _judged(configs, folds, lambda config, detections: (track(config, detections),), ("causal",))
+
+
+def judge_both(config: Config, folds: Sequence[Sequence[Recording]]) -> Verdict:
+    """Track with one configuration and judge the causal and the smoothed table, which count the same.
+
+    Args:
+        config: of all folds.
+        folds: recordings with truth.
+    """
+    return _judged([config] * len(folds), folds, both_tables, ("causal", "smoothed"))
+
+
+def _judged(
+    configs: Sequence[Config],
+    folds: Sequence[Sequence[Recording]],
+    tables_of: Callable[[Config, Detections], tuple[Trajectories, ...]],
+    kinds: Sequence[Kind],
+) -> Verdict:
+    accuracy, weight, fold, charge = [], [], [], []
+    for k, (config, recordings) in enumerate(zip(configs, folds, strict=True)):
+        tables = [tables_of(config, detections) for detections, _ in recordings]
+        for group in _with_truth(recordings):
+            scores = []
+            for c, kind in enumerate(kinds):
+                pairs = [(recordings[i][1], tables[i][c]) for i in group]
+                instants = [np.unique(recordings[i][0].scan_t) for i in group]
+                scores.append(evaluate(pairs, kind=kind, instants=instants if kind == "causal" else None))
+            if not scores[0].truth_boxes:
+                continue
+            accuracy.append(float(np.mean([s.MOTA + s.IDF1 + s.HOTA for s in scores])) / 3.0)
+            weight.append(float(scores[0].truth_boxes))
+            fold.append(k)
+        for c, kind in enumerate(kinds):
+            pairs = [(truth, one[c]) for (_, truth), one in zip(recordings, tables, strict=True)]
+            charge.append(price(position_nees(pairs, kind).anees))
+    return Verdict(np.array(accuracy), np.array(weight), np.array(fold), float(np.mean(charge)))
+
+
+def _with_truth(recordings: Sequence[Recording]) -> list[list[int]]:
+    """Group recordings so that each group has something to find: an empty one joins the one before."""
+    groups: list[list[int]] = [[]]
+    for k, (_, truth) in enumerate(recordings):
+        filled = any(not recordings[i][1].ignore.all() for i in groups[-1])
+        if filled and not truth.ignore.all():
+            groups.append([])
+        groups[-1].append(k)
+    return groups

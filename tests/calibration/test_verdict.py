@@ -1,0 +1,98 @@
+"""Between two configurations the more accurate one wins, if it wins by more than chance."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from jeat_graph import load_config
+from jeat_graph.calibration.tune import folds, shorten
+from jeat_graph.calibration.verdict import Verdict, better, judge, judge_both, standard_error
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.trajectories import GroundTruth
+from jeat_graph.eval.metrics import evaluate
+from jeat_graph.tracking.whole import track
+
+LEAST = 0.1
+
+
+def verdict(accuracy, charge=0.0, weight=None):
+    count = len(accuracy)
+    weights = np.ones(count) if weight is None else np.asarray(weight, dtype=float)
+    return Verdict(np.asarray(accuracy, dtype=float), weights, np.arange(count) % 2, charge)
+
+
+def test_a_gain_on_every_recording_is_better():
+    assert better(verdict([81, 82, 83, 84]), verdict([80, 81, 82, 83]), LEAST)
+
+
+def test_truer_variances_never_pay_for_accuracy():
+    assert not better(verdict([79, 80, 81, 82], charge=0.0), verdict([80, 81, 82, 83], charge=20.0), LEAST)
+
+
+def test_of_two_as_accurate_as_each_other_the_truer_one_is_better():
+    same = [80, 81, 82, 83]
+    assert better(verdict(same, charge=0.0), verdict(same, charge=1.0), LEAST)
+    assert not better(verdict(same, charge=1.0), verdict(same, charge=0.0), LEAST)
+
+
+def test_more_accuracy_is_better_whatever_it_charges():
+    assert better(verdict([82, 83, 84, 85], charge=3.0), verdict([80, 81, 82, 83], charge=0.0), LEAST)
+
+
+def test_a_gain_on_one_half_alone_is_chance():
+    assert not better(verdict([90, 80, 90, 80]), verdict([80, 81, 80, 81]), LEAST)
+
+
+def test_a_gain_that_the_recordings_disagree_about_is_chance():
+    now = verdict([80.0] * 8)
+    gains = np.array([8.0, 8.0, -7.0, -7.0, 0.1, 0.1, 0.1, 0.1])
+    assert gains.mean() > LEAST
+    assert not better(verdict(80.0 + gains), now, LEAST)
+
+
+def test_standard_error_is_that_of_a_mean():
+    gain = np.array([1.0, 2.0, 4.0, 7.0])
+    assert standard_error(gain, np.full(4, 3.0)) == pytest.approx(gain.std(ddof=1) / 2.0)
+    assert standard_error(gain[:2], np.ones(2)) == 0.0
+
+
+@given(
+    st.lists(st.floats(0.0, 100.0), min_size=2, max_size=8),
+    st.lists(st.floats(0.0, 100.0), min_size=2, max_size=8),
+    st.floats(0.0, 10.0),
+    st.floats(0.0, 10.0),
+)
+def test_two_are_never_better_than_each_other(one, other, charge, other_charge):
+    count = min(len(one), len(other))
+    a, b = verdict(one[:count], charge), verdict(other[:count], other_charge)
+    assert not (better(a, b, LEAST) and better(b, a, LEAST))
+
+
+def test_accuracy_is_the_mean_of_three_scores_of_each_recording(recordings):
+    config, parts = load_config("default"), folds(shorten(recordings, 300))
+    found = judge([config] * len(parts), parts)
+    for k, (detections, truth) in enumerate([one for part in parts for one in part]):
+        s = evaluate([(truth, track(config, detections))], instants=[np.unique(detections.scan_t)])
+        assert found.accuracy[k] == pytest.approx((s.MOTA + s.IDF1 + s.HOTA) / 3.0)
+        assert found.weight[k] == s.truth_boxes
+
+
+def test_a_recording_without_a_vehicle_is_judged_with_the_one_before(recordings):
+    """False boxes where there is nothing to find must not vanish from the judgement."""
+    config, (busy, *_) = load_config("default"), shorten(recordings, 300)
+    t = np.repeat(np.arange(40) / 20.0, 2)
+    boxes = np.tile([[100.0, 100.0, 60.0, 60.0], [400.0, 300.0, 60.0, 60.0]], (40, 1))
+    false = Detections.from_rows(t, np.full(80, "rgb"), boxes, np.full(80, 0.99))
+    nothing = GroundTruth(
+        t=np.zeros(0),
+        object_id=np.zeros(0, dtype=np.int64),
+        boxes=np.zeros((0, 4)),
+        motion=None,
+        ignore=np.zeros(0, dtype=bool),
+        frames=np.unique(t),
+    )
+    alone = judge_both(config, [[busy]])
+    both = judge_both(config, [[busy, (false, nothing)]])
+    assert len(both.accuracy) == len(alone.accuracy) == 1
+    assert both.mean < alone.mean
