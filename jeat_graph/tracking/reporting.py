@@ -29,9 +29,18 @@ def longest_gap_s(scene: SceneState, model: Model) -> float:
     output = model.settings.output
     if output.max_gap_scans == 0.0:
         return float(output.max_gap_s)
-    needed = output.max_gap_scans * model.sensors.period_s / scene.p_detect**4
-    longest = float(needed[scene.trust >= _TRUSTED * scene.trust.max()].max())
-    return min(longest, float(output.max_gap_s))
+    longest = _longest_wait(scene.p_detect, scene.trust, model.sensors.period_s)
+    return float(min(output.max_gap_scans * longest, output.max_gap_s))
+
+
+@njit(cache=True)
+def _longest_wait(p_detect: FloatArray, trust: FloatArray, period_s: FloatArray) -> float:
+    """Return the longest P_D⁻⁴ periods (s) of the sensors that are waited for."""
+    longest = 0.0
+    for s in range(len(trust)):
+        if trust[s] >= _TRUSTED * trust.max():
+            longest = max(longest, period_s[s] / p_detect[s] ** 4)
+    return longest
 
 
 @njit(cache=True)

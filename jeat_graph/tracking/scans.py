@@ -9,8 +9,9 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Scan
-from jeat_graph.data.errors import TimeOrderError, UnknownSensorError
+from jeat_graph.data.errors import DataError, TimeOrderError, UnknownSensorError
 from jeat_graph.tracking.batch import Arrivals
 
 ScanLike: TypeAlias = (
@@ -57,15 +58,29 @@ def arrivals_of(batch: Sequence[Scan], sensor_names: Sequence[str]) -> Arrivals:
     """
     codes = [sensor_index(scan.sensor, sensor_names) for scan in batch]
     if len(batch) == 1:
-        boxes, scores = batch[0].boxes, batch[0].scores
+        boxes, scores = _plain(batch[0].boxes, 2), _plain(batch[0].scores, 1)
         sensor = np.full(len(scores), codes[0], dtype=np.int64)
     else:
-        boxes = np.concatenate([scan.boxes for scan in batch])
-        scores = np.concatenate([scan.scores for scan in batch])
+        boxes = _plain(np.concatenate([scan.boxes for scan in batch]), 2)
+        scores = _plain(np.concatenate([scan.scores for scan in batch]), 1)
         sensor = np.repeat(np.array(codes, dtype=np.int64), [len(scan) for scan in batch])
     present = np.zeros(len(sensor_names), dtype=np.bool_)
     present[codes] = True
     return Arrivals(batch[0].t, boxes, scores, sensor, present)
+
+
+def _plain(values: FloatArray, ndim: int) -> FloatArray:
+    """Return the numbers as the kernels' machine code takes them; scans of unchecked columns may differ.
+
+    Raises:
+        DataError: they have another number of dimensions.
+    """
+    if values.ndim != ndim:
+        raise DataError(f"boxes must have shape (M, 4) and scores shape (M,), not {values.shape}")
+    flags = values.flags
+    if values.dtype == np.float64 and flags.c_contiguous and flags.behaved:
+        return values
+    return np.array(values, dtype=np.float64, order="C")
 
 
 def sensor_index(name: str, names: Sequence[str]) -> int:

@@ -20,6 +20,7 @@ from jeat_graph.data.errors import JeatGraphError, TimeOrderError
 from jeat_graph.data.interop import boxes_of
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.classes import ClassTally, check_names, count_votes
+from jeat_graph.tracking.direct_call import DirectCall
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.notice import notice_if_cold
 from jeat_graph.tracking.prediction import Prediction, predict_reported
@@ -76,6 +77,8 @@ class Tracker(SmoothedTracks):
         self._next_id = 1
         self._t: float | None = None
         self._log = allocate_log(0)
+        # Of a step's arguments `arrivals_of` alone comes from outside, and it sees to their types.
+        self._step, self._report = DirectCall(step), DirectCall(report)
         self._classes: ClassTally | None = None
         self._watch = InputWatch(config)
         notice_if_cold()
@@ -142,7 +145,7 @@ class Tracker(SmoothedTracks):
         if logs and count > len(self._log.rows):
             self._log = allocate_log(2 * count)
         first_id = self._next_id
-        self._num_tracks, self._next_id = step(
+        self._num_tracks, self._next_id = self._step(
             self._tracks, self._num_tracks, self._next_id, dt, arrivals, self._scene, self._model, self._log
         )
         self._t = t
@@ -260,7 +263,7 @@ class Tracker(SmoothedTracks):
         settings = self._model.settings
         by_existence = settings.lifecycle.by_existence
         gap = longest_gap_s(self._scene, self._model)
-        columns = report(
+        columns = self._report(
             self._tracks, self._num_tracks, t, gap, settings.image, settings.output, by_existence
         )
         classes = (None, None) if self._classes is None else self._classes.columns(columns[1])

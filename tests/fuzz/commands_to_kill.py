@@ -31,3 +31,5 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 }
 #: What a kill may leave at any length: rows of a stream that were final.
 MAY_GROW = {"s.csv"}
+#: What is written anew, whole, while the command goes on.
+WRITTEN_AGAIN = {"c.npz"}

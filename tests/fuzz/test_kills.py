@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 import yaml
 
-from .commands_to_kill import COMMANDS, MAY_GROW
+from .commands_to_kill import COMMANDS, MAY_GROW, WRITTEN_AGAIN
 
 FULL = bool(os.environ.get("JEAT_GRAPH_FULL"))
 #: Kills of each command in the long form; half of them at changes to files.
@@ -137,7 +137,8 @@ def check(left: Killed, whole: dict[str, bytes], number: int, varying: set[str])
         if Path(name).name in MAY_GROW:
             continue
         assert name in whole, f"{name} is of no run"
-        assert data == whole[name] or (name in varying and is_whole(name, data)), f"{name} is not whole"
+        other = name in varying or Path(name).name in WRITTEN_AGAIN
+        assert data == whole[name] or (other and is_whole(name, data)), f"{name} is not whole"
     if number == signal.SIGTERM and left.status:
         assert "Traceback" not in left.said, left.said
         assert left.status in (128 + number, -number)  # the latter while Python itself starts
@@ -205,5 +206,5 @@ def test_any_command_killed_at_any_moment_leaves_whole_files_and_ends_the_same_w
     assert after.status == 0, after.said
     assert (after.hidden, after.files.keys()) == ([], whole.files.keys())
     assert all(after.files[file] == whole.files[file] for file in whole.files.keys() - varying)
-    assert died > KILLS // 3
+    assert died >= max(KILLS // 3, 1)
     print(f"{name}: killed {died} times, {len(whole.files)} files whole each time")

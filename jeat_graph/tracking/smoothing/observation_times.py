@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from numba import njit
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 
@@ -15,6 +16,7 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 BELIEVED = 0.5
 #: How often one that has gone comes back to just where it would have been, against one that comes first.
 RETURNS = 0.02
+_MOST_ODDS = 40.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,40 +82,67 @@ class ObservationTimes:
             lifetime_s: mean time a vehicle stays, and mean time until one comes (s).
             known: whether it was believed in before the first of these steps.
         """
-        if not len(self):
-            return np.zeros(0)
-        seen = np.isfinite(self.existence)
-        # The recursion is over numbers of Python's own: those taken out of an array one by one cost thrice.
-        there = seen.tolist()
-        odds = _log_odds(np.where(seen, self.existence, 0.5)).tolist()
-        gone = (known | (np.maximum.accumulate(np.where(seen, self.existence, 0.0)) >= BELIEVED)).tolist()
-        change = [-math.expm1(-step / lifetime_s) for step in np.diff(self.t).tolist()]
-        later = 0.0  # ln of what the future says for presence against absence
-        said = [0.0] * len(self)
+        return _hindsight(self.t, self.existence, lifetime_s, known)
+
+
+@njit(cache=True)
+def _hindsight(t: FloatArray, existence: FloatArray, lifetime_s: float, known: bool) -> FloatArray:
+    """As `ObservationTimes.hindsight`; compiled, for each of a packet's steps is gone through again."""
+    count = len(t)
+    odds, gone = np.empty(count), np.empty(count, dtype=np.bool_)
+    for k in range(count):
+        there = not math.isnan(existence[k])
+        odds[k] = _log_odds(existence[k]) if there else np.nan
+        known = known or (there and existence[k] >= BELIEVED)
+        gone[k] = known
+    said = np.empty(count)
+    later = 0.0  # ln of what the future says for presence against absence
+    gained = 0.0
+    for k in range(count - 1, -1, -1):
+        if k + 1 < count:
+            change = -math.expm1(-(t[k + 1] - t[k]) / lifetime_s)
+            later = _passed(later + gained, change, change * (RETURNS if gone[k] else 1.0))
+        there = not math.isnan(odds[k])
+        said[k] = odds[k] + later if there else later
         gained = 0.0
-        for k in range(len(self) - 1, -1, -1):
-            if k + 1 < len(self):
-                later = _passed(later + gained, change[k], change[k] * (RETURNS if gone[k] else 1.0))
-            said[k] = odds[k] + later if there[k] else later
-            both = k > 0 and there[k] and there[k - 1]
-            gained = odds[k] - _predicted(odds[k - 1], change[k - 1]) if both else 0.0
-        out = np.array(said)
-        if not seen.all():
-            # Between two fragments the vehicle was there if it was at their ends.
-            out[~seen] = np.minimum(_held(out, seen), _held(out[::-1], seen[::-1])[::-1])[~seen]
-        return np.asarray(1.0 / (1.0 + np.exp(-np.clip(out, -_MOST_ODDS, _MOST_ODDS))))
+        if k > 0 and there and not math.isnan(odds[k - 1]):
+            gained = odds[k] - _predicted(odds[k - 1], -math.expm1(-(t[k] - t[k - 1]) / lifetime_s))
+    _bridge(said, odds)
+    for k in range(count):
+        said[k] = 1.0 / (1.0 + math.exp(-min(max(said[k], -_MOST_ODDS), _MOST_ODDS)))
+    return said
 
 
-def _log_odds(p: FloatArray) -> FloatArray:
-    return np.asarray(np.clip(np.log(np.maximum(p, 1e-12)) - np.log(np.maximum(1.0 - p, 1e-12)), -20.0, 20.0))
+@njit(cache=True)
+def _bridge(said: FloatArray, odds: FloatArray) -> None:
+    """Between two fragments (`odds` is NaN) the vehicle was there if it was at their ends."""
+    before, after = -1, 0
+    for k in range(len(said)):
+        if not math.isnan(odds[k]):
+            before = k
+            continue
+        after = max(after, k)
+        while after < len(said) and math.isnan(odds[after]):
+            after += 1
+        if before >= 0 and after < len(said):
+            said[k] = min(said[before], said[after])
+        elif before >= 0 or after < len(said):
+            said[k] = said[before if before >= 0 else after]
 
 
+@njit(cache=True)
+def _log_odds(p: float) -> float:
+    return min(max(math.log(max(p, 1e-12)) - math.log(max(1.0 - p, 1e-12)), -20.0), 20.0)
+
+
+@njit(cache=True)
 def _predicted(odds: float, change: float) -> float:
     """Log odds after a time in which presence ends with probability `change`."""
     p = (1.0 - change) / (1.0 + math.exp(-odds))
     return math.log(p) - math.log1p(-p)
 
 
+@njit(cache=True)
 def _passed(future: float, end: float, begin: float) -> float:
     """Log odds that the future gives the state before a step.
 
@@ -124,12 +153,3 @@ def _passed(future: float, end: float, begin: float) -> float:
     """
     ratio = math.exp(min(max(future, -_MOST_ODDS), _MOST_ODDS))
     return math.log((1.0 - end) * ratio + end) - math.log((1.0 - begin) + begin * ratio)
-
-
-def _held(values: FloatArray, known: BoolArray) -> FloatArray:
-    """The last known value (K,) at each place; the first known one before it."""
-    index = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
-    return values[np.where(index >= 0, index, int(np.argmax(known)))]
-
-
-_MOST_ODDS = 40.0

@@ -1,0 +1,45 @@
+"""Calls compiled code without having the types of all its arguments looked at again each time.
+
+A kernel that takes named tuples of a hundred arrays pays as much for finding out that they are what they
+were at the last call as a small step costs. Who always hands over the same types can ask once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+
+class DirectCall:
+    """A kernel bound to the types of the arguments of its first call.
+
+    Later arguments must have these types, which is not checked: the same fields, dtypes and numbers of
+    dimensions, arrays contiguous in C's order and writable as they were. Where compilation is switched off it
+    is the plain function.
+
+    Args:
+        kernel: decorated with `njit`.
+    """
+
+    def __init__(self, kernel: Callable[..., Any]) -> None:
+        self._kernel = kernel
+        self._code: Callable[..., Any] | None = None
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Run the kernel."""
+        if self._code is None:
+            self._code = machine_code(self._kernel, arguments)
+        return self._code(*arguments)
+
+    def __reduce__(self) -> tuple[type[DirectCall], tuple[Callable[..., Any]]]:
+        return DirectCall, (self._kernel,)
+
+
+def machine_code(kernel: Any, arguments: tuple[Any, ...]) -> Callable[..., Any]:
+    """Return what runs for arguments of these types; compiled, or taken from the cache, if need be."""
+    if not hasattr(kernel, "overloads"):
+        return kernel  # type: ignore[no-any-return]  # compilation is switched off (NUMBA_DISABLE_JIT)
+    from numba import typeof
+
+    code: Callable[..., Any] = kernel.compile(tuple(map(typeof, arguments)))
+    return code
