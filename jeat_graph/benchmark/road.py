@@ -81,9 +81,13 @@ def _judge_real(job: tuple[Path, str, int]) -> dict[str, Any]:
 def judge_scene(job: tuple[str, int, float]) -> list[dict[str, Any]]:
     """Track one simulated scene and judge the road's tables with the exact and with a perturbed camera.
 
+    With the exact one, also what the factor graph makes of the detections, and what the smoothed table of the
+    picture alone tells.
+
     Args:
         job: scenario, seed and duration (s).
     """
+    from jeat_graph.benchmark.road_engines import judge_engines
     from jeat_graph.eval.road import judge_road_run
     from jeat_graph.road.camera import PARAMETERS
     from jeat_graph.road.camera_file import read_camera
@@ -109,6 +113,8 @@ def judge_scene(job: tuple[str, int, float]) -> list[dict[str, Any]]:
             for table, scores in judge_road_run(run, scene / "gt_road.csv").items():
                 kind = table.removeprefix("road_")
                 out.append({"scenario": scenario, "seed": seed, "camera": name, "table": kind, **scores})
+        for kind, scores in judge_engines(run, scene / "gt_road.csv", load_config("highway"), exact).items():
+            out.append({"scenario": scenario, "seed": seed, "camera": "exact", "table": kind, **scores})
     return out
 
 

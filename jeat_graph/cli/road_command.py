@@ -36,6 +36,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar=("M", "SD"),
         help="height of the tracked point above the road and how well it is known (0.1 0.058)",
     )
+    add(
+        "--smoother",
+        choices=("spline", "graph"),
+        default="spline",
+        help="what fits boxes: our own compiled solver, or the same as a factor graph in GTSAM (spline)",
+    )
     add("--interval", type=positive, metavar="S", help="length of an interval of counts.csv (300)")
     add(
         "--out",
@@ -49,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
     """Fit the vehicles and write the tables."""
     from jeat_graph.io.table_writer import write_columns
     from jeat_graph.road.box_rows import BoxConfig
-    from jeat_graph.road.boxes_road import follow_boxes
+    from jeat_graph.road.boxes_road import BOX_MOTION, follow_boxes
     from jeat_graph.road.camera_file import read_camera
     from jeat_graph.road.cuboid_fit import CuboidConfig
     from jeat_graph.road.inputs import RoadMarks, read_marks
@@ -77,7 +83,9 @@ def run(args: argparse.Namespace) -> int:
         seen = boxes_of(args.source, camera, BoxConfig(), _say, sys.stderr.isatty())
         total = len(seen)
         with _bar(total) as bar:
-            sized = follow_boxes(seen, camera, CuboidConfig(), progress=lambda done, _: _advance(bar, done))
+            sized = follow_boxes(
+                seen, camera, CuboidConfig(), BOX_MOTION, lambda done, _: _advance(bar, done), args.smoother
+            )
         contact = ContactConfig(0.0, 0.0, 0.0)
         vehicles = [one.vehicle for one in sized]
     else:

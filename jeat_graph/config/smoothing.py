@@ -26,6 +26,12 @@ class SmootherConfig(Section):
         ("none", "cauchy", "student-t"),
         "full and rts: kernel that weighs down outlying measurements",
     )
+    road: str = choice(
+        "spline",
+        ("spline", "graph"),
+        "with --camera, motion and size of whole tracks on the road: spline: by our own compiled solver; "
+        "graph: the same by a factor graph in GTSAM, which takes longer",
+    )
     min_existence: float = number(
         0.7, "1", "rows are written where the smoothed probability of existence is at least this", 0.0, 1.0
     )

@@ -75,11 +75,27 @@ def follow_boxes(
     config: CuboidConfig,
     motion: MotionFitConfig = BOX_MOTION,
     progress: Callable[[int, int], None] | None = None,
+    smoother: str = "spline",
 ) -> list[SizedVehicle]:
-    """Fit every track; `progress` hears how many of how many are done."""
+    """Fit every track.
+
+    Args:
+        tracks: what was seen.
+        camera: the camera.
+        config: what is taken for a vehicle.
+        motion: how vehicles move.
+        progress: hears how many of how many are done.
+        smoother: `spline` or `graph` (`SmootherConfig.road`).
+    """
+    fit_one = fit_cuboid
+    if smoother == "graph":
+        # GTSAM is imported where it is asked for.
+        from jeat_graph.road.graph_fit import fit_graph
+
+        fit_one = fit_graph
     found: list[SizedVehicle] = []
     for k, one in enumerate(tracks):
-        fit = fit_cuboid(one.rows, camera, config, motion)
+        fit = fit_one(one.rows, camera, config, motion)
         if fit is not None:
             mean, spread = fit.size.tolist(), np.diag(fit.size_covariance).tolist()
             size = Size((mean[0], mean[1], mean[2]), (spread[0], spread[1], spread[2]))

@@ -7,6 +7,7 @@ is weighed by the evidence of each kind's sizes, and where that leaves a doubt, 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -18,6 +19,7 @@ from jeat_graph.road.box_kernel import CHANNELS, HIGH, WHOLE, KernelCamera, kern
 from jeat_graph.road.box_solver import BoxRows, Motion, linearise, solve_boxes, whiten
 from jeat_graph.road.camera import PARAMETERS, RoadCamera
 from jeat_graph.road.fleet import CLASSES
+from jeat_graph.road.key_motion import RoadMotion
 from jeat_graph.road.motion_fit import MotionFit, MotionFitConfig, basis_rows, motion_prior, spaced_knots
 
 _LEAST_BOXES = 4
@@ -56,7 +58,7 @@ class CuboidFit(NamedTuple):
         chi2: mean square of the residuals in their stated errors.
     """
 
-    motion: MotionFit
+    motion: RoadMotion
     by_calibration: FloatArray
     kind: int
     size: FloatArray
@@ -64,7 +66,38 @@ class CuboidFit(NamedTuple):
     chi2: float
 
 
-class _Candidate(NamedTuple):
+class Beginning(NamedTuple):
+    """What a fit begins with.
+
+    Attributes:
+        rows: the boxes, from the first to the last that stands on the road.
+        t0: time from which its own are counted (s).
+        knots: (J,) times of jerks, so counted (s).
+        basis: what a trial motion is made of.
+        prior: (2 C, 2 C) precision of its coefficients.
+        starts: coefficients (2 C,) to begin with, for each kind of vehicle.
+    """
+
+    rows: BoxRows
+    t0: float
+    knots: FloatArray
+    basis: Motion
+    prior: FloatArray
+    starts: list[FloatArray]
+
+
+class Candidate(NamedTuple):
+    """A fit as one kind of vehicle.
+
+    Attributes:
+        kind: index into `CLASSES`.
+        theta: (P,) coefficients of the motion, then length, width, height.
+        covariance: (P, P) of them.
+        cost: minus twice the logarithm of the evidence.
+        chi2: mean square of the residuals in their stated errors.
+        weight: (N,) robust weights of the boxes.
+    """
+
     kind: int
     theta: FloatArray
     covariance: FloatArray
@@ -87,6 +120,41 @@ def fit_cuboid(
     Returns:
         The fit, or None where too little of the vehicle is on the road, or no cuboid makes such boxes.
     """
+    begun = begin(rows, camera, config, motion)
+    if begun is None:
+        return None
+    kernel = kernel_camera(camera)
+    found = [one for k in range(len(CLASSES)) if (one := _fit_kind(kernel, begun, k, config)) is not None]
+    mixed = mix(found, config)
+    if mixed is None:
+        return None
+    best, theta, covariance = mixed
+    rows, C = begun.rows, begun.basis.basis.shape[1]
+    fit = MotionFit(
+        begun.t0,
+        begun.knots,
+        theta[: 2 * C].reshape(2, C),
+        covariance[: 2 * C, : 2 * C],
+        np.zeros((2 * C, 0, 2)),
+        rows.t,
+        np.zeros((len(rows.t), 2)),
+        best.weight,
+    )
+    effect = _calibration_effect(camera, rows, begun.basis, best)[: 2 * C]
+    return CuboidFit(
+        fit,
+        effect @ camera.covariance @ effect.T,
+        best.kind,
+        theta[2 * C :],
+        covariance[2 * C :, 2 * C :],
+        best.chi2,
+    )
+
+
+def begin(
+    rows: BoxRows, camera: RoadCamera, config: CuboidConfig, motion: MotionFitConfig
+) -> Beginning | None:
+    """Find a motion to begin with, for each kind of vehicle; None where too little is on the road."""
     contact = _contact(rows, camera)
     good = np.asarray(np.isfinite(contact).all(axis=1))
     if good.sum() < _LEAST_BOXES:
@@ -108,18 +176,37 @@ def fit_cuboid(
     reach = abs(float(away @ [math.sin(heading), math.cos(heading)])) / float(np.linalg.norm(away)) ** 2
     B = basis_rows(t_good - t0, knots, 0)
     normal = np.kron(np.eye(2), B.T @ B) + prior
-    kernel = kernel_camera(camera)
-    found: list[_Candidate] = []
-    for k, one in enumerate(CLASSES):
+    starts: list[FloatArray] = []
+    for one in CLASSES:
         # From the near end, which stands on the road where the box ends, to the middle.
         middle = contact + away * (one.mean[0] / 2.0 * reach)
-        c = np.linalg.solve(normal, (B.T @ middle).T.ravel())
-        fit = _fit_kind(kernel, rows, basis, np.concatenate([c, one.mean]), prior, k, config)
-        if fit is not None:
-            found.append(fit)
+        starts.append(np.asarray(np.linalg.solve(normal, (B.T @ middle).T.ravel()), dtype=np.float64))
+    return Beginning(rows, t0, knots, basis, prior, starts)
+
+
+def mix(found: list[Candidate], config: CuboidConfig) -> tuple[Candidate, FloatArray, FloatArray] | None:
+    """Weigh the kinds by their evidence.
+
+    Returns:
+        The likeliest, and mean (P,) and covariance (P, P) of the mixture; None where no kind fits.
+    """
     if not found:
         return None
-    return _joined(found, rows, basis, camera, (t0, knots), config)
+    best = min(found, key=lambda one: one.cost)
+    if not best.chi2 <= config.worst_chi2:
+        return None
+    likely = [one for one in found if one.cost - best.cost < _DOUBT]
+    share = np.exp(-0.5 * np.array([one.cost - best.cost for one in likely]))
+    share /= share.sum()
+    theta = np.einsum("k,kp->p", share, [one.theta for one in likely])
+    # Errors that are larger than stated, by what is left over, are believed to be so.
+    count = float(best.weight.sum()) * CHANNELS
+    factor = (config.scale_strength + best.chi2 * count) / (config.scale_strength + count)
+    covariance = np.zeros((len(theta), len(theta)))
+    for weight, one in zip(share, likely, strict=True):
+        off = one.theta - theta
+        covariance += weight * (one.covariance * max(factor, 1.0) + np.outer(off, off))
+    return best, theta, (covariance + covariance.T) / 2.0
 
 
 def _contact(rows: BoxRows, camera: RoadCamera) -> FloatArray:
@@ -141,25 +228,18 @@ def _from_to(rows: BoxRows, first: int, last: int) -> BoxRows:
     return rows._replace(**cut)
 
 
-def _fit_kind(
-    camera: KernelCamera,
-    rows: BoxRows,
-    motion: Motion,
-    start: FloatArray,
-    motion_precision: FloatArray,
-    kind: int,
-    config: CuboidConfig,
-) -> _Candidate | None:
-    P, one = len(start), CLASSES[kind]
+def _fit_kind(camera: KernelCamera, begun: Beginning, kind: int, config: CuboidConfig) -> Candidate | None:
+    one, start = CLASSES[kind], np.concatenate([begun.starts[kind], CLASSES[kind].mean])
+    P = len(start)
     precision = np.zeros((P, P))
-    precision[: P - _SIZES, : P - _SIZES] = motion_precision
+    precision[: P - _SIZES, : P - _SIZES] = begun.prior
     precision[P - _SIZES :, P - _SIZES :] = np.diag(np.array(one.spread) ** -2.0)
     mean = np.concatenate([np.zeros(P - _SIZES), one.mean])
     C = (P - _SIZES) // 2
     mean[0], mean[C] = start[0], start[C]
-    weight = np.ones(len(rows.t))
+    weight = np.ones(len(begun.rows.t))
     settled, theta, normal, cost, chi2 = solve_boxes(
-        camera, rows, motion, start, mean, precision, config.soft, weight
+        camera, begun.rows, begun.basis, start, mean, precision, config.soft, weight
     )
     if not settled or not math.isfinite(cost) or (theta[P - _SIZES :] <= 0).any():
         return None
@@ -168,75 +248,48 @@ def _fit_kind(
         return None
     # The evidence: how well the data agree, less what it costs to have been able to agree with others.
     score = cost + float(log_determinant) + 2.0 * float(np.log(one.spread).sum()) - 2.0 * math.log(one.share)
-    return _Candidate(kind, theta, np.asarray(np.linalg.inv(normal), dtype=np.float64), score, chi2, weight)
+    return Candidate(kind, theta, np.asarray(np.linalg.inv(normal), dtype=np.float64), score, chi2, weight)
 
 
-def _joined(
-    found: list[_Candidate],
-    rows: BoxRows,
-    motion: Motion,
-    camera: RoadCamera,
-    times: tuple[float, FloatArray],
-    config: CuboidConfig,
-) -> CuboidFit | None:
-    """Weigh the kinds by their evidence: mean and covariance of the mixture."""
-    best = min(found, key=lambda one: one.cost)
-    if not best.chi2 <= config.worst_chi2:
-        return None
-    likely = [one for one in found if one.cost - best.cost < _DOUBT]
-    share = np.exp(-0.5 * np.array([one.cost - best.cost for one in likely]))
-    share /= share.sum()
-    theta = np.einsum("k,kp->p", share, [one.theta for one in likely])
-    # Errors that are larger than stated, by what is left over, are believed to be so.
-    count = float(best.weight.sum()) * CHANNELS
-    factor = (config.scale_strength + best.chi2 * count) / (config.scale_strength + count)
-    covariance = np.zeros((len(theta), len(theta)))
-    for weight, one in zip(share, likely, strict=True):
-        off = one.theta - theta
-        covariance += weight * (one.covariance * max(factor, 1.0) + np.outer(off, off))
-    covariance = (covariance + covariance.T) / 2.0
-    t0, knots = times
-    C = motion.basis.shape[1]
-    fit = MotionFit(
-        t0,
-        knots,
-        theta[: 2 * C].reshape(2, C),
-        covariance[: 2 * C, : 2 * C],
-        np.zeros((2 * C, 0, 2)),
-        rows.t,
-        np.zeros((len(rows.t), 2)),
-        best.weight,
-    )
-    effect = _calibration_effect(camera, rows, motion, best)[: 2 * C]
-    return CuboidFit(
-        fit,
-        effect @ camera.covariance @ effect.T,
-        best.kind,
-        theta[2 * C :],
-        covariance[2 * C :, 2 * C :],
-        best.chi2,
-    )
-
-
-def _calibration_effect(camera: RoadCamera, rows: BoxRows, motion: Motion, best: _Candidate) -> FloatArray:
-    """Derivative (P, 12) of the unknowns with respect to the camera's parameters."""
-    P, count = len(best.theta), len(PARAMETERS)
-    effect = np.zeros((P, count))
+def residual_slopes(camera: RoadCamera, residual: Callable[[KernelCamera], FloatArray]) -> FloatArray:
+    """Derivatives (..., 12) of residuals with respect to the camera's parameters, zero for exact ones."""
     spread = np.sqrt(np.diag(camera.covariance))
-    if not spread.any():
-        return effect
-    columns = np.zeros((len(rows.t), CHANNELS, P + 1 + count))
-    trial = np.zeros((len(rows.t), CHANNELS, P + 1))
-    linearise(kernel_camera(camera), rows, motion, best.theta, trial)
-    columns[..., : P + 1] = trial
+    slopes = np.zeros((*residual(kernel_camera(camera)).shape, len(PARAMETERS)))
     for k in np.flatnonzero(spread > 0):
-        slope = []
-        for sign in (1.0, -1.0):
-            change = np.zeros(count)
-            change[k] = sign * _CALIBRATION_STEP * spread[k]
-            linearise(kernel_camera(camera.moved(change)), rows, motion, best.theta, trial)
-            slope.append(trial[..., P].copy())
-        columns[..., P + 1 + k] = (slope[0] - slope[1]) / (2.0 * _CALIBRATION_STEP * spread[k])
-    whiten(columns, rows, best.weight)
-    flat = columns.reshape(-1, columns.shape[2])
-    return np.asarray(best.covariance @ (flat[:, :P].T @ flat[:, P + 1 :]), dtype=np.float64)
+        change = np.zeros(len(PARAMETERS))
+        change[k] = _CALIBRATION_STEP * spread[k]
+        more, less = (residual(kernel_camera(camera.moved(sign * change))) for sign in (1.0, -1.0))
+        slopes[..., k] = (more - less) / (2.0 * change[k])
+    return slopes
+
+
+def _calibration_effect(camera: RoadCamera, rows: BoxRows, motion: Motion, best: Candidate) -> FloatArray:
+    """Derivative (P, 12) of the unknowns with respect to the camera's parameters."""
+    P = len(best.theta)
+    if not camera.covariance.any():
+        return np.zeros((P, len(PARAMETERS)))
+    trial = np.zeros((len(rows.t), CHANNELS, P + 1))
+
+    def residual(kernel: KernelCamera) -> FloatArray:
+        linearise(kernel, rows, motion, best.theta, trial)
+        return trial[..., P].copy()
+
+    slopes = residual_slopes(camera, residual)
+    linearise(kernel_camera(camera), rows, motion, best.theta, trial)
+    return calibration_effect(trial[..., :P], slopes, rows, best)
+
+
+def calibration_effect(columns: FloatArray, slopes: FloatArray, rows: BoxRows, best: Candidate) -> FloatArray:
+    """Derivative (P, 12) of the unknowns with respect to the camera's parameters.
+
+    Args:
+        columns: (N, 4, P) derivatives of what is measured with respect to the unknowns.
+        slopes: (N, 4, 12) of the residuals with respect to the camera's parameters.
+        rows: the boxes.
+        best: the fit.
+    """
+    P = columns.shape[-1]
+    white = np.concatenate([columns, slopes], axis=-1)
+    whiten(white, rows, best.weight)
+    flat = white.reshape(-1, white.shape[2])
+    return np.asarray(best.covariance @ (flat[:, :P].T @ flat[:, P:]), dtype=np.float64)

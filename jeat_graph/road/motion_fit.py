@@ -21,7 +21,7 @@ from jeat_graph.road.robust import agreed_weights, kernel
 
 _ROBUST_PASSES = 5
 _STIFF_PASSES = 3
-_ANYWHERE_M = 1e3
+ANYWHERE_M = 1e3
 _BELIEVED = 0.25  # weight of a point that is as far off as the kernel is wide
 
 
@@ -112,7 +112,7 @@ def motion_prior(s: FloatArray, knots: FloatArray, config: MotionFitConfig) -> F
     """Precision (2 C, 2 C) of the coefficients, x before y: across the road everything is calmer."""
     step = float(s[-1] - s[0]) / (len(knots) + 1)
     jerks = np.full(len(knots), config.jerk**2 * step)
-    along = np.r_[_ANYWHERE_M**2, config.speed_sd**2, config.acceleration_sd**2, jerks]
+    along = np.r_[ANYWHERE_M**2, config.speed_sd**2, config.acceleration_sd**2, jerks]
     across = along * np.r_[1.0, np.full(len(along) - 1, config.lateral_factor**2)]
     return np.diag(1.0 / np.concatenate([across, along]))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from jeat_graph.io.measurements_io import read_measurements
 from jeat_graph.io.table_writer import TableWriter
 from jeat_graph.io.trajectories_io import read_trajectories
 from jeat_graph.road.box_rows import BoxConfig
-from jeat_graph.road.boxes_road import follow_boxes
+from jeat_graph.road.boxes_road import SizedVehicle, follow_boxes
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.causal import RoadFilter, RoadFilterConfig
 from jeat_graph.road.cuboid_fit import CuboidConfig
@@ -45,9 +46,14 @@ def write_run_tables(folder: Path, config: Config, camera: RoadCamera) -> None:
         return
     smoothed = read_trajectories(folder / "smoothed.csv")
     tracks = boxes_of_log(log, sensor_errors(config), smoothed, camera, BoxConfig())
+    write_smoothed(follow_boxes(tracks, camera, CuboidConfig(), smoother=config.smoother.road), folder)
+
+
+def write_smoothed(vehicles: Sequence[SizedVehicle], folder: Path) -> None:
+    """Write `road_smoothed.csv` into a folder."""
     with TableWriter(folder / ROAD_SMOOTHED) as writer:
         writer.append(empty_road_columns())
-        for one in follow_boxes(tracks, camera, CuboidConfig()):
+        for one in vehicles:
             writer.append(road_columns(one.vehicle, one.size))
 
 

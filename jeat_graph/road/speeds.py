@@ -12,7 +12,8 @@ from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.evidence import within
-from jeat_graph.road.motion_fit import MotionFit, MotionFitConfig, fit_motion, thinned
+from jeat_graph.road.key_motion import RoadMotion
+from jeat_graph.road.motion_fit import MotionFitConfig, fit_motion, thinned
 
 KMH = 3.6
 Z95 = 1.959963984540054
@@ -77,7 +78,7 @@ class Vehicle:
 
     track_id: int
     t: FloatArray
-    fit: MotionFit
+    fit: RoadMotion
     by_calibration: FloatArray
     height_gain: float
     spread_m: float
