@@ -7,10 +7,13 @@ were at the last call as a small step costs. Who always hands over the same type
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Generic, ParamSpec, TypeVar
+
+_Arguments = ParamSpec("_Arguments")
+_Result = TypeVar("_Result")
 
 
-class DirectCall:
+class DirectCall(Generic[_Arguments, _Result]):
     """A kernel bound to the types of the arguments of its first call.
 
     Later arguments must have these types, which is not checked: the same fields, dtypes and numbers of
@@ -21,17 +24,17 @@ class DirectCall:
         kernel: decorated with `njit`.
     """
 
-    def __init__(self, kernel: Callable[..., Any]) -> None:
+    def __init__(self, kernel: Callable[_Arguments, _Result]) -> None:
         self._kernel = kernel
-        self._code: Callable[..., Any] | None = None
+        self._code: Callable[_Arguments, _Result] | None = None
 
-    def __call__(self, *arguments: Any) -> Any:
-        """Run the kernel."""
+    def __call__(self, *arguments: _Arguments.args, **named: _Arguments.kwargs) -> _Result:
+        """Run the kernel; arguments go by their places."""
         if self._code is None:
             self._code = machine_code(self._kernel, arguments)
-        return self._code(*arguments)
+        return self._code(*arguments, **named)
 
-    def __reduce__(self) -> tuple[type[DirectCall], tuple[Callable[..., Any]]]:
+    def __reduce__(self) -> tuple[type[DirectCall[..., Any]], tuple[Callable[..., Any]]]:
         return DirectCall, (self._kernel,)
 
 
