@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from jeat_graph.data.arrays import BoolArray, FloatArray
+from jeat_graph.io.decoders import RgbImage
 from jeat_graph.training.data_sets import EventSegment, Picture
 from jeat_graph.training.event_samples import draw_sequence
 from jeat_graph.training.learning import Target
@@ -20,13 +21,14 @@ from jeat_graph.training.settings import NetSettings, TrainSettings
 
 #: Tell the random numbers of the order from those of the changes.
 _ORDER, _CHANGES = 0, 1
+_BYTES_PER_MB = 1e6
 
 
 class ShownBatch(NamedTuple):
     """What is shown.
 
     Attributes:
-        steps: inputs (B, C, H, W) of the windows in their order; of pictures one.
+        steps: inputs (B, C, H, W) of the windows in their order, counts as whole numbers; of pictures one.
         targets: of each step, of each of the B.
     """
 
@@ -52,6 +54,8 @@ class Batches:
         self._members, self._net, self._settings = members, net, settings
         self._pool = ThreadPoolExecutor(1)
         self._ahead: tuple[int, Future[ShownBatch]] | None = None
+        self._kept: dict[int, RgbImage] = {}
+        self._room_bytes = settings.kept_mb * _BYTES_PER_MB
 
     def close(self) -> None:
         """End the thread that works ahead."""
@@ -78,9 +82,7 @@ class Batches:
     def _make(self, step: int) -> ShownBatch:
         size = self._settings.batch
         parts = [self._one(step * size + k) for k in range(size)]
-        shown = [
-            torch.from_numpy(np.stack(arrays)).float() for arrays in zip(*(p[0] for p in parts), strict=True)
-        ]
+        shown = [torch.from_numpy(np.stack(arrays)) for arrays in zip(*(p[0] for p in parts), strict=True)]
         targets = [list(step_targets) for step_targets in zip(*(p[1] for p in parts), strict=True)]
         return ShownBatch(shown, targets)
 
@@ -93,11 +95,21 @@ class Batches:
             drawn = draw_sequence(member, rng, self._net, self._settings)
             return list(drawn.windows), [_target(*p) for p in zip(drawn.corners, drawn.ignored, strict=True)]
         changes = self._settings.pictures
-        frame = member.load()
+        frame = self._picture(int(order[number % count]), member)
         shares = (changes.zoom, changes.mirror_share, changes.on_box_share)
         size_px = (frame.shape[1], frame.shape[0])
         window = draw_window(rng, size_px, self._settings.crop_px, member.truth, shares)
         return [cut_out(frame, window, rng, changes)], [_target(*window.boxes(member.truth))]
+
+    def _picture(self, index: int, member: Picture) -> RgbImage:
+        """Return a picture; those that were read are kept as long as there is room: reading takes longest."""
+        if index in self._kept:
+            return self._kept[index]
+        frame = member.load()
+        if frame.nbytes <= self._room_bytes:
+            self._room_bytes -= frame.nbytes
+            self._kept[index] = frame
+        return frame
 
 
 def _target(corners: FloatArray, ignored: BoolArray) -> Target:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -69,7 +70,7 @@ def draw_sequence(
         events = file.between(int(plan.start_us), int(end_us) + 1)
         size_px = file.size_px or _extent(events)
     ends = [(net.bins + k * plan.step_bins) * bin_us for k in range(settings.steps)]
-    truth = [asked_for(segment, plan.file_s(0.0), plan.file_s(end), settings.still_px_s) for end in ends]
+    truth = [asked_for(segment, plan.file_s(0.0), plan.file_s(end), settings.least_way_px) for end in ends]
     window = draw_window(
         rng,
         size_px,
@@ -77,10 +78,7 @@ def draw_sequence(
         truth[-1],
         (changes.zoom, changes.mirror_share, changes.on_box_share),
     )
-    t_us = ((events.t_us - plan.start_us) * plan.rate).astype(np.int64)
-    own = _changed(
-        EventArray.trusted(t_us, events.x, events.y, events.polarity), window, rng, settings, ends[-1]
-    )
+    own = _changed(_seen_in(events, window), plan, window, rng, settings, ends[-1])
     boxes = [window.boxes(one) for one in truth]
     return Sequence(
         np.stack(list(windows_of(own, settings.crop_px, net, ends))),
@@ -89,10 +87,10 @@ def draw_sequence(
     )
 
 
-def asked_for(segment: EventSegment, start: float, end: float, still_px_s: float) -> TrueBoxes:
-    """Return the truth at `end` (s); who has not moved since `start` left no events and is ignored."""
+def asked_for(segment: EventSegment, start: float, end: float, least_px: float) -> TrueBoxes:
+    """Return the truth at `end` (s); who has hardly moved since `start` left no events and is ignored."""
     truth = segment.truth.at(end)
-    moving = segment.truth.moving(start, end, still_px_s)
+    moving = segment.truth.moved(start, end, least_px)
     still = np.array([one not in moving for one in truth.object_id.tolist()], dtype=bool)
     return truth._replace(ignored=truth.ignored | still)
 
@@ -156,19 +154,35 @@ def _plan(
             )
 
 
+def _seen_in(events: EventArray, window: CutOut) -> EventArray:
+    """Leave out what is certainly not in the cut-out: most of it, and quickly."""
+    kept = np.ones(len(events), dtype=bool)
+    for place, shift, side in zip((events.x, events.y), (window.left, window.top), window.side, strict=True):
+        low, high = -shift / window.scale - 1.0, (side - shift) / window.scale + 1.0
+        kept &= (place >= max(math.floor(low), 0)) & (place <= max(math.ceil(high), 0))
+    rows = np.flatnonzero(kept)
+    return EventArray.trusted(events.t_us[rows], events.x[rows], events.y[rows], events.polarity[rows])
+
+
 def _changed(
-    events: EventArray, window: CutOut, rng: np.random.Generator, settings: TrainSettings, length_us: int
+    events: EventArray,
+    plan: SequencePlan,
+    window: CutOut,
+    rng: np.random.Generator,
+    settings: TrainSettings,
+    length_us: int,
 ) -> EventArray:
-    """Move events into the cut-out, drop some, and add some from nowhere."""
+    """Move events into the cut-out and onto the sequence's clock, drop some, and add some from nowhere."""
     changes, (width, height) = settings.events, window.side
-    kept = rng.random(len(events)) >= rng.uniform(0.0, changes.drop_share)
+    t_us = ((events.t_us - plan.start_us) * plan.rate).astype(np.int64)
+    kept = rng.random(len(events), dtype=np.float32) >= rng.uniform(0.0, changes.drop_share)
     x = np.floor((events.x + 0.5) * window.scale + window.left).astype(np.int64)
     y = np.floor((events.y + 0.5) * window.scale + window.top).astype(np.int64)
     if window.mirrored:
         x = width - 1 - x
     kept &= (x >= 0) & (x < width) & (y >= 0) & (y < height)
     more = int(rng.poisson(rng.uniform(0.0, changes.noise_hz_px) * width * height * length_us / _US))
-    t = np.concatenate([events.t_us[kept], rng.integers(0, length_us, more)])
+    t = np.concatenate([t_us[kept], rng.integers(0, length_us, more)])
     order = np.argsort(t, kind="stable")
     return EventArray.trusted(
         t[order],

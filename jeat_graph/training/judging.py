@@ -158,7 +158,9 @@ def _windows(
             rows, state = net(torch.from_numpy(window[None]).float().to(reader.device), state)
             corners, scores = reader.read(rows)
             begin, now = first_us / _US, (first_us + end) / _US
-            yield Looked(segment.source, corners, scores, asked_for(segment, begin, now, settings.still_px_s))
+            yield Looked(
+                segment.source, corners, scores, asked_for(segment, begin, now, settings.least_way_px)
+            )
 
 
 class _Reader:

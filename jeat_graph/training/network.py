@@ -72,16 +72,23 @@ class DetectionNet(nn.Module):
             for channels, s in zip(self.state_channels, _MEMORY_STRIDES, strict=False)
         )
 
-    def forward(self, x: Tensor, state: Sequence[Tensor] = ()) -> tuple[Tensor, tuple[Tensor, ...]]:
-        """Look at a batch.
+    def forward(
+        self, x: Tensor, state: Sequence[Tensor] = (), length: int = 1
+    ) -> tuple[Tensor, tuple[Tensor, ...]]:
+        """Look at a batch, or at windows that follow one another, of B sequences at once.
+
+        All that has no memory looks at all windows together: that is quicker, and batch normalisation then
+        knows more than one moment of few sequences.
 
         Args:
-            x: (B, 3, H, W) red, green, blue of 0 to 1, or (B, 2 x bins, H, W) counts of events.
+            x: (L x B, 3, H, W) red, green, blue of 0 to 1, or (L x B, 2 x bins, H, W) counts of events; first
+                the first windows of all sequences, then the second ones.
             state: of the windows before; for a network without a memory none.
+            length: L.
 
         Returns:
-            Rows (B, N, 5), fine level first, row by row: middle (cells from the cell's own), size (logarithm,
-            in cells) and logit; and the next state.
+            Rows (L x B, N, 5), fine level first, row by row: middle (cells from the cell's own), size
+            (logarithm, in cells) and logit; and the state after the last window.
         """
         if self.settings.has_memory:
             x = torch.clamp(x, max=_MOST_COUNT) * _COUNT_SCALE
@@ -89,11 +96,12 @@ class DetectionNet(nn.Module):
         middle = self.to_8(fine)
         kept: tuple[Tensor, ...] = ()
         if self.settings.has_memory:
-            middle = self.memory[0](middle, state[0])
+            middle, now = _remembered(self.memory[0], middle, state[0], length)
+            kept = (now,)
         coarse = self.to_16(middle)
         if self.settings.has_memory:
-            coarse = self.memory[1](coarse, state[1])
-            kept = (middle, coarse)
+            coarse, now = _remembered(self.memory[1], coarse, state[1], length)
+            kept = (*kept, now)
         low = self.lateral[2](coarse)
         mid = self.merge[1](self.lateral[1](middle) + _doubled(low))
         top = self.merge[0](self.lateral[0](fine) + _doubled(mid))
@@ -102,6 +110,18 @@ class DetectionNet(nn.Module):
             seen = torch.relu(self.tower_norm[level](self.tower(features)))
             rows.append(self.row(seen).flatten(2))
         return torch.cat(rows, dim=2).transpose(1, 2), kept
+
+
+def _remembered(memory: nn.Module, x: Tensor, state: Tensor, length: int) -> tuple[Tensor, Tensor]:
+    """Let a memory see windows (L x B, C, H, W) in their order; return what it says, and its last state."""
+    if length == 1:
+        state = memory(x, state)
+        return state, state
+    seen = []
+    for one in x.chunk(length):
+        state = memory(one, state)
+        seen.append(state)
+    return torch.cat(seen), state
 
 
 def _doubled(x: Tensor) -> Tensor:

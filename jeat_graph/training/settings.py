@@ -9,6 +9,7 @@ from jeat_graph.data.errors import ConfigError
 
 FRAMES, EVENTS = "frames", "events"
 KINDS = (FRAMES, EVENTS)
+FLOAT32, BFLOAT16 = "float32", "bfloat16"
 #: Channels of the first layer by the name of a size.
 WIDTHS = {"tiny": 8, "small": 16, "medium": 32, "large": 48}
 _COLOURS = 3
@@ -45,6 +46,9 @@ class PictureChanges(Section):
     )
     exposure: float = number(1.8, "1", "light is multiplied by 1/exposure to exposure", 1.0, 16.0)
     gamma: float = number(1.3, "1", "and put to a power of 1/gamma to gamma", 1.0, 4.0)
+    grey_share: float = number(
+        0.2, "1", "so many lose their colours, as a camera without them sees", 0.0, 1.0
+    )
     noise: float = number(8.0, "grey levels", "noise of up to this deviation is added", 0.0, 128.0)
 
 
@@ -72,6 +76,11 @@ class TrainSettings(Section):
         30.0, "1", "times that all pictures, or as much time of events, are seen", open_low=True
     )
     minutes: float | None = number(None, "min", "train for so long instead of `epochs`", open_low=True)
+    precision: str = choice(
+        FLOAT32,
+        (FLOAT32, BFLOAT16),
+        "of the layers while learning; bfloat16 halves the time where the processor has AVX512-BF16 or AMX",
+    )
     seed: int = number(0, "1", "of first weights, order and changes", 0, 2**31)
     learning_rate: float = number(2e-3, "1", "the highest, of AdamW", 0.0, 1.0, open_low=True)
     final_share: float = number(0.02, "1", "share of it at the end of the cosine", 0.0, 1.0)
@@ -79,12 +88,13 @@ class TrainSettings(Section):
     weight_decay: float = number(0.02, "1", "of AdamW", 0.0, 1.0)
     clip: float = number(10.0, "1", "longest gradient", open_low=True)
     average_steps: float = number(500.0, "1", "steps that the averaged weights go back", 1.0)
+    kept_mb: float = number(2000.0, "MB", "so much of the pictures is kept in memory once it was read")
     steps: int = number(8, "1", "windows of a sequence of events", 1, 1000)
     back: int = number(4, "1", "windows through which a gradient goes back", 1, 1000)
     least_step_bins: int = number(2, "bins", "shortest step from window to window (10 ms)", 1, 1000)
     most_step_bins: int = number(10, "bins", "longest (50 ms)", 1, 1000)
-    still_px_s: float = number(
-        3.0, "px/s", "who has been slower since a sequence began left no events and is not asked for"
+    least_way_px: float = number(
+        1.0, "px", "who has gone less since a sequence began left hardly an event and is not asked for"
     )
     judge_every: float = number(
         0.1, "1", "share of the training between two looks at what it has learned", 0.001, 1.0

@@ -19,7 +19,7 @@ from jeat_graph.training.data_sets import EventSegment, Picture, Split
 from jeat_graph.training.judging import judge
 from jeat_graph.training.learning import cost_of
 from jeat_graph.training.network import DetectionNet, cell_places
-from jeat_graph.training.settings import NetSettings, TrainSettings
+from jeat_graph.training.settings import BFLOAT16, NetSettings, TrainSettings
 
 _CHECKPOINT_S = 60.0
 _S_PER_MIN = 60.0
@@ -92,7 +92,8 @@ class Trainer:
         self._job = job
         settings = job.settings
         torch.manual_seed(settings.seed)
-        self.net = DetectionNet(job.net).to(job.device)
+        # Channels last: convolutions of few channels are a fifth quicker so on processors.
+        self.net = DetectionNet(job.net).to(job.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
         self.average = copy.deepcopy(self.net).requires_grad_(False)
         self._optimiser = torch.optim.AdamW(
             _groups(self.net, settings.weight_decay), lr=settings.learning_rate, betas=(0.9, 0.99)
@@ -157,20 +158,24 @@ class Trainer:
         count = len(batch.steps)
         for first in range(0, count, settings.back):
             part = slice(first, first + settings.back)
-            rows, targets = [], []
-            for shown, asked in zip(batch.steps[part], batch.targets[part], strict=True):
-                seen, state = self.net(shown.to(device), state)
-                rows.append(seen)
-                targets += [type(t)(t.boxes.to(device), t.ignored.to(device)) for t in asked]
-            cost = cost_of(torch.cat(rows), targets, self._places, self._strides)
+            length = len(batch.steps[part])
+            shown = torch.cat(batch.steps[part]).to(device, memory_format=torch.channels_last).float()
+            targets = [
+                type(t)(t.boxes.to(device), t.ignored.to(device))
+                for asked in batch.targets[part]
+                for t in asked
+            ]
+            with torch.autocast(device, torch.bfloat16, enabled=settings.precision == BFLOAT16):
+                rows, state = self.net(shown, state, length)
+            state = tuple(one.detach().float() for one in state)
+            cost = cost_of(rows.float(), targets, self._places, self._strides)
             if not bool(torch.isfinite(cost.total)):
                 raise DataError(
                     f"the loss is no number any more at step {self.step}: train with a lower learning rate "
                     "(--set learning_rate=…)"
                 )
-            share = len(rows) / count
+            share = length / count
             (cost.total * share).backward()  # type: ignore[no-untyped-call]
-            state = tuple(one.detach() for one in state)
             for k, value in enumerate(cost):
                 self._sums[k] += float(value.detach()) * share
         torch.nn.utils.clip_grad_norm_(self.net.parameters(), settings.clip)

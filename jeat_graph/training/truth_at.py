@@ -81,20 +81,22 @@ class TruthByTime:
             np.concatenate([a.object_id[in_a], a.object_id[lone_a], b.object_id[lone_b]]),
         )
 
-    def moving(self, start: float, end: float, least_px_s: float) -> set[int]:
-        """Return who has been faster than `least_px_s` at some time from `start` to `end` (s).
+    def moved(self, start: float, end: float, least_px: float) -> set[int]:
+        """Return who has gone at least `least_px` from `start` to `end` (s), to and fro counted alike.
 
         The way of that side of the box counts that goes farthest: what comes straight at the camera grows.
         """
         first = max(int(np.searchsorted(self.times, start + _SAME_S)) - 1, 0)
         last = min(int(np.searchsorted(self.times, end - _SAME_S)), len(self.times) - 1)
-        found: set[int] = set()
+        ways: dict[int, float] = {}
         for k in range(first, last):
             gap = self.times[k + 1] - self.times[k]
             if not 0.0 < gap <= _LONGEST_GAP_S:
                 continue
+            share = (min(end, self.times[k + 1]) - max(start, self.times[k])) / gap
             a, b = self.at_frame(k), self.at_frame(k + 1)
             same, in_a, in_b = np.intersect1d(a.object_id, b.object_id, return_indices=True)
-            way = np.abs(b.corners[in_b] - a.corners[in_a]).max(axis=1)
-            found.update(same[way > least_px_s * gap].tolist())
-        return found
+            way = share * np.abs(b.corners[in_b] - a.corners[in_a]).max(axis=1)
+            for one, part in zip(same.tolist(), way.tolist(), strict=True):
+                ways[one] = ways.get(one, 0.0) + part
+        return {one for one, way in ways.items() if way >= least_px}

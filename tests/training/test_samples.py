@@ -83,8 +83,11 @@ def test_truth_between_two_frames_lies_between_their_boxes():
     assert found.object_id.tolist() == [1, 2, 3]
     assert found.ignored.tolist() == [False, True, True]
     assert truth.at(0.1).ignored.tolist() == [False, False]
-    assert truth.moving(0.0, 0.1, 50.0) == {1}
-    assert truth.moving(0.0, 0.1, 150.0) == set()
+    # The right side of vehicle 1 goes farthest: 10 px, half of them in half of the time.
+    assert truth.moved(0.0, 0.1, 9.0) == {1}
+    assert truth.moved(0.0, 0.1, 11.0) == set()
+    assert truth.moved(0.05, 0.1, 4.5) == {1}
+    assert truth.moved(0.05, 0.1, 5.5) == set()
 
 
 def test_events_lie_in_the_boxes_of_the_moment(small_set):
