@@ -56,13 +56,18 @@ class AveragePrecision:
 
 
 def detection_ap(
-    pairs: Sequence[tuple[GroundTruth, Detections]], *, tolerance_s: float = 0.01
+    pairs: Sequence[tuple[GroundTruth, Detections]],
+    *,
+    tolerance_s: float = 0.01,
+    sides_px: tuple[float, float] = (0.0, np.inf),
 ) -> dict[str, AveragePrecision]:
     """Average precision of every sensor, pooled over sequences.
 
     Args:
         pairs: truth and detections of each sequence.
         tolerance_s: largest distance in time of a scan to its frame (s).
+        sides_px: only objects with the root of their area from the first to below the second are asked for;
+            others are ignored, and so are detections of other sizes that find nothing.
 
     Returns:
         By sensor, in alphabetical order; NaN where there is no object to be found.
@@ -71,7 +76,7 @@ def detection_ap(
         DataError: no scan of a sensor lies at a frame of the truth.
     """
     names = sorted({name for _, detections in pairs for name in detections.sensors})
-    return {name: _sensor_ap(pairs, name, tolerance_s) for name in names}
+    return {name: _sensor_ap(pairs, name, tolerance_s, sides_px) for name in names}
 
 
 def nearest_scans(frames: FloatArray, scans: FloatArray, tolerance_s: float) -> tuple[IntArray, IntArray]:
@@ -103,7 +108,10 @@ def _nearest(values: FloatArray, wanted: FloatArray) -> IntArray:
 
 
 def _sensor_ap(
-    pairs: Sequence[tuple[GroundTruth, Detections]], sensor: str, tolerance_s: float
+    pairs: Sequence[tuple[GroundTruth, Detections]],
+    sensor: str,
+    tolerance_s: float,
+    sides_px: tuple[float, float],
 ) -> AveragePrecision:
     scores: list[FloatArray] = []
     hits: list[BoolArray] = []
@@ -123,11 +131,13 @@ def _sensor_ap(
             boxes = _moved(truth, rows, float(detections.scan_t[s] - times[frame[k]]))
             own = slice(int(detections.scan_start[s]), int(detections.scan_start[s + 1]))
             rank = np.argsort(-detections.scores[own], kind="stable")
-            hit, out = match_greedily(detections.boxes[own][rank], boxes, truth.ignore[rows])
+            ignored = truth.ignore[rows] | ~_of_size(boxes, sides_px)
+            hit, out = match_greedily(detections.boxes[own][rank], boxes, ignored)
+            out |= ~hit & ~_of_size(detections.boxes[own][rank], sides_px)
             scores.append(detections.scores[own][rank])
             hits.append(hit)
             outs.append(out)
-            truth_boxes += int((~truth.ignore[rows]).sum())
+            truth_boxes += int((~ignored).sum())
         frames += len(frame)
     if not frames:
         raise DataError(f"no scan of sensor {sensor} lies within {tolerance_s:g} s of a frame of the truth")
@@ -142,6 +152,12 @@ def _sensor_ap(
         truth_boxes=truth_boxes,
         detections=len(score),
     )
+
+
+def _of_size(boxes: FloatArray, sides_px: tuple[float, float]) -> BoolArray:
+    """Tell which boxes (M, 4) have the root of their area within the limits (px)."""
+    side = np.sqrt(boxes[:, 2] * boxes[:, 3])
+    return np.asarray((side >= sides_px[0]) & (side < sides_px[1]))
 
 
 def _moved(truth: GroundTruth, rows: IntArray, dt: float) -> FloatArray:

@@ -9,12 +9,14 @@ from typing import Any
 from jeat_graph.cli.options import Parser
 from jeat_graph.data.errors import ConfigError
 
-HELP = "Reproduce the README's tables: accuracy, ablation, smoothing, real, speed or events."
+HELP = "Reproduce the tables: accuracy, ablation, smoothing, real, detection, raw, speed or events."
 _KINDS = {
     "accuracy": "our tracker and others' on simulated and real data",
     "ablation": "from the paper's tracker to the default, one change a row",
     "smoothing": "what smoothing gains over the causal estimates",
     "real": "real detectors that nothing was made for, and simulated odd ones",
+    "detection": "how well detectors find vehicles in raw pictures and raw events",
+    "raw": "from raw pictures and raw events to tracks",
     "road": "place and speed on the road, simulated and against laser gates, and whether intervals hold",
     "speed": "time per step, against others",
     "endurance": "a day of input through the live path: memory, latency and counts, hour by hour",

@@ -1,0 +1,212 @@
+"""`jeat-graph benchmark raw`: from raw pictures and raw events to tracks, ours and ByteTrack's."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import stdev
+from typing import TYPE_CHECKING, Any
+
+from jeat_graph.benchmark import common
+from jeat_graph.benchmark.judging import METRICS, in_processes
+from jeat_graph.benchmark.peer_search import peers_here
+from jeat_graph.benchmark.provenance import provenance
+from jeat_graph.benchmark.raw_options import add_raw, detectors_of, findings
+from jeat_graph.benchmark.raw_segments import SENSORS, Found, described, find_in, segments_in
+from jeat_graph.benchmark.recordings import JudgedRecording
+from jeat_graph.benchmark.steps import start
+from jeat_graph.config.reading import load_config
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.errors import ConfigError
+
+if TYPE_CHECKING:
+    from jeat_graph.config.schema import Config
+    from jeat_graph.eval.tables import Cell, Table
+
+BYTETRACK, PAPER = "ByteTrack", "paper"
+CAUSAL, SMOOTHED = "causal", "smoothed"
+_ALL = "all"
+
+
+@dataclass(frozen=True, eq=False)
+class SizedRecording(JudgedRecording):
+    """Detections with their truth, and the picture that they were found in.
+
+    Attributes:
+        size_px: its width and height.
+    """
+
+    size_px: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of the table.
+
+    Attributes:
+        detectors: of pictures and of events, by name.
+        tracker: `ByteTrack`, `paper`, or the preset of ours.
+        sensors: what it is given.
+    """
+
+    detectors: tuple[str, str]
+    tracker: str
+    sensors: tuple[str, ...]
+
+    def __str__(self) -> str:
+        by_sensor = dict(zip(SENSORS, self.detectors, strict=True))
+        return f"{self.tracker}, " + " + ".join(f"{s} {by_sensor[s]}" for s in self.sensors)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the benchmark's arguments."""
+    add_raw(parser, "raw")
+    parser.add_argument(
+        "--presets", nargs="+", default=["default"], metavar="NAME", help="of our tracker (default: default)"
+    )
+    parser.add_argument("--no-peers", action="store_true", help="leave ByteTrack out")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure (or read an earlier result), print and write."""
+    return common.measure_or_read(args, "raw", measure, tables)
+
+
+def measure(args: argparse.Namespace) -> dict[str, Any]:
+    """Detect once, then track and judge with every tracker."""
+    folders = [Path(one) for one in args.folders]
+    segments = segments_in(folders)
+    if len(args.frames) != len(args.events):
+        raise ConfigError(
+            f"{len(args.frames)} detectors of pictures and {len(args.events)} of events: they go in pairs"
+        )
+    configs = {name: load_config(name) for name in (*args.presets, PAPER)}
+    with_peers = not args.no_peers and "bytetrack" in peers_here()
+    found = in_processes(find_in, findings(args, segments), args.jobs, "detecting")
+    recordings = _recordings(found)
+    rows = [
+        row
+        for pair in zip(args.frames, args.events, strict=True)
+        for row in rows_of(pair, args.presets, with_peers)
+    ]
+    jobs = [(row, recordings[row.detectors]) for row in rows]
+    records = in_processes(_judge, jobs, args.jobs, "tracking")
+    settings = {
+        "data": described(folders),
+        "detectors": detectors_of(args),
+        "detection": list(args.detection_set),
+    }
+    return {
+        "benchmark": "raw",
+        **provenance(settings, configs),
+        "sources": list(dict.fromkeys(s.source for s in segments)),
+        "records": [record for part in records for record in part],
+    }
+
+
+def rows_of(detectors: tuple[str, str], presets: Sequence[str], with_peers: bool) -> list[Row]:
+    """Return the rows of a pair of detectors: each sensor alone and both, theirs, the paper's and ours."""
+    streams = [*((sensor,) for sensor in SENSORS), SENSORS]
+    theirs = [Row(detectors, BYTETRACK, stream) for stream in streams] if with_peers else []
+    ours = [Row(detectors, preset, stream) for preset in presets for stream in streams]
+    return [*theirs, Row(detectors, PAPER, SENSORS), *ours]
+
+
+def _recordings(found: Sequence[Found]) -> dict[tuple[str, str], dict[str, list[SizedRecording]]]:
+    """Return, by pair of detectors and by data set, recordings with the detections of both sensors."""
+    by_sensor: dict[str, dict[tuple[str, str, str], Found]] = {sensor: {} for sensor in SENSORS}
+    for one in found:
+        asked = one.finding
+        by_sensor[asked.sensor][asked.detector, asked.segment.source, asked.segment.name] = one
+    out: dict[tuple[str, str], dict[str, list[SizedRecording]]] = {}
+    frames, events = (by_sensor[sensor] for sensor in SENSORS)
+    for (first, source, name), rgb in frames.items():
+        segment = rgb.finding.segment
+        truth, size_px = segment.truth(), segment.size_px()
+        for (second, *place), evt in events.items():
+            if place != [source, name]:
+                continue
+            both = Detections.concatenate([rgb.detections, evt.detections])
+            group = out.setdefault((first, second), {}).setdefault(source, [])
+            group.append(SizedRecording(f"{source}/{name}", both, truth, size_px))
+    return out
+
+
+def _judge(job: tuple[Row, dict[str, list[SizedRecording]]]) -> list[dict[str, Any]]:
+    """Judge one row in all data sets: a record for each, and for what it reports (causal, smoothed)."""
+    row, by_source = job
+    everything = {**by_source, _ALL: [one for group in by_source.values() for one in group]}
+    tracked = {one.name: _tracked(row, one) for group in by_source.values() for one in group}
+    out = []
+    for source, group in everything.items():
+        for kind in tracked[group[0].name]:
+            scores = _scores(group, [tracked[one.name][kind] for one in group], row, kind)
+            each = [_scores([one], [tracked[one.name][kind]], row, kind) for one in group]
+            spread = {m: stdev([e[m] for e in each]) if len(each) > 1 else 0.0 for m in METRICS}
+            out.append(
+                {
+                    "row": str(row) + (", smoothed" if kind == SMOOTHED else ""),
+                    "detectors": dict(zip(SENSORS, row.detectors, strict=True)),
+                    "tracker": row.tracker,
+                    "sensors": list(row.sensors),
+                    "kind": kind,
+                    "source": source,
+                    "segments": len(group),
+                    "scores": scores,
+                    "std": spread,
+                }
+            )
+    return out
+
+
+def _tracked(row: Row, recording: SizedRecording) -> dict[str, Any]:
+    """Return the tables of a tracker, by what they are."""
+    from jeat_graph.eval.baselines import run_baseline
+    from jeat_graph.runs.latency import at_measurement
+    from jeat_graph.tracking.whole import both_tables, track
+
+    if row.tracker == BYTETRACK:
+        return {CAUSAL: run_baseline("bytetrack", recording.detections, row.sensors)}
+    seen = recording.only(row.sensors)
+    config = _config(row.tracker, seen, recording.size_px)
+    seen = at_measurement(seen, config)
+    if row.tracker == PAPER:
+        return {CAUSAL: track(config, seen)}
+    return dict(zip((CAUSAL, SMOOTHED), both_tables(config, seen), strict=True))
+
+
+def _config(name: str, seen: Detections, size_px: tuple[int, int]) -> Config:
+    """Return a preset for what is seen: the rates of the sensors, and their picture."""
+    from jeat_graph.runs.declaring import fit_input
+
+    width, height = size_px
+    picture = [f"image.width={width}", f"image.height={height}"]
+    fitted, _ = fit_input(load_config("default" if name == PAPER else name, picture), seen)
+    return start(load_config(PAPER), fitted) if name == PAPER else fitted
+
+
+def _scores(group: Sequence[JudgedRecording], found: Sequence[Any], row: Row, kind: Any) -> dict[str, Any]:
+    from jeat_graph.eval.metrics import evaluate
+
+    first = row.sensors[:1] if row.tracker == BYTETRACK else row.sensors
+    instants = [one.instants(first) for one in group] if kind == CAUSAL else None
+    pairs = [(one.truth, table) for one, table in zip(group, found, strict=True)]
+    return evaluate(pairs, kind=kind, instants=instants).as_dict()
+
+
+def tables(result: Mapping[str, Any]) -> dict[str, Table]:
+    """Tables of a result, by the name of their markers: one for all data together, and one a data set."""
+    from jeat_graph.eval.tables import Table
+
+    sources = [*result["sources"], _ALL]
+    cells: dict[str, dict[str, Cell]] = {}
+    for one in result["records"]:
+        several = one["segments"] > 1
+        cell = " / ".join(
+            f"{one['scores'][m]:.1f}" + (f"±{one['std'][m]:.0f}" if several else "") for m in METRICS
+        )
+        cells.setdefault(one["row"], {"": one["row"]})[one["source"]] = cell
+    title = f"From raw pictures and events: {' / '.join(METRICS)}, segments pooled (± over segments)"
+    return {"raw": Table.from_records(list(cells.values()), ["", *sources], title=title)}

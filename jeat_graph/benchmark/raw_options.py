@@ -1,0 +1,94 @@
+"""Options that the benchmarks from raw recordings share: data sets, and detectors of each sensor."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from jeat_graph.benchmark import common
+from jeat_graph.benchmark.raw_segments import SENSORS, Finding, RawSegment, detector_named
+from jeat_graph.data.errors import ConfigError
+
+
+def add_raw(parser: argparse.ArgumentParser, name: str) -> None:
+    """Declare data sets and detectors.
+
+    Args:
+        parser: of the benchmark.
+        name: of the files that it writes.
+    """
+    add = parser.add_argument
+    add(
+        "folders",
+        nargs="*",
+        metavar="DATA",
+        help="folders that `simulate --sensors pictures` wrote, one a light; no detector may have seen them",
+    )
+    texts = "detectors of {}: motion, the name of a network that comes with the package, or FILE.onnx"
+    add(
+        "--frames",
+        nargs="+",
+        default=["motion"],
+        metavar="NAME|FILE",
+        help=texts.format("pictures (default: motion)"),
+    )
+    add(
+        "--events",
+        nargs="+",
+        default=["motion"],
+        metavar="NAME|FILE",
+        help=texts.format("events (default: motion)"),
+    )
+    add(
+        "--detection-set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change a setting of the detectors, say model_frames.threads=1; may be given many times",
+    )
+    common.declare(parser, name, {})
+
+
+def detectors_of(args: argparse.Namespace) -> dict[str, list[dict[str, Any]]]:
+    """Return the detectors of each sensor, with checksums of files.
+
+    Raises:
+        ConfigError: one is neither a name nor a file.
+    """
+    return {
+        sensor: [detector_named(one) for one in names]
+        for sensor, names in zip(SENSORS, (args.frames, args.events), strict=True)
+    }
+
+
+def findings(
+    args: argparse.Namespace, segments: Sequence[RawSegment], changes: Sequence[str] = ()
+) -> list[Finding]:
+    """Return what is to be looked for: each detector in each segment.
+
+    Args:
+        args: of the command.
+        segments: to look at.
+        changes: `section.key=value` texts over the detectors' settings; those of the command are over them.
+
+    Raises:
+        ConfigError: no data, settings that are not valid, or two detectors of one name.
+    """
+    from jeat_graph.detection.settings import load_settings
+
+    detectors_of(args)
+    settings = load_settings(None, (*changes, *args.detection_set))
+    for names in (args.frames, args.events):
+        short = [Path(one).name for one in names]
+        if len(set(short)) < len(short):
+            raise ConfigError(
+                f"{max(short, key=short.count)} is named twice: its rows could not be told apart"
+            )
+    return [
+        Finding(segment, sensor, detector, settings)
+        for sensor, names in zip(SENSORS, (args.frames, args.events), strict=True)
+        for detector in names
+        for segment in segments
+    ]
