@@ -24,6 +24,7 @@ def problems(wheel: Path) -> list[str]:
     for folder in ("filters", "association", "smoothers", "eval", "configs"):
         modules += [Path("jeat_graph") / path for path in Path(folder).rglob("*.py")]
     wanted |= {path.as_posix() for path in modules}
+    wanted |= {path.as_posix() for path in Path("jeat_graph").rglob("weights/*.onnx")}
     return found + [f"{name} is missing from the wheel" for name in sorted(wanted - set(names))]
 
 

@@ -15,7 +15,7 @@ from jeat_graph.benchmark import common
 from jeat_graph.benchmark.judging import in_processes
 from jeat_graph.benchmark.provenance import provenance
 from jeat_graph.benchmark.raw_options import add_raw, detectors_of, findings
-from jeat_graph.benchmark.raw_segments import SENSORS, Found, described, find_in, segments_in
+from jeat_graph.benchmark.raw_segments import SENSORS, RawFound, described, find_in, segments_in
 from jeat_graph.data.trajectories import GroundTruth
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
     return {"benchmark": "detection", **provenance(settings, {}), "records": records}
 
 
-def judge_detector(found: Sequence[Found]) -> dict[str, Any]:
+def judge_detector(found: Sequence[RawFound]) -> dict[str, Any]:
     """Judge what one detector found in all segments.
 
     Returns:

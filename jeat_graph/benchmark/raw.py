@@ -14,7 +14,7 @@ from jeat_graph.benchmark.judging import METRICS, in_processes
 from jeat_graph.benchmark.peer_search import peers_here
 from jeat_graph.benchmark.provenance import provenance
 from jeat_graph.benchmark.raw_options import add_raw, detectors_of, findings
-from jeat_graph.benchmark.raw_segments import SENSORS, Found, described, find_in, segments_in
+from jeat_graph.benchmark.raw_segments import SENSORS, RawFound, described, find_in, segments_in
 from jeat_graph.benchmark.recordings import JudgedRecording
 from jeat_graph.benchmark.steps import start
 from jeat_graph.config.reading import load_config
@@ -114,9 +114,9 @@ def rows_of(detectors: tuple[str, str], presets: Sequence[str], with_peers: bool
     return [*theirs, Row(detectors, PAPER, SENSORS), *ours]
 
 
-def _recordings(found: Sequence[Found]) -> dict[tuple[str, str], dict[str, list[SizedRecording]]]:
+def _recordings(found: Sequence[RawFound]) -> dict[tuple[str, str], dict[str, list[SizedRecording]]]:
     """Return, by pair of detectors and by data set, recordings with the detections of both sensors."""
-    by_sensor: dict[str, dict[tuple[str, str, str], Found]] = {sensor: {} for sensor in SENSORS}
+    by_sensor: dict[str, dict[tuple[str, str, str], RawFound]] = {sensor: {} for sensor in SENSORS}
     for one in found:
         asked = one.finding
         by_sensor[asked.sensor][asked.detector, asked.segment.source, asked.segment.name] = one

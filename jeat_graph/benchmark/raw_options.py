@@ -10,6 +10,9 @@ from typing import Any
 from jeat_graph.benchmark import common
 from jeat_graph.benchmark.raw_segments import SENSORS, Finding, RawSegment, detector_named
 from jeat_graph.data.errors import ConfigError
+from jeat_graph.detection.named import EVENTS, FRAMES
+
+KINDS = (FRAMES, EVENTS)
 
 
 def add_raw(parser: argparse.ArgumentParser, name: str) -> None:
@@ -55,11 +58,12 @@ def detectors_of(args: argparse.Namespace) -> dict[str, list[dict[str, Any]]]:
     """Return the detectors of each sensor, with checksums of files.
 
     Raises:
-        ConfigError: one is neither a name nor a file.
+        ConfigError: a name that is not known.
+        DataError: no such file.
     """
     return {
-        sensor: [detector_named(one) for one in names]
-        for sensor, names in zip(SENSORS, (args.frames, args.events), strict=True)
+        sensor: [detector_named(one, kind) for one in names]
+        for sensor, kind, names in zip(SENSORS, KINDS, (args.frames, args.events), strict=True)
     }
 
 

@@ -11,6 +11,7 @@ from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR, DetectRequest
+from jeat_graph.detection.named import MOTION, network_file
 from jeat_graph.detection.settings import DetectionSettings
 from jeat_graph.io.hashing import sha256_of
 
@@ -64,7 +65,7 @@ class Finding:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class RawFound:
     """What a detector has found.
 
     Attributes:
@@ -106,7 +107,7 @@ def segments_in(folders: list[Path]) -> list[RawSegment]:
     return found
 
 
-def find_in(finding: Finding) -> Found:
+def find_in(finding: Finding) -> RawFound:
     """Let a detector look at a segment.
 
     Raises:
@@ -127,7 +128,7 @@ def find_in(finding: Finding) -> Found:
     )
     begun = time.process_time()
     detections = detect_files(request)
-    return Found(finding, detections, time.process_time() - begun)
+    return RawFound(finding, detections, time.process_time() - begun)
 
 
 def described(folders: list[Path]) -> list[dict[str, Any]]:
@@ -149,17 +150,16 @@ def described(folders: list[Path]) -> list[dict[str, Any]]:
     return found
 
 
-def detector_named(detector: str) -> dict[str, Any]:
+def detector_named(detector: str, kind: str) -> dict[str, Any]:
     """Return a detector's name, and of a file its checksum.
 
     Raises:
-        ConfigError: neither a name that is known nor a file.
+        ConfigError: a name that is not known.
+        DataError: no such file.
     """
-    from jeat_graph.detection.detecting import MOTION
-
     if detector == MOTION:
         return {"name": detector}
-    path = Path(detector)
+    path = network_file(detector, kind)
     if not path.is_file():
-        raise ConfigError(f"{detector}: neither the name of a detector ({MOTION}) nor a file")
+        raise DataError("no such file of a network", path)
     return {"name": path.name, "sha256": sha256_of(path)}

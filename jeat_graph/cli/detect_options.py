@@ -19,7 +19,7 @@ def add_detecting(parser: argparse._ActionsContainer) -> None:
         default="motion",
         metavar="NAME|FILE.onnx",
         help="what finds vehicles in frames: motion (default; what moves before a camera that stands "
-        "still), or a network",
+        "still), a network that comes with the package, or a network's file",
     )
     add(
         "--detector-events",

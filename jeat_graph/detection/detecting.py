@@ -17,12 +17,11 @@ from jeat_graph.data.events import EventArray
 from jeat_graph.data.progress import told
 from jeat_graph.detection.binned import BinnedDetector
 from jeat_graph.detection.event_detector import EventDetector
+from jeat_graph.detection.named import EVENTS, FRAMES, MOTION, network_file
 from jeat_graph.detection.picture_detector import PictureDetector
 from jeat_graph.detection.settings import DetectionSettings
 
 FRAMES_SENSOR, EVENTS_SENSOR = "rgb", "evt"
-#: The detectors without weights, by the name that `--detector-frames` and `--detector-events` take.
-MOTION = "motion"
 _US_PER_S = 1e6
 
 
@@ -33,8 +32,8 @@ class DetectRequest:
     Attributes:
         frames: a video, a folder of pictures, or an AEDAT 4 file; or None.
         events: a file of events; or None.
-        detector_frames: `motion`, or an ONNX file.
-        detector_events: `motion`, or an ONNX file.
+        detector_frames: `motion`, a network that comes with the package, or an ONNX file.
+        detector_events: the same.
         rate_hz: frames per second where neither the video nor a table beside it says.
         event_size_px: width and height of the event camera's picture, where the file does not say.
         events_later_s: what to add to the times of the events for the clock of the frames (s).
@@ -126,7 +125,8 @@ def _picture_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str]
     if request.detector_frames != MOTION:
         from jeat_graph.detection.models.pictures import ModelPictureDetector
 
-        model = ModelPictureDetector(request.detector_frames, FRAMES_SENSOR, request.settings.model_frames)
+        network = network_file(request.detector_frames, FRAMES)
+        model = ModelPictureDetector(network, FRAMES_SENSOR, request.settings.model_frames)
         say(model.description)
         return (model(frame, t) for t, frame in told(source, len(source)))
     detector = PictureDetector(FRAMES_SENSOR, request.settings.frames)
@@ -160,8 +160,9 @@ def _event_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str], 
     if request.detector_events != MOTION:
         from jeat_graph.detection.models.events import ModelEventDetector
 
+        network = network_file(request.detector_events, EVENTS)
         model = ModelEventDetector(
-            request.detector_events, reader.size_px, EVENTS_SENSOR, settings.events, settings.model_events
+            network, reader.size_px, EVENTS_SENSOR, settings.events, settings.model_events
         )
         say(model.description)
         detector = model

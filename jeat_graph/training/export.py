@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
@@ -23,6 +24,8 @@ from jeat_graph.training.network import DetectionNet, cell_places, served_boxes
 from jeat_graph.training.settings import EVENTS
 
 _OPSET = 17
+#: Smaller tensors are not worth a cast.
+_LEAST_HALVED = 64
 _CLASS = "vehicle"
 #: Under which names the notes stand in the file; `names` is where detectors have their classes.
 CARD, NAMES = "card", "names"
@@ -83,6 +86,28 @@ def write_onnx(net: DetectionNet, side: tuple[int, int], card: Mapping[str, Any]
             output_names=["boxes", *(f"next_state_{k}" for k in states)],
         )
     model = onnx.load_from_string(buffer.getvalue())
+    _halve(model)
     onnx.helper.set_model_props(model, {NAMES: str({0: _CLASS}), CARD: json.dumps(card, sort_keys=True)})
     with atomic_path(path) as temporary:
         temporary.write_bytes(model.SerializeToString(deterministic=True))
+
+
+def _halve(model: Any) -> None:
+    """Store weights in half precision, each with a cast before its first use: half the file.
+
+    Whoever runs the network casts them once, when it is loaded; it calculates in single precision.
+    """
+    from onnx import TensorProto, helper, numpy_helper
+
+    graph, kept, casts = model.graph, [], []
+    for tensor in graph.initializer:
+        if tensor.data_type != TensorProto.FLOAT or np.prod(tensor.dims) < _LEAST_HALVED:
+            kept.append(tensor)
+            continue
+        name = f"{tensor.name}_half"
+        kept.append(numpy_helper.from_array(numpy_helper.to_array(tensor).astype(np.float16), name))
+        casts.append(helper.make_node("Cast", [name], [tensor.name], to=TensorProto.FLOAT))
+    nodes = list(graph.node)
+    del graph.initializer[:], graph.node[:]
+    graph.initializer.extend(kept)
+    graph.node.extend([*casts, *nodes])

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from jeat_graph.data.detections import Detections
+from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.eval.detection_ap import detection_ap, nearest_scans
 
 from .data import make_truth
@@ -116,3 +117,20 @@ def test_random_detections_have_the_ap_of_supervision():
     assert pytest.approx(100 * theirs.map50_95, abs=1e-4) == ours.AP
     assert pytest.approx(100 * theirs.map50, abs=1e-4) == ours.AP50
     assert pytest.approx(100 * theirs.map75, abs=1e-4) == ours.AP75
+
+
+def test_only_objects_of_a_size_are_asked_for():
+    """A small and a large object are found, and a small box is false: it hurts among the small ones alone."""
+    truth = GroundTruth(
+        t=np.zeros(2),
+        object_id=np.array([1, 2]),
+        boxes=np.array([[0.0, 0, 8, 8], [100, 0, 40, 40]]),
+        motion=None,
+        ignore=np.zeros(2, dtype=bool),
+    )
+    boxes = np.array([[0.0, 0, 8, 8], [100, 0, 40, 40], [50, 50, 6, 6]])
+    found = Detections.from_scans([Scan(0.0, "rgb", boxes, np.array([0.5, 0.5, 0.9]))])
+    large = detection_ap([(truth, found)], sides_px=(12.0, np.inf))["rgb"]
+    small = detection_ap([(truth, found)], sides_px=(0.0, 12.0))["rgb"]
+    assert (large.AP50, large.truth_boxes) == (100.0, 1)
+    assert (small.AP50, small.truth_boxes) == (pytest.approx(50.0), 1)

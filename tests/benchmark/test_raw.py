@@ -1,0 +1,136 @@
+"""`benchmark detection` and `benchmark raw`, in small: a set of two segments, one of which is for tests."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from jeat_graph.benchmark.detection import only_moved
+from jeat_graph.benchmark.raw_segments import segments_in
+from jeat_graph.cli.main import main
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.trajectories import GroundTruth
+from jeat_graph.io.events_dsec_writer import EventWriter
+from jeat_graph.io.truth_io import write_truth
+
+from ..detection.moving import SIZE, box_at, events_of, picture_of
+
+FRAMES, RATE_HZ = 40, 20.0
+CAR = ((10, 60), (60, 8), (40, 20))
+
+
+def write_segment(folder) -> None:
+    """Pictures, events and truth of one thing that moves."""
+    import cv2
+
+    rng = np.random.default_rng(0)
+    background = rng.uniform(40, 120, (SIZE[1], SIZE[0]))
+    (folder / "frames").mkdir(parents=True)
+    times = np.arange(FRAMES) / RATE_HZ
+    for k, t in enumerate(times.tolist()):
+        cv2.imwrite(str(folder / "frames" / f"{k:06d}.png"), picture_of([(CAR, 200)], t, background, rng))
+    rows = "".join(f"{k},{round(t * 1e6)}\n" for k, t in enumerate(times))
+    (folder / "frames.csv").write_text("index,t_us\n" + rows, encoding="utf-8")
+    write_truth(
+        GroundTruth(
+            t=times,
+            object_id=np.ones(FRAMES, dtype=np.int64),
+            boxes=np.array([box_at(*CAR, t) for t in times]),
+            motion=None,
+            ignore=np.zeros(FRAMES, dtype=bool),
+        ),
+        folder / "gt.csv",
+    )
+    end_us = round(FRAMES / RATE_HZ * 1e6)
+    with EventWriter(folder / "events.h5", SIZE, "none") as writer:
+        writer.append(events_of([CAR], FRAMES / RATE_HZ, noise_hz_px=0.05), end_us)
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    root = tmp_path_factory.mktemp("raw") / "small"
+    for segment in range(2):
+        write_segment(root / "segments" / f"{segment:06d}")
+    (root / "test.txt").write_text("segments/000001\n", encoding="utf-8")
+    return root
+
+
+def test_only_segments_for_tests_are_judged(small):
+    assert [s.name for s in segments_in([small])] == ["000001"]
+    with pytest.raises(DataError, match="2 data sets are called small"):
+        segments_in([small, small])
+
+
+def test_detectors_are_judged_by_light_motion_and_size(small, tmp_path, capsys):
+    assert main(["benchmark", "detection", str(small), "--jobs", "1", "--out", str(tmp_path)]) == 0
+    assert "YOLOv11" in capsys.readouterr().out
+    found = json.loads((tmp_path / "detection.json").read_text())
+    assert found["settings"]["detectors"] == {"rgb": [{"name": "motion"}], "evt": [{"name": "motion"}]}
+    by_sensor = {one["sensor"]: one["groups"] for one in found["records"]}
+    for groups in by_sensor.values():
+        assert groups["all"]["boxes"] == groups["small"]["boxes"]
+        sizes = [groups[name]["boxes"] for name in ("below 12 px", "12 to 32 px", "above 32 px")]
+        assert sum(sizes) == groups["all"]["boxes"]
+    # One thing that moves, on a ground that does not: what the detectors without weights are for.
+    assert by_sensor["rgb"]["all"]["boxes"] == FRAMES
+    assert by_sensor["rgb"]["all"]["AP50"] > 90.0
+    assert by_sensor["evt"]["that moved"]["AP50"] > 90.0
+
+
+def test_from_raw_to_scores(small, tmp_path, capsys):
+    args = ["benchmark", "raw", str(small), "--jobs", "1", "--no-peers", "--out", str(tmp_path)]
+    assert main(args) == 0
+    found = json.loads((tmp_path / "raw.json").read_text())
+    rows = {one["row"]: one["scores"] for one in found["records"] if one["source"] == "small"}
+    both = "rgb motion + evt motion"
+    assert set(rows) == {
+        f"paper, {both}",
+        *(
+            f"default, {what}{how}"
+            for what in ("rgb motion", "evt motion", both)
+            for how in ("", ", smoothed")
+        ),
+    }
+    assert rows[f"default, {both}, smoothed"]["IDF1"] > 80.0
+    assert set(found["configs"]) == {"default", "paper"}
+    again = tmp_path / "page.md"
+    again.write_text("<!-- table: raw -->\n<!-- end -->\n", encoding="utf-8")
+    assert main(["benchmark", "raw", "--from", str(tmp_path / "raw.json"), "--readme", str(again)]) == 0
+    assert (tmp_path / "raw.md").read_text().strip() in again.read_text()
+    capsys.readouterr()
+
+
+@pytest.mark.parametrize(
+    ("more", "line"),
+    [
+        (["--frames", "motion", "motion"], "motion is named twice"),
+        (["--frames", "sehm"], "'sehm' is no detector of frames"),
+        (["--events", "none.onnx"], "no such file of a network"),
+    ],
+)
+def test_detectors_that_are_not_there_are_named(small, capsys, more, line):
+    assert main(["benchmark", "detection", str(small), *more]) == 2
+    assert line in capsys.readouterr().err
+
+
+def test_data_must_be_named(capsys):
+    assert main(["benchmark", "raw"]) == 2
+    assert "give DATA" in capsys.readouterr().err
+
+
+def test_who_stands_is_not_asked_of_those_who_see_motion():
+    """Vehicle 1 goes 20 px/s, so 1 px within 50 ms; vehicle 2 stands."""
+    times = np.arange(5) * 0.05
+    boxes = [[x, 0.0, 10.0, 10.0] for t in times for x in (20.0 * t, 50.0)]
+    truth = GroundTruth(
+        t=np.repeat(times, 2),
+        object_id=np.tile([1, 2], 5),
+        boxes=np.array(boxes),
+        motion=None,
+        ignore=np.zeros(10, dtype=bool),
+    )
+    ignored = only_moved(truth).ignore.reshape(5, 2)
+    assert ignored[:, 1].all()
+    assert ignored[:, 0].tolist() == [True, False, False, False, False]

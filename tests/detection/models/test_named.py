@@ -1,0 +1,39 @@
+"""Names of networks: those that come with the package, and everything else is a file."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from jeat_graph.data.errors import ConfigError
+from jeat_graph.detection.models.events import ModelEventDetector
+from jeat_graph.detection.models.onnx_head import read_onnx_head
+from jeat_graph.detection.models.pictures import ModelPictureDetector
+from jeat_graph.detection.named import network_file, networks
+
+SHIPPED = [(kind, name) for kind in ("frames", "events") for name in networks(kind)]
+
+
+def test_files_are_files(tmp_path):
+    assert network_file("mine.onnx", "frames").name == "mine.onnx"
+    assert network_file("nets/mine", "events").parts == ("nets", "mine")
+
+
+def test_a_name_that_is_not_known_is_told_what_is():
+    with pytest.raises(ConfigError, match=r"'sehm' is no detector of frames: it is one of motion"):
+        network_file("sehm", "frames")
+
+
+@pytest.mark.parametrize(("kind", "name"), SHIPPED)
+def test_shipped_networks_load_and_say_where_they_come_from(kind, name):
+    path = network_file(name, kind)
+    card = json.loads(read_onnx_head(path).notes["card"])
+    assert card["kind"] == kind
+    assert card["data"]
+    assert all(one["AP50"] is not None for one in card["tested"].values())
+    assert path.stat().st_size < 1_000_000
+    detector = (
+        ModelPictureDetector(path) if kind == "frames" else ModelEventDetector(path, tuple(card["side"]))
+    )
+    assert "layout yolov8" in detector.description

@@ -1,0 +1,38 @@
+"""The network's memory: windows that are looked at together give what they give one after the other."""
+
+from __future__ import annotations
+
+import pytest
+
+torch = pytest.importorskip("torch", reason="training needs PyTorch, the extra `train`")
+
+from jeat_graph.training.network import DetectionNet  # noqa: E402
+from jeat_graph.training.settings import NetSettings  # noqa: E402
+
+SIDE = (48, 32)
+LENGTH, BATCH = 3, 2
+
+
+def test_windows_together_are_windows_one_after_the_other():
+    torch.manual_seed(1)
+    net = DetectionNet(NetSettings(kind="events", width=4)).eval()
+    shown = 3.0 * torch.rand(LENGTH, BATCH, net.settings.channels, SIDE[1], SIDE[0])
+    with torch.no_grad():
+        together, last = net(shown.flatten(0, 1), net.empty_state(BATCH, SIDE), LENGTH)
+        state, rows = net.empty_state(BATCH, SIDE), []
+        for window in shown:
+            seen, state = net(window, state)
+            rows.append(seen)
+    torch.testing.assert_close(together, torch.cat(rows), atol=1e-5, rtol=1e-4)
+    for one, other in zip(last, state, strict=True):
+        torch.testing.assert_close(one, other, atol=1e-5, rtol=1e-4)
+
+
+def test_what_was_seen_before_counts():
+    torch.manual_seed(2)
+    net = DetectionNet(NetSettings(kind="events", width=4)).eval()
+    window = torch.rand(1, net.settings.channels, SIDE[1], SIDE[0])
+    with torch.no_grad():
+        fresh, state = net(window, net.empty_state(1, SIDE))
+        again, _ = net(window, state)
+    assert not torch.allclose(fresh, again)
