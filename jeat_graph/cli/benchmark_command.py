@@ -20,6 +20,7 @@ _KINDS = {
     "road": "place and speed on the road, simulated and against laser gates, and whether intervals hold",
     "speed": "time per step, against others",
     "endurance": "a day of input through the live path: memory, latency and counts, hour by hour",
+    "worlds": "what nets that were trained on varied or on one fixed world find in worlds they never saw",
     "events": "noise of the event cameras, what tames it, and what vehicles give",
 }
 

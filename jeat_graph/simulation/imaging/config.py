@@ -9,6 +9,7 @@ from typing import Any
 from jeat_graph.config.fields import check, choice, number
 from jeat_graph.config.section_tree import build
 from jeat_graph.simulation.imaging.event_sensors import SENSORS, with_sensor
+from jeat_graph.simulation.imaging.lens_config import LensConfig
 
 
 @dataclass(frozen=True)
@@ -165,12 +166,13 @@ class CarlaEventConfig:
 
 @dataclass(frozen=True)
 class ImagingConfig:
-    """Renderer and cameras."""
+    """Renderer, cameras, and the lens that both look through."""
 
     render: RenderConfig = field(default_factory=RenderConfig)
     rgb: RGBConfig = field(default_factory=RGBConfig)
     evt: EventCameraConfig = field(default_factory=EventCameraConfig)
     carla: CarlaEventConfig = field(default_factory=CarlaEventConfig)
+    lens: LensConfig = field(default_factory=LensConfig)
 
 
 def load_imaging(tree: Mapping[str, Any] | None = None) -> ImagingConfig:

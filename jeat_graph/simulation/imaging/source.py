@@ -16,11 +16,16 @@ from jeat_graph.data.events import EventArray
 from jeat_graph.simulation.imaging.config import ImagingConfig
 from jeat_graph.simulation.imaging.contrast import contrast_to_noise, tight_boxes
 from jeat_graph.simulation.imaging.event_camera import EventCamera
+from jeat_graph.simulation.imaging.lens import Lens
+from jeat_graph.simulation.imaging.lens_config import LensConfig
+from jeat_graph.simulation.imaging.lens_events import LensEventCamera
+from jeat_graph.simulation.imaging.lens_views import Blocked, photograph
 from jeat_graph.simulation.imaging.renderer import Renderer
-from jeat_graph.simulation.imaging.rgb_camera import choose_exposure, develop, electrons, expose
+from jeat_graph.simulation.imaging.rgb_camera import choose_exposure, develop, electrons
 from jeat_graph.simulation.imaging.scaling import scaled_camera
 from jeat_graph.simulation.imaging.truth import ImageViews, frame_truth
 from jeat_graph.simulation.imaging.visibility import buffers
+from jeat_graph.simulation.lens_variety import vary_lens
 from jeat_graph.simulation.scenario import Scenario
 from jeat_graph.simulation.segment import SegmentStep
 from jeat_graph.simulation.streams import stream
@@ -45,6 +50,7 @@ class RenderedSource:
         frames: int = 100,
         world: str = "fixed",
         sensors: str = "pictures",
+        traffic: int = 0,
     ) -> None:
         """Prepare; nothing is rendered yet.
 
@@ -55,6 +61,7 @@ class RenderedSource:
             frames: RGB frames a segment.
             world: `fixed`, the same road and camera in all segments, or `varied`, one a segment.
             sensors: `pictures` for both; `rgb` leaves events out, `events` makes black pictures.
+            traffic: other numbers have the same worlds with other vehicles and other noise in them.
 
         Raises:
             ConfigError: a negative seed, no frames, or no such world or sensors.
@@ -67,7 +74,7 @@ class RenderedSource:
             raise ConfigError(f"world: must be one of {', '.join(WORLDS)}, not {world!r}")
         if sensors not in SENSORS:
             raise ConfigError(f"sensors: must be one of {', '.join(SENSORS)}, not {sensors!r}")
-        self.world, self.sensors = world, sensors
+        self.world, self.sensors, self.traffic = world, sensors, traffic
         self.scenario = scenario
         self.imaging = imaging or ImagingConfig()
         self.seed = seed
@@ -83,7 +90,7 @@ class RenderedSource:
 
     def calibration(self) -> dict[str, Any]:
         """Return the camera's calibration as plain values."""
-        return self.camera.to_dict()
+        return self._with_lens(self.camera.to_dict(), self.imaging)
 
     def settings(self) -> dict[str, Any]:
         """Return all settings as plain values; with the index they define a segment."""
@@ -93,13 +100,20 @@ class RenderedSource:
             "frames": self.frames,
             "world": self.world,
             "sensors": self.sensors,
+            **({"traffic": self.traffic} if self.traffic else {}),
             "scenario": plain(dataclasses.asdict(self.scenario)),
-            "imaging": plain(dataclasses.asdict(self.imaging)),
+            "imaging": _stated(self.imaging),
         }
+
+    @staticmethod
+    def _with_lens(calibration: dict[str, Any], imaging: ImagingConfig) -> dict[str, Any]:
+        lens = imaging.lens
+        return calibration | ({"k1": lens.k1, "k2": lens.k2} if lens.k1 or lens.k2 else {})
 
     def calibration_of(self, index: int) -> dict[str, Any]:
         """Return the calibration of segment `index`, which has a camera of its own in varied worlds."""
-        return self.scene(index).camera.to_dict()
+        scene, imaging, _ = self._build(index)
+        return self._with_lens(scene.camera.to_dict(), imaging)
 
     def scene(self, index: int) -> Scene:
         """Build the scene of segment `index`, with traffic of its own, and a world where they vary."""
@@ -111,6 +125,8 @@ class RenderedSource:
             # Each light has worlds and traffic of its own, so that a net cannot learn one from the other.
             light = f"{s.light.ambient_lux:g}.{s.light.lamp_candela:g}.{s.light.lit_share:g}"
             s, imaging, around = vary(stream(self.seed, f"segment.{index}.world.{light}"), s, imaging)
+            rng = stream(self.seed, f"segment.{index}.lens.{light}")
+            imaging = replace(imaging, lens=vary_lens(rng, imaging.lens, s.camera))
         seed = self._segment_seed(index)
         duration = (self.frames + _BEFORE) / imaging.rgb.rate_hz + 1.0
         camera = scaled_camera(s.camera, imaging.render.width, imaging.render.height)
@@ -129,39 +145,57 @@ class RenderedSource:
         """Yield the frames of segment `index`."""
         scene, config, scenario = self._build(index)
         seed, camera = self._segment_seed(index), scene.camera
+        lens = None
+        if config.lens != LensConfig():
+            lens = Lens(config.lens, camera, stream(seed, "lens"))
+            scene = replace(scene, camera=lens.canvas)
         renderer = Renderer(scene, config.render, seed, varied=self.world == "varied")
         exposure = choose_exposure(config.rgb, renderer.background.whole)
-        scale = exposure.scale(config.rgb)
-        times_us = self.frame_times_us(index)
-        eye = None
+        eye: EventCamera | LensEventCamera | None = None
         if self.sensors != "rgb":
-            eye = EventCamera(renderer, config, self.seed, seed, scale)
+            if lens is None:
+                eye = EventCamera(renderer, config, self.seed, seed, exposure.scale(config.rgb))
+            else:
+                eye = LensEventCamera(renderer, lens, config, self.seed, seed)
         noise = stream(seed, "rgb.noise")
-        ground = renderer.background
         least = scenario.truth.min_side_px * camera.width / scenario.camera.width
         black = np.zeros((camera.height, camera.width, 3), dtype=np.uint8)
-        for t_us in times_us:
+        blocked = Blocked.of(renderer.background, lens)
+        for t_us in self.frame_times_us(index):
             time = np.array([1e-6 * t_us])
             events = EventArray.empty(labelled=True) if eye is None else eye.advance(int(t_us))
-            rgb = black
+            rgb, radiance = black, None
             if self.sensors != "events":
-                radiance = expose(renderer, float(time[0]), exposure.time_s, config.rgb.readout_s)
-                charge = electrons(radiance, exposure.time_s, config.rgb, noise)
+                radiance, seen = photograph(renderer, lens, float(time[0]), exposure, config.rgb)
+                charge = electrons(seen, exposure.time_s, config.rgb, noise)
                 rgb = develop(charge, exposure.gain, config.rgb)
             look = renderer.plan(float(time[0]), float(time[0])).look
             moments = renderer.moments(time, look)
-            _, instance, visible = buffers(moments, look, ground.front_depth, ground.front_cover)
-            tight = tight_boxes(moments, self.size_px)
+            _, instance, visible = buffers(moments, look, blocked.depth, blocked.cover)
+            tight = tight_boxes(moments, (scene.camera.width, scene.camera.height))
             contrast = np.full(len(look.number), np.nan)
-            if self.sensors != "events":
+            if radiance is not None:
                 contrast = contrast_to_noise(
                     radiance, instance, look.number, tight, exposure.time_s, config.rgb
                 )
+            if lens is not None:
+                tight = lens.boxes(tight, float(time[0]))
             states = scene.states_at(time, far_m=config.render.far_m)
             row = np.searchsorted(look.number, states.object_id)
             views = ImageViews(visible[row], tight[row], contrast[row])
-            truth = frame_truth(states, camera, views, least, scenario.truth.range_m)
+            seen_by = camera if lens is None else lens.camera_at(float(time[0]))
+            truth = frame_truth(states, seen_by, views, least, scenario.truth.range_m)
             yield SegmentStep(t_us=int(t_us), rgb=rgb, events=events, truth=truth)
 
     def _segment_seed(self, index: int) -> int:
-        return int(stream(self.seed, f"segment.{index}").integers(0, 2**62))
+        other = f".traffic.{self.traffic}" if self.traffic else ""
+        return int(stream(self.seed, f"segment.{index}{other}").integers(0, 2**62))
+
+
+def _stated(imaging: ImagingConfig) -> dict[str, Any]:
+    """Return settings as plain values; of the lens only if there is one."""
+    tree = plain(dataclasses.asdict(imaging))
+    assert isinstance(tree, dict)
+    if imaging.lens == LensConfig():
+        del tree["lens"]
+    return tree

@@ -1,0 +1,39 @@
+"""Draws a lens and a mount for a segment: none in two of three, for they make events slower to render."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from jeat_graph.simulation.imaging.lens_config import LensConfig
+from jeat_graph.simulation.world.camera import CameraConfig
+
+_SHARE = 1.0 / 3.0  # of segments with a lens that bends and a mount that sways
+_BENT = (-0.10, 0.02)  # by how much of its radius the corner moves: barrel mostly, as wide lenses have it
+_SWAY_PX = (0.1, 2.0)  # rms, in a picture as wide as this:
+_WIDE_PX = 640.0
+_SWAY_HZ = (0.6, 3.5)
+_DROPS_SHARE = 0.2
+
+
+def vary_lens(rng: np.random.Generator, lens: LensConfig, camera: CameraConfig) -> LensConfig:
+    """Draw distortion, sway and drops, unless the settings have a lens already.
+
+    Args:
+        rng: random stream of the segment's lens.
+        lens: as set; kept if it is any.
+        camera: of the segment.
+    """
+    if lens != LensConfig() or rng.random() >= _SHARE:
+        return lens
+    corner2 = (0.5 * camera.width / camera.fx) ** 2 + (0.5 * camera.height / camera.fy) ** 2
+    sway_px = math.exp(rng.uniform(math.log(_SWAY_PX[0]), math.log(_SWAY_PX[1])))
+    return replace(
+        lens,
+        k1=float(rng.uniform(*_BENT)) / corner2,
+        sway_deg=math.degrees(sway_px / (camera.fx * _WIDE_PX / camera.width)),
+        sway_hz=float(rng.uniform(*_SWAY_HZ)),
+        drops=int(rng.integers(3, 15)) if rng.random() < _DROPS_SHARE else 0,
+    )
