@@ -19,6 +19,7 @@ import numpy as np
 from jeat_graph.benchmark import common
 from jeat_graph.benchmark.judging import in_processes
 from jeat_graph.benchmark.provenance import provenance
+from jeat_graph.benchmark.road_cost import road_costs
 from jeat_graph.benchmark.road_real import LENGTH_SETS, find_brno, judge_camera, speed_scores
 from jeat_graph.config.reading import load_config
 
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 _SCENARIOS = ("day", "night", "night-nolight")
 _CAMERAS = ("exact", "perturbed")
 _DURATION_S, _QUICK_DURATION_S = 30.0, 6.0
+_COST_DURATION_S = 15.0
 _EVERY_MINUTES, _QUICK_EVERY = 3, 20
 # A perturbed camera: standard deviations of focal length (1), direction (rad) and height (m).
 _SPREAD = {"log_f": 0.005, "turn_x": 0.001, "turn_y": 0.001, "turn_z": 0.003, "z": 0.04}
@@ -71,6 +73,7 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
         **provenance(settings, {"highway": load_config("highway")}),
         "simulated": [one for scene in simulated for one in scene],
         "real": in_processes(_judge_real, jobs, args.jobs, "real cameras"),
+        "costs": road_costs(_QUICK_DURATION_S if args.quick else _COST_DURATION_S),
     }
 
 
@@ -135,6 +138,9 @@ def tables(result: Mapping[str, Any]) -> dict[str, Table]:
         title = f"Real highways, lengths: {which} (km/h; held: % of the 95 % intervals)"
         key = f"road-real-{which.replace(', ', '-').replace(' ', '-')}"
         found[key] = Table.from_records(records, title=title, digits={"held": 1})
+    title = "Cost (share: of a tracker's step; real time: seconds of a recording per second of CPU time)"
+    if result.get("costs"):
+        found["road-cost"] = Table.from_records(result["costs"], title=title)
     return found
 
 

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
+
+import numpy as np
+
+from jeat_graph.data.arrays import FloatArray
 
 
 class VehicleClass(NamedTuple):
@@ -29,3 +34,27 @@ CLASSES = (
     VehicleClass("truck", 0.07, (9.0, 2.5, 3.5), (1.8, 0.08, 0.4)),
     VehicleClass("truck", 0.06, (14.5, 2.52, 3.8), (2.2, 0.06, 0.3)),
 )
+
+
+def sizes_allowed(information: FloatArray, vector: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean (3,) and covariance (3, 3) of sizes of vehicles of the kinds that the boxes so far allow.
+
+    Args:
+        information: (3, 3) what the boxes alone tell of the size, as the inverse of its covariance.
+        vector: (3,) that times the size that they tell.
+    """
+    score, means, covs = [], [], []
+    for one in CLASSES:
+        own = np.diag(np.array(one.spread) ** -2.0)
+        total = information + own
+        pull = vector + own @ np.array(one.mean)
+        log_det = float(np.linalg.slogdet(total)[1])
+        fit = float(pull @ np.linalg.solve(total, pull) - np.array(one.mean) @ own @ np.array(one.mean))
+        score.append(math.log(one.share) - float(np.log(one.spread).sum()) + 0.5 * (fit - log_det))
+        means.append(np.array(one.mean))
+        covs.append(np.diag(np.array(one.spread) ** 2))
+    share = np.exp(np.array(score) - max(score))
+    share /= share.sum()
+    mean = share @ np.array(means)
+    off = np.array(means) - mean
+    return mean, np.einsum("k,kij->ij", share, covs) + np.einsum("k,ki,kj->ij", share, off, off)

@@ -31,19 +31,26 @@ class ChainRows(NamedTuple):
     b: FloatArray
     counts: IntArray
 
+    def take(self, first: int, end: int) -> ChainRows:
+        """Return the rows between the states `first` to `end`."""
+        part = slice(first, end)
+        return ChainRows(self.A0[part], self.A1[part], self.B[part], self.b[part], self.counts[part])
+
 
 class PriorRows(NamedTuple):
-    """What is known about one state, or about the shared unknowns where `key` is None: A x - b is white.
+    """What is known about one state, or what is shared where `key` is None: A x + B s - b is white.
 
     Attributes:
         key: number of the state, or None.
         A: (R, n) or (R, m).
         b: (R,).
+        B: (R, m) on what is shared, for rows on a state; None for nothing.
     """
 
     key: int | None
     A: FloatArray
     b: FloatArray
+    B: FloatArray | None = None
 
 
 class SharedChain(NamedTuple):
@@ -96,27 +103,9 @@ def solve_shared_chain(rows: ChainRows, priors: list[PriorRows]) -> SharedChain:
     Raises:
         RuntimeError: GTSAM's, if the system is indeterminate.
     """
-    import gtsam
-
     n, m = rows.A0.shape[2], rows.B.shape[2]
     K = len(rows.counts) + 1
-    graph: Any = gtsam.GaussianFactorGraph()
-    unit: dict[int, Any] = {}
-
-    def noise(count: int) -> Any:
-        if count not in unit:
-            unit[count] = gtsam.noiseModel.Unit.Create(count)
-        return unit[count]
-
-    for k, count in enumerate(rows.counts.tolist()):
-        first, second = rows.A0[k, :count], rows.A1[k, :count]
-        graph.add(k, first, k + 1, second, K, rows.B[k, :count], rows.b[k, :count], noise(count))
-    for prior in priors:
-        graph.add(K if prior.key is None else prior.key, prior.A, prior.b, noise(len(prior.b)))
-    ordering = gtsam.Ordering()
-    for key in range(K + 1):
-        ordering.push_back(key)
-    net = graph.eliminateSequential(ordering, gtsam.EliminateQR)
+    net = _eliminated(rows, priors)
     solution = net.optimize()
     gain, conditional = np.zeros((K, n, n + m)), np.zeros((K, n, n))
     log_determinant = 0.0
@@ -132,3 +121,45 @@ def solve_shared_chain(rows: ChainRows, priors: list[PriorRows]) -> SharedChain:
     log_determinant -= 2.0 * float(np.log(np.abs(np.diag(root))).sum())
     states = np.stack([solution.at(k) for k in range(K)])
     return SharedChain(states, np.asarray(solution.at(K)), gain, conditional, root @ root.T, log_determinant)
+
+
+def known_of_last(rows: ChainRows, priors: list[PriorRows]) -> PriorRows:
+    """What all of these rows say about the last state and what is shared, as rows on state 0 of a new chain.
+
+    Raises:
+        RuntimeError: GTSAM's, if the system is indeterminate.
+    """
+    n, m = rows.A0.shape[2], rows.B.shape[2]
+    K = len(rows.counts) + 1
+    net = _eliminated(rows, priors)
+    state, shared = net.at(K - 1), net.at(K)
+    A, B = np.zeros((n + m, n)), np.zeros((n + m, m))
+    A[:n], B[:n], B[n:] = state.R(), state.S(), shared.R()
+    return PriorRows(0, A, np.concatenate([state.d(), shared.d()]), B)
+
+
+def _eliminated(rows: ChainRows, priors: list[PriorRows]) -> Any:
+    """GTSAM's net of conditionals: the states in order of time, then what is shared."""
+    import gtsam
+
+    K = len(rows.counts) + 1
+    graph: Any = gtsam.GaussianFactorGraph()
+    unit: dict[int, Any] = {}
+
+    def noise(count: int) -> Any:
+        if count not in unit:
+            unit[count] = gtsam.noiseModel.Unit.Create(count)
+        return unit[count]
+
+    for k, count in enumerate(rows.counts.tolist()):
+        first, second = rows.A0[k, :count], rows.A1[k, :count]
+        graph.add(k, first, k + 1, second, K, rows.B[k, :count], rows.b[k, :count], noise(count))
+    for key, A, b, B in priors:
+        if key is None or B is None:
+            graph.add(K if key is None else key, A, b, noise(len(b)))
+        else:
+            graph.add(key, A, K, B, b, noise(len(b)))
+    ordering = gtsam.Ordering()
+    for key in range(K + 1):
+        ordering.push_back(key)
+    return graph.eliminateSequential(ordering, gtsam.EliminateQR)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from jeat_graph.benchmark.road import tables
+from jeat_graph.benchmark.road_cost import causal_cost, lag_cost, many_vehicles
 from jeat_graph.benchmark.road_real import chosen_lengths, paired, speed_scores
 
 
@@ -47,3 +48,21 @@ def test_tables_pool_seeds_by_rows() -> None:
     assert row["speed_rmse_kmh"] == pytest.approx(np.sqrt((3 * 1 + 9) / 4))
     assert row["nees"] == pytest.approx(2.0)
     assert [r[0] for r in found["road-real-all"].rows] == ["a", "all"]
+
+
+def test_thirty_vehicles_are_seen_by_both_sensors_at_their_rates() -> None:
+    _, log = many_vehicles(2.0)
+    assert len(log) == 30 * (40 + 200)
+    assert (np.diff(log["t"]) >= 0).all()
+    assert len(np.unique(log["track_id"][log["t"] < 0.1])) == 30
+
+
+def test_costs_are_shares_of_what_was_measured() -> None:
+    """No figure of time is tested: that there is one, of the right kind."""
+    causal, lag = causal_cost(1.2), lag_cost(1.6)
+    assert causal["share"] > 0
+    assert lag["real_time"] > 0
+    table = tables(
+        {"simulated": [], "real": [], "costs": [{"what": "causal", **causal}, {"what": "lag", **lag}]}
+    )
+    assert len(table["road-cost"].rows) == 2

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from jeat_graph.smoothers.gtsam.shared_chain import ChainRows, PriorRows, solve_shared_chain
+from jeat_graph.smoothers.gtsam.shared_chain import ChainRows, PriorRows, known_of_last, solve_shared_chain
 
 STATES, N, SHARED, ROWS = 6, 5, 3, 9
 SIZE = STATES * N + SHARED
@@ -17,7 +17,7 @@ def _problem(rng: np.random.Generator) -> tuple[ChainRows, list[PriorRows]]:
     B, b = rng.standard_normal((*shape, SHARED)), rng.standard_normal(shape)
     priors = [
         PriorRows(0, rng.standard_normal((N, N)), rng.standard_normal(N)),
-        PriorRows(3, rng.standard_normal((2, N)), rng.standard_normal(2)),
+        PriorRows(3, rng.standard_normal((2, N)), rng.standard_normal(2), rng.standard_normal((2, SHARED))),
         PriorRows(None, np.eye(SHARED), np.arange(3.0)),
     ]
     return ChainRows(A0, A1, B, b, rng.integers(N, ROWS + 1, STATES - 1)), priors
@@ -32,10 +32,12 @@ def _dense(rows: ChainRows, priors: list[PriorRows]) -> tuple[np.ndarray, np.nda
         block[:, STATES * N :] = rows.B[k, :count]
         A.append(block)
         b.append(rows.b[k, :count])
-    for key, own, right in priors:
+    for key, own, right, shared in priors:
         block = np.zeros((len(right), SIZE))
         where = slice(STATES * N, None) if key is None else slice(key * N, (key + 1) * N)
         block[:, where] = own
+        if shared is not None:
+            block[:, STATES * N :] = shared
         A.append(block)
         b.append(right)
     return np.concatenate(A), np.concatenate(b)
@@ -69,4 +71,20 @@ def test_what_nothing_is_known_about_is_an_error() -> None:
     rows, priors = _problem(np.random.default_rng(6))
     blind = rows._replace(B=np.zeros_like(rows.B))
     with pytest.raises(RuntimeError):
-        solve_shared_chain(blind, priors[:2])
+        solve_shared_chain(blind, priors[:1])
+
+
+def test_states_that_leave_are_remembered_exactly() -> None:
+    """What the first half says, put before the second half, gives what both halves give together."""
+    rows, priors = _problem(np.random.default_rng(7))
+    half = 2
+    first, second = rows.take(0, half), rows.take(half, STATES - 1)
+    early = [prior for prior in priors if prior.key == 0]
+    late = [prior._replace(key=prior.key - half) if prior.key else prior for prior in priors[1:]]
+    known = known_of_last(first, [*early, PriorRows(None, 1e-3 * np.eye(SHARED), np.zeros(SHARED))])
+    both = [*priors, PriorRows(None, 1e-3 * np.eye(SHARED), np.zeros(SHARED))]
+    together, parts = solve_shared_chain(rows, both), solve_shared_chain(second, [known, *late])
+    np.testing.assert_allclose(parts.states, together.states[half:], atol=1e-9)
+    np.testing.assert_allclose(parts.shared, together.shared, atol=1e-9)
+    whole = together.covariance()[half * N :, half * N :]
+    np.testing.assert_allclose(parts.covariance(), whole, atol=1e-9)
