@@ -13,6 +13,7 @@ import numpy.typing as npt
 from jeat_graph.config.fields import check, number
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
+from jeat_graph.filters.measurement import MEASUREMENT
 from jeat_graph.road.box_kernel import kernel_camera
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.causal_steps import forget, step_road
@@ -21,6 +22,7 @@ from jeat_graph.road.results import columns_of_states
 from jeat_graph.road.road_state import MODEL, ROAD_ROW, SPEED, STRIPS, TRACK, RoadState
 from jeat_graph.road.speeds import KMH
 from jeat_graph.road.taken_boxes import sensor_errors
+from jeat_graph.tracking.direct_call import DirectCall
 
 _OF_CONFIG = (
     "speed_std",
@@ -35,6 +37,7 @@ _OF_CONFIG = (
 )
 _FIRST_CAPACITY = 64
 _FORGET_EVERY = 512  # steps
+_ROOM = 4096  # records
 _GRID = (24, 14)  # places of the picture at which the calibration's share is worked out
 
 
@@ -98,7 +101,9 @@ class RoadFilter:
         self._camera = kernel_camera(camera)
         self._config = config
         self._state = _allocate(_FIRST_CAPACITY, len(self._errors))
+        self._room, self._used = np.empty(0, dtype=ROAD_ROW), 0
         self._steps = 0
+        self._step = DirectCall(step_road)
         self._calibration = CalibrationShare(camera)
 
     def step(self, t: float, rows: RecordArray, ids: IntArray) -> RecordArray:
@@ -114,11 +119,16 @@ class RoadFilter:
         """
         if int(self._state.count[0]) + len(rows) > len(self._state.track):
             self._state = _grown(self._state, len(rows))
-        found = np.empty(len(ids), dtype=ROAD_ROW)
-        count = step_road(self._state, t, rows, ids, self._model, self._errors, self._camera, found)
+        if self._used + len(ids) > len(self._room):
+            # One piece for many steps: room for records costs more to ask for than to fill.
+            self._room, self._used = np.empty(max(_ROOM, len(ids)), dtype=ROAD_ROW), 0
+        found = self._room[self._used : self._used + len(ids)]
+        rows, ids = np.ascontiguousarray(rows, dtype=MEASUREMENT), np.ascontiguousarray(ids, dtype=np.int64)
+        count = self._step(self._state, float(t), rows, ids, self._model, self._errors, self._camera, found)
         self._steps += 1
         if self._steps % _FORGET_EVERY == 0:
             forget(self._state, t, self._config.silence_s)
+        self._used += count
         return found[:count]
 
     def columns(self, steps: Sequence[RecordArray]) -> dict[str, npt.NDArray[Any]]:

@@ -11,9 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.io.table_writer import round_decimals, round_significant
+from jeat_graph.io.table_writer import round_decimals
 from jeat_graph.road.crossings import Crossing
 from jeat_graph.road.lanes import Lanes
+from jeat_graph.road.rounding import round_states
 from jeat_graph.road.speeds import KMH, Speed, Vehicle
 
 _DECIMALS = 3
@@ -116,11 +117,10 @@ def columns_of_states(
     mean, var = mean.copy(), var.copy()
     mean[_HEADING] *= _DEGREES
     var[_HEADING] = np.minimum(var[_HEADING] * _DEGREES**2, 180.0**2)
+    round_states(mean, var, _DECIMALS, _DIGITS)
     columns: dict[str, npt.NDArray[Any]] = {"t": t + 0.0, "track_id": track_id}
-    columns |= {name: round_decimals(values, _DECIMALS) for name, values in zip(STATES, mean, strict=True)}
-    return columns | {
-        f"var_{name}": round_significant(values, _DIGITS) for name, values in zip(STATES, var, strict=True)
-    }
+    columns |= dict(zip(STATES, mean, strict=True))
+    return columns | {f"var_{name}": values for name, values in zip(STATES, var, strict=True)}
 
 
 def speed_columns(result: RoadResult) -> dict[str, npt.NDArray[Any]]:

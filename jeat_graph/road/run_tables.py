@@ -24,7 +24,7 @@ from jeat_graph.road.results import empty_road_columns, road_columns
 from jeat_graph.road.taken_boxes import boxes_of_log, sensor_errors
 from jeat_graph.runs.directory import MEASUREMENTS, ROAD_CAUSAL, ROAD_SMOOTHED
 
-_STEPS_AT_ONCE = 256
+_STEPS_AT_ONCE = 64
 _SAME_TIME_S = 1e-5  # times of a table are rounded
 
 
