@@ -62,7 +62,9 @@ class BinnedDetector:
         elif first_us < self._last_us:
             raise DataError(f"events begin at {first_us} µs, before the last ones at {self._last_us} µs")
         self._last_us = last_us
-        signal = self._noise.keep(EventArray.trusted(events.t_us, events.x, events.y, events.polarity))
+        signal = EventArray.trusted(events.t_us, events.x, events.y, events.polarity)
+        if self._noise.settings.background or self._noise.settings.hot_pixels:
+            signal = self._noise.keep(signal)
         waiting = _joined(self._rest, signal)
         times = waiting.t_us
         scans: list[Scan] = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from jeat_graph.detection.models.engine import open_engine
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.models.onnx_head import OnnxHead, Port, read_onnx_head
 from jeat_graph.detection.models.output_reader import OutputReader, scan_within
+from jeat_graph.detection.noise import NoiseSettings
 from jeat_graph.detection.settings import EventSettings
 from jeat_graph.detection.windows import EventBins
 
@@ -54,6 +56,8 @@ class ModelEventDetector(BinnedDetector):
     ) -> None:
         times = times or EventSettings()
         self._settings = settings or ModelSettings()
+        if not self._settings.noise_filter:
+            times = replace(times, noise=NoiseSettings(background=False, hot_pixels=False))
         self._path = Path(path)
         head = read_onnx_head(path)
         self._input = _window_input(head, self._path)

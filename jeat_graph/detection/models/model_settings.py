@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from jeat_graph.config.fields import Section, choice, number
+from jeat_graph.config.fields import Section, choice, flag, number
 
 LAYOUTS = (
     "auto",
@@ -49,6 +49,10 @@ class ModelSettings(Section):
     score: float = number(0.1, "1", "detections below are left out; the tracker weighs the others", 0.0, 1.0)
     overlap: float = number(
         0.65, "1", "of two boxes that overlap by more (IoU) the better one stays", 0.0, 1.0
+    )
+
+    noise_filter: bool = flag(
+        False, "whether a network of events is spared noise (events.noise); most were trained with all events"
     )
 
     @property

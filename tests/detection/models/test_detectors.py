@@ -9,6 +9,7 @@ import pytest
 
 from jeat_graph.cli.main import main
 from jeat_graph.data.errors import ConfigError, DataError
+from jeat_graph.data.events import EventArray
 from jeat_graph.detection.models.events import ModelEventDetector
 from jeat_graph.detection.models.feeding import Feed, place
 from jeat_graph.detection.models.model_settings import ModelSettings
@@ -96,6 +97,22 @@ def test_a_network_of_events_keeps_its_memory(tmp_path, name):
     assert scans[0].t == pytest.approx(0.06)
     left = [scan.boxes[0, 0] for scan in scans[:5]]
     np.testing.assert_allclose(left, 10 + 8 * np.arange(1, 6), atol=1e-3)
+
+
+@pytest.mark.parametrize(("asked", "seen"), [(False, 5), (True, 0)])
+def test_a_network_sees_noise_unless_it_shall_not(tmp_path, asked, seen):
+    """Of events that stand alone the network counts those in its window, or none."""
+    path = counting_net(tmp_path / "rnn.onnx", SIDE, 20, ROWS[:1], per_event=1.0)
+    detector = ModelEventDetector(path, (100, 80), settings=ModelSettings(noise_filter=asked))
+    times, place = 1000 * np.array([21, 41, 42, 43, 44, 45]), 10 * np.arange(1, 7)
+    lone = EventArray(times, place.astype("u2"), place.astype("u2"), np.ones(6, dtype="u1"))
+    late = EventArray(
+        np.array([90_000]), *(np.array([90], dtype=kind) for kind in ("u2", "u2")), np.ones(1, "u1")
+    )
+    scans = [*detector.push(lone), *detector.push(late)]
+    # The first window that is full is that from 30 to 80 ms.
+    assert scans
+    assert scans[0].boxes[0, 0] == pytest.approx(10 + 8 * (1 + seen))
 
 
 def test_a_file_says_what_it_wants_and_gives(net):

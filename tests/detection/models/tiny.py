@@ -28,8 +28,8 @@ def constant_net(path, outputs, side, channels=3, notes=None):
     return _save(path, helper.make_graph(nodes, "tiny", [given], ports, values), notes)
 
 
-def counting_net(path, side, channels, rows):
-    """A network with a state: each window adds 8 px to the left of its boxes (K, 6)."""
+def counting_net(path, side, channels, rows, per_event=0.0):
+    """A network with a state: each window, and each event, adds 8 px to the left of its boxes (K, 6)."""
     width, height = side
     shift = np.zeros((1, *rows.shape), np.float32)
     shift[..., [0, 2]] = 8.0
@@ -38,12 +38,14 @@ def counting_net(path, side, channels, rows):
         helper.make_node("Mul", ["mean", "zero"], ["nothing4"]),
         helper.make_node("Add", ["state", "one"], ["counted"]),
         helper.make_node("Add", ["counted", "nothing4"], ["state_next"]),
-        helper.make_node("Reshape", ["counted", "one_side"], ["count"]),
+        helper.make_node("Reshape", ["state_next", "one_side"], ["count"]),
         helper.make_node("Mul", ["count", "shift"], ["moved"]),
         helper.make_node("Add", ["rows", "moved"], ["found"]),
     ]
     values = [
-        numpy_helper.from_array(np.zeros((1, 1, 1, 1), np.float32), "zero"),
+        numpy_helper.from_array(
+            np.full((1, 1, 1, 1), per_event * channels * width * height, np.float32), "zero"
+        ),
         numpy_helper.from_array(np.ones((1, 1, 1, 1), np.float32), "one"),
         numpy_helper.from_array(np.array([1, 1, 1], np.int64), "one_side"),
         numpy_helper.from_array(shift, "shift"),
