@@ -23,6 +23,7 @@ class Expected(NamedTuple):
         log_size: (N, 2) predicted ln width, ln height.
         log_size_var: (N, 2) their variances.
         size_noise: (S, 2) measurement variances of ln width, ln height.
+        cut: (N, 2) what the edges of the picture cut of the last detection, along x and y.
     """
 
     position: FloatArray
@@ -31,6 +32,7 @@ class Expected(NamedTuple):
     log_size: FloatArray
     log_size_var: FloatArray
     size_noise: FloatArray
+    cut: IntArray
 
 
 class Found(NamedTuple):
@@ -123,7 +125,7 @@ def _fill(
     A function of its own, because arrays that may be replaced inside the loop make it five times slower.
     """
     rows, cols, d2, log_density, log_size_density = pairs
-    position, position_var, noise, log_size, log_size_var, size_noise = expected
+    position, position_var, noise, log_size, log_size_var, size_noise, last_cut = expected
     z, z_log_size, weight, sensor, cut, side = found
     num_tracks = position.shape[0]
     num_dets = z.shape[0]
@@ -170,7 +172,8 @@ def _fill(
                 shown = cut[j, 1], side[j, 1], z_log_size[j, 1]
                 centre, var = centre_of_cut(*shown, *known)
                 dy = 0.0 if cut[j, 1] == BOTH_CUT else centre - position[i, s, 1]
-                Sy += var
+                white = noise[i, s, 1] * weight[j]
+                Sy = variance_of_cut(cut[j, 1], last_cut[i, 1], position_var[i, s, 1], white, var)
             ny = dy * dy / Sy
             if ny > gate:
                 continue
@@ -181,7 +184,8 @@ def _fill(
                 shown = cut[j, 0], side[j, 0], z_log_size[j, 0]
                 centre, var = centre_of_cut(*shown, *known)
                 dx = 0.0 if cut[j, 0] == BOTH_CUT else centre - position[i, s, 0]
-                Sx += var
+                white = noise[i, s, 0] * weight[j]
+                Sx = variance_of_cut(cut[j, 0], last_cut[i, 0], position_var[i, s, 0], white, var)
             distance = dx * dx / Sx + ny
             if not distance <= gate:
                 continue
@@ -227,6 +231,26 @@ def _reach(some_cut: bool, log_size: float, log_size_var: float) -> tuple[float,
         return 0.0, 0.0
     half, var = centre_from_side(HIGH_CUT, 0.0, log_size, log_size_var)
     return half, var
+
+
+@njit(cache=True)
+def variance_of_cut(cut: int, last_cut: int, position_var: float, white: float, size_var: float) -> float:
+    """Variance (px²) of the difference between the centre of a track and the one by a box that is cut.
+
+    A track that was cut in the same way the last time has its centre from that same side and that same size:
+    the error of the size is in both and cancels. What remains is how well the side is known, for which there
+    is no state: what the size does not account for, and no less than the noise of a box.
+
+    Args:
+        cut: what is cut of the box.
+        last_cut: what was cut of the last one of this track.
+        position_var: variance of the track's centre (px²).
+        white: of the box's noise (px²).
+        size_var: what the size adds (px²), by `centre_of_cut`.
+    """
+    if cut == last_cut and cut != BOTH_CUT:
+        return max(position_var - size_var, white) + white
+    return position_var + white + size_var
 
 
 @njit(cache=True)

@@ -24,6 +24,8 @@ WHOLE, LOW_CUT, HIGH_CUT, BOTH_CUT = 0, 1, 2, 3
 FIRST_LOG_GROWTH = 0.35
 #: with this standard deviation.
 FIRST_LOG_GROWTH_STD = 0.5
+#: No size is less known than this standard deviation of ln size says: a factor of e.
+LEAST_KNOWN_LOG_STD = 1.0
 #: Variance (px², ln²) that stands for "not measured".
 UNKNOWN = 1e10
 
@@ -64,6 +66,24 @@ def centre_from_side(cut: int, side: float, log_size: float, log_size_var: float
     half = 0.5 * math.exp(min(log_size, _MOST_LOG_SIZE))
     centre = side - half if cut == LOW_CUT else side + half
     return centre, half * half * log_size_var
+
+
+@njit(cache=True)
+def bound_unmeasured(P: FloatArray) -> None:
+    """Bound the variance of a size that is not measured, in place, to what is known of any vehicle.
+
+    A size that nobody measures would drift without end, and a track whose size nobody can tell would lose its
+    own boxes to any other track near by.
+
+    Args:
+        P: (2, 2) covariance of ln size and its rate.
+    """
+    most = LEAST_KNOWN_LOG_STD * LEAST_KNOWN_LOG_STD
+    if P[0, 0] > most:
+        shrink = math.sqrt(most / P[0, 0])
+        P[0, 0] = most
+        P[0, 1] *= shrink
+        P[1, 0] = P[0, 1]
 
 
 @njit(cache=True)

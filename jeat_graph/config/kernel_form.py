@@ -82,6 +82,8 @@ class SensorArrays(NamedTuple):
         curve_precision: (S, K) its values.
         tempering: (S,) exponent on evidence.
         blind_speed: (S,) px/s.
+        disagreement: (S,) power of the share of its lasting tracks that others see; 0: always believed.
+        prior_trust: (S,) trust in the sensor before anything is known of it.
     """
 
     sigma_px: FloatArray
@@ -100,6 +102,8 @@ class SensorArrays(NamedTuple):
     curve_precision: FloatArray
     tempering: FloatArray
     blind_speed: FloatArray
+    disagreement: FloatArray
+    prior_trust: FloatArray
 
 
 class Model(NamedTuple):
@@ -152,6 +156,8 @@ def sensor_arrays(config: Config) -> SensorArrays:
         for name in _members(SensorConfig)
         if name in SensorArrays._fields
     }
+    lifecycle = config.lifecycle
+    power = np.array([lifecycle.disagreement if s.disagreement is None else s.disagreement for s in sensors])
     return SensorArrays(
         **same,
         rho=np.array([[s.rho_x, s.rho_y] for s in sensors]),
@@ -162,6 +168,8 @@ def sensor_arrays(config: Config) -> SensorArrays:
         period_s=np.array([1.0 / s.rate_hz for s in sensors]),
         curve_score=score,
         curve_precision=np.array([[p[1] for p in c] for c in curves]),
+        disagreement=power,
+        prior_trust=lifecycle.agreement_prior**power,
     )
 
 

@@ -134,11 +134,6 @@ class LifecycleConfig(Section):
     )
 
     @property
-    def prior_trust(self) -> float:
-        """Trust in a sensor of which nothing is known yet."""
-        return float(self.agreement_prior**self.disagreement)
-
-    @property
     def by_existence(self) -> bool:
         """Whether the probability of existence decides, and not hit counts."""
         return self.method == "existence"

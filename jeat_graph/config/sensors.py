@@ -48,7 +48,9 @@ class SensorConfig(Section):
     blind_speed: float = number(
         0.0, "px/s", "image speed below which the sensor sees nothing (events); 0: it sees what stands still"
     )
-
+    disagreement: float | None = number(
+        None, "1", "`lifecycle.disagreement` for this sensor, if another than for all", 0.0
+    )
     latency_s: float = number(
         0.0, "s", "known constant delay of its times: so much is taken off the time of every scan"
     )
@@ -81,6 +83,7 @@ class InputConfig(Section):
     rho_size: float = number(0.0, "1", "of such a sensor")
     correlated_share: float = number(0.0, "1", "of such a sensor", 0.0, 0.99)
     memory_s: float = number(0.2, "s", "of such a sensor", 1e-3, 1e4)
+    disagreement: float | None = number(None, "1", "of such a sensor", 0.0)
     picture: str = choice(
         "given",
         ("given", "seen"),

@@ -80,6 +80,7 @@ def undeclared_sensor(assumed: InputConfig) -> SensorConfig:
         rho_size=assumed.rho_size,
         correlated_share=assumed.correlated_share,
         memory_s=assumed.memory_s,
+        disagreement=assumed.disagreement,
     )
 
 

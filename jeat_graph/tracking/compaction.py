@@ -31,6 +31,7 @@ def keep_rows(tracks: TrackArrays, rows: IntArray) -> None:
     _shift(tracks.cov, rows, first)
     _shift(tracks.size_mean, rows, first)
     _shift(tracks.size_cov, rows, first)
+    _shift(tracks.cut, rows, first)
     _shift(tracks.rest_point, rows, first)
     _shift(tracks.rest_var, rows, first)
     _shift(tracks.rest_since, rows, first)

@@ -19,6 +19,7 @@ class TrackArrays(NamedTuple):
         cov: (C, 2, 3 + B, 3 + B) covariance per axis; the axes are independent.
         size_mean: (C, 2, 2) ln width and ln height, each with its rate (1/s).
         size_cov: (C, 2, 2, 2) covariance of each.
+        cut: (C, 2) what the edges of the picture cut of the last detection (`filters.cut_boxes`).
         rest_point: (C, 2) where the track is if it stands still (px).
         rest_var: (C, 2) variances of that point (px²).
         rest_since: (C,) since when it may have stood there (s).
@@ -41,6 +42,7 @@ class TrackArrays(NamedTuple):
     cov: FloatArray
     size_mean: FloatArray
     size_cov: FloatArray
+    cut: IntArray
     rest_point: FloatArray
     rest_var: FloatArray
     rest_since: FloatArray
@@ -87,14 +89,16 @@ class SceneState(NamedTuple):
     looked: FloatArray
 
 
-def start_scene(clutter: FloatArray, p_detect: FloatArray, undetected: float, trust: float) -> SceneState:
+def start_scene(
+    clutter: FloatArray, p_detect: FloatArray, undetected: float, trust: FloatArray
+) -> SceneState:
     """Return what is held of a scene before the first scan.
 
     Args:
         clutter: (S,) expected false boxes in a scan of each sensor.
         p_detect: (S,) probability of detection.
         undetected: expected number of vehicles.
-        trust: in each sensor.
+        trust: (S,) in each sensor.
     """
     num_sensors = len(clutter)
     return SceneState(
@@ -104,7 +108,7 @@ def start_scene(clutter: FloatArray, p_detect: FloatArray, undetected: float, tr
         last_look=np.full(num_sensors, -np.inf),
         claims=np.zeros(num_sensors),
         agreed=np.zeros(num_sensors),
-        trust=np.full(num_sensors, trust),
+        trust=trust.copy(),
         fruitless=np.zeros(num_sensors),
         looked=np.zeros(num_sensors),
     )
@@ -118,6 +122,7 @@ def allocate(capacity: int, num_sensors: int, num_errors: int = 0) -> TrackArray
         cov=np.zeros((capacity, 2, dim, dim)),
         size_mean=np.zeros((capacity, 2, 2)),
         size_cov=np.zeros((capacity, 2, 2, 2)),
+        cut=np.zeros((capacity, 2), dtype=np.int64),
         rest_point=np.zeros((capacity, 2)),
         rest_var=np.zeros((capacity, 2)),
         rest_since=np.zeros(capacity),

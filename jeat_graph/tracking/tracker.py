@@ -71,7 +71,7 @@ class Tracker(SmoothedTracks):
         sensors = self._model.sensors
         self._tracks = allocate(_FIRST_CAPACITY, len(self.sensor_names), len(sensors.correlation_time_s))
         self._scene = start_scene(
-            sensors.clutter_per_scan, sensors.p_detect, config.birth.initial, config.lifecycle.prior_trust
+            sensors.clutter_per_scan, sensors.p_detect, config.birth.initial, sensors.prior_trust
         )
         self._num_tracks = 0
         self._next_id = 1

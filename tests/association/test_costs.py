@@ -24,6 +24,7 @@ def two_sensors(residual, variances, weights=(1.0, 1.0), track_var=4.0):
         flat,
         small,
         np.full((2, 2), 0.01),
+        np.zeros((1, 2), dtype=np.int64),
     )
     cut = np.zeros((2, 2), dtype=np.int64), np.zeros((2, 2))
     measured = np.full((2, 2), residual), np.zeros((2, 2)), np.array(weights), np.array([0, 1])

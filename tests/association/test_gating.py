@@ -22,6 +22,7 @@ def random_scene(rng, tracks, dets, sensors=2, width=300.0):
         rng.normal(4.0, 0.3, (tracks, 2)),
         rng.uniform(0.001, 0.05, (tracks, 2)),
         rng.uniform(0.005, 0.05, (sensors, 2)),
+        np.zeros((tracks, 2), dtype=np.int64),
     )
     found = Found(
         rng.uniform(0.0, width, (dets, 2)),
@@ -35,7 +36,7 @@ def random_scene(rng, tracks, dets, sensors=2, width=300.0):
 
 
 def all_pairs(expected, found, _, gate, size_gate):
-    position, var, noise, log_size, size_var, size_noise = expected
+    position, var, noise, log_size, size_var, size_noise, _ = expected
     z, z_size, weight, sensor, _, _ = found
     out = []
     for i in range(len(position)):
@@ -85,7 +86,7 @@ def test_a_detection_on_the_gate_is_inside():
     one, flat = np.ones((1, 2)), np.zeros((1, 2))
     z = np.array([[6.0, 0.0]])
     arguments = (
-        Expected(flat[None], one[None], np.ones((1, 1, 2)), flat, one, one),
+        Expected(flat[None], one[None], np.ones((1, 1, 2)), flat, one, one, np.zeros((1, 2), dtype=np.int64)),
         Found(z, flat, np.ones(1), np.zeros(1, dtype=np.int64), np.zeros((1, 2), dtype=np.int64), flat),
         NORMAL,
     )
@@ -106,15 +107,16 @@ def test_heavy_tails_are_students_t_of_the_same_covariance(dims, freedom):
         assert found == pytest.approx(expected, rel=1e-9)
 
 
-def one_cut(cut, side, shown, centre=100.0, width=80.0, size_var=0.04):
+def one_cut(cut, side, shown, centre=100.0, width=80.0, size_var=0.04, last_cut=0, position_var=4.0):
     """Pairs of one track 80 px wide around x = 100 with one detection cut along x, of which `side` shows."""
     track = Expected(
         np.array([[[centre, 50.0]]]),
-        np.full((1, 1, 2), 4.0),
+        np.full((1, 1, 2), position_var),
         np.full((1, 1, 2), 5.0),
         np.log([[width, 40.0]]),
         np.full((1, 2), size_var),
         np.full((1, 2), 0.01),
+        np.array([[last_cut, 0]]),
     )
     middle = side - 0.5 * shown if cut == LOW_CUT else side + 0.5 * shown
     found = Found(
@@ -156,3 +158,22 @@ def test_a_box_cut_on_both_sides_may_belong_to_any_place():
     near = one_cut(BOTH_CUT, 0.0, 1000.0, centre=500.0, width=1500.0)
     assert far.d2[0] == near.d2[0] == 0.0
     assert far.log_density[0] == near.log_density[0]
+
+
+def test_a_track_that_was_cut_in_the_same_way_is_compared_by_the_side_that_shows():
+    """Its centre comes from that side and that size: the error of the size is in both and cancels."""
+    size_var = 0.25
+    from_size = 40.0**2 * size_var
+    known = {"size_var": size_var, "position_var": from_size + 9.0}
+    same = one_cut(LOW_CUT, 140.0 + 3.0, 60.0, last_cut=LOW_CUT, **known)
+    entering = one_cut(LOW_CUT, 140.0 + 3.0, 60.0, last_cut=0, **known)
+    y_part = -0.5 * np.log(2.0 * np.pi * (from_size + 9.0 + 5.0))
+    for pairs, var in ((same, 9.0 + 5.0), (entering, from_size + 9.0 + 5.0 + from_size)):
+        x_part = -0.5 * (3.0**2 / var + np.log(2.0 * np.pi * var))
+        assert pairs.log_density[0] == pytest.approx(x_part + y_part, rel=1e-9)
+
+
+def test_the_side_is_known_no_better_than_a_box_measures_it():
+    same = one_cut(HIGH_CUT, 60.0, 60.0, last_cut=HIGH_CUT, size_var=0.25, position_var=400.0)
+    y_part = -0.5 * np.log(2.0 * np.pi * 405.0)
+    assert same.log_density[0] == pytest.approx(y_part - 0.5 * np.log(2.0 * np.pi * 10.0), rel=1e-9)

@@ -8,8 +8,10 @@ from hypothesis import strategies as st
 from jeat_graph.filters.cut_boxes import (
     BOTH_CUT,
     HIGH_CUT,
+    LEAST_KNOWN_LOG_STD,
     LOW_CUT,
     WHOLE,
+    bound_unmeasured,
     centre_from_side,
     cut_of,
     floor_of_centre,
@@ -70,3 +72,15 @@ def test_other_boxes_leave_the_covariance_alone(cut):
     P = np.diag([1.0, 2.0, 3.0])
     floor_of_centre(cut, np.log(80.0), 0.01, P)
     assert np.array_equal(P, np.diag([1.0, 2.0, 3.0]))
+
+
+def test_a_size_that_is_not_measured_is_no_less_known_than_that_of_any_vehicle():
+    P = np.array([[9.0, 3.0], [3.0, 4.0]])
+    correlation = P[0, 1] / np.sqrt(P[0, 0] * P[1, 1])
+    bound_unmeasured(P)
+    assert np.diag(P) == pytest.approx([LEAST_KNOWN_LOG_STD**2, 4.0])
+    assert P[0, 1] == P[1, 0] == pytest.approx(correlation * LEAST_KNOWN_LOG_STD * 2.0)
+    known = np.array([[0.01, 0.002], [0.002, 0.04]])
+    kept = known.copy()
+    bound_unmeasured(kept)
+    assert np.array_equal(kept, known)

@@ -96,3 +96,30 @@ def test_a_look_in_between_changes_nothing(engine):
     once, looked = (crossing(3.0, engine=engine, fetch=fetch)[1] for fetch in (False, True))
     assert np.array_equal(once.boxes, looked.boxes)
     assert np.array_equal(once.mean, looked.mean)
+
+
+def test_two_detectors_that_disagree_about_a_cut_box_do_not_drive_its_size_off():
+    """One sees the edge, the other stops short of it: a car beside ours for six seconds."""
+    rng = np.random.default_rng(0)
+    noise = "{rate_hz: 10, sigma_px: 0.7, rho_size: 0.02, sigma_log_width: 0.03, sigma_log_height: 0.03}"
+    tracker = Tracker(
+        load_config("default", (f"sensors.short={noise}", f"sensors.whole={noise}", "smoother.engine=none"))
+    )
+    for k in range(60):
+        cut = np.array([[0.0, 200.0, 379.0 + rng.normal(0.0, 1.0), 160.0]])
+        short = np.array([[10.0, 200.0, 355.0 + rng.normal(0.0, 1.0), 160.0]])
+        table = tracker.step([(k / 10.0, "whole", cut, np.ones(1)), (k / 10.0, "short", short, np.ones(1))])
+    assert len(table) == 1
+    width = tracker.snapshot().tracks.size_mean[0, 0]
+    assert abs(width[1]) < 0.2
+    assert np.exp(width[0]) == pytest.approx(370.0, rel=0.04)
+
+
+def test_a_size_that_nobody_measures_stays_within_that_of_vehicles():
+    tracker = Tracker(load_config("default", ("smoother.engine=none",)))
+    for k in range(200):
+        box = np.array([[300.0, 600.0, 120.0, 120.0]])  # its lower side is below the picture
+        tracker.step((k / 20.0, "rgb", box, np.ones(1)))
+    snapshot = tracker.snapshot().tracks
+    assert np.sqrt(snapshot.size_cov[0, 1, 0, 0]) <= 1.05
+    assert np.sqrt(snapshot.cov[0, 1, 0, 0]) < 200.0

@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from jeat_graph.config.kernel_form import kernel_model
 from jeat_graph.config.reading import load_config
+from jeat_graph.data.detections import Detections
+from jeat_graph.runs.declaring import fit_input
 from jeat_graph.tracking.tracker import Tracker
 
 RATE_HZ = 10.0
@@ -69,6 +72,23 @@ def test_two_good_sensors_are_not_disturbed_by_a_third():
 
 
 def test_of_a_sensor_alone_nothing_is_learnt():
-    config = load_config("default")
+    lifecycle = load_config("default").lifecycle
     tracker, _ = follow(("poor",))
-    assert trust(tracker)["poor"] == pytest.approx(config.lifecycle.prior_trust)
+    assert trust(tracker)["poor"] == pytest.approx(lifecycle.agreement_prior**lifecycle.disagreement)
+
+
+def test_a_sensor_may_be_believed_whatever_the_others_say():
+    tracker, _ = follow(("good", "poor"), ["sensors.poor.disagreement=0"])
+    assert trust(tracker)["poor"] == 1.0
+
+
+def test_sensors_that_highway_does_not_know_have_to_earn_their_trust():
+    """Its own two do not: in the dark only one of them sees."""
+    rng = np.random.default_rng(0)
+    t = np.repeat(np.arange(20) / 10.0, 3)
+    names = np.tile(["rgb", "evt", "third"], 20)
+    seen = Detections.from_rows(t, names, rng.uniform(50.0, 90.0, (60, 4)), np.full(60, 0.9))
+    config, _ = fit_input(load_config("highway", ("input.undeclared=declare",)), seen)
+    prior = dict(zip(config.sensor_names, kernel_model(config).sensors.prior_trust, strict=True))
+    assert prior["rgb"] == prior["evt"] == 1.0
+    assert prior["third"] == pytest.approx(0.91**12)

@@ -55,6 +55,7 @@ def associate(
             tracks.size_mean[:n, :, 0],
             tracks.size_cov[:n, :, 0, 0],
             sensors.size_var,
+            tracks.cut[:n],
         ),
         Found(batch.z, batch.log_size, batch.weight, batch.sensor, batch.cut, batch.side),
         Likelihood(settings.tail_freedom, settings.log_size_range),

@@ -166,6 +166,7 @@ def start_track(
     size_mean, size_cov = tracks.size_mean[i], tracks.size_cov[i]
     write_size_prior(view.log_size, view.log_size_var, rate_var, size_mean, size_cov)
     for axis in range(2):
+        tracks.cut[i, axis] = batch.cut[j, axis]
         tracks.rest_point[i, axis] = view.z[axis]
         tracks.rest_var[i, axis] = white[axis] + coloured_std[axis] * coloured_std[axis]
     tracks.rest_since[i] = t

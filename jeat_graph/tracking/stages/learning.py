@@ -79,10 +79,8 @@ def learn_trust(
     for s in range(len(batch.present)):
         if batch.present[s]:
             scene.last_look[s] = batch.t
-    if lifecycle.disagreement <= 0.0:
-        return
     for s in range(len(batch.present)):
-        if not batch.present[s]:
+        if not batch.present[s] or sensors.disagreement[s] <= 0.0:
             continue
         sharpest = 0.0
         for other in range(len(batch.present)):
@@ -101,7 +99,7 @@ def learn_trust(
                 if tracks.seen_by[i] & ~(1 << s):
                     scene.agreed[s] += weight
         agreed = scene.agreed[s] + _PRIOR_CLAIMS * lifecycle.agreement_prior
-        scene.trust[s] = (agreed / (scene.claims[s] + _PRIOR_CLAIMS)) ** lifecycle.disagreement
+        scene.trust[s] = (agreed / (scene.claims[s] + _PRIOR_CLAIMS)) ** sensors.disagreement[s]
 
 
 @inner

@@ -13,6 +13,7 @@ from jeat_graph.filters.cut_boxes import (
     BOTH_CUT,
     UNKNOWN,
     WHOLE,
+    bound_unmeasured,
     centre_from_side,
     floor_of_centre,
 )
@@ -120,8 +121,14 @@ def update_track(
             measured.log_size[side],
             measured.log_size_var[side],
         )
+        tracks.cut[i, side] = batch.cut[j, side]
         if batch.cut[j, side] != WHOLE:
-            tracks.size_mean[i, side, 0] = max(tracks.size_mean[i, side, 0], batch.log_size[j, side])
+            bound_unmeasured(tracks.size_cov[i, side])
+            if batch.log_size[j, side] > tracks.size_mean[i, side, 0]:
+                # The whole is no smaller than the part, and does not shrink either: between one sensor's
+                # bound and another's slightly shorter boxes the rate would run away.
+                tracks.size_mean[i, side, 0] = batch.log_size[j, side]
+                tracks.size_mean[i, side, 1] = max(tracks.size_mean[i, side, 1], 0.0)
         floor_of_centre(
             batch.cut[j, side],
             tracks.size_mean[i, side, 0],
