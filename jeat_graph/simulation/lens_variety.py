@@ -1,4 +1,4 @@
-"""Draws a lens and a mount for a segment: none in two of three, for they make events slower to render."""
+"""Draws lens and mount of a segment (none in two of three: they cost time), and whether its road is wet."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from jeat_graph.simulation.imaging.config import RenderConfig
 from jeat_graph.simulation.imaging.lens_config import LensConfig
 from jeat_graph.simulation.world.camera import CameraConfig
 
@@ -16,6 +17,7 @@ _SWAY_PX = (0.1, 2.0)  # rms, in a picture as wide as this:
 _WIDE_PX = 640.0
 _SWAY_HZ = (0.6, 3.5)
 _DROPS_SHARE = 0.2
+_WET_SHARE = (0.6, 0.1)  # of segments: in fog or rain, and in clear air, after rain
 
 
 def vary_lens(rng: np.random.Generator, lens: LensConfig, camera: CameraConfig) -> LensConfig:
@@ -37,3 +39,10 @@ def vary_lens(rng: np.random.Generator, lens: LensConfig, camera: CameraConfig) 
         sway_hz=float(rng.uniform(*_SWAY_HZ)),
         drops=int(rng.integers(3, 15)) if rng.random() < _DROPS_SHARE else 0,
     )
+
+
+def vary_wet(rng: np.random.Generator, render: RenderConfig) -> RenderConfig:
+    """Draw how wet the road is, unless the settings say so."""
+    share = _WET_SHARE[0] if render.fog_m > 0.0 else _WET_SHARE[1]
+    wet = float(rng.uniform(0.4, 1.0)) if rng.random() < share else 0.0
+    return render if render.wet > 0.0 else replace(render, wet=wet)

@@ -15,6 +15,7 @@ from jeat_graph.simulation.imaging.lighting import LUMINANCE, Lights
 from jeat_graph.simulation.imaging.optics import Optics, splat_glow
 from jeat_graph.simulation.imaging.tiles import View, view_of
 from jeat_graph.simulation.imaging.trace import trace
+from jeat_graph.simulation.imaging.wet_road import mirror_ground, mirror_lamps
 from jeat_graph.simulation.world.camera import Camera
 from jeat_graph.simulation.world.scene import Scene
 
@@ -86,6 +87,9 @@ def make_background(scene: Scene, lights: Lights, optics: Optics, config: Render
     layers = trace(view_of(camera), land, lights)
     back, albedo, place, lux, front, front_albedo, cover, depth = layers
     view = view_of(camera)
+    if config.wet > 0.0:
+        mirror_ground(view, land, lights, config.wet, place, back, albedo)
+        mirror_lamps(camera, lights, config.wet, lux, back)
     beta = lights.beta
     glow = _lamp_glow(camera, lights, optics, beta)
     if beta > 0.0:

@@ -48,6 +48,9 @@ class RenderConfig:
     vignetting: float = number(
         0.0, "1", "share of the fourth power of the cosine by which light falls to the corners", 0.0, 1.0
     )
+    wet: float = number(
+        0.0, "1", "how wet the road is: a darker surface that mirrors sky and lamps", 0.0, 1.0
+    )
     far_m: float = number(230.0, "m", "vehicles beyond are not drawn", 30.0)
 
     def __post_init__(self) -> None:

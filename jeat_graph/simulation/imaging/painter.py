@@ -13,7 +13,8 @@ from jeat_graph.simulation.imaging.bodies import add_body, add_glow, add_lamps
 from jeat_graph.simulation.imaging.layers import GLOW, ON_GROUND, ON_WALL, TileLayers, meets
 from jeat_graph.simulation.imaging.road_light import cast_beams, cast_shadow
 from jeat_graph.simulation.imaging.shapes import PARTS
-from jeat_graph.simulation.imaging.stage import LIGHTS_ON, SUN_LUX, Stage
+from jeat_graph.simulation.imaging.stage import LIGHTS_ON, SUN_LUX, WET, Stage
+from jeat_graph.simulation.imaging.streaks import add_streaks
 from jeat_graph.simulation.imaging.tiles import TILE_H, TILE_W, Tile
 
 
@@ -79,6 +80,16 @@ def paint_tile(tile: Tile, j: int, who: IntArray, counts: IntArray, stage: Stage
             cast_shadow(tile, pose, skin, scene, canvas.ground, canvas.shade)
             if scene[LIGHTS_ON] > 0.0:
                 add_lamps(tile, moments.lamp[j, v], stage.optics, canvas.filled, canvas.value)
+                if scene[WET] > 0.0:
+                    add_streaks(
+                        tile,
+                        moments.lamp[j, v],
+                        stage.camera,
+                        scene,
+                        canvas.ground,
+                        canvas.filled,
+                        canvas.value,
+                    )
     compose(tile, shaded, scene[SUN_LUX], light, canvas)
     return touched
 

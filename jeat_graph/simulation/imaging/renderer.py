@@ -16,6 +16,7 @@ from jeat_graph.simulation.imaging.painter import light_tile, paint_tile, take_g
 from jeat_graph.simulation.imaging.plan import Plan, make_plan, who_touches
 from jeat_graph.simulation.imaging.projection import project_moments
 from jeat_graph.simulation.imaging.stage import Setting, Stage, make_setting
+from jeat_graph.simulation.imaging.streaks import reach_streaks
 from jeat_graph.simulation.imaging.tiles import TILE_W, tile_raster, view_of
 from jeat_graph.simulation.streams import stream
 from jeat_graph.simulation.world.scene import Scene, VehicleStates
@@ -81,7 +82,7 @@ class Renderer:
         """Put together what tiles are painted from, in three channels or in luminance alone (1)."""
         if channels not in self._settings:
             self._settings[channels] = make_setting(
-                self.background, self.lights, self.optics, self.view, channels
+                self.background, self.lights, self.optics, self.view, channels, self.config.wet
             )
         return self._settings[channels].stage(moments, look)
 
@@ -114,7 +115,10 @@ class Renderer:
 
     def _project(self, states: VehicleStates, times: FloatArray, look: Look, every: IntArray) -> Moments:
         placed = line_up(states, look.number, times, self.config.far_m)
-        return project_moments(placed, look, every, self.view, self.lights, self.optics)
+        moments = project_moments(placed, look, every, self.view, self.lights, self.optics)
+        if self.config.wet > 0.0 and self.lights.on:
+            reach_streaks(moments, float(self.view.lens[1]))
+        return moments
 
 
 @njit(cache=True)

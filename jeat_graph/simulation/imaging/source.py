@@ -25,7 +25,7 @@ from jeat_graph.simulation.imaging.rgb_camera import choose_exposure, develop, e
 from jeat_graph.simulation.imaging.scaling import scaled_camera
 from jeat_graph.simulation.imaging.truth import ImageViews, frame_truth
 from jeat_graph.simulation.imaging.visibility import buffers
-from jeat_graph.simulation.lens_variety import vary_lens
+from jeat_graph.simulation.lens_variety import vary_lens, vary_wet
 from jeat_graph.simulation.scenario import Scenario
 from jeat_graph.simulation.segment import SegmentStep
 from jeat_graph.simulation.streams import stream
@@ -127,6 +127,7 @@ class RenderedSource:
             s, imaging, around = vary(stream(self.seed, f"segment.{index}.world.{light}"), s, imaging)
             rng = stream(self.seed, f"segment.{index}.lens.{light}")
             imaging = replace(imaging, lens=vary_lens(rng, imaging.lens, s.camera))
+            imaging = replace(imaging, render=vary_wet(rng, imaging.render))
         seed = self._segment_seed(index)
         duration = (self.frames + _BEFORE) / imaging.rgb.rate_hz + 1.0
         camera = scaled_camera(s.camera, imaging.render.width, imaging.render.height)
@@ -193,9 +194,11 @@ class RenderedSource:
 
 
 def _stated(imaging: ImagingConfig) -> dict[str, Any]:
-    """Return settings as plain values; of the lens only if there is one."""
+    """Return settings as plain values; of the lens and of water only if there is any."""
     tree = plain(dataclasses.asdict(imaging))
     assert isinstance(tree, dict)
     if imaging.lens == LensConfig():
         del tree["lens"]
+    if not imaging.render.wet:
+        del tree["render"]["wet"]
     return tree

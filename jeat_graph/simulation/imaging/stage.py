@@ -16,7 +16,7 @@ from jeat_graph.simulation.imaging.optics import Optics
 from jeat_graph.simulation.imaging.tiles import View
 
 # Of the flat numbers of a scene, for the kernels.
-SKY_LUX, SUN_LUX, SUN, BEAM_RANGE, BEAM_PEAK, BEAM_STRAY, LIGHTS_ON, SKY_TINT, BETA, AIR = (
+SKY_LUX, SUN_LUX, SUN, BEAM_RANGE, BEAM_PEAK, BEAM_STRAY, LIGHTS_ON, SKY_TINT, BETA, AIR, WET = (
     0,
     1,
     2,
@@ -27,6 +27,7 @@ SKY_LUX, SUN_LUX, SUN, BEAM_RANGE, BEAM_PEAK, BEAM_STRAY, LIGHTS_ON, SKY_TINT, B
     9,
     12,
     13,
+    16,
 )
 # Of the flat numbers of a vehicle: size, colour, kind, salt.
 SKIN_COLOUR, SKIN_KIND, SKIN_SALT = 3, 6, 7
@@ -40,7 +41,7 @@ class Stage(NamedTuple):
         moments: the V vehicles at J times.
         skin: (V, 8) their size, colour, kind, salt.
         camera: (18,) fx, fy, cx, cy, width, height, eye (3), rotation (9).
-        scene: (16,) light of sky and sun, headlights, fog.
+        scene: (17,) light of sky and sun, headlights, fog, how wet the road is.
         optics: glow of the lens.
         canvas: room to work.
     """
@@ -70,7 +71,7 @@ class Setting(NamedTuple):
 
 
 def make_setting(
-    background: Background, lights: Lights, optics: Optics, view: View, channels: int
+    background: Background, lights: Lights, optics: Optics, view: View, channels: int, wet: float = 0.0
 ) -> Setting:
     """Lay a scene's constants flat, for pictures of 3 channels or of luminance alone (1)."""
     scene = [
@@ -79,6 +80,7 @@ def make_setting(
         *lights.sky_tint,
         lights.beta,
         *airlight(lights),
+        wet,
     ]
     return Setting(
         packed=pack(background, lights, view, channels),

@@ -19,11 +19,11 @@ _SAMPLES = 3  # a pixel is sampled this many times each way: it is done once, so
 _POLE_RADIUS_M, _POST_M = 0.11, 4.0
 _TREES_FAR_M, _MAX_GROUND_M = 650.0, 3000.0
 _UNDER_BRIDGE = 0.2  # part of the light that is left below a bridge
-_NOTHING, _GROUND, _LEAVES, _HILL, _SKY = range(5)
+_NOTHING, GROUND, LEAVES, HILL, SKY = range(5)
 
 
 @njit(cache=True)
-def _front(
+def in_front(
     eye: FloatArray, dx: float, dy: float, dz: float, land: Landscape, lights: Lights, out: FloatArray
 ) -> float:
     """Nearest of walls, boxes and poles: distance, and albedo (3) and normal (3) into `out`."""
@@ -94,7 +94,7 @@ def _front(
 
 
 @njit(cache=True)
-def _behind(eye: FloatArray, dx: float, dy: float, dz: float, land: Landscape) -> tuple[int, float]:
+def behind(eye: FloatArray, dx: float, dy: float, dz: float, land: Landscape) -> tuple[int, float]:
     """What is behind all that: ground, leaves, a hill or the sky, and how far."""
     country = land.country
     ground = -eye[2] / dz if dz < 0.0 else np.inf
@@ -123,16 +123,16 @@ def _behind(eye: FloatArray, dx: float, dy: float, dz: float, land: Landscape) -
         if t < tree and eye[2] + t * dz < top:
             tree = t
     if ground < tree:
-        return _GROUND, ground
+        return GROUND, ground
     if tree < np.inf:
-        return _LEAVES, tree
+        return LEAVES, tree
     flat = math.hypot(dx, dy)
     azimuth = math.atan2(dx, dy)
     ridge = country.hills * (1.0 + 0.5 * value_noise(6.0 * azimuth, 1.0, country.salt + 15))
     ridge += 0.1 * country.hills * value_noise(60.0 * azimuth, 2.0, country.salt + 16) + country.grade
     if dz < flat * ridge:
-        return _HILL, 3000.0
-    return _SKY, np.inf
+        return HILL, 3000.0
+    return SKY, np.inf
 
 
 @njit(cache=True)
@@ -179,8 +179,8 @@ def trace(
                 dx = X * rotation[0, 0] + Y * rotation[1, 0] + rotation[2, 0]
                 dy = X * rotation[0, 1] + Y * rotation[1, 1] + rotation[2, 1]
                 dz = X * rotation[0, 2] + Y * rotation[1, 2] + rotation[2, 2]
-                near = _front(eye, dx, dy, dz, land, lights, what)
-                kind, far = _behind(eye, dx, dy, dz, land)
+                near = in_front(eye, dx, dy, dz, land, lights, what)
+                kind, far = behind(eye, dx, dy, dz, land)
                 if near < far:
                     x, y, z = eye[0] + near * dx, eye[1] + near * dy, eye[2] + near * dz
                     nx, ny, nz = what[3], what[4], what[5]
@@ -199,7 +199,7 @@ def trace(
                         front[row, column, c] += share * what[c] * light / math.pi
                         front_albedo[row, column, c] += share * what[c]
                 x, y, z = eye[0] + far * dx, eye[1] + far * dy, eye[2] + far * dz
-                if kind == _GROUND:
+                if kind == GROUND:
                     across, along = road_place(x, y, land.curvature)
                     r, g, b = ground_albedo(across, along, land.layout)
                     lamp_light = lamp_lux(Surface(x, y, 0.0, 0.0, 0.0, 1.0), lights)
@@ -216,14 +216,14 @@ def trace(
                         )
                         albedo[row, column, c] += share * a
                         back[row, column, c] += share * a * light / math.pi
-                elif kind == _LEAVES:
+                elif kind == LEAVES:
                     leaf = 1.0 + 0.6 * value_noise(1.5 * x + 1.5 * y, 1.5 * z, 15)
                     light = 0.5 * (lights.sky_lux + lights.sun_lux)
                     facing = Surface(x, y, z, -math.copysign(1.0, x), 0.0, 0.0)
                     light += 0.3 * lamp_lux(facing, lights)
                     for c in range(3):
                         back[row, column, c] += share * country.leaves[c] * leaf * light / math.pi
-                elif kind == _HILL:
+                elif kind == HILL:
                     # Air makes far hills bluish: half of what is seen is the sky's light.
                     light = 0.5 * (lights.sky_lux + lights.sun_lux) / math.pi
                     for c in range(3):
