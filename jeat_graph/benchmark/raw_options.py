@@ -85,14 +85,14 @@ def findings(
     detectors_of(args)
     settings = load_settings(None, (*changes, *args.detection_set))
     for names in (args.frames, args.events):
-        short = [Path(one).name for one in names]
+        short = [Path(one).name for one in dict.fromkeys(names)]
         if len(set(short)) < len(short):
             raise ConfigError(
-                f"{max(short, key=short.count)} is named twice: its rows could not be told apart"
+                f"{max(short, key=short.count)} is the name of two files: their rows could not be told apart"
             )
     return [
         Finding(segment, sensor, detector, settings)
         for sensor, names in zip(SENSORS, (args.frames, args.events), strict=True)
-        for detector in names
+        for detector in dict.fromkeys(names)
         for segment in segments
     ]

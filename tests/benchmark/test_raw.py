@@ -105,7 +105,6 @@ def test_from_raw_to_scores(small, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("more", "line"),
     [
-        (["--frames", "motion", "motion"], "motion is named twice"),
         (["--frames", "sehm"], "'sehm' is no detector of frames"),
         (["--events", "none.onnx"], "no such file of a network"),
     ],
@@ -113,6 +112,15 @@ def test_from_raw_to_scores(small, tmp_path, capsys):
 def test_detectors_that_are_not_there_are_named(small, capsys, more, line):
     assert main(["benchmark", "detection", str(small), *more]) == 2
     assert line in capsys.readouterr().err
+
+
+def test_files_of_one_name_are_told_of(small, tmp_path, capsys):
+    paths = [tmp_path / name / "net.onnx" for name in "ab"]
+    for path in paths:
+        path.parent.mkdir()
+        path.touch()
+    assert main(["benchmark", "detection", str(small), "--frames", *map(str, paths)]) == 2
+    assert "net.onnx is the name of two files" in capsys.readouterr().err
 
 
 def test_data_must_be_named(capsys):
