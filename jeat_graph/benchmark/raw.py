@@ -156,6 +156,7 @@ def _judge(job: tuple[Row, dict[str, list[SizedRecording]]]) -> list[dict[str, A
                     "segments": len(group),
                     "scores": scores,
                     "std": spread,
+                    "nees": _nees(group, [tracked[one.name][kind] for one in group], row, kind),
                 }
             )
     return out
@@ -196,6 +197,20 @@ def _scores(group: Sequence[JudgedRecording], found: Sequence[Any], row: Row, ki
     return evaluate(pairs, kind=kind, instants=instants).as_dict()
 
 
+def _nees(
+    group: Sequence[JudgedRecording], found: Sequence[Any], row: Row, kind: Any
+) -> dict[str, float | int]:
+    """Whether what is said of the errors is true: only ours says something."""
+    from jeat_graph.eval.position_nees import position_nees
+
+    if row.tracker in (BYTETRACK, PAPER):
+        return {}
+    judged = position_nees([(one.truth, table) for one, table in zip(group, found, strict=True)], kind)
+    if not judged.matched:
+        return {}
+    return {"anees": judged.anees, "coverage": judged.coverage, "matched": judged.matched}
+
+
 def tables(result: Mapping[str, Any]) -> dict[str, Table]:
     """Tables of a result, by the name of their markers: one for all data together, and one a data set."""
     from jeat_graph.eval.tables import Table
@@ -209,4 +224,21 @@ def tables(result: Mapping[str, Any]) -> dict[str, Table]:
         )
         cells.setdefault(one["row"], {"": one["row"]})[one["source"]] = cell
     title = f"From raw pictures and events: {' / '.join(METRICS)}, segments pooled (± over segments)"
-    return {"raw": Table.from_records(list(cells.values()), ["", *sources], title=title)}
+    honest: list[dict[str, Cell]] = [
+        {
+            "": one["row"],
+            "ANEES": one["nees"]["anees"],
+            "within 95 % ellipses (%)": 100.0 * one["nees"]["coverage"],
+            "boxes": one["nees"]["matched"],
+        }
+        for one in result["records"]
+        if one["source"] == _ALL and one["nees"]
+    ]
+    return {
+        "raw": Table.from_records(list(cells.values()), ["", *sources], title=title),
+        "raw-honesty": Table.from_records(
+            honest,
+            title="Errors of position against what is said of them, all data (ANEES 1 and 95 % are right)",
+            digits={"within 95 % ellipses (%)": 1},
+        ),
+    }
