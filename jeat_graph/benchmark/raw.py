@@ -91,7 +91,8 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
         for pair in zip(args.frames, args.events, strict=True)
         for row in rows_of(pair, args.presets, with_peers)
     ]
-    jobs = [(row, recordings[row.detectors]) for row in rows]
+    # Pairs that share a detector share the rows of its sensor alone.
+    jobs = [(row, recordings[row.detectors]) for row in {str(row): row for row in rows}.values()]
     records = in_processes(_judge, jobs, args.jobs, "tracking")
     settings = {
         "data": described(folders),
@@ -224,8 +225,8 @@ def tables(result: Mapping[str, Any]) -> dict[str, Table]:
         )
         cells.setdefault(one["row"], {"": one["row"]})[one["source"]] = cell
     title = f"From raw pictures and events: {' / '.join(METRICS)}, segments pooled (± over segments)"
-    honest: list[dict[str, Cell]] = [
-        {
+    honest: dict[str, dict[str, Cell]] = {
+        one["row"]: {
             "": one["row"],
             "ANEES": one["nees"]["anees"],
             "within 95 % ellipses (%)": 100.0 * one["nees"]["coverage"],
@@ -233,11 +234,11 @@ def tables(result: Mapping[str, Any]) -> dict[str, Table]:
         }
         for one in result["records"]
         if one["source"] == _ALL and one["nees"]
-    ]
+    }
     return {
         "raw": Table.from_records(list(cells.values()), ["", *sources], title=title),
         "raw-honesty": Table.from_records(
-            honest,
+            list(honest.values()),
             title="Errors of position against what is said of them, all data (ANEES 1 and 95 % are right)",
             digits={"within 95 % ellipses (%)": 1},
         ),
