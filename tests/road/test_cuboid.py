@@ -17,6 +17,7 @@ from jeat_graph.road.cuboid import sides
 from jeat_graph.road.cuboid_fit import CuboidConfig, CuboidFit, fit_cuboid
 from jeat_graph.road.fleet import CLASSES
 from jeat_graph.road.motion_fit import MotionFitConfig
+from jeat_graph.road.speeds import Vehicle
 
 MOTION = MotionFitConfig(acceleration_sd=0.8, jerk=0.3)
 
@@ -139,3 +140,16 @@ def test_calibration_moves_a_vehicle_as_foretold() -> None:
     row = np.r_[np.zeros(found.motion.coefficients.shape[1]), found.motion.basis(np.array(0.8), 1)]
     moved = lifted.motion.at(np.array(0.8), 1)[1] - found.motion.at(np.array(0.8), 1)[1]
     assert np.sqrt(row @ found.by_calibration @ row) == pytest.approx(abs(moved), rel=0.1)
+
+
+@pytest.mark.parametrize("y", [40.0, 80.0])
+def test_a_standing_vehicle_has_no_speed(y: float) -> None:
+    """Its boxes jitter, some of it persisting; over its whole track it still stands, to half a km/h."""
+    rng, t = np.random.default_rng(int(y)), np.arange(0.0, 12.0, 0.1)
+    seen, _ = sides(camera(), np.tile([3.0, y], (len(t), 1)), np.zeros(len(t)), np.array([4.5, 1.8, 1.5]))
+    drift = np.cumsum(rng.standard_normal(seen.shape), axis=0) * 0.05
+    seen = seen + 0.4 * rng.standard_normal(seen.shape) + drift - drift.mean(axis=0)
+    found = _fit(t, np.c_[seen[:, :2], seen[:, 2:] - seen[:, :2]], camera(), CuboidConfig())
+    assert found is not None
+    vehicle = Vehicle(1, t, found.motion, found.by_calibration, 0.0, 0.0)
+    assert vehicle.mean_speed(*found.motion.window()).kmh < 0.5
