@@ -57,7 +57,7 @@ class Row:
 
     def __str__(self) -> str:
         by_sensor = dict(zip(SENSORS, self.detectors, strict=True))
-        return f"{self.tracker}, " + " + ".join(f"{s} {by_sensor[s]}" for s in self.sensors)
+        return f"{self.tracker}, " + " + ".join(f"{s} {Path(by_sensor[s]).name}" for s in self.sensors)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
