@@ -60,7 +60,7 @@ STEPS = (
     Change("+ no duplicate births, merging", ("birth.max_overlap", "merge")),
     Change(
         "+ existence probability, births weighed",
-        ("lifecycle", "birth", "sensors.*.tempering"),
+        ("lifecycle", "birth", "sensors.*.tempering", "input"),
         {"lifecycle.hidden_prior": 0.0, "lifecycle.p_detect_weight": 0.0, "lifecycle.leave_picture": False},
     ),
     Change("+ output rules", ("output", "smoother", "lifecycle.leave_picture")),

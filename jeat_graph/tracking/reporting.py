@@ -39,7 +39,8 @@ def _longest_wait(p_detect: FloatArray, trust: FloatArray, period_s: FloatArray)
     longest = 0.0
     for s in range(len(trust)):
         if trust[s] >= _TRUSTED * trust.max():
-            longest = max(longest, period_s[s] / p_detect[s] ** 4)
+            squared = p_detect[s] * p_detect[s]
+            longest = max(longest, period_s[s] / (squared * squared))
     return longest
 
 
