@@ -71,10 +71,16 @@ class EventBins:
         self._total[:] = 0
         self.end_us = end_us
 
-    def stack(self) -> npt.NDArray[np.uint8]:
-        """Return the histogram (2 x bins, H, W): bins from old to new, each first darker, then brighter."""
+    def stack(self, by_polarity: bool = False) -> npt.NDArray[np.uint8]:
+        """Return the histogram (2 x bins, H, W): bins from old to new, each first darker, then brighter.
+
+        Args:
+            by_polarity: the bins of all darker events first, then those of the brighter ones.
+        """
         order = (np.arange(len(self._ring)) + self._newest + 1) % len(self._ring)
         stacked = self._ring[order]
+        if by_polarity:
+            stacked = stacked.swapaxes(0, 1)
         return stacked.reshape(-1, *stacked.shape[2:])
 
     def recent(self, bins: int) -> npt.NDArray[np.uint16]:

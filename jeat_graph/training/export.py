@@ -19,6 +19,7 @@ import torch
 from torch import Tensor, nn
 
 from jeat_graph.data.errors import ConfigError
+from jeat_graph.detection.models.onnx_head import CARD
 from jeat_graph.io.atomic import atomic_path
 from jeat_graph.training.network import DetectionNet, cell_places, served_boxes
 from jeat_graph.training.settings import EVENTS
@@ -27,8 +28,8 @@ _OPSET = 17
 #: Smaller tensors are not worth a cast.
 _LEAST_HALVED = 64
 _CLASS = "vehicle"
-#: Under which names the notes stand in the file; `names` is where detectors have their classes.
-CARD, NAMES = "card", "names"
+#: Name of the note in which detectors have their classes.
+NAMES = "names"
 
 
 class ServedNet(nn.Module):

@@ -38,6 +38,7 @@ def test_every_window_is_the_histogram_of_its_events():
         assert ring.end_us == (k + 1) * 5000
         expected = brute_force(events, ring.end_us, 10, 5000)
         np.testing.assert_array_equal(ring.stack(), expected)
+        np.testing.assert_array_equal(ring.stack(by_polarity=True), [*expected[::2], *expected[1::2]])
         np.testing.assert_array_equal(ring.total, expected.sum(axis=0))
         np.testing.assert_array_equal(ring.recent(3), expected[-6:].sum(axis=0))
 

@@ -87,7 +87,7 @@ def test_the_file_is_recognised_and_runs(pair, engine):
         x, y = (rng.integers(0, side, 500).astype(np.uint16) for side in SIDE)
         scan = detector.push(EventArray(t, x, y, rng.integers(0, 2, 500).astype(np.uint8)))[0]
         assert (
-            "layout yolov8, windows of 10 bins of 0.005 s in 64 x 48 px, 2 states kept"
+            "layout yolov8, windows of 10 bins of 0.005 s by time in 64 x 48 px, 2 states kept"
             in detector.description
         )
     assert "classes vehicle" in detector.description

@@ -14,7 +14,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.detection.binned import BinnedDetector
 from jeat_graph.detection.models.engine import open_engine
 from jeat_graph.detection.models.model_settings import ModelSettings
-from jeat_graph.detection.models.onnx_head import OnnxHead, Port, read_onnx_head
+from jeat_graph.detection.models.onnx_head import CARD, OnnxHead, Port, read_onnx_head
 from jeat_graph.detection.models.output_reader import OutputReader, scan_within
 from jeat_graph.detection.noise import NoiseSettings
 from jeat_graph.detection.settings import EventSettings
@@ -70,15 +70,17 @@ class ModelEventDetector(BinnedDetector):
                 f"takes windows of {self._side[0]} x {self._side[1]} px; the camera has {width} x {height}",
                 path,
             )
+        self._by_polarity = _by_polarity(self._settings.channels, head)
         self._memory, outputs = _memory(head, self._path)
         self._outputs = OutputReader(outputs, self._side, head.notes, self._settings, self._path, coco=False)
         self._read = [port.name for port in outputs]
         self._engine = open_engine(path, head, self._settings.backend, self._settings.threads)
         self._state: dict[str, npt.NDArray[Any]] = {}
         kept = f", {len(self._memory)} states kept" if self._memory else ""
+        order = "polarity" if self._by_polarity else "time"
         self.description = (
             f"{self._path.name}: layout {self._outputs.layout}, windows of {bins} bins of {times.bin_s:g} s "
-            f"in {self._side[0]} x {self._side[1]} px{kept}, {self._outputs.words}, "
+            f"by {order} in {self._side[0]} x {self._side[1]} px{kept}, {self._outputs.words}, "
             f"run by {self._engine.name}"
         )
 
@@ -90,7 +92,7 @@ class ModelEventDetector(BinnedDetector):
         window = np.zeros(
             (1, self._input.shape[1] or 0, self._side[1], self._side[0]), dtype=self._input.kind
         )
-        window[0, :, :height, :width] = self._bins.stack()
+        window[0, :, :height, :width] = self._bins.stack(self._by_polarity)
         inputs = {self._input.name: window}
         for given, _ in self._memory:
             empty = np.zeros([side or 1 for side in given.shape], dtype=given.kind)
@@ -110,6 +112,10 @@ def _window_input(head: OnnxHead, path: Path) -> Port:
             f"takes {shapes}; a detector of events takes [1, 2 x bins, height, width] first", path
         )
     return first
+
+
+def _by_polarity(channels: str, head: OnnxHead) -> bool:
+    return channels == "polarity" or (channels == "auto" and CARD not in head.notes)
 
 
 def _memory(head: OnnxHead, path: Path) -> tuple[list[tuple[Port, str]], tuple[Port, ...]]:

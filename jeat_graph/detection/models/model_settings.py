@@ -55,6 +55,13 @@ class ModelSettings(Section):
         False, "whether a network of events is spared noise (events.noise); most were trained with all events"
     )
 
+    channels: str = choice(
+        "auto",
+        ("auto", "polarity", "time"),
+        "order in a histogram of events: by polarity (all bins of the darker ones, then of the brighter), or "
+        "by time (both polarities of each bin); auto: by time for files of `train`, else by polarity (RVT)",
+    )
+
     @property
     def open_side(self) -> tuple[int, int]:
         """Width and height where the file leaves them open (px)."""

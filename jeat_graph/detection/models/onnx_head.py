@@ -20,6 +20,8 @@ _NAME, _TYPE, _TENSOR, _KIND, _SHAPE, _DIMENSION, _VALUE = 1, 2, 1, 1, 2, 1, 1
 _VARINT, _FIXED_64, _BYTES, _FIXED_32 = 0, 1, 2, 5
 _KINDS = {1: "float32", 2: "uint8", 6: "int32", 7: "int64", 10: "float16", 11: "float64"}
 _MOST_BYTES = 1 << 31
+#: Note of a network that `train` made: its card.
+CARD = "card"
 
 
 class Port(NamedTuple):

@@ -89,7 +89,7 @@ def test_a_network_of_events_keeps_its_memory(tmp_path, name):
     path = counting_net(tmp_path / "rnn.onnx", SIDE, 20, ROWS[:1])
     times = EventSettings(rate_hz=50.0)
     detector = ModelEventDetector(path, (100, 80), times=times, settings=ModelSettings(backend=backend(name)))
-    assert "windows of 10 bins of 0.005 s in 128 x 96 px, 1 states kept" in detector.description
+    assert "windows of 10 bins of 0.005 s by polarity in 128 x 96 px, 1 states kept" in detector.description
     events = events_of([((20, 20), (50, 0), (20, 10))], 0.3, size=(100, 80))
     scans = detector.push(events)
     assert len(scans) > 8
@@ -113,6 +113,28 @@ def test_a_network_sees_noise_unless_it_shall_not(tmp_path, asked, seen):
     # The first window that is full is that from 30 to 80 ms.
     assert scans
     assert scans[0].boxes[0, 0] == pytest.approx(10 + 8 * (1 + seen))
+
+
+@pytest.mark.parametrize(
+    ("channels", "notes", "place"),
+    [
+        ("auto", None, 9),  # as RVT has them: the tenth bin of the darker ones
+        ("polarity", {"card": "{}"}, 9),
+        ("auto", {"card": "{}"}, 18),  # as `train` makes them: the first of the tenth bin's two
+        ("time", None, 18),
+    ],
+)
+def test_channels_are_in_the_order_that_the_network_has_learned(tmp_path, channels, notes, place):
+    found = {}
+    for seen in range(20):
+        path = counting_net(tmp_path / f"{seen}.onnx", SIDE, 20, ROWS[:1], 1.0, seen, notes)
+        detector = ModelEventDetector(path, (100, 80), settings=ModelSettings(channels=channels))
+        # Three that became darker, in the newest bin of the first window, which is that from 30 to 80 ms.
+        times = np.array([21_000, 76_000, 77_000, 78_000, 90_000])
+        at = 10 * np.arange(1, 6, dtype="u2")
+        scans = detector.push(EventArray(times, at, at, np.zeros(5, dtype="u1")))
+        found[seen] = round((scans[0].boxes[0, 0] - 10) / 8 - 1)
+    assert {seen: count for seen, count in found.items() if count} == {place: 3}
 
 
 def test_a_file_says_what_it_wants_and_gives(net):

@@ -28,13 +28,16 @@ def constant_net(path, outputs, side, channels=3, notes=None):
     return _save(path, helper.make_graph(nodes, "tiny", [given], ports, values), notes)
 
 
-def counting_net(path, side, channels, rows, per_event=0.0):
-    """A network with a state: each window, and each event, adds 8 px to the left of its boxes (K, 6)."""
+def counting_net(path, side, channels, rows, per_event=0.0, seen=slice(None), notes=None):
+    """A network with a state: each window, and each event seen, adds 8 px to the left of its boxes (K, 6)."""
     width, height = side
     shift = np.zeros((1, *rows.shape), np.float32)
     shift[..., [0, 2]] = 8.0
+    weights = np.zeros((1, channels, 1, 1), np.float32)
+    weights[:, seen] = 1.0
     nodes = [
-        helper.make_node("ReduceMean", ["events"], ["mean"], keepdims=1, axes=[1, 2, 3]),
+        helper.make_node("Mul", ["events", "weights"], ["looked_at"]),
+        helper.make_node("ReduceMean", ["looked_at"], ["mean"], keepdims=1, axes=[1, 2, 3]),
         helper.make_node("Mul", ["mean", "zero"], ["nothing4"]),
         helper.make_node("Add", ["state", "one"], ["counted"]),
         helper.make_node("Add", ["counted", "nothing4"], ["state_next"]),
@@ -46,6 +49,7 @@ def counting_net(path, side, channels, rows, per_event=0.0):
         numpy_helper.from_array(
             np.full((1, 1, 1, 1), per_event * channels * width * height, np.float32), "zero"
         ),
+        numpy_helper.from_array(weights, "weights"),
         numpy_helper.from_array(np.ones((1, 1, 1, 1), np.float32), "one"),
         numpy_helper.from_array(np.array([1, 1, 1], np.int64), "one_side"),
         numpy_helper.from_array(shift, "shift"),
@@ -59,7 +63,7 @@ def counting_net(path, side, channels, rows, per_event=0.0):
         helper.make_tensor_value_info("found", TensorProto.FLOAT, [1, *rows.shape]),
         helper.make_tensor_value_info("state_next", TensorProto.FLOAT, [1, 1, 1, 1]),
     ]
-    return _save(path, helper.make_graph(nodes, "counting", inputs, outputs, values), None)
+    return _save(path, helper.make_graph(nodes, "counting", inputs, outputs, values), notes)
 
 
 def _save(path, graph, notes):
