@@ -10,7 +10,7 @@ from typing import Any
 from jeat_graph.benchmark import common
 from jeat_graph.benchmark.raw_segments import SENSORS, Finding, RawSegment, detector_named
 from jeat_graph.data.errors import ConfigError
-from jeat_graph.detection.named import EVENTS, FRAMES
+from jeat_graph.detection.named import EVENTS, FRAMES, MOTION
 
 KINDS = (FRAMES, EVENTS)
 
@@ -30,20 +30,9 @@ def add_raw(parser: argparse.ArgumentParser, name: str) -> None:
         help="folders that `simulate --sensors pictures` wrote, one a light; no detector may have seen them",
     )
     texts = "detectors of {}: motion, the name of a network that comes with the package, or FILE.onnx"
-    add(
-        "--frames",
-        nargs="+",
-        default=["motion"],
-        metavar="NAME|FILE",
-        help=texts.format("pictures (default: motion)"),
-    )
-    add(
-        "--events",
-        nargs="+",
-        default=["motion"],
-        metavar="NAME|FILE",
-        help=texts.format("events (default: motion)"),
-    )
+    for kind, seen in zip(KINDS, ("pictures", "events"), strict=True):
+        help_text = texts.format(f"{seen} (default: {MOTION})")
+        add(f"--{kind}", nargs="+", default=[MOTION], metavar="NAME|FILE", help=help_text)
     add(
         "--detection-set",
         action="append",

@@ -6,7 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from jeat_graph.calibration.verdict import CHANCE, Recording, Verdict, judge_both
+from jeat_graph.calibration.supervised import Recording
+from jeat_graph.calibration.verdict import CHANCE, Verdict, judge_both
 from jeat_graph.config.schema import Config
 
 #: Factors on the standard deviation of the centre's noise that are tried.

@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from jeat_graph.calibration.supervised import MatchedSensors, measure_sensors, with_sensors
+from jeat_graph.calibration.supervised import MatchedSensors, Recording, measure_sensors, with_sensors
 from jeat_graph.calibration.tune import folds, shorten
-from jeat_graph.calibration.verdict import Recording, better, judge
+from jeat_graph.calibration.verdict import better, judge
 from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import DataError
 

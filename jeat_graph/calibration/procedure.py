@@ -9,10 +9,9 @@ from jeat_graph.calibration.matches import SensorMatches, match_sensor
 from jeat_graph.calibration.noise_scale import scale_noise
 from jeat_graph.calibration.offset import Lag, lags_between, lags_from_truth, with_lags
 from jeat_graph.calibration.parts import PARTS, PartChoice, choose_parts
-from jeat_graph.calibration.supervised import calibrate
+from jeat_graph.calibration.supervised import Recording, calibrate
 from jeat_graph.calibration.tracked import follow
 from jeat_graph.calibration.tune import Choice, folds, knobs, shorten, tune
-from jeat_graph.calibration.verdict import Recording
 from jeat_graph.config.schema import Config, InputConfig
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError

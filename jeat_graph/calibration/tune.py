@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from jeat_graph.calibration.verdict import Recording, Verdict, better, judge
+from jeat_graph.calibration.supervised import Recording
+from jeat_graph.calibration.verdict import Verdict, better, judge
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError

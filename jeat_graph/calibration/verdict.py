@@ -13,16 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from jeat_graph.calibration.honesty import price
+from jeat_graph.calibration.supervised import Recording
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.detections import Detections
-from jeat_graph.data.trajectories import GroundTruth, Trajectories
+from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.eval.frames import Kind
 from jeat_graph.eval.metrics import evaluate
 from jeat_graph.eval.position_nees import position_nees
 from jeat_graph.tracking.whole import both_tables, track
-
-Recording = tuple[Detections, GroundTruth]
 
 #: What a change may lose, in the mean or on one half (per cent), and still count as no worse.
 CHANCE = 0.05

@@ -30,12 +30,9 @@ def check_boxes(boxes: npt.ArrayLike, scores: npt.ArrayLike) -> tuple[FloatArray
             outside [0, 1]. The message names the first row at fault.
     """
     try:
-        b = np.ascontiguousarray(boxes, dtype=np.float64)
-        s = np.ascontiguousarray(scores, dtype=np.float64)
+        b, s = plain_floats(boxes), plain_floats(scores)
     except (TypeError, ValueError):
         raise DataError("boxes must have shape (M, 4) and scores shape (M,), all of them numbers") from None
-    b = b if b.flags.behaved else b.copy()
-    s = s if s.flags.behaved else s.copy()
     if b.size == 0:
         b = b.reshape(0, 4)
     if b.ndim != 2 or b.shape[1] != 4:
@@ -47,6 +44,16 @@ def check_boxes(boxes: npt.ArrayLike, scores: npt.ArrayLike) -> tuple[FloatArray
         row, what = bad
         raise DataError(f"box {row}: {what}")
     return b, s
+
+
+def plain_floats(values: npt.ArrayLike) -> FloatArray:
+    """Return numbers as compiled code takes them: C-contiguous, writable float64; copied if need be.
+
+    Raises:
+        TypeError, ValueError: not numbers.
+    """
+    array = np.ascontiguousarray(values, dtype=np.float64)
+    return array if array.flags.behaved else array.copy()
 
 
 def find_bad_row(boxes: FloatArray, scores: FloatArray) -> tuple[int, str] | None:

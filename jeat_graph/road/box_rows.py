@@ -10,6 +10,7 @@ from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 from jeat_graph.road.box_kernel import HIGH, LOW, NEITHER, WHOLE
 from jeat_graph.road.box_solver import BoxRows
+from jeat_graph.road.camera import RoadCamera
 
 _CUT_SIGMAS = 2.0  # a side this many standard deviations from the picture's edge may be cut off by it
 
@@ -151,3 +152,12 @@ def binned(rows: BoxRows, config: BoxConfig) -> BoxRows:
         np.ascontiguousarray(rows.group[first][order]),
         rows.memory_s,
     )
+
+
+def contact_places(rows: BoxRows, camera: RoadCamera) -> FloatArray:
+    """Where the middles of the lower edges are on the road (N, 2); NaN where a side is cut off."""
+    x, y = rows.mode.T
+    bottom = rows.z[:, 1] + np.where(y == WHOLE, np.exp(rows.z[:, 3]) / 2.0, 0.0)
+    place = camera.to_road(np.stack([rows.z[:, 0], bottom], axis=1))
+    seen = (x == WHOLE) & ((y == WHOLE) | (y == HIGH))
+    return np.where(seen[:, None], place, np.nan)

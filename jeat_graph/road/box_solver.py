@@ -51,6 +51,11 @@ class BoxRows(NamedTuple):
     group: IntArray
     memory_s: FloatArray
 
+    def take(self, part: slice) -> BoxRows:
+        """Return some of the boxes."""
+        of_boxes = (name for name in self._fields if name != "memory_s")
+        return self._replace(**{name: np.ascontiguousarray(getattr(self, name)[part]) for name in of_boxes})
+
 
 class Motion(NamedTuple):
     """What a trial motion is made of.

@@ -15,7 +15,8 @@ import numpy as np
 
 from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.road.box_kernel import CHANNELS, HIGH, WHOLE, KernelCamera, kernel_camera
+from jeat_graph.road.box_kernel import CHANNELS, KernelCamera, kernel_camera
+from jeat_graph.road.box_rows import contact_places
 from jeat_graph.road.box_solver import BoxRows, Motion, linearise, solve_boxes, whiten
 from jeat_graph.road.camera import PARAMETERS, RoadCamera
 from jeat_graph.road.fleet import CLASSES
@@ -121,8 +122,20 @@ def fit_cuboid(
         The fit, or None where too little of the vehicle is on the road, or no cuboid makes such boxes.
     """
     begun = begin(rows, camera, config, motion)
-    if begun is None:
-        return None
+    return None if begun is None else fit_begun(begun, camera, config)
+
+
+def fit_begun(begun: Beginning, camera: RoadCamera, config: CuboidConfig) -> CuboidFit | None:
+    """Fit one vehicle's boxes from where `begin` begins.
+
+    Args:
+        begun: the boxes, and motions to begin with.
+        camera: the camera.
+        config: what is taken for a vehicle.
+
+    Returns:
+        The fit, or None where no cuboid makes such boxes.
+    """
     kernel = kernel_camera(camera)
     found = [one for k in range(len(CLASSES)) if (one := _fit_kind(kernel, begun, k, config)) is not None]
     mixed = mix(found, config)
@@ -131,37 +144,45 @@ def fit_cuboid(
     best, theta, covariance = mixed
     rows, C = begun.rows, begun.basis.basis.shape[1]
     fit = MotionFit(
-        begun.t0,
-        begun.knots,
-        theta[: 2 * C].reshape(2, C),
-        covariance[: 2 * C, : 2 * C],
-        np.zeros((2 * C, 0, 2)),
-        rows.t,
-        np.zeros((len(rows.t), 2)),
-        best.weight,
+        *(begun.t0, begun.knots),
+        *(theta[: 2 * C].reshape(2, C), covariance[: 2 * C, : 2 * C], np.zeros((2 * C, 0, 2))),
+        *(rows.t, np.zeros((len(rows.t), 2)), best.weight),
     )
-    effect = _calibration_effect(camera, rows, begun.basis, best)[: 2 * C]
-    return CuboidFit(
-        fit,
-        effect @ camera.covariance @ effect.T,
-        best.kind,
-        theta[2 * C :],
-        covariance[2 * C :, 2 * C :],
-        best.chi2,
-    )
+    return fit_of(fit, mixed, _calibration_effect(camera, rows, begun.basis, best), camera)
+
+
+def fit_of(
+    motion: RoadMotion,
+    mixed: tuple[Candidate, FloatArray, FloatArray],
+    effect: FloatArray,
+    camera: RoadCamera,
+) -> CuboidFit:
+    """Put together what was found.
+
+    Args:
+        motion: the vehicle's.
+        mixed: from `mix`.
+        effect: (P, C) derivative of the motion's coefficients and the size with respect to the camera's.
+        camera: the camera.
+    """
+    best, theta, covariance = mixed
+    effect = effect[:-_SIZES]
+    by_calibration = effect @ camera.covariance @ effect.T
+    size = slice(-_SIZES, None)
+    return CuboidFit(motion, by_calibration, best.kind, theta[size], covariance[size, size], best.chi2)
 
 
 def begin(
     rows: BoxRows, camera: RoadCamera, config: CuboidConfig, motion: MotionFitConfig
 ) -> Beginning | None:
     """Find a motion to begin with, for each kind of vehicle; None where too little is on the road."""
-    contact = _contact(rows, camera)
+    contact = contact_places(rows, camera)
     good = np.asarray(np.isfinite(contact).all(axis=1))
     if good.sum() < _LEAST_BOXES:
         return None
     t_good, contact = rows.t[good], contact[good]
     first, last = np.flatnonzero(good)[[0, -1]].tolist()
-    rows = _from_to(rows, first, last)
+    rows = rows.take(slice(first, last + 1))
     if t_good[-1] <= t_good[0]:
         return None
     t0 = float(rows.t.mean())
@@ -207,25 +228,6 @@ def mix(found: list[Candidate], config: CuboidConfig) -> tuple[Candidate, FloatA
         off = one.theta - theta
         covariance += weight * (one.covariance * max(factor, 1.0) + np.outer(off, off))
     return best, theta, (covariance + covariance.T) / 2.0
-
-
-def _contact(rows: BoxRows, camera: RoadCamera) -> FloatArray:
-    """Where the middles of the lower edges are on the road (N, 2); NaN where a side is cut off."""
-    x, y = rows.mode.T
-    bottom = rows.z[:, 1] + np.where(y == WHOLE, np.exp(rows.z[:, 3]) / 2.0, 0.0)
-    place = camera.to_road(np.stack([rows.z[:, 0], bottom], axis=1))
-    seen = (x == WHOLE) & ((y == WHOLE) | (y == HIGH))
-    return np.where(seen[:, None], place, np.nan)
-
-
-def _from_to(rows: BoxRows, first: int, last: int) -> BoxRows:
-    part = slice(first, last + 1)
-    cut = {
-        name: np.ascontiguousarray(getattr(rows, name)[part])
-        for name in rows._fields
-        if name not in ("memory_s",)
-    }
-    return rows._replace(**cut)
 
 
 def _fit_kind(camera: KernelCamera, begun: Beginning, kind: int, config: CuboidConfig) -> Candidate | None:

@@ -22,7 +22,7 @@ from jeat_graph.road.boxes_road import BOX_MOTION
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.causal_steps import road_terms
 from jeat_graph.road.chain_rows import SIZES
-from jeat_graph.road.cuboid_fit import CuboidConfig, begin, fit_cuboid
+from jeat_graph.road.cuboid_fit import CuboidConfig, begin, fit_begun
 from jeat_graph.road.fleet import sizes_allowed
 from jeat_graph.road.motion_fit import MotionFitConfig
 from jeat_graph.road.road_factors import (
@@ -183,7 +183,7 @@ class RoadFixedLag:
     def _begun(self, rows: BoxRows) -> _Window | None:
         """Begin with a fit to the first boxes; None where they do not make a vehicle yet."""
         begun = begin(rows, self._camera, CuboidConfig(), self._motion)
-        fit = fit_cuboid(rows, self._camera, CuboidConfig(), self._motion)
+        fit = None if begun is None else fit_begun(begun, self._camera, CuboidConfig())
         if begun is None or fit is None:
             return None
         keys = self._keys(begun.rows.t[0], begun.rows.t[-1])
@@ -236,8 +236,7 @@ def _leave(identity: int, window: _Window, until: float) -> RecordArray:
         # The last solution's rows, linearised where it was, stand for the boxes from now on.
         window.priors = [known_of_last(system.take(first, first + count), window.priors)]
         kept = np.searchsorted(window.rows.t, window.keys[count], side="right")
-        later = {name: np.ascontiguousarray(getattr(window.rows, name)[kept:]) for name in _OF_BOXES}
-        window.rows = window.rows._replace(**later)
+        window.rows = window.rows.take(slice(kept, None))
         window.gone += count
         window.keys = window.keys[count:]
         window.coefficients = np.ascontiguousarray(window.coefficients[:, 3 * count :])

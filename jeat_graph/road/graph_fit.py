@@ -26,6 +26,7 @@ from jeat_graph.road.cuboid_fit import (
     CuboidFit,
     begin,
     calibration_effect,
+    fit_of,
     mix,
     residual_slopes,
 )
@@ -107,15 +108,7 @@ def fit_graph(
     best, theta, covariance = mixed
     C = 3 * count
     fit = KeyMotion(drive.keys, theta[: 2 * C].reshape(2, C), covariance[: 2 * C, : 2 * C], t, best.weight)
-    effect = _calibration_effect(camera, drive, best)[: 2 * C]
-    return CuboidFit(
-        fit,
-        effect @ camera.covariance @ effect.T,
-        best.kind,
-        theta[2 * C :],
-        covariance[2 * C :, 2 * C :],
-        best.chi2,
-    )
+    return fit_of(fit, mixed, _calibration_effect(camera, drive, best), camera)
 
 
 def _fit_kind(

@@ -11,8 +11,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.road.robust import believed_span
 
-_BELIEVED = 0.25  # weight of a box that is as far off as the kernel is wide
 #: Quintics (6, 6), ascending powers of u in [0, 1], with one each of place, speed and acceleration at u = 0,
 #: then at u = 1, equal to one and all others zero.
 _QUINTIC = np.linalg.inv(
@@ -70,10 +70,7 @@ class KeyMotion(NamedTuple):
 
     def window(self) -> tuple[float, float]:
         """First and last time that the fit believes (s)."""
-        good = np.flatnonzero(self.weight > _BELIEVED)
-        if len(good) < 2:
-            return float(self.t[0]), float(self.t[-1])
-        return float(self.t[good[0]]), float(self.t[good[-1]])
+        return believed_span(self.t, self.weight)
 
     def basis(self, t: FloatArray, derivative: int = 0) -> FloatArray:
         """Rows (..., 3 K) whose product with the coefficients is place, speed or acceleration at t (s)."""

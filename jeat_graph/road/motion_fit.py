@@ -17,12 +17,11 @@ from scipy.linalg import cho_factor, cho_solve
 
 from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.road.robust import agreed_weights, kernel
+from jeat_graph.road.robust import agreed_weights, believed_span, kernel
 
 _ROBUST_PASSES = 5
 _STIFF_PASSES = 3
 ANYWHERE_M = 1e3
-_BELIEVED = 0.25  # weight of a point that is as far off as the kernel is wide
 
 
 @dataclass(frozen=True)
@@ -74,10 +73,7 @@ class MotionFit(NamedTuple):
 
     def window(self) -> tuple[float, float]:
         """First and last time that the fit believes (s): ends of a track that wander off do not count."""
-        good = np.flatnonzero(self.weight > _BELIEVED)
-        if len(good) < 2:
-            return float(self.t[0]), float(self.t[-1])
-        return float(self.t[good[0]]), float(self.t[good[-1]])
+        return believed_span(self.t, self.weight)
 
     def basis(self, t: FloatArray, derivative: int = 0) -> FloatArray:
         """Rows B (..., C) whose product with the coefficients is place, speed or acceleration at t (s)."""

@@ -8,6 +8,7 @@ from jeat_graph.data.arrays import FloatArray
 
 _DRAWS = 80
 _LEAST_APART = 0.15  # of the track's time, between the three points of a draw
+_BELIEVED = 0.25  # weight of a point that is as far off as the kernel is wide
 
 
 def kernel(distance: FloatArray, soft: float) -> FloatArray:
@@ -46,3 +47,16 @@ def agreed_weights(s: FloatArray, xy: FloatArray, whiten: FloatArray, soft: floa
     distance = np.linalg.norm(np.einsum("mij,dmj->dmi", whiten, miss), axis=-1)
     cost = (1.0 - kernel(distance, soft)).sum(axis=1)
     return kernel(distance[int(np.argmin(cost))], 2.0 * soft)
+
+
+def believed_span(t: FloatArray, weight: FloatArray) -> tuple[float, float]:
+    """First and last time (s) that a fit believes: ends of a track that wander off do not count.
+
+    Args:
+        t: (N,) times of what was fitted, ascending (s).
+        weight: (N,) robust weights.
+    """
+    good = np.flatnonzero(weight > _BELIEVED)
+    if len(good) < 2:
+        return float(t[0]), float(t[-1])
+    return float(t[good[0]]), float(t[good[-1]])

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.boxes import plain_floats
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError, TimeOrderError, UnknownSensorError
 from jeat_graph.tracking.batch import Arrivals
@@ -77,10 +78,7 @@ def _plain(values: FloatArray, ndim: int) -> FloatArray:
     """
     if values.ndim != ndim:
         raise DataError(f"boxes must have shape (M, 4) and scores shape (M,), not {values.shape}")
-    flags = values.flags
-    if values.dtype == np.float64 and flags.c_contiguous and flags.behaved:
-        return values
-    return np.array(values, dtype=np.float64, order="C")
+    return plain_floats(values)
 
 
 def sensor_index(name: str, names: Sequence[str]) -> int:
