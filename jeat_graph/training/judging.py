@@ -31,6 +31,8 @@ _LEAST_SCORE = 0.01
 SIZES = {"below 12 px": (0.0, 12.0), "12 to 32 px": (12.0, 32.0), "above 32 px": (32.0, np.inf)}
 #: Windows are judged every 20 ms.
 _STEP_BINS = 4
+#: Who has hardly moved for so long is not asked for: nothing shows it, though a memory may know of it (s).
+_SEEN_S = 0.2
 _US = 1e6
 
 
@@ -157,7 +159,8 @@ def _windows(
         for end, window in zip(ends, windows_of(own, side, shape, ends), strict=True):
             rows, state = net(torch.from_numpy(window[None]).float().to(reader.device), state)
             corners, scores = reader.read(rows)
-            begin, now = first_us / _US, (first_us + end) / _US
+            now = (first_us + end) / _US
+            begin = max(first_us / _US, now - _SEEN_S)
             yield Looked(
                 segment.source, corners, scores, asked_for(segment, begin, now, settings.least_way_px)
             )

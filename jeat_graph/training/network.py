@@ -24,8 +24,8 @@ _PRIOR = 0.01
 #: A box is first about e cells wide: 11, 22 and 43 px.
 _FIRST_SIZE = 1.0
 _LOG_SIZE = (-3.0, 5.0)
-#: Events of a pixel in a bin above this say no more; then they are brought to about 1.
-_MOST_COUNT, _COUNT_SCALE = 8.0, 0.5
+#: Events of a pixel in a bin above this say no more. The first normalisation sees to their scale.
+_MOST_COUNT = 8
 
 
 class DetectionNet(nn.Module):
@@ -72,6 +72,17 @@ class DetectionNet(nn.Module):
             for channels, s in zip(self.state_channels, _MEMORY_STRIDES, strict=False)
         )
 
+    def learn(self, settled: bool) -> None:
+        """Take the mode for learning.
+
+        Args:
+            settled: normalise as in use, by means and variances seen so far, and leave those as they are.
+        """
+        self.train()
+        for layer in self.modules():
+            if isinstance(layer, nn.BatchNorm2d):
+                layer.train(not settled)
+
     def forward(
         self, x: Tensor, state: Sequence[Tensor] = (), length: int = 1
     ) -> tuple[Tensor, tuple[Tensor, ...]]:
@@ -91,7 +102,7 @@ class DetectionNet(nn.Module):
             (logarithm, in cells) and logit; and the state after the last window.
         """
         if self.settings.has_memory:
-            x = torch.clamp(x, max=_MOST_COUNT) * _COUNT_SCALE
+            x = _cut_off(x)
         fine = self.to_4(self.stem(x))
         middle = self.to_8(fine)
         kept: tuple[Tensor, ...] = ()
@@ -122,6 +133,13 @@ def _remembered(memory: nn.Module, x: Tensor, state: Tensor, length: int) -> tup
         state = memory(one, state)
         seen.append(state)
     return torch.cat(seen), state
+
+
+def _cut_off(counts: Tensor) -> Tensor:
+    """Cut off high counts, while they are bytes, and bring them to the precision of the layers."""
+    device = counts.device.type
+    kind = torch.get_autocast_dtype(device) if torch.is_autocast_enabled(device) else torch.float32
+    return torch.clamp(counts, max=_MOST_COUNT).to(kind)
 
 
 def _doubled(x: Tensor) -> Tensor:

@@ -85,6 +85,14 @@ class TrainSettings(Section):
     learning_rate: float = number(2e-3, "1", "the highest, of AdamW", 0.0, 1.0, open_low=True)
     final_share: float = number(0.02, "1", "share of it at the end of the cosine", 0.0, 1.0)
     warm_up_share: float = number(0.03, "1", "share of the training in which the rate rises", 0.0, 0.5)
+    settled_share: float = number(
+        0.4,
+        "1",
+        "share of the training, its last part, in which layers are normalised as in use: by what was seen on "
+        "the way, not by the few cut-outs of a step, whose light may be of all kinds",
+        0.0,
+        1.0,
+    )
     weight_decay: float = number(0.02, "1", "of AdamW", 0.0, 1.0)
     clip: float = number(10.0, "1", "longest gradient", open_low=True)
     average_steps: float = number(500.0, "1", "steps that the averaged weights go back", 1.0)

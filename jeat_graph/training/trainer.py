@@ -120,6 +120,7 @@ class Trainer:
         saved = time.monotonic()
         try:
             while (progress := self._progress(total)) < 1.0:
+                self.net.learn(settled=progress >= 1.0 - self._job.settings.settled_share)
                 self._learn(batches.get(self.step), self._rate(progress))
                 self._spent_s = time.monotonic() - begun
                 after = self._progress(total)
@@ -152,14 +153,13 @@ class Trainer:
         settings, device = self._job.settings, self._job.device
         for group in self._optimiser.param_groups:
             group["lr"] = rate
-        self.net.train()
         self._optimiser.zero_grad(set_to_none=True)
         state = self.net.empty_state(len(batch.targets[0]), settings.crop_px)
         count = len(batch.steps)
         for first in range(0, count, settings.back):
             part = slice(first, first + settings.back)
             length = len(batch.steps[part])
-            shown = torch.cat(batch.steps[part]).to(device, memory_format=torch.channels_last).float()
+            shown = torch.cat(batch.steps[part]).to(device, memory_format=torch.channels_last)
             targets = [
                 type(t)(t.boxes.to(device), t.ignored.to(device))
                 for asked in batch.targets[part]

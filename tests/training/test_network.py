@@ -36,3 +36,18 @@ def test_what_was_seen_before_counts():
         fresh, state = net(window, net.empty_state(1, SIDE))
         again, _ = net(window, state)
     assert not torch.allclose(fresh, again)
+
+
+@pytest.mark.parametrize("settled", [False, True])
+def test_a_network_that_has_settled_learns_with_the_normalisation_that_it_is_used_with(settled):
+    torch.manual_seed(3)
+    net = DetectionNet(NetSettings(kind="frames", width=4))
+    shown = torch.rand(BATCH, 3, SIDE[1], SIDE[0])
+    with torch.no_grad():
+        used, _ = net.eval()(shown)
+        means = {name: value.clone() for name, value in net.named_buffers()}
+        net.learn(settled)
+        learned, _ = net(shown)
+    assert net.training
+    assert all(torch.equal(value, means[name]) for name, value in net.named_buffers()) == settled
+    assert torch.allclose(used, learned, atol=1e-6) == settled
