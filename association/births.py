@@ -18,7 +18,7 @@ def choose_births(
     track_boxes: FloatArray,
     min_existence: float,
     max_overlap: float,
-) -> tuple[IntArray, IntArray]:
+) -> tuple[IntArray, IntArray, IntArray]:
     """Choose the leftover detections that start tracks, the surest first.
 
     A detection that coincides with a living track, or with a birth by the same sensor, is a duplicate and
@@ -36,11 +36,13 @@ def choose_births(
 
     Returns:
         parents (B,) detections that start tracks; partner (M,) the index into `parents` of the birth that a
-        detection joins, or -1.
+        detection joins, or -1; double (M,) a living track that the detection coincides with and that has not
+        taken it, or -1.
     """
     num = len(existence)
     parents = np.empty(num, dtype=np.int64)
     partner = np.full(num, -1, dtype=np.int64)
+    double = np.full(num, -1, dtype=np.int64)
     count = 0
     order = np.argsort(-existence, kind="mergesort")
     by_left = np.argsort(track_boxes[:, 0], kind="mergesort")
@@ -55,6 +57,8 @@ def choose_births(
             k = np.searchsorted(left, boxes[j, 0] - widest)
             while k < len(left) and left[k] < right and not refused:
                 refused = overlap(boxes[j], track_boxes[by_left[k]]) > max_overlap
+                if refused:
+                    double[j] = by_left[k]
                 k += 1
             if refused:
                 continue
@@ -69,4 +73,4 @@ def choose_births(
         if not refused:
             parents[count] = j
             count += 1
-    return parents[:count], partner
+    return parents[:count], partner, double

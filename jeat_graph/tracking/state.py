@@ -74,7 +74,8 @@ class SceneState(NamedTuple):
         agreed: (S,) those of them on tracks that another sensor has seen.
         trust: (S,) what the ratio of the two says of the sensor: factor on its evidence, in (0, 1].
         fruitless: (S,) recent mean number, a scan, of each sensor's detections on tracks that ended without
-            having been confirmed, and that no other sensor saw.
+            having been confirmed, and of those that no track took where there was such a track; all on tracks
+            that no other sensor saw.
         looked: (S,) scans full of confirmed tracks that `p_detect` rests on.
     """
 

@@ -17,7 +17,7 @@ def iou(a, b):
 
 def births(boxes, existence, sensor, taken=None, tracks=(), least=0.01, most=0.5):
     boxes = np.array(boxes, dtype=float).reshape(-1, 4)
-    parents, partner = choose_births(
+    parents, partner, double = choose_births(
         boxes,
         np.array(existence, dtype=float),
         np.array(sensor, dtype=np.int64),
@@ -26,17 +26,20 @@ def births(boxes, existence, sensor, taken=None, tracks=(), least=0.01, most=0.5
         least,
         most,
     )
-    return parents.tolist(), partner.tolist()
+    return parents.tolist(), partner.tolist(), double.tolist()
 
 
 def by_definition(boxes, existence, sensor, taken, tracks, least, most):
     """The rule in plain words: the surest first; refuse, join, or start."""
-    parents, partner = [], [-1] * len(boxes)
+    parents, partner, double = [], [-1] * len(boxes), [-1] * len(boxes)
     for j in sorted(range(len(boxes)), key=lambda j: (-existence[j], j)):
         if taken[j] or existence[j] < least:
             continue
         if most < 1.0:
-            if any(iou(boxes[j], track) > most for track in tracks):
+            over = [i for i, track in enumerate(tracks) if iou(boxes[j], track) > most]
+            if over:
+                # Where several refuse it, the leftmost does.
+                double[j] = min(over, key=lambda i: (tracks[i][0], i))
                 continue
             near = [
                 b
@@ -48,7 +51,7 @@ def by_definition(boxes, existence, sensor, taken, tracks, least, most):
                     partner[j] = near[0]
                 continue
         parents.append(j)
-    return parents, partner
+    return parents, partner, double
 
 
 @st.composite
@@ -86,27 +89,32 @@ def test_births_are_those_of_the_definition(dets, tracks, seed, least, most):
 
 def test_the_surest_detection_is_born_first():
     far = [[0, 0, 10, 10], [100, 0, 10, 10], [200, 0, 10, 10]]
-    assert births(far, [0.2, 0.9, 0.5], [0, 0, 0]) == ([1, 2, 0], [-1, -1, -1])
+    assert births(far, [0.2, 0.9, 0.5], [0, 0, 0])[:2] == ([1, 2, 0], [-1, -1, -1])
 
 
-def test_a_detection_on_a_track_starts_none():
-    assert births([[0, 0, 10, 10]], [0.9], [0], tracks=[[1, 0, 10, 10]]) == ([], [-1])
+def test_a_detection_on_a_track_starts_none_and_says_on_which():
+    tracks = [[50, 0, 10, 10], [1, 0, 10, 10]]
+    assert births([[0, 0, 10, 10], [90, 0, 10, 10]], [0.9, 0.9], [0, 0], tracks=tracks) == (
+        [1],
+        [-1, -1],
+        [1, -1],
+    )
 
 
 def test_two_sensors_views_of_one_vehicle_are_one_birth():
-    assert births([[0, 0, 10, 10], [1, 0, 10, 10]], [0.4, 0.9], [0, 1]) == ([1], [0, -1])
+    assert births([[0, 0, 10, 10], [1, 0, 10, 10]], [0.4, 0.9], [0, 1])[:2] == ([1], [0, -1])
 
 
 def test_two_boxes_of_one_sensor_on_one_place_are_one_birth_and_no_second_view():
-    assert births([[0, 0, 10, 10], [1, 0, 10, 10]], [0.4, 0.9], [0, 0]) == ([1], [-1, -1])
+    assert births([[0, 0, 10, 10], [1, 0, 10, 10]], [0.4, 0.9], [0, 0])[:2] == ([1], [-1, -1])
 
 
 def test_what_a_track_took_and_what_is_too_doubtful_start_none():
     far = [[0, 0, 10, 10], [100, 0, 10, 10], [200, 0, 10, 10]]
-    assert births(far, [0.9, 0.001, 0.9], [0, 0, 0], taken=[1, 0, 0]) == ([2], [-1, -1, -1])
+    assert births(far, [0.9, 0.001, 0.9], [0, 0, 0], taken=[1, 0, 0])[:2] == ([2], [-1, -1, -1])
 
 
 def test_the_paper_refuses_no_birth():
     same = [[0, 0, 10, 10]] * 3
-    parents, partner = births(same, [0.0, 0.0, 0.0], [0, 1, 0], tracks=same, least=0.0, most=1.0)
+    parents, partner, _ = births(same, [0.0, 0.0, 0.0], [0, 1, 0], tracks=same, least=0.0, most=1.0)
     assert (parents, partner) == ([0, 1, 2], [-1, -1, -1])

@@ -25,6 +25,7 @@ from jeat_graph.tracking.batch import Batch, Measured
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.ending import confirm
 from jeat_graph.tracking.stages.inner import inner
+from jeat_graph.tracking.stages.learning import scan_weight
 from jeat_graph.tracking.stages.predicting import jerk_of, split_noise
 from jeat_graph.tracking.stages.updating import update_track
 from jeat_graph.tracking.state import SceneState, TrackArrays
@@ -45,7 +46,7 @@ def give_birth(
     """Start tracks from leftovers; returns the number of tracks and the next identity."""
     settings = model.settings
     existence = birth_existence(batch, scene, model)
-    parents, partner = choose_births(
+    parents, partner, double = choose_births(
         batch.boxes,
         existence,
         batch.sensor,
@@ -54,6 +55,11 @@ def give_birth(
         settings.birth.min_existence,
         settings.birth.max_overlap,
     )
+    for j in range(len(double)):
+        # What comes to nothing on a track of nobody else's is no vehicle either.
+        i, s = double[j], batch.sensor[j]
+        if i >= 0 and not tracks.confirmed[i] and tracks.seen_by[i] == 1 << s:
+            scene.fruitless[s] += scan_weight(s, model)
     for b in range(len(parents)):
         start_track(tracks, n + b, next_id + b, batch, parents[b], model, log)
         tracks.existence[n + b] = existence[parents[b]]
