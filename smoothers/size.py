@@ -22,47 +22,69 @@ class SmoothedSize:
         rate_density: (K,) root spectral density of the rate over the interval that ends there (1/s^1.5).
         mean: (K, 2, 2) for width and height, [ln size, rate] (ln px, 1/s).
         cov: (K, 2, 2, 2) covariances.
+        cross: (K, 2, 2, 2) covariance of each key with the next; of the last, nothing.
     """
 
     t: FloatArray
     rate_density: FloatArray
     mean: FloatArray
     cov: FloatArray
+    cross: FloatArray
 
-    def at(self, t: FloatArray) -> FloatArray:
-        """Sizes (T, 2), width and height (px), at times `t` (T,) (s).
+    def at(self, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Sizes at times `t` (T,) (s).
 
-        Between two keys by the cubic that the model's prior implies, beyond the ends at constant rate.
+        Between two keys as the model's prior implies, beyond the ends at constant rate.
+
+        Returns:
+            (T, 2) width and height (px), and (T, 2) the variances of their logarithms.
         """
-        return _sizes_at(self.t, self.mean, np.asarray(t, dtype=np.float64))
+        query = np.asarray(t, dtype=np.float64)
+        return _sizes_at(self.t, self.rate_density, self.mean, self.cov, self.cross, query)
 
 
 @njit(cache=True)
-def _sizes_at(t: FloatArray, mean: FloatArray, query: FloatArray) -> FloatArray:
+def _sizes_at(
+    t: FloatArray,
+    rate_density: FloatArray,
+    mean: FloatArray,
+    cov: FloatArray,
+    cross: FloatArray,
+    query: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
     """`SmoothedSize.at`."""
-    out = np.empty((len(query), 2))
+    out, var = np.empty((len(query), 2)), np.empty((len(query), 2))
     last, right = len(t) - 1, 0
     for i in range(len(query)):
         if right > last or t[right] < query[i] or (right > 0 and t[right - 1] >= query[i]):
             right = np.searchsorted(t, query[i])
         if query[i] <= t[0] or query[i] >= t[last]:
             edge = 0 if query[i] <= t[0] else last
+            d = query[i] - t[edge]
+            grown = rate_density[last] * rate_density[last] * abs(d * d * d) / 3.0
             for axis in range(2):
-                out[i, axis] = math.exp(mean[edge, axis, 0] + (query[i] - t[edge]) * mean[edge, axis, 1])
+                out[i, axis] = math.exp(mean[edge, axis, 0] + d * mean[edge, axis, 1])
+                C = cov[edge, axis]
+                var[i, axis] = C[0, 0] + 2.0 * d * C[0, 1] + d * d * C[1, 1] + grown
             continue
         span = t[right] - t[right - 1]
         s = (query[i] - t[right - 1]) / span
+        # The conditional mean of a constant-velocity (white-acceleration) prior is the cubic Hermite
+        # polynomial of its two ends (Barfoot, State Estimation for Robotics, ch. 3.4); about it the size
+        # varies by as much as an integrated random walk does that is held at both.
+        a0, a1 = (1 + 2 * s) * (1 - s) * (1 - s), s * (1 - s) * (1 - s) * span
+        b0, b1 = s * s * (3 - 2 * s), s * s * (s - 1) * span
+        arc = span * s * (1 - s)
+        free = rate_density[right] * rate_density[right] * arc * arc * arc / 3.0
         for axis in range(2):
             a, b = mean[right - 1, axis], mean[right, axis]
-            # The conditional mean of a constant-velocity (white-acceleration) prior is the cubic Hermite
-            # polynomial of its two ends (Barfoot, State Estimation for Robotics, ch. 3.4).
-            out[i, axis] = math.exp(
-                (1 + 2 * s) * (1 - s) * (1 - s) * a[0]
-                + s * (1 - s) * (1 - s) * span * a[1]
-                + s * s * (3 - 2 * s) * b[0]
-                + s * s * (s - 1) * span * b[1]
-            )
-    return out
+            out[i, axis] = math.exp(a0 * a[0] + a1 * a[1] + b0 * b[0] + b1 * b[1])
+            A, B, C = cov[right - 1, axis], cov[right, axis], cross[right - 1, axis]
+            ends = a0 * a0 * A[0, 0] + 2.0 * a0 * a1 * A[0, 1] + a1 * a1 * A[1, 1]
+            ends += b0 * b0 * B[0, 0] + 2.0 * b0 * b1 * B[0, 1] + b1 * b1 * B[1, 1]
+            between = a0 * (C[0, 0] * b0 + C[0, 1] * b1) + a1 * (C[1, 0] * b0 + C[1, 1] * b1)
+            var[i, axis] = ends + 2.0 * between + free
+    return out, var
 
 
 @njit(cache=True)
@@ -74,7 +96,7 @@ def _smooth(
     z: FloatArray,
     r: FloatArray,
     drift: FloatArray,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Filter and smooth [ln size, rate]; see `smooth_size`, whose measurements are in order of time here."""
     t, rate_density = np.empty(len(times) + 1), np.empty(len(times) + 1)
     key = np.empty(len(times), dtype=np.int64)
@@ -85,6 +107,7 @@ def _smooth(
             keys += 1
         key[i] = keys - 1
     mean, cov = np.empty((keys, 2, 2)), np.empty((keys, 2, 2, 2))
+    cross = np.zeros((keys, 2, 2, 2))
     ahead = np.empty((keys, 2, 3))  # predicted covariances: of the size, with the rate, of the rate
     for axis in range(2):
         i = 0
@@ -123,6 +146,11 @@ def _smooth(
             e1 = mean[k + 1, axis, 1] - mean[k, axis, 1]
             mean[k, axis, 0] += g00 * e0 + g01 * e1
             mean[k, axis, 1] += g10 * e0 + g11 * e1
+            N = cov[k + 1, axis]
+            cross[k, axis, 0, 0] = g00 * N[0, 0] + g01 * N[1, 0]
+            cross[k, axis, 0, 1] = g00 * N[0, 1] + g01 * N[1, 1]
+            cross[k, axis, 1, 0] = g10 * N[0, 0] + g11 * N[1, 0]
+            cross[k, axis, 1, 1] = g10 * N[0, 1] + g11 * N[1, 1]
             D0 = cov[k + 1, axis, 0, 0] - A[0]
             D1 = cov[k + 1, axis, 0, 1] - A[1]
             D2 = cov[k + 1, axis, 1, 1] - A[2]
@@ -130,7 +158,7 @@ def _smooth(
             P[0, 1] += g10 * (g00 * D0 + g01 * D1) + g11 * (g00 * D1 + g01 * D2)
             P[1, 0] = P[0, 1]
             P[1, 1] += g10 * (g10 * D0 + g11 * D1) + g11 * (g10 * D1 + g11 * D2)
-    return t[:keys], rate_density[:keys], mean, cov
+    return t[:keys], rate_density[:keys], mean, cov, cross
 
 
 def smooth_size(

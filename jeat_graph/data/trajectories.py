@@ -34,6 +34,8 @@ class Trajectories(TrajectoryViews):
         classes: (N,) class that most of the track's detections so far name, weighed by their scores; empty
             text where none names any. None where no detection of the recording has a class.
         class_probability: (N,) share of those scores that speak for it, NaN where it is unknown; or None.
+        size_var: (N, 2) variances of width and height, those of the whole box, not of what the picture leaves
+            of it (px²); NaN where they are unknown, as all are where nothing is given.
 
     Raises:
         DataError: if the columns differ in length or shape.
@@ -49,10 +51,13 @@ class Trajectories(TrajectoryViews):
     sensors: tuple[str, ...] = ()
     classes: TextArray | None = None
     class_probability: FloatArray | None = None
+    size_var: FloatArray = None  # type: ignore[assignment]  # filled in below
 
     def __post_init__(self) -> None:
         n = len(self.t)
-        for name, width in (("boxes", 4), ("mean", 6), ("var", 6)):
+        if self.size_var is None:
+            object.__setattr__(self, "size_var", np.full((n, 2), np.nan))
+        for name, width in (("boxes", 4), ("mean", 6), ("var", 6), ("size_var", 2)):
             if getattr(self, name).shape != (n, width):
                 raise DataError(f"{name} must have shape ({n}, {width}), not {getattr(self, name).shape}")
         for name in ("track_id", "existence", "used"):
@@ -107,7 +112,7 @@ class Trajectories(TrajectoryViews):
 
 
 #: Names of the columns that every table has.
-COLUMNS = ("t", "track_id", "boxes", "existence", "mean", "var", "used")
+COLUMNS = ("t", "track_id", "boxes", "existence", "mean", "var", "used", "size_var")
 
 
 @dataclass(frozen=True, eq=False)

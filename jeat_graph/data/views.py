@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 BOX = ("left", "top", "width", "height")
 MEAN = ("x", "y", "vx", "vy", "ax", "ay")
 VAR = tuple(f"var_{name}" for name in MEAN)
+SIZE_VAR = ("var_width", "var_height")
 _SHOWN_ROWS = 8
 
 
@@ -32,6 +33,7 @@ class TrajectoryViews:
         existence: FloatArray
         mean: FloatArray
         var: FloatArray
+        size_var: FloatArray
         used: IntArray
         sensors: tuple[str, ...]
         classes: TextArray | None
@@ -109,6 +111,7 @@ class TrajectoryViews:
         columns["sensors"] = self.sensor_text()
         if self.classes is not None:
             columns |= {"class": self.classes, "class_probability": self.class_probability}
+        columns |= {name: self.size_var[:, k] for k, name in enumerate(SIZE_VAR)}
         return pd.DataFrame(columns)
 
     @classmethod
@@ -138,6 +141,7 @@ class TrajectoryViews:
             var=stack(VAR),
             used=np.array(used, dtype=np.int64),
             sensors=tuple(names),
+            size_var=stack(SIZE_VAR) if all(name in c for name in SIZE_VAR) else None,
             **class_column(c.get("class"), c.get("class_probability")),
         )
 

@@ -9,7 +9,14 @@ import numpy as np
 
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.table_writer import csv_lines
-from jeat_graph.io.trajectories_io import CLASS_COLUMNS, COLUMNS, EXISTENCE_DECIMALS, rounded, table_columns
+from jeat_graph.io.trajectories_io import (
+    CLASS_COLUMNS,
+    COLUMNS,
+    EXISTENCE_DECIMALS,
+    SIZE_COLUMNS,
+    rounded,
+    table_columns,
+)
 
 _ENCODER = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"), check_circular=False)
 
@@ -18,7 +25,8 @@ def json_line(t: float, table: Trajectories) -> str:
     """Return the tracks of one moment as one line of JSON, numbers rounded as in `causal.csv`.
 
     `{"t": s, "tracks": [{"track_id", "box": [l, t, w, h], "existence", "mean": [x, y, vx, vy, ax, ay],
-    "var": [the six variances], "sensors": [names used now]}, …]}`. Variances that are not known are null.
+    "var": [the six variances], "size_var": [those of width and height], "sensors": [names used now]}, …]}`.
+    Variances that are not known are null.
     Where detections have classes, `"class"` and `"class_probability"` follow, null where nothing names one.
 
     Args:
@@ -27,8 +35,8 @@ def json_line(t: float, table: Trajectories) -> str:
     """
     tracks: list[dict[str, Any]] = []
     if len(table):
-        boxes, existence, mean, var = (values.tolist() for values in rounded(table))
-        known = not np.isnan(table.var).any()
+        boxes, existence, mean, var, size_var = (values.tolist() for values in rounded(table))
+        known = not (np.isnan(table.var).any() or np.isnan(table.size_var).any())
         names = {
             used: [name for s, name in enumerate(table.sensors) if used >> s & 1]
             for used in set(table.used.tolist())
@@ -40,7 +48,8 @@ def json_line(t: float, table: Trajectories) -> str:
                     "box": boxes[k],
                     "existence": existence[k],
                     "mean": mean[k],
-                    "var": var[k] if known else [None if value != value else value for value in var[k]],
+                    "var": var[k] if known else _nulls(var[k]),
+                    "size_var": size_var[k] if known else _nulls(size_var[k]),
                     "sensors": names[used],
                 }
             )
@@ -51,9 +60,13 @@ def json_line(t: float, table: Trajectories) -> str:
     return _ENCODER.encode({"t": t, "tracks": tracks}) + "\n"
 
 
+def _nulls(values: list[float]) -> list[float | None]:
+    return [None if value != value else value for value in values]
+
+
 def csv_header(classes: bool = False) -> str:
     """Return the first line of a causal table, with or without the columns of classes."""
-    return ",".join((*COLUMNS, *CLASS_COLUMNS) if classes else COLUMNS) + "\n"
+    return ",".join((*COLUMNS, *(CLASS_COLUMNS if classes else ()), *SIZE_COLUMNS)) + "\n"
 
 
 def csv_rows(table: Trajectories, classes: bool = False) -> str:

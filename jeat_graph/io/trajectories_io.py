@@ -18,7 +18,7 @@ from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.class_columns import class_column, unknown_classes
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.data.views import BOX, MEAN, VAR
+from jeat_graph.data.views import BOX, MEAN, SIZE_VAR, VAR
 from jeat_graph.io import kitti, motchallenge
 from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.formats import recognise
@@ -28,9 +28,11 @@ from jeat_graph.io.plain_text import frames_of
 from jeat_graph.io.table_writer import TableWriter, round_decimals, round_significant
 from jeat_graph.io.tables import read_table
 
-#: Columns of every table, and those behind them where the detections have classes.
+#: Columns that a table must have; those behind them where the detections have classes; the last ones, which
+#: older tables lack.
 COLUMNS = ("t", "track_id", *BOX, "existence", *MEAN, *VAR, "sensors")
 CLASS_COLUMNS = ("class", "class_probability")
+SIZE_COLUMNS = SIZE_VAR
 #: Decimals that boxes, motion, and probabilities are written with.
 PX_DECIMALS = 3
 EXISTENCE_DECIMALS = 6
@@ -96,7 +98,7 @@ def table_columns(table: Trajectories, classes: bool | None = None) -> dict[str,
         table: the rows.
         classes: whether those of classes are among them; by default where the table has such.
     """
-    boxes, existence, mean, var = rounded(table)
+    boxes, existence, mean, var, size_var = rounded(table)
     columns: dict[str, Any] = {"t": table.t + 0.0, "track_id": table.track_id}
     columns |= {name: boxes[:, k] for k, name in enumerate(BOX)}
     columns["existence"] = existence
@@ -108,15 +110,21 @@ def table_columns(table: Trajectories, classes: bool | None = None) -> dict[str,
         if table.classes is not None and table.class_probability is not None:
             names, share = table.classes, table.class_probability
         columns |= {"class": names, "class_probability": round_decimals(share, EXISTENCE_DECIMALS)}
+    columns |= {name: size_var[:, k] for k, name in enumerate(SIZE_COLUMNS)}
     return columns
 
 
-def rounded(table: Trajectories) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return boxes (N, 4), existence (N,), mean (N, 6) and variances (N, 6), rounded as they are written."""
+def rounded(table: Trajectories) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return what is written, rounded as it is written.
+
+    Returns:
+        Boxes (N, 4), existence (N,), mean (N, 6), its variances (N, 6) and those of width and height (N, 2).
+    """
     # In one array: for the few tracks of one moment every call costs more than its arithmetic.
     values = np.concatenate([table.boxes, table.mean, table.existence[:, None]], axis=1)
     values = np.rint(values * _SCALE) / _SCALE + 0.0
-    return values[:, :4], values[:, 10], values[:, 4:10], round_significant(table.var, _VAR_DIGITS)
+    var = round_significant(np.concatenate([table.var, table.size_var], axis=1), _VAR_DIGITS)
+    return values[:, :4], values[:, 10], values[:, 4:10], var[:, :6], var[:, 6:]
 
 
 def write_trajectories(table: Trajectories, path: str | Path) -> None:
@@ -155,7 +163,7 @@ def read_trajectories(
         found = _without_motion(table, frame / rate, kitti.boxes_of(table), "score")
         found = replace(found, **class_column(table.text("type"), None))
     else:
-        table = read_table(path, COLUMNS, CLASS_COLUMNS)
+        table = read_table(path, COLUMNS, (*CLASS_COLUMNS, *SIZE_COLUMNS))
         found = _read_contract(table)
     _check(table, found)
     return found
@@ -169,17 +177,23 @@ def _read_contract(table: FileTable) -> Trajectories:
         raise DataError(f"names {len(sensors)} sensors; at most {_MOST_SENSORS} can be kept", table.path)
     bit = {name: 1 << k for k, name in enumerate(sensors)}
     mask = [sum(bit[name] for name in set(words.split(_JOINT)) if name) for words in distinct.tolist()]
+    stated = all(name in table for name in SIZE_COLUMNS)
     return Trajectories(
         t=table.number("t"),
         track_id=table.whole("track_id"),
         boxes=_stack(table, BOX),
         existence=table.number("existence"),
         mean=_stack(table, MEAN),
-        var=np.stack([table.number(name, blank_ok=True, nan_ok=True) for name in VAR], axis=1),
+        var=_variances(table, VAR),
+        size_var=_variances(table, SIZE_COLUMNS) if stated else np.full((len(table), 2), np.nan),
         used=np.asarray(mask, dtype=np.int64)[index.reshape(-1)],
         sensors=sensors,
         **_classes_of(table),
     )
+
+
+def _variances(table: FileTable, names: tuple[str, ...]) -> FloatArray:
+    return np.stack([table.number(name, blank_ok=True, nan_ok=True) for name in names], axis=1)
 
 
 def _classes_of(table: FileTable) -> dict[str, Any]:

@@ -84,14 +84,16 @@ def rows_of_table(
     Args:
         t: (N,) times, ascending (s).
         boxes: (N, 4) left, top, width, height (px).
-        stated: (N, 2) variances of their middles as the tracker states them (px²).
+        stated: (N, 4) variances of their middles, of width and height as the tracker states them (px²); NaN
+            where it states none.
         size: width and height of the picture (px).
         config: how such boxes err.
     """
     extent = np.maximum(boxes[:, 2:], 1e-3)
     z = np.concatenate([boxes[:, :2] + extent / 2.0, np.log(extent)], axis=1)
     side = config.side_px**2 + (config.side_share * extent) ** 2
-    total = np.concatenate([side / 2.0 + np.nan_to_num(stated), 2.0 * side / extent**2], axis=1)
+    told = np.nan_to_num(stated)
+    total = np.concatenate([side / 2.0 + told[:, :2], (2.0 * side + told[:, 2:]) / extent**2], axis=1)
     rows = BoxRows(
         np.asarray(t, dtype=np.float64),
         z,

@@ -57,7 +57,8 @@ def boxes_of_table(table: Trajectories, camera: RoadCamera, config: BoxConfig) -
     size = (camera.width, camera.height)
     tracks = []
     for one in each_track(table):
-        rows = rows_of_table(one.t, one.boxes, one.var[:, :2], size, config)
+        stated = np.concatenate([one.var[:, :2], one.size_var], axis=1)
+        rows = rows_of_table(one.t, one.boxes, stated, size, config)
         tracks.append(TrackBoxes(int(one.track_id[0]), one.t, rows))
     return tracks
 

@@ -46,8 +46,8 @@ def predict_reported(now: Snapshot, t: float, model: Model, sensors: tuple[str, 
     # Nobody has looked in between, so nobody can have missed a track either: what counts is the gap now.
     now.tracks.t_update[:] += t - here
     found = report(now.tracks, n, t, *how)
-    classes = (None, None) if now.classes is None else now.classes.columns(found[1])
-    columns = Trajectories(*found, sensors, *classes)
+    kinds, share = (None, None) if now.classes is None else now.classes.columns(found[1])
+    columns = Trajectories(*found[:-1], sensors, kinds, share, found[-1])
     table = columns.take(np.isin(columns.track_id, reported))
     rows = np.searchsorted(now.tracks.track_id, table.track_id)
     cov = np.zeros((len(table), 6, 6))

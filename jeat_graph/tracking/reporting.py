@@ -53,7 +53,7 @@ def report(
     image: ImageConfig,
     output: OutputConfig,
     by_existence: bool,
-) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray, FloatArray, IntArray]:
+) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray, FloatArray, IntArray, FloatArray]:
     """Collect the confirmed tracks that are alive now.
 
     Args:
@@ -67,7 +67,7 @@ def report(
 
     Returns:
         Columns of `Trajectories`: t (R,), track_id (R,), boxes (R, 4), existence (R,), mean (R, 6),
-        var (R, 6), used (R,).
+        var (R, 6), used (R,), size_var (R, 2).
     """
     boxes = track_boxes(tracks.mean[:num_tracks], tracks.size_mean[:num_tracks])
     width, height = image.width, image.height
@@ -92,6 +92,7 @@ def report(
     out_boxes = np.empty((count, 4))
     mean = np.empty((count, 6))
     var = np.empty((count, 6))
+    size_var = np.empty((count, 2))
     for r in range(count):
         i = rows[r]
         for axis in range(2):
@@ -102,6 +103,8 @@ def report(
                 high = min(high, width if axis == 0 else height)
             out_boxes[r, axis] = low
             out_boxes[r, 2 + axis] = high - low
+            # Of e^s where ln e^s = s is what is estimated: to first order e^2s times the variance of s.
+            size_var[r, axis] = boxes[i, 2 + axis] * boxes[i, 2 + axis] * tracks.size_cov[i, axis, 0, 0]
             for d in range(3):
                 mean[r, 2 * d + axis] = tracks.mean[i, axis, d]
                 var[r, 2 * d + axis] = tracks.cov[i, axis, d, d]
@@ -114,4 +117,5 @@ def report(
         mean,
         var,
         tracks.used[chosen],
+        size_var,
     )

@@ -266,8 +266,8 @@ class Tracker(SmoothedTracks):
         columns = self._report(
             self._tracks, self._num_tracks, t, gap, settings.image, settings.output, by_existence
         )
-        classes = (None, None) if self._classes is None else self._classes.columns(columns[1])
-        return Trajectories(*columns, self.sensor_names, *classes)
+        kinds, share = (None, None) if self._classes is None else self._classes.columns(columns[1])
+        return Trajectories(*columns[:-1], self.sensor_names, kinds, share, columns[-1])
 
     def last_updates(self) -> Diagnostics:
         """Return what the last step gave to the tracks, those too that are not reported.

@@ -43,7 +43,7 @@ def run(tmp_path_factory):
 def test_track_writes_the_class_of_each_track_in_every_format_that_has_one(run):
     for name in ("causal.csv", "smoothed.csv"):
         table = pd.read_csv(run / "run" / name)
-        assert list(table.columns)[-3:] == ["sensors", "class", "class_probability"]
+        assert list(table.columns)[-5:-2] == ["sensors", "class", "class_probability"]
         last = table.groupby("track_id").last()
         assert sorted(last["class"]) == ["car", "truck"]
         assert last.set_index("class").class_probability["car"] == pytest.approx(0.75, abs=1e-6)
@@ -156,9 +156,9 @@ def test_stream_says_the_class_of_each_track(monkeypatch, capsys, tmp_path):
     assert (last["class"], last["class_probability"]) == ("car", 1.0)
     assert set(pd.read_csv(tmp_path / "s.csv")["class"].dropna()) == {"car"}
     out = streamed(monkeypatch, capsys, scans(True), "--format", "csv")
-    assert out.splitlines()[0].endswith(",sensors,class,class_probability")
+    assert out.splitlines()[0].endswith(",sensors,class,class_probability,var_width,var_height")
     out = streamed(monkeypatch, capsys, scans(False), "--format", "csv")
-    assert out.splitlines()[0].endswith(",sensors")
+    assert out.splitlines()[0].endswith(",sensors,var_width,var_height")
     assert "class" not in streamed(monkeypatch, capsys, scans(False))
 
 

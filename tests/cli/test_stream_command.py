@@ -157,6 +157,7 @@ def test_json_out_holds_the_numbers_of_the_causal_table(joint_lines, tracked, mo
     np.testing.assert_array_equal([track["box"] for _, track in rows], table.boxes)
     np.testing.assert_array_equal([track["mean"] for _, track in rows], table.mean)
     np.testing.assert_array_equal([track["var"] for _, track in rows], table.var)
+    np.testing.assert_array_equal([track["size_var"] for _, track in rows], table.size_var)
     np.testing.assert_array_equal([track["existence"] for _, track in rows], table.existence)
     assert ["|".join(track["sensors"]) for _, track in rows] == table.sensor_text()
     assert len(rows[0][1]["mean"]) == len(MEAN)

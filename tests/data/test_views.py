@@ -25,6 +25,7 @@ def table():
         var=rng.uniform(0.1, 2.0, (n, 6)),
         used=np.array([0, 1, 2, 3] * 3),
         sensors=("evt", "rgb"),
+        size_var=rng.uniform(0.1, 2.0, (n, 2)),
     )
 
 
@@ -33,9 +34,11 @@ def test_a_table_survives_the_way_to_pandas_and_back(table):
     assert list(frame.columns[:6]) == ["t", "track_id", "left", "top", "width", "height"]
     assert frame.sensors.tolist()[:4] == ["", "evt", "rgb", "evt|rgb"]
     back = Trajectories.from_pandas(frame)
-    for name in ("t", "track_id", "boxes", "existence", "mean", "var", "used"):
+    for name in ("t", "track_id", "boxes", "existence", "mean", "var", "used", "size_var"):
         assert np.array_equal(getattr(back, name), getattr(table, name)), name
     assert back.sensors == table.sensors
+    old = Trajectories.from_pandas(frame.drop(columns=["var_width", "var_height"]))
+    assert np.isnan(old.size_var).all()
 
 
 def test_a_missing_column_is_named(table):
@@ -105,7 +108,7 @@ def named(table):
 
 def test_classes_are_seen_in_every_view(named):
     frame = named.to_pandas()
-    assert list(frame.columns)[-2:] == ["class", "class_probability"]
+    assert list(frame.columns)[-4:-2] == ["class", "class_probability"]
     assert Trajectories.from_pandas(frame).classes.tolist() == named.classes.tolist()
     assert "van 1 at" in repr(named)
     assert "track 5 at" in repr(named)

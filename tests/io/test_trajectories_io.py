@@ -37,6 +37,7 @@ def table(n: int, seed: int = 0, sensors: tuple[str, ...] = ("rgb", "evt")) -> T
         var=rng.uniform(1, 10, (n, 6)) * 10.0 ** rng.integers(-12, 12, (n, 6)),
         used=rng.integers(0, 1 << len(sensors), n),
         sensors=sensors,
+        size_var=rng.uniform(1, 10, (n, 2)) * 10.0 ** rng.integers(-12, 12, (n, 2)),
     )
 
 
@@ -75,6 +76,7 @@ def test_values_come_back_to_the_digits_that_are_kept(tmp_path, name):
     assert np.abs(after.mean - before.mean).max() <= 0.0005 + 1e-9
     assert np.abs(after.existence - before.existence).max() <= 5e-7 + 1e-12
     assert np.abs(after.var / before.var - 1).max() <= 5e-6 * (1 + 1e-9)
+    assert np.abs(after.size_var / before.size_var - 1).max() <= 5e-6 * (1 + 1e-9)
     assert after.sensor_text() == before.sensor_text()
 
 
@@ -103,18 +105,29 @@ def test_the_csv_is_what_the_contract_says(tmp_path):
         var=np.array([[1.23456789, 0.000123456789, 123456789.0, 1e-30, 1e5, np.nan]]),
         used=np.array([3]),
         sensors=("rgb", "evt"),
+        size_var=np.array([[0.25, np.nan]]),
     )
     write_trajectories(row, tmp_path / "t.csv")
     head, line = (tmp_path / "t.csv").read_text(encoding="utf-8").splitlines()
     assert head == (
         "t,track_id,left,top,width,height,existence,x,y,vx,vy,ax,ay,"
-        "var_x,var_y,var_vx,var_vy,var_ax,var_ay,sensors"
+        "var_x,var_y,var_vx,var_vy,var_ax,var_ay,sensors,var_width,var_height"
     )
     fields = line.split(",")
     assert float(fields[0]) == 1700000000.1234567
     assert fields[1:13] == ["7", "1.235", "0", "3", "4.5", "1", "2.735", "2.25", "-12.346", "0", "0", "0"]
     assert [float(field) for field in fields[13:17]] == [1.23457, 0.000123457, 123457000, 0.0]
-    assert fields[17:] == ["100000", "", "rgb|evt"]
+    assert fields[17:] == ["100000", "", "rgb|evt", "0.25", ""]
+
+
+def test_a_table_of_an_earlier_version_says_nothing_of_how_sure_sizes_are(tmp_path):
+    write_trajectories(table(5), tmp_path / "t.csv")
+    lines = (tmp_path / "t.csv").read_text(encoding="utf-8").splitlines()
+    (tmp_path / "old.csv").write_text("\n".join(line.rsplit(",", 2)[0] for line in lines) + "\n")
+    now, old = read_trajectories(tmp_path / "t.csv"), read_trajectories(tmp_path / "old.csv")
+    assert np.isnan(old.size_var).all()
+    assert np.array_equal(old.var, now.var)
+    assert old.sensor_text() == now.sensor_text()
 
 
 @FORMATS

@@ -84,7 +84,7 @@ def test_whitening_is_the_inverse_root_of_the_dense_covariance() -> None:
 
 
 def _fit(t: np.ndarray, boxes: np.ndarray, cam: RoadCamera, config: CuboidConfig) -> CuboidFit | None:
-    rows = rows_of_table(t, boxes, np.zeros((len(t), 2)), (cam.width, cam.height), BoxConfig())
+    rows = rows_of_table(t, boxes, np.zeros((len(t), 4)), (cam.width, cam.height), BoxConfig())
     return fit_cuboid(rows, cam, config, MOTION)
 
 

@@ -125,7 +125,7 @@ def _drive(rng: np.random.Generator, noise: float, length: float = 4.5) -> BoxRo
     seen, _ = sides(camera(), xy, np.zeros(len(t)), np.array([length, 1.8, 1.5]))
     seen = seen + noise * rng.standard_normal(seen.shape)
     boxes, cam = np.c_[seen[:, :2], seen[:, 2:] - seen[:, :2]], camera()
-    return rows_of_table(t, boxes, np.zeros((len(t), 2)), (cam.width, cam.height), BoxConfig())
+    return rows_of_table(t, boxes, np.zeros((len(t), 4)), (cam.width, cam.height), BoxConfig())
 
 
 def _deviation(fit: CuboidFit, t: np.ndarray, derivative: int) -> np.ndarray:

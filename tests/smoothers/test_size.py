@@ -69,22 +69,29 @@ def test_between_keys_equals_a_key_without_information():
             np.append(r, [[1e12, 1e12]], axis=0),
             np.append(q, 0.3),
         )
-        exact = np.exp(idle.mean[np.searchsorted(idle.t, query), :, 0])
-        assert np.allclose(result.at(np.array([query]))[0], exact, rtol=1e-8)
+        key = np.searchsorted(idle.t, query)
+        size, log_var = result.at(np.array([query]))
+        assert np.allclose(size[0], np.exp(idle.mean[key, :, 0]), rtol=1e-8)
+        assert np.allclose(log_var[0], idle.cov[key, :, 0, 0], rtol=1e-6)
 
 
 def test_beyond_the_ends_it_grows_at_constant_rate():
     t, z, r = example()
     result = smooth_size(0.0, PRIOR_MEAN, PRIOR_COV, t, z, r, np.full(len(t), 0.3))
     ln, rate = result.mean[-1].T
-    assert np.allclose(result.at(np.array([t[-1] + 0.4]))[0], np.exp(ln + 0.4 * rate))
-    assert np.allclose(result.at(result.t), np.exp(result.mean[:, :, 0]))
+    size, log_var = result.at(np.array([t[-1] + 0.4]))
+    assert np.allclose(size, np.exp(ln + 0.4 * rate))
+    ahead = np.array([1.0, 0.4])
+    assert np.allclose(log_var[0], [ahead @ P @ ahead + 0.3**2 * 0.4**3 / 3 for P in result.cov[-1]])
+    size, log_var = result.at(result.t)
+    assert np.allclose(size, np.exp(result.mean[:, :, 0]))
+    assert np.allclose(log_var, result.cov[:, :, 0, 0])
 
 
 def test_sizes_of_a_track_with_its_prior_alone():
     none = np.zeros((0, 2))
     result = smooth_size(1.0, PRIOR_MEAN, PRIOR_COV, np.zeros(0), none, none, np.zeros(0))
-    assert np.allclose(result.at(np.array([1.0])), np.exp(PRIOR_MEAN[:, 0]))
+    assert np.allclose(result.at(np.array([1.0]))[0], np.exp(PRIOR_MEAN[:, 0]))
 
 
 def test_a_size_older_than_the_prior_is_refused():

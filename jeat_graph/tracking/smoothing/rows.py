@@ -41,7 +41,7 @@ def rows_of(
     # Within a microsecond of the last state a detection shares it: the track is seen there, not held.
     held = observed.t - path.t[-1] > COINCIDENT_S
     mean[held, :, 1:] = 0.0
-    size = sizes.at(np.minimum(t, sizes.t[-1]))
+    size, log_var = sizes.at(np.minimum(t, sizes.t[-1]))
     boxes, visible = _boxes(mean, size, config.image.width, config.image.height, config.output.clip)
     keep: slice | BoolArray = slice(None)
     if config.output.clip:
@@ -58,6 +58,7 @@ def rows_of(
         var=var.transpose(0, 2, 1).reshape(-1, 6)[keep],
         used=observed.used[keep],
         sensors=config.sensor_names,
+        size_var=(size * size * log_var)[keep],
     )
 
 
