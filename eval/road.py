@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from jeat_graph.config.fields import check, number
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.tables import read_table
 
@@ -83,6 +84,22 @@ def _read(path: str | Path, identity: str, columns: tuple[str, ...], blank: tupl
     return RoadRows(t[order], ids[order], values[order])
 
 
+class Matched(NamedTuple):
+    """A track and the vehicle that it is.
+
+    Attributes:
+        track_id: identity of the track.
+        t: (N,) times of its rows during the vehicle's life (s).
+        true: (N, 3) x, y (m), speed (km/h) of the vehicle.
+        found: (N, 6) what the track says of them, with variances.
+    """
+
+    track_id: int
+    t: FloatArray
+    true: FloatArray
+    found: FloatArray
+
+
 @dataclass(frozen=True, eq=False)
 class RoadErrors:
     """Errors of rows that count.
@@ -91,11 +108,23 @@ class RoadErrors:
         error: (N, 3) across, along (m), speed (km/h): estimate less truth; NaN where no speed is stated.
         var: (N, 3) variances as stated.
         tracks: how many tracks they are of.
+        t: (N,) times (s).
+        track_id: (N,) identities of the tracks.
+        along: (N,) true places along the road (m).
     """
 
     error: FloatArray
     var: FloatArray
     tracks: int
+    t: FloatArray
+    track_id: IntArray
+    along: FloatArray
+
+    def take(self, rows: BoolArray | IntArray) -> RoadErrors:
+        """Return some of the rows."""
+        track_id = self.track_id[rows]
+        columns = (self.t[rows], track_id, self.along[rows])
+        return RoadErrors(self.error[rows], self.var[rows], len(np.unique(track_id)), *columns)
 
     def scores(self) -> dict[str, float | int]:
         """Root mean squares, normalised squares and the shares of 95 % intervals that hold.
@@ -133,7 +162,8 @@ def judge_road(tracks: RoadRows, truth: RoadRows, config: RoadJudging) -> RoadEr
     """Compare tracks with the true vehicles that they are at for most of their time.
 
     Truth is interpolated to the tracks' times. Which vehicle a track is taken for is decided over its whole
-    life; all of its rows then count, those far off too.
+    life; all of its rows then count, those far off too. A vehicle is one track's at a time, the one's that is
+    at it for longest: a false track that vehicles drive by is none of them.
 
     Args:
         tracks: estimates with variances.
@@ -143,29 +173,76 @@ def judge_road(tracks: RoadRows, truth: RoadRows, config: RoadJudging) -> RoadEr
     Raises:
         DataError: truth without rows.
     """
-    vehicles = truth.each()
+    errors, variances, count = [np.zeros((0, 3))], [np.zeros((0, 3))], 0
+    t, ids = [np.zeros(0)], [np.zeros(0, dtype=np.int64)]
+    y = [np.zeros(0)]
+    for one in matched(tracks, truth, config):
+        counts = (one.true[:, 1] >= config.near_m) & (one.true[:, 1] <= config.far_m)
+        errors.append((one.found[:, :3] - one.true)[counts])
+        variances.append(one.found[counts, 3:])
+        t.append(one.t[counts])
+        y.append(one.true[counts, 1])
+        ids.append(np.full(int(counts.sum()), one.track_id))
+        count += bool(counts.any())
+    return RoadErrors(
+        *(np.concatenate(errors), np.concatenate(variances), count),
+        *(np.concatenate(t), np.concatenate(ids), np.concatenate(y)),
+    )
+
+
+class _Pair(NamedTuple):
+    """A track and a vehicle that it may be.
+
+    Attributes:
+        track: place of the track.
+        vehicle: place of the vehicle.
+        near: (N,) times at which the track is at the vehicle (s).
+    """
+
+    track: int
+    vehicle: int
+    near: FloatArray
+
+
+def matched(tracks: RoadRows, truth: RoadRows, config: RoadJudging) -> list[Matched]:
+    """Tell which vehicle each track is, and list the track's rows beside the truth; as `judge_road`.
+
+    Raises:
+        DataError: truth without rows.
+    """
+    vehicles, all_tracks = truth.each(), tracks.each()
     if not vehicles:
         raise DataError("the truth on the road has no rows")
     gate = np.array([config.gate_across_m, config.gate_along_m])
-    errors, variances, count = [np.zeros((0, 3))], [np.zeros((0, 3))], 0
-    for track in tracks.each():
-        best: tuple[int, FloatArray, FloatArray] | None = None
-        for one in vehicles:
-            during = (track.t >= one.t[0]) & (track.t <= one.t[-1])
-            if not during.any():
-                continue
-            true = np.stack([np.interp(track.t[during], one.t, column) for column in one.values.T], axis=1)
-            near = (np.abs(true[:, :2] - track.values[during, :2]) < gate).all(axis=1).sum()
-            if near > config.least_share * len(track.t) and (best is None or near > best[0]):
-                best = int(near), true, track.values[during]
-        if best is None:
-            continue
-        _, true, found = best
-        counts = (true[:, 1] >= config.near_m) & (true[:, 1] <= config.far_m)
-        errors.append((found[:, :3] - true)[counts])
-        variances.append(found[counts, 3:])
-        count += bool(counts.any())
-    return RoadErrors(np.concatenate(errors), np.concatenate(variances), count)
+    pairs: list[_Pair] = []
+    for k, track in enumerate(all_tracks):
+        for v, one in enumerate(vehicles):
+            during, true = _beside(track, one)
+            near = (np.abs(true[:, :2] - track.values[during, :2]) < gate).all(axis=1)
+            if near.sum() > config.least_share * len(track.t):
+                pairs.append(_Pair(k, v, track.t[during][near]))
+    taken: dict[int, list[FloatArray]] = {}
+    chosen: dict[int, int] = {}
+    for pair in sorted(pairs, key=lambda one: -len(one.near)):
+        free = np.ones(len(pair.near), dtype=np.bool_)
+        for other in taken.get(pair.vehicle, []):
+            free &= (pair.near < other[0]) | (pair.near > other[-1])
+        if pair.track not in chosen and free.sum() > config.least_share * len(all_tracks[pair.track].t):
+            chosen[pair.track] = pair.vehicle
+            taken.setdefault(pair.vehicle, []).append(pair.near)
+    out = []
+    for k, v in sorted(chosen.items()):
+        track = all_tracks[k]
+        during, true = _beside(track, vehicles[v])
+        out.append(Matched(int(track.identity[0]), track.t[during], true, track.values[during]))
+    return out
+
+
+def _beside(track: RoadRows, vehicle: RoadRows) -> tuple[BoolArray, FloatArray]:
+    """Which rows of a track (N,) are during a vehicle's life, and the truth at those (K, 3)."""
+    during = np.asarray((track.t >= vehicle.t[0]) & (track.t <= vehicle.t[-1]))
+    true = [np.interp(track.t[during], vehicle.t, column) for column in vehicle.values.T]
+    return during, np.stack(true, axis=1)
 
 
 def judge_road_run(

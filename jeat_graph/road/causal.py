@@ -17,7 +17,7 @@ from jeat_graph.filters.measurement import MEASUREMENT
 from jeat_graph.road.box_kernel import kernel_camera
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.causal_steps import forget, step_road
-from jeat_graph.road.fleet import CLASSES
+from jeat_graph.road.fleet import CLASSES, EXTREMES, MOST_BEYOND
 from jeat_graph.road.results import columns_of_states
 from jeat_graph.road.road_state import MODEL, ROAD_ROW, SPEED, STRIPS, TRACK, RoadState
 from jeat_graph.road.speeds import KMH
@@ -34,6 +34,7 @@ _OF_CONFIG = (
     "edge_px",
     "gate",
     "pause",
+    "most_beyond",
 )
 _FIRST_CAPACITY = 64
 _FORGET_EVERY = 512  # steps
@@ -61,6 +62,12 @@ class RoadFilterConfig:
     known_kmh: float = number(
         20.0, "km/h", "a speed that is less sure (standard deviation) is not known yet", open_low=True
     )
+    most_beyond: float = number(
+        MOST_BEYOND,
+        "1",
+        "squared distance of a size beyond those of all kinds above which it is no vehicle",
+        open_low=True,
+    )
     silence_s: float = number(10.0, "s", "a track without a box for longer is forgotten", open_low=True)
 
     def __post_init__(self) -> None:
@@ -78,6 +85,7 @@ def road_model(config: RoadFilterConfig, camera: RoadCamera) -> RecordArray:
     model["size_mean"] = middle
     model["size_cov"] = np.einsum("k,ki,kj->ij", share, off, off) + within
     model["picture"] = camera.width, camera.height
+    model["extremes"] = EXTREMES
     for name in _OF_CONFIG:
         model[name] = getattr(config, name)
     return model

@@ -10,6 +10,7 @@ from numba import njit
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 from jeat_graph.road.box_kernel import CHANNELS, WHOLE, KernelCamera
 from jeat_graph.road.causal_kernel import begin, read_box
+from jeat_graph.road.fleet import beyond_vehicles
 from jeat_graph.road.road_state import (
     AY,
     LENGTH,
@@ -27,6 +28,7 @@ from jeat_graph.road.road_state import (
 
 _FIRST_BOXES = 5  # of a track that have to be whole
 _TELLS_AFTER = 30  # boxes of a track after which its speed counts for its strip
+_SIZE = 5  # first place of the size in a row of a table of the road
 _LEAST_MS = 1e-3  # a heading of a slower vehicle is not known at all
 
 
@@ -143,7 +145,7 @@ def states_at(state: RoadState, t: float, ids: IntArray, model: Record, found: R
         found: (N,) records of `ROAD_ROW`, filled with those of the known ones, in the order of `ids`.
 
     Returns:
-        How many are known.
+        How many are known, and of a vehicle's size.
     """
     count, n = 0, state.count[0]
     for j in range(len(ids)):
@@ -155,7 +157,11 @@ def states_at(state: RoadState, t: float, ids: IntArray, model: Record, found: R
         track["t"] = max(t, track["t"])
         row["t"], row["track_id"] = t, ids[j]
         road_terms(track["mean"], track["cov"], row["mean"], row["var"])
-        count += 1
+        if (
+            beyond_vehicles(row["mean"][_SIZE:], row["var"][_SIZE:], model["extremes"])
+            <= model["most_beyond"]
+        ):
+            count += 1
     return count
 
 

@@ -7,7 +7,6 @@ is weighed by the evidence of each kind's sizes, and where that leaves a doubt, 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -17,14 +16,14 @@ from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.road.box_kernel import CHANNELS, KernelCamera, kernel_camera
 from jeat_graph.road.box_rows import contact_places
-from jeat_graph.road.box_solver import BoxRows, Motion, linearise, solve_boxes, whiten
+from jeat_graph.road.box_solver import BoxRows, Motion, linearise, solve_boxes
+from jeat_graph.road.calibration_effect import calibration_effect, residual_slopes
 from jeat_graph.road.camera import PARAMETERS, RoadCamera
-from jeat_graph.road.fleet import CLASSES
+from jeat_graph.road.fleet import CLASSES, EXTREMES, MOST_BEYOND, beyond_vehicles
 from jeat_graph.road.key_motion import RoadMotion
 from jeat_graph.road.motion_fit import MotionFit, MotionFitConfig, basis_rows, motion_prior, spaced_knots
 
 _LEAST_BOXES = 4
-_CALIBRATION_STEP = 1e-3  # in standard deviations of each parameter, where it has one
 _DOUBT = 12.0  # minus twice the log of the odds below which a kind is ruled out
 _SIZES = 3
 
@@ -36,6 +35,12 @@ class CuboidConfig:
     soft: float = number(3.0, "1", "residual / error at which a box's weight is a quarter", open_low=True)
     worst_chi2: float = number(
         6.0, "1", "mean square of residuals above which it is no vehicle", open_low=True
+    )
+    most_beyond: float = number(
+        MOST_BEYOND,
+        "1",
+        "squared distance of a size beyond those of all kinds above which it is no vehicle",
+        open_low=True,
     )
     scale_strength: float = number(
         40.0, "1", "observations' worth of belief in the stated errors", open_low=True
@@ -209,12 +214,16 @@ def mix(found: list[Candidate], config: CuboidConfig) -> tuple[Candidate, FloatA
     """Weigh the kinds by their evidence.
 
     Returns:
-        The likeliest, and mean (P,) and covariance (P, P) of the mixture; None where no kind fits.
+        The likeliest, and mean (P,) and covariance (P, P) of the mixture; None where no kind fits, or only
+        in a size that no vehicle has.
     """
     if not found:
         return None
     best = min(found, key=lambda one: one.cost)
     if not best.chi2 <= config.worst_chi2:
+        return None
+    exact = np.zeros(_SIZES)
+    if beyond_vehicles(best.theta[-_SIZES:], exact, EXTREMES) > config.most_beyond:
         return None
     likely = [one for one in found if one.cost - best.cost < _DOUBT]
     share = np.exp(-0.5 * np.array([one.cost - best.cost for one in likely]))
@@ -253,18 +262,6 @@ def _fit_kind(camera: KernelCamera, begun: Beginning, kind: int, config: CuboidC
     return Candidate(kind, theta, np.asarray(np.linalg.inv(normal), dtype=np.float64), score, chi2, weight)
 
 
-def residual_slopes(camera: RoadCamera, residual: Callable[[KernelCamera], FloatArray]) -> FloatArray:
-    """Derivatives (..., 12) of residuals with respect to the camera's parameters, zero for exact ones."""
-    spread = np.sqrt(np.diag(camera.covariance))
-    slopes = np.zeros((*residual(kernel_camera(camera)).shape, len(PARAMETERS)))
-    for k in np.flatnonzero(spread > 0):
-        change = np.zeros(len(PARAMETERS))
-        change[k] = _CALIBRATION_STEP * spread[k]
-        more, less = (residual(kernel_camera(camera.moved(sign * change))) for sign in (1.0, -1.0))
-        slopes[..., k] = (more - less) / (2.0 * change[k])
-    return slopes
-
-
 def _calibration_effect(camera: RoadCamera, rows: BoxRows, motion: Motion, best: Candidate) -> FloatArray:
     """Derivative (P, 12) of the unknowns with respect to the camera's parameters."""
     P = len(best.theta)
@@ -278,20 +275,4 @@ def _calibration_effect(camera: RoadCamera, rows: BoxRows, motion: Motion, best:
 
     slopes = residual_slopes(camera, residual)
     linearise(kernel_camera(camera), rows, motion, best.theta, trial)
-    return calibration_effect(trial[..., :P], slopes, rows, best)
-
-
-def calibration_effect(columns: FloatArray, slopes: FloatArray, rows: BoxRows, best: Candidate) -> FloatArray:
-    """Derivative (P, 12) of the unknowns with respect to the camera's parameters.
-
-    Args:
-        columns: (N, 4, P) derivatives of what is measured with respect to the unknowns.
-        slopes: (N, 4, 12) of the residuals with respect to the camera's parameters.
-        rows: the boxes.
-        best: the fit.
-    """
-    P = columns.shape[-1]
-    white = np.concatenate([columns, slopes], axis=-1)
-    whiten(white, rows, best.weight)
-    flat = white.reshape(-1, white.shape[2])
-    return np.asarray(best.covariance @ (flat[:, :P].T @ flat[:, P:]), dtype=np.float64)
+    return calibration_effect(trial[..., :P], slopes, rows, best.weight, best.covariance)

@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from jeat_graph.data.arrays import FloatArray
 
@@ -34,6 +35,37 @@ CLASSES = (
     VehicleClass("truck", 0.07, (9.0, 2.5, 3.5), (1.8, 0.08, 0.4)),
     VehicleClass("truck", 0.06, (14.5, 2.52, 3.8), (2.2, 0.06, 0.3)),
 )
+
+_MEANS = np.array([one.mean for one in CLASSES])
+_SPREADS = np.array([one.spread for one in CLASSES])
+_EACH = np.arange(3)
+#: Least and greatest length, width, height (m) of all kinds, and how sizes of those kinds differ: (2, 2, 3).
+EXTREMES = np.array(
+    [[_MEANS[k, _EACH], _SPREADS[k, _EACH]] for k in (_MEANS.argmin(axis=0), _MEANS.argmax(axis=0))]
+)
+#: Squared distance beyond all kinds from which it is no vehicle: chi square, three sizes, one in 10,000.
+MOST_BEYOND = 21.1
+
+
+@njit(cache=True)
+def beyond_vehicles(size: FloatArray, var: FloatArray, extremes: FloatArray) -> float:
+    """Squared distance of a size from what lies between the smallest and the largest kind, in their spreads.
+
+    What lies between two kinds, as a car with a trailer does, is no distance away.
+
+    Args:
+        size: (3,) length, width, height (m).
+        var: (3,) variances of how it is known (m²).
+        extremes: `EXTREMES`.
+    """
+    total = 0.0
+    for k in range(3):
+        off = max(extremes[0, 0, k] - size[k], 0.0)
+        spread = extremes[0, 1, k]
+        if size[k] > extremes[1, 0, k]:
+            off, spread = size[k] - extremes[1, 0, k], extremes[1, 1, k]
+        total += off * off / (spread * spread + var[k])
+    return total
 
 
 def sizes_allowed(information: FloatArray, vector: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -17,6 +17,7 @@ from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.road.box_kernel import CHANNELS, KernelCamera, kernel_camera
 from jeat_graph.road.box_solver import BoxRows, whiten
+from jeat_graph.road.calibration_effect import calibration_effect, residual_slopes
 from jeat_graph.road.camera import PARAMETERS, RoadCamera
 from jeat_graph.road.chain_rows import MOTION, SIZES
 from jeat_graph.road.cuboid_fit import (
@@ -25,10 +26,8 @@ from jeat_graph.road.cuboid_fit import (
     CuboidConfig,
     CuboidFit,
     begin,
-    calibration_effect,
     fit_of,
     mix,
-    residual_slopes,
 )
 from jeat_graph.road.fleet import CLASSES
 from jeat_graph.road.key_motion import KeyMotion, key_rows
@@ -189,4 +188,6 @@ def _calibration_effect(camera: RoadCamera, drive: Drive, best: Candidate) -> Fl
     basis = key_rows(rows.t, drive.keys, 0)
     of_ways = [here[0][..., axis, None] * basis[:, None] for axis in range(2)]
     columns = np.concatenate([*of_ways, here[0][..., 2:]], axis=-1)
-    return calibration_effect(columns, residual_slopes(camera, residual_of), rows, best)
+    return calibration_effect(
+        columns, residual_slopes(camera, residual_of), rows, best.weight, best.covariance
+    )

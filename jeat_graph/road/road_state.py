@@ -61,6 +61,7 @@ TRACK = np.dtype(
 #: lateral_std, lateral_s: the same of speeds across it (m/s, s). edge_px: a side this near the picture's edge
 #: is cut off by it. gate: squared distance a degree of freedom beyond which a box is believed less. pause:
 #: share of a sensor's memory within which a further box of it is left out. picture: width and height (px).
+#: extremes, most_beyond: sizes that a vehicle may have (`fleet`).
 MODEL = np.dtype(
     [
         ("size_mean", np.float64, (3,)),
@@ -75,6 +76,8 @@ MODEL = np.dtype(
         ("gate", np.float64),
         ("pause", np.float64),
         ("picture", np.float64, (2,)),
+        ("extremes", np.float64, (2, 2, 3)),
+        ("most_beyond", np.float64),
     ]
 )
 

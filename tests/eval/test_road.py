@@ -53,6 +53,30 @@ def test_a_track_at_no_vehicle_is_not_judged() -> None:
     assert judge_road(_tracks(error), _truth(), RoadJudging()).scores() == {"rows": 0, "tracks": 0}
 
 
+def test_a_false_track_that_a_vehicle_drives_by_is_not_judged() -> None:
+    """It stands for 0.7 s on a lane: the vehicle that passes is within 8 m of it for most of that."""
+    true = _truth()
+    t = np.arange(0.7, 1.4, 0.05)
+    values = np.tile([0.0, 50.0, 0.0, 0.04, 0.04, 0.04], (len(t), 1))
+    alone = RoadRows(t, np.full(len(t), 300), values)
+    assert judge_road(alone, true, RoadJudging()).tracks == 1  # nothing else is at the vehicle
+    tracks = _tracks(np.zeros((2 * len(T), 3)))
+    both = RoadRows(
+        *(np.concatenate(pair) for pair in zip(vars(tracks).values(), vars(alone).values(), strict=True))
+    )
+    found = judge_road(both, true, RoadJudging())
+    assert set(found.track_id.tolist()) == {105, 106}
+    assert np.abs(found.error).max() < 1e-9
+
+
+def test_two_pieces_of_one_track_are_both_judged() -> None:
+    tracks = _tracks(np.zeros((2 * len(T), 3)))
+    identity = np.where(tracks.t > 1.0, tracks.identity + 200, tracks.identity)
+    order = np.lexsort((tracks.t, identity))
+    cut = RoadRows(tracks.t[order], identity[order], tracks.values[order])
+    assert set(judge_road(cut, _truth(), RoadJudging()).track_id.tolist()) == {105, 106, 305, 306}
+
+
 def test_tables_of_a_folder(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="no table of a road"):
         judge_road_run(tmp_path, tmp_path / "gt.csv")

@@ -153,3 +153,18 @@ def test_a_standing_vehicle_has_no_speed(y: float) -> None:
     assert found is not None
     vehicle = Vehicle(1, t, found.motion, found.by_calibration, 0.0, 0.0)
     assert vehicle.mean_speed(*found.motion.window()).kmh < 0.5
+
+
+def test_what_no_vehicle_is_as_small_as_is_no_vehicle() -> None:
+    """Boxes of a thing of 1.3 m that stands there make none; of a car with a trailer and a bicycle they do."""
+    cam, t = camera(), np.arange(0.0, 2.0, 0.05)
+    for size, speed, found in (
+        ((1.3, 0.5, 0.55), 0.0, False),
+        ((9.0, 1.9, 1.6), 20.0, True),
+        ((1.9, 0.65, 1.6), 6.0, True),
+    ):
+        xy = np.c_[np.full(len(t), 1.0), 25.0 + speed * t]
+        box = sides(cam, xy, np.zeros(len(t)), np.array(size))[0]
+        boxes = np.c_[box[:, :2], box[:, 2:] - box[:, :2]]
+        rows = rows_of_table(t, boxes, np.zeros((len(t), 4)), (cam.width, cam.height), BoxConfig())
+        assert (fit_cuboid(rows, cam, CuboidConfig(), MOTION) is not None) is found, size
