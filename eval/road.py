@@ -84,6 +84,11 @@ def _read(path: str | Path, identity: str, columns: tuple[str, ...], blank: tupl
     return RoadRows(t[order], ids[order], values[order])
 
 
+def share_held(error: FloatArray, var: FloatArray) -> FloatArray:
+    """Per cent of errors (N, ...) within the 95 % intervals of normal errors of these variances (...)."""
+    return np.asarray(100.0 * (np.abs(error) <= _Z95 * np.sqrt(var)).mean(axis=0), dtype=np.float64)
+
+
 class Matched(NamedTuple):
     """A track and the vehicle that it is.
 
@@ -136,7 +141,7 @@ class RoadErrors:
         place, place_var = self.error[:, :2], self.var[:, :2]
         known = np.isfinite(self.error[:, 2])
         speed, speed_var = self.error[known, 2], self.var[known, 2]
-        held = 100.0 * (np.abs(place) <= _Z95 * np.sqrt(place_var)).mean(axis=0)
+        held = share_held(place, place_var)
         rmse = np.sqrt((place**2).mean(axis=0))
         scores: dict[str, float | int] = {"across_rmse_m": float(rmse[0]), "along_rmse_m": float(rmse[1])}
         if known.any():
@@ -145,7 +150,7 @@ class RoadErrors:
                 "speed_median_kmh": float(np.median(np.abs(speed))),
                 "speed_bias_kmh": float(speed.mean()),
                 "speed_nees": float((speed**2 / speed_var).mean()),
-                "speed_held": float(100.0 * (np.abs(speed) <= _Z95 * np.sqrt(speed_var)).mean()),
+                "speed_held": float(share_held(speed, speed_var)),
             }
         return scores | {
             # Two coordinates: one where the covariances are right.

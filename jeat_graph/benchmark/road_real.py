@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
-from jeat_graph.eval.road import RoadErrors
+from jeat_graph.eval.road import share_held
 from jeat_graph.io.tables import read_table
 
 #: Which of the measured lengths are used.
@@ -88,8 +88,6 @@ def judge_camera(folder: Path, which: str, every: int) -> dict[str, Any]:
 def speed_scores(error: FloatArray, sigma: FloatArray) -> dict[str, Any]:
     """Mean, median and 95th percentile of absolute errors (km/h), bias, and the intervals that hold (%)."""
     size = np.abs(error)
-    nothing = np.zeros((len(error), 2))
-    held = RoadErrors(np.c_[nothing, error], np.c_[nothing + 1.0, sigma**2], 0).scores().get("speed_held")
     if not len(error):
         return {"vehicles": 0}
     return {
@@ -99,7 +97,7 @@ def speed_scores(error: FloatArray, sigma: FloatArray) -> dict[str, Any]:
         "p95_kmh": float(np.percentile(size, 95.0)),
         "bias_kmh": float(np.median(error)),
         "sigma_kmh": float(np.median(sigma)),
-        "held": held,
+        "held": float(share_held(error, sigma**2)),
         "errors": np.round(error, 3).tolist(),
     }
 

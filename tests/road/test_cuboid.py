@@ -156,7 +156,7 @@ def test_a_standing_vehicle_has_no_speed(y: float) -> None:
 
 
 def test_what_no_vehicle_is_as_small_as_is_no_vehicle() -> None:
-    """Boxes of a thing of 1.3 m that stands there make none; of a car with a trailer and a bicycle they do."""
+    """Boxes of a thing of 1.3 m that stands there make none; a car with a trailer and a bicycle do."""
     cam, t = camera(), np.arange(0.0, 2.0, 0.05)
     for size, speed, found in (
         ((1.3, 0.5, 0.55), 0.0, False),
