@@ -25,6 +25,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--gt", metavar="FILE", help="truth with motion; without it only consistency is judged"
     )
     parser.add_argument(
+        "--road",
+        metavar="FILE",
+        help="truth on the road: errors in m and km/h of a run with a camera too "
+        "(default: gt_road.csv beside --gt, if it is there)",
+    )
+    parser.add_argument(
         "--out", metavar="DIR", help="where to write compare.json and pictures (default: RUN)"
     )
     parser.add_argument(
@@ -47,6 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Read or track again, compare, print the tables, write `compare.json` and the pictures."""
     from jeat_graph.drawing.comparison import write_plots
+    from jeat_graph.eval.road_compare import road_truth_beside, with_road
     from jeat_graph.eval.tables import to_json
     from jeat_graph.io.atomic import check_writable, open_atomic
     from jeat_graph.io.truth_io import read_truth
@@ -70,6 +77,7 @@ def run(args: argparse.Namespace) -> int:
         measured = measured_run(folder, args.detections)
         stage("smoothing at all lags")
         comparison = compare_run(measured, truth, args.lags)
+        comparison = with_road(comparison, folder, args.road or road_truth_beside(folder, args.gt))
     print("\n".join(table.render() for table in comparison.tables), end="")
     with open_atomic(out / "compare.json") as file:
         file.write(to_json(comparison.values))

@@ -74,6 +74,7 @@ def _compare(args: argparse.Namespace) -> tuple[ComparedRun | None, str | None]:
         return None, "Filter against smoother was left out (--no-compare)."
     from jeat_graph.data.errors import DataError
     from jeat_graph.drawing.page.figures import compared_run
+    from jeat_graph.eval.road_compare import road_truth_beside, with_road
     from jeat_graph.io.truth_io import read_truth
     from jeat_graph.runs.measured import compare_run, measured_run
 
@@ -89,6 +90,6 @@ def _compare(args: argparse.Namespace) -> tuple[ComparedRun | None, str | None]:
         return None, f"Filter against smoother is not shown: {error}."
     truth = None if args.gt is None else read_truth(args.gt, rate_hz=args.rate)
     with portion(0.3, 0.8):
-        comparison = compare_run(measured, truth)
+        comparison = with_road(compare_run(measured, truth), folder, road_truth_beside(folder, args.gt))
     with portion(0.8, 1.0):
         return compared_run(comparison), None

@@ -41,29 +41,36 @@ def write_plots(comparison: Comparison, folder: str | Path) -> list[Path]:
     """Draw all pictures that a comparison with truth allows, each as PNG and SVG.
 
     Args:
-        comparison: with samples; without them nothing is drawn.
+        comparison: with samples, or with errors on the road; without them nothing is drawn.
         folder: where to write.
 
     Returns:
         The files written.
     """
-    if comparison.samples is None or not len(comparison.samples):
+    on_road = comparison.values.get("road", {})
+    samples, written = comparison.samples, list[Path]()
+    seen = samples is not None and len(samples) > 0
+    if not seen and not on_road.get("by_distance"):
         return []
     import matplotlib as mpl
     from matplotlib import pyplot as plt
 
+    from jeat_graph.drawing.road_comparison import road_errors
     from jeat_graph.io.atomic import atomic_path
 
-    samples, written = comparison.samples, []
     backend = mpl.get_backend()
     plt.switch_backend("agg")
     try:
         with mpl.rc_context(_STYLE):
-            figures: dict[str, Callable[[], Figure]] = {
-                "trajectories": lambda: _trajectories(plt, samples),
-                "error-over-time": lambda: _error_over_time(plt, samples, comparison.lags_s),
-                "rmse-against-lag": lambda: _rmse_against_lag(plt, comparison),
-            }
+            figures: dict[str, Callable[[], Figure]] = {}
+            if samples is not None and seen:
+                figures = {
+                    "trajectories": lambda: _trajectories(plt, samples),
+                    "error-over-time": lambda: _error_over_time(plt, samples, comparison.lags_s),
+                    "rmse-against-lag": lambda: _rmse_against_lag(plt, comparison),
+                }
+            if on_road.get("by_distance"):
+                figures["road-errors"] = lambda: road_errors(plt, on_road)
             for name, draw in told(figures.items()):
                 figure = draw()
                 for suffix in told((".png", ".svg")):

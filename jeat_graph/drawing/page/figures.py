@@ -70,6 +70,10 @@ _TEXTS = {
         "RMSE of position, velocity and acceleration against the smoother's lag",
         "What delay buys: a lag of 0 is the filter, the dashed line the smoother over whole tracks.",
     ),
+    "road-errors": (
+        "RMSE across and along the road and of the speed, and the intervals that hold, against the distance",
+        "On the road: filter and smoother at the same rows, against the truth in metres and km/h.",
+    ),
 }
 
 
