@@ -29,7 +29,29 @@ class Components(NamedTuple):
         return Components(self.boxes[keep], self.weight[keep], self.pixels[keep])
 
 
-def linked(marks: npt.NDArray[Any], link_px: int) -> tuple[int, npt.NDArray[np.int32]]:
+class Marked(NamedTuple):
+    """Marked pixels, row by row: few of a picture's, so that what is asked of them costs little.
+
+    Attributes:
+        x: (P,) columns (px).
+        y: (P,) rows (px).
+        group: (P,) number of the group that each belongs to, from 1; 0 for none.
+        weight: (P,) its mark.
+    """
+
+    x: IntArray
+    y: IntArray
+    group: IntArray
+    weight: IntArray
+
+    def renumbered(self, number: IntArray) -> Marked:
+        """Return the pixels of groups g with `number[g]` > 0, which is their new number."""
+        group = number[self.group]
+        kept = np.flatnonzero(group)
+        return Marked(self.x[kept], self.y[kept], group[kept], self.weight[kept])
+
+
+def linked(marks: npt.NDArray[Any], link_px: int) -> tuple[int, Marked]:
     """Number the groups of marked pixels: two belong together across a gap of less than `link_px`.
 
     Args:
@@ -37,7 +59,7 @@ def linked(marks: npt.NDArray[Any], link_px: int) -> tuple[int, npt.NDArray[np.i
         link_px: the gap (px), along rows and columns.
 
     Returns:
-        The number of groups, and (H, W) the group of each pixel, from 1; 0 where there is none.
+        The number of groups, and the marked pixels.
     """
     import cv2
 
@@ -45,30 +67,22 @@ def linked(marks: npt.NDArray[Any], link_px: int) -> tuple[int, npt.NDArray[np.i
     if link_px > 1:
         mask = cv2.dilate(mask, np.ones((link_px, link_px), dtype=np.uint8))
     count, labels = cv2.connectedComponents(mask, connectivity=8, ltype=cv2.CV_32S)
-    return count - 1, np.asarray(labels, dtype=np.int32)
+    return count - 1, Marked(*_gathered(labels, marks))
 
 
-def measured(
-    count: int,
-    labels: npt.NDArray[np.int32],
-    marks: npt.NDArray[Any],
-    trim_share: float = 0.0,
-    *,
-    keep_empty: bool = False,
-) -> Components:
+def measured(count: int, marked: Marked, trim_share: float = 0.0, *, keep_empty: bool = False) -> Components:
     """Measure groups by their marked pixels.
 
     Args:
         count: number of groups.
-        labels: (H, W) group of each pixel, 0 for none.
-        marks: (H, W) weight of each pixel; 0 where it is not marked.
+        marked: pixels; those with no weight are not marked.
         trim_share: columns at the left and right of a group that have fewer marked pixels than this share of
             its fullest column are not of its box, and so for rows: thin shadows, and noise.
         keep_empty: also return groups without a marked pixel, with boxes of no size, so that rows are groups.
     """
-    corners, weight, pixels = _measure(count, labels, marks)
+    corners, weight, pixels = _measure(count, marked)
     if trim_share > 0.0:
-        _trim(labels, marks, corners, trim_share)
+        _trim(marked, corners, trim_share)
     found = (pixels > 0) | keep_empty
     corners[pixels == 0] = 0
     corners = corners[found].astype(np.float64)
@@ -95,30 +109,47 @@ def without_inner(found: Components, share: float) -> BoolArray:
 
 
 @numba.njit(cache=True)
-def _measure(count: int, labels: Any, marks: Any) -> tuple[Any, Any, Any]:
-    """Corners (M, 4) left, top, right, bottom, sums and numbers of the marked pixels of each group."""
-    height, width = labels.shape
-    corners = np.empty((count, 4), dtype=np.int64)
-    corners[:, 0], corners[:, 1] = width, height
-    corners[:, 2] = corners[:, 3] = 0
-    weight = np.zeros(count)
-    pixels = np.zeros(count, dtype=np.int64)
+def _gathered(labels: Any, marks: Any) -> tuple[Any, Any, Any, Any]:
+    """Column, row, group and mark (P,) of each marked pixel, row by row."""
+    height, width = marks.shape
+    count = 0
     for row in range(height):
         for column in range(width):
-            mark = marks[row, column]
-            if mark > 0 and labels[row, column] > 0:
-                k = labels[row, column] - 1
-                corners[k, 0] = min(corners[k, 0], column)
-                corners[k, 1] = min(corners[k, 1], row)
-                corners[k, 2] = max(corners[k, 2], column + 1)
-                corners[k, 3] = max(corners[k, 3], row + 1)
-                weight[k] += mark
-                pixels[k] += 1
+            count += marks[row, column] > 0
+    found = np.empty((4, count), dtype=np.int64)
+    k = 0
+    for row in range(height):
+        for column in range(width):
+            if marks[row, column] > 0:
+                found[0, k], found[1, k] = column, row
+                found[2, k], found[3, k] = labels[row, column], marks[row, column]
+                k += 1
+    return found[0], found[1], found[2], found[3]
+
+
+@numba.njit(cache=True)
+def _measure(count: int, marked: Marked) -> tuple[Any, Any, Any]:
+    """Corners (M, 4) left, top, right, bottom, sums and numbers of the marked pixels of each group."""
+    corners = np.empty((count, 4), dtype=np.int64)
+    corners[:, :2] = np.iinfo(np.int64).max
+    corners[:, 2:] = 0
+    weight = np.zeros(count)
+    pixels = np.zeros(count, dtype=np.int64)
+    for p in range(len(marked.x)):
+        k = marked.group[p] - 1
+        if marked.weight[p] > 0 and k >= 0:
+            column, row = marked.x[p], marked.y[p]
+            corners[k, 0] = min(corners[k, 0], column)
+            corners[k, 1] = min(corners[k, 1], row)
+            corners[k, 2] = max(corners[k, 2], column + 1)
+            corners[k, 3] = max(corners[k, 3], row + 1)
+            weight[k] += marked.weight[p]
+            pixels[k] += 1
     return corners, weight, pixels
 
 
 @numba.njit(cache=True)
-def _trim(labels: Any, marks: Any, corners: Any, share: float) -> None:
+def _trim(marked: Marked, corners: Any, share: float) -> None:
     """Take thin ends off the corners (M, 4), from each side up to the first full enough column or row."""
     count = len(corners)
     start = np.zeros((count + 1, 2), dtype=np.int64)
@@ -127,13 +158,11 @@ def _trim(labels: Any, marks: Any, corners: Any, share: float) -> None:
         start[k + 1, 1] = start[k, 1] + max(corners[k, 3] - corners[k, 1], 0)
     columns = np.zeros(start[count, 0], dtype=np.int64)
     rows = np.zeros(start[count, 1], dtype=np.int64)
-    height, width = labels.shape
-    for row in range(height):
-        for column in range(width):
-            if labels[row, column] > 0 and marks[row, column] > 0:
-                k = labels[row, column] - 1
-                columns[start[k, 0] + column - corners[k, 0]] += 1
-                rows[start[k, 1] + row - corners[k, 1]] += 1
+    for p in range(len(marked.x)):
+        k = marked.group[p] - 1
+        if marked.weight[p] > 0 and k >= 0:
+            columns[start[k, 0] + marked.x[p] - corners[k, 0]] += 1
+            rows[start[k, 1] + marked.y[p] - corners[k, 1]] += 1
     for k in range(count):
         for axis, filled in ((0, columns), (1, rows)):
             low, high = start[k, axis], start[k + 1, axis]

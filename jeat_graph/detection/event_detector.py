@@ -76,26 +76,19 @@ class EventDetector(BinnedDetector):
         """Link the window's events; boxes from the newest part, weights from all."""
         settings = self.settings
         total = self._bins.total
-        count, labels = linked(total, self._link_px(total))
-        whole = measured(count, labels, total)
+        count, marked = linked(total, self._link_px(total))
+        whole = measured(count, marked)
         enough = whole.weight >= settings.least_events
         if not enough.any():
             self._memory.remember(whole.boxes[:0])
             return whole.take(enough)
-        labels = _kept(labels, enough)
-        count, labels = self._memory.relabel(labels, total)
-        whole = measured(count, labels, total, keep_empty=True)
-        newest = self._bins.recent(settings.bins(settings.extent_s))
-        recent = measured(count, labels, newest, settings.trim_share, keep_empty=True)
+        heavy = np.append(False, enough)  # no group comes first
+        count, marked = self._memory.relabel(marked.renumbered(np.cumsum(heavy) * heavy))
+        whole = measured(count, marked, keep_empty=True)
+        newest = self._bins.recent(settings.bins(settings.extent_s), marked.y, marked.x)
+        recent = measured(count, marked._replace(weight=newest), settings.trim_share, keep_empty=True)
         seen = (recent.pixels > 0) & (recent.boxes[:, 2:] >= settings.least_side_px).all(axis=1)
         found = Components(recent.boxes, whole.weight, recent.pixels).take(seen)
         found = found.take(without_inner(found, settings.inside_share))
         self._memory.remember(found.boxes)
         return found
-
-
-def _kept(labels: np.ndarray[tuple[int, int], np.dtype[np.int32]], keep: np.ndarray) -> np.ndarray:
-    """Number the kept groups anew, and take the others away."""
-    number = np.zeros(len(keep) + 1, dtype=np.int32)
-    number[1:][keep] = np.arange(1, int(keep.sum()) + 1)
-    return number[labels]

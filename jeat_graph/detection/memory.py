@@ -10,9 +10,9 @@ from typing import Any
 
 import numba
 import numpy as np
-import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.detection.components import Marked
 
 # A box is found again where it overlaps its place by this (intersection over union).
 _SAME_IOU = 0.3
@@ -51,28 +51,22 @@ class CloudMemory:
         moved[:, :2] += self.velocity
         return moved
 
-    def relabel(
-        self, labels: npt.NDArray[np.int32], marks: npt.NDArray[Any]
-    ) -> tuple[int, npt.NDArray[np.int32]]:
+    def relabel(self, marked: Marked) -> tuple[int, Marked]:
         """Put pieces together, and take clouds apart.
 
         Args:
-            labels: (H, W) cloud of each pixel, from 1; 0 where there is none.
-            marks: (H, W) events of each pixel.
+            marked: pixels, each of a cloud.
 
         Returns:
-            The number of clouds, and the labels (H, W) of the marked pixels anew.
+            The number of clouds, and the pixels with the clouds numbered anew.
         """
         expected = self.expected()
-        y, x = np.nonzero((labels > 0) & (marks > 0))
-        cloud = labels[y, x].astype(np.int64)
-        out = np.zeros_like(labels)
-        if len(expected) and len(y):
-            places = np.stack([x, y], axis=1).astype(np.float64) + 0.5
+        cloud = marked.group
+        if len(expected) and len(cloud):
+            places = np.stack([marked.x, marked.y], axis=1).astype(np.float64) + 0.5
             cloud = self._assign(cloud, places, expected)
         there = np.bincount(cloud) > 0
-        out[y, x] = np.cumsum(there)[cloud]
-        return int(there.sum()), out
+        return int(there.sum()), marked._replace(group=np.cumsum(there)[cloud])
 
     def _assign(self, cloud: IntArray, places: FloatArray, expected: FloatArray) -> IntArray:
         """Name the cloud of each marked pixel (P,): as before, or a new name for each remembered box.

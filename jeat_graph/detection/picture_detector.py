@@ -152,10 +152,10 @@ class PictureDetector:
 
     def _groups(self, marks: npt.NDArray[np.uint8]) -> Components:
         settings = self.settings
-        count, labels = linked(marks, self._link_px)
+        count, marked = linked(marks, self._link_px)
         if self._memory is not None:
-            count, labels = self._memory.relabel(labels, marks)
-        found = measured(count, labels, marks, settings.trim_share)
+            count, marked = self._memory.relabel(marked)
+        found = measured(count, marked, settings.trim_share)
         large = (found.boxes[:, 2:] >= settings.least_side_px).all(axis=1)
         found = found.take(large & (found.pixels >= settings.least_pixels))
         found = found.take(without_inner(found, settings.inside_share))

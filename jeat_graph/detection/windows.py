@@ -13,6 +13,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.events import EventArray
 
@@ -83,14 +84,16 @@ class EventBins:
             stacked = stacked.swapaxes(0, 1)
         return stacked.reshape(-1, *stacked.shape[2:])
 
-    def recent(self, bins: int) -> npt.NDArray[np.uint16]:
-        """Return the events of each pixel (H, W) in the newest `bins`."""
-        out = np.zeros_like(self._total)
-        for k in range(bins):
-            slot = self._ring[(self._newest - k) % len(self._ring)]
-            out += slot[0]
-            out += slot[1]
-        return out
+    def recent(self, bins: int, y: IntArray, x: IntArray) -> IntArray:
+        """Return the events (P,) of pixels in the newest `bins`.
+
+        Args:
+            bins: how many.
+            y: (P,) rows (px).
+            x: (P,) columns (px).
+        """
+        slots = (self._newest - np.arange(bins)) % len(self._ring)
+        return _summed(self._ring, slots, y, x)
 
 
 @numba.njit(cache=True)
@@ -109,3 +112,12 @@ def _count(
             if slot[which, row, column] < _MOST:
                 slot[which, row, column] += 1
                 total[row, column] += 1
+
+
+@numba.njit(cache=True)
+def _summed(ring: npt.NDArray[np.uint8], slots: IntArray, y: IntArray, x: IntArray) -> npt.NDArray[np.int64]:
+    out = np.zeros(len(x), dtype=np.int64)
+    for slot in slots:
+        for p in range(len(x)):
+            out[p] += np.int64(ring[slot, 0, y[p], x[p]]) + np.int64(ring[slot, 1, y[p], x[p]])
+    return out
