@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from jeat_graph.cli.options import add_classes, add_old_name, add_output_rate, add_rate
 from jeat_graph.cli.terminal import one_line
-from jeat_graph.config.argument_types import drawn_size, not_negative, positive
+from jeat_graph.config.argument_types import counting, drawn_size, not_negative, positive
 from jeat_graph.data.errors import DataError
 from jeat_graph.drawing.movie.film import CODECS
 from jeat_graph.drawing.movie.moments import TRAIL_S
@@ -43,9 +43,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out",
         required=True,
         metavar="FILE",
-        help="FILE.mp4 or FILE.webm (written faster), or FILE.png with --at",
+        help="FILE.mp4 or FILE.webm (written faster), or FILE.png with --at or --strip",
     )
-    add("--at", type=float, metavar="T", help="draw only this time (s), as PNG")
+    one = parser.add_mutually_exclusive_group()
+    one.add_argument("--at", type=float, metavar="T", help="draw only this time (s), as PNG")
+    one.add_argument(
+        "--strip",
+        type=counting,
+        metavar="N",
+        help="draw N times, from first to last, one below the other, as PNG",
+    )
     add("--start", type=float, metavar="S", help="first time (s)")
     add("--end", type=float, metavar="S", help="last time (s)")
     add("--only", choices=("causal", "smoothed"), help="draw only these tracks")
@@ -76,7 +83,8 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.drawing.movie.sources import Request, open_movie
 
     out = Path(args.out)
-    _check_out(out, args.at is not None)
+    one = args.at is not None or args.strip is not None
+    _check_out(out, one)
     request = Request(
         run=Path(args.run_directory),
         frames=_path(args.frames),
@@ -101,11 +109,11 @@ def run(args: argparse.Namespace) -> int:
         movie, rate_hz, warnings = open_movie(request, stack)
         for warning in warnings:
             print(f"jeat-graph render: warning: {one_line(warning)}", file=sys.stderr)
-        if args.at is not None:
-            write_png(out, movie.picture(0))
+        if one:
+            write_png(out, movie.strip(args.strip or 1))
         else:
             _write_movie(movie, rate_hz, out)
-    count, (width, height) = len(movie.times), movie.size_px
+    count, (width, height) = min(len(movie.times), args.strip or len(movie.times)), movie.size_px
     if args.rate is not None and not _counted(request):
         print(
             "jeat-graph render: warning: --rate was not needed: nothing here counts frames "
@@ -141,7 +149,7 @@ def _check_out(out: Path, one: bool) -> None:
         raise DataError("is a folder; --out must name a file", out)
     suffixes = (".png",) if one else tuple(CODECS)
     if out.suffix.lower() not in suffixes:
-        hint = "--at writes a PNG picture" if one else "a film (one picture: --at T)"
+        hint = "--at and --strip write a PNG picture" if one else "a film (one picture: --at T)"
         raise DataError(f"must end in {' or '.join(suffixes)}: {hint}", out)
 
 

@@ -52,6 +52,11 @@ class Movie:
         panels = [self._panel(background, k) for background in self.backgrounds]
         return panels[0] if len(panels) == 1 else np.concatenate(panels, axis=1)
 
+    def strip(self, count: int) -> RgbImage:
+        """Draw `count` times, evenly spread from first to last, one below the other: (H, W, 3) uint8."""
+        chosen = np.unique(np.linspace(0, len(self.times) - 1, count).round().astype(int))
+        return np.concatenate([self.picture(k) for k in chosen.tolist()])
+
     def _panel(self, background: FilmBackground, k: int) -> RgbImage:
         import cv2
 

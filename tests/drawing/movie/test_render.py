@@ -293,6 +293,17 @@ def recording_of_size(tmp_path):
     return make
 
 
+def test_a_strip_is_moments_from_first_to_last_one_below_the_other(run, tmp_path):
+    def drawn(*arguments):
+        out = tmp_path / "x.png"
+        assert main(["render", str(run), "--out", str(out), *arguments]) == 0
+        return cv2.imread(str(out))
+
+    strip = drawn("--strip", "3", "--output-rate", "10")
+    alone = [drawn("--at", t) for t in ("0", "0.5", "1")]
+    np.testing.assert_array_equal(strip, np.concatenate(alone))
+
+
 def test_truth_alone_may_be_far_longer_than_the_tracks(run, tmp_path):
     gt = tmp_path / "gt.csv"
     write_truth(truth_of(vehicle(np.arange(41) * 0.05)), gt)
@@ -307,6 +318,7 @@ def test_truth_alone_may_be_far_longer_than_the_tracks(run, tmp_path):
         (["--out", "x.avi"], "must end in .mp4"),
         (["--out", "x.png"], "--at"),
         (["--out", "x.mp4", "--at", "1"], "must end in .png"),
+        (["--out", "x.mp4", "--strip", "2"], "must end in .png"),
         (["--out", "x.mp4", "--start", "5"], "nothing to draw from 5 s; the recording lasts from 0 s to 1 s"),
         (["--out", "x.mp4", "--start", "5", "--end", "4"], "--end 4 s lies before the start, 5 s"),
         (["--out", "x.mp4", "--start", "5", "--end", "6"], "lasts from 0 s to 1 s"),
