@@ -29,9 +29,19 @@ def existence_after_hit(existence: float, evidence: float, tempering: float) -> 
 
 
 @njit(cache=True)
-def existence_after_miss(existence: float, p_detect: float) -> float:
-    """Probability of existence after a scan without a detection: r (1 − P_D) / (1 − r P_D)."""
-    return existence * (1.0 - p_detect) / max(1.0 - existence * p_detect, 1e-12)
+def existence_after_miss(existence: float, p_detect: float, blind: float = 0.0) -> float:
+    """Probability of existence after a scan without a detection: b r + (1 − b) r (1 − P_D) / (1 − r P_D).
+
+    With b_ the probability of blindness by all else than this miss, that is Bayes' rule with
+    P(miss | exists) = 1 − P_D (1 − b_).
+
+    Args:
+        existence: r before.
+        p_detect: P_D of a sensor that sees.
+        blind: b, the probability, after this scan, that the sensor is blind as a whole (`filters.blindness`).
+    """
+    if_it_sees = existence * (1.0 - p_detect) / max(1.0 - existence * p_detect, 1e-12)
+    return blind * existence + (1.0 - blind) * if_it_sees
 
 
 @njit(cache=True)

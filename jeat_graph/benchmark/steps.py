@@ -138,4 +138,8 @@ def without(target: Config) -> list[tuple[str, Config]]:
     return [
         ("all, without NIS adaptation", replace(target, noise=replace(target.noise, adaptation_rate=0.0))),
         ("all, without errors with memory", replace(target, sensors=white)),
+        (
+            "all, misses of one scan independent",
+            replace(target, lifecycle=replace(target.lifecycle, sight_scans=0.0)),
+        ),
     ]

@@ -101,6 +101,23 @@ class LifecycleConfig(Section):
     hidden_memory_s: float = number(
         0.3, "s", "time after which a hidden vehicle may be visible again", open_low=True
     )
+    sight_scans: float = number(
+        1000.0,
+        "scans",
+        "mean number of scans until a sensor goes blind as a whole (dazzled, covered, failed), a broad "
+        "guess; 0: never, its misses are independent",
+    )
+    blind_scans: float = number(
+        50.0, "scans", "mean number of scans for which it then finds nothing, a broad guess", 1.0
+    )
+    unproven: float = number(
+        0.9,
+        "1",
+        "as long as a sensor has found nothing at all, an empty scan of it says so much less that no vehicle "
+        "waits to be found",
+        0.0,
+        0.999,
+    )
     scene_memory_s: float = number(
         10.0, "s", "memory of the running estimates of each sensor's clutter and P_D; 0 keeps the configured"
     )
@@ -137,6 +154,21 @@ class LifecycleConfig(Section):
     def by_existence(self) -> bool:
         """Whether the probability of existence decides, and not hit counts."""
         return self.method == "existence"
+
+    @property
+    def judges_sight(self) -> bool:
+        """Whether a sensor may be found blind as a whole."""
+        return self.by_existence and self.sight_scans > 0.0
+
+    @property
+    def usual_blindness(self) -> float:
+        """Probability that a sensor is blind as a whole where nothing is known: its share of the time."""
+        return self.blind_scans / (self.sight_scans + self.blind_scans) if self.judges_sight else 0.0
+
+    @property
+    def first_doubt(self) -> float:
+        """Probability that a sensor finds nothing, before it has found anything."""
+        return self.unproven if self.judges_sight else 0.0
 
 
 @dataclass(frozen=True)

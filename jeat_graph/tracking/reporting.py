@@ -11,7 +11,7 @@ from jeat_graph.config.schema import ImageConfig, OutputConfig
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
-# A sensor of less than this share of the greatest trust is not waited for.
+# A sensor of less than this share of the greatest trust, or that sees so much less likely, is not waited for.
 _TRUSTED = 0.5
 
 
@@ -20,7 +20,7 @@ def longest_gap_s(scene: SceneState, model: Model) -> float:
 
     In scans of the sensor that needs most time: one that finds one vehicle in two has to be given more of
     them than one that finds all (P_D⁻², and as much again because the P_D of tracks that were found is larger
-    than that of vehicles). Sensors that the others do not bear out are not waited for.
+    than that of vehicles). Sensors that the others do not bear out, or that are blind, are not waited for.
 
     Args:
         scene: what is learnt of the sensors.
@@ -29,7 +29,7 @@ def longest_gap_s(scene: SceneState, model: Model) -> float:
     output = model.settings.output
     if output.max_gap_scans == 0.0:
         return float(output.max_gap_s)
-    longest = _longest_wait(scene.p_detect, scene.trust, model.sensors.period_s)
+    longest = _longest_wait(scene.p_detect, scene.trust * (1.0 - scene.blind), model.sensors.period_s)
     return float(min(output.max_gap_scans * longest, output.max_gap_s))
 
 

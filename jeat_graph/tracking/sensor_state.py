@@ -14,12 +14,14 @@ class SensorState(NamedTuple):
         clutter: expected false boxes in a scan.
         p_detect: mean probability that it detects a confirmed track.
         trust: factor on the weight of its evidence, as far as the other sensors bear it out, in (0, 1].
+        blind: probability that it is blind as a whole now: finds nothing, whatever is there.
         noise_scale: mean factor on its noise variance over the confirmed tracks (paper eq. 5), 1 without any.
     """
 
     clutter: float
     p_detect: float
     trust: float
+    blind: float
     noise_scale: float
 
 
@@ -31,6 +33,7 @@ def sensor_states(now: Snapshot, sensors: tuple[str, ...]) -> dict[str, SensorSt
             float(now.scene.clutter[s]),
             float(now.scene.p_detect[s]),
             float(now.scene.trust[s]),
+            float(now.scene.blind[s]),
             float(scale[:, s].mean()) if len(scale) else 1.0,
         )
         for s, name in enumerate(sensors)

@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from jeat_graph.config.kernel_form import SensorArrays
+from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray
 
 
@@ -77,6 +79,8 @@ class SceneState(NamedTuple):
             having been confirmed, and of those that no track took where there was such a track; all on tracks
             that no other sensor saw.
         looked: (S,) scans full of confirmed tracks that `p_detect` rests on.
+        blind: (S,) probability that each sensor is blind as a whole for now.
+        unproven: (S,) probability that it has never found a vehicle.
     """
 
     clutter: FloatArray
@@ -88,30 +92,25 @@ class SceneState(NamedTuple):
     trust: FloatArray
     fruitless: FloatArray
     looked: FloatArray
+    blind: FloatArray
+    unproven: FloatArray
 
 
-def start_scene(
-    clutter: FloatArray, p_detect: FloatArray, undetected: float, trust: FloatArray
-) -> SceneState:
-    """Return what is held of a scene before the first scan.
-
-    Args:
-        clutter: (S,) expected false boxes in a scan of each sensor.
-        p_detect: (S,) probability of detection.
-        undetected: expected number of vehicles.
-        trust: (S,) in each sensor.
-    """
-    num_sensors = len(clutter)
+def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
+    """Return what is held of a scene of S sensors before the first scan."""
+    num_sensors = len(sensors.p_detect)
     return SceneState(
-        clutter=clutter.copy(),
-        p_detect=p_detect.copy(),
-        undetected=np.array([undetected]),
+        clutter=sensors.clutter_per_scan.copy(),
+        p_detect=sensors.p_detect.copy(),
+        undetected=np.array([config.birth.initial]),
         last_look=np.full(num_sensors, -np.inf),
         claims=np.zeros(num_sensors),
         agreed=np.zeros(num_sensors),
-        trust=trust.copy(),
+        trust=sensors.prior_trust.copy(),
         fruitless=np.zeros(num_sensors),
         looked=np.zeros(num_sensors),
+        blind=np.full(num_sensors, config.lifecycle.usual_blindness),
+        unproven=np.full(num_sensors, config.lifecycle.first_doubt),
     )
 
 

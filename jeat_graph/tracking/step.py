@@ -12,6 +12,7 @@ from jeat_graph.tracking.stages.beginning import give_birth
 from jeat_graph.tracking.stages.ending import confirm, remove_ended
 from jeat_graph.tracking.stages.learning import count_misses, learn_scene, learn_trust
 from jeat_graph.tracking.stages.predicting import current_p_detect, expect_detections, occlusion, predict_all
+from jeat_graph.tracking.stages.sight import judge_sight
 from jeat_graph.tracking.stages.updating import take_second_views, update_matched
 from jeat_graph.tracking.state import SceneState, TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog
@@ -52,17 +53,19 @@ def step(
     expectation = expect_detections(tracks, n, model.sensors)
     widen_hidden(expectation.white, expectation.coloured_std, occluded, settings.noise.hidden_growth)
     association = associate(tracks, n, batch, expectation, p_detect, scene, model)
+    judge_sight(tracks, n, batch, association, p_detect, scene, model)
     update_matched(tracks, n, batch, expectation, association, scene, model, log)
     if settings.association.second_views:
         take_second_views(tracks, n, batch, association, model, log)
     learn_trust(tracks, n, batch, association, scene, model)
     learn_scene(tracks, n, dt, batch, association, p_detect, scene, model)
-    count_misses(tracks, n, batch, association, p_detect, settings)
+    count_misses(tracks, n, batch, association, p_detect, scene, settings)
     confirm(tracks, n, batch.t, settings)
     n = remove_ended(tracks, n, batch.t, scene, model)
     n, next_id = give_birth(tracks, n, next_id, batch, association, scene, model, log)
     # Vehicles that this batch could have shown and did not are rarer from now on.
     for s in range(len(batch.present)):
         if batch.present[s]:
-            scene.undetected[0] *= 1.0 - scene.p_detect[s]
+            sees = 1.0 - max(scene.blind[s], scene.unproven[s])
+            scene.undetected[0] *= 1.0 - scene.p_detect[s] * sees
     return n, next_id

@@ -70,9 +70,7 @@ class Tracker(SmoothedTracks):
         self._model = kernel_model(config)
         sensors = self._model.sensors
         self._tracks = allocate(_FIRST_CAPACITY, len(self.sensor_names), len(sensors.correlation_time_s))
-        self._scene = start_scene(
-            sensors.clutter_per_scan, sensors.p_detect, config.birth.initial, sensors.prior_trust
-        )
+        self._scene = start_scene(sensors, config)
         self._num_tracks = 0
         self._next_id = 1
         self._t: float | None = None

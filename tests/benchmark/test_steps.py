@@ -60,3 +60,6 @@ def test_each_row_without_a_part_differs_in_that_part_alone():
     white = named["all, without errors with memory"]
     assert {s.correlated_share for s in white.sensors.values()} == {0.0}
     assert replace(white, sensors=target.sensors) == target
+    independent = named["all, misses of one scan independent"]
+    assert not independent.lifecycle.judges_sight
+    assert replace(independent, lifecycle=target.lifecycle) == target

@@ -131,6 +131,7 @@ def birth_existence(batch: Batch, scene: SceneState, model: Model) -> FloatArray
 
     u P_D LR(score) / (u P_D LR(score) + λ): u vehicles in the scene are expected to have no track yet, and
     most leftovers are clutter however high their score (Williams 2015, the Poisson part of the mixture).
+    A box as large as the picture says nothing of where a vehicle is: what dazzled detectors of change give.
     """
     image, lifecycle = model.settings.image, model.settings.lifecycle
     out = np.empty(len(batch.precision))
@@ -139,6 +140,9 @@ def birth_existence(batch: Batch, scene: SceneState, model: Model) -> FloatArray
         x, y = batch.z[j]
         if lifecycle.leave_picture and not (0.0 <= x <= image.width and 0.0 <= y <= image.height):
             out[j] = -1.0  # it would end in the same step
+            continue
+        if batch.cut[j, 0] == BOTH_CUT and batch.cut[j, 1] == BOTH_CUT:
+            out[j] = -1.0
             continue
         true = scene.undetected[0] * scene.p_detect[s] * math.exp(batch.log_score[j])
         out[j] = true / (true + scene.clutter[s])

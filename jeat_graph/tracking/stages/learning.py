@@ -41,9 +41,10 @@ def count_misses(
     batch: Batch,
     association: Association,
     p_detect: FloatArray,
+    scene: SceneState,
     settings: Settings,
 ) -> None:
-    """Lower existence and P_D of the tracks that a sensor looked for and did not find."""
+    """Lower existence and P_D of the tracks that a sensor looked for and did not find, as far as it sees."""
     lifecycle = settings.lifecycle
     if not lifecycle.by_existence:
         return
@@ -52,13 +53,15 @@ def count_misses(
         for s in range(len(present)):
             if not present[s] or match[i, s] >= 0:
                 continue
-            tracks.existence[i] = existence_after_miss(tracks.existence[i], p_detect[i, s])
+            tracks.existence[i] = existence_after_miss(tracks.existence[i], p_detect[i, s], scene.blind[s])
             # Only as far as the miss was to be expected does it say anything about the sensor.
             own = tracks.p_detect[i, s]
-            visible = p_detect[i, s] / own
+            sees = 1.0 - scene.blind[s]
+            visible = p_detect[i, s] / own * sees
             if tracks.hidden[i, s] < 1.0:
                 awake = min(p_detect[i, s] / (1.0 - tracks.hidden[i, s]), 0.999)
-                tracks.hidden[i, s] = min(hidden_after_miss(tracks.hidden[i, s], awake), 0.999)
+                hidden = min(hidden_after_miss(tracks.hidden[i, s], awake), 0.999)
+                tracks.hidden[i, s] += sees * (hidden - tracks.hidden[i, s])
             tracks.p_detect[i, s] = max(
                 own - lifecycle.p_detect_weight * visible * own, lifecycle.p_detect_min
             )
@@ -85,7 +88,7 @@ def learn_trust(
         sharpest = 0.0
         for other in range(len(batch.present)):
             if other != s and batch.t - scene.last_look[other] <= lifecycle.max_gap_confirmed_s:
-                sharpest = max(sharpest, scene.p_detect[other])
+                sharpest = max(sharpest, scene.p_detect[other] * (1.0 - scene.blind[other]))
         if sharpest == 0.0:
             continue
         kept = math.exp(-sensors.period_s[s] / lifecycle.disagreement_memory_s)
@@ -153,7 +156,8 @@ def learn_scene(
         if scene.fruitless[s] > _GROSS * sensors.clutter_per_scan[s]:
             scene.clutter[s] = max(scene.clutter[s], scene.fruitless[s])
         # At first a mean of all looks, of which what is assumed beforehand makes some; then one with memory.
-        full = min(_LOOK_WEIGHT * looks, 1.0)
+        # What a blind one does not find says nothing of how well it sees.
+        full = min(_LOOK_WEIGHT * looks, 1.0) * (1.0 - scene.blind[s])
         scene.looked[s] += full
         share = scene.p_detect[s] + full * max(weight, 1.0 / (_PRIOR_SCANS + scene.looked[s])) * (
             hits / max(looks, 1e-9) - scene.p_detect[s]

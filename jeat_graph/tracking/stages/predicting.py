@@ -57,6 +57,17 @@ def most_trusted(seen_by: int, trust: FloatArray) -> float:
     return best
 
 
+@inner
+def last_sight(scene: SceneState) -> float:
+    """Return the time of the last scan (s) of a sensor that sees as likely as not, compared to the others."""
+    sharpest = 1.0 - np.min(scene.blind)
+    newest = -np.inf
+    for s in range(len(scene.blind)):
+        if 1.0 - scene.blind[s] >= 0.5 * sharpest:
+            newest = max(newest, scene.last_look[s])
+    return newest
+
+
 @njit(cache=True)
 def predict_all(tracks: TrackArrays, n: int, dt: float, scene: SceneState, model: Model) -> None:
     """Predict motion, size and existence of the first `n` tracks by `dt` seconds, in place."""
@@ -75,7 +86,7 @@ def predict_all(tracks: TrackArrays, n: int, dt: float, scene: SceneState, model
         predict_errors(tracks.mean[:n], tracks.cov[:n], sensors.correlation_time_s, dt)
     predict_size(tracks.size_mean[:n], tracks.size_cov[:n], settings.size.rate_density, dt)
     if settings.motion.unseen_memory_s > 0.0:
-        unseen = tracks.t_update[:n] < np.max(scene.last_look)
+        unseen = tracks.t_update[:n] < last_sight(scene)
         memory_s = settings.motion.unseen_memory_s
         forget(
             tracks.mean[:n], tracks.cov[:n], tracks.size_mean[:n], tracks.size_cov[:n], unseen, dt, memory_s

@@ -1,0 +1,60 @@
+"""Whether each sensor that looked sees at all, or is blind as a whole: the common cause of its misses."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jeat_graph.config.kernel_form import Model
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.filters.blindness import (
+    blind_after_scan,
+    blind_before_scan,
+    ratio_of_hit,
+    ratio_of_leftover,
+    ratio_of_miss,
+)
+from jeat_graph.tracking.batch import Batch
+from jeat_graph.tracking.stages.associating import Association
+from jeat_graph.tracking.stages.beginning import birth_existence
+from jeat_graph.tracking.stages.inner import inner
+from jeat_graph.tracking.state import SceneState, TrackArrays
+
+
+@inner
+def judge_sight(
+    tracks: TrackArrays,
+    n: int,
+    batch: Batch,
+    association: Association,
+    p_detect: FloatArray,
+    scene: SceneState,
+    model: Model,
+) -> None:
+    """Follow the probability that each present sensor is blind as a whole, in place.
+
+    What it should have found by P_D and visibility against what it found. With no track to find, and nothing
+    found, the scan says nothing: an empty road and a blind sensor look alike. Called before the existence of
+    the tracks is updated.
+    """
+    lifecycle = model.settings.lifecycle
+    if not lifecycle.judges_sight:
+        return
+    newcomer = birth_existence(batch, scene, model)
+    leftover = np.ones(len(newcomer), dtype=np.bool_)
+    for s in range(len(batch.present)):
+        if not batch.present[s]:
+            continue
+        missed, found = 0.0, 0.0
+        for i in range(n):
+            j = association.match[i, s]
+            if j < 0:
+                missed += ratio_of_miss(tracks.existence[i], p_detect[i, s])
+            else:
+                leftover[j] = False
+                found += ratio_of_hit(tracks.existence[i], p_detect[i, s], association.evidence[i, s])
+        for j in range(len(leftover)):
+            if leftover[j] and batch.sensor[j] == s and newcomer[j] > 0.0:
+                found += ratio_of_leftover(newcomer[j])
+        before = blind_before_scan(scene.blind[s], lifecycle.sight_scans, lifecycle.blind_scans)
+        scene.blind[s] = blind_after_scan(before, missed + found)
+        scene.unproven[s] = blind_after_scan(scene.unproven[s], min(found, 0.0))
