@@ -21,7 +21,8 @@ from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.formats import recognise
 from jeat_graph.io.frames import check_rate, fill_frames, gap_times, scale_scores, score_hint
 from jeat_graph.io.plain_text import frames_of
-from jeat_graph.io.table_writer import round_decimals, write_columns
+from jeat_graph.io.rounding import round_decimals
+from jeat_graph.io.table_writer import write_columns
 from jeat_graph.io.tables import read_table
 
 DEFAULT_SENSOR = "rgb"

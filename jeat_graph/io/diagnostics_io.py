@@ -9,7 +9,8 @@ import numpy as np
 
 from jeat_graph.data.diagnostics import Diagnostics
 from jeat_graph.io.piecewise import PiecewiseWriter
-from jeat_graph.io.table_writer import TableWriter, round_decimals, round_significant
+from jeat_graph.io.rounding import round_decimals, round_significant
+from jeat_graph.io.table_writer import TableWriter
 from jeat_graph.io.tables import read_table
 
 COLUMNS = ("t", "track_id", "sensor", "nis", "noise_scale", "existence")

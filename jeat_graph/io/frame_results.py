@@ -13,7 +13,8 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.data.views import BOX
 from jeat_graph.io import kitti, motchallenge
 from jeat_graph.io.frames import check_rate
-from jeat_graph.io.table_writer import round_decimals, write_columns
+from jeat_graph.io.rounding import round_decimals
+from jeat_graph.io.table_writer import write_columns
 from jeat_graph.io.trajectories_io import EXISTENCE_DECIMALS, PX_DECIMALS
 
 

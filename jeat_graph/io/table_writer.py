@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.atomic import atomic_path
 from jeat_graph.io.piecewise import PiecewiseWriter
@@ -17,8 +16,6 @@ from jeat_graph.io.tables import PARQUET_SUFFIXES
 
 # Rows kept in memory, and a Parquet row group. Fixed, because the bytes of a Parquet file depend on it.
 _CHUNK_ROWS = 1 << 16
-_MOST_DECIMALS = 22  # 10^22 is the largest power of ten that a float holds exactly
-_POWERS: FloatArray = 10.0 ** np.arange(0.0, 309.0)
 
 
 class TableWriter(PiecewiseWriter):
@@ -111,27 +108,6 @@ def csv_lines(columns: Mapping[str, npt.NDArray[Any]], delimiter: str = ",") -> 
 
     table = pa.table([_to_arrow(values) for values in columns.values()], names=list(columns))
     return _csv_bytes(table, delimiter).decode("utf-8")
-
-
-def round_decimals(values: FloatArray, decimals: int) -> FloatArray:
-    """Round to a number of decimals; minus zero becomes zero."""
-    return np.asarray(np.round(values, decimals) + 0.0, dtype=np.float64)
-
-
-def round_significant(values: FloatArray, digits: int) -> FloatArray:
-    """Round to a number of significant decimal digits; zero, NaN and infinity stay."""
-    good: BoolArray = np.isfinite(values) & (values != 0)
-    all_good = bool(good.all())
-    safe = np.abs(values) if all_good else np.where(good, np.abs(values), 1.0)
-    decimals = np.minimum(digits - 1 - np.floor(np.log10(safe)).astype(np.int64), _MOST_DECIMALS)
-    # Both factors are exact powers of ten, and one is 1, so the result is the float nearest to its digits.
-    up, down = _POWERS[np.maximum(decimals, 0)], _POWERS[np.maximum(-decimals, 0)]
-    with np.errstate(over="ignore", invalid="ignore"):
-        rounded = np.rint(values * up / down) / up * down + 0.0
-    fits: BoolArray = np.isfinite(rounded)
-    if all_good and fits.all():
-        return np.asarray(rounded)
-    return np.asarray(np.where(good & fits, rounded, values + 0.0), dtype=np.float64)
 
 
 def _to_arrow(values: npt.NDArray[Any]) -> Any:

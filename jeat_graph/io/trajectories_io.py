@@ -25,7 +25,8 @@ from jeat_graph.io.formats import recognise
 from jeat_graph.io.frames import check_rate
 from jeat_graph.io.piecewise import PiecewiseWriter
 from jeat_graph.io.plain_text import frames_of
-from jeat_graph.io.table_writer import TableWriter, round_decimals, round_significant
+from jeat_graph.io.rounding import round_decimals, round_significant
+from jeat_graph.io.table_writer import TableWriter
 from jeat_graph.io.tables import read_table
 
 #: Columns that a table must have; those behind them where the detections have classes; the last ones, which

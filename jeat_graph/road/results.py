@@ -11,10 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.io.table_writer import round_decimals
+from jeat_graph.io.rounding import round_decimals, round_significant
 from jeat_graph.road.crossings import Crossing
 from jeat_graph.road.lanes import Lanes
-from jeat_graph.road.rounding import round_states
 from jeat_graph.road.speeds import KMH, Speed, Vehicle
 
 _DECIMALS = 3
@@ -117,7 +116,7 @@ def columns_of_states(
     mean, var = mean.copy(), var.copy()
     mean[_HEADING] *= _DEGREES
     var[_HEADING] = np.minimum(var[_HEADING] * _DEGREES**2, 180.0**2)
-    round_states(mean, var, _DECIMALS, _DIGITS)
+    mean, var = round_decimals(mean, _DECIMALS), round_significant(var, _DIGITS)
     columns: dict[str, npt.NDArray[Any]] = {"t": t + 0.0, "track_id": track_id}
     columns |= dict(zip(STATES, mean, strict=True))
     return columns | {f"var_{name}": values for name, values in zip(STATES, var, strict=True)}

@@ -1,37 +1,12 @@
-"""Rounding for tables, against decimal arithmetic."""
+"""Tables as files: text is quoted where it must be."""
 
 from __future__ import annotations
 
-from decimal import ROUND_HALF_EVEN, Context, Decimal
-
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.table_writer import TableWriter, round_decimals, round_significant, write_columns
-
-
-@given(st.floats(1e-14, 1e14) | st.floats(-1e14, -1e-14))
-def test_significant_digits_are_those_of_decimal_arithmetic(value):
-    exact = Context(prec=6, rounding=ROUND_HALF_EVEN).create_decimal(Decimal(value))
-    found = float(round_significant(np.array([value]), 6)[0])
-    # A value half-way between two roundings may go either way: the scaling itself rounds.
-    spacing = Decimal(10) ** (exact.adjusted() - 5)
-    assert len(Decimal(repr(found)).normalize().as_tuple().digits) <= 6
-    assert abs(Decimal(repr(found)) - Decimal(value)) <= spacing / 2 * Decimal("1.000000001")
-
-
-def test_what_has_no_digits_stays_as_it_is():
-    values = np.array([0.0, -0.0, np.nan, np.inf, -np.inf])
-    found = round_significant(values, 6)
-    assert np.array_equal(found, values, equal_nan=True)
-    assert not np.signbit(found[:2]).any()
-
-
-def test_rounding_leaves_no_minus_zero():
-    assert not np.signbit(round_decimals(np.array([-0.0001, -0.0]), 3)).any()
+from jeat_graph.io.table_writer import TableWriter, write_columns
 
 
 def test_text_is_quoted_only_where_it_must_be(tmp_path):

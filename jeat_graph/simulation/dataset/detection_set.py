@@ -14,7 +14,8 @@ from jeat_graph.io.atomic import open_atomic
 from jeat_graph.io.detections_io import write_detections
 from jeat_graph.io.hashing import sha256_of
 from jeat_graph.io.locking import hold_folder
-from jeat_graph.io.table_writer import round_decimals, write_columns
+from jeat_graph.io.rounding import round_decimals
+from jeat_graph.io.table_writer import write_columns
 from jeat_graph.io.truth_io import write_truth
 from jeat_graph.simulation.dataset.layout import (
     CAMERA,

@@ -12,7 +12,8 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.io.coco_writer import coco_annotations, coco_categories, coco_images, write_coco
 from jeat_graph.io.prophesee_writer import write_array
-from jeat_graph.io.table_writer import round_decimals, write_columns
+from jeat_graph.io.rounding import round_decimals
+from jeat_graph.io.table_writer import write_columns
 from jeat_graph.io.truth_io import write_truth
 from jeat_graph.io.video import VIDEO_FILES
 from jeat_graph.simulation.dataset.layout import BOXES, COCO, SEGMENTS, TRUTH, VEHICLES, segment_name
