@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.simulation.imaging.air import airlight, corner_gain, ground_distance
@@ -13,7 +14,7 @@ from jeat_graph.simulation.imaging.config import RenderConfig
 from jeat_graph.simulation.imaging.landscape import landscape_of
 from jeat_graph.simulation.imaging.lighting import LUMINANCE, Lights
 from jeat_graph.simulation.imaging.optics import Optics, splat_glow
-from jeat_graph.simulation.imaging.tiles import View, view_of
+from jeat_graph.simulation.imaging.tiles import TILE_H, TILE_W, View, view_of
 from jeat_graph.simulation.imaging.trace import trace
 from jeat_graph.simulation.imaging.wet_road import mirror_ground, mirror_lamps
 from jeat_graph.simulation.world.camera import Camera
@@ -54,14 +55,14 @@ class Background(NamedTuple):
 
 
 # Of a pixel of the packed picture: light of the ground (lux), its place x, y (m), cover and depth of what
-# stands in front, its place x, y (m), part of the light that the lens lets through; from PACKED on, in each
-# channel: radiance of the back, albedo over π in headlights, radiance of the front times cover, its albedo
-# likewise, glow.
-LUX, PLACE, COVER, DEPTH, WALL, GAIN, PACKED = 0, 1, 3, 4, 5, 7, 8
+# stands in front, its place x, y (m), part of the light that the lens lets through, and that the air lets
+# through from the ground; from PACKED on, in each channel: radiance of the back, albedo over π in headlights,
+# radiance of the front times cover, its albedo likewise, glow.
+LUX, PLACE, COVER, DEPTH, WALL, GAIN, CLEAR, PACKED = 0, 1, 3, 4, 5, 7, 8, 9
 
 
 def pack(background: Background, lights: Lights, view: View, channels: int) -> FloatArray:
-    """Lay the static picture flat, (H, W, 8 + 5 C), in three channels or in luminance alone."""
+    """Lay the static picture flat, (H, W, 9 + 5 C), in three channels or in luminance alone."""
     b = background
     height, width = b.lux.shape
     tint = lights.head_tint / math.pi
@@ -77,7 +78,33 @@ def pack(background: Background, lights: Lights, view: View, channels: int) -> F
         for k in range(2)
     ]
     flat = [b.lux[..., None], b.place, b.front_cover[..., None], b.front_depth[..., None]]
-    return np.concatenate([*flat, np.stack(wall, axis=2), b.gain[..., None], *planes], axis=2)
+    clear = np.exp(-lights.beta * ground_distance(b.place, b.lux, view))
+    through = np.stack([b.gain, clear], axis=2)
+    return np.concatenate([*flat, np.stack(wall, axis=2), through, *planes], axis=2)
+
+
+@njit(cache=True)
+def ground_extents(packed: FloatArray) -> FloatArray:
+    """Circles about the lit ground in each tile of a flat static picture.
+
+    Returns:
+        Centre x, y and radius (m) by rows and columns of tiles (R, C, 3); the radius is -1 where is none.
+    """
+    height, width = packed.shape[:2]
+    out = np.full((-(-height // TILE_H), -(-width // TILE_W), 3), -1.0)
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            left, right, near, far = np.inf, -np.inf, np.inf, -np.inf
+            for row in range(i * TILE_H, min((i + 1) * TILE_H, height)):
+                for column in range(j * TILE_W, min((j + 1) * TILE_W, width)):
+                    if packed[row, column, LUX] > 0.0:
+                        x, y = packed[row, column, PLACE], packed[row, column, PLACE + 1]
+                        left, right = min(left, x), max(right, x)
+                        near, far = min(near, y), max(far, y)
+            if left <= right:
+                out[i, j, 0], out[i, j, 1] = 0.5 * (left + right), 0.5 * (near + far)
+                out[i, j, 2] = 0.5 * math.hypot(right - left, far - near)
+    return out
 
 
 def make_background(scene: Scene, lights: Lights, optics: Optics, config: RenderConfig) -> Background:

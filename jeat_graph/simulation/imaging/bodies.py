@@ -9,7 +9,7 @@ from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.simulation.imaging.air import through
-from jeat_graph.simulation.imaging.layers import GLOW, TileLayers, insert, meets
+from jeat_graph.simulation.imaging.layers import GLOW, TileLayers, insert
 from jeat_graph.simulation.imaging.moments import (
     BOX,
     FACE,
@@ -55,7 +55,7 @@ def add_body(
     """Add one body of one vehicle: its cover of each pixel is the product of its outline's half-planes.
 
     Args:
-        tile: where.
+        tile: where; the body's box meets it.
         body: (BODY_RECORD,) of it (see `moments`).
         pose: (4,) of the vehicle.
         fade: of the vehicle.
@@ -64,8 +64,6 @@ def add_body(
         scene: (16,) of the stage.
         canvas: where to.
     """
-    if body[SIDES] == 0.0 or not meets(body[BOX : BOX + 4], tile.row, tile.column):
-        return
     # Most half-planes have a tile wholly within them, or wholly without: only the others are looked at again.
     active = np.empty(6, dtype=np.int64)
     sides = _active(body, HULL, int(body[SIDES]), tile, active)
@@ -79,6 +77,7 @@ def add_body(
     x, y, sin, cos = pose
     fx, fy, cx, cy = camera[0], camera[1], camera[2], camera[3]
     off_x, off_y, eye_z = camera[6] - x, camera[7] - y, camera[8]
+    filled, value = canvas.filled, canvas.value
     near, far = body[NEAR], body[FAR]
     faces = int(body[FACES])
     mirror = _GLASS_MIRROR * (scene[SKY_LUX] + 0.2 * scene[SUN_LUX])
@@ -153,7 +152,7 @@ def add_body(
                 green * scale + haze * scene[AIR + 1],
                 blue * scale + haze * scene[AIR + 2],
             )
-            insert(canvas.filled, canvas.value, r * TILE_W + c, depth, cover, red, green, blue)
+            insert(filled, value, r * TILE_W + c, depth, cover, red, green, blue)
 
 
 @njit(cache=True)

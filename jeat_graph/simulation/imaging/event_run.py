@@ -21,9 +21,9 @@ from jeat_graph.simulation.imaging.tiles import TILE, TILE_H, TILE_W, Tile
 
 _SETTLE_STEPS = 8  # of pixels that see nothing move, while their photoreceptors still follow
 _FOLLOWING, _SETTLED = 0.01, 1e-6  # ln
-_MAX_KEYS = 32
+MAX_KEYS = 32
 _COARSE = 4  # steps that are tried as one
-_UNNOTICED = 0.02  # relative change that needs no samples between
+UNNOTICED = 0.02  # relative change that needs no samples between
 _BEND = 0.02  # relative distance of beams' and glow's light from a straight line in time
 _FAINT_CD_M2 = 0.005
 
@@ -94,9 +94,7 @@ def read_luminance(patch: FloatArray, tile: Tile, luminance: FloatArray) -> None
 
 
 @njit(cache=True)
-def _key_lights(
-    tile: Tile, most: int, who: IntArray, counts: IntArray, stage: Stage, keys: FloatArray
-) -> int:
+def key_lights(tile: Tile, most: int, who: IntArray, counts: IntArray, stage: Stage, keys: FloatArray) -> int:
     """Fill the light of beams and glow after the beginning at key times, between which it is linear.
 
     Args:
@@ -152,7 +150,7 @@ def run_physical(
     who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)
     counts = np.zeros(3, dtype=np.int64)
     pixels, luminance = np.zeros(TILE, dtype=np.int64), np.zeros(TILE)
-    keys = np.zeros((1 + _MAX_KEYS, TILE, GLOW + 1))
+    keys = np.zeros((1 + MAX_KEYS, TILE, GLOW + 1))
     light = np.zeros((TILE, GLOW + 1))
     seen, still = np.zeros((4, TILE)), np.zeros(TILE)
     stack, painted = np.zeros(4, dtype=np.int64), np.zeros(4, dtype=np.bool_)
@@ -181,7 +179,7 @@ def run_physical(
         key_count = 1
         if lit[n] > 0 or glowing[n]:
             keys[0] = light_now[n]
-            key_count = _key_lights(tile, max(lit[n], 1), who, counts, stage, keys)
+            key_count = key_lights(tile, max(lit[n], 1), who, counts, stage, keys)
             glowing[n] = lit[n] > 0
             light_now[n] = keys[key_count]
             constant = False
@@ -228,10 +226,13 @@ def run_physical(
 @njit(cache=True)
 def _any_touch(j: int, who: IntArray, counts: IntArray, moments: Moments, tile: Tile) -> bool:
     """Say whether any body or shadow may be on a tile at time `j`."""
-    found = False
+    touch = moments.touch
     for n in range(counts[0]):
-        found |= meets(moments.touch[j, who[0, n], 0], tile.row, tile.column)
-    return found
+        v = who[0, n]
+        box = (touch[j, v, 0, 0], touch[j, v, 0, 1], touch[j, v, 0, 2], touch[j, v, 0, 3])
+        if meets(box[0], box[1], box[2], box[3], tile.row, tile.column):
+            return True
+    return False
 
 
 @njit(cache=True)
@@ -239,6 +240,6 @@ def _differ(luminance: FloatArray, pixels: IntArray, model: PixelModel, state: P
     """Say whether what pixels see differs from what they saw last by more than would go unnoticed."""
     for n in range(len(luminance)):
         before = state.table[pixels[n], SEEN]
-        if abs(luminance[n] - before) > _UNNOTICED * (before + model.dark):
+        if abs(luminance[n] - before) > UNNOTICED * (before + model.dark):
             return True
     return False

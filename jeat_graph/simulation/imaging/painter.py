@@ -8,12 +8,14 @@ from __future__ import annotations
 from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.simulation.imaging.background import COVER, DEPTH, GAIN, LUX, PACKED
+from jeat_graph.simulation.imaging.background import CLEAR, COVER, DEPTH, GAIN, LUX, PACKED
 from jeat_graph.simulation.imaging.bodies import add_body, add_glow, add_lamps
 from jeat_graph.simulation.imaging.layers import GLOW, ON_GROUND, ON_WALL, TileLayers, meets
-from jeat_graph.simulation.imaging.road_light import cast_beams, cast_shadow
+from jeat_graph.simulation.imaging.moments import BOX, SIDES
+from jeat_graph.simulation.imaging.road_light import cast_beams
+from jeat_graph.simulation.imaging.shadows import cast_shadow
 from jeat_graph.simulation.imaging.shapes import PARTS
-from jeat_graph.simulation.imaging.stage import LIGHTS_ON, SUN_LUX, WET, Stage
+from jeat_graph.simulation.imaging.stage import AIR, BETA, LIGHTS_ON, SUN_LUX, WET, Stage
 from jeat_graph.simulation.imaging.streaks import add_streaks
 from jeat_graph.simulation.imaging.tiles import TILE_H, TILE_W, Tile
 
@@ -44,10 +46,7 @@ def light_tile(tile: Tile, j: int, who: IntArray, counts: IntArray, stage: Stage
     moments = stage.moments
     light[:] = 0.0
     if counts[2]:
-        cast_beams(
-            tile, who[2, : counts[2]], moments.pose[j], moments.fade[j], stage.skin, stage.scene,
-            stage.canvas.ground, light,
-        )  # fmt: skip
+        cast_beams(tile, j, who[2, : counts[2]], stage, light)
     for n in range(counts[1]):
         add_glow(tile, moments.lamp[j, who[1, n]], stage.optics, light)
 
@@ -65,19 +64,33 @@ def paint_tile(tile: Tile, j: int, who: IntArray, counts: IntArray, stage: Stage
         light: (P, 2 + C) of beams and glow, as from `light_tile`.
     """
     canvas, scene, moments = stage.canvas, stage.scene, stage.moments
+    fades, touch, bodies = moments.fade, moments.touch, moments.body
+    row, column = tile.row, tile.column
+    at = stage.extent[row // TILE_H, column // TILE_W]
+    extent = (at[0], at[1], at[2])
     canvas.filled[:] = 0
     shaded = touched = False
     for n in range(counts[0]):
         v = who[0, n]
-        fade = moments.fade[j, v]
-        if fade > 0.0 and meets(moments.touch[j, v, 0], tile.row, tile.column):
+        fade = fades[j, v]
+        box = (touch[j, v, 0, 0], touch[j, v, 0, 1], touch[j, v, 0, 2], touch[j, v, 0, 3])
+        if fade > 0.0 and meets(box[0], box[1], box[2], box[3], row, column):
             if not shaded:
                 canvas.shade[:] = 1.0
                 shaded = touched = True
             pose, skin = moments.pose[j, v], stage.skin[v]
             for part in range(PARTS):
-                add_body(tile, moments.body[j, v, part], pose, fade, skin, stage.camera, scene, canvas)
-            cast_shadow(tile, pose, skin, scene, canvas.ground, canvas.shade)
+                if bodies[j, v, part, SIDES] > 0.0 and meets(
+                    bodies[j, v, part, BOX],
+                    bodies[j, v, part, BOX + 1],
+                    bodies[j, v, part, BOX + 2],
+                    bodies[j, v, part, BOX + 3],
+                    row,
+                    column,
+                ):
+                    add_body(tile, bodies[j, v, part], pose, fade, skin, stage.camera, scene, canvas)
+            if extent[2] >= 0.0:
+                cast_shadow(tile, extent, pose, skin, scene, canvas.ground, canvas.shade)
             if scene[LIGHTS_ON] > 0.0:
                 add_lamps(tile, moments.lamp[j, v], stage.optics, canvas.filled, canvas.value)
                 if scene[WET] > 0.0:
@@ -90,23 +103,24 @@ def paint_tile(tile: Tile, j: int, who: IntArray, counts: IntArray, stage: Stage
                         canvas.filled,
                         canvas.value,
                     )
-    compose(tile, shaded, scene[SUN_LUX], light, canvas)
+    compose(tile, shaded, scene, light, canvas)
     return touched
 
 
 @njit(cache=True)
-def compose(tile: Tile, shaded: bool, sun: float, light: FloatArray, canvas: TileLayers) -> None:
+def compose(tile: Tile, shaded: bool, scene: FloatArray, light: FloatArray, canvas: TileLayers) -> None:
     """Lay everything over the ground, from far to near.
 
     Args:
         tile: where.
         shaded: whether the canvas's `shade` counts.
-        sun: light of the sun (lux).
+        scene: (17,) of the stage.
         light: of beams and glow.
         canvas: its `out` is filled.
     """
     ground, filled, value, shade, out = canvas.ground, canvas.filled, canvas.value, canvas.shade, canvas.out
     channels = out.shape[1]
+    sun, foggy = scene[SUN_LUX], shaded and scene[BETA] > 0.0
     back, albedo = PACKED, PACKED + channels
     front, front_albedo, glow = PACKED + 2 * channels, PACKED + 3 * channels, PACKED + 4 * channels
     for r in range(tile.rows):
@@ -120,7 +134,12 @@ def compose(tile: Tile, shaded: bool, sun: float, light: FloatArray, canvas: Til
             cover = ground[p, COVER]
             depth = ground[p, DEPTH] if cover > 0.0 else -1.0
             for k in range(channels):
-                level = left * ground[p, back + k] + ground[p, albedo + k] * lit
+                level = ground[p, back + k]
+                if shaded:
+                    # What fog sends to the eye before the ground is not shaded with it.
+                    air = (1.0 - ground[p, CLEAR]) * _airlight(scene, k, channels) if foggy else 0.0
+                    level = air + left * (level - air)
+                level += ground[p, albedo + k] * lit
                 waiting = depth > 0.0
                 for n in range(filled[p] + 1):
                     last = n == filled[p]
@@ -131,3 +150,12 @@ def compose(tile: Tile, shaded: bool, sun: float, light: FloatArray, canvas: Til
                     if not last:
                         level = level * (1.0 - value[p, n, 1]) + value[p, n, 2 + k]
                 out[p, k] = (level + ground[p, glow + k] + light[p, GLOW + k]) * ground[p, GAIN]
+
+
+@njit(cache=True, inline="always")
+def _airlight(scene: FloatArray, channel: int, channels: int) -> float:
+    """Radiance of endless fog in a channel (cd/m²)."""
+    out: float = scene[AIR + channel]
+    if channels == 1:
+        out = 0.2126 * scene[AIR] + 0.7152 * scene[AIR + 1] + 0.0722 * scene[AIR + 2]
+    return out

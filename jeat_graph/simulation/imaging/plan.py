@@ -94,12 +94,14 @@ def who_touches(row0: int, column0: int, boxes: FloatArray, who: IntArray, count
         How many there are in all.
     """
     counts[:] = 0
+    right, low = column0 + TILE_W, row0 + TILE_H
     for v in range(len(boxes)):
         for kind in range(3):
-            box = boxes[v, kind]
-            apart = box[2] <= column0 or box[0] >= column0 + TILE_W
-            apart |= box[3] <= row0 or box[1] >= row0 + TILE_H
-            if not apart and box[2] > box[0]:
+            if boxes[v, kind, 2] <= column0 or boxes[v, kind, 0] >= right:
+                continue
+            if boxes[v, kind, 3] <= row0 or boxes[v, kind, 1] >= low:
+                continue
+            if boxes[v, kind, 2] > boxes[v, kind, 0]:
                 who[kind, counts[kind]] = v
                 counts[kind] += 1
     return int(counts[0] + counts[1] + counts[2])

@@ -72,6 +72,10 @@ class Renderer:
         step = self.config.max_step_px if step_px is None else step_px
         return make_plan(moments, velocity, look, self.tiles, self.view, step, duration, self.lights.on)
 
+    def look(self, time_s: float) -> Look:
+        """Say which vehicles there are at a time (s), and what they look like."""
+        return self._look(self.scene.states_at(np.array([time_s]), self.config.far_m, _NEAR_M))[0]
+
     def moments(self, times: FloatArray, look: Look, every: IntArray | None = None) -> Moments:
         """Project the vehicles of a plan at `times` (J,) (s), each as often as `every` (V,) says."""
         states = self.scene.states_at(times, self.config.far_m, _NEAR_M)

@@ -6,6 +6,7 @@ Rows are exposed in turn (rolling shutter): each row for the same time, the last
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,7 @@ from jeat_graph.simulation.imaging.stage import Stage
 from jeat_graph.simulation.imaging.tiles import TILE_H, TILE_W
 
 _POISSON_BELOW_E = 60.0
+_LEAST_PART = 1e-27  # of a distribution: exp(-60) is larger, and it is far out in the tail beyond
 
 
 @dataclass(frozen=True)
@@ -71,15 +73,39 @@ def expose(renderer: Renderer, time_s: float, exposure_s: float, readout_s: floa
 def electrons(radiance: FloatArray, time_s: float, config: RGBConfig, rng: np.random.Generator) -> FloatArray:
     """Charge that is read from each pixel (e-): Poisson photoelectrons up to full well, plus read noise.
 
-    From 60 electrons on a normal distribution stands for the Poisson one, whose skewness is then below 0.13.
+    From 60 electrons on a normal distribution stands for the Poisson one, whose skewness is then below 0.13;
+    below it is drawn by inversion (Devroye 1986, X.3).
     """
-    mean = np.maximum(radiance, 0.0) * (config.responsivity * time_s)
-    few = mean < _POISSON_BELOW_E
-    out = mean + np.sqrt(mean) * rng.standard_normal(mean.shape, dtype=np.float32)
-    out[few] = rng.poisson(mean[few])
-    np.minimum(out, config.full_well_e, out=out)
-    out += config.read_noise_e * rng.standard_normal(out.shape, dtype=np.float32)
-    return np.asarray(out, dtype=np.float64)
+    noise = rng.standard_normal(radiance.shape, dtype=np.float32)
+    draw = rng.random(radiance.shape, dtype=np.float32)
+    scale = config.responsivity * time_s
+    return _charge(radiance, scale, config.full_well_e, config.read_noise_e, noise, draw)
+
+
+@njit(cache=True)
+def _charge(
+    radiance: FloatArray, scale: float, most: float, read: float, noise: npt.NDArray[np.float32],
+    draw: npt.NDArray[np.float32],
+) -> FloatArray:  # fmt: skip
+    """Charge of all pixels from normal and uniform numbers, all (H, W, C); see `electrons`."""
+    out = np.empty(radiance.shape)
+    rows, columns, channels = radiance.shape
+    for r in range(rows):
+        for c in range(columns):
+            for k in range(channels):
+                mean = max(radiance[r, c, k], 0.0) * scale
+                if mean >= _POISSON_BELOW_E:
+                    # Two normal numbers add up to one.
+                    out[r, c, k] = min(mean + math.sqrt(mean + read * read) * noise[r, c, k], most)
+                else:
+                    left, drawn = float(draw[r, c, k]), 0.0
+                    part = math.exp(-mean)
+                    while left >= part and part > _LEAST_PART:
+                        left -= part
+                        drawn += 1.0
+                        part *= mean / drawn
+                    out[r, c, k] = min(drawn, most) + read * noise[r, c, k]
+    return out
 
 
 def develop(charge: FloatArray, gain: float, config: RGBConfig) -> npt.NDArray[np.uint8]:

@@ -1,4 +1,4 @@
-"""What vehicles do to the light on the road: shadows and beams."""
+"""The light of vehicles' beams on the road and on barriers."""
 
 from __future__ import annotations
 
@@ -11,160 +11,152 @@ from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.simulation.imaging.background import COVER, LUX, PLACE, WALL
 from jeat_graph.simulation.imaging.layers import ON_GROUND, ON_WALL
 from jeat_graph.simulation.imaging.lighting import LAMP_HEIGHT_M, beam_candela
-from jeat_graph.simulation.imaging.reach import SHADOW_M
 from jeat_graph.simulation.imaging.smooth import clamp01
-from jeat_graph.simulation.imaging.stage import BEAM_PEAK, BEAM_RANGE, BEAM_STRAY, SUN, SUN_LUX
-from jeat_graph.simulation.imaging.tiles import TILE_H, TILE_W, Tile
+from jeat_graph.simulation.imaging.stage import BEAM_PEAK, BEAM_RANGE, BEAM_STRAY, Stage
+from jeat_graph.simulation.imaging.tiles import TILE, TILE_H, TILE_W, Tile
 
-_SHADOW_DEPTH = 0.75
-_SUN_EDGE_M = 0.3
 _WALL_HEIGHT_M = 0.5
-_NEGLIGIBLE = 0.003  # of the light there is: a fiftieth of what it takes to make an event
-_FAR_TILES = 1.5
+_NEGLIGIBLE = 0.01  # of the light there is: a twentieth of what it takes to make an event
+_FAR_TILES, _FARTHER_TILES, _FARTHEST_TILES = 1.5, 3.0, 6.0  # from the lamps, in the tile's own diagonals
 _DARK_LUX = 0.15  # on the road, what a pixel's dark current is worth
 _OTHERS = 0.25  # share of all beams' light that must be there for one beam to go unnoticed
 _NODES = np.array([0, 2, 4, 6, 7])  # rows and columns of a tile at which far light is made
 _BLOCKED_M = 0.5  # way through a vehicle after which a beam is blocked
 _BLOCKERS = 4  # vehicles that may stand before one vehicle's beams
+_CORNER = 5  # where a vehicle's light at the four corners begins among what is kept of it
 
 
 @njit(cache=True)
-def cast_shadow(
-    tile: Tile, pose: FloatArray, size: FloatArray, scene: FloatArray, ground: FloatArray, shade: FloatArray
-) -> None:
-    """Take the sky's light from the ground beside and below a vehicle, and the sun's beyond it."""
-    x, y, sin, cos = pose
-    half_a, half_b, high = 0.5 * size[0], 0.5 * size[1], size[2]
-    day = scene[SUN_LUX] > 0.0
-    reach = max(half_a, half_b) + SHADOW_M
-    step_a = step_b = low0 = last0 = 0.0
-    if day:
-        sun_x, sun_y, sun_z = scene[SUN], scene[SUN + 1], scene[SUN + 2]
-        step_a, step_b = sun_x * sin + sun_y * cos, sun_x * cos - sun_y * sin
-        reach += high / sun_z
-        low0, last0 = 0.12 * high / sun_z, 0.9 * high / sun_z
-    inverse_a = 1.0 / step_a if abs(step_a) > 1e-9 else 0.0
-    inverse_b = 1.0 / step_b if abs(step_b) > 1e-9 else 0.0
-    for r in range(tile.rows):
-        for c in range(tile.columns):
-            p = r * TILE_W + c
-            if ground[p, LUX] <= 0.0:
-                continue
-            dx, dy = ground[p, PLACE] - x, ground[p, PLACE + 1] - y
-            if abs(dx) > reach or abs(dy) > reach:
-                continue
-            along, across = dx * sin + dy * cos, dx * cos - dy * sin
-            over_a, over_b = max(abs(along) - half_a, 0.0), max(abs(across) - half_b, 0.0)
-            if over_a < SHADOW_M and over_b < SHADOW_M:
-                near = clamp01(1.0 - math.sqrt(over_a * over_a + over_b * over_b) / SHADOW_M)
-                shade[p, 0] *= 1.0 - _SHADOW_DEPTH * near * near
-            if day:
-                # Way of the sun's ray to this place within the vehicle's box.
-                low, last = low0, last0
-                if inverse_a != 0.0:
-                    first, second = (-half_a - along) * inverse_a, (half_a - along) * inverse_a
-                    low, last = max(low, min(first, second)), min(last, max(first, second))
-                elif abs(along) > half_a:
-                    last = low
-                if inverse_b != 0.0:
-                    first, second = (-half_b - across) * inverse_b, (half_b - across) * inverse_b
-                    low, last = max(low, min(first, second)), min(last, max(first, second))
-                elif abs(across) > half_b:
-                    last = low
-                shade[p, 1] *= 1.0 - clamp01((last - low) / _SUN_EDGE_M)
-
-
-@njit(cache=True)
-def cast_beams(
-    tile: Tile, who: IntArray, pose: FloatArray, fade: FloatArray, skin: FloatArray, scene: FloatArray,
-    ground: FloatArray, light: FloatArray,
-) -> None:  # fmt: skip
-    """Add the light of the beams of some vehicles (who, (W,)) on the ground and on barriers.
+def cast_beams(tile: Tile, j: int, who: IntArray, stage: Stage, light: FloatArray) -> None:
+    """Add the light of the beams of some vehicles on the ground and on barriers at time `j`.
 
     Args:
         tile: where.
+        j: index of the time.
         who: (W,) vehicles.
-        pose: (V, 4) of all.
-        fade: (V,) of all.
-        skin: (V, 8) of all.
-        scene: (16,) of the stage.
-        ground: (P, …) of the canvas.
+        stage: what there is; the tile's ground is on its canvas.
         light: (P, …) of the canvas; changed.
     """
+    pose, fade, skin, scene = stage.moments.pose[j], stage.moments.fade[j], stage.skin, stage.scene
+    ground = stage.canvas.ground
+    place = stage.extent[tile.row // TILE_H, tile.column // TILE_W]
+    if place[2] >= 0.0:
+        _on_ground(tile, (place[0], place[1], place[2]), who, pose, fade, skin, scene, ground, light)
+    for r in range(tile.rows):
+        for c in range(tile.columns):
+            p = r * TILE_W + c
+            if ground[p, COVER] > 0.0:
+                light[p, ON_WALL] = _on_barrier(ground[p], who, pose, fade, skin, scene)
+
+
+@njit(cache=True)
+def _on_ground(
+    tile: Tile, extent: tuple[float, float, float], who: IntArray, pose: FloatArray, fade: FloatArray,
+    skin: FloatArray, scene: FloatArray, ground: FloatArray, light: FloatArray,
+) -> None:  # fmt: skip
+    """Add beams' light on a tile's ground. Nine parameters: the kernels' own tables."""
     rows, columns = tile.rows, tile.columns
-    limit = scene[BEAM_RANGE]
+    limit, radius = scene[BEAM_RANGE], extent[2]
     limit2, peak, stray = limit * limit, scene[BEAM_PEAK], scene[BEAM_STRAY]
-    lift = LAMP_HEIGHT_M
-    corner, opposite = 0, (rows - 1) * TILE_W + columns - 1
-    across = (ground[corner, PLACE] - ground[opposite, PLACE]) ** 2
-    across += (ground[corner, PLACE + 1] - ground[opposite, PLACE + 1]) ** 2
+    lift2 = LAMP_HEIGHT_M * LAMP_HEIGHT_M
     blockers = np.empty(_BLOCKERS, dtype=np.int64)
-    nodes = np.empty((len(_NODES), len(_NODES)))
-    # Whether beams matter on this tile is told by its corners, unless these are near the lamps.
-    brightest, nearest, farthest = np.empty(len(who)), np.empty(len(who)), np.empty(len(who))
-    total, least, whole = 0.0, math.inf, rows == TILE_H and columns == TILE_W
+    count = 0
+    # Of each vehicle whose light may get here: which, where its lamps are, how near, its light at corners.
+    kept, value = np.empty(len(who), dtype=np.int64), np.empty((len(who), 9))
+    total, least, whole, across = 0.0, math.inf, rows == TILE_H and columns == TILE_W, 0.0
     for k in range(4):
         lux = ground[(rows - 1) * (k >> 1) * TILE_W + (columns - 1) * (k & 1), LUX]
         least = min(least, lux)
         whole &= lux > 0.0
-    for n in range(len(who)):
-        v = who[n]
+    if whole:
+        across = (ground[0, PLACE] - ground[TILE - 1, PLACE]) ** 2
+        across += (ground[0, PLACE + 1] - ground[TILE - 1, PLACE + 1]) ** 2
+    for v in who:
         sin, cos = pose[v, 2], pose[v, 3]
         x, y = pose[v, 0] + 0.5 * skin[v, 0] * sin, pose[v, 1] + 0.5 * skin[v, 0] * cos
-        nearest[n], farthest[n], brightest[n] = math.inf, -math.inf, 0.0
-        for k in range(4):
-            p = (rows - 1) * (k >> 1) * TILE_W + (columns - 1) * (k & 1)
-            dx, dy = ground[p, PLACE] - x, ground[p, PLACE + 1] - y
-            forward, r2 = dx * sin + dy * cos, dx * dx + dy * dy + lift * lift
-            candela = fade[v] * beam_candela(forward, dx * cos - dy * sin, -lift, peak, stray)
-            brightest[n] = max(brightest[n], candela * lift / (r2 * math.sqrt(r2)))
-            nearest[n], farthest[n] = min(nearest[n], r2), max(farthest[n], forward)
-            if ground[p, LUX] <= 0.0:
-                farthest[n], brightest[n] = math.inf, math.inf
-        total += brightest[n]
+        dx, dy = extent[0] - x, extent[1] - y
+        ahead = dx * sin + dy * cos + radius
+        if fade[v] <= 0.0 or ahead <= 0.0 or dx * dx + dy * dy > (limit + radius) * (limit + radius):
+            continue
+        brightest = nearest = math.inf
+        if whole:
+            brightest = 0.0
+            for k in range(4):
+                p = (TILE_H - 1) * (k >> 1) * TILE_W + (TILE_W - 1) * (k & 1)
+                dx, dy = ground[p, PLACE] - x, ground[p, PLACE + 1] - y
+                nearest = min(nearest, dx * dx + dy * dy + lift2)
+                value[count, _CORNER + k] = fade[v] * _beam_at(dx, dy, sin, cos, limit2, peak, stray)
+                brightest = max(brightest, value[count, _CORNER + k])
+        kept[count] = v
+        value[count, 0], value[count, 1], value[count, 2] = x, y, ahead
+        value[count, 3], value[count, 4] = nearest, brightest
+        count += 1
+        total += brightest
     enough = _NEGLIGIBLE * (least + _DARK_LUX + _OTHERS * (total if total < math.inf else 0.0))
-    for n in range(len(who)):
-        v = who[n]
-        near = nearest[n] <= _FAR_TILES * _FAR_TILES * across
-        if fade[v] <= 0.0 or farthest[n] <= 0.0 or (not near and brightest[n] < enough):
+    nodes = np.zeros((len(_NODES), len(_NODES)))
+    smooth = False
+    for n in range(count):
+        v, x, y = kept[n], value[n, 0], value[n, 1]
+        apart = value[n, 3] / across if across > 0.0 else 0.0
+        near = not whole or apart <= _FAR_TILES * _FAR_TILES
+        # Whether beams matter on this tile is told by its corners, unless these are near the lamps.
+        if not near and value[n, 4] < enough:
             continue
         sin, cos = pose[v, 2], pose[v, 3]
-        x, y = pose[v, 0] + 0.5 * skin[v, 0] * sin, pose[v, 1] + 0.5 * skin[v, 0] * cos
-        blocked = _before(v, x, y, min(farthest[n], limit), pose, fade, skin, blockers)
-        if whole and not near:
-            # Far from the lamps light changes little across a tile: it is made at nodes.
-            for r in range(len(_NODES)):
-                for c in range(len(_NODES)):
-                    p = _NODES[r] * TILE_W + _NODES[c]
-                    nodes[r, c] = _beam_at(
-                        ground[p, PLACE] - x, ground[p, PLACE + 1] - y, sin, cos, limit2, peak, stray
-                    )
-                    if blocked and nodes[r, c] > 0.0:
-                        nodes[r, c] *= _let_through(x, y, ground[p], pose, skin, blockers[:blocked])
-            for r in range(TILE_H):
-                r0 = min(r >> 1, len(_NODES) - 2)
-                down = (r - _NODES[r0]) / (_NODES[r0 + 1] - _NODES[r0])
-                for c in range(TILE_W):
-                    c0 = min(c >> 1, len(_NODES) - 2)
-                    right = (c - _NODES[c0]) / (_NODES[c0 + 1] - _NODES[c0])
-                    above = nodes[r0, c0] + right * (nodes[r0, c0 + 1] - nodes[r0, c0])
-                    below = nodes[r0 + 1, c0] + right * (nodes[r0 + 1, c0 + 1] - nodes[r0 + 1, c0])
-                    light[r * TILE_W + c, ON_GROUND] += fade[v] * (above + down * (below - above))
+        blocked = _before(v, x, y, min(value[n, 2], limit), pose, fade, skin, blockers)
+        if near:
+            for r in range(rows):
+                for c in range(columns):
+                    p = r * TILE_W + c
+                    if ground[p, LUX] > 0.0:
+                        dx, dy = ground[p, PLACE] - x, ground[p, PLACE + 1] - y
+                        lux = fade[v] * _beam_at(dx, dy, sin, cos, limit2, peak, stray)
+                        if blocked and lux > 0.0:
+                            lux *= _let_through(x, y, dx, dy, pose, skin, blockers, blocked)
+                        light[p, ON_GROUND] += lux
             continue
-        for r in range(rows):
-            for c in range(columns):
-                p = r * TILE_W + c
-                if ground[p, LUX] > 0.0:
+        # Far from the lamps light changes little across a tile: it is made at nodes, the fewer the farther.
+        smooth = True
+        step = 1
+        if not blocked:
+            step = 4 if apart > _FARTHEST_TILES**2 else (2 if apart > _FARTHER_TILES**2 else 1)
+        for r in range(0, len(_NODES), step):
+            for c in range(0, len(_NODES), step):
+                if step == 4:
+                    lux = value[n, _CORNER + (r >> 1) + (c >> 2)]
+                else:
+                    p = _NODES[r] * TILE_W + _NODES[c]
                     dx, dy = ground[p, PLACE] - x, ground[p, PLACE + 1] - y
                     lux = fade[v] * _beam_at(dx, dy, sin, cos, limit2, peak, stray)
                     if blocked and lux > 0.0:
-                        lux *= _let_through(x, y, ground[p], pose, skin, blockers[:blocked])
-                    light[p, ON_GROUND] += lux
-    for r in range(rows):
-        for c in range(columns):
-            p = r * TILE_W + c
-            if ground[p, COVER] > 0.0:
-                light[p, ON_WALL] = _on_barrier(ground[p], who, pose, fade, skin, scene)
+                        lux *= _let_through(x, y, dx, dy, pose, skin, blockers, blocked)
+                _spread(nodes, r, c, step, lux)
+    if smooth:
+        for r in range(TILE_H):
+            r0 = min(r >> 1, len(_NODES) - 2)
+            down = (r - _NODES[r0]) / (_NODES[r0 + 1] - _NODES[r0])
+            for c in range(TILE_W):
+                c0 = min(c >> 1, len(_NODES) - 2)
+                right = (c - _NODES[c0]) / (_NODES[c0 + 1] - _NODES[c0])
+                above = nodes[r0, c0] + right * (nodes[r0, c0 + 1] - nodes[r0, c0])
+                below = nodes[r0 + 1, c0] + right * (nodes[r0 + 1, c0 + 1] - nodes[r0 + 1, c0])
+                light[r * TILE_W + c, ON_GROUND] += above + down * (below - above)
+
+
+@njit(cache=True)
+def _spread(nodes: FloatArray, row: int, column: int, step: int, lux: float) -> None:
+    """Add the light of one of every `step`-th nodes to it and, in straight lines, to those around it."""
+    for r in range(max(0, row - step + 1), min(len(nodes), row + step)):
+        down = 1.0
+        if r != row:
+            end = row + step if r > row else row - step
+            down = (_NODES[end] - _NODES[r]) / (_NODES[end] - _NODES[row])
+        for c in range(max(0, column - step + 1), min(len(nodes), column + step)):
+            right = 1.0
+            if c != column:
+                end = column + step if c > column else column - step
+                right = (_NODES[end] - _NODES[c]) / (_NODES[end] - _NODES[column])
+            nodes[r, c] += down * right * lux
 
 
 @njit(cache=True)
@@ -183,13 +175,14 @@ def _beam_at(dx: float, dy: float, sin: float, cos: float, limit2: float, peak: 
 
 @njit(cache=True)
 def _let_through(
-    x: float, y: float, ground: FloatArray, pose: FloatArray, skin: FloatArray, blockers: IntArray
+    x: float, y: float, dx: float, dy: float, pose: FloatArray, skin: FloatArray, blockers: IntArray, n: int
 ) -> float:
-    """Part of the light from (x, y) to a place on the ground that vehicles in between let through."""
+    """Part of the light that `n` vehicles let through on the way from (x, y) by (dx, dy) to the ground."""
     left = 1.0
-    for w in blockers:
-        inside = _way_within(x, y, ground[PLACE] - x, ground[PLACE + 1] - y, pose[w], skin[w])
-        left *= 1.0 - clamp01(inside / _BLOCKED_M)
+    for k in range(n):
+        w = blockers[k]
+        outline = (pose[w, 0], pose[w, 1], pose[w, 2], pose[w, 3], 0.48 * skin[w, 0], 0.46 * skin[w, 1])
+        left *= 1.0 - clamp01(_way_within(x, y, dx, dy, outline) / _BLOCKED_M)
     return left
 
 
@@ -216,16 +209,21 @@ def _before(
 
 
 @njit(cache=True)
-def _way_within(x: float, y: float, dx: float, dy: float, pose: FloatArray, skin: FloatArray) -> float:
-    """Length (m) of the way from (x, y) by (dx, dy) within a vehicle's outline on the road."""
-    sin, cos = pose[2], pose[3]
-    ox, oy = x - pose[0], y - pose[1]
+def _way_within(
+    x: float, y: float, dx: float, dy: float, outline: tuple[float, float, float, float, float, float]
+) -> float:
+    """Length (m) of the way from (x, y) by (dx, dy) within a vehicle's outline on the road.
+
+    The outline is x, y, sine and cosine of the direction, half of the length and of the width.
+    """
+    sin, cos = outline[2], outline[3]
+    ox, oy = x - outline[0], y - outline[1]
     low, high = 0.0, 1.0
     for axis in range(2):
         if axis == 0:
-            start, step, most = ox * sin + oy * cos, dx * sin + dy * cos, 0.48 * skin[0]
+            start, step, most = ox * sin + oy * cos, dx * sin + dy * cos, outline[4]
         else:
-            start, step, most = ox * cos - oy * sin, dx * cos - dy * sin, 0.46 * skin[1]
+            start, step, most = ox * cos - oy * sin, dx * cos - dy * sin, outline[5]
         if abs(step) < 1e-9:
             if abs(start) > most:
                 return 0.0

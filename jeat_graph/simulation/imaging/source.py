@@ -170,7 +170,7 @@ class RenderedSource:
                 radiance, seen = photograph(renderer, lens, float(time[0]), exposure, config.rgb)
                 charge = electrons(seen, exposure.time_s, config.rgb, noise)
                 rgb = develop(charge, exposure.gain, config.rgb)
-            look = renderer.plan(float(time[0]), float(time[0])).look
+            look = renderer.look(float(time[0]))
             moments = renderer.moments(time, look)
             _, instance, visible = buffers(moments, look, blocked.depth, blocked.cover)
             tight = tight_boxes(moments, (scene.camera.width, scene.camera.height))

@@ -8,7 +8,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.simulation.imaging.air import airlight
-from jeat_graph.simulation.imaging.background import Background, pack
+from jeat_graph.simulation.imaging.background import Background, ground_extents, pack
 from jeat_graph.simulation.imaging.layers import TileLayers, make_canvas
 from jeat_graph.simulation.imaging.lighting import Lights
 from jeat_graph.simulation.imaging.moments import Look, Moments
@@ -37,7 +37,8 @@ class Stage(NamedTuple):
     """All that a tile is painted from, in few arrays: handing tables to a function has its price.
 
     Attributes:
-        packed: (H, W, 8 + 5 C) the static picture.
+        packed: (H, W, PACKED + 5 C) the static picture.
+        extent: (R, C, 3) circles about the ground in its tiles (see `ground_extents`).
         moments: the V vehicles at J times.
         skin: (V, 8) their size, colour, kind, salt.
         camera: (18,) fx, fy, cx, cy, width, height, eye (3), rotation (9).
@@ -47,6 +48,7 @@ class Stage(NamedTuple):
     """
 
     packed: FloatArray
+    extent: FloatArray
     moments: Moments
     skin: FloatArray
     camera: FloatArray
@@ -59,6 +61,7 @@ class Setting(NamedTuple):
     """What of a stage stays the same through a segment, in one number of channels."""
 
     packed: FloatArray
+    extent: FloatArray
     camera: FloatArray
     scene: FloatArray
     optics: Optics
@@ -67,7 +70,9 @@ class Setting(NamedTuple):
     def stage(self, moments: Moments, look: Look) -> Stage:
         """Put the vehicles of some times on it."""
         skin = np.column_stack([look.size, look.colour, look.kind, look.salt]).astype(np.float64)
-        return Stage(self.packed, moments, skin, self.camera, self.scene, self.optics, self.canvas)
+        return Stage(
+            self.packed, self.extent, moments, skin, self.camera, self.scene, self.optics, self.canvas
+        )
 
 
 def make_setting(
@@ -82,8 +87,10 @@ def make_setting(
         *airlight(lights),
         wet,
     ]
+    packed = pack(background, lights, view, channels)
     return Setting(
-        packed=pack(background, lights, view, channels),
+        packed=packed,
+        extent=ground_extents(packed),
         camera=np.concatenate([view.lens, view.eye, view.rotation.ravel()]),
         scene=np.array(scene, dtype=np.float64),
         optics=optics,

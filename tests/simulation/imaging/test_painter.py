@@ -132,6 +132,30 @@ def test_fog_takes_contrast_away_by_the_law_of_koschmieder() -> None:
     assert foggy[inside].mean() == pytest.approx(expected, rel=0.03)
 
 
+def test_fog_takes_contrast_from_shadows_as_from_what_stands_there() -> None:
+    clear, foggy = (
+        renderer_of([CAR], DAY, fog_m=fog, headlight_candela=0.0, taillight_candela=0.0)
+        for fog in (0.0, 60.0)
+    )
+    change = [(r.picture(0.0) - r.background.whole) @ LUMINANCE for r in (clear, foggy)]
+    ground = clear.background
+    # Shaded ground beside the car, none of whose pixels it covers.
+    body = clear.moments(np.array([0.0]), clear.plan(0.0, 0.0).look).body[0, 0]
+    seen = body[body[:, SIDES] > 0.0]
+    rows, columns = np.mgrid[0:112, 0:192] + 0.5
+    beside = (
+        (columns < seen[:, BOX].min()) | (columns > seen[:, BOX + 2].max()) | (rows > seen[:, BOX + 3].max())
+    )
+    shaded = beside & (ground.front_cover == 0.0) & (change[0] < -0.2 * ground.whole @ LUMINANCE)
+    assert shaded.sum() > 10
+    eye = clear.view.eye
+    away = np.linalg.norm(
+        np.concatenate([ground.place - eye[:2], 0 * ground.lux[..., None] - eye[2]], axis=2), axis=2
+    )
+    left = 0.02 ** (away[shaded] / 60.0)
+    np.testing.assert_allclose(change[1][shaded], change[0][shaded] * left, rtol=0.02)
+
+
 def test_corners_are_darker_by_the_fourth_power_of_the_cosine() -> None:
     plain, dark = (renderer_of([], DAY, vignetting=v) for v in (0.0, 1.0))
     ratio = dark.picture(0.0)[0, 0] / plain.picture(0.0)[0, 0]
