@@ -46,21 +46,20 @@ def run(preset: str, engine: str, steps: list[Step], *more: str) -> tuple[list[T
 
 def check_identities(ids: np.ndarray, before: np.ndarray, next_before: int, next_now: int) -> None:
     """Whoever is not of before is new, and has a number that nobody has had."""
-    new = np.setdiff1d(ids, before)
-    assert (np.diff(ids) > 0).all()
-    assert ((new >= next_before) & (new < next_now)).all()
+    assert (ids[1:] > ids[:-1]).all()
+    old = ids[ids < next_before]
+    assert (before[np.minimum(np.searchsorted(before, old), len(before) - 1)] == old).all()
+    assert len(ids) == 0 or ids[-1] < next_now
 
 
 def check_covariances(cov: np.ndarray) -> None:
     """All (N, 2, D, D) are symmetric and positive definite: judged as correlations, whatever the units."""
-    assert np.isfinite(cov).all()
     if cov.size:
         std = np.sqrt(np.einsum("...ii->...i", cov))
-        assert (std > 0).all()
         correlation = cov / std[..., :, None] / std[..., None, :]
+        # NaN, infinity and a variance that is not positive fail here, too.
         assert (np.abs(correlation - np.swapaxes(correlation, -1, -2)) < 1e-9).all()
-        # Every leading block has a positive determinant.
-        assert all((np.linalg.det(correlation[..., :k, :k]) > 0).all() for k in range(2, cov.shape[-1] + 1))
+        np.linalg.cholesky(correlation)  # raises where one is not positive definite
 
 
 def check_table(table: Trajectories) -> None:
