@@ -103,15 +103,16 @@ class DetectionNet(nn.Module):
         """
         if self.settings.has_memory:
             x = _cut_off(x)
+        keep = self.settings.memory_keep
         fine = self.to_4(self.stem(x))
         middle = self.to_8(fine)
         kept: tuple[Tensor, ...] = ()
         if self.settings.has_memory:
-            middle, now = _remembered(self.memory[0], middle, state[0], length)
+            middle, now = _remembered(self.memory[0], middle, state[0], length, keep)
             kept = (now,)
         coarse = self.to_16(middle)
         if self.settings.has_memory:
-            coarse, now = _remembered(self.memory[1], coarse, state[1], length)
+            coarse, now = _remembered(self.memory[1], coarse, state[1], length, keep)
             kept = (*kept, now)
         low = self.lateral[2](coarse)
         mid = self.merge[1](self.lateral[1](middle) + _doubled(low))
@@ -123,14 +124,16 @@ class DetectionNet(nn.Module):
         return torch.cat(rows, dim=2).transpose(1, 2), kept
 
 
-def _remembered(memory: nn.Module, x: Tensor, state: Tensor, length: int) -> tuple[Tensor, Tensor]:
+def _remembered(
+    memory: nn.Module, x: Tensor, state: Tensor, length: int, keep: float
+) -> tuple[Tensor, Tensor]:
     """Let a memory see windows (L x B, C, H, W) in their order; return what it says, and its last state."""
     if length == 1:
-        state = memory(x, state)
+        state = memory(x, keep * state)
         return state, state
     seen = []
     for one in x.chunk(length):
-        state = memory(one, state)
+        state = memory(one, keep * state)
         seen.append(state)
     return torch.cat(seen), state
 

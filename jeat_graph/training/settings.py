@@ -24,6 +24,15 @@ class NetSettings(Section):
     bins: int = number(10, "1", "bins of a window of events; each has two polarities", 1, 100)
     bin_s: float = number(0.005, "s", "length of a bin", 1e-4, 1.0)
 
+    memory_keep: float = number(
+        0.8,
+        "1",
+        "share of a memory that is left at the next window: what learned from short sequences would drift "
+        "in long ones",
+        0.0,
+        1.0,
+    )
+
     @property
     def channels(self) -> int:
         """Channels of the input."""

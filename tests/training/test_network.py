@@ -38,6 +38,20 @@ def test_what_was_seen_before_counts():
     assert not torch.allclose(fresh, again)
 
 
+@pytest.mark.parametrize("keep", [0.0, 0.5])
+def test_of_a_memory_a_share_is_left_at_the_next_window(keep):
+    torch.manual_seed(4)
+    net = DetectionNet(NetSettings(kind="events", width=4, memory_keep=keep)).eval()
+    whole = DetectionNet(NetSettings(kind="events", width=4, memory_keep=1.0)).eval()
+    whole.load_state_dict(net.state_dict())
+    window = torch.rand(1, net.settings.channels, SIDE[1], SIDE[0])
+    with torch.no_grad():
+        _, state = net(window, net.empty_state(1, SIDE))
+        again, _ = net(window, state)
+        expected, _ = whole(window, [keep * one for one in state])
+    torch.testing.assert_close(again, expected)
+
+
 @pytest.mark.parametrize("settled", [False, True])
 def test_a_network_that_has_settled_learns_with_the_normalisation_that_it_is_used_with(settled):
     torch.manual_seed(3)
