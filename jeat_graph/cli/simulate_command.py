@@ -26,7 +26,7 @@ _SIZE = (640, 384)
 # Arguments that only mean something with pictures, by the name of the attribute.
 _PICTURE_ONLY = (
     *("segments", "frames", "size", "workers", "video", "compression", "split", "imaging"),
-    *("world", "event_camera"),
+    *("world", "event_camera", "masks"),
 )
 _CARLA_ONLY = ("carla_host", "carla_port")
 
@@ -83,6 +83,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("davis346", "imx636", "iebcs", "ideal"),
         help="whose noise the event camera has (default davis346)",
     )
+    pictures.add_argument(
+        "--masks",
+        action="store_true",
+        default=None,
+        help="also write a mask a frame: which vehicle each pixel shows",
+    )
     pictures.add_argument("--size", type=_size, metavar="WxH", help="of the pictures (default 640x384)")
     pictures.add_argument("--workers", type=counting, metavar="K", help="processes (default: one a core)")
     pictures.add_argument(
@@ -119,7 +125,7 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError("SCENARIO and --out DIR are needed (or --verify DIR)")
     unfit = [*(_PICTURE_ONLY if args.sensors == "detections" else ("duration",))]
     unfit += [] if args.sensors == "carla" else _CARLA_ONLY
-    unfit += ["imaging", "workers", "world", "event_camera"] if args.sensors == "carla" else []
+    unfit += ["imaging", "workers", "world", "event_camera", "masks"] if args.sensors == "carla" else []
     for name in unfit:
         if getattr(args, name) is not None:
             flag = "--" + name.replace("_", "-")
@@ -214,7 +220,16 @@ def _renderer(args: argparse.Namespace, scenario: Scenario, frames: int) -> Sour
     if args.event_camera is not None:
         tree["evt"] = {**(tree.get("evt") or {}), "sensor": args.event_camera}
     world = args.world or "fixed"
-    return partial(RenderedSource, scenario, load_imaging(tree), args.seed, frames, world, args.sensors)
+    return partial(
+        RenderedSource,
+        scenario,
+        load_imaging(tree),
+        args.seed,
+        frames,
+        world,
+        args.sensors,
+        masks=bool(args.masks),
+    )
 
 
 def _carla_source(args: argparse.Namespace, scenario: Scenario, frames: int) -> SourceFactory:

@@ -67,12 +67,15 @@ class SegmentStep:
         rgb: (H, W, 3) uint8 picture in the order red, green, blue.
         events: events since the step before, up to `t_us`; those of the first step begin at 0.
         truth: vehicles at `t_us`.
+        mask: (H, W) uint16 identity of the vehicle that each pixel shows, 0 for none; None where masks are
+            not asked for.
     """
 
     t_us: int
     rgb: npt.NDArray[np.uint8]
     events: EventArray
     truth: FrameTruth
+    mask: npt.NDArray[np.uint16] | None = None
 
 
 class SegmentSource(Protocol):

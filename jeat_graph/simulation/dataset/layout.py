@@ -11,6 +11,7 @@
     segments/000000/         one folder a segment:
         frames.mp4           or frames.avi (lossless), or frames/000000.png, …
         frames.csv           index,t_us
+        masks/000000.png, …  with --masks: identity of the vehicle that each pixel shows (16 bit, 0: none)
         events.h5            events as in DSEC
         gt.csv               truth as everywhere in this package
         vehicles.csv         visible fraction, size, 3D pose and velocity, row by row beside gt.csv
@@ -32,6 +33,7 @@ ANNOTATIONS = "annotations"
 SEGMENTS = "segments"
 SEGMENT_JSON = "segment.json"
 EVENTS = "events.h5"
+MASKS = "masks"
 TRUTH = "gt.csv"
 DETECTIONS = "detections.csv"  # of a simulation at the level of detections
 TRUTH_ROAD = "gt_road.csv"  # where the vehicles are on the road, beside the truth in the picture

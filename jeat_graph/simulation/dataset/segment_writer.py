@@ -27,6 +27,7 @@ from jeat_graph.simulation.dataset.layout import (
     segment_folder,
     segment_name,
 )
+from jeat_graph.simulation.dataset.masks import write_mask
 from jeat_graph.simulation.dataset.protocol import Protocol
 from jeat_graph.simulation.dataset.truth_files import SegmentTruth
 from jeat_graph.simulation.segment import SegmentSource, SegmentStep
@@ -102,6 +103,8 @@ def _fill(
                     f"an event at {step.events.t_us[-1]} µs came with the frame at {step.t_us} µs"
                 )
             frames.append(step.t_us, step.rgb)
+            if step.mask is not None:
+                write_mask(folder, counts["frames"], step.mask, source.size_px)
             events.append(step.events, step.t_us)
             truth.append(step.t_us, step.truth)
             counts["frames"] += 1

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from jeat_graph.data.arrays import BoolArray, FloatArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.simulation.imaging.lens_config import LensConfig
 from jeat_graph.simulation.imaging.sway import Sway, draw_sway, turn
@@ -101,6 +101,17 @@ class Lens:
                 maps = np.broadcast_to(self.homography(t), (rows, 3, 3))
             _look(picture, self.rays, np.ascontiguousarray(maps), out)
         return out / times
+
+    def nearest(self, picture: IntArray, t: float) -> IntArray:
+        """What the pixels' centres see at a time (s) of numbers (Hc, Wc) on the canvas: (H, W)."""
+        m = self.homography(t)
+        place = self.rays @ m[:, :2].T + m[:, 2]
+        column, row = place[..., 0] / place[..., 2], place[..., 1] / place[..., 2]
+        # A pixel's number is that of its left and upper border, whose centre is half a pixel on.
+        high, wide = picture.shape
+        at = np.clip(np.floor(row), 0, high - 1).astype(np.int64)
+        out: IntArray = picture[at, np.clip(np.floor(column), 0, wide - 1).astype(np.int64)]
+        return out
 
     def covered(self) -> BoolArray:
         """Part of the canvas, (Hc, Wc) true or false, that the pixels look at while the mount is at rest."""

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from jeat_graph.config.section_tree import plain
 from jeat_graph.data.arrays import IntArray
@@ -51,6 +52,7 @@ class RenderedSource:
         world: str = "fixed",
         sensors: str = "pictures",
         traffic: int = 0,
+        masks: bool = False,
     ) -> None:
         """Prepare; nothing is rendered yet.
 
@@ -62,6 +64,7 @@ class RenderedSource:
             world: `fixed`, the same road and camera in all segments, or `varied`, one a segment.
             sensors: `pictures` for both; `rgb` leaves events out, `events` makes black pictures.
             traffic: other numbers have the same worlds with other vehicles and other noise in them.
+            masks: whether each step has a mask of its vehicles.
 
         Raises:
             ConfigError: a negative seed, no frames, or no such world or sensors.
@@ -74,7 +77,7 @@ class RenderedSource:
             raise ConfigError(f"world: must be one of {', '.join(WORLDS)}, not {world!r}")
         if sensors not in SENSORS:
             raise ConfigError(f"sensors: must be one of {', '.join(SENSORS)}, not {sensors!r}")
-        self.world, self.sensors, self.traffic = world, sensors, traffic
+        self.world, self.sensors, self.traffic, self.masks = world, sensors, traffic, masks
         self.scenario = scenario
         self.imaging = imaging or ImagingConfig()
         self.seed = seed
@@ -101,6 +104,7 @@ class RenderedSource:
             "world": self.world,
             "sensors": self.sensors,
             **({"traffic": self.traffic} if self.traffic else {}),
+            **({"masks": True} if self.masks else {}),
             "scenario": plain(dataclasses.asdict(self.scenario)),
             "imaging": _stated(self.imaging),
         }
@@ -186,11 +190,18 @@ class RenderedSource:
             views = ImageViews(visible[row], tight[row], contrast[row])
             seen_by = camera if lens is None else lens.camera_at(float(time[0]))
             truth = frame_truth(states, seen_by, views, least, scenario.truth.range_m)
-            yield SegmentStep(t_us=int(t_us), rgb=rgb, events=events, truth=truth)
+            mask = _mask(instance, lens, float(time[0])) if self.masks else None
+            yield SegmentStep(t_us=int(t_us), rgb=rgb, events=events, truth=truth, mask=mask)
 
     def _segment_seed(self, index: int) -> int:
         other = f".traffic.{self.traffic}" if self.traffic else ""
         return int(stream(self.seed, f"segment.{index}{other}").integers(0, 2**62))
+
+
+def _mask(instance: IntArray, lens: Lens | None, time_s: float) -> npt.NDArray[np.uint16]:
+    """Identities as the pixels see them; those of a segment fit in 16 bit."""
+    seen = instance if lens is None else lens.nearest(instance, time_s)
+    return seen.astype(np.uint16)
 
 
 def _stated(imaging: ImagingConfig) -> dict[str, Any]:

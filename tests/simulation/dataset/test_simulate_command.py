@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import cv2
 import pytest
 import yaml
 
@@ -64,6 +65,19 @@ def test_a_damaged_set_verifies_with_exit_code_1_and_a_line_for_each_problem(
     assert len(lines) == 2
     assert "changed" in lines[0]
     assert lines[1].endswith("train.txt: missing")
+
+
+def test_masks_are_written_beside_the_frames_and_belong_to_the_set(tmp_path: Path) -> None:
+    out, arguments = tmp_path / "set", ["--segments", "1", "--seed", "3", "--masks", *SMALL]
+    assert main(["simulate", "day", "--out", str(out), *arguments]) == 0
+    folder = out / "segments" / "000000"
+    assert [path.name for path in sorted((folder / "masks").iterdir())] == [f"{k:06d}.png" for k in range(3)]
+    mask = cv2.imread(str(folder / "masks" / "000000.png"), cv2.IMREAD_UNCHANGED)
+    assert (mask.shape, str(mask.dtype)) == ((48, 64), "uint16")
+    assert mask.max() > 0
+    assert main(["simulate", "--verify", str(out)]) == 0
+    (folder / "masks" / "000001.png").unlink()
+    assert main(["simulate", "--verify", str(out)]) == 1
 
 
 def test_settings_of_renderer_and_cameras_come_from_a_file(tmp_path: Path) -> None:

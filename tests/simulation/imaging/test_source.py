@@ -192,3 +192,32 @@ def test_a_camera_of_a_varied_world_is_written_with_its_segment() -> None:
     made = RenderedSource(load_scenario("day"), small(), seed=5, frames=1, world="varied")
     assert made.calibration_of(0) != made.calibration_of(1)
     assert source("day").calibration_of(1) == source("day").calibration()
+
+
+@pytest.mark.parametrize("lens", [{}, {"k1": -0.2, "sway_deg": 0.3}])
+def test_masks_show_the_visible_part_of_each_vehicle_where_its_box_is_and_change_nothing_else(lens) -> None:
+    tree = {"lens": lens} if lens else {}
+    plain = next(iter(RenderedSource(load_scenario("day"), small(tree), seed=5, frames=1).segment(0)))
+    made = RenderedSource(load_scenario("day"), small(tree), seed=5, frames=1, masks=True)
+    step = next(iter(made.segment(0)))
+    assert digest(step) == digest(plain)
+    assert plain.mask is None
+    assert step.mask is not None
+    assert (step.mask.shape, step.mask.dtype) == ((96, 160), np.uint16)
+    truth, found = step.truth, 0
+    assert set(np.unique(step.mask)) - {0} <= set(truth.object_id)
+    for k, number in enumerate(truth.object_id):
+        rows, columns = np.nonzero(step.mask == number)
+        left, top, width, height = truth.tight[k]
+        if truth.visible[k] < 0.9 or width * height < 60.0:
+            continue
+        found += 1
+        assert 0.4 * width * height < len(rows) < 1.1 * width * height
+        box = [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]
+        np.testing.assert_allclose(box, [left, top, left + width, top + height], atol=1.6)
+    assert found >= 3
+
+
+def test_masks_are_stated_only_if_they_are_asked_for() -> None:
+    assert "masks" not in source().settings()
+    assert RenderedSource(load_scenario("day"), small(), masks=True).settings()["masks"] is True
