@@ -27,6 +27,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--lengths", metavar="FILE", help="measured lengths: x1, y1, x2, y2 (px), metres, along or across")
     add("--points", metavar="FILE", help="surveyed points: x, y (px), east, north (m)")
+    add(
+        "--camera",
+        metavar="CAMERA.yaml",
+        help="a camera calibrated before, with its covariance: tracks and lengths sharpen it",
+    )
     add("--zone", default="", metavar="UTM", help="UTM zone of the points, such as 33N, for maps")
     add(
         "--image",
@@ -48,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _calibrate(args: argparse.Namespace) -> int:
     from jeat_graph.road.calibrate import calibrate
-    from jeat_graph.road.camera_file import write_camera
+    from jeat_graph.road.camera_file import read_camera, write_camera
     from jeat_graph.road.evidence import CalibrationConfig, thin
     from jeat_graph.road.inputs import read_lengths, read_surveyed_points
     from jeat_graph.road.report import calibration_lines
@@ -58,16 +63,25 @@ def _calibrate(args: argparse.Namespace) -> int:
 
     if Path(args.out).suffix not in (".yaml", ".yml"):
         raise DataError("the name of a camera's file must end in .yaml", args.out)
+    known = None if args.camera is None else read_camera(args.camera)
+    if known is not None and args.lengths is None and args.tracks is None:
+        raise DataError("nothing sharpens the camera: give --run or --lengths", args.camera)
     if args.lengths is None and args.points is None and args.tracks is None:
         raise DataError("nothing tells the scale: give --lengths or --points")
     config = CalibrationConfig()
     lengths = None if args.lengths is None else read_lengths(args.lengths)
     points = None if args.points is None else read_surveyed_points(args.points)
     size = args.image or (None if args.tracks is None else recorded_size(args.tracks))
+    if known is not None:
+        if size not in (None, (known.width, known.height)):
+            raise DataError(
+                f"is of {known.width} x {known.height} px, not {size[0]} x {size[1]}", args.camera
+            )
+        size = (known.width, known.height)
     if size is None:
         raise DataError("the size of the picture is not known: give --image WxH")
     width, height = size
-    if not args.image:
+    if not args.image and known is None:
         print(
             f"jeat-graph camera: picture of {width} x {height} px, as {args.tracks} says (--image WxH says "
             "otherwise)",
@@ -82,7 +96,7 @@ def _calibrate(args: argparse.Namespace) -> int:
             tracks = None
     with stages("camera", 1) as stage:
         stage("fitting")
-        calibration = calibrate(Problem(width, height, lengths, points, tracks, config), args.zone)
+        calibration = calibrate(Problem(width, height, lengths, points, tracks, config, known), args.zone)
     lines = calibration_lines(calibration)
     write_camera(calibration.camera, args.out, lines)
     print("\n".join(lines))

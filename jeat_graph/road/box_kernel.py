@@ -42,27 +42,6 @@ def kernel_camera(camera: RoadCamera) -> KernelCamera:
 
 
 @njit(cache=True)
-def _corner(
-    camera: KernelCamera, x: float, y: float, sin: float, cos: float, size: FloatArray, k: int
-) -> tuple[float, float, float, float, float]:
-    """Corner k of a cuboid as the camera sees it.
-
-    Returns:
-        Where it is along and across the cuboid (±1/2), and what it is right of, below and before the camera
-        (m).
-    """
-    R, position = camera.rotation, camera.position
-    a = -0.5 if k & 2 == 0 else 0.5
-    b = -0.5 if k & 1 == 0 else 0.5
-    px = x + a * size[0] * sin + b * size[1] * cos - position[0]
-    py = y + a * size[0] * cos - b * size[1] * sin - position[1]
-    pz = (size[2] if k >= 4 else 0.0) - position[2]
-    X = R[0, 0] * px + R[0, 1] * py + R[0, 2] * pz
-    Y = R[1, 0] * px + R[1, 1] * py + R[1, 2] * pz
-    return a, b, X, Y, R[2, 0] * px + R[2, 1] * py + R[2, 2] * pz
-
-
-@njit(cache=True)
 def cuboid_sides(
     camera: KernelCamera,
     x: float,
@@ -86,16 +65,34 @@ def cuboid_sides(
     Returns:
         Whether the whole cuboid is in front of the camera.
     """
-    R, lens = camera.rotation, camera.lens
+    R, lens, position = camera.rotation, camera.lens, camera.position
     sin, cos = math.sin(heading), math.cos(heading)
+    # The footprint's middle, half a length ahead, half a width beside and the height, as the camera sees
+    # them: right, below, before (m). All corners are sums of these.
+    px, py, pz = x - position[0], y - position[1], -position[2]
+    half_l, half_w, height = 0.5 * size[0], 0.5 * size[1], size[2]
+    mx = R[0, 0] * px + R[0, 1] * py + R[0, 2] * pz
+    my = R[1, 0] * px + R[1, 1] * py + R[1, 2] * pz
+    mz = R[2, 0] * px + R[2, 1] * py + R[2, 2] * pz
+    lx = half_l * (R[0, 0] * sin + R[0, 1] * cos)
+    ly = half_l * (R[1, 0] * sin + R[1, 1] * cos)
+    lz = half_l * (R[2, 0] * sin + R[2, 1] * cos)
+    wx = half_w * (R[0, 0] * cos - R[0, 1] * sin)
+    wy = half_w * (R[1, 0] * cos - R[1, 1] * sin)
+    wz = half_w * (R[2, 0] * cos - R[2, 1] * sin)
+    hx, hy, hz = height * R[0, 2], height * R[1, 2], height * R[2, 2]
     left = top = right = bottom = 0
     side[0] = side[1] = np.inf
     side[2] = side[3] = -np.inf
     for k in range(8):
-        _, _, X, Y, Z = _corner(camera, x, y, sin, cos, size, k)
+        a = -1.0 if k & 2 == 0 else 1.0
+        b = -1.0 if k & 1 == 0 else 1.0
+        c = 1.0 if k >= 4 else 0.0
+        Z = mz + a * lz + b * wz + c * hz
         if Z < _NEAR_M:
             return False
-        n0, n1 = X / Z, Y / Z
+        inverse = 1.0 / Z
+        n0, n1 = (mx + a * lx + b * wx + c * hx) * inverse, (my + a * ly + b * wy + c * hy) * inverse
         r2 = n0 * n0 + n1 * n1
         gain = 1.0 + lens[4] * r2 + lens[5] * r2 * r2
         u, v = n0 * gain * lens[0] + lens[2], n1 * gain * lens[1] + lens[3]
@@ -109,8 +106,11 @@ def cuboid_sides(
             side[3], bottom = v, k
     for s in range(4):
         k, axis = (left, top, right, bottom)[s], s % 2
-        a, b, X, Y, Z = _corner(camera, x, y, sin, cos, size, k)
-        n0, n1 = X / Z, Y / Z
+        a = -0.5 if k & 2 == 0 else 0.5
+        b = -0.5 if k & 1 == 0 else 0.5
+        c = 1.0 if k >= 4 else 0.0
+        Z = mz + 2.0 * (a * lz + b * wz) + c * hz
+        n0, n1 = (mx + 2.0 * (a * lx + b * wx) + c * hx) / Z, (my + 2.0 * (a * ly + b * wy) + c * hy) / Z
         r2 = n0 * n0 + n1 * n1
         gain = 1.0 + lens[4] * r2 + lens[5] * r2 * r2
         bend = 2.0 * lens[4] + 4.0 * lens[5] * r2

@@ -34,7 +34,6 @@ _SCALE_PRIOR_STRENGTH = 6.0  # observations' worth of belief in the stated error
 _BAD_TRACK = 4.0  # mean square of a track, in those of the median track, at which its weight is a quarter
 _LEAST_NODES_SHARE = 0.5
 _LEAST_IN_PLACE = 3.0  # tracks that pass a place before it tells what they share
-_PLACE = (9, 10)  # of PARAMETERS: along the plane, where only surveyed points tell anything
 _LANE_WIDTHS_M = 1.75  # width of the strips in which tracks share what is wrong with the camera's model
 
 
@@ -67,6 +66,12 @@ def calibrate(problem: Problem, zone: str = "") -> CameraCalibration:
     Raises:
         DataError: there is no evidence of scale, or no camera above a road fits.
     """
+    if problem.known is not None:
+        if problem.points is not None:
+            raise DataError("surveyed points make a camera anew: leave them out, or the camera")
+        if not len(problem.free()):
+            raise DataError("the camera has no covariance: it counts as exact, and nothing can sharpen it")
+        return _solve(problem)
     if problem.points is None:
         calibration = _solve(problem)
         if problem.lengths is None and calibration.weighting.lanes is None:
@@ -135,8 +140,8 @@ def _solve(problem: Problem) -> CameraCalibration:
     In turn: robust weights of the tracks' points and the size of every kind of error from the residuals,
     then a Gauss-Newton solve (scipy) over the camera's parameters and the vehicles' common acceleration.
     """
-    camera = first_guess(problem)
-    free = [k for k in range(len(PARAMETERS)) if problem.points is not None or k not in _PLACE]
+    camera = first_guess(problem) if problem.known is None else problem.known
+    free = problem.free()
     shape = (0, 1) if problem.tracks is None else problem.tracks.t.shape
     weighting = Weighting(np.zeros((0, 2)), 1.0, problem.config.track_px, 1.0, np.ones(shape))
     acceleration = 0.0
@@ -177,7 +182,8 @@ def _count(problem: Problem, w: Weighting) -> int:
     tracks = 0 if problem.tracks is None else problem.tracks.t.size * 2 + 2 * len(problem.tracks)
     lengths = 0 if problem.lengths is None else 2 * len(problem.lengths)
     points = 0 if problem.points is None else 2 * len(problem.points)
-    return 9 + tracks + lengths + points + (w.lanes is not None)
+    priors = 9 if problem.known is None else len(problem.free()) + 1
+    return priors + tracks + lengths + points + (w.lanes is not None)
 
 
 def _residuals(camera: RoadCamera, problem: Problem, w: Weighting, acceleration: float) -> FloatArray:
@@ -266,4 +272,5 @@ def _shared(
         # A track's own five unknowns take their part of what is common, too.
         common = max(common / (2.0 * places), 0.0) * m / (m - 2.5)
         between = 1.0 + common / left * each / places
-    return replace(w, track_share=1.0 / (within * between))
+    share = 1.0 / (within * between)
+    return replace(w, track_share=share if problem.known is None else min(share, 1.0))

@@ -178,6 +178,24 @@ class RoadCamera:
             position=self.position + change[9:12],
         )
 
+    def change_to(self, other: RoadCamera) -> FloatArray:
+        """Change (12,) of the `PARAMETERS` by which `moved` makes this camera another one."""
+        R = other.rotation @ self.rotation.T
+        axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+        angle = math.atan2(float(np.linalg.norm(axis)) / 2.0, (float(np.trace(R)) - 1.0) / 2.0)
+        scale = 0.5 if angle < 1e-9 else angle / float(np.linalg.norm(axis))
+        own, new = self.fy / self.fx, other.fy / other.fx
+        lens = [math.log(other.fx / self.fx), math.log(new / own), other.cx - self.cx, other.cy - self.cy]
+        return np.array(
+            [
+                *lens,
+                other.k1 - self.k1,
+                other.k2 - self.k2,
+                *(axis * scale),
+                *(other.position - self.position),
+            ]
+        )
+
     def calibration_jacobian(self, pixels: FloatArray, height_m: float | FloatArray = 0.0) -> FloatArray:
         """Derivative (..., 2, 12) of `to_road` with respect to `PARAMETERS`, by central differences."""
         columns = []

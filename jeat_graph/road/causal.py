@@ -57,7 +57,7 @@ class RoadFilterConfig:
     edge_px: float = number(2.0, "px", "a side this near the picture's edge is cut off by it")
     gate: float = number(9.0, "1", "squared residual / variance from which a box counts less", open_low=True)
     pause: float = number(
-        0.15, "1", "share of a sensor's memory within which a further box of it is left out", 0.0, 1.0
+        0.35, "1", "share of a sensor's memory within which a further box of it is left out", 0.0, 1.0
     )
     known_kmh: float = number(
         20.0, "km/h", "a speed that is less sure (standard deviation) is not known yet", open_low=True

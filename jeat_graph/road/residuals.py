@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from jeat_graph.data.arrays import FloatArray
-from jeat_graph.road.camera import RoadCamera
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.road.camera import PARAMETERS, RoadCamera
 from jeat_graph.road.evidence import CalibrationConfig, Lengths, Points, TrackNodes
 from jeat_graph.road.lane_spacing import LaneComb, comb_pitch
 from jeat_graph.road.track_fit import fit_tracks
 
+#: Of PARAMETERS: along the plane, where only surveyed points tell anything.
+PLACE = (9, 10)
 _UNSEEN = 1e3  # residual of a length that the trial camera sees in the sky
 
 
@@ -27,6 +29,8 @@ class Problem:
         points: surveyed points, or None.
         tracks: the vehicles' tracks, or None.
         config: noise of the evidence and prior beliefs.
+        known: a camera that was calibrated before: its covariance takes the place of beliefs about cameras in
+            general, and what it holds for exact stays as it is.
     """
 
     width: int
@@ -35,12 +39,31 @@ class Problem:
     points: Points | None
     tracks: TrackNodes | None
     config: CalibrationConfig
+    known: RoadCamera | None = None
 
     @property
     def needs_lanes(self) -> bool:
         """Whether nothing that was measured tells the scale across the road."""
         across = self.lengths is not None and not self.lengths.along.all()
-        return self.points is None and not across and self.tracks is not None
+        return self.points is None and not across and self.tracks is not None and self.known is None
+
+    def motion_of(self, camera: RoadCamera) -> CalibrationConfig:
+        """What is believed of motions seen through a trial camera.
+
+        In a smaller scene all accelerations are smaller. Where the scale is known before, that must not speak
+        for a smaller one: beliefs grow and shrink with the height.
+        """
+        c = self.config
+        if self.known is None:
+            return c
+        factor = float(camera.position[2] / self.known.position[2])
+        return replace(c, acceleration_sd=c.acceleration_sd * factor, lateral_sd=c.lateral_sd * factor)
+
+    def free(self) -> IntArray:
+        """Which of the camera's parameters are sought: places in `PARAMETERS`."""
+        if self.known is not None:
+            return np.flatnonzero(np.diag(self.known.covariance) > 0.0)
+        return np.array([k for k in range(len(PARAMETERS)) if self.points is not None or k not in PLACE])
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +88,17 @@ class Weighting:
 
 
 def prior_residuals(camera: RoadCamera, problem: Problem, common_acceleration: float) -> FloatArray:
-    """What speaks against this camera before any evidence (10,)."""
+    """What speaks against this camera before any evidence.
+
+    Returns:
+        (9,), or one for each parameter sought and one where the camera was known before.
+    """
     c = problem.config
+    if problem.known is not None:
+        free = problem.free()
+        root = np.linalg.cholesky(problem.known.covariance[np.ix_(free, free)])
+        off = np.linalg.solve(root, problem.known.change_to(camera)[free])
+        return np.append(off, common_acceleration / c.common_acceleration_sd)
     corner = math.hypot(problem.width, problem.height) / 2.0 / camera.fx
     centre = c.centre_share * problem.width
     return np.array(
@@ -146,7 +178,7 @@ def track_residuals(
 ) -> FloatArray:
     """Residuals of the tracks (K (2 M + 2),): nodes, then what their accelerations and turns cost."""
     assert problem.tracks is not None
-    c, w = problem.config, weighting.node_weight
+    c, w = problem.motion_of(camera), weighting.node_weight
     fit = fit_tracks(camera, problem.tracks, c, weighting.track_px, common_acceleration, w)
     used = np.sqrt(w.max(axis=1))
     parts = np.concatenate(
