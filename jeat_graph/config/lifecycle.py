@@ -187,6 +187,14 @@ class BirthConfig(Section):
         0.0,
         1.0,
     )
+    max_picture_share: float = number(
+        0.8,
+        "1",
+        "no birth of a box that touches three edges of the picture and covers more of it: where the light "
+        "changes, detectors of change see that everywhere",
+        0.0,
+        1.0,
+    )
 
 
 @dataclass(frozen=True)

@@ -99,6 +99,8 @@ class SceneState(NamedTuple):
 def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
     """Return what is held of a scene of S sensors before the first scan."""
     num_sensors = len(sensors.p_detect)
+    # Of a sensor that is the only one, nothing can be told but by itself.
+    doubt = config.lifecycle.first_doubt if num_sensors > 1 else 0.0
     return SceneState(
         clutter=sensors.clutter_per_scan.copy(),
         p_detect=sensors.p_detect.copy(),
@@ -110,7 +112,7 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
         fruitless=np.zeros(num_sensors),
         looked=np.zeros(num_sensors),
         blind=np.full(num_sensors, config.lifecycle.usual_blindness),
-        unproven=np.full(num_sensors, config.lifecycle.first_doubt),
+        unproven=np.full(num_sensors, doubt),
     )
 
 

@@ -16,6 +16,7 @@ from jeat_graph.tracking.whole import track
 RATE_HZ = 20.0
 WITHOUT = "lifecycle.sight_scans=0"
 NOTHING = (np.zeros((0, 4)), np.zeros(0))
+NEARLY = (np.array([[0.0, 1.0, 1280.0, 690.0]]), np.ones(1))
 WHOLE_PICTURE = (np.array([[0.0, 0.0, 1280.0, 720.0]]), np.ones(1))
 
 
@@ -40,7 +41,9 @@ def follow(blind, vehicles=6, seconds=12.0, shows=NOTHING, overrides=()):
     return tables, states
 
 
-@pytest.mark.parametrize("shows", [NOTHING, WHOLE_PICTURE], ids=["nothing", "one box, the whole picture"])
+@pytest.mark.parametrize(
+    "shows", [NOTHING, WHOLE_PICTURE, NEARLY], ids=["nothing", "the whole picture", "nearly all of it"]
+)
 def test_a_sensor_that_never_finds_anything_takes_no_track(shows):
     tables, states = follow(lambda t: True, shows=shows)
     assert np.mean([len(table) for table in tables[20:]]) > 5.0
@@ -70,6 +73,17 @@ def test_one_that_goes_blind_for_five_seconds_costs_no_identity_and_is_back_at_o
 def test_where_every_sensor_sees_none_is_held_to_be_blind():
     _, states = follow(lambda t: False)
     assert all(one[name].blind < 0.02 for one in states[3:] for name in ("good", "other"))
+
+
+def test_a_sensor_that_looks_alone_is_taken_to_see_and_its_misses_count():
+    """Nobody could tell; what it has ever seen may have been nothing."""
+    tracker = Tracker(load_config("default", ["smoother.engine=none"]), image=(1280, 720))
+    boxes = np.array([[200.0 * i + 100.0, 300.0, 60.0, 40.0] for i in range(5)])
+    for k in range(40):
+        seen = (boxes, np.full(5, 0.9)) if k < 20 else NOTHING
+        tracker.step((k / 20.0, "rgb", *seen))
+    assert tracker.sensor_states()["rgb"].blind == 0.0
+    assert (tracker.snapshot().tracks.existence < 0.5).all()
 
 
 def test_false_tracks_of_one_sensor_still_die_by_its_own_misses():

@@ -131,7 +131,7 @@ def birth_existence(batch: Batch, scene: SceneState, model: Model) -> FloatArray
 
     u P_D LR(score) / (u P_D LR(score) + λ): u vehicles in the scene are expected to have no track yet, and
     most leftovers are clutter however high their score (Williams 2015, the Poisson part of the mixture).
-    A box as large as the picture says nothing of where a vehicle is: what dazzled detectors of change give.
+    A box of nearly the whole picture says nothing of where a vehicle is: dazzled detectors of change give it.
     """
     image, lifecycle = model.settings.image, model.settings.lifecycle
     out = np.empty(len(batch.precision))
@@ -141,12 +141,20 @@ def birth_existence(batch: Batch, scene: SceneState, model: Model) -> FloatArray
         if lifecycle.leave_picture and not (0.0 <= x <= image.width and 0.0 <= y <= image.height):
             out[j] = -1.0  # it would end in the same step
             continue
-        if batch.cut[j, 0] == BOTH_CUT and batch.cut[j, 1] == BOTH_CUT:
+        if covers_picture(batch, j, image.width * image.height, model.settings.birth.max_picture_share):
             out[j] = -1.0
             continue
         true = scene.undetected[0] * scene.p_detect[s] * math.exp(batch.log_score[j])
         out[j] = true / (true + scene.clutter[s])
     return out
+
+
+@inner
+def covers_picture(batch: Batch, j: int, area: float, most: float) -> bool:
+    """Whether detection `j` reaches three edges of the picture and covers more than `most` of its `area`."""
+    first, second = batch.cut[j]
+    reaches = first != WHOLE and second != WHOLE and (first == BOTH_CUT or second == BOTH_CUT)
+    return bool(reaches and batch.boxes[j, 2] * batch.boxes[j, 3] > most * area)
 
 
 @inner

@@ -21,6 +21,15 @@ from jeat_graph.tracking.state import SceneState, TrackArrays
 
 
 @inner
+def others_look(s: int, t: float, scene: SceneState, model: Model) -> bool:
+    """Whether another sensor than `s` has looked of late, at time `t` (s)."""
+    for other in range(len(scene.last_look)):
+        if other != s and t - scene.last_look[other] <= model.settings.lifecycle.max_gap_confirmed_s:
+            return True
+    return False
+
+
+@inner
 def judge_sight(
     tracks: TrackArrays,
     n: int,
@@ -33,8 +42,9 @@ def judge_sight(
     """Follow the probability that each present sensor is blind as a whole, in place.
 
     What it should have found by P_D and visibility against what it found. With no track to find, and nothing
-    found, the scan says nothing: an empty road and a blind sensor look alike. Called before the existence of
-    the tracks is updated.
+    found, the scan says nothing: an empty road and a blind sensor look alike. Misses count on tracks that
+    another sensor has seen; a sensor that looks alone is taken to see, for nobody could tell. Called before
+    the existence of the tracks is updated.
     """
     lifecycle = model.settings.lifecycle
     if not lifecycle.judges_sight:
@@ -44,17 +54,24 @@ def judge_sight(
     for s in range(len(batch.present)):
         if not batch.present[s]:
             continue
+        others = others_look(s, batch.t, scene, model)
         missed, found = 0.0, 0.0
         for i in range(n):
             j = association.match[i, s]
             if j < 0:
-                missed += ratio_of_miss(tracks.existence[i], p_detect[i, s])
+                # What it alone has ever seen may as well have been nothing.
+                if tracks.seen_by[i] & ~(1 << s):
+                    missed += ratio_of_miss(tracks.existence[i], p_detect[i, s])
             else:
                 leftover[j] = False
                 found += ratio_of_hit(tracks.existence[i], p_detect[i, s], association.evidence[i, s])
         for j in range(len(leftover)):
             if leftover[j] and batch.sensor[j] == s and newcomer[j] > 0.0:
                 found += ratio_of_leftover(newcomer[j])
-        before = blind_before_scan(scene.blind[s], lifecycle.sight_scans, lifecycle.blind_scans)
-        scene.blind[s] = blind_after_scan(before, missed + found)
+        if not others:
+            scene.blind[s] = 0.0
+        else:
+            last = scene.blind[s] if scene.blind[s] > 0.0 else lifecycle.usual_blindness
+            before = blind_before_scan(last, lifecycle.sight_scans, lifecycle.blind_scans)
+            scene.blind[s] = blind_after_scan(before, missed + found)
         scene.unproven[s] = blind_after_scan(scene.unproven[s], min(found, 0.0))
