@@ -1,6 +1,6 @@
 # Every target does its own set-up in .venv and needs only make and Python 3.11 or later.
 #
-#   make demo    simulate a highway at night, track it, judge the tracks, draw a picture (in demo/)
+#   make demo    from raw pictures and events to tracks on a film, and a longer simulation judged (in demo/)
 #   make test    run all tests, those of time and memory by themselves
 #   make test-portable   run the numerical tests with other kernels, in random order (SEED=... repeats one)
 #   make licences   list the licences of everything installed with the package
@@ -32,11 +32,16 @@ OTHER_KERNELS = OPENBLAS_CORETYPE=$(if $(filter x86_64 AMD64,$(shell uname -m)),
 	NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python .ci/kernels.py names)" \
 	NUMBA_CPU_NAME=generic NUMBA_CACHE_DIR=$(CURDIR)/$(VENV)/numba-generic
 
-.PHONY: demo test test-portable licences live fuzz lint types bounds build docs clean
+.PHONY: demo clip test test-portable licences live fuzz lint types bounds build docs clean
 .DELETE_ON_ERROR:
 
-demo: $(VENV)/.compiled
-	@$(BIN)/jeat-graph demo --out demo
+# The clip is rendered on one core while the tracker is compiled on the other.
+demo: $(VENV)/.run
+	@$(MAKE) --no-print-directory -j 2 $(VENV)/.compiled clip
+	@$(BIN)/jeat-graph demo --from-raw --out demo
+
+clip: $(VENV)/.run
+	@$(BIN)/python -m jeat_graph.cli.demo_raw demo
 
 test: $(VENV)/.test $(VENV)/.compiled
 	@echo "make: running the tests"

@@ -34,6 +34,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--duration", type=float, default=DURATION_S, metavar="S", help=f"length (default {DURATION_S:g})")
     add("--seed", type=int, default=SEED, metavar="N", help=f"seed of the simulation (default {SEED})")
     add_config(parser, "highway", settings=False)
+    add(
+        "--from-raw",
+        action="store_true",
+        help="before that, go the whole way with a short clip: simulate pictures and events, find the "
+        "vehicles in them, track, judge, and draw a film and a strip of pictures",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -54,6 +60,11 @@ def run(args: argparse.Namespace) -> int:
     config = load_config(args.config)
     scenario = load_scenario(args.scenario)
     out = Path(args.out)
+    if args.from_raw:
+        from jeat_graph.cli.demo_raw import go_the_whole_way
+
+        if code := go_the_whole_way(out):
+            return code
     with stages("demo", 1) as stage:
         stage(f"simulating {args.duration:g} s")
         recording = record(scenario, args.seed, args.duration)

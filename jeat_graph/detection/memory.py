@@ -66,7 +66,7 @@ class CloudMemory:
             places = np.stack([marked.x, marked.y], axis=1).astype(np.float64) + 0.5
             cloud = self._assign(cloud, places, expected)
         there = np.bincount(cloud) > 0
-        return int(there.sum()), marked._replace(group=np.cumsum(there)[cloud])
+        return int(there.sum()), marked._replace(group=np.cumsum(there, dtype=np.int64)[cloud])
 
     def _assign(self, cloud: IntArray, places: FloatArray, expected: FloatArray) -> IntArray:
         """Name the cloud of each marked pixel (P,): as before, or a new name for each remembered box.

@@ -1,0 +1,62 @@
+"""The part of `jeat-graph demo` that begins with raw pictures and events: commands that anybody can repeat.
+
+`python -m jeat_graph.cli.demo_raw DIR` renders the clip ahead of time, say while the tracker is compiled;
+what is there already is not rendered again.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+SCENARIO, SEED, FRAMES, SIZE = "night-nolight", 7, 40, "640x384"
+NETWORK, PRESET = "sehn", "default"
+#: Moments of the strip of pictures.
+MOMENTS = 4
+
+
+def clip_command(out: Path) -> list[str]:
+    """Return the arguments of the command that renders the clip."""
+    what = [SCENARIO, "--density", "sparse", "--sensors", "pictures", "--frames", str(FRAMES), "--size", SIZE]
+    return ["simulate", *what, "--seed", str(SEED), "--out", str(out / "clip")]
+
+
+def commands(out: Path) -> list[list[str]]:
+    """Return the arguments of the commands, in their order: render, track, judge, film, strip."""
+    segment = out / "clip" / "segments" / "000000"
+    tracked = str(out / "raw")
+    raw = ["--frames", str(segment), "--events", str(segment / "events.h5")]
+    network = ["--detector-frames", NETWORK, "--detector-events", NETWORK, "--config", PRESET]
+    return [
+        clip_command(out),
+        ["track", *raw, *network, "--out", tracked],
+        ["eval", tracked, "--gt", str(segment / "gt.csv")],
+        ["render", tracked, *raw, "--out", str(out / "raw.mp4")],
+        ["render", tracked, *raw, "--strip", str(MOMENTS), "--out", str(out / "raw.png")],
+    ]
+
+
+def go_the_whole_way(out: Path) -> int:
+    """Run the commands, and say each before it runs.
+
+    Returns:
+        The exit code of the first that failed, which has said why; 0 if none did.
+    """
+    for one in commands(out):
+        if code := _run(one):
+            return code
+    print(f"film      {out / 'raw.mp4'} (moments of it: {out / 'raw.png'}), pictures left, events right")
+    print()
+    return 0
+
+
+def _run(arguments: Sequence[str]) -> int:
+    from jeat_graph.cli.main import main
+
+    print(f"demo: jeat-graph {' '.join(arguments)}", file=sys.stderr)
+    return main(arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(_run(clip_command(Path(sys.argv[1]))))
