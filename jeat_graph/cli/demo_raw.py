@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 SCENARIO, SEED, FRAMES, SIZE = "night-nolight", 7, 40, "640x384"
-NETWORK, PRESET = "sehn", "default"
+NETWORK = PRESET = "sehn"
 #: Moments of the strip of pictures.
 MOMENTS = 4
 
