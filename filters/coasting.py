@@ -16,6 +16,8 @@ from numba import njit
 from jeat_graph.data.arrays import BoolArray, FloatArray
 
 _ACCELERATION, _RATE = 2, 1
+# So many memories leave two billionths; a minute's gap would leave a variance that no float holds.
+_MOST_MEMORIES = 20.0
 
 
 @njit(cache=True)
@@ -30,7 +32,7 @@ def forget(
 ) -> None:
     """Let acceleration and growth of the unseen tracks die away over `dt`, in place: a ← a exp(−Δ / τ).
 
-    The covariances are those of the scaled variables: what is smaller is also surer.
+    The covariances are those of the scaled variables: what is smaller is also surer. After twenty τ it stays.
 
     Args:
         mean: (N, 2, 3 + B) per axis [p, v, a, …] (px, px/s, px/s²).
@@ -41,7 +43,7 @@ def forget(
         dt: time step (s), >= 0.
         memory_s: τ (s), > 0.
     """
-    kept = math.exp(-dt / memory_s)
+    kept = math.exp(-min(dt / memory_s, _MOST_MEMORIES))
     for i in range(len(unseen)):
         if not unseen[i]:
             continue

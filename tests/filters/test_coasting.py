@@ -59,3 +59,14 @@ def test_covariances_stay_symmetric_and_positive(seed):
     for cov in (arrays[1], arrays[3]):
         assert (cov == cov.swapaxes(-1, -2)).all()
         assert np.linalg.eigvalsh(cov).min() > 0.0
+
+
+@given(seed=st.integers(0, 2**31), dt=st.floats(60.0, 1e9))
+def test_no_gap_is_so_long_that_a_variance_vanishes(seed, dt):
+    arrays = made(seed)
+    forget(*arrays, np.ones(3, dtype=bool), dt, 0.2)
+    for cov in (arrays[1], arrays[3]):
+        variance = np.diagonal(cov, axis1=-2, axis2=-1)
+        assert (variance > 0.0).all()
+        std = np.sqrt(variance)
+        np.linalg.cholesky(cov / std[..., :, None] / std[..., None, :])  # raises where it is not positive
