@@ -201,11 +201,15 @@ class _Pair(NamedTuple):
     Attributes:
         track: place of the track.
         vehicle: place of the vehicle.
+        during: which of the track's rows are during the vehicle's life.
+        true: (K, 3) the vehicle at the times of those.
         near: (N,) times at which the track is at the vehicle (s).
     """
 
     track: int
     vehicle: int
+    during: BoolArray
+    true: FloatArray
     near: FloatArray
 
 
@@ -225,21 +229,21 @@ def matched(tracks: RoadRows, truth: RoadRows, config: RoadJudging) -> list[Matc
             during, true = _beside(track, one)
             near = (np.abs(true[:, :2] - track.values[during, :2]) < gate).all(axis=1)
             if near.sum() > config.least_share * len(track.t):
-                pairs.append(_Pair(k, v, track.t[during][near]))
+                pairs.append(_Pair(k, v, during, true, track.t[during][near]))
     taken: dict[int, list[FloatArray]] = {}
-    chosen: dict[int, int] = {}
+    chosen: dict[int, _Pair] = {}
     for pair in sorted(pairs, key=lambda one: -len(one.near)):
         free = np.ones(len(pair.near), dtype=np.bool_)
         for other in taken.get(pair.vehicle, []):
             free &= (pair.near < other[0]) | (pair.near > other[-1])
         if pair.track not in chosen and free.sum() > config.least_share * len(all_tracks[pair.track].t):
-            chosen[pair.track] = pair.vehicle
+            chosen[pair.track] = pair
             taken.setdefault(pair.vehicle, []).append(pair.near)
     out = []
-    for k, v in sorted(chosen.items()):
-        track = all_tracks[k]
-        during, true = _beside(track, vehicles[v])
-        out.append(Matched(int(track.identity[0]), track.t[during], true, track.values[during]))
+    for k in sorted(chosen):
+        track, pair = all_tracks[k], chosen[k]
+        found = track.values[pair.during]
+        out.append(Matched(int(track.identity[0]), track.t[pair.during], pair.true, found))
     return out
 
 

@@ -8,7 +8,8 @@ the filter is linear, so that residuals and columns of the Jacobian go through i
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -53,8 +54,15 @@ class BoxRows(NamedTuple):
 
     def take(self, part: slice) -> BoxRows:
         """Return some of the boxes."""
+        return self._each(lambda name: np.ascontiguousarray(getattr(self, name)[part]))
+
+    def followed_by(self, later: BoxRows) -> BoxRows:
+        """Return these boxes and later ones, of the same sensors."""
+        return self._each(lambda name: np.concatenate([getattr(self, name), getattr(later, name)]))
+
+    def _each(self, change: Callable[[str], Any]) -> BoxRows:
         of_boxes = (name for name in self._fields if name != "memory_s")
-        return self._replace(**{name: np.ascontiguousarray(getattr(self, name)[part]) for name in of_boxes})
+        return self._replace(**{name: change(name) for name in of_boxes})
 
 
 class Motion(NamedTuple):

@@ -45,7 +45,6 @@ from jeat_graph.smoothers.gtsam.shared_chain import (
 )
 
 _ANY_SIZE_M = 100.0
-_OF_BOXES = tuple(name for name in BoxRows._fields if name != "memory_s")
 # Of a state of the graph, in the order of the causal filter's: x, its speed, y, its speed and acceleration.
 _AS_CAUSAL = np.array([0, 1, 3, 4, 5])
 
@@ -175,9 +174,7 @@ class RoadFixedLag:
         keys = self._keys(window.keys[-1], rows.t[-1])[1:]
         window.coefficients = _extended(window, keys)
         window.keys = np.concatenate([window.keys, keys])
-        window.rows = window.rows._replace(
-            **{name: np.concatenate([getattr(window.rows, name), getattr(rows, name)]) for name in _OF_BOXES}
-        )
+        window.rows = window.rows.followed_by(rows)
         return self._solve(window)
 
     def _begun(self, rows: BoxRows) -> _Window | None:

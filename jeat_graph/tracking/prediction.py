@@ -9,7 +9,7 @@ import numpy as np
 from jeat_graph.config.kernel_form import Model
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.tracking.reporting import longest_gap_s, report
+from jeat_graph.tracking.reporting import as_table, longest_gap_s, report
 from jeat_graph.tracking.snapshot import Snapshot
 from jeat_graph.tracking.stages.predicting import predict_all
 
@@ -45,9 +45,7 @@ def predict_reported(now: Snapshot, t: float, model: Model, sensors: tuple[str, 
     predict_all(now.tracks, n, max(t - here, 0.0), now.scene, model)
     # Nobody has looked in between, so nobody can have missed a track either: what counts is the gap now.
     now.tracks.t_update[:] += t - here
-    found = report(now.tracks, n, t, *how)
-    kinds, share = (None, None) if now.classes is None else now.classes.columns(found[1])
-    columns = Trajectories(*found[:-1], sensors, kinds, share, found[-1])
+    columns = as_table(report(now.tracks, n, t, *how), sensors, now.classes)
     table = columns.take(np.isin(columns.track_id, reported))
     rows = np.searchsorted(now.tracks.track_id, table.track_id)
     cov = np.zeros((len(table), 6, 6))

@@ -9,6 +9,8 @@ from jeat_graph.association.boxes import track_boxes, visible_fraction
 from jeat_graph.config.kernel_form import Model
 from jeat_graph.config.schema import ImageConfig, OutputConfig
 from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.tracking.classes import ClassTally
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
 # A sensor of less than this share of the greatest trust, or that sees so much less likely, is not waited for.
@@ -42,6 +44,18 @@ def _longest_wait(p_detect: FloatArray, trust: FloatArray, period_s: FloatArray)
             squared = p_detect[s] * p_detect[s]
             longest = max(longest, period_s[s] / (squared * squared))
     return longest
+
+
+def as_table(
+    columns: tuple[
+        FloatArray, IntArray, FloatArray, FloatArray, FloatArray, FloatArray, IntArray, FloatArray
+    ],
+    sensors: tuple[str, ...],
+    classes: ClassTally | None,
+) -> Trajectories:
+    """Put together what `report` returned, the names of the sensors, and the classes where there are any."""
+    names, share = (None, None) if classes is None else classes.columns(columns[1])
+    return Trajectories(*columns[:-1], sensors, names, share, columns[-1])
 
 
 @njit(cache=True)

@@ -24,7 +24,7 @@ from jeat_graph.tracking.direct_call import DirectCall
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.notice import notice_if_cold
 from jeat_graph.tracking.prediction import Prediction, predict_reported
-from jeat_graph.tracking.reporting import longest_gap_s, report
+from jeat_graph.tracking.reporting import as_table, longest_gap_s, report
 from jeat_graph.tracking.scans import ScanLike, arrivals_of, as_scans
 from jeat_graph.tracking.sensor_state import SensorState, sensor_states
 from jeat_graph.tracking.smoothing.access import SmoothedTracks
@@ -264,8 +264,7 @@ class Tracker(SmoothedTracks):
         columns = self._report(
             self._tracks, self._num_tracks, t, gap, settings.image, settings.output, by_existence
         )
-        kinds, share = (None, None) if self._classes is None else self._classes.columns(columns[1])
-        return Trajectories(*columns[:-1], self.sensor_names, kinds, share, columns[-1])
+        return as_table(columns, self.sensor_names, self._classes)
 
     def last_updates(self) -> Diagnostics:
         """Return what the last step gave to the tracks, those too that are not reported.

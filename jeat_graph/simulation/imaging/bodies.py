@@ -10,6 +10,7 @@ from numba import njit
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.simulation.imaging.air import through
 from jeat_graph.simulation.imaging.layers import GLOW, TileLayers, insert
+from jeat_graph.simulation.imaging.lighting import luminance
 from jeat_graph.simulation.imaging.moments import (
     BOX,
     FACE,
@@ -207,7 +208,7 @@ def add_glow(tile: Tile, lamps: FloatArray, optics: Optics, light: FloatArray) -
                 part = seen * glow_at((column0 + c + 0.5 - u) ** 2 + (row0 + r + 0.5 - w) ** 2, optics)
                 p = r * TILE_W + c
                 if mono:
-                    light[p, GLOW] += part * (0.2126 * red + 0.7152 * green + 0.0722 * blue)
+                    light[p, GLOW] += part * luminance(red, green, blue)
                 else:
                     light[p, GLOW] += part * red
                     light[p, GLOW + 1] += part * green

@@ -19,10 +19,10 @@ from jeat_graph.simulation.imaging.plan import who_touches
 from jeat_graph.simulation.imaging.stage import Stage
 from jeat_graph.simulation.imaging.tiles import TILE, TILE_H, TILE_W, Tile
 
-_SETTLE_STEPS = 8  # of pixels that see nothing move, while their photoreceptors still follow
+SETTLE_STEPS = 8  # of pixels that see nothing move, while their photoreceptors still follow
 _FOLLOWING, _SETTLED = 0.01, 1e-6  # ln
 MAX_KEYS = 32
-_COARSE = 4  # steps that are tried as one
+COARSE = 4  # steps that are tried as one
 UNNOTICED = 0.02  # relative change that needs no samples between
 _BEND = 0.02  # relative distance of beams' and glow's light from a straight line in time
 _FAINT_CD_M2 = 0.005
@@ -94,8 +94,10 @@ def read_luminance(patch: FloatArray, tile: Tile, luminance: FloatArray) -> None
 
 
 @njit(cache=True)
-def key_lights(tile: Tile, most: int, who: IntArray, counts: IntArray, stage: Stage, keys: FloatArray) -> int:
-    """Fill the light of beams and glow after the beginning at key times, between which it is linear.
+def key_lights(
+    tile: Tile, most: int, who: IntArray, counts: IntArray, stage: Stage, now: FloatArray, keys: FloatArray
+) -> int:
+    """Fill the light of beams and glow at key times, between which it is linear.
 
     Args:
         tile: whose ground is on the canvas.
@@ -103,14 +105,17 @@ def key_lights(tile: Tile, most: int, who: IntArray, counts: IntArray, stage: St
         who: vehicles that may touch it.
         counts: how many.
         stage: the scene at J times.
-        keys: (1 + MAX_KEYS, P, 3) the first is that of the interval's beginning; the others are filled.
+        now: (P, 3) light at the interval's beginning; then that at its end.
+        keys: (1 + MAX_KEYS, P, 3) filled, the first with that of the beginning.
 
     Returns:
         How many keys follow the first, a power of two.
     """
+    keys[0] = now
     available = len(stage.moments.times)
     most = min(most, len(keys) - 1)
     light_tile(tile, available - 1, who, counts, stage, keys[most])
+    now[:] = keys[most]
     if most == 1:
         return 1
     middle, end = keys[most // 2], keys[most]
@@ -166,7 +171,7 @@ def run_physical(
             pieces = 1
             if not quiet[n]:
                 apart = unsettled(pixels[:count], luminance[:count], model, state)
-                pieces = _SETTLE_STEPS if apart > _FOLLOWING else 1
+                pieces = SETTLE_STEPS if apart > _FOLLOWING else 1
                 quiet[n] = apart < _SETTLED
             for k in range(pieces):
                 a, b = start + (end - start) * k / pieces, start + (end - start) * (k + 1) / pieces
@@ -178,10 +183,8 @@ def run_physical(
         still[:count] = luminance[:count]
         key_count = 1
         if lit[n] > 0 or glowing[n]:
-            keys[0] = light_now[n]
-            key_count = key_lights(tile, max(lit[n], 1), who, counts, stage, keys)
+            key_count = key_lights(tile, max(lit[n], 1), who, counts, stage, light_now[n], keys)
             glowing[n] = lit[n] > 0
-            light_now[n] = keys[key_count]
             constant = False
         else:
             keys[:2] = 0.0
@@ -190,14 +193,16 @@ def run_physical(
         stride = available // samples
         # Samples are taken coarsely first, and where they differ, those between them too. Nothing as wide as
         # a vehicle passes a tile unseen within four steps; its lamps might, and so might light.
-        coarse = min(samples, _COARSE if constant else _COARSE // 2)
+        coarse = min(samples, COARSE if constant else COARSE // 2)
         for k in range(0, samples, coarse):
             top, stack[0] = 0, k + coarse
             done = k
             while top >= 0:
                 here = stack[top]
                 if not painted[top]:
-                    if constant and not _any_touch(here * stride - 1, who, counts, stage.moments, tile):
+                    if constant and not any_touch(
+                        here * stride - 1, who, counts, stage.moments, row0, column0
+                    ):
                         seen[top, :count] = still[:count]
                     else:
                         if not constant:
@@ -224,13 +229,13 @@ def run_physical(
 
 
 @njit(cache=True)
-def _any_touch(j: int, who: IntArray, counts: IntArray, moments: Moments, tile: Tile) -> bool:
-    """Say whether any body or shadow may be on a tile at time `j`."""
+def any_touch(j: int, who: IntArray, counts: IntArray, moments: Moments, row0: int, column0: int) -> bool:
+    """Say whether any body or shadow may be on the tile that begins at (row0, column0) at time `j`."""
     touch = moments.touch
     for n in range(counts[0]):
         v = who[0, n]
         box = (touch[j, v, 0, 0], touch[j, v, 0, 1], touch[j, v, 0, 2], touch[j, v, 0, 3])
-        if meets(box[0], box[1], box[2], box[3], tile.row, tile.column):
+        if meets(box[0], box[1], box[2], box[3], row0, column0):
             return True
     return False
 

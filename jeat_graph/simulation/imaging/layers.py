@@ -9,6 +9,7 @@ from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.simulation.imaging.background import PACKED
+from jeat_graph.simulation.imaging.lighting import luminance
 from jeat_graph.simulation.imaging.tiles import TILE, TILE_H, TILE_W
 
 LAYERS = 12  # bodies and lights over one pixel; more are left out, and nobody would see them
@@ -66,7 +67,7 @@ def insert(
             at -= 1
         value[p, at, 0], value[p, at, 1] = depth, cover
         if width == 3:
-            value[p, at, 2] = 0.2126 * r + 0.7152 * g + 0.0722 * b
+            value[p, at, 2] = luminance(r, g, b)
         else:
             value[p, at, 2], value[p, at, 3], value[p, at, 4] = r, g, b
 

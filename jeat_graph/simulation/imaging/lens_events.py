@@ -11,12 +11,12 @@ from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.events import EventArray
 from jeat_graph.simulation.imaging.config import ImagingConfig
 from jeat_graph.simulation.imaging.event_pixel import make_model, make_state
-from jeat_graph.simulation.imaging.event_run import light_all
+from jeat_graph.simulation.imaging.event_run import SETTLE_STEPS, light_all
 from jeat_graph.simulation.imaging.event_sink import make_sink, to_events
 from jeat_graph.simulation.imaging.layers import GLOW
 from jeat_graph.simulation.imaging.lens import Lens
 from jeat_graph.simulation.imaging.lens_interval import LensInterval, Pictures, Sight, light_canvas
-from jeat_graph.simulation.imaging.lens_run import SETTLE_STEPS, run_lens
+from jeat_graph.simulation.imaging.lens_run import run_lens
 from jeat_graph.simulation.imaging.lighting import LUMINANCE
 from jeat_graph.simulation.imaging.renderer import Renderer
 from jeat_graph.simulation.imaging.tiles import TILE, TILE_H, TILE_W, tile_raster

@@ -89,10 +89,8 @@ def light_canvas(
             row0, column0 = tiles[n]
             who_touches(row0, column0, boxes, who, counts)
             tile = take_ground(row0, column0, stage.packed, stage.canvas.ground)
-            keys[0] = now[n]
-            count = key_lights(tile, max(lit[n], 1), who, counts, stage, keys)
+            count = key_lights(tile, max(lit[n], 1), who, counts, stage, now[n], keys)
             glowing[n] = lit[n] > 0
-            now[n] = keys[count]
             if used + count + 1 > len(pool):
                 larger = np.zeros((2 * len(pool) + count + 1, TILE, GLOW + 1))
                 larger[:used] = pool[:used]

@@ -12,18 +12,14 @@ from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.simulation.imaging.event_pixel import PixelModel, PixelState, advance
-from jeat_graph.simulation.imaging.event_run import UNNOTICED
+from jeat_graph.simulation.imaging.event_run import COARSE, SETTLE_STEPS, UNNOTICED, any_touch
 from jeat_graph.simulation.imaging.event_sink import EventSink, with_room
-from jeat_graph.simulation.imaging.layers import meets
 from jeat_graph.simulation.imaging.lens import place_on_canvas
 from jeat_graph.simulation.imaging.lens_interval import LensInterval, Pictures, Sight
 from jeat_graph.simulation.imaging.painter import paint_tile, take_ground
 from jeat_graph.simulation.imaging.plan import who_touches
 from jeat_graph.simulation.imaging.stage import Stage
 from jeat_graph.simulation.imaging.tiles import TILE, TILE_H, TILE_W
-
-_COARSE = 4  # steps that are tried as one
-SETTLE_STEPS = 8  # of pixels that saw something move in the interval before
 
 
 @njit(cache=True)
@@ -121,7 +117,7 @@ def _next_painting(
     keys = max(0, int(work.first[n + 1] - work.first[n]) - 1)
     samples = max(int(work.steps[n]), keys, 1)
     stride = count // samples
-    most = min(samples, _COARSE if keys == 0 else _COARSE // 2)
+    most = min(samples, COARSE if keys == 0 else COARSE // 2)
     copy_tile(row0, column0, pictures.after, pictures.before)
     # Light alone goes in straight lines between its keys.
     if most > 1 and work.steps[n] > 0 and start % (most * stride) == 0:
@@ -147,14 +143,9 @@ def _paint(
     who = np.empty((3, max(1, len(work.boxes))), dtype=np.int64)
     counts = np.empty(3, dtype=np.int64)
     who_touches(row0, column0, work.boxes, who, counts)
-    light, canvas, touch = stage.canvas.light, stage.canvas, stage.moments.touch
+    light, canvas = stage.canvas.light, stage.canvas
     if keys == 0:
-        found = False
-        for k in range(counts[0]):
-            v = who[0, k]
-            box = (touch[step - 1, v, 0, 0], touch[step - 1, v, 0, 1])
-            found |= meets(box[0], box[1], touch[step - 1, v, 0, 2], touch[step - 1, v, 0, 3], row0, column0)
-        if not found:
+        if not any_touch(step - 1, who, counts, stage.moments, row0, column0):
             copy_tile(row0, column0, static, picture)
             return
         light[:] = 0.0

@@ -14,13 +14,20 @@ from jeat_graph.simulation.imaging.smooth import clamp01
 from jeat_graph.simulation.world.bend import bend_points
 from jeat_graph.simulation.world.scene import Scene
 
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB primaries (ITU-R BT.709)
+_RED, _GREEN, _BLUE = 0.2126, 0.7152, 0.0722  # of linear sRGB primaries (ITU-R BT.709)
+LUMINANCE = np.array([_RED, _GREEN, _BLUE])
 LAMP_HEIGHT_M = 0.65  # of headlights above the road
 _FAR_LAMPS_M = 400.0
 _KOSCHMIEDER = 3.912  # ln 50: contrast falls to 2 % at the visual range (Koschmieder 1924)
 _FLOOR_CD_M2 = 0.005  # what a pixel's dark current is worth
 # A beam is drawn as far as it adds this fraction of the light that is there anyway, and no farther.
 _BEAM_SHARE, _BEAM_MIN_M, _BEAM_MAX_M = 0.005, 6.0, 90.0
+
+
+@njit(cache=True, inline="always")
+def luminance(red: float, green: float, blue: float) -> float:
+    """Luminance of a colour in linear sRGB."""
+    return _RED * red + _GREEN * green + _BLUE * blue
 
 
 def _tint(red: float, green: float, blue: float) -> FloatArray:

@@ -11,6 +11,7 @@ from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.simulation.imaging.background import CLEAR, COVER, DEPTH, GAIN, LUX, PACKED
 from jeat_graph.simulation.imaging.bodies import add_body, add_glow, add_lamps
 from jeat_graph.simulation.imaging.layers import GLOW, ON_GROUND, ON_WALL, TileLayers, meets
+from jeat_graph.simulation.imaging.lighting import luminance
 from jeat_graph.simulation.imaging.moments import BOX, SIDES
 from jeat_graph.simulation.imaging.road_light import cast_beams
 from jeat_graph.simulation.imaging.shadows import cast_shadow
@@ -157,5 +158,5 @@ def _airlight(scene: FloatArray, channel: int, channels: int) -> float:
     """Radiance of endless fog in a channel (cd/m²)."""
     out: float = scene[AIR + channel]
     if channels == 1:
-        out = 0.2126 * scene[AIR] + 0.7152 * scene[AIR + 1] + 0.0722 * scene[AIR + 2]
+        out = luminance(scene[AIR], scene[AIR + 1], scene[AIR + 2])
     return out

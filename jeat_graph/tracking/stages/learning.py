@@ -35,6 +35,12 @@ def scan_weight(s: int, model: Model) -> float:
 
 
 @inner
+def looks_too(other: int, s: int, t: float, scene: SceneState, model: Model) -> bool:
+    """Whether a sensor is another one than `s` and has looked of late, at time `t` (s)."""
+    return other != s and t - scene.last_look[other] <= model.settings.lifecycle.max_gap_confirmed_s
+
+
+@inner
 def count_misses(
     tracks: TrackArrays,
     n: int,
@@ -87,7 +93,7 @@ def learn_trust(
             continue
         sharpest = 0.0
         for other in range(len(batch.present)):
-            if other != s and batch.t - scene.last_look[other] <= lifecycle.max_gap_confirmed_s:
+            if looks_too(other, s, batch.t, scene, model):
                 sharpest = max(sharpest, scene.p_detect[other] * (1.0 - scene.blind[other]))
         if sharpest == 0.0:
             continue

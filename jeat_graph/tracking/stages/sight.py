@@ -17,16 +17,17 @@ from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.beginning import birth_existence
 from jeat_graph.tracking.stages.inner import inner
+from jeat_graph.tracking.stages.learning import looks_too
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
 
 @inner
 def others_look(s: int, t: float, scene: SceneState, model: Model) -> bool:
     """Whether another sensor than `s` has looked of late, at time `t` (s)."""
+    looking = False
     for other in range(len(scene.last_look)):
-        if other != s and t - scene.last_look[other] <= model.settings.lifecycle.max_gap_confirmed_s:
-            return True
-    return False
+        looking = looking or looks_too(other, s, t, scene, model)
+    return looking
 
 
 @inner
