@@ -17,6 +17,7 @@ from jeat_graph.benchmark.provenance import provenance
 from jeat_graph.benchmark.raw_options import add_raw, detectors_of, findings
 from jeat_graph.benchmark.raw_segments import SENSORS, RawFound, described, find_in, segments_in
 from jeat_graph.data.trajectories import GroundTruth
+from jeat_graph.detection.detecting import FUSED_SENSOR
 
 if TYPE_CHECKING:
     from jeat_graph.data.detections import Detections
@@ -34,7 +35,7 @@ PAPER = {
     "DAGR, both": (67.7, None),
 }
 #: Average precision is over all scores; what is certainly wrong only takes time.
-_EVERY_SCORE = ("model_frames.score=0.01", "model_events.score=0.01")
+_EVERY_SCORE = ("model_frames.score=0.01", "model_events.score=0.01", "model_fused.score=0.01")
 _KEYS = ("AP50", "AP")
 
 
@@ -60,7 +61,7 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
         "detection": list(args.detection_set),
     }
     records = []
-    for sensor in SENSORS:
+    for sensor in (*SENSORS, FUSED_SENSOR):
         for detector in dict.fromkeys(one.finding.detector for one in found if one.finding.sensor == sensor):
             own = [one for one in found if (one.finding.sensor, one.finding.detector) == (sensor, detector)]
             records.append({"sensor": sensor, "detector": Path(detector).name, **judge_detector(own)})

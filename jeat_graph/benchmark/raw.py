@@ -14,12 +14,13 @@ from jeat_graph.benchmark.judging import METRICS, in_processes
 from jeat_graph.benchmark.peer_search import peers_here
 from jeat_graph.benchmark.provenance import provenance
 from jeat_graph.benchmark.raw_options import add_raw, detectors_of, findings
-from jeat_graph.benchmark.raw_segments import SENSORS, RawFound, described, find_in, segments_in
+from jeat_graph.benchmark.raw_segments import SENSORS, RawFound, RawSegment, described, find_in, segments_in
 from jeat_graph.benchmark.recordings import JudgedRecording
 from jeat_graph.benchmark.steps import start
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError
+from jeat_graph.detection.detecting import FUSED_SENSOR
 
 if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
@@ -46,7 +47,7 @@ class Row:
     """A row of the table.
 
     Attributes:
-        detectors: of pictures and of events, by name.
+        detectors: of pictures and of events, by name; that of both twice.
         tracker: `ByteTrack`, `paper`, or the preset of ours.
         sensors: what it is given.
     """
@@ -55,8 +56,13 @@ class Row:
     tracker: str
     sensors: tuple[str, ...]
 
+    @property
+    def key(self) -> tuple[str, str]:
+        """Whose recordings they are."""
+        return (FUSED_SENSOR, self.detectors[0]) if self.sensors == (FUSED_SENSOR,) else self.detectors
+
     def __str__(self) -> str:
-        by_sensor = dict(zip(SENSORS, self.detectors, strict=True))
+        by_sensor = {**dict(zip(SENSORS, self.detectors, strict=True)), FUSED_SENSOR: self.detectors[0]}
         return f"{self.tracker}, " + " + ".join(f"{s} {Path(by_sensor[s]).name}" for s in self.sensors)
 
 
@@ -91,8 +97,9 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
         for pair in zip(args.frames, args.events, strict=True)
         for row in rows_of(pair, args.presets, with_peers)
     ]
+    rows += [row for one in args.fused for row in fused_rows(one, args.presets, with_peers)]
     # Pairs that share a detector share the rows of its sensor alone.
-    jobs = [(row, recordings[row.detectors]) for row in {str(row): row for row in rows}.values()]
+    jobs = [(row, recordings[row.key]) for row in {str(row): row for row in rows}.values()]
     records = in_processes(_judge, jobs, args.jobs, "tracking")
     settings = {
         "data": described(folders),
@@ -115,24 +122,39 @@ def rows_of(detectors: tuple[str, str], presets: Sequence[str], with_peers: bool
     return [*theirs, Row(detectors, PAPER, SENSORS), *ours]
 
 
+def fused_rows(detector: str, presets: Sequence[str], with_peers: bool) -> list[Row]:
+    """Return the rows of a network of both sensors, whose boxes are those of one sensor: theirs and ours."""
+    trackers = [*([BYTETRACK] if with_peers else []), *presets]
+    return [Row((detector, detector), tracker, (FUSED_SENSOR,)) for tracker in trackers]
+
+
 def _recordings(found: Sequence[RawFound]) -> dict[tuple[str, str], dict[str, list[SizedRecording]]]:
-    """Return, by pair of detectors and by data set, recordings with the detections of both sensors."""
+    """Return recordings by data set, by pair of detectors with the detections of both sensors.
+
+    A network of both sensors stands as `fused` and its name.
+    """
     by_sensor: dict[str, dict[tuple[str, str, str], RawFound]] = {sensor: {} for sensor in SENSORS}
+    out: dict[tuple[str, str], dict[str, list[SizedRecording]]] = {}
     for one in found:
         asked = one.finding
+        if asked.sensor == FUSED_SENSOR:
+            group = out.setdefault((FUSED_SENSOR, asked.detector), {}).setdefault(asked.segment.source, [])
+            group.append(_recording(asked.segment, one.detections))
+            continue
         by_sensor[asked.sensor][asked.detector, asked.segment.source, asked.segment.name] = one
-    out: dict[tuple[str, str], dict[str, list[SizedRecording]]] = {}
     frames, events = (by_sensor[sensor] for sensor in SENSORS)
     for (first, source, name), rgb in frames.items():
-        segment = rgb.finding.segment
-        truth, size_px = segment.truth(), segment.size_px()
         for (second, *place), evt in events.items():
             if place != [source, name]:
                 continue
             both = Detections.concatenate([rgb.detections, evt.detections])
             group = out.setdefault((first, second), {}).setdefault(source, [])
-            group.append(SizedRecording(f"{source}/{name}", both, truth, size_px))
+            group.append(_recording(rgb.finding.segment, both))
     return out
+
+
+def _recording(segment: RawSegment, found: Detections) -> SizedRecording:
+    return SizedRecording(f"{segment.source}/{segment.name}", found, segment.truth(), segment.size_px())
 
 
 def _judge(job: tuple[Row, dict[str, list[SizedRecording]]]) -> list[dict[str, Any]]:

@@ -10,7 +10,8 @@ from typing import Any
 from jeat_graph.benchmark import common
 from jeat_graph.benchmark.raw_segments import SENSORS, Finding, RawSegment, detector_named
 from jeat_graph.data.errors import ConfigError
-from jeat_graph.detection.named import EVENTS, FRAMES, MOTION
+from jeat_graph.detection.detecting import FUSED_SENSOR
+from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION
 
 KINDS = (FRAMES, EVENTS)
 
@@ -34,6 +35,13 @@ def add_raw(parser: argparse.ArgumentParser, name: str) -> None:
         help_text = texts.format(f"{seen} (default: {MOTION})")
         add(f"--{kind}", nargs="+", default=[MOTION], metavar="NAME|FILE", help=help_text)
     add(
+        "--fused",
+        nargs="+",
+        default=[],
+        metavar="NAME|FILE",
+        help="networks that look at both at once (default: none)",
+    )
+    add(
         "--detection-set",
         action="append",
         default=[],
@@ -50,10 +58,13 @@ def detectors_of(args: argparse.Namespace) -> dict[str, list[dict[str, Any]]]:
         ConfigError: a name that is not known.
         DataError: no such file.
     """
-    return {
-        sensor: [detector_named(one, kind) for one in names]
-        for sensor, kind, names in zip(SENSORS, KINDS, (args.frames, args.events), strict=True)
-    }
+    return {sensor: [detector_named(one, kind) for one in names] for sensor, kind, names in _asked(args)}
+
+
+def _asked(args: argparse.Namespace) -> list[tuple[str, str, list[str]]]:
+    """Return sensors with what they look at and the detectors asked for."""
+    asked = list(zip(SENSORS, KINDS, (args.frames, args.events), strict=True))
+    return [*asked, (FUSED_SENSOR, FUSED, args.fused)] if args.fused else asked
 
 
 def findings(
@@ -73,7 +84,7 @@ def findings(
 
     detectors_of(args)
     settings = load_settings(None, (*changes, *args.detection_set))
-    for names in (args.frames, args.events):
+    for _, _, names in _asked(args):
         short = [Path(one).name for one in dict.fromkeys(names)]
         if len(set(short)) < len(short):
             raise ConfigError(
@@ -81,7 +92,7 @@ def findings(
             )
     return [
         Finding(segment, sensor, detector, settings)
-        for sensor, names in zip(SENSORS, (args.frames, args.events), strict=True)
+        for sensor, _, names in _asked(args)
         for detector in dict.fromkeys(names)
         for segment in segments
     ]

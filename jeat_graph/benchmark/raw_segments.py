@@ -10,7 +10,7 @@ from typing import Any
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.trajectories import GroundTruth
-from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR, DetectRequest
+from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR, FUSED_SENSOR, DetectRequest
 from jeat_graph.detection.named import MOTION, network_file
 from jeat_graph.detection.settings import DetectionSettings
 from jeat_graph.io.hashing import sha256_of
@@ -53,7 +53,7 @@ class Finding:
 
     Attributes:
         segment: where.
-        sensor: `rgb` or `evt`.
+        sensor: `rgb`, `evt`, or `fused` for a network of both.
         detector: name or ONNX file.
         settings: of the detectors.
     """
@@ -115,15 +115,15 @@ def find_in(finding: Finding) -> RawFound:
     """
     from jeat_graph.detection.detecting import detect_files
 
-    folder = finding.segment.folder
-    of_frames = finding.sensor == FRAMES_SENSOR
-    if not of_frames and not (folder / _EVENTS).is_file():
+    folder, sensor = finding.segment.folder, finding.sensor
+    if sensor != FRAMES_SENSOR and not (folder / _EVENTS).is_file():
         raise DataError("has no events; make the data set with --sensors pictures", folder)
     request = DetectRequest(
-        frames=folder if of_frames else None,
-        events=None if of_frames else folder / _EVENTS,
-        detector_frames=finding.detector,
-        detector_events=finding.detector,
+        frames=None if sensor == EVENTS_SENSOR else folder,
+        events=None if sensor == FRAMES_SENSOR else folder / _EVENTS,
+        detector_frames=finding.detector if sensor == FRAMES_SENSOR else MOTION,
+        detector_events=finding.detector if sensor == EVENTS_SENSOR else MOTION,
+        detector_fused=finding.detector if sensor == FUSED_SENSOR else None,
         settings=finding.settings,
     )
     begun = time.process_time()

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +21,9 @@ if TYPE_CHECKING:
     from jeat_graph.data.detections import Detections
     from jeat_graph.detection.detecting import DetectRequest
 
+STDOUT = "-"
+#: Decimal places of boxes (px) and of times (s) on stdout.
+_PLACES, _TIME_PLACES = 3, 6
 HELP = "find vehicles in raw pictures and events and write a file of detections"
 
 
@@ -29,7 +34,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--events", metavar="FILE", help="a file of events: RAW, DAT, AEDAT, HDF5, ROS bag")
     add_detecting(parser)
     add_rate(parser)
-    add("--out", required=True, metavar="FILE", help="FILE.csv or FILE.parquet")
+    add(
+        "--out",
+        required=True,
+        metavar="FILE",
+        help="FILE.csv or FILE.parquet; -: each scan at once on stdout, a line of JSON as `stream` takes it",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -38,6 +48,8 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.io.detections_io import write_detections
 
     request = detect_request(args)
+    if args.out == STDOUT:
+        return _to_stdout(request)
     out = Path(args.out)
     if out.suffix.lower() not in (".csv", ".parquet"):
         raise DataError("must end in .csv or .parquet", out)
@@ -54,15 +66,33 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _to_stdout(request: DetectRequest) -> int:
+    """Write each scan as soon as it is known."""
+    from jeat_graph.detection.detecting import detect_scans
+
+    for scan in detect_scans(request, _sayer("detect")):
+        boxes = np.round(scan.boxes, _PLACES).tolist()
+        line = {"t": round(scan.t, _TIME_PLACES), "sensor": scan.sensor, "boxes": boxes}
+        line["scores"] = np.round(scan.scores, _PLACES + 1).tolist()
+        sys.stdout.write(json.dumps(line) + "\n")
+        sys.stdout.flush()
+    return 0
+
+
+def _sayer(command: str) -> Callable[[str], None]:
+    def say(text: str) -> None:
+        write_line(f"jeat-graph {command}: {one_line(text)}")
+
+    return say
+
+
 def detect_with_bar(request: DetectRequest, command: str) -> Detections:
     """Detect, and show on a terminal how far it has come."""
     from tqdm import tqdm
 
     from jeat_graph.detection.detecting import detect_files
 
-    def say(text: str) -> None:
-        write_line(f"jeat-graph {command}: {one_line(text)}")
-
+    say = _sayer(command)
     hidden = not sys.stderr.isatty()
     if request.frames is not None:
         form = "{desc}: {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"

@@ -28,9 +28,16 @@ def add_detecting(parser: argparse._ActionsContainer) -> None:
         help="what finds vehicles in events: motion (default), or a network",
     )
     add(
+        "--detector-fused",
+        metavar="NAME|FILE.onnx",
+        help="a network that looks at frames and events of the same pixels at once (`train fused`), "
+        "instead of the other two; either may be missing",
+    )
+    add(
         "--detection-config",
         metavar="FILE",
-        help="YAML with settings of the detectors (sections frames, events, model_frames, model_events)",
+        help="YAML with settings of the detectors (sections frames, events, model_frames, model_events, "
+        "model_fused)",
     )
     add(
         "--detection-set",
@@ -74,6 +81,7 @@ def detect_request(args: argparse.Namespace) -> DetectRequest:
         events=args.events,
         detector_frames=args.detector_frames,
         detector_events=args.detector_events,
+        detector_fused=args.detector_fused,
         rate_hz=args.rate,
         event_size_px=args.event_size,
         events_later_s=args.event_delay,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,15 +17,15 @@ from jeat_graph.data.progress import write_line
 if TYPE_CHECKING:
     from jeat_graph.training.procedure import TrainRequest
 
-HELP = "train a network that finds vehicles in pictures or in events, and write it as ONNX"
-_KINDS = ("frames", "events")
+HELP = "train a network that finds vehicles in pictures, in events or in both, and write it as ONNX"
+_KINDS = ("frames", "events", "fused")
 _NETS = ("tiny", "small", "medium", "large")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     add = parser.add_argument
-    add("kind", choices=_KINDS, help="what the network looks at; one of events has a memory")
+    add("kind", choices=_KINDS, help="what the network looks at (fused: both at once); events have a memory")
     add(
         "data",
         nargs="+",
@@ -49,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--net",
         choices=_NETS,
         default="medium",
-        help="size: about .04, .15, .6 (default) or 1.3 million parameters",
+        help="size: about .04, .15, .6 (default) or 1.3 million parameters; of both sensors twice as many",
     )
     add(
         "--size",
@@ -62,6 +63,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=picture_size,
         metavar="WxH",
         help="what is learned from are cut-outs of this size (default 320x192)",
+    )
+    add(
+        "--start",
+        nargs="+",
+        default=[],
+        metavar="NAME|FILE",
+        help="networks that `train` made, whose weights are the first ones: of the same kind and size, "
+        "and for fused one of frames and one of events; a NAME comes with the package",
     )
     add("--batch", type=counting, metavar="N", help="cut-outs, or sequences of events, a step (default 8)")
     length = parser.add_mutually_exclusive_group()
@@ -153,4 +162,16 @@ def _request(args: argparse.Namespace) -> TrainRequest:
         pictures=Path(args.pictures) if args.pictures else None,
         side=args.size,
         device=args.device,
+        start=_start(args.kind, args.start),
     )
+
+
+def _start(kind: str, names: Sequence[str]) -> tuple[Path, ...]:
+    """Return the files whose weights are the first ones; a name means all kinds that are of use."""
+    from jeat_graph.detection.named import network_file, networks
+
+    found: list[Path] = []
+    for name in names:
+        kinds = [one for one in (_KINDS[:2] if kind == _KINDS[2] else (kind,)) if name in networks(one)]
+        found += [network_file(name, one) for one in kinds or (kind,)]
+    return tuple(found)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,11 +17,15 @@ from jeat_graph.data.events import EventArray
 from jeat_graph.data.progress import told
 from jeat_graph.detection.binned import BinnedDetector
 from jeat_graph.detection.event_detector import EventDetector
-from jeat_graph.detection.named import EVENTS, FRAMES, MOTION, network_file
+from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION, network_file
 from jeat_graph.detection.picture_detector import PictureDetector
 from jeat_graph.detection.settings import DetectionSettings
 
-FRAMES_SENSOR, EVENTS_SENSOR = "rgb", "evt"
+if TYPE_CHECKING:
+    from jeat_graph.io.events.reader import EventReader
+    from jeat_graph.io.video import FrameSource
+
+FRAMES_SENSOR, EVENTS_SENSOR, FUSED_SENSOR = "rgb", "evt", "fused"
 _US_PER_S = 1e6
 
 
@@ -34,6 +38,7 @@ class DetectRequest:
         events: a file of events; or None.
         detector_frames: `motion`, a network that comes with the package, or an ONNX file.
         detector_events: the same.
+        detector_fused: a network that looks at both at once, instead of the other two; or None.
         rate_hz: frames per second where neither the video nor a table beside it says.
         event_size_px: width and height of the event camera's picture, where the file does not say.
         events_later_s: what to add to the times of the events for the clock of the frames (s).
@@ -44,6 +49,7 @@ class DetectRequest:
     events: str | Path | None = None
     detector_frames: str = MOTION
     detector_events: str = MOTION
+    detector_fused: str | None = None
     rate_hz: float | None = None
     event_size_px: tuple[int, int] | None = None
     events_later_s: float = 0.0
@@ -52,6 +58,8 @@ class DetectRequest:
     def __post_init__(self) -> None:
         if self.frames is None and self.events is None:
             raise ConfigError("nothing to detect in: give --frames, --events or both")
+        if self.detector_fused is not None and {self.detector_frames, self.detector_events} != {MOTION}:
+            raise ConfigError("--detector-fused takes the place of --detector-frames and --detector-events")
 
     @property
     def files(self) -> list[str]:
@@ -77,9 +85,11 @@ def detect_scans(
     """
     with ExitStack() as stack:
         streams = []
-        if request.frames is not None:
+        if request.detector_fused is not None:
+            streams.append(_fused_scans(request, stack, say))
+        elif request.frames is not None:
             streams.append(_picture_scans(request, stack, say))
-        if request.events is not None:
+        if request.detector_fused is None and request.events is not None:
             streams.append(_event_scans(request, stack, say))
         for scan in heapq.merge(*streams, key=lambda scan: scan.t):
             on_time(scan.t)
@@ -113,7 +123,7 @@ def detect_files(
     return found
 
 
-def _picture_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str], object]) -> Iterator[Scan]:
+def _frames(request: DetectRequest, stack: ExitStack, say: Callable[[str], object]) -> FrameSource:
     from jeat_graph.io.video import open_frames
 
     assert request.frames is not None
@@ -122,6 +132,11 @@ def _picture_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str]
     say(f"frames: {len(source)} of {width} x {height} px, {request.frames}")
     if source.missing:
         say(f"{request.frames}: damaged or cut off: {source.missing} frames cannot be decoded")
+    return source
+
+
+def _picture_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str], object]) -> Iterator[Scan]:
+    source = _frames(request, stack, say)
     if request.detector_frames != MOTION:
         from jeat_graph.detection.models.pictures import ModelPictureDetector
 
@@ -146,7 +161,36 @@ def _prime(detector: PictureDetector, source: Any, request: DetectRequest) -> No
     detector.prime([source.frame(int(k)) for k in chosen])
 
 
-def _event_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str], object]) -> Iterator[Scan]:
+def _fused_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str], object]) -> Iterator[Scan]:
+    from jeat_graph.detection.models.fused import FusedDetector
+
+    assert request.detector_fused is not None
+    network = network_file(request.detector_fused, FUSED)
+    settings = request.settings.events, request.settings.model_fused
+    source = None if request.frames is None else _frames(request, stack, say)
+    if request.events is None:
+        assert source is not None
+        detector = FusedDetector(network, source.size_px, FUSED_SENSOR, *settings)
+        say(detector.description)
+        return (detector.look_at(frame, t) for t, frame in told(source, len(source)))
+    reader, size_px = _events(request, stack, say)
+    if source is not None and source.size_px != size_px:
+        (width, height), (wide, high) = source.size_px, size_px
+        raise DataError(
+            f"has {width} x {height} px and the events {wide} x {high}: a network of both needs pictures and "
+            "events of the same pixels",
+            request.frames,
+        )
+    pictures = () if source is None else told(source, len(source))
+    detector = FusedDetector(network, size_px, FUSED_SENSOR, *settings, pictures)
+    say(detector.description)
+    return _pushed(detector, reader, request, say)
+
+
+def _events(
+    request: DetectRequest, stack: ExitStack, say: Callable[[str], object]
+) -> tuple[EventReader, tuple[int, int]]:
+    """Open the events; return them, and width and height of their picture (px)."""
     from jeat_graph.io.events.opening import open_events
 
     assert request.events is not None
@@ -155,27 +199,33 @@ def _event_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str], 
         raise DataError("does not say the size of its picture; give it with --event-size WxH", request.events)
     width, height = reader.size_px
     say(f"events: {reader.format_name} of {width} x {height} px, {request.events}")
+    return reader, reader.size_px
+
+
+def _event_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str], object]) -> Iterator[Scan]:
+    reader, size_px = _events(request, stack, say)
     settings = request.settings
     detector: BinnedDetector
     if request.detector_events != MOTION:
         from jeat_graph.detection.models.events import ModelEventDetector
 
         network = network_file(request.detector_events, EVENTS)
-        model = ModelEventDetector(
-            network, reader.size_px, EVENTS_SENSOR, settings.events, settings.model_events
-        )
+        model = ModelEventDetector(network, size_px, EVENTS_SENSOR, settings.events, settings.model_events)
         say(model.description)
         detector = model
     else:
-        detector = EventDetector(reader.size_px, EVENTS_SENSOR, settings.events)
+        detector = EventDetector(size_px, EVENTS_SENSOR, settings.events)
+    return _pushed(detector, reader, request, say)
+
+
+def _pushed(
+    detector: BinnedDetector, reader: EventReader, request: DetectRequest, say: Callable[[str], object]
+) -> Iterator[Scan]:
+    """Yield what a detector finds in the events, and say at their end what is wrong with the file."""
     later_us = reader.t_offset_us + round(request.events_later_s * _US_PER_S)
-
-    def scans() -> Iterator[Scan]:
-        for piece in reader.pieces():
-            moved = EventArray.trusted(piece.t_us + later_us, piece.x, piece.y, piece.polarity)
-            yield from detector.push(moved)
-        yield from detector.finish()
-        for note in reader.damage.notes():
-            say(f"{request.events}: {note}")
-
-    return scans()
+    for piece in reader.pieces():
+        moved = EventArray.trusted(piece.t_us + later_us, piece.x, piece.y, piece.polarity)
+        yield from detector.push(moved)
+    yield from detector.finish()
+    for note in reader.damage.notes():
+        say(f"{request.events}: {note}")

@@ -1,7 +1,8 @@
-"""Networks that come with the package, by the names that `--detector-frames` and `--detector-events` take.
+"""Networks that come with the package, by the names that `--detector-frames` and its like take.
 
-A network NAME for pictures is `weights/NAME-frames.onnx`, one for events `weights/NAME-events.onnx`. What it
-was trained on, by which command, and how good it is stands in the file (`card`).
+A network NAME for pictures is `weights/NAME-frames.onnx`, one for events `weights/NAME-events.onnx`, one for
+both at once `weights/NAME-fused.onnx`. What it was trained on, by which command, and how good it is stands in
+the file (`card`).
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from jeat_graph.data.errors import ConfigError
 #: The detectors without weights.
 MOTION = "motion"
 #: What a network looks at.
-FRAMES, EVENTS = "frames", "events"
+FRAMES, EVENTS, FUSED = "frames", "events", "fused"
 _FOLDER = Path(__file__).parent / "weights"
 _ONNX = ".onnx"
 
@@ -22,7 +23,7 @@ def networks(kind: str) -> dict[str, Path]:
     """Return the networks of a kind that come with the package, by name.
 
     Args:
-        kind: `frames` or `events`.
+        kind: `frames`, `events` or `fused`.
     """
     found = sorted(_FOLDER.glob(f"*-{kind}{_ONNX}"))
     return {path.name.removesuffix(f"-{kind}{_ONNX}"): path for path in found}
@@ -33,7 +34,7 @@ def network_file(detector: str, kind: str) -> Path:
 
     Args:
         detector: a name, or a path; what ends in `.onnx` or has a folder is a path.
-        kind: `frames` or `events`.
+        kind: `frames`, `events` or `fused`.
 
     Raises:
         ConfigError: a name that is not known.
@@ -43,8 +44,10 @@ def network_file(detector: str, kind: str) -> Path:
         return path
     known = networks(kind)
     if detector not in known:
-        names = ", ".join((MOTION, *known))
+        names = list(known) if kind == FUSED else [MOTION, *known]
+        choice = f"one of {', '.join(names)}, or " if names else ""
+        seen = "both sensors" if kind == FUSED else kind
         raise ConfigError(
-            f"{detector!r} is no detector of {kind}: it is one of {names}, or a network's file (FILE.onnx)"
+            f"{detector!r} is no detector of {seen}: it is {choice}a network's file (FILE.onnx)"
         )
     return known[detector]

@@ -1,4 +1,4 @@
-"""Settings of detectors, from YAML: `frames`, `events`, and of networks `model_frames`, `model_events`."""
+"""Settings of detectors, from YAML: `frames`, `events`, and of networks `model_frames` and its like."""
 
 from __future__ import annotations
 
@@ -123,6 +123,7 @@ class DetectionSettings:
     events: EventSettings = field(default_factory=EventSettings)
     model_frames: ModelSettings = field(default_factory=ModelSettings)
     model_events: ModelSettings = field(default_factory=ModelSettings)
+    model_fused: ModelSettings = field(default_factory=ModelSettings)
 
 
 def load_settings(path: str | Path | None = None, changes: Sequence[str] = ()) -> DetectionSettings:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from collections.abc import Sequence as AnySequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import NamedTuple
@@ -13,11 +14,13 @@ from torch import Tensor
 
 from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.io.decoders import RgbImage
-from jeat_graph.training.data_sets import EventSegment, Picture
-from jeat_graph.training.event_samples import draw_sequence
+from jeat_graph.training.data_sets import EventSegment, FusedSegment, Picture
+from jeat_graph.training.event_samples import Sequence, draw_sequence
+from jeat_graph.training.fused_network import TOLD, SeenPictures
+from jeat_graph.training.fused_samples import FusedSequence, draw_fused
 from jeat_graph.training.learning import Target
-from jeat_graph.training.picture_samples import cut_out, draw_window
-from jeat_graph.training.settings import NetSettings, TrainSettings
+from jeat_graph.training.picture_samples import cut_out, draw_light, draw_window
+from jeat_graph.training.settings import FUSED, NetSettings, TrainSettings
 
 #: Tell the random numbers of the order from those of the changes.
 _ORDER, _CHANGES = 0, 1
@@ -30,10 +33,22 @@ class ShownBatch(NamedTuple):
     Attributes:
         steps: inputs (B, C, H, W) of the windows in their order, counts as whole numbers; of pictures one.
         targets: of each step, of each of the B.
+        pictures: that go with the windows of a network of both sensors, `which` and `given` step by step.
     """
 
     steps: list[Tensor]
     targets: list[list[Target]]
+    pictures: SeenPictures | None = None
+
+    def seen(self, part: slice, device: str) -> tuple[SeenPictures, ...]:
+        """Return the pictures of some steps, as the network takes them after the windows; () without any."""
+        if self.pictures is None:
+            return ()
+        size = len(self.targets[0])
+        rows = slice(part.start * size, part.stop * size)
+        kept, which = torch.unique(self.pictures.which[rows], return_inverse=True)
+        shown = self.pictures.pictures[kept].to(device, memory_format=torch.channels_last)
+        return (SeenPictures(shown, which.to(device), self.pictures.given[rows].to(device)),)
 
 
 class Batches:
@@ -47,14 +62,14 @@ class Batches:
 
     def __init__(
         self,
-        members: AnySequence[Picture] | AnySequence[EventSegment],
+        members: AnySequence[Picture | EventSegment],
         net: NetSettings,
         settings: TrainSettings,
     ) -> None:
         self._members, self._net, self._settings = members, net, settings
         self._pool = ThreadPoolExecutor(1)
         self._ahead: tuple[int, Future[ShownBatch]] | None = None
-        self._kept: dict[int, RgbImage] = {}
+        self._kept: dict[tuple[int, int], RgbImage] = {}
         self._room_bytes = settings.kept_mb * _BYTES_PER_MB
 
     def close(self) -> None:
@@ -81,35 +96,70 @@ class Batches:
 
     def _make(self, step: int) -> ShownBatch:
         size = self._settings.batch
+        if self._net.kind == FUSED:
+            return _joined([self._fused(step * size + k) for k in range(size)])
         parts = [self._one(step * size + k) for k in range(size)]
         shown = [torch.from_numpy(np.stack(arrays)) for arrays in zip(*(p[0] for p in parts), strict=True)]
         targets = [list(step_targets) for step_targets in zip(*(p[1] for p in parts), strict=True)]
         return ShownBatch(shown, targets)
 
-    def _one(self, number: int) -> tuple[list[npt.NDArray[np.generic]], list[Target]]:
+    def _drawn(self, number: int) -> tuple[int, np.random.Generator]:
+        """Return the member of a cut-out or sequence, and its random numbers."""
         seed, count = self._settings.seed, len(self._members)
         order = np.random.default_rng([seed, _ORDER, number // count]).permutation(count)
-        member = self._members[int(order[number % count])]
-        rng = np.random.default_rng([seed, _CHANGES, number])
+        return int(order[number % count]), np.random.default_rng([seed, _CHANGES, number])
+
+    def _fused(self, number: int) -> FusedSequence:
+        index, rng = self._drawn(number)
+        member = self._members[index]
+        assert isinstance(member, FusedSegment)
+
+        def picture(frame: int) -> RgbImage:
+            return self._picture((index, frame), lambda: member.picture(frame))
+
+        return draw_fused(member, rng, self._net, self._settings, picture)
+
+    def _one(self, number: int) -> tuple[list[npt.NDArray[np.generic]], list[Target]]:
+        index, rng = self._drawn(number)
+        member = self._members[index]
         if isinstance(member, EventSegment):
             drawn = draw_sequence(member, rng, self._net, self._settings)
-            return list(drawn.windows), [_target(*p) for p in zip(drawn.corners, drawn.ignored, strict=True)]
+            return list(drawn.windows), _targets(drawn)
         changes = self._settings.pictures
-        frame = self._picture(int(order[number % count]), member)
+        frame = self._picture((index, 0), member.load)
         shares = (changes.zoom, changes.mirror_share, changes.on_box_share)
         size_px = (frame.shape[1], frame.shape[0])
         window = draw_window(rng, size_px, self._settings.crop_px, member.truth, shares)
-        return [cut_out(frame, window, rng, changes)], [_target(*window.boxes(member.truth))]
+        shown = cut_out(frame, window, rng, draw_light(rng, changes))
+        return [shown], [_target(*window.boxes(member.truth))]
 
-    def _picture(self, index: int, member: Picture) -> RgbImage:
+    def _picture(self, key: tuple[int, int], load: Callable[[], RgbImage]) -> RgbImage:
         """Return a picture; those that were read are kept as long as there is room: reading takes longest."""
-        if index in self._kept:
-            return self._kept[index]
-        frame = member.load()
+        if key in self._kept:
+            return self._kept[key]
+        frame = load()
         if frame.nbytes <= self._room_bytes:
             self._room_bytes -= frame.nbytes
-            self._kept[index] = frame
+            self._kept[key] = frame
         return frame
+
+
+def _joined(drawn: AnySequence[FusedSequence]) -> ShownBatch:
+    """Put sequences side by side: step by step, as the network takes them."""
+    windows = np.stack([one.events.windows for one in drawn], axis=1)
+    first = np.cumsum([0, *(len(one.pictures) for one in drawn)])
+    which = np.stack([one.which + k for one, k in zip(drawn, first[:-1], strict=True)], axis=1)
+    seen = SeenPictures(
+        torch.from_numpy(np.concatenate([one.pictures for one in drawn])),
+        torch.from_numpy(which.reshape(-1)),
+        torch.from_numpy(np.stack([one.given for one in drawn], axis=1).reshape(-1, TOLD)),
+    )
+    targets = [list(of_step) for of_step in zip(*(_targets(one.events) for one in drawn), strict=True)]
+    return ShownBatch([torch.from_numpy(step) for step in windows], targets, seen)
+
+
+def _targets(drawn: Sequence) -> list[Target]:
+    return [_target(*pair) for pair in zip(drawn.corners, drawn.ignored, strict=True)]
 
 
 def _target(corners: FloatArray, ignored: BoolArray) -> Target:

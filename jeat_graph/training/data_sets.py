@@ -10,6 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic, TypeVar
 
+import numpy as np
+
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.decoders import RgbImage
 from jeat_graph.io.truth_io import read_truth
@@ -56,7 +59,30 @@ class EventSegment:
     truth: TruthByTime
 
 
-Member = TypeVar("Member", Picture, EventSegment)
+@dataclass(frozen=True)
+class FusedSegment(EventSegment):
+    """A recording of events with the pictures of the same pixels.
+
+    Attributes:
+        frames: where the pictures are.
+        times_s: (F,) when they were taken, on the clock of the events (s).
+    """
+
+    frames: Path
+    times_s: FloatArray
+
+    def picture(self, index: int) -> RgbImage:
+        """Read a picture, (H, W, 3) red, green, blue."""
+        with open_frames(self.frames) as frames:
+            return frames.frame(index)
+
+    def newest(self, t: float) -> int | None:
+        """Return the index of the last picture up to a time (s), or None."""
+        index = int(np.searchsorted(self.times_s, t + _SAME_S, side="right")) - 1
+        return None if index < 0 else index
+
+
+Member = TypeVar("Member", bound=Picture | EventSegment)
 
 
 @dataclass(frozen=True)
@@ -127,6 +153,27 @@ def read_event_segments(root: Path) -> list[EventSegment]:
     ]
     if not found:
         raise DataError("holds no events; make it with --sensors pictures or events", root)
+    return found
+
+
+def read_fused_segments(root: Path) -> list[FusedSegment]:
+    """Return the recordings of a folder that have pictures and events.
+
+    Raises:
+        DataError: there are none.
+    """
+    found = []
+    for segment in read_event_segments(root):
+        folder = Path(segment.group)
+        place = next((folder / name for name in VIDEO_FILES.values() if (folder / name).exists()), None)
+        if place is not None:
+            with open_frames(place) as frames:
+                times = frames.times_s
+            found.append(
+                FusedSegment(segment.group, segment.source, segment.path, segment.truth, place, times)
+            )
+    if not found:
+        raise DataError("holds no pictures beside its events; make it with --sensors pictures", root)
     return found
 
 

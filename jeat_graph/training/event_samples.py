@@ -52,6 +52,11 @@ class SequencePlan(NamedTuple):
         """Return a time of the sequence (µs) on the file's clock (s)."""
         return (self.start_us + own_us / self.rate) / _US
 
+    def ends_us(self, net: NetSettings, settings: TrainSettings) -> list[int]:
+        """Return where the windows end on the sequence's clock (µs)."""
+        bin_us = round(net.bin_s * _US)
+        return [(net.bins + k * self.step_bins) * bin_us for k in range(settings.steps)]
+
 
 def draw_sequence(
     segment: EventSegment, rng: np.random.Generator, net: NetSettings, settings: TrainSettings
@@ -61,23 +66,48 @@ def draw_sequence(
     Raises:
         DataError: the recording is too short, or cannot be read.
     """
+    plan, events, size_px = drawn_events(segment, rng, net, settings)
+    ends = plan.ends_us(net, settings)
+    truth = [asked_for(segment, plan.file_s(0.0), plan.file_s(end), settings.least_way_px) for end in ends]
     changes = settings.events
+    shares = (changes.zoom, changes.mirror_share, changes.on_box_share)
+    window = draw_window(rng, size_px, settings.crop_px, truth[-1], shares)
+    return cut_sequence(events, truth, plan, window, (rng, net, settings))
+
+
+def drawn_events(
+    segment: EventSegment, rng: np.random.Generator, net: NetSettings, settings: TrainSettings
+) -> tuple[SequencePlan, EventArray, tuple[int, int]]:
+    """Draw when a sequence is; return that, its events, and width and height of their picture (px).
+
+    Raises:
+        DataError: the recording is too short, or cannot be read.
+    """
     with EventFile(segment.path) as file:
         plan = _plan(segment, file, rng, net, settings)
-        bin_us = round(net.bin_s * _US)
-        length = net.bins + (settings.steps - 1) * plan.step_bins
-        end_us = plan.start_us + length * bin_us / plan.rate
+        end_us = plan.start_us + plan.ends_us(net, settings)[-1] / plan.rate
         events = file.between(int(plan.start_us), int(end_us) + 1)
-        size_px = file.size_px or _extent(events)
-    ends = [(net.bins + k * plan.step_bins) * bin_us for k in range(settings.steps)]
-    truth = [asked_for(segment, plan.file_s(0.0), plan.file_s(end), settings.least_way_px) for end in ends]
-    window = draw_window(
-        rng,
-        size_px,
-        settings.crop_px,
-        truth[-1],
-        (changes.zoom, changes.mirror_share, changes.on_box_share),
-    )
+        return plan, events, file.size_px or _extent(events)
+
+
+def cut_sequence(
+    events: EventArray,
+    truth: list[TrueBoxes],
+    plan: SequencePlan,
+    window: CutOut,
+    how: tuple[np.random.Generator, NetSettings, TrainSettings],
+) -> Sequence:
+    """Return the sequence of a cut-out.
+
+    Args:
+        events: of the recording.
+        truth: at the end of each window.
+        plan: when it is.
+        window: the cut-out.
+        how: random numbers, the network's settings and those of the training.
+    """
+    rng, net, settings = how
+    ends = plan.ends_us(net, settings)
     own = _changed(_seen_in(events, window), plan, window, rng, settings, ends[-1])
     boxes = [window.boxes(one) for one in truth]
     return Sequence(

@@ -2,7 +2,8 @@
 
 Output `boxes` (1, 5, N): middle and size in px of the input, and a score. Input `picture` (1, 3, H, W), red
 first, 0 to 1; or `events` (1, 2 x bins, H, W) counts and one state a level of the memory, which come back as
-outputs of the same shapes.
+outputs of the same shapes. A network of both sensors takes `events`, `picture` and `given` (1, 3): whether
+there is a picture (1 or 0), how old it is (s), and whether there are events (1 or 0).
 """
 
 from __future__ import annotations
@@ -21,8 +22,7 @@ from torch import Tensor, nn
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.detection.models.onnx_head import CARD
 from jeat_graph.io.atomic import atomic_path
-from jeat_graph.training.network import DetectionNet, cell_places, served_boxes
-from jeat_graph.training.settings import EVENTS
+from jeat_graph.training.network import VehicleNet, cell_places, served_boxes
 
 _OPSET = 17
 #: Smaller tensors are not worth a cast.
@@ -40,20 +40,20 @@ class ServedNet(nn.Module):
         side: width and height of the input (px), whole multiples of 16.
     """
 
-    def __init__(self, net: DetectionNet, side: tuple[int, int]) -> None:
+    def __init__(self, net: VehicleNet, side: tuple[int, int]) -> None:
         super().__init__()
         self.net = net
         places, strides = cell_places(side)
         self.register_buffer("places", places)
         self.register_buffer("strides", strides)
 
-    def forward(self, x: Tensor, *state: Tensor) -> tuple[Tensor, ...]:
-        """Return boxes and scores (1, 5, N), and the next states."""
-        rows, kept = self.net(x, state)
+    def forward(self, *values: Tensor) -> tuple[Tensor, ...]:
+        """Return boxes and scores (1, 5, N), and the next states, of inputs and states."""
+        rows, kept = self.net.serve(values)
         return (served_boxes(rows, self.get_buffer("places"), self.get_buffer("strides")), *kept)
 
 
-def write_onnx(net: DetectionNet, side: tuple[int, int], card: Mapping[str, Any], path: Path) -> None:
+def write_onnx(net: VehicleNet, side: tuple[int, int], card: Mapping[str, Any], path: Path) -> None:
     """Write a network with its card.
 
     Args:
@@ -70,20 +70,19 @@ def write_onnx(net: DetectionNet, side: tuple[int, int], card: Mapping[str, Any]
     except ImportError:
         raise ConfigError("writing ONNX needs pip install 'jeat-graph[train]'") from None
     served = ServedNet(net, side).to("cpu").eval()
-    kind = net.settings.kind
-    inputs = (torch.zeros(1, net.settings.channels, side[1], side[0]), *net.to("cpu").empty_state(1, side))
-    states = range(len(inputs) - 1)
+    inputs, state = net.to("cpu").inputs(side), net.empty_state(1, side)
+    states = range(len(state))
     buffer = io.BytesIO()
     with warnings.catch_warnings():
         # This exporter needs nothing but PyTorch; the newer one, which it announces, needs more packages.
         warnings.simplefilter("ignore")
         torch.onnx.export(
             served,
-            inputs,
+            (*inputs.values(), *state),
             cast(Any, buffer),  # takes open files, too
             dynamo=False,
             opset_version=_OPSET,
-            input_names=["events" if kind == EVENTS else "picture", *(f"state_{k}" for k in states)],
+            input_names=[*inputs, *(f"state_{k}" for k in states)],
             output_names=["boxes", *(f"next_state_{k}" for k in states)],
         )
     model = onnx.load_from_string(buffer.getvalue())

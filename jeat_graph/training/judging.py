@@ -12,14 +12,15 @@ from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.events import EventArray
 from jeat_graph.data.interop import from_xyxy
 from jeat_graph.detection.models.choosing import choose
-from jeat_graph.detection.models.feeding import place, usual_feed
+from jeat_graph.detection.models.feeding import picture_input, place, usual_feed
 from jeat_graph.detection.models.layouts import decode
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.eval.detection_ap import average_precision, match_greedily
 from jeat_graph.io.events_dsec import EventFile
-from jeat_graph.training.data_sets import EventSegment, Picture
+from jeat_graph.training.data_sets import EventSegment, FusedSegment, Picture
 from jeat_graph.training.event_samples import asked_for, windows_of
-from jeat_graph.training.network import DetectionNet, cell_places, served_boxes
+from jeat_graph.training.fused_network import FusedNet, SeenPictures
+from jeat_graph.training.network import PICTURE_INPUT, VehicleNet, cell_places, served_boxes
 from jeat_graph.training.settings import TrainSettings, padded
 from jeat_graph.training.truth_at import TrueBoxes
 
@@ -61,8 +62,8 @@ class Looked(NamedTuple):
 
 
 def judge(
-    net: DetectionNet,
-    members: Sequence[Picture] | Sequence[EventSegment],
+    net: VehicleNet,
+    members: Sequence[Picture | EventSegment],
     side: tuple[int, int],
     settings: TrainSettings,
     most: int,
@@ -126,7 +127,7 @@ def _evenly(members: Sequence[Picture], most: int) -> list[Picture]:
 
 
 @torch.no_grad()
-def _pictures(net: DetectionNet, pictures: Sequence[Picture], side: tuple[int, int]) -> Iterator[Looked]:
+def _pictures(net: VehicleNet, pictures: Sequence[Picture], side: tuple[int, int]) -> Iterator[Looked]:
     reader = _Reader(net, side)
     feed = usual_feed(LAYOUT, ModelSettings())
     for picture in pictures:
@@ -138,7 +139,7 @@ def _pictures(net: DetectionNet, pictures: Sequence[Picture], side: tuple[int, i
 
 @torch.no_grad()
 def _windows(
-    net: DetectionNet, segments: Sequence[EventSegment], settings: TrainSettings, most: int
+    net: VehicleNet, segments: Sequence[EventSegment], settings: TrainSettings, most: int
 ) -> Iterator[Looked]:
     shape = net.settings
     bin_us = round(shape.bin_s * _US)
@@ -157,19 +158,40 @@ def _windows(
         reader = _Reader(net, side)
         state = tuple(one.to(reader.device) for one in net.empty_state(1, side))
         for end, window in zip(ends, windows_of(own, side, shape, ends), strict=True):
-            rows, state = net(torch.from_numpy(window[None]).float().to(reader.device), state)
-            corners, scores = reader.read(rows)
             now = (first_us + end) / _US
+            shown = torch.from_numpy(window[None]).float().to(reader.device)
+            rows, state = net(shown, state, 1, *_seen(net, segment, now, side))
+            corners, scores = reader.read(rows)
             begin = max(first_us / _US, now - _SEEN_S)
-            yield Looked(
-                segment.source, corners, scores, asked_for(segment, begin, now, settings.least_way_px)
+            truth = (
+                segment.truth.at(now)  # pictures show who stands, too
+                if isinstance(net, FusedNet)
+                else asked_for(segment, begin, now, settings.least_way_px)
             )
+            yield Looked(segment.source, corners, scores, truth)
+
+
+def _seen(
+    net: VehicleNet, segment: EventSegment, now: float, side: tuple[int, int]
+) -> tuple[SeenPictures, ...]:
+    """Return the newest picture up to a time (s) for a network of both sensors; () for another."""
+    if not isinstance(net, FusedNet) or not isinstance(segment, FusedSegment):
+        return ()
+    device = next(net.parameters()).device
+    index = segment.newest(now)
+    if index is None:
+        shown, given = net.inputs(side)[PICTURE_INPUT], [0.0, 0.0, 1.0]
+    else:
+        shown = torch.from_numpy(picture_input(segment.picture(index), side))
+        given = [1.0, max(now - float(segment.times_s[index]), 0.0), 1.0]
+    none = torch.zeros(0, dtype=torch.long)
+    return (SeenPictures(shown.to(device), none, torch.tensor([given]).to(device)),)
 
 
 class _Reader:
     """Turns the network's rows into boxes just as its ONNX file is read."""
 
-    def __init__(self, net: DetectionNet, side: tuple[int, int]) -> None:
+    def __init__(self, net: VehicleNet, side: tuple[int, int]) -> None:
         self.device = next(net.parameters()).device
         self._side = side
         self._places, self._strides = (part.to(self.device) for part in cell_places(side))

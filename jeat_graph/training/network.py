@@ -16,6 +16,8 @@ from torch import Tensor, nn
 from jeat_graph.training.blocks import ConvBlock, ConvGru, CspBlock
 from jeat_graph.training.settings import COARSEST, STRIDES, NetSettings
 
+#: Names of inputs.
+PICTURE_INPUT, EVENTS_INPUT = "picture", "events"
 #: Numbers of a cell: two of the middle, two of the size, one of the class.
 ROW = 5
 _MEMORY_STRIDES = STRIDES[1:]
@@ -28,29 +30,63 @@ _LOG_SIZE = (-3.0, 5.0)
 _MOST_COUNT = 8
 
 
-class DetectionNet(nn.Module):
-    """Finds vehicles.
+class Backbone(nn.Module):
+    """Features of pictures or of windows of events at strides of 4, 8 and 16 px.
 
     Args:
-        settings: what it looks like.
+        channels: of the input.
+        settings: width, and the share of the memory that is left at the next window.
+        has_memory: whether it remembers windows before, at the two coarser strides.
 
     Attributes:
-        settings: the same.
         state_channels: channels of each state, fine to coarse; empty without a memory.
     """
 
-    def __init__(self, settings: NetSettings) -> None:
+    def __init__(self, channels: int, settings: NetSettings, has_memory: bool) -> None:
         super().__init__()
-        self.settings = settings
+        self._keep = settings.memory_keep
         w = settings.width
-        fine, middle, coarse, shared = 2 * w, 3 * w, 4 * w, 2 * w
-        self.stem = ConvBlock(settings.channels, w, 3, 2)
+        fine, middle, coarse = level_channels(w)
+        self.stem = ConvBlock(channels, w, 3, 2)
         self.to_4 = nn.Sequential(ConvBlock(w, fine, 3, 2), CspBlock(fine, fine))
         self.to_8 = nn.Sequential(ConvBlock(fine, middle, 3, 2), CspBlock(middle, middle))
         self.to_16 = nn.Sequential(ConvBlock(middle, coarse, 3, 2), CspBlock(coarse, coarse, 2))
-        self.state_channels = (middle, coarse) if settings.has_memory else ()
+        self.state_channels = (middle, coarse) if has_memory else ()
         self.memory = nn.ModuleList(ConvGru(channels) for channels in self.state_channels)
-        self.lateral = nn.ModuleList(ConvBlock(given, shared, 1) for given in (fine, middle, coarse))
+
+    def forward(
+        self, x: Tensor, state: Sequence[Tensor] = (), length: int = 1
+    ) -> tuple[tuple[Tensor, Tensor, Tensor], tuple[Tensor, ...]]:
+        """Return the features (L x B, C, H/stride, W/stride), fine to coarse, and the last state.
+
+        Arguments as `DetectionNet.forward`.
+        """
+        if self.state_channels:
+            x = _cut_off(x)
+        fine = self.to_4(self.stem(x))
+        middle = self.to_8(fine)
+        kept: tuple[Tensor, ...] = ()
+        if self.state_channels:
+            middle, now = _remembered(self.memory[0], middle, state[0], length, self._keep)
+            kept = (now,)
+        coarse = self.to_16(middle)
+        if self.state_channels:
+            coarse, now = _remembered(self.memory[1], coarse, state[1], length, self._keep)
+            kept = (*kept, now)
+        return (fine, middle, coarse), kept
+
+
+class Head(nn.Module):
+    """A pyramid that carries what coarse levels know to the fine ones, and the rows of all cells.
+
+    Args:
+        width: of the backbone.
+    """
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        shared = 2 * width
+        self.lateral = nn.ModuleList(ConvBlock(given, shared, 1) for given in level_channels(width))
         self.merge = nn.ModuleList(ConvBlock(shared, shared) for _ in range(2))
         self.tower = nn.Conv2d(shared, shared, 3, padding=1, bias=False)
         self.tower_norm = nn.ModuleList(nn.BatchNorm2d(shared) for _ in STRIDES)
@@ -59,6 +95,35 @@ class DetectionNet(nn.Module):
         prior = -math.log((1 - _PRIOR) / _PRIOR)
         self.row.bias = nn.Parameter(torch.tensor([0.0, 0.0, _FIRST_SIZE, _FIRST_SIZE, prior]))
 
+    def forward(self, levels: tuple[Tensor, Tensor, Tensor]) -> Tensor:
+        """Return rows (B, N, 5) of features, fine to coarse."""
+        fine, middle, coarse = levels
+        low = self.lateral[2](coarse)
+        mid = self.merge[1](self.lateral[1](middle) + _doubled(low))
+        top = self.merge[0](self.lateral[0](fine) + _doubled(mid))
+        rows = []
+        for level, features in enumerate((top, mid, low)):
+            seen = torch.relu(self.tower_norm[level](self.tower(features)))
+            rows.append(self.row(seen).flatten(2))
+        return torch.cat(rows, dim=2).transpose(1, 2)
+
+
+class VehicleNet(nn.Module):
+    """What networks of all kinds have in common.
+
+    Args:
+        settings: what it looks like.
+        state_channels: channels of each state, fine to coarse; empty without a memory.
+
+    Attributes:
+        settings: the same.
+        state_channels: the same.
+    """
+
+    def __init__(self, settings: NetSettings, state_channels: tuple[int, ...]) -> None:
+        super().__init__()
+        self.settings, self.state_channels = settings, state_channels
+
     def empty_state(self, batch: int, side: tuple[int, int]) -> tuple[Tensor, ...]:
         """Return states of nothing seen, (batch, C, height/stride, width/stride) each, fine to coarse.
 
@@ -66,7 +131,7 @@ class DetectionNet(nn.Module):
             batch: how many sequences.
             side: width and height of the input (px), whole multiples of 16.
         """
-        like = self.row.weight
+        like = next(self.parameters())
         return tuple(
             torch.zeros(batch, channels, side[1] // s, side[0] // s, device=like.device, dtype=like.dtype)
             for channels, s in zip(self.state_channels, _MEMORY_STRIDES, strict=False)
@@ -82,6 +147,32 @@ class DetectionNet(nn.Module):
         for layer in self.modules():
             if isinstance(layer, nn.BatchNorm2d):
                 layer.train(not settled)
+
+    def inputs(self, side: tuple[int, int]) -> dict[str, Tensor]:
+        """Return what it takes in use, by name and beside its states: zeros of the right shapes.
+
+        Args:
+            side: width and height (px), whole multiples of 16.
+        """
+        raise NotImplementedError
+
+    def serve(self, values: Sequence[Tensor]) -> tuple[Tensor, tuple[Tensor, ...]]:
+        """Return rows (1, N, 5) and the next state, of inputs in the order of `inputs` and of the state."""
+        raise NotImplementedError
+
+
+class DetectionNet(VehicleNet):
+    """Finds vehicles in pictures, or in events.
+
+    Args:
+        settings: what it looks like.
+    """
+
+    def __init__(self, settings: NetSettings) -> None:
+        backbone = Backbone(settings.channels, settings, settings.has_memory)
+        super().__init__(settings, backbone.state_channels)
+        self.backbone = backbone
+        self.head = Head(settings.width)
 
     def forward(
         self, x: Tensor, state: Sequence[Tensor] = (), length: int = 1
@@ -101,27 +192,23 @@ class DetectionNet(nn.Module):
             Rows (L x B, N, 5), fine level first, row by row: middle (cells from the cell's own), size
             (logarithm, in cells) and logit; and the state after the last window.
         """
-        if self.settings.has_memory:
-            x = _cut_off(x)
-        keep = self.settings.memory_keep
-        fine = self.to_4(self.stem(x))
-        middle = self.to_8(fine)
-        kept: tuple[Tensor, ...] = ()
-        if self.settings.has_memory:
-            middle, now = _remembered(self.memory[0], middle, state[0], length, keep)
-            kept = (now,)
-        coarse = self.to_16(middle)
-        if self.settings.has_memory:
-            coarse, now = _remembered(self.memory[1], coarse, state[1], length, keep)
-            kept = (*kept, now)
-        low = self.lateral[2](coarse)
-        mid = self.merge[1](self.lateral[1](middle) + _doubled(low))
-        top = self.merge[0](self.lateral[0](fine) + _doubled(mid))
-        rows = []
-        for level, features in enumerate((top, mid, low)):
-            seen = torch.relu(self.tower_norm[level](self.tower(features)))
-            rows.append(self.row(seen).flatten(2))
-        return torch.cat(rows, dim=2).transpose(1, 2), kept
+        levels, kept = self.backbone(x, state, length)
+        return self.head(levels), kept
+
+    def inputs(self, side: tuple[int, int]) -> dict[str, Tensor]:
+        """Return what it takes in use: one picture, or one window of events."""
+        name = EVENTS_INPUT if self.settings.has_memory else PICTURE_INPUT
+        return {name: torch.zeros(1, self.settings.channels, side[1], side[0])}
+
+    def serve(self, values: Sequence[Tensor]) -> tuple[Tensor, tuple[Tensor, ...]]:
+        """Return rows and the next state of one picture or window."""
+        rows, kept = self(values[0], values[1:])
+        return rows, kept
+
+
+def level_channels(width: int) -> tuple[int, int, int]:
+    """Return channels of the features, fine to coarse, of a network's width."""
+    return 2 * width, 3 * width, 4 * width
 
 
 def _remembered(

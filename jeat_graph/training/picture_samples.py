@@ -82,8 +82,32 @@ def draw_window(
     return CutOut(side, scale, -float(start[0]), -float(start[1]), mirrored)
 
 
+class LightChange(NamedTuple):
+    """How a picture's light and grain are changed.
+
+    Attributes:
+        levels: (256,) what each grey level becomes, 0 to 1.
+        grey: whether colours are lost.
+        sigma: of the noise, where white is 1.
+    """
+
+    levels: npt.NDArray[np.float32]
+    grey: bool
+    sigma: float
+
+
+def draw_light(rng: np.random.Generator, changes: PictureChanges) -> LightChange:
+    """Draw how a picture, or all of a sequence, are lit and grained anew."""
+    gain = float(np.exp(rng.uniform(-1.0, 1.0) * np.log(changes.exposure)))
+    power = float(np.exp(rng.uniform(-1.0, 1.0) * np.log(changes.gamma)))
+    # There are 256 grey levels: a table of them is a tenth of the work of doing it for each pixel.
+    levels = np.clip(np.arange(_LEVELS) / _WHITE * gain, 0.0, 1.0) ** power
+    grey = bool(rng.random() < changes.grey_share)
+    return LightChange(levels.astype(np.float32), grey, rng.uniform(0.0, changes.noise) / _WHITE)
+
+
 def cut_out(
-    frame: RgbImage, window: CutOut, rng: np.random.Generator, changes: PictureChanges
+    frame: RgbImage, window: CutOut, rng: np.random.Generator, light: LightChange
 ) -> npt.NDArray[np.float32]:
     """Return the cut-out (3, H, W) of a picture (H, W, 3), lit and grained anew, red first, 0 to 1."""
     import cv2
@@ -92,15 +116,10 @@ def cut_out(
     half = 0.5 * (window.scale - 1.0)
     matrix = np.array([[window.scale, 0.0, window.left + half], [0.0, window.scale, window.top + half]])
     warped = cv2.warpAffine(frame, matrix, window.side, flags=cv2.INTER_LINEAR, borderValue=(_GREY,) * 3)
-    gain = float(np.exp(rng.uniform(-1.0, 1.0) * np.log(changes.exposure)))
-    power = float(np.exp(rng.uniform(-1.0, 1.0) * np.log(changes.gamma)))
-    # There are 256 grey levels: a table of them is a tenth of the work of doing it for each pixel.
-    levels = np.clip(np.arange(_LEVELS) / _WHITE * gain, 0.0, 1.0) ** power
-    values = levels.astype(np.float32)[np.asarray(warped)]
+    values = light.levels[np.asarray(warped)]
     if window.mirrored:
         values = values[:, ::-1]
-    if rng.random() < changes.grey_share:
+    if light.grey:
         values = np.repeat((values @ _LUMA)[..., None], 3, axis=-1)
-    sigma = rng.uniform(0.0, changes.noise) / _WHITE
-    values = values + np.float32(sigma) * rng.standard_normal(values.shape, dtype=np.float32)
+    values = values + np.float32(light.sigma) * rng.standard_normal(values.shape, dtype=np.float32)
     return np.ascontiguousarray(np.clip(values, 0.0, 1.0).transpose(2, 0, 1))

@@ -19,13 +19,14 @@ from jeat_graph.training.data_sets import (
     EventSegment,
     Picture,
     read_event_segments,
+    read_fused_segments,
     read_pictures,
     split_by_segment,
 )
 from jeat_graph.training.export import write_onnx
 from jeat_graph.training.judging import Precision, judge
 from jeat_graph.training.log_files import draw_log, write_log
-from jeat_graph.training.settings import FRAMES, NetSettings, TrainSettings, padded
+from jeat_graph.training.settings import FRAMES, FUSED, NetSettings, TrainSettings, padded
 from jeat_graph.training.trainer import Trainer, TrainingJob
 from jeat_graph.version import __version__
 
@@ -47,6 +48,7 @@ class TrainRequest:
         pictures: where the names in COCO files begin, if not beside them.
         side: width and height of the network's input (px); None: the first picture's, rounded up.
         device: `auto`, `cpu` or `cuda`.
+        start: networks that `train` made, which the first weights are taken from.
     """
 
     data: tuple[Path, ...]
@@ -57,6 +59,7 @@ class TrainRequest:
     pictures: Path | None = None
     side: tuple[int, int] | None = None
     device: str = "auto"
+    start: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -113,9 +116,13 @@ def train(
         "side": list(side),
         "data": [_described(path) for path in request.data],
     }
+    if request.start:
+        about["start"] = [_described(path) for path in request.start]
     identity = json.dumps(about, sort_keys=True)
     request.out.parent.mkdir(parents=True, exist_ok=True)
-    trainer = Trainer(TrainingJob(request.net, request.settings, split, side, device, checkpoint, identity))
+    trainer = Trainer(
+        TrainingJob(request.net, request.settings, split, side, device, checkpoint, identity, request.start)
+    )
     if trainer.step:
         say(f"goes on from step {trainer.step} of {checkpoint}")
     count = sum(p.numel() for p in trainer.net.parameters())
@@ -142,7 +149,9 @@ def _read(request: TrainRequest, paths: Sequence[Path]) -> Any:
     """
     found: list[Any] = []
     for path in paths:
-        if request.net.kind != FRAMES:
+        if request.net.kind == FUSED:
+            found += read_fused_segments(path)
+        elif request.net.kind != FRAMES:
             found += read_event_segments(path)
         elif path.suffix.lower() == _JSON:
             found += read_coco_pictures(path, request.pictures)

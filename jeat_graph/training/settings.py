@@ -7,19 +7,20 @@ from dataclasses import dataclass, field
 from jeat_graph.config.fields import Section, choice, number
 from jeat_graph.data.errors import ConfigError
 
-FRAMES, EVENTS = "frames", "events"
-KINDS = (FRAMES, EVENTS)
+FRAMES, EVENTS, FUSED = "frames", "events", "fused"
+KINDS = (FRAMES, EVENTS, FUSED)
 FLOAT32, BFLOAT16 = "float32", "bfloat16"
 #: Channels of the first layer by the name of a size.
 WIDTHS = {"tiny": 8, "small": 16, "medium": 32, "large": 48}
-_COLOURS = 3
+#: Channels of a picture: red, green, blue.
+COLOURS = 3
 
 
 @dataclass(frozen=True)
 class NetSettings(Section):
     """What a network looks like."""
 
-    kind: str = choice(FRAMES, KINDS, "what it looks at; one of events has a memory")
+    kind: str = choice(FRAMES, KINDS, "what it looks at; one that sees events has a memory")
     width: int = number(32, "1", "channels of its first layer; the others follow", 2, 512)
     bins: int = number(10, "1", "bins of a window of events; each has two polarities", 1, 100)
     bin_s: float = number(0.005, "s", "length of a bin", 1e-4, 1.0)
@@ -35,13 +36,13 @@ class NetSettings(Section):
 
     @property
     def channels(self) -> int:
-        """Channels of the input."""
-        return _COLOURS if self.kind == FRAMES else 2 * self.bins
+        """Channels of the input; of one that sees both those of its events."""
+        return COLOURS if self.kind == FRAMES else 2 * self.bins
 
     @property
     def has_memory(self) -> bool:
         """Whether states are carried from window to window."""
-        return self.kind == EVENTS
+        return self.kind != FRAMES
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,16 @@ class EventChanges(Section):
     drop_share: float = number(0.5, "1", "up to this share of the events is left out", 0.0, 0.99)
     time_scale: float = number(1.4, "1", "time runs slower or faster by up to this", 1.0, 4.0)
     noise_hz_px: float = number(0.2, "Hz/px", "up to so many events from nowhere are added", 0.0, 100.0)
+
+
+@dataclass(frozen=True)
+class FusedChanges(Section):
+    """How what a network of both sensors is shown lacks one of them, so that it learns to do without."""
+
+    no_picture_share: float = number(0.1, "1", "so many sequences have no picture", 0.0, 1.0)
+    no_events_share: float = number(0.1, "1", "so many, of the others, have no events", 0.0, 1.0)
+    stale_share: float = number(0.3, "1", "in so many the pictures come late", 0.0, 1.0)
+    stale_s: float = number(0.15, "s", "by up to so much", 0.0, 10.0)
 
 
 @dataclass(frozen=True)
@@ -119,6 +130,7 @@ class TrainSettings(Section):
     judged: int = number(300, "1", "at most so many pictures or windows are judged then", 1)
     pictures: PictureChanges = field(default_factory=PictureChanges)
     events: EventChanges = field(default_factory=EventChanges)
+    fused: FusedChanges = field(default_factory=FusedChanges)
 
     def __post_init__(self) -> None:
         super().__post_init__()

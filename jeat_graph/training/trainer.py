@@ -15,10 +15,11 @@ import torch
 from jeat_graph.data.errors import DataError
 from jeat_graph.training.batches import Batches, ShownBatch
 from jeat_graph.training.checkpoint import read_checkpoint, write_checkpoint
-from jeat_graph.training.data_sets import EventSegment, Picture, Split
+from jeat_graph.training.data_sets import Split
 from jeat_graph.training.judging import judge
 from jeat_graph.training.learning import cost_of
-from jeat_graph.training.network import DetectionNet, cell_places
+from jeat_graph.training.making import new_network
+from jeat_graph.training.network import VehicleNet, cell_places
 from jeat_graph.training.settings import BFLOAT16, NetSettings, TrainSettings
 
 _CHECKPOINT_S = 60.0
@@ -61,15 +62,17 @@ class TrainingJob:
         device: such as `cpu`.
         checkpoint: where the state is kept.
         identity: what a checkpoint must be of, to be gone on with.
+        start: networks that the first weights are taken from. Their normalisations are settled, and stay so.
     """
 
     net: NetSettings
     settings: TrainSettings
-    split: Split[Picture] | Split[EventSegment]
+    split: Split[Any]
     side: tuple[int, int]
     device: str
     checkpoint: Path
     identity: str
+    start: tuple[Path, ...] = ()
 
 
 class Trainer:
@@ -93,7 +96,8 @@ class Trainer:
         settings = job.settings
         torch.manual_seed(settings.seed)
         # Channels last: convolutions of few channels are a fifth quicker so on processors.
-        self.net = DetectionNet(job.net).to(job.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
+        net = new_network(job.net, job.start)
+        self.net = net.to(job.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
         self.average = copy.deepcopy(self.net).requires_grad_(False)
         self._optimiser = torch.optim.AdamW(
             _groups(self.net, settings.weight_decay), lr=settings.learning_rate, betas=(0.9, 0.99)
@@ -101,6 +105,7 @@ class Trainer:
         self._places, self._strides = (part.to(job.device) for part in cell_places(settings.crop_px))
         self.step, self.log = 0, list[LogRow]()
         self._spent_s = 0.0
+        self._unsettled = 1.0 - settings.settled_share
         self._sums = [0.0, 0.0, 0.0, 0.0]
         if job.checkpoint.is_file():
             self._restore(read_checkpoint(job.checkpoint, job.identity, job.device))
@@ -120,7 +125,7 @@ class Trainer:
         saved = time.monotonic()
         try:
             while (progress := self._progress(total)) < 1.0:
-                self.net.learn(settled=progress >= 1.0 - self._job.settings.settled_share)
+                self.net.learn(settled=bool(self._job.start) or progress >= self._unsettled)
                 self._learn(batches.get(self.step), self._rate(progress))
                 self._spent_s = time.monotonic() - begun
                 after = self._progress(total)
@@ -166,7 +171,7 @@ class Trainer:
                 for t in asked
             ]
             with torch.autocast(device, torch.bfloat16, enabled=settings.precision == BFLOAT16):
-                rows, state = self.net(shown, state, length)
+                rows, state = self.net(shown, state, length, *batch.seen(part, device))
             state = tuple(one.detach().float() for one in state)
             cost = cost_of(rows.float(), targets, self._places, self._strides)
             if not bool(torch.isfinite(cost.total)):
@@ -229,7 +234,7 @@ class Trainer:
             raise DataError("is damaged; remove it to begin anew", self._job.checkpoint) from None
 
 
-def _groups(net: DetectionNet, decay: float) -> Sequence[dict[str, Any]]:
+def _groups(net: VehicleNet, decay: float) -> Sequence[dict[str, Any]]:
     """Weights of convolutions are held small; biases and normalisations are free."""
     held = [p for p in net.parameters() if p.ndim > 1]
     free = [p for p in net.parameters() if p.ndim <= 1]

@@ -21,7 +21,7 @@ from jeat_graph.training.data_sets import (  # noqa: E402
 )
 from jeat_graph.training.event_samples import draw_sequence  # noqa: E402
 from jeat_graph.training.judging import Looked, precision_of  # noqa: E402
-from jeat_graph.training.picture_samples import CutOut, cut_out, draw_window  # noqa: E402
+from jeat_graph.training.picture_samples import CutOut, cut_out, draw_light, draw_window  # noqa: E402
 from jeat_graph.training.settings import (  # noqa: E402
     EventChanges,
     NetSettings,
@@ -48,7 +48,7 @@ def test_boxes_stay_on_what_they_are_about(seed):
     truth = one_box(40.0, 30.0, 100.0, 70.0)
     window = draw_window(rng, (128, 96), (64, 48), truth, (1.6, 0.5, 1.0))
     (corners,), _ = window.boxes(truth)
-    values = cut_out(frame, window, rng, NO_CHANGE).mean(axis=0)
+    values = cut_out(frame, window, rng, draw_light(rng, NO_CHANGE)).mean(axis=0)
     rows, columns = np.nonzero(values > 0.6)
     # The pad is grey (0.45), and interpolation blurs an edge over a pixel.
     found = [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]

@@ -47,7 +47,7 @@ def test_a_network_learns_events_by_heart(small_set, tmp_path):
     assert judge(trainer.average, members, SIZE, settings, 99)["all"].ap50 > 90.0
 
 
-@pytest.mark.parametrize("kind", ["frames", "events"])
+@pytest.mark.parametrize("kind", ["frames", "events", "fused"])
 def test_a_training_that_was_killed_writes_the_same_bytes(small_set, tmp_path, kind):
     settings = TrainSettings(
         crop_px=(32, 32), batch=2, epochs=1.0, judge_every=0.2, judged=2, steps=2, back=1, seed=3

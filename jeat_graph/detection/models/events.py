@@ -46,6 +46,9 @@ class ModelEventDetector(BinnedDetector):
         DataError: no ONNX file, or one that does not fit.
     """
 
+    #: Inputs that are neither windows nor memory.
+    _beside: tuple[str, ...] = ()
+
     def __init__(
         self,
         path: str | Path,
@@ -71,7 +74,7 @@ class ModelEventDetector(BinnedDetector):
                 path,
             )
         self._by_polarity = _by_polarity(self._settings.channels, head)
-        self._memory, outputs = _memory(head, self._path)
+        self._memory, outputs = _memory(head, self._path, self._beside)
         self._outputs = OutputReader(outputs, self._side, head.notes, self._settings, self._path, coco=False)
         self._read = [port.name for port in outputs]
         self._engine = open_engine(path, head, self._settings.backend, self._settings.threads)
@@ -89,18 +92,24 @@ class ModelEventDetector(BinnedDetector):
 
     def _look(self) -> Scan:
         width, height = self.size_px
-        window = np.zeros(
-            (1, self._input.shape[1] or 0, self._side[1], self._side[0]), dtype=self._input.kind
-        )
+        window = self._empty_window()
         window[0, :, :height, :width] = self._bins.stack(self._by_polarity)
-        inputs = {self._input.name: window}
+        return self._scan(self._bins.end_us / _US_PER_S, window, {})
+
+    def _empty_window(self) -> npt.NDArray[Any]:
+        shape = (1, self._input.shape[1] or 0, self._side[1], self._side[0])
+        return np.zeros(shape, dtype=self._input.kind)
+
+    def _scan(self, t: float, window: npt.NDArray[Any], beside: dict[str, npt.NDArray[Any]]) -> Scan:
+        """Run the network on a window that ends at t (s), and on what goes with it."""
+        inputs = {self._input.name: window, **beside}
         for given, _ in self._memory:
             empty = np.zeros([side or 1 for side in given.shape], dtype=given.kind)
             inputs[given.name] = self._state.get(given.name, empty)
         outputs = self._engine.run(inputs)
         self._state = {given.name: outputs[returned] for given, returned in self._memory}
         corners, scores = self._outputs.read({name: outputs[name] for name in self._read})
-        return scan_within(self._bins.end_us / _US_PER_S, self.sensor, corners, scores, self.size_px)
+        return scan_within(t, self.sensor, corners, scores, self.size_px)
 
 
 def _window_input(head: OnnxHead, path: Path) -> Port:
@@ -118,11 +127,15 @@ def _by_polarity(channels: str, head: OnnxHead) -> bool:
     return channels == "polarity" or (channels == "auto" and CARD not in head.notes)
 
 
-def _memory(head: OnnxHead, path: Path) -> tuple[list[tuple[Port, str]], tuple[Port, ...]]:
+def _memory(
+    head: OnnxHead, path: Path, beside: tuple[str, ...]
+) -> tuple[list[tuple[Port, str]], tuple[Port, ...]]:
     """Pair inputs and outputs of a network's memory, and return what other outputs there are."""
     pairs: list[tuple[Port, str]] = []
     left = list(head.outputs)
     for given in head.inputs[1:]:
+        if given.name in beside:
+            continue
         match = next((port for port in left if port.shape == given.shape), None)
         if match is None:
             raise DataError(f"takes {given.name} {list(given.shape)} and gives nothing like it back", path)

@@ -11,6 +11,8 @@ from jeat_graph.data.arrays import FloatArray
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.io.decoders import RgbImage
 
+#: Grey level beside a picture that is smaller than the input, and white.
+_FILL, _WHITE = np.float32(114.0), np.float32(255.0)
 _IMAGENET_MEAN, _IMAGENET_STD = (123.675, 116.28, 103.53), (58.395, 57.12, 57.375)
 
 
@@ -101,3 +103,17 @@ def place(frame: RgbImage, side: tuple[int, int], feed: Feed) -> tuple[npt.NDArr
     mean, std = np.array(feed.mean, dtype=np.float32), np.array(feed.std, dtype=np.float32)
     values = (ordered.astype(np.float32) * np.float32(feed.scale) - mean) / std
     return np.ascontiguousarray(values.transpose(2, 0, 1)[None]), at
+
+
+def picture_input(frame: RgbImage, side: tuple[int, int]) -> npt.NDArray[np.float32]:
+    """Return a picture (H, W, 3) as (1, 3, height, width) of 0 to 1, filled up at the right and below.
+
+    Args:
+        frame: no larger than `side`.
+        side: width and height of the input (px).
+    """
+    height, width = frame.shape[:2]
+    values = np.full((1, 3, side[1], side[0]), _FILL / _WHITE, dtype=np.float32)
+    values[0, :, :height, :width] = frame.transpose(2, 0, 1)
+    values[0, :, :height, :width] /= _WHITE
+    return values

@@ -66,6 +66,41 @@ def counting_net(path, side, channels, rows, per_event=0.0, seen=slice(None), no
     return _save(path, helper.make_graph(nodes, "counting", inputs, outputs, values), notes)
 
 
+def telling_net(path, side, channels, rows):
+    """A network of both sensors that tells what it is given by where its boxes (K, 6) are.
+
+    Boxes lie 8 px to the right with a picture, 16 px with events, and down by 100 px a second of age and by
+    what the picture's mean is (px).
+    """
+    width, height = side
+    told = np.zeros((3, 6), np.float32)
+    told[0, [0, 2]], told[2, [0, 2]], told[1, [1, 3]] = 8.0, 16.0, 100.0
+    down = np.zeros((1, 1, 6), np.float32)
+    down[..., [1, 3]] = 1.0
+    nodes = [
+        helper.make_node("ReduceMean", ["events"], ["seen"], keepdims=1, axes=[1, 2, 3]),
+        helper.make_node("Mul", ["seen", "zero"], ["nothing4"]),
+        helper.make_node("ReduceMean", ["picture"], ["light4"], keepdims=1, axes=[1, 2, 3]),
+        helper.make_node("Add", ["nothing4", "light4"], ["both4"]),
+        helper.make_node("Reshape", ["both4", "one_side"], ["light"]),
+        helper.make_node("Mul", ["light", "down"], ["lower"]),
+        helper.make_node("MatMul", ["given", "told"], ["shift"]),
+        helper.make_node("Add", ["rows", "shift"], ["moved"]),
+        helper.make_node("Add", ["moved", "lower"], ["found"]),
+    ]
+    values = [
+        numpy_helper.from_array(np.zeros((1, 1, 1, 1), np.float32), "zero"),
+        numpy_helper.from_array(np.array([1, 1, 1], np.int64), "one_side"),
+        numpy_helper.from_array(told, "told"),
+        numpy_helper.from_array(down, "down"),
+        numpy_helper.from_array(rows[None].astype(np.float32), "rows"),
+    ]
+    shapes = {"events": [1, channels, height, width], "picture": [1, 3, height, width], "given": [1, 3]}
+    inputs = [helper.make_tensor_value_info(k, TensorProto.FLOAT, shape) for k, shape in shapes.items()]
+    outputs = [helper.make_tensor_value_info("found", TensorProto.FLOAT, [1, *rows.shape])]
+    return _save(path, helper.make_graph(nodes, "telling", inputs, outputs, values), None)
+
+
 def _save(path, graph, notes):
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 13)], ir_version=8)
     if notes:
