@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.io.arrow_arrays import to_numpy
 
 _LIST = re.compile(rb"[ \t\r\n]*\[[ \t\r\n]*(?=\{)")
 _NAMED_LIST = re.compile(rb'"annotations"[ \t\r\n]*:[ \t\r\n]*\[[ \t\r\n]*(?=\{)')
@@ -107,6 +108,6 @@ def _columns(piece: bytes, count: int) -> tuple[IntArray, FloatArray, FloatArray
     values = boxes.flatten()
     if len(table) != count or any(column.null_count for column in (image, boxes, scores, category, values)):
         raise ValueError("an entry is not as it should be")
-    if not (np.diff(boxes.offsets.to_numpy()) == 4).all():
+    if not (np.diff(to_numpy(boxes.offsets)) == 4).all():
         raise ValueError("a box has not four numbers")
-    return image.to_numpy(), values.to_numpy().reshape(-1, 4), scores.to_numpy(), category.to_numpy()
+    return to_numpy(image), to_numpy(values).reshape(-1, 4), to_numpy(scores), to_numpy(category)

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.io.arrow_arrays import to_numpy
 
 _LARGEST_EXACT = 2.0**53  # beyond it a float cannot tell neighbouring whole numbers apart
 
@@ -61,7 +62,7 @@ class FileTable:
 
     def blank(self, name: str) -> BoolArray:
         """Tell where a column has no value (R,)."""
-        return np.asarray(self._columns[name].is_null().to_numpy(), dtype=bool)
+        return to_numpy(self._columns[name].is_null())
 
     def number(self, name: str, *, blank_ok: bool = False, nan_ok: bool = False) -> FloatArray:
         """Convert a column to numbers.
@@ -103,7 +104,7 @@ class FileTable:
         if not pa.types.is_floating(column.type):
             # Not by way of floats, so that ids above 2^53 keep their last digits.
             try:
-                return np.asarray(column.cast(pa.int64()).fill_null(0).to_numpy(), dtype=np.int64)
+                return to_numpy(column.cast(pa.int64()), missing=0)
             except pa.ArrowException:
                 pass
         values = self.number(name, blank_ok=blank_ok)
@@ -142,10 +143,10 @@ class FileTable:
                     column = column.cast(column.type.value_type)
                 column = column.cast(pa.string()).dictionary_encode()
             coded = pa.chunked_array([column.unify_dictionaries().combine_chunks()]).combine_chunks()
-            texts = compute.utf8_trim_whitespace(coded.dictionary).fill_null("").to_pylist()
+            texts = [text or "" for text in compute.utf8_trim_whitespace(coded.dictionary).to_pylist()]
         except (pa.ArrowException, UnicodeDecodeError):
             raise DataError(f"column {name} must hold text", self.path) from None
-        index = np.asarray(coded.indices.fill_null(len(texts)).to_numpy(zero_copy_only=False), dtype=np.int64)
+        index = to_numpy(coded.indices.cast(pa.int64()), missing=len(texts))
         texts.append("")
         used = np.bincount(index, minlength=len(texts)) > 0
         words = sorted({text for text, there in zip(texts, used, strict=True) if there})
@@ -170,8 +171,7 @@ class FileTable:
             numbers = _cast(column, self._decimal_comma)
         except (pa.ArrowException, UnicodeDecodeError):
             raise self._not_a_number(name, column) from None
-        values = np.asarray(numbers.to_numpy(), dtype=np.float64)
-        return values if values.flags.writeable else values.copy(), is_null
+        return to_numpy(numbers, missing=np.nan).copy(), is_null
 
     def _not_a_number(self, name: str, column: Any) -> DataError:
         """Find the first field of a column that is no number, by halving."""

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.io.arrow_arrays import from_numpy
 from jeat_graph.io.atomic import atomic_path
 from jeat_graph.io.piecewise import PiecewiseWriter
 from jeat_graph.io.tables import PARQUET_SUFFIXES
@@ -57,7 +57,7 @@ class TableWriter(PiecewiseWriter):
 
         if self._target is None:
             raise RuntimeError("the writer must be entered with `with` before rows are appended")
-        arrays = [_to_arrow(values) for values in columns.values()]
+        arrays = [from_numpy(values) for values in columns.values()]
         self._pending.append(pa.table(arrays, names=list(columns)))
         self._rows += len(self._pending[-1])
         if self._rows >= _CHUNK_ROWS:
@@ -106,23 +106,8 @@ def csv_lines(columns: Mapping[str, npt.NDArray[Any]], delimiter: str = ",") -> 
     """Return the lines of a text file with these rows, without its header, just as they would be written."""
     import pyarrow as pa
 
-    table = pa.table([_to_arrow(values) for values in columns.values()], names=list(columns))
+    table = pa.table([from_numpy(values) for values in columns.values()], names=list(columns))
     return _csv_bytes(table, delimiter).decode("utf-8")
-
-
-def _to_arrow(values: npt.NDArray[Any]) -> Any:
-    import pyarrow as pa
-
-    if values.dtype.kind == "U":
-        distinct, index = np.unique(values, return_inverse=True)
-        try:
-            texts = pa.array(distinct.tolist(), pa.string())
-        except UnicodeEncodeError as error:
-            raise DataError(f"text that UTF-8 cannot hold: {error.object!r}") from None
-        return texts.take(pa.array(index.reshape(-1)))
-    if isinstance(values, np.ma.MaskedArray):
-        return pa.array(values.data, mask=np.ma.getmaskarray(values))
-    return pa.array(values, from_pandas=True)
 
 
 def _csv_bytes(table: Any, delimiter: str) -> bytes:

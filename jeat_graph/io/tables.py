@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.data.arrays import IntArray
+from jeat_graph.io.arrow_arrays import from_numpy, to_numpy
 from jeat_graph.io.column_names import standing_in, usual_names
 from jeat_graph.io.csv_text import TEXT, CsvBody, read_text
 from jeat_graph.io.file_table import FileTable
@@ -104,10 +105,10 @@ def _table(
     rows: IntArray | None = None
     columns = list(named.values())
     if columns and all(column.null_count for column in columns):
-        nothing = reduce(compute.and_, [column.is_null() for column in columns]).to_numpy()
+        nothing = to_numpy(reduce(compute.and_, [column.is_null() for column in columns]))
         if nothing.any():
             rows = np.flatnonzero(~nothing)
-            named = {name: column.take(rows) for name, column in named.items()}
+            named = {name: column.take(from_numpy(rows)) for name, column in named.items()}
     return FileTable(
         path,
         named,
