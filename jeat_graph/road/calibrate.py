@@ -13,19 +13,18 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.data.progress import told
 from jeat_graph.road.camera import PARAMETERS, Georeference, RoadCamera
 from jeat_graph.road.evidence import Points
-from jeat_graph.road.lane_spacing import comb_pitch, find_comb
+from jeat_graph.road.lane_spacing import find_comb
+from jeat_graph.road.length_evidence import length_covariance, length_residuals
 from jeat_graph.road.residuals import (
     Problem,
     Weighting,
     lane_residuals,
-    length_residuals,
-    length_spread,
     point_residuals,
     prior_residuals,
     track_residuals,
 )
 from jeat_graph.road.start import first_guess
-from jeat_graph.road.track_fit import fit_tracks
+from jeat_graph.road.track_fit import fit_tracks, track_scale
 
 _MOST_ROUNDS = 10
 _SETTLED = 0.05  # change of every parameter, in its standard deviation, at which the rounds end
@@ -76,7 +75,7 @@ def calibrate(problem: Problem, zone: str = "") -> CameraCalibration:
         calibration = _solve(problem)
         if problem.lengths is None and calibration.weighting.lanes is None:
             raise DataError("nothing tells the scale: give measured lengths or surveyed points")
-        return calibration if problem.lengths is not None else _with_lanes_as_wide(calibration)
+        return calibration
     surveyed = problem.points
     east, north = (float(v) for v in surveyed.places.mean(axis=0))
     map_axes = Georeference(east, north, 0.0, zone)
@@ -89,20 +88,6 @@ def calibrate(problem: Problem, zone: str = "") -> CameraCalibration:
         places = map_axes.from_map(surveyed.places)
         calibration = _solve(replace(problem, points=Points(surveyed.pixels, places)))
     return _with_origin_below(calibration, map_axes)
-
-
-def _with_lanes_as_wide(calibration: CameraCalibration) -> CameraCalibration:
-    """Set the height by the lanes alone: what is believed of accelerations makes every scene look smaller."""
-    camera, problem, w = calibration.camera, calibration.problem, calibration.weighting
-    assert problem.tracks is not None
-    assert w.lanes is not None
-    x = fit_tracks(camera, problem.tracks, problem.config, w.track_px, 0.0, w.node_weight).motion[:, 0]
-    factor = problem.config.lane_m / comb_pitch(x, w.lanes)
-    scale = np.ones(len(PARAMETERS))
-    scale[-3:] = factor
-    covariance = camera.covariance * np.outer(scale, scale)
-    camera = replace(camera, position=camera.position * factor, covariance=covariance)
-    return replace(calibration, camera=camera)
 
 
 def _along(camera: RoadCamera, problem: Problem) -> float:
@@ -143,7 +128,7 @@ def _solve(problem: Problem) -> CameraCalibration:
     camera = first_guess(problem) if problem.known is None else problem.known
     free = problem.free()
     shape = (0, 1) if problem.tracks is None else problem.tracks.t.shape
-    weighting = Weighting(np.zeros((0, 2)), 1.0, problem.config.track_px, 1.0, np.ones(shape))
+    weighting = Weighting(np.zeros((0, 0)), 1.0, problem.config.track_px, 1.0, np.ones(shape))
     acceleration = 0.0
     covariance = np.zeros((len(PARAMETERS), len(PARAMETERS)))
     for _ in told(range(_MOST_ROUNDS)):
@@ -189,7 +174,7 @@ def _count(problem: Problem, w: Weighting) -> int:
 def _residuals(camera: RoadCamera, problem: Problem, w: Weighting, acceleration: float) -> FloatArray:
     parts = [prior_residuals(camera, problem, acceleration)]
     if problem.lengths is not None:
-        parts.append(length_residuals(camera, problem, w.length_spread))
+        parts.append(length_residuals(camera, problem.lengths, w.lengths))
     if problem.points is not None:
         parts.append(point_residuals(camera, problem, w.point_scale))
     parts.append(lane_residuals(camera, problem, w))
@@ -209,10 +194,11 @@ def _reweighted(camera: RoadCamera, problem: Problem, w: Weighting, acceleration
     """Sizes of the errors and robust weights of the tracks at this camera."""
     if problem.lengths is not None:
         # A camera's height and focal length follow the lengths: two of their numbers are used up.
-        # The spread stays as it is while the camera is sought: else a camera could buy a better fit by a
-        # horizon so near that every length becomes doubtful.
-        spread = length_spread(camera, problem.lengths, problem.config)
-        w = replace(w, length_spread=spread * _scale(length_residuals(camera, problem, spread), 2.0))
+        # The covariance stays as it is while the camera is sought: else a camera could buy a better fit by
+        # a horizon so near that every length becomes doubtful.
+        expected = length_covariance(camera, problem.lengths, problem.config)
+        scale = _scale(length_residuals(camera, problem.lengths, expected), 2.0)
+        w = replace(w, lengths=expected * scale**2)
     if problem.points is not None:
         w = replace(w, point_scale=_scale(point_residuals(camera, problem, 1.0), 8.0))
     if problem.tracks is None or not len(problem.tracks):
@@ -228,7 +214,13 @@ def _reweighted(camera: RoadCamera, problem: Problem, w: Weighting, acceleration
     typical = float(np.median(mean[enough]))
     track = np.where(enough, 1.0 / (1.0 + mean / (_BAD_TRACK * typical)) ** 2, 0.0)
     lanes = find_comb(fit.motion[:, 0], track) if problem.needs_lanes else None
-    return replace(w, track_px=problem.config.track_px, node_weight=fit.weight * track[:, None], lanes=lanes)
+    return replace(
+        w,
+        track_px=problem.config.track_px,
+        node_weight=fit.weight * track[:, None],
+        lanes=lanes,
+        scene=track_scale(camera, problem.tracks),
+    )
 
 
 def _shared(

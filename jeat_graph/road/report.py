@@ -8,7 +8,7 @@ import numpy as np
 
 from jeat_graph.road.calibrate import CameraCalibration
 from jeat_graph.road.camera import RoadCamera
-from jeat_graph.road.residuals import length_errors
+from jeat_graph.road.length_evidence import length_errors
 from jeat_graph.road.speeds import Z95
 
 _ROWS = (0.25, 0.5, 0.75, 0.95)  # of the picture's height
@@ -66,11 +66,12 @@ def calibration_lines(calibration: CameraCalibration) -> list[str]:
     lines = camera_lines(camera)
     if problem.lengths is not None:
         error = length_errors(camera, problem.lengths)[:, 0]
+        expected = Z95 * np.sqrt(np.diag(w.lengths)[::2])
         for k in range(len(problem.lengths)):
             way = "along" if problem.lengths.along[k] else "across"
             lines.append(
                 f"length {k + 1}: {problem.lengths.metres[k]:.3f} m {way}, looks {error[k]:+.3f} m longer"
-                f" (expected ± {Z95 * w.length_spread[k, 0]:.3f})"
+                f" (expected ± {expected[k]:.3f})"
             )
     if problem.points is not None:
         places = np.c_[problem.points.places, np.zeros(len(problem.points))]

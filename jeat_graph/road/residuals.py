@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,11 +11,11 @@ from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.road.camera import PARAMETERS, RoadCamera
 from jeat_graph.road.evidence import CalibrationConfig, Lengths, Points, TrackNodes
 from jeat_graph.road.lane_spacing import LaneComb, comb_pitch
-from jeat_graph.road.track_fit import fit_tracks
+from jeat_graph.road.track_fit import fit_tracks, track_scale
 
 #: Of PARAMETERS: along the plane, where only surveyed points tell anything.
 PLACE = (9, 10)
-_UNSEEN = 1e3  # residual of a length that the trial camera sees in the sky
+_UNSEEN = 1e3  # residual of a point that the trial camera sees behind it, or of lanes that it sees none of
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,18 +47,6 @@ class Problem:
         across = self.lengths is not None and not self.lengths.along.all()
         return self.points is None and not across and self.tracks is not None and self.known is None
 
-    def motion_of(self, camera: RoadCamera) -> CalibrationConfig:
-        """What is believed of motions seen through a trial camera.
-
-        In a smaller scene all accelerations are smaller. Where the scale is known before, that must not speak
-        for a smaller one: beliefs grow and shrink with the height.
-        """
-        c = self.config
-        if self.known is None:
-            return c
-        factor = float(camera.position[2] / self.known.position[2])
-        return replace(c, acceleration_sd=c.acceleration_sd * factor, lateral_sd=c.lateral_sd * factor)
-
     def free(self) -> IntArray:
         """Which of the camera's parameters are sought: places in `PARAMETERS`."""
         if self.known is not None:
@@ -71,20 +59,23 @@ class Weighting:
     """How much the evidence counts, found in turn with the camera.
 
     Attributes:
-        length_spread: (L, 2) error of each length and of its direction (m).
+        lengths: (2 L, 2 L) covariance of each length's error and of its direction's (m²).
         point_scale: factor on the expected error of points.
         track_px: error of a track's node (px).
         track_share: how many independent tracks' worth one track is (design effect's inverse).
         node_weight: (K, M) robust weights.
         lanes: the lanes of the tracks where their distance is evidence, or None.
+        scene: (K, 2) how large the scene of each track looks through the camera that its motion is judged
+            by (`track_scale`), or None.
     """
 
-    length_spread: FloatArray
+    lengths: FloatArray
     point_scale: float
     track_px: float
     track_share: float
     node_weight: FloatArray
     lanes: LaneComb | None = None
+    scene: FloatArray | None = None
 
 
 def prior_residuals(camera: RoadCamera, problem: Problem, common_acceleration: float) -> FloatArray:
@@ -116,38 +107,6 @@ def prior_residuals(camera: RoadCamera, problem: Problem, common_acceleration: f
     )
 
 
-def length_spread(camera: RoadCamera, lengths: Lengths, config: CalibrationConfig) -> FloatArray:
-    """Expected error of each length through this camera (L, 2) in m: of its size and of its direction."""
-    spread = []
-    vector = camera.to_road(lengths.end) - camera.to_road(lengths.start)
-    size = np.linalg.norm(vector, axis=1)
-    unit = vector / size[:, None]
-    normal = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
-    ends = [camera.to_road_jacobian(camera.to_road(one)) for one in (lengths.start, lengths.end)]
-    turn = np.where(lengths.along, config.along_sd_rad, config.across_sd_rad)
-    for axis, own in ((unit, np.full(len(size), config.length_sd_m)), (normal, turn * size)):
-        clicks = sum((np.einsum("li,lij->lj", axis, J) ** 2).sum(axis=1) for J in ends)
-        spread.append(np.sqrt(config.click_px**2 * clicks + own**2))
-    return np.stack(spread, axis=1)
-
-
-def length_errors(camera: RoadCamera, lengths: Lengths) -> FloatArray:
-    """How much longer each length looks than it is, and how far its end lies beside its direction.
-
-    Returns:
-        (L, 2) in m.
-    """
-    vector = camera.to_road(lengths.end) - camera.to_road(lengths.start)
-    beside = np.where(lengths.along, vector[:, 0], vector[:, 1])
-    return np.stack([np.linalg.norm(vector, axis=1) - lengths.metres, beside], axis=1)
-
-
-def length_residuals(camera: RoadCamera, problem: Problem, spread: FloatArray) -> FloatArray:
-    """Residuals of the lengths (2 L,) in their spreads (L, 2)."""
-    assert problem.lengths is not None
-    return np.nan_to_num(length_errors(camera, problem.lengths) / spread, nan=_UNSEEN).ravel()
-
-
 def point_residuals(camera: RoadCamera, problem: Problem, scale: float) -> FloatArray:
     """Residuals of the surveyed points (2 P,): in the picture, where the error of the survey is added."""
     assert problem.points is not None
@@ -176,16 +135,24 @@ def lane_residuals(camera: RoadCamera, problem: Problem, weighting: Weighting) -
 def track_residuals(
     camera: RoadCamera, problem: Problem, weighting: Weighting, common_acceleration: float
 ) -> FloatArray:
-    """Residuals of the tracks (K (2 M + 2),): nodes, then what their accelerations and turns cost."""
+    """Residuals of the tracks (K (2 M + 2),): nodes, then what their accelerations and turns cost.
+
+    In a smaller scene all accelerations are smaller. That must not speak for a smaller one: what is believed
+    of motions grows and shrinks with the scene that a trial camera sees.
+    """
     assert problem.tracks is not None
-    c, w = problem.motion_of(camera), weighting.node_weight
-    fit = fit_tracks(camera, problem.tracks, c, weighting.track_px, common_acceleration, w)
+    c, w = problem.config, weighting.node_weight
+    scale = np.ones((len(w), 2))
+    if weighting.scene is not None:
+        scale = track_scale(camera, problem.tracks) / weighting.scene
+    fit = fit_tracks(camera, problem.tracks, c, weighting.track_px, common_acceleration, w, scale)
     used = np.sqrt(w.max(axis=1))
+    across, along = scale.T
     parts = np.concatenate(
         [
             (fit.residual * np.sqrt(w)[..., None]).reshape(len(w), -1),
-            (fit.motion[:, 1] / c.lateral_sd * used)[:, None],
-            ((fit.motion[:, 4] - common_acceleration) / c.acceleration_sd * used)[:, None],
+            (fit.motion[:, 1] / across / c.lateral_sd * used)[:, None],
+            ((fit.motion[:, 4] / along - common_acceleration) / c.acceleration_sd * used)[:, None],
         ],
         axis=1,
     )

@@ -10,7 +10,8 @@ from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.road.camera import RoadCamera, mounted
 from jeat_graph.road.lane_spacing import comb_pitch, find_comb
-from jeat_graph.road.residuals import Problem, length_errors, length_residuals, length_spread, prior_residuals
+from jeat_graph.road.length_evidence import length_covariance, length_errors, length_residuals
+from jeat_graph.road.residuals import Problem, prior_residuals
 from jeat_graph.road.track_fit import TrackFit, fit_tracks
 from jeat_graph.road.vanishing import vanishing_point
 
@@ -129,11 +130,11 @@ def _lane_cost(problem: Problem, fit: TrackFit, factor: float = 1.0) -> float:
 def _cost(camera: RoadCamera, problem: Problem) -> float:
     cost = float((prior_residuals(camera, problem, 0.0) ** 2).sum())
     if problem.lengths is not None:
-        spread = length_spread(camera, problem.lengths, problem.config)
-        if not np.isfinite(spread).all():
+        expected = length_covariance(camera, problem.lengths, problem.config)
+        if not np.isfinite(expected).all():
             return math.inf
         # Soft: one wrong length of many must not send the search astray.
-        cost += float(np.log1p(length_residuals(camera, problem, 2.0 * spread) ** 2).sum())
+        cost += float(np.log1p(length_residuals(camera, problem.lengths, 4.0 * expected) ** 2).sum())
     if problem.tracks is not None and len(problem.tracks):
         fit = fit_tracks(camera, problem.tracks, problem.config, _COARSE_PX)
         each = np.log1p((fit.residual**2).sum(axis=-1)).mean(axis=1)

@@ -42,6 +42,7 @@ def fit_tracks(
     sigma_px: float,
     common_acceleration: float = 0.0,
     weight: FloatArray | None = None,
+    scale: FloatArray | None = None,
 ) -> TrackFit:
     """Fit constant speed across and constant acceleration along, weighted by what a pixel is worth there.
 
@@ -55,7 +56,10 @@ def fit_tracks(
         sigma_px: error of a node (px).
         common_acceleration: mean of the accelerations' prior (m/s²).
         weight: (K, M) robust weights; found by reweighting if they are not given.
+        scale: (K, 2) how many times as large the scene looks there as in the one that the beliefs about
+            motions are of, across and along the road; 1 if it is not given.
     """
+    across, along = np.ones((2, len(tracks))) if scale is None else scale.T
     xy = camera.to_road(tracks.pixels)
     seen = np.asarray(np.isfinite(xy).all(axis=-1))
     xy = np.where(seen[..., None], xy, 0.0)
@@ -66,20 +70,35 @@ def fit_tracks(
     design[..., 0, 0] = design[..., 1, 2] = 1.0
     design[..., 0, 1] = design[..., 1, 3] = s
     design[..., 1, 4] = 0.5 * s**2
-    prior = np.array([_WEAK, config.lateral_sd**-2, _WEAK, _WEAK, config.acceleration_sd**-2])
-    pull = prior * [0.0, 0.0, 0.0, 0.0, common_acceleration]
+    prior = np.full((len(tracks), 5), _WEAK)
+    prior[:, 1], prior[:, 4] = (config.lateral_sd * across) ** -2, (config.acceleration_sd * along) ** -2
+    pull = prior * np.array([0.0, 0.0, 0.0, 0.0, common_acceleration]) * along[:, None]
     A, b = whiten @ design, (whiten @ xy[..., None])[..., 0]
     fixed = weight is not None
     w = _agreed(s, xy, whiten) if weight is None else weight
     for _ in range(1 if fixed else _ROBUST_PASSES):
         wA = A * w[..., None, None]
-        normal = np.einsum("kmij,kmil->kjl", wA, A) + np.diag(prior)
+        normal = np.einsum("kmij,kmil->kjl", wA, A) + prior[:, :, None] * np.eye(5)
         right = np.einsum("kmij,kmi->kj", wA, b) + pull
         motion = np.linalg.solve(normal, right[..., None])[..., 0]
         residual = b - np.einsum("kmij,kj->kmi", A, motion)
         if not fixed:
             w = kernel(np.linalg.norm(residual, axis=-1), _SOFT)
     return TrackFit(residual, motion, w * seen)
+
+
+def track_scale(camera: RoadCamera, tracks: TrackNodes) -> FloatArray:
+    """How large the scene of each track looks through a camera (K, 2), in m.
+
+    Across the road what a pixel beside the track's middle is worth, along it the way from the first node to
+    the last. 1 where the camera sees the sky.
+    """
+    middle = camera.to_road(tracks.pixels[:, tracks.pixels.shape[1] // 2])
+    seen = np.asarray(np.isfinite(middle).all(axis=1))
+    J = camera.to_road_jacobian(np.where(seen[:, None], middle, [0.0, camera.position[2]]))
+    way = camera.to_road(tracks.pixels[:, -1]) - camera.to_road(tracks.pixels[:, 0])
+    size = np.stack([np.linalg.norm(J[:, 0], axis=1), np.abs(way[:, 1])], axis=1)
+    return np.where(seen[:, None] & np.isfinite(size) & (size > 0.0), size, 1.0)
 
 
 def _agreed(s: FloatArray, xy: FloatArray, whiten: FloatArray) -> FloatArray:
