@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.io.atomic import atomic_path
-from jeat_graph.io.decoders import without_a_word
+from jeat_graph.io.pictures import as_png, open_video
+from jeat_graph.io.piecewise import PiecewiseWriter
 from jeat_graph.io.video import FRAME_TIMES, VIDEO_FILES, RgbImage, quietly
 from jeat_graph.io.webm import settle_webm
 
@@ -20,7 +18,7 @@ from jeat_graph.io.webm import settle_webm
 _CODECS = {"mp4": "mp4v", "webm": "VP80", "lossless": "FFV1"}
 
 
-class FrameWriter:
+class FrameWriter(PiecewiseWriter):
     """A context manager that writes frames; a video, and `frames.csv`, appear only when it has ended well.
 
     Args:
@@ -34,40 +32,33 @@ class FrameWriter:
     """
 
     def __init__(self, folder: str | Path, video: str, size_px: tuple[int, int], rate_hz: float) -> None:
+        super().__init__()
         if video not in VIDEO_FILES:
             raise ConfigError(f"video must be one of {', '.join(VIDEO_FILES)}, not {video!r}")
         self._folder, self._video, self._size_px, self._rate_hz = Path(folder), video, size_px, rate_hz
-        self._stack = ExitStack()
         self._times: list[int] = []
         self._target = Path()
         self._sink: Any = None
 
-    def __enter__(self) -> Self:
+    def _begin(self) -> None:
         target = self._folder / VIDEO_FILES[self._video]
         if self._video == "png":
             target.mkdir(parents=True, exist_ok=True)
             self._target = target
         else:
             self._target = self._stack.enter_context(atomic_path(target))
-            self._sink = _open_sink(self._target, _CODECS[self._video], self._rate_hz, self._size_px)
-        return self
+            size_px, codec = self._size_px, _CODECS[self._video]
+            self._sink = open_video(self._stack, self._target, codec, self._rate_hz, size_px)
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def _finish(self) -> None:
+        from jeat_graph.io.table_writer import write_columns
+
         if self._sink is not None:
             quietly(self._sink.release)
-            if error is None and self._video == "webm":
+            if self._video == "webm":
                 settle_webm(self._target)
-        self._stack.__exit__(kind, error, trace)
-        if error is None:
-            from jeat_graph.io.table_writer import write_columns
-
-            t_us = np.array(self._times, dtype=np.int64)
-            write_columns({"index": np.arange(len(t_us)), "t_us": t_us}, self._folder / FRAME_TIMES)
+        t_us = np.array(self._times, dtype=np.int64)
+        write_columns({"index": np.arange(len(t_us)), "t_us": t_us}, self._folder / FRAME_TIMES)
 
     def append(self, t_us: int, rgb: RgbImage) -> None:
         """Add a frame.
@@ -79,30 +70,14 @@ class FrameWriter:
         Raises:
             DataError: the time does not go on, or the picture has another size.
         """
-        import cv2
-
         width, height = self._size_px
         if rgb.shape != (height, width, 3) or rgb.dtype != np.uint8:
             raise DataError(f"frame must be ({height}, {width}, 3) uint8, not {rgb.shape} {rgb.dtype}")
         if self._times and t_us <= self._times[-1]:
             raise DataError(f"frame at {t_us} µs does not follow the one at {self._times[-1]} µs")
-        bgr = np.ascontiguousarray(rgb[..., ::-1])
         if self._video == "png":
-            _write_png(self._target / f"{len(self._times):06d}.png", cv2.imencode(".png", bgr)[1])
+            (self._target / f"{len(self._times):06d}.png").write_bytes(as_png(rgb))
         else:
+            bgr = np.ascontiguousarray(rgb[..., ::-1])
             quietly(lambda: self._sink.write(bgr))
         self._times.append(t_us)
-
-
-def _write_png(path: Path, data: npt.NDArray[np.uint8]) -> None:
-    path.write_bytes(data.tobytes())
-
-
-def _open_sink(path: Path, codec: str, rate_hz: float, size_px: tuple[int, int]) -> Any:
-    import cv2
-
-    code = cv2.VideoWriter.fourcc(*codec)
-    sink = without_a_word(lambda: cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, rate_hz, size_px))
-    if not sink.isOpened():
-        raise DataError(f"this build of OpenCV cannot write {codec} video; take --video png", path)
-    return sink

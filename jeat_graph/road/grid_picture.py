@@ -8,6 +8,7 @@ import numpy as np
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.atomic import atomic_path
+from jeat_graph.io.pictures import as_png
 from jeat_graph.road.camera import RoadCamera
 
 _ACROSS_M = np.arange(-21.0, 21.1, 3.5)
@@ -48,11 +49,9 @@ def draw_grid(camera: RoadCamera, path: str | Path, frame: str | Path | None = N
     for y in np.arange(0.0, _FAR_M + 1.0, _ALONG_STEPS_M[0]):
         colour = (60, 160, 255) if y % _ALONG_STEPS_M[1] == 0 else (90, 200, 90)
         _draw(canvas, camera, np.c_[across, np.full(_SAMPLES, camera.position[1] + y)], colour)
-    done, data = cv2.imencode(".png", canvas)
-    if not done:
-        raise DataError("cannot be drawn", path)
+    data = as_png(canvas[..., ::-1])
     with atomic_path(path) as temporary:
-        temporary.write_bytes(data.tobytes())
+        temporary.write_bytes(data)
 
 
 def _draw(canvas: np.ndarray, camera: RoadCamera, places: np.ndarray, colour: tuple[int, int, int]) -> None:

@@ -10,21 +10,20 @@ The FFmpeg that comes with OpenCV has no encoder for H.264; MPEG-4 part 2, which
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.atomic import atomic_path
-from jeat_graph.io.decoders import without_a_word
+from jeat_graph.io.pictures import as_png, open_video
+from jeat_graph.io.piecewise import PiecewiseWriter
 from jeat_graph.io.video import RgbImage, count_frames, quietly
 from jeat_graph.io.webm import settle_webm
 
 CODECS = {".mp4": "vp09", ".webm": "VP80"}
 
 
-class MovieWriter:
+class MovieWriter(PiecewiseWriter):
     """A context manager that writes frames of one size; the same frames give the same bytes.
 
     Args:
@@ -37,45 +36,22 @@ class MovieWriter:
     """
 
     def __init__(self, path: str | Path, size_px: tuple[int, int], rate_hz: float) -> None:
+        super().__init__()
         self._path, self._size_px, self._rate_hz = Path(path), size_px, rate_hz
-        self._stack = ExitStack()
         self._sink: Any = None
         self._temporary = Path()
         self._count = 0
 
-    def __enter__(self) -> Self:
-        import cv2
-
-        code = cv2.VideoWriter.fourcc(*CODECS[self._path.suffix.lower()])
+    def _begin(self) -> None:
+        codec = CODECS[self._path.suffix.lower()]
         self._temporary = self._stack.enter_context(atomic_path(self._path))
-        name = str(self._temporary)
-        self._sink = without_a_word(
-            lambda: cv2.VideoWriter(name, cv2.CAP_FFMPEG, code, self._rate_hz, self._size_px)
-        )
-        if not self._sink.isOpened():
-            error = DataError(
-                "cannot be written: this OpenCV has no encoder for it, or the disk is full", self._path
-            )
-            self._stack.__exit__(type(error), error, None)
-            raise error
-        return self
+        self._sink = open_video(self._stack, self._temporary, codec, self._rate_hz, self._size_px)
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def _finish(self) -> None:
         quietly(self._sink.release)
-        if error is None:
-            try:
-                self._check()
-                if self._path.suffix.lower() == ".webm":
-                    settle_webm(self._temporary)
-            except BaseException as bad:
-                self._stack.__exit__(type(bad), bad, None)
-                raise
-        self._stack.__exit__(kind, error, trace)
+        self._check()
+        if self._path.suffix.lower() == ".webm":
+            settle_webm(self._temporary)
 
     def append(self, rgb: RgbImage) -> None:
         """Add a frame (H, W, 3)."""
@@ -96,8 +72,6 @@ class MovieWriter:
 
 def write_png(path: str | Path, rgb: RgbImage) -> None:
     """Write one picture (H, W, 3) as PNG."""
-    import cv2
-
-    data = cv2.imencode(".png", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR))[1]
+    data = as_png(rgb)
     with atomic_path(path) as temporary:
-        temporary.write_bytes(data.tobytes())
+        temporary.write_bytes(data)

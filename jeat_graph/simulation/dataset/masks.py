@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.io.pictures import as_png
 from jeat_graph.simulation.dataset.layout import MASKS
 
 
@@ -23,9 +24,7 @@ def write_mask(folder: Path, frame: int, mask: npt.NDArray[np.uint16], size_px: 
     Raises:
         DataError: a mask of another size or type.
     """
-    import cv2
-
     if mask.shape != size_px[::-1] or mask.dtype != np.uint16:
         raise DataError(f"mask must be {size_px[::-1]} uint16, not {mask.shape} {mask.dtype}")
     (folder / MASKS).mkdir(exist_ok=True)
-    (folder / MASKS / f"{frame:06d}.png").write_bytes(cv2.imencode(".png", mask)[1].tobytes())
+    (folder / MASKS / f"{frame:06d}.png").write_bytes(as_png(mask))
