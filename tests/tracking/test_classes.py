@@ -38,14 +38,23 @@ def config(engine: str = "none"):
     return load_config("default", [f"smoother.engine={engine}", "smoother.lag_s=0.5", "smoother.chunk=4"])
 
 
-def majority(detections: Detections, vehicle: int, until: float) -> tuple[str, float]:
-    """The same by a dictionary: the detections of a vehicle lie in one half of the picture."""
+def said_of(detections: Detections) -> list[tuple[float, int, str, float]]:
+    """Time, vehicle, class and score of all that has a class; a vehicle keeps to its half of the picture."""
+    return [
+        (float(scan.t), int(box[1] > 350.0), str(kind), float(score))
+        for scan in detections.scans()
+        if scan.classes is not None
+        for box, score, kind in zip(scan.boxes, scan.scores, scan.classes, strict=True)
+        if kind
+    ]
+
+
+def majority(said: list[tuple[float, int, str, float]], vehicle: int, until: float) -> tuple[str, float]:
+    """The same by a dictionary."""
     votes: dict[str, float] = {}
-    for scan in detections.scans():
-        if scan.t <= until and scan.classes is not None:
-            for box, score, kind in zip(scan.boxes, scan.scores, scan.classes, strict=True):
-                if kind and (box[1] > 350.0) == bool(vehicle):
-                    votes[str(kind)] = votes.get(str(kind), 0.0) + float(score)
+    for t, whose, kind, score in said:
+        if t <= until and whose == vehicle:
+            votes[kind] = votes.get(kind, 0.0) + score
     best = max(sorted(votes), key=lambda name: votes[name])
     return best, votes[best] / sum(votes.values())
 
@@ -56,10 +65,10 @@ def vehicle_of(table, row: int) -> int:
 
 def test_a_causal_class_is_the_majority_by_score_of_what_had_come():
     detections = recording()
-    changed = set()
+    said, changed = said_of(detections), set()
     for table in Tracker(config()).run(detections):
         for row in range(len(table)):
-            name, share = majority(detections, vehicle_of(table, row), float(table.t[row]))
+            name, share = majority(said, vehicle_of(table, row), float(table.t[row]))
             assert table.classes[row] == name
             assert table.class_probability[row] == pytest.approx(share)
             changed.add((vehicle_of(table, row), name))
@@ -72,13 +81,13 @@ def test_smoothed_rows_have_the_class_of_all_that_their_track_took_in(engine):
     tracker = Tracker(config(engine))
     for batch in detections.batches():
         tracker.step(batch)
-    table = tracker.finish()
+    table, said = tracker.finish(), said_of(detections)
     whole = engine in ("rts", "full")
     for row in range(len(table)):
         t = float(table.t[row])
-        known = {majority(detections, vehicle_of(table, row), end) for end in np.arange(t + 1e-6, 3.1, 0.05)}
+        known = {majority(said, vehicle_of(table, row), end) for end in np.arange(t + 1e-6, 3.1, 0.05)}
         if whole:
-            known = {majority(detections, vehicle_of(table, row), 9.0)}
+            known = {majority(said, vehicle_of(table, row), 9.0)}
         shares = [share for name, share in known if name == table.classes[row]]
         assert np.isclose(shares, table.class_probability[row]).any()
 
