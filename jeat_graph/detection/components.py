@@ -46,9 +46,7 @@ class Marked(NamedTuple):
 
     def renumbered(self, number: IntArray) -> Marked:
         """Return the pixels of groups g with `number[g]` > 0, which is their new number."""
-        group = number[self.group]
-        kept = np.flatnonzero(group)
-        return Marked(self.x[kept], self.y[kept], group[kept], self.weight[kept])
+        return Marked(*_renumbered(self, number))
 
 
 def linked(marks: npt.NDArray[Any], link_px: int) -> tuple[int, Marked]:
@@ -63,11 +61,12 @@ def linked(marks: npt.NDArray[Any], link_px: int) -> tuple[int, Marked]:
     """
     import cv2
 
-    mask: Any = (marks > 0).astype(np.uint8)
+    marked = np.asarray(marks > 0)
+    mask: Any = marked.view(np.uint8)
     if link_px > 1:
         mask = cv2.dilate(mask, np.ones((link_px, link_px), dtype=np.uint8))
     count, labels = cv2.connectedComponents(mask, connectivity=8, ltype=cv2.CV_32S)
-    return count - 1, Marked(*_gathered(labels, marks))
+    return count - 1, Marked(*_gathered(np.flatnonzero(marked), labels, marks))
 
 
 def measured(count: int, marked: Marked, trim_share: float = 0.0, *, keep_empty: bool = False) -> Components:
@@ -108,22 +107,45 @@ def without_inner(found: Components, share: float) -> BoolArray:
     return np.asarray(~inside.any(axis=1))
 
 
+def weights(count: int, marked: Marked) -> FloatArray:
+    """Return the sum of the marks (M,) of each group, which is all that `measured` says of it at times."""
+    return np.asarray(_weights(count, marked))
+
+
 @numba.njit(cache=True)
-def _gathered(labels: Any, marks: Any) -> tuple[Any, Any, Any, Any]:
-    """Column, row, group and mark (P,) of each marked pixel, row by row."""
-    height, width = marks.shape
+def _weights(count: int, marked: Marked) -> Any:
+    found = np.zeros(count + 1)
+    for p in range(len(marked.group)):
+        found[marked.group[p]] += marked.weight[p]
+    return found[1:]
+
+
+@numba.njit(cache=True)
+def _renumbered(marked: Marked, number: IntArray) -> tuple[Any, Any, Any, Any]:
+    """Column, row, new group and mark of the pixels whose group has a new number above 0."""
     count = 0
-    for row in range(height):
-        for column in range(width):
-            count += marks[row, column] > 0
+    for group in marked.group:
+        count += number[group] > 0
     found = np.empty((4, count), dtype=np.int64)
     k = 0
-    for row in range(height):
-        for column in range(width):
-            if marks[row, column] > 0:
-                found[0, k], found[1, k] = column, row
-                found[2, k], found[3, k] = labels[row, column], marks[row, column]
-                k += 1
+    for p in range(len(marked.group)):
+        new = number[marked.group[p]]
+        if new > 0:
+            found[0, k], found[1, k] = marked.x[p], marked.y[p]
+            found[2, k], found[3, k] = new, marked.weight[p]
+            k += 1
+    return found[0], found[1], found[2], found[3]
+
+
+@numba.njit(cache=True)
+def _gathered(places: IntArray, labels: Any, marks: Any) -> tuple[Any, Any, Any, Any]:
+    """Column, row, group and mark (P,) of pixels by their number, row by row."""
+    width = marks.shape[1]
+    found = np.empty((4, len(places)), dtype=np.int64)
+    for k in range(len(places)):
+        row, column = places[k] // width, places[k] % width
+        found[0, k], found[1, k] = column, row
+        found[2, k], found[3, k] = labels[row, column], marks[row, column]
     return found[0], found[1], found[2], found[3]
 
 

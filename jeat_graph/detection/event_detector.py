@@ -20,7 +20,7 @@ import numpy.typing as npt
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Scan
 from jeat_graph.detection.binned import BinnedDetector
-from jeat_graph.detection.components import Components, linked, measured, without_inner
+from jeat_graph.detection.components import Components, linked, measured, weights, without_inner
 from jeat_graph.detection.memory import CloudMemory
 from jeat_graph.detection.settings import EventSettings
 from jeat_graph.detection.windows import EventBins
@@ -77,18 +77,18 @@ class EventDetector(BinnedDetector):
         settings = self.settings
         total = self._bins.total
         count, marked = linked(total, self._link_px(total))
-        whole = measured(count, marked)
-        enough = whole.weight >= settings.least_events
+        enough = weights(count, marked) >= settings.least_events
         if not enough.any():
-            self._memory.remember(whole.boxes[:0])
-            return whole.take(enough)
+            nothing = Components(np.zeros((0, 4)), np.zeros(0), np.zeros(0, dtype=np.int64))
+            self._memory.remember(nothing.boxes)
+            return nothing
         heavy = np.append(False, enough)  # no group comes first
         count, marked = self._memory.relabel(marked.renumbered(np.cumsum(heavy) * heavy))
-        whole = measured(count, marked, keep_empty=True)
+        whole = weights(count, marked)
         newest = self._bins.recent(settings.bins(settings.extent_s), marked.y, marked.x)
         recent = measured(count, marked._replace(weight=newest), settings.trim_share, keep_empty=True)
         seen = (recent.pixels > 0) & (recent.boxes[:, 2:] >= settings.least_side_px).all(axis=1)
-        found = Components(recent.boxes, whole.weight, recent.pixels).take(seen)
+        found = Components(recent.boxes, whole, recent.pixels).take(seen)
         found = found.take(without_inner(found, settings.inside_share))
         self._memory.remember(found.boxes)
         return found

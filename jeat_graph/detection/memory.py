@@ -195,16 +195,19 @@ def _shares(cloud: IntArray, places: FloatArray, boxes: FloatArray) -> FloatArra
 
 @numba.njit(cache=True)
 def _count_inside(cloud: IntArray, places: FloatArray, boxes: FloatArray, names: int) -> tuple[Any, Any]:
-    """Pixels of each cloud in each box (names, K), and of each cloud (names,)."""
+    """Pixels of each cloud in each box (names, K), and of each cloud (names,); places are row by row."""
     inside = np.zeros((names, len(boxes)), dtype=np.int64)
     count = np.zeros(names, dtype=np.int64)
-    for k in range(len(cloud)):
-        x, y, name = places[k, 0], places[k, 1], cloud[k]
+    for name in cloud:
         count[name] += 1
-        for j in range(len(boxes)):
-            dx, dy = x - boxes[j, 0], y - boxes[j, 1]
-            if 0.0 <= dx <= boxes[j, 2] and 0.0 <= dy <= boxes[j, 3]:
-                inside[name, j] += 1
+    # A pixel is not asked about boxes of other rows: most of them.
+    rows = places[:, 1].copy()
+    for j in range(len(boxes)):
+        k = np.searchsorted(rows, boxes[j, 1])
+        while k < len(rows) and rows[k] - boxes[j, 1] <= boxes[j, 3]:
+            if 0.0 <= places[k, 0] - boxes[j, 0] <= boxes[j, 2]:
+                inside[cloud[k], j] += 1
+            k += 1
     return inside, count
 
 

@@ -140,11 +140,17 @@ def _judge(
         if hot[row, column]:
             continue
         since = t[k] - support_us
-        near = False
-        for dy in range(3):
-            for dx in range(3):
-                if (dx != 1 or dy != 1) and last[row + dy, column + dx] >= since:
-                    near = True
+        # Most events have company; the first that is found will do.
+        near = (
+            last[row + 1, column] >= since
+            or last[row + 1, column + 2] >= since
+            or last[row, column + 1] >= since
+            or last[row + 2, column + 1] >= since
+            or last[row, column] >= since
+            or last[row, column + 2] >= since
+            or last[row + 2, column] >= since
+            or last[row + 2, column + 2] >= since
+        )
         last[row + 1, column + 1] = t[k]
         if not near:
             alone += 1

@@ -15,6 +15,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import numba
 import numpy as np
 import numpy.typing as npt
 
@@ -73,8 +74,7 @@ class PictureDetector:
         if len(greys) < 3 or any(grey.shape != greys[0].shape for grey in greys):
             raise DataError("the background needs at least three pictures of one size")
         stack = np.stack(greys)
-        middle = np.median(stack, axis=0)
-        mad = np.median(np.abs(stack.astype(np.float32) - middle.astype(np.float32)), axis=0)
+        middle, mad = _middle_and_spread(stack)
         self._background = np.rint(middle).astype(np.uint8)
         self._noise = _SIGMA_PER_MAD * mad
         self._most_noise = _MOST_NOISE * float(np.median(self._noise)) + 1.0
@@ -162,6 +162,39 @@ class PictureDetector:
         if self._memory is not None:
             self._memory.remember(found.boxes)
         return found
+
+
+@numba.njit(cache=True)
+def _middle_and_spread(stack: npt.NDArray[np.uint8]) -> tuple[Any, Any]:
+    """Median (H, W) of pictures (N, H, W), and the median of the deviations from it."""
+    count, height, width = stack.shape
+    middle = np.empty((height, width))
+    spread = np.empty((height, width), dtype=np.float32)
+    values = np.empty(count, dtype=np.int64)
+    low, high = (count - 1) // 2, count // 2
+    for row in range(height):
+        for column in range(width):
+            # Few values: each is put where it belongs among those before.
+            for n in range(count):
+                value, k = np.int64(stack[n, row, column]), n
+                while k > 0 and values[k - 1] > value:
+                    values[k] = values[k - 1]
+                    k -= 1
+                values[k] = value
+            twice = values[low] + values[high]
+            # The deviations are in order from the middle outwards: the nearer of the two ends comes next.
+            left, right, one, other = low, low + 1, 0, 0
+            for _ in range(high + 1):
+                to_left = twice - 2 * values[left] if left >= 0 else np.iinfo(np.int64).max
+                to_right = 2 * values[right] - twice if right < count else np.iinfo(np.int64).max
+                one, other = other, min(to_left, to_right)
+                if to_left <= to_right:
+                    left -= 1
+                else:
+                    right += 1
+            middle[row, column] = twice / 2.0
+            spread[row, column] = (one + other) / 4.0 if count % 2 == 0 else other / 2.0
+    return middle, spread
 
 
 def _grey(frame: RgbImage) -> npt.NDArray[np.uint8]:

@@ -19,6 +19,8 @@ from jeat_graph.data.events import EventArray
 
 _US_PER_S = 1e6
 _MOST = 255
+#: A bin with fewer events than this share of its cells is emptied event by event, a fuller one as a whole.
+_SPARSE_SHARE = 0.01
 
 
 class EventBins:
@@ -45,6 +47,7 @@ class EventBins:
         self._ring = np.zeros((bins, 2, height, width), dtype=np.uint8)
         self._total = np.zeros((height, width), dtype=np.uint16)
         self._newest = bins - 1
+        self._filled = [EventArray.empty()] * bins
 
     @property
     def total(self) -> npt.NDArray[np.uint16]:
@@ -58,18 +61,22 @@ class EventBins:
             events: those with `end_us` <= t < `end_us` + bin; others must not be given.
         """
         self._newest = (self._newest + 1) % len(self._ring)
-        slot = self._ring[self._newest]
-        if slot.any():
+        slot, old = self._ring[self._newest], self._filled[self._newest]
+        if len(old) > _SPARSE_SHARE * slot.size:
             self._total -= slot[0]
             self._total -= slot[1]
             slot[:] = 0
+        else:
+            _clear(old.x, old.y, slot, self._total)
         _count(events.x, events.y, events.polarity, slot, self._total)
+        self._filled[self._newest] = events
         self.end_us += self.bin_us
 
     def skip_to(self, end_us: int) -> None:
         """Empty the window and let it end at `end_us`, a whole multiple of the bin."""
         self._ring[:] = 0
         self._total[:] = 0
+        self._filled = [EventArray.empty()] * len(self._ring)
         self.end_us = end_us
 
     def stack(self, by_polarity: bool = False) -> npt.NDArray[np.uint8]:
@@ -112,6 +119,23 @@ def _count(
             if slot[which, row, column] < _MOST:
                 slot[which, row, column] += 1
                 total[row, column] += 1
+
+
+@numba.njit(cache=True)
+def _clear(
+    x: npt.NDArray[np.uint16],
+    y: npt.NDArray[np.uint16],
+    slot: npt.NDArray[np.uint8],
+    total: npt.NDArray[np.uint16],
+) -> None:
+    """Empty the cells (2, H, W) of a bin's events, and take them off the total (H, W)."""
+    height, width = total.shape
+    for k in range(len(x)):
+        column, row = np.int64(x[k]), np.int64(y[k])
+        if column < width and row < height:
+            total[row, column] -= slot[0, row, column] + slot[1, row, column]
+            slot[0, row, column] = 0
+            slot[1, row, column] = 0
 
 
 @numba.njit(cache=True)

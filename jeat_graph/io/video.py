@@ -80,12 +80,14 @@ class FrameSource:
         if not 0 <= index < len(self):
             raise IndexError(f"frame {index} of {len(self)}")
         if index not in self._kept:
+            import cv2
+
             bgr = self._decode.bgr(index)
             if bgr.shape[1::-1] != self.size_px:
                 raise DataError(
                     f"frame {index} is {bgr.shape[1]} x {bgr.shape[0]} px, not as the first", self.path
                 )
-            self._kept[index] = np.ascontiguousarray(bgr[..., ::-1])
+            self._kept[index] = np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB), dtype=np.uint8)
             while len(self._kept) > _KEPT_FRAMES:
                 self._kept.popitem(last=False)
         return self._kept[index]

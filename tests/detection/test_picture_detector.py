@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.detection.picture_detector import PictureDetector
+from jeat_graph.detection.picture_detector import PictureDetector, _middle_and_spread
 from jeat_graph.detection.settings import PictureSettings
 
 from .moving import SIZE, box_at, iou, picture_of
@@ -93,3 +93,12 @@ def test_pictures_must_fit(scene):
         detector(scene[0][0][:-1], 2.0)
     with pytest.raises(DataError, match="at least three pictures"):
         detector.prime(scene[0][:2])
+
+
+@pytest.mark.parametrize("count", [3, 4, 9, 10])
+def test_middle_and_spread_are_the_medians(count):
+    stack = np.random.default_rng(count).integers(0, 256, (count, 6, 7)).astype(np.uint8)
+    stack[:, 0] = stack[0, 0]  # pixels that never change
+    middle, spread = _middle_and_spread(stack)
+    np.testing.assert_array_equal(middle, np.median(stack, axis=0))
+    np.testing.assert_array_equal(spread, np.median(np.abs(stack - np.median(stack, axis=0)), axis=0))
