@@ -112,7 +112,7 @@ def weights(count: int, marked: Marked) -> FloatArray:
     return np.asarray(_weights(count, marked))
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _weights(count: int, marked: Marked) -> Any:
     found = np.zeros(count + 1)
     for p in range(len(marked.group)):
@@ -120,7 +120,7 @@ def _weights(count: int, marked: Marked) -> Any:
     return found[1:]
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _renumbered(marked: Marked, number: IntArray) -> tuple[Any, Any, Any, Any]:
     """Column, row, new group and mark of the pixels whose group has a new number above 0."""
     count = 0
@@ -137,7 +137,7 @@ def _renumbered(marked: Marked, number: IntArray) -> tuple[Any, Any, Any, Any]:
     return found[0], found[1], found[2], found[3]
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _gathered(places: IntArray, labels: Any, marks: Any) -> tuple[Any, Any, Any, Any]:
     """Column, row, group and mark (P,) of pixels by their number, row by row."""
     width = marks.shape[1]
@@ -149,7 +149,7 @@ def _gathered(places: IntArray, labels: Any, marks: Any) -> tuple[Any, Any, Any,
     return found[0], found[1], found[2], found[3]
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _measure(count: int, marked: Marked) -> tuple[Any, Any, Any]:
     """Corners (M, 4) left, top, right, bottom, sums and numbers of the marked pixels of each group."""
     corners = np.empty((count, 4), dtype=np.int64)
@@ -170,7 +170,7 @@ def _measure(count: int, marked: Marked) -> tuple[Any, Any, Any]:
     return corners, weight, pixels
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _trim(marked: Marked, corners: Any, share: float) -> None:
     """Take thin ends off the corners (M, 4), from each side up to the first full enough column or row."""
     count = len(corners)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,7 @@ from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.data.progress import told
+from jeat_graph.detection.ahead import ahead
 from jeat_graph.detection.binned import BinnedDetector
 from jeat_graph.detection.event_detector import EventDetector
 from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION, network_file
@@ -91,6 +92,8 @@ def detect_scans(
             streams.append(_picture_scans(request, stack, say))
         if request.detector_fused is None and request.events is not None:
             streams.append(_event_scans(request, stack, say))
+        if len(streams) > 1:
+            streams = [stack.enter_context(closing(ahead(stream))) for stream in streams]
         for scan in heapq.merge(*streams, key=lambda scan: scan.t):
             on_time(scan.t)
             yield scan

@@ -170,7 +170,7 @@ def _join(
             whole = both
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _extents(cloud: IntArray, places: FloatArray, names: int) -> tuple[Any, Any]:
     """Left, top, right, bottom (names, 4) of the pixels of each cloud (px), and their number (names,)."""
     extents = np.empty((names, 4))
@@ -193,7 +193,7 @@ def _shares(cloud: IntArray, places: FloatArray, boxes: FloatArray) -> FloatArra
     return np.asarray(inside / np.maximum(count, 1)[:, None])
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _count_inside(cloud: IntArray, places: FloatArray, boxes: FloatArray, names: int) -> tuple[Any, Any]:
     """Pixels of each cloud in each box (names, K), and of each cloud (names,); places are row by row."""
     inside = np.zeros((names, len(boxes)), dtype=np.int64)
@@ -211,7 +211,7 @@ def _count_inside(cloud: IntArray, places: FloatArray, boxes: FloatArray, names:
     return inside, count
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _nearest(places: FloatArray, boxes: FloatArray) -> Any:
     """Return which box each place belongs to: distances in halves of a box, so that 1 is its edge."""
     out = np.zeros(len(places), dtype=np.int64)

@@ -117,7 +117,7 @@ class NoiseFilter:
         self._counts[:] = 0
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _judge(
     t: IntArray,
     x: npt.NDArray[np.uint16],

@@ -164,7 +164,7 @@ class PictureDetector:
         return found
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _middle_and_spread(stack: npt.NDArray[np.uint8]) -> tuple[Any, Any]:
     """Median (H, W) of pictures (N, H, W), and the median of the deviations from it."""
     count, height, width = stack.shape

@@ -103,7 +103,7 @@ class EventBins:
         return _summed(self._ring, slots, y, x)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _count(
     x: npt.NDArray[np.uint16],
     y: npt.NDArray[np.uint16],
@@ -121,7 +121,7 @@ def _count(
                 total[row, column] += 1
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _clear(
     x: npt.NDArray[np.uint16],
     y: npt.NDArray[np.uint16],
@@ -138,7 +138,7 @@ def _clear(
             slot[1, row, column] = 0
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _summed(ring: npt.NDArray[np.uint8], slots: IntArray, y: IntArray, x: IntArray) -> npt.NDArray[np.int64]:
     out = np.zeros(len(x), dtype=np.int64)
     for slot in slots:
