@@ -127,7 +127,8 @@ def test_smoothed_estimates_are_sound_and_causal_ones_do_not_depend_on_them(seed
     with_smoother, smoothed = run(preset, engine, steps)
     assert_same(causal, with_smoother)
     check_table(smoothed)
-    # Out of sight the filter lets accelerations die away; the smoothers, which know how it went on, do not.
-    as_one = "motion.unseen_memory_s=0"
-    causal, smoothed = run(preset, "none", steps, as_one)[0], run(preset, engine, steps, as_one)[1]
+    # Out of sight the filter lets accelerations die away, and holds what stands to have no velocity. The
+    # smoothers know how it went on, and do neither.
+    as_one = ("motion.unseen_memory_s=0", "standing.enabled=false")
+    causal, smoothed = run(preset, "none", steps, *as_one)[0], run(preset, engine, steps, *as_one)[1]
     check_later_knows_more(Trajectories.concatenate(causal), smoothed)
