@@ -46,7 +46,12 @@ def add_detecting(parser: argparse._ActionsContainer) -> None:
         metavar="KEY=VALUE",
         help="change one of these settings, say model_frames.layout=yolov8; may be given many times",
     )
-    add("--event-rate", type=positive, metavar="HZ", help="scans of the events per second (default: 50)")
+    add(
+        "--event-rate",
+        type=positive,
+        metavar="HZ",
+        help="scans of the events per second (default: 50; of networks 20)",
+    )
     add(
         "--event-size",
         type=picture_size,

@@ -22,7 +22,7 @@ from jeat_graph.data.detections import Scan
 from jeat_graph.detection.binned import BinnedDetector
 from jeat_graph.detection.components import Components, linked, measured, weights, without_inner
 from jeat_graph.detection.memory import CloudMemory
-from jeat_graph.detection.settings import EventSettings
+from jeat_graph.detection.settings import MOTION_RATE_HZ, EventSettings
 from jeat_graph.detection.windows import EventBins
 
 _US_PER_S = 1e6
@@ -43,9 +43,10 @@ class EventDetector(BinnedDetector):
         self.settings = settings or EventSettings()
         bins = self.settings.bins(self.settings.window_s)
         ring = EventBins(size_px, bins, self.settings.bin_s)
-        super().__init__(size_px, sensor, self.settings.rate_hz, ring, bins, self.settings)
+        self._rate_hz = self.settings.rate(MOTION_RATE_HZ)
+        super().__init__(size_px, sensor, self._rate_hz, ring, bins, self.settings)
         diagonal = math.hypot(*size_px)
-        self._steps = max(1, round(self.settings.apart_s * self.settings.rate_hz))
+        self._steps = max(1, round(self.settings.apart_s * self._rate_hz))
         self._near_px = max(2, round(self.settings.near_share * diagonal))
         self._memory = CloudMemory(self._near_px, self._steps)
 
@@ -62,7 +63,7 @@ class EventDetector(BinnedDetector):
     def _unsmeared(self, boxes: FloatArray) -> FloatArray:
         """Take off what a box is too long because its events are of some time; the centre stays."""
         settings = self.settings
-        smear = np.abs(self._memory.velocity) * settings.rate_hz * settings.extent_s
+        smear = np.abs(self._memory.velocity) * self._rate_hz * settings.extent_s
         side = np.maximum(boxes[:, 2:] - smear, np.minimum(boxes[:, 2:], settings.least_side_px))
         return np.column_stack([boxes[:, :2] + (boxes[:, 2:] - side) / 2.0, side])
 

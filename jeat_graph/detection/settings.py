@@ -30,6 +30,14 @@ _TRIM = (
     "its box"
 )
 _INSIDE = "a group is part of a heavier one if this share of its box lies in the other's"
+#: Scans of events per second where nothing is said, of the detector without weights and of networks. More
+#: scans of a network, whose windows overlap, repeat its false boxes: 20 Hz are better tracked than 50 Hz, and
+#: cost two fifths (`docs/benchmarks/raw.md`).
+MOTION_RATE_HZ, NETWORK_RATE_HZ = 50.0, 20.0
+_RATE = (
+    f"scans per second; a step is a whole number of bins; null: {MOTION_RATE_HZ:g} of what moves, "
+    f"{NETWORK_RATE_HZ:g} of networks"
+)
 _APART = "two groups that run together stay two if they were there, and moved apart, for so long"
 
 
@@ -37,7 +45,7 @@ _APART = "two groups that run together stay two if they were there, and moved ap
 class EventSettings(Section):
     """How moving things are found in events."""
 
-    rate_hz: float = number(50.0, "Hz", "scans per second; a step is a whole number of bins", 1.0, 1000.0)
+    rate_hz: float | None = number(None, "Hz", _RATE, 1.0, 1000.0)
     window_s: float = number(0.04, "s", "events of so long are linked", open_low=True)
     extent_s: float = number(0.02, "s", "a box reaches as far as the newest events of so long", open_low=True)
     bin_s: float = number(0.005, "s", "length of a bin; the other times are whole multiples of it", 1e-4, 1.0)
@@ -56,15 +64,29 @@ class EventSettings(Section):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name, length_s in (("rate_hz", 1.0 / self.rate_hz), ("window_s", self.window_s)):
-            if not self._whole(length_s):
-                raise ConfigError(
-                    f"{name}: {getattr(self, name):g} gives {length_s:g} s, no whole number of bins of "
-                    f"{self.bin_s:g} s; with 5 ms 10, 20, 25, 40, 50, 100 and 200 Hz do"
-                )
+        self._check("window_s", self.window_s, self.window_s)
+        if self.rate_hz is not None:
+            self.rate(self.rate_hz)
         if not self._whole(self.extent_s) or self.extent_s > self.window_s:
             raise ConfigError(
                 f"extent_s: {self.extent_s:g} s must be a whole number of bins, and no longer than window_s"
+            )
+
+    def rate(self, usual_hz: float) -> float:
+        """Return the scans per second (Hz): `rate_hz`, or what is usual.
+
+        Raises:
+            ConfigError: a step is no whole number of bins.
+        """
+        hz = usual_hz if self.rate_hz is None else self.rate_hz
+        self._check("rate_hz", hz, 1.0 / hz)
+        return hz
+
+    def _check(self, name: str, value: float, length_s: float) -> None:
+        if not self._whole(length_s):
+            raise ConfigError(
+                f"{name}: {value:g} gives {length_s:g} s, no whole number of bins of {self.bin_s:g} s; with "
+                "5 ms 10, 20, 25, 40, 50, 100 and 200 Hz do"
             )
 
     def _whole(self, length_s: float) -> bool:

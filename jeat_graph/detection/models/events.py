@@ -17,7 +17,7 @@ from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.models.onnx_head import CARD, OnnxHead, Port, read_onnx_head
 from jeat_graph.detection.models.output_reader import OutputReader, scan_within
 from jeat_graph.detection.noise import NoiseSettings
-from jeat_graph.detection.settings import EventSettings
+from jeat_graph.detection.settings import NETWORK_RATE_HZ, EventSettings
 from jeat_graph.detection.windows import EventBins
 
 _US_PER_S = 1e6
@@ -35,7 +35,7 @@ class ModelEventDetector(BinnedDetector):
         path: the ONNX file.
         size_px: width and height of the camera's picture.
         sensor: name of the sensor in the scans.
-        times: rate and bins of the windows.
+        times: rate and bins of the windows; by default 20 a second.
         settings: how the network is read.
 
     Attributes:
@@ -65,7 +65,8 @@ class ModelEventDetector(BinnedDetector):
         head = read_onnx_head(path)
         self._input = _window_input(head, self._path)
         bins = (self._input.shape[1] or 0) // 2
-        super().__init__(size_px, sensor, times.rate_hz, EventBins(size_px, bins, times.bin_s), bins, times)
+        ring, rate_hz = EventBins(size_px, bins, times.bin_s), times.rate(NETWORK_RATE_HZ)
+        super().__init__(size_px, sensor, rate_hz, ring, bins, times)
         width, height = size_px
         self._side = (self._input.shape[3] or width, self._input.shape[2] or height)
         if width > self._side[0] or height > self._side[1]:
@@ -138,7 +139,10 @@ def _memory(
             continue
         match = next((port for port in left if port.shape == given.shape), None)
         if match is None:
-            raise DataError(f"takes {given.name} {list(given.shape)} and gives nothing like it back", path)
+            other = "; a network of both sensors is for --detector-fused" if given.name == "picture" else ""
+            raise DataError(
+                f"takes {given.name} {list(given.shape)} and gives nothing like it back{other}", path
+            )
         left.remove(match)
         pairs.append((given, match.name))
     return pairs, tuple(left)

@@ -103,7 +103,8 @@ def test_a_network_of_events_keeps_its_memory(tmp_path, name):
 def test_a_network_sees_noise_unless_it_shall_not(tmp_path, asked, seen):
     """Of events that stand alone the network counts those in its window, or none."""
     path = counting_net(tmp_path / "rnn.onnx", SIDE, 20, ROWS[:1], per_event=1.0)
-    detector = ModelEventDetector(path, (100, 80), settings=ModelSettings(noise_filter=asked))
+    settings = ModelSettings(noise_filter=asked)
+    detector = ModelEventDetector(path, (100, 80), times=EventSettings(rate_hz=50.0), settings=settings)
     times, place = 1000 * np.array([21, 41, 42, 43, 44, 45]), 10 * np.arange(1, 7)
     lone = EventArray(times, place.astype("u2"), place.astype("u2"), np.ones(6, dtype="u1"))
     late = EventArray(
@@ -128,7 +129,8 @@ def test_channels_are_in_the_order_that_the_network_has_learned(tmp_path, channe
     found = {}
     for seen in range(20):
         path = counting_net(tmp_path / f"{seen}.onnx", SIDE, 20, ROWS[:1], 1.0, seen, notes)
-        detector = ModelEventDetector(path, (100, 80), settings=ModelSettings(channels=channels))
+        settings = ModelSettings(channels=channels)
+        detector = ModelEventDetector(path, (100, 80), times=EventSettings(rate_hz=50.0), settings=settings)
         # Three that became darker, in the newest bin of the first window, which is that from 30 to 80 ms.
         times = np.array([21_000, 76_000, 77_000, 78_000, 90_000])
         at = 10 * np.arange(1, 6, dtype="u2")

@@ -11,7 +11,9 @@ from jeat_graph.cli.main import main
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.detection.detecting import DetectRequest, detect_files
+from jeat_graph.detection.models.events import ModelEventDetector
 from jeat_graph.detection.models.fused import FusedDetector
+from jeat_graph.detection.settings import EventSettings
 from jeat_graph.io.detections_io import read_detections
 from jeat_graph.io.events_dsec_writer import EventWriter
 
@@ -24,6 +26,7 @@ ROWS = np.array([[10, 4, 20, 14, 0.9, 0]])
 #: Where the box is without anything, and how far it goes for each thing that is given (px).
 LEFT, TOP, OF_PICTURE, OF_EVENTS, PER_S = 10.0, 4.0, 8.0, 16.0, 100.0
 END_S = 0.5
+FAST = EventSettings(rate_hz=50.0)
 
 
 def few_events(end_s: float = END_S) -> EventArray:
@@ -59,7 +62,7 @@ def recording(tmp_path):
 
 def test_a_window_goes_with_the_newest_picture_and_its_age(net):
     times = 0.05 * np.arange(5)
-    detector = FusedDetector(net, SIDE, pictures=[(float(t), frame()) for t in times])
+    detector = FusedDetector(net, SIDE, times=FAST, pictures=[(float(t), frame()) for t in times])
     scans = detector.push(few_events())
     assert {scan.sensor for scan in scans} == {"fused"}
     assert scans[0].t == pytest.approx(0.06)
@@ -79,13 +82,13 @@ def test_pictures_are_read_no_further_than_the_events_have_come(net):
             read.append(k)
             yield 0.05 * k, frame()
 
-    detector = FusedDetector(net, SIDE, pictures=pictures())
+    detector = FusedDetector(net, SIDE, times=FAST, pictures=pictures())
     detector.push(few_events(0.2))
     assert len(read) <= 5
 
 
 def test_what_is_seen_live_counts_from_its_time_on(net):
-    detector = FusedDetector(net, SIDE)
+    detector = FusedDetector(net, SIDE, times=FAST)
     events = few_events()
     early = events.between(0, 120_000)
     assert all(scan.boxes[0, 0] == LEFT + OF_EVENTS for scan in detector.push(early))
@@ -97,7 +100,7 @@ def test_what_is_seen_live_counts_from_its_time_on(net):
         np.testing.assert_allclose(scan.boxes[0, :2], expected, atol=1e-3)
 
 
-@pytest.mark.parametrize(("given", "left", "scans"), [("frames", OF_PICTURE, 5), ("events", OF_EVENTS, 23)])
+@pytest.mark.parametrize(("given", "left", "scans"), [("frames", OF_PICTURE, 5), ("events", OF_EVENTS, 10)])
 def test_one_sensor_may_be_missing(net, recording, given, left, scans):
     place = recording if given == "frames" else recording / "events.h5"
     found = detect_files(DetectRequest(**{given: place}, detector_fused=str(net)))
@@ -132,6 +135,8 @@ def test_what_does_not_fit_is_refused(net, recording, tmp_path):
     other = constant_net(tmp_path / "other.onnx", {"output0": ROWS[None]}, SIDE)
     with pytest.raises(DataError, match="a network of both sensors, as `train fused` makes it"):
         FusedDetector(other, SIDE)
+    with pytest.raises(DataError, match="a network of both sensors is for --detector-fused"):
+        ModelEventDetector(net, SIDE)
     detector = FusedDetector(net, (40, 40))
     with pytest.raises(DataError, match="pictures and events of the same pixels"):
         detector.look_at(frame(), 0.0)
