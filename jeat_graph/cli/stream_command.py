@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
     from jeat_graph.data.errors import DataError
     from jeat_graph.data.trajectories import Trajectories
-    from jeat_graph.live.health import Event
     from jeat_graph.live.inputs import Interrupts
     from jeat_graph.live.late import LiveTracker
     from jeat_graph.live.messages import ScanMessage
@@ -72,6 +71,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a line that cannot be read: the end, with what was smoothed kept, or passed over and counted",
     )
     add("--smoothed", metavar="FILE", help="write the smoothed trajectories there, each row when it is final")
+    add("--camera", metavar="CAMERA.yaml", help="a calibrated camera over the road, for --road")
+    add(
+        "--road",
+        metavar="FILE",
+        help="write the vehicles' motion and size on the road there (m, km/h), each row when it is final, "
+        "smoother.lag_s later; needs --late skip or refuse",
+    )
     add(
         "--checkpoint",
         metavar="FILE",
@@ -83,6 +89,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Track until the input ends, the reader of the output goes away, or a signal comes."""
+    from jeat_graph.cli.stream_output import StreamOutput
     from jeat_graph.live.inputs import Interrupts
     from jeat_graph.live.session import Ends, Session
     from jeat_graph.live.smoothed_file import SmoothedFile
@@ -96,9 +103,9 @@ def run(args: argparse.Namespace) -> int:
         smoothed = None
         if args.smoothed is not None:
             smoothed = stack.enter_context(SmoothedFile(args.smoothed, more.get("smoothed")))
-        output = _Output(args.format, args.encoding, sink)
+        output = StreamOutput(args.format, args.encoding, sink)
         ends = Ends(
-            tracks=output.tracks,
+            tracks=_with_road(output.tracks, live, args, stack),
             event=output.event,
             warn=_warn,
             smoothed=smoothed,
@@ -130,6 +137,12 @@ def _config(args: argparse.Namespace) -> Config:
         raise ConfigError("--checkpoint does not go with smoother.worker: its state is in another process")
     if args.sink is not None and args.format == "csv":
         raise ConfigError("--format csv is for stdout; messages to --sink are JSON or MessagePack")
+    if (args.road is None) != (args.camera is None):
+        raise ConfigError("--road and --camera go together: give both")
+    if args.road is not None and args.late == "rewind":
+        raise ConfigError("--road gives rows that stay: it needs --late skip or --late refuse")
+    if args.road is not None and args.checkpoint is not None:
+        raise ConfigError("--road does not go with --checkpoint, which does not hold its windows")
     if args.smoothed is None:
         return replace(config, smoother=replace(config.smoother, engine="none"))
     if config.smoother.engine == "none":
@@ -144,7 +157,29 @@ def _tracker(args: argparse.Namespace, config: Config) -> tuple[LiveTracker, dic
 
     if args.checkpoint is not None and Path(args.checkpoint).is_file():
         return LiveTracker.load(args.checkpoint, config)
-    return LiveTracker(Tracker(config), args.late), {}
+    return LiveTracker(Tracker(config, diagnostics=args.road is not None), args.late), {}
+
+
+def _with_road(
+    tracks: Callable[[float, Trajectories, ScanMessage, float], object],
+    live: LiveTracker,
+    args: argparse.Namespace,
+    stack: contextlib.ExitStack,
+) -> Callable[[float, Trajectories, ScanMessage, float], object]:
+    """Have each answer taken in by the vehicles' motion on the road too, if that is wanted."""
+    if args.road is None:
+        return tracks
+    from jeat_graph.road.camera_file import read_camera
+    from jeat_graph.road.lag_table import RoadFile, RoadLagTable
+
+    table = RoadLagTable(read_camera(args.camera), live.tracker.config)
+    road = stack.enter_context(RoadFile(args.road, table))
+
+    def both(t: float, table: Trajectories, message: ScanMessage, late_s: float) -> None:
+        tracks(t, table, message, late_s)
+        road.take(t, live.tracker.last_measurements()[0], table.track_id)
+
+    return both
 
 
 def _ends(args: argparse.Namespace, stack: contextlib.ExitStack) -> tuple[Source | None, Sink | None]:
@@ -242,59 +277,3 @@ def _finish(session: Session, args: argparse.Namespace) -> None:
 
 def _warn(text: str) -> None:
     print(f"jeat-graph stream: {text}", file=sys.stderr)
-
-
-class _Output:
-    """Tracks to stdout, each line flushed at once, or as messages to a broker.
-
-    Attributes:
-        seq: number of the next message to a broker.
-    """
-
-    def __init__(self, form: str, encoding: str, sink: Sink | None) -> None:
-        self.seq = 0
-        self._encoding, self._sink = encoding, sink
-        self._csv = form == "csv"
-        self._classes: bool | None = None  # whether the rows of CSV have them
-
-    def tracks(self, t: float, table: Trajectories, message: ScanMessage, late_s: float) -> None:
-        """Give out the tracks after an arrival; CSV has no rows twice, so none after a late one."""
-        from jeat_graph.io.track_lines import csv_rows, json_line
-        from jeat_graph.live.messages import encode_tracks
-
-        if self._sink is not None:
-            self._sink.send(encode_tracks(json_line(t, table), self.seq, message, self._encoding))
-            self.seq += 1
-        elif not self._csv:
-            self._say(json_line(t, table))
-        elif late_s == 0.0:
-            self.begin(table.classes is not None)
-            self._say(csv_rows(table, bool(self._classes)))
-
-    def begin(self, classes: bool = False) -> None:
-        """Give out the header of CSV, once; the first answer shows whether there are classes."""
-        from jeat_graph.io.track_lines import csv_header
-
-        if self._csv and self._classes is None:
-            self._classes = classes
-            self._say(csv_header(classes))
-
-    def event(self, event: Event) -> None:
-        """Say on the output, too, that a sensor fails or is well again."""
-        line = json.dumps({"t": event.t, "event": f"sensor-{event.what}", "sensor": event.sensor}) + "\n"
-        if self._sink is not None:
-            from jeat_graph.live.messages import encode_tracks
-
-            self._sink.send(encode_tracks(line, self.seq, None, self._encoding))
-            self.seq += 1
-        elif not self._csv:
-            self._say(line)
-
-    def flush(self) -> None:
-        """Wait until the broker has all."""
-        if self._sink is not None:
-            self._sink.flush()
-
-    def _say(self, text: str) -> None:
-        sys.stdout.write(text)
-        sys.stdout.flush()

@@ -28,9 +28,10 @@ class SmootherConfig(Section):
     )
     road: str = choice(
         "spline",
-        ("spline", "graph"),
-        "with --camera, motion and size of whole tracks on the road: spline: by our own compiled solver; "
-        "graph: the same by a factor graph in GTSAM, which takes longer",
+        ("spline", "graph", "fixed-lag"),
+        "with --camera, motion and size on the road. spline: of whole tracks, by our own compiled solver; "
+        "graph: the same by a factor graph in GTSAM, which takes longer; fixed-lag: as they are known lag_s "
+        "later, by windows of that graph, which is what stream --road writes while it runs",
     )
     min_existence: float = number(
         0.7, "1", "rows are written where the smoothed probability of existence is at least this", 0.0, 1.0

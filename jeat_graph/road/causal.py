@@ -146,15 +146,28 @@ class RoadFilter:
         """
         # As bytes: NumPy compares the fields of all records with each other before it joins them.
         rows = np.frombuffer(b"".join(step.tobytes() for step in steps), dtype=ROAD_ROW)
-        mean, var = rows["mean"].T.copy(), rows["var"].T.copy()
-        place_var, relative = self._calibration.at(rows["mean"][:, :2])
-        var[:2] += place_var.T
-        var[SPEED] += relative * mean[SPEED] ** 2
-        unknown = var[SPEED] > (self._config.known_kmh / KMH) ** 2
-        mean[SPEED : SPEED + 3, unknown] = var[SPEED : SPEED + 3, unknown] = np.nan
-        mean[SPEED] *= KMH
-        var[SPEED] *= KMH**2
-        return columns_of_states(rows["t"].copy(), rows["track_id"].copy(), mean, var)
+        return columns_of_rows(rows, self._calibration, self._config.known_kmh)
+
+
+def columns_of_rows(
+    rows: RecordArray, calibration: CalibrationShare, known_kmh: float = math.inf
+) -> dict[str, npt.NDArray[Any]]:
+    """Columns of the table of the road, with what the calibration adds to the variances.
+
+    Args:
+        rows: (N,) records of `road_state.ROAD_ROW`.
+        calibration: what the camera leaves open.
+        known_kmh: speed, heading and acceleration are NaN where the speed's standard deviation is larger.
+    """
+    mean, var = rows["mean"].T.copy(), rows["var"].T.copy()
+    place_var, relative = calibration.at(rows["mean"][:, :2])
+    var[:2] += place_var.T
+    var[SPEED] += relative * mean[SPEED] ** 2
+    unknown = var[SPEED] > (known_kmh / KMH) ** 2
+    mean[SPEED : SPEED + 3, unknown] = var[SPEED : SPEED + 3, unknown] = np.nan
+    mean[SPEED] *= KMH
+    var[SPEED] *= KMH**2
+    return columns_of_states(rows["t"].copy(), rows["track_id"].copy(), mean, var)
 
 
 class CalibrationShare:

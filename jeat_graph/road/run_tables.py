@@ -20,6 +20,7 @@ from jeat_graph.road.boxes_road import SizedVehicle, follow_boxes
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.causal import RoadFilter, RoadFilterConfig
 from jeat_graph.road.cuboid_fit import CuboidConfig
+from jeat_graph.road.lag_table import RoadLagTable, lagged_pieces
 from jeat_graph.road.results import empty_road_columns, road_columns
 from jeat_graph.road.taken_boxes import boxes_of_log, sensor_errors
 from jeat_graph.runs.directory import MEASUREMENTS, ROAD_CAUSAL, ROAD_SMOOTHED
@@ -43,6 +44,13 @@ def write_run_tables(folder: Path, config: Config, camera: RoadCamera) -> None:
         for piece in causal_pieces(log, causal, RoadFilter(camera, config, RoadFilterConfig())):
             writer.append(piece)
     if not (folder / "smoothed.csv").is_file():
+        return
+    if config.smoother.road == "fixed-lag":
+        instants = np.unique(np.concatenate([log["t"], _instants(log["t"], causal.t)]))
+        with TableWriter(folder / ROAD_SMOOTHED) as writer:
+            writer.append(empty_road_columns())
+            for piece in lagged_pieces(log, instants, RoadLagTable(camera, config)):
+                writer.append(piece)
         return
     smoothed = read_trajectories(folder / "smoothed.csv")
     tracks = boxes_of_log(log, sensor_errors(config), smoothed, camera, BoxConfig())

@@ -1,0 +1,117 @@
+"""Smoothed rows of the road from the command line: those of `RoadFixedLag`, live and of a recording."""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from jeat_graph import Tracker, load_config, read_detections
+from jeat_graph.cli.main import main
+from jeat_graph.io.tables import read_table
+from jeat_graph.road.camera_file import read_camera
+from jeat_graph.road.fixed_lag import RoadFixedLag, RoadLagConfig
+
+LAG_S = 0.75
+SETTINGS = (f"smoother.lag_s={LAG_S}",)
+COLUMNS = ("t", "x", "y", "speed_kmh", "length", "var_x", "var_y", "var_speed_kmh")
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("lag") / "scene"
+    assert main(["simulate", "day-sparse", "--out", str(folder), "--duration", "2.5", "--seed", "5"]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def expected(scene: Path) -> dict[tuple[int, float], list[float]]:
+    """What the class gives, fed step by step, of tracks that were reported by then."""
+    config = load_config("highway", SETTINGS)
+    tracker, reported = Tracker(config, diagnostics=True), set()
+    behind = RoadFixedLag(read_camera(scene / "camera.yaml"), config, RoadLagConfig(lag_s=LAG_S))
+    found = []
+    for batch in read_detections(scene / "detections.csv").batches():
+        reported.update(tracker.step(batch).track_id.tolist())
+        rows = behind.step(batch[0].t, tracker.last_measurements()[0])
+        found += [row for row in rows if row["track_id"] in reported]
+    found += [row for row in behind.finish() if row["track_id"] in reported]
+    return {
+        (int(row["track_id"]), round(float(row["t"]), 4)): [
+            *(row["t"], row["mean"][0], row["mean"][1], row["mean"][2] * 3.6, row["mean"][5]),
+            *(row["var"][0], row["var"][1], row["var"][2] * 3.6**2),
+        ]
+        for row in found
+    }
+
+
+def _rows(path: Path) -> dict[tuple[int, float], list[float]]:
+    table = read_table(path, ("track_id", *COLUMNS))
+    ids, values = table.number("track_id"), np.stack([table.number(name) for name in COLUMNS], axis=1)
+    return {(int(k), round(float(row[0]), 4)): row.tolist() for k, row in zip(ids, values, strict=True)}
+
+
+def _stream(scene: Path, monkeypatch: pytest.MonkeyPatch, *more: str) -> int:
+    lines = []
+    for batch in read_detections(scene / "detections.csv").batches():
+        scans = [
+            {"t": s.t, "sensor": s.sensor, "boxes": s.boxes.tolist(), "scores": s.scores.tolist()}
+            for s in batch
+        ]
+        lines.append(json.dumps(scans) + "\n")
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO("".join(lines).encode())))
+    settings = [part for one in SETTINGS for part in ("--set", one)]
+    return main(["stream", "--config", "highway", *settings, *more])
+
+
+def test_a_stream_writes_what_the_class_gives(
+    scene: Path,
+    expected: dict[tuple[int, float], list[float]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    camera, out = str(scene / "camera.yaml"), tmp_path / "road.csv"
+    assert _stream(scene, monkeypatch, "--camera", camera, "--road", str(out), "--late", "skip") == 0
+    found = _rows(out)
+    assert len(found) > 20
+    assert found.keys() == expected.keys()
+    for key, row in found.items():
+        assert_allclose(row, expected[key], rtol=1e-5, atol=6e-4)  # as the tables are rounded
+
+
+def test_a_run_writes_the_same(
+    scene: Path, expected: dict[tuple[int, float], list[float]], tmp_path: Path
+) -> None:
+    settings = [part for one in (*SETTINGS, "smoother.road=fixed-lag") for part in ("--set", one)]
+    given = [str(scene / "detections.csv"), "--config", "highway", *settings]
+    assert main(["track", *given, "--camera", str(scene / "camera.yaml"), "--out", str(tmp_path)]) == 0
+    found = _rows(tmp_path / "road_smoothed.csv")
+    # Of a recording it is known from the beginning which tracks were to be reported.
+    assert found.keys() >= expected.keys()
+    for key, row in expected.items():
+        assert_allclose(found[key], row, rtol=1e-5, atol=6e-4)
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (("--road", "r.csv"), "go together"),
+        (("--camera", "CAMERA", "--road", "r.csv"), "--late skip"),
+        (("--camera", "CAMERA", "--road", "r.csv", "--late", "skip", "--checkpoint", "c"), "--checkpoint"),
+    ],
+)
+def test_what_cannot_be_had_is_said(
+    scene: Path,
+    more: tuple[str, ...],
+    message: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    camera = str(scene / "camera.yaml")
+    assert _stream(scene, monkeypatch, *(camera if part == "CAMERA" else part for part in more)) == 2
+    assert message in capsys.readouterr().err
