@@ -123,10 +123,7 @@ def _weights(count: int, marked: Marked) -> Any:
 @numba.njit(cache=True, nogil=True)
 def _renumbered(marked: Marked, number: IntArray) -> tuple[Any, Any, Any, Any]:
     """Column, row, new group and mark of the pixels whose group has a new number above 0."""
-    count = 0
-    for group in marked.group:
-        count += number[group] > 0
-    found = np.empty((4, count), dtype=np.int64)
+    found = np.empty((4, len(marked.group)), dtype=np.int64)
     k = 0
     for p in range(len(marked.group)):
         new = number[marked.group[p]]
@@ -134,7 +131,7 @@ def _renumbered(marked: Marked, number: IntArray) -> tuple[Any, Any, Any, Any]:
             found[0, k], found[1, k] = marked.x[p], marked.y[p]
             found[2, k], found[3, k] = new, marked.weight[p]
             k += 1
-    return found[0], found[1], found[2], found[3]
+    return found[0, :k], found[1, :k], found[2, :k], found[3, :k]
 
 
 @numba.njit(cache=True, nogil=True)

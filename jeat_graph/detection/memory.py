@@ -63,7 +63,9 @@ class CloudMemory:
         expected = self.expected()
         cloud = marked.group
         if len(expected) and len(cloud):
-            places = np.stack([marked.x, marked.y], axis=1).astype(np.float64) + 0.5
+            places = np.empty((len(cloud), 2))
+            places[:, 0], places[:, 1] = marked.x, marked.y
+            places += 0.5
             cloud = self._assign(cloud, places, expected)
         there = np.bincount(cloud) > 0
         return int(there.sum()), marked._replace(group=np.cumsum(there, dtype=np.int64)[cloud])

@@ -74,7 +74,7 @@ class NoiseFilter:
 
     def keep(self, events: EventArray) -> EventArray:
         """Return the events that are not noise."""
-        return events.take(self.signal(events))
+        return events.take(np.flatnonzero(self.signal(events)))
 
     def signal(self, events: EventArray) -> BoolArray:
         """Return which events (N,) are not noise."""
@@ -88,11 +88,10 @@ class NoiseFilter:
                 self._period_end = int(events.t_us[start]) + period_us
             end = int(np.searchsorted(events.t_us, self._period_end))
             rows = slice(start, max(end, start + 1))
-            part = events.take(rows)
             alone = _judge(
-                part.t_us,
-                part.x,
-                part.y,
+                events.t_us[rows],
+                events.x[rows],
+                events.y[rows],
                 self._last,
                 self._counts,
                 self.hot,

@@ -63,9 +63,7 @@ class EventBins:
         self._newest = (self._newest + 1) % len(self._ring)
         slot, old = self._ring[self._newest], self._filled[self._newest]
         if len(old) > _SPARSE_SHARE * slot.size:
-            self._total -= slot[0]
-            self._total -= slot[1]
-            slot[:] = 0
+            _clear_all(slot, self._total)
         else:
             _clear(old.x, old.y, slot, self._total)
         _count(events.x, events.y, events.polarity, slot, self._total)
@@ -119,6 +117,16 @@ def _count(
             if slot[which, row, column] < _MOST:
                 slot[which, row, column] += 1
                 total[row, column] += 1
+
+
+@numba.njit(cache=True, nogil=True)
+def _clear_all(slot: npt.NDArray[np.uint8], total: npt.NDArray[np.uint16]) -> None:
+    """Empty all cells (2, H, W) of a bin, and take them off the total (H, W)."""
+    height, width = total.shape
+    for row in range(height):
+        for column in range(width):
+            total[row, column] -= np.uint16(slot[0, row, column]) + np.uint16(slot[1, row, column])
+    slot[:] = 0
 
 
 @numba.njit(cache=True, nogil=True)
