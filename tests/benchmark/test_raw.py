@@ -57,6 +57,16 @@ def small(tmp_path_factory):
     return root
 
 
+@pytest.fixture(scope="module")
+def of_both(tmp_path_factory):
+    """A network of both sensors that always sees the same box."""
+    pytest.importorskip("onnx", reason="pip install onnx")
+    from ..detection.models.tiny import telling_net
+
+    path = tmp_path_factory.mktemp("net") / "both.onnx"
+    return str(telling_net(path, SIZE, 20, np.array([[10, 60, 50, 80, 0.9, 0]])))
+
+
 def test_only_segments_for_tests_are_judged(small):
     assert [s.name for s in segments_in([small])] == ["000001"]
     with pytest.raises(DataError, match="2 data sets are called small"):
@@ -79,8 +89,23 @@ def test_detectors_are_judged_by_light_motion_and_size(small, tmp_path, capsys):
     assert by_sensor["evt"]["that moved"]["AP50"] > 90.0
 
 
-def test_from_raw_to_scores(small, tmp_path, capsys):
+def test_a_network_of_both_sensors_has_a_row_of_its_own(small, of_both, tmp_path, capsys):
+    args = ["benchmark", "detection", str(small), "--jobs", "1", "--fused", of_both, "--out", str(tmp_path)]
+    assert main(args) == 0
+    found = json.loads((tmp_path / "detection.json").read_text())
+    assert [(one["sensor"], one["detector"]) for one in found["records"]] == [
+        ("rgb", "motion"),
+        ("evt", "motion"),
+        ("fused", "both.onnx"),
+    ]
+    assert found["settings"]["detectors"]["fused"][0]["name"] == "both.onnx"
+    assert found["records"][2]["scans"] > 10
+    assert "both.onnx" in capsys.readouterr().out
+
+
+def test_from_raw_to_scores(small, of_both, tmp_path, capsys):
     args = ["benchmark", "raw", str(small), "--jobs", "1", "--no-peers", "--out", str(tmp_path)]
+    args += ["--fused", of_both]
     assert main(args) == 0
     found = json.loads((tmp_path / "raw.json").read_text())
     rows = {one["row"]: one["scores"] for one in found["records"] if one["source"] == "small"}
@@ -89,7 +114,7 @@ def test_from_raw_to_scores(small, tmp_path, capsys):
         f"paper, {both}",
         *(
             f"default, {what}{how}"
-            for what in ("rgb motion", "evt motion", both)
+            for what in ("rgb motion", "evt motion", both, "fused both.onnx")
             for how in ("", ", smoothed")
         ),
     }

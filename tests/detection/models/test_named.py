@@ -8,11 +8,12 @@ import pytest
 
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.detection.models.events import ModelEventDetector
+from jeat_graph.detection.models.fused import FusedDetector
 from jeat_graph.detection.models.onnx_head import read_onnx_head
 from jeat_graph.detection.models.pictures import ModelPictureDetector
 from jeat_graph.detection.named import network_file, networks
 
-SHIPPED = [(kind, name) for kind in ("frames", "events") for name in networks(kind)]
+SHIPPED = [(kind, name) for kind in ("frames", "events", "fused") for name in networks(kind)]
 
 
 def test_files_are_files(tmp_path):
@@ -33,7 +34,9 @@ def test_shipped_networks_load_and_say_where_they_come_from(kind, name):
     assert card["data"]
     assert all(one["AP50"] is not None for one in card["tested"].values())
     assert path.stat().st_size < 1_000_000
-    detector = (
-        ModelPictureDetector(path) if kind == "frames" else ModelEventDetector(path, tuple(card["side"]))
-    )
+    size_px = tuple(card["side"])
+    if kind == "frames":
+        detector = ModelPictureDetector(path)
+    else:
+        detector = {"events": ModelEventDetector, "fused": FusedDetector}[kind](path, size_px)
     assert "layout yolov8" in detector.description
