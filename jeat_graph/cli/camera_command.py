@@ -58,7 +58,7 @@ def _calibrate(args: argparse.Namespace) -> int:
     from jeat_graph.road.inputs import read_lengths, read_surveyed_points
     from jeat_graph.road.report import calibration_lines
     from jeat_graph.road.residuals import Problem
-    from jeat_graph.road.sources import contact_pixels
+    from jeat_graph.road.sources import box_sides, contact_pixels
     from jeat_graph.runs.beside import recorded_size
 
     if Path(args.out).suffix not in (".yaml", ".yml"):
@@ -90,7 +90,7 @@ def _calibrate(args: argparse.Namespace) -> int:
     tracks = None
     if args.tracks is not None:
         table = contact_pixels(args.tracks)
-        tracks = thin(table.t, table.track_id, table.pixels, config, size)
+        tracks = thin(table.t, table.track_id, table.pixels, config, size, box_sides(args.tracks))
         if not len(tracks):
             print(f"jeat-graph camera: {args.tracks}: no track is long enough to help", file=sys.stderr)
             tracks = None

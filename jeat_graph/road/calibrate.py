@@ -23,6 +23,7 @@ from jeat_graph.road.residuals import (
     prior_residuals,
     track_residuals,
 )
+from jeat_graph.road.size_evidence import size_ratios, size_residuals, weigh_sizes
 from jeat_graph.road.start import first_guess
 from jeat_graph.road.track_fit import fit_tracks, track_scale
 
@@ -73,7 +74,8 @@ def calibrate(problem: Problem, zone: str = "") -> CameraCalibration:
         return _solve(problem)
     if problem.points is None:
         calibration = _solve(problem)
-        if problem.lengths is None and calibration.weighting.lanes is None:
+        w = calibration.weighting
+        if problem.lengths is None and w.lanes is None and w.sizes is None:
             raise DataError("nothing tells the scale: give measured lengths or surveyed points")
         return calibration
     surveyed = problem.points
@@ -168,7 +170,14 @@ def _count(problem: Problem, w: Weighting) -> int:
     lengths = 0 if problem.lengths is None else 2 * len(problem.lengths)
     points = 0 if problem.points is None else 2 * len(problem.points)
     priors = 9 if problem.known is None else len(problem.free()) + 1
-    return priors + tracks + lengths + points + (w.lanes is not None)
+    return (
+        priors
+        + tracks
+        + lengths
+        + points
+        + (w.lanes is not None)
+        + (0 if w.sizes is None else len(w.sizes.root))
+    )
 
 
 def _residuals(camera: RoadCamera, problem: Problem, w: Weighting, acceleration: float) -> FloatArray:
@@ -178,6 +187,8 @@ def _residuals(camera: RoadCamera, problem: Problem, w: Weighting, acceleration:
     if problem.points is not None:
         parts.append(point_residuals(camera, problem, w.point_scale))
     parts.append(lane_residuals(camera, problem, w))
+    if w.sizes is not None and problem.tracks is not None:
+        parts.append(size_residuals(camera, problem.tracks, w.sizes))
     if problem.tracks is not None:
         parts.append(track_residuals(camera, problem, w, acceleration))
     return np.concatenate(parts)
@@ -214,12 +225,16 @@ def _reweighted(camera: RoadCamera, problem: Problem, w: Weighting, acceleration
     typical = float(np.median(mean[enough]))
     track = np.where(enough, 1.0 / (1.0 + mean / (_BAD_TRACK * typical)) ** 2, 0.0)
     lanes = find_comb(fit.motion[:, 0], track) if problem.needs_lanes else None
+    sizes = None
+    if problem.needs_sizes:
+        sizes = weigh_sizes(size_ratios(camera, problem.tracks), problem.config)
     return replace(
         w,
         track_px=problem.config.track_px,
         node_weight=fit.weight * track[:, None],
         lanes=lanes,
         scene=track_scale(camera, problem.tracks),
+        sizes=sizes,
     )
 
 

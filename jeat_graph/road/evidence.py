@@ -37,6 +37,9 @@ class CalibrationConfig:
     height_log_sd: float = number(0.7, "1", "spread of its logarithm", open_low=True)
     lane_m: float = number(3.6, "m", "distance of lanes that is most likely", open_low=True)
     lane_log_sd: float = number(0.06, "1", "spread of its logarithm, where it tells the scale", open_low=True)
+    size_log_sd: float = number(
+        0.08, "1", "how far boxes of all vehicles may be off what is believed, relative", open_low=True
+    )
     most_tracks: int = number(120, "tracks", "as many as are used", 1)
     nodes: int = number(14, "points", "a track is thinned to these", 4)
     edge_share: float = number(0.01, "1", "points this near the edge are cut by it / height of the picture")
@@ -93,17 +96,25 @@ class TrackNodes:
     Attributes:
         t: (K, M) time (s).
         pixels: (K, M, 2) px.
+        sides: (K, M, 4) left, top, right, bottom of the boxes (px), NaN where the picture's edge cuts one
+            off, or None for tracks of points.
     """
 
     t: FloatArray
     pixels: FloatArray
+    sides: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.t)
 
 
 def thin(
-    t: FloatArray, track_id: IntArray, pixels: FloatArray, config: CalibrationConfig, size: tuple[int, int]
+    t: FloatArray,
+    track_id: IntArray,
+    pixels: FloatArray,
+    config: CalibrationConfig,
+    size: tuple[int, int],
+    sides: FloatArray | None = None,
 ) -> TrackNodes:
     """Choose tracks that cross enough of the picture, evenly over the recording, and thin each of them.
 
@@ -116,11 +127,15 @@ def thin(
         pixels: (N, 2) px.
         config: how many tracks and nodes.
         size: width and height of the picture (px).
+        sides: (N, 4) left, top, right, bottom of the boxes (px), if there are boxes.
     """
-    inside = within(pixels, size, config.edge_share)
-    t, track_id, pixels = t[inside], track_id[inside], pixels[inside]
-    order = np.lexsort((t, track_id))
+    inside = np.flatnonzero(within(pixels, size, config.edge_share))
+    order = inside[np.lexsort((t[inside], track_id[inside]))]
     t, track_id, pixels = t[order], track_id[order], pixels[order]
+    boxes = np.zeros((len(t), 0)) if sides is None else sides[order].copy()
+    if sides is not None:
+        whole = within(boxes[:, :2], size, config.edge_share) & within(boxes[:, 2:], size, config.edge_share)
+        boxes[~whole] = np.nan
     starts = np.flatnonzero(np.r_[True, track_id[1:] != track_id[:-1]]) if len(t) else np.zeros(0, int)
     ends = np.r_[starts[1:], len(t)]
     span = np.linalg.norm(pixels[ends - 1] - pixels[starts], axis=1) if len(t) else np.zeros(0)
@@ -129,6 +144,7 @@ def thin(
     if len(good) > config.most_tracks:
         good = good[np.linspace(0, len(good) - 1, config.most_tracks).astype(int)]
     times, places = np.zeros((len(good), m)), np.zeros((len(good), m, 2))
+    seen = np.zeros((len(good), m, boxes.shape[1]))
     for k, one in enumerate(good):
         edges = np.linspace(starts[one], ends[one], m + 1)
         for j in range(m):
@@ -137,7 +153,8 @@ def thin(
             a = int(edges[j] + third)
             b = max(a + 1, int(np.ceil(edges[j + 1] - third)))
             times[k, j], places[k, j] = t[a:b].mean(), pixels[a:b].mean(axis=0)
-    return TrackNodes(times, places)
+            seen[k, j] = boxes[a:b].mean(axis=0)
+    return TrackNodes(times, places, None if sides is None else seen)
 
 
 def within(pixels: FloatArray, size: tuple[int, int], edge_share: float) -> BoolArray:

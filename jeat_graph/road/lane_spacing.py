@@ -15,6 +15,7 @@ from jeat_graph.data.arrays import FloatArray, IntArray
 
 _TRIED_M = np.geomspace(2.0, 6.5, 120)
 _LEAST_ORDER = 0.5  # length of the mean phase vector below which there is no comb
+_CHANCE = 0.01  # of as good a comb, at any pitch tried, of vehicles that keep to no lanes (Rayleigh's test)
 _NEAR_BEST = 0.9  # of two pitches that fit alike the larger one is that of the lanes
 _LEAST_TRACKS = 4  # of the second busiest lane
 
@@ -43,7 +44,8 @@ def find_comb(x: FloatArray, weight: FloatArray) -> LaneComb | None:
     phase = np.exp(2j * np.pi * x[:, None] / _TRIED_M)
     mean = (weight[:, None] * phase).sum(axis=0) / weight.sum()
     order = np.abs(mean)
-    if order.max() < _LEAST_ORDER:
+    independent = weight.sum() ** 2 / (weight**2).sum()
+    if order.max() < max(_LEAST_ORDER, np.sqrt(np.log(len(_TRIED_M) / _CHANCE) / independent)):
         return None
     best = int(np.flatnonzero(order >= _NEAR_BEST * order.max())[-1])
     # The nearest peak: the larger pitch may be on the flank of one.

@@ -84,6 +84,11 @@ def calibration_lines(calibration: CameraCalibration) -> list[str]:
             f"nothing measured tells the scale across the road: lanes {problem.config.lane_m:g} m apart"
             f" (± {100.0 * Z95 * problem.config.lane_log_sd:.0f} %) are assumed to"
         )
+    if w.sizes is not None:
+        lines.append(
+            "nothing was measured: the vehicles' mean length, width and height are assumed to be as elsewhere"
+            f" (each ± {100.0 * Z95 * problem.config.size_log_sd:.0f} %); measure one length each way"
+        )
     if problem.tracks is not None:
         lines.append(
             f"tracks: {int(calibration.tracks_used.sum())} of {len(problem.tracks)} used,"

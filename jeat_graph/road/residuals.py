@@ -11,6 +11,7 @@ from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.road.camera import PARAMETERS, RoadCamera
 from jeat_graph.road.evidence import CalibrationConfig, Lengths, Points, TrackNodes
 from jeat_graph.road.lane_spacing import LaneComb, comb_pitch
+from jeat_graph.road.size_evidence import VehicleSizes
 from jeat_graph.road.track_fit import fit_tracks, track_scale
 
 #: Of PARAMETERS: along the plane, where only surveyed points tell anything.
@@ -47,6 +48,12 @@ class Problem:
         across = self.lengths is not None and not self.lengths.along.all()
         return self.points is None and not across and self.tracks is not None and self.known is None
 
+    @property
+    def needs_sizes(self) -> bool:
+        """Whether nothing was measured at all, and there are boxes whose sizes tell some scale."""
+        measured = self.lengths is not None or self.points is not None or self.known is not None
+        return not measured and self.tracks is not None and self.tracks.sides is not None
+
     def free(self) -> IntArray:
         """Which of the camera's parameters are sought: places in `PARAMETERS`."""
         if self.known is not None:
@@ -67,6 +74,7 @@ class Weighting:
         lanes: the lanes of the tracks where their distance is evidence, or None.
         scene: (K, 2) how large the scene of each track looks through the camera that its motion is judged
             by (`track_scale`), or None.
+        sizes: how much each vehicle tells by its size, or None.
     """
 
     lengths: FloatArray
@@ -76,6 +84,7 @@ class Weighting:
     node_weight: FloatArray
     lanes: LaneComb | None = None
     scene: FloatArray | None = None
+    sizes: VehicleSizes | None = None
 
 
 def prior_residuals(camera: RoadCamera, problem: Problem, common_acceleration: float) -> FloatArray:

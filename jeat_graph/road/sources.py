@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.trajectories_io import read_trajectories
 from jeat_graph.road.box_rows import BoxConfig
@@ -46,6 +47,16 @@ def contact_pixels(source: str | Path, contact: str | None = None) -> PointTable
     else:
         pixels = np.stack([left + width / 2.0, top + height], axis=1)
     return PointTable(table.t, table.track_id, pixels)
+
+
+def box_sides(source: str | Path) -> FloatArray | None:
+    """Left, top, right, bottom (N, 4) of the boxes of `contact_pixels`; None for a table of points alone."""
+    path = run_table(source)
+    if only_points(path):
+        return None
+    table = read_trajectories(path)
+    left, top, width, height = table.take(np.lexsort((table.t, table.track_id))).boxes.T
+    return np.stack([left, top, left + width, top + height], axis=1)
 
 
 def boxes_of(

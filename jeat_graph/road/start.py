@@ -9,9 +9,11 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.road.camera import RoadCamera, mounted
+from jeat_graph.road.evidence import TrackNodes
 from jeat_graph.road.lane_spacing import comb_pitch, find_comb
 from jeat_graph.road.length_evidence import length_covariance, length_errors, length_residuals
 from jeat_graph.road.residuals import Problem, prior_residuals
+from jeat_graph.road.size_evidence import size_costs, size_ratios
 from jeat_graph.road.track_fit import TrackFit, fit_tracks
 from jeat_graph.road.vanishing import vanishing_point
 
@@ -22,6 +24,7 @@ _YAWS_DEG = np.arange(-60.0, 61.0, 5.0)
 _LEAST_PITCH = 0.01
 _HEIGHT_FACTORS = np.geomspace(0.4, 2.5, 19)
 _COARSE_PX = 3.0
+_COARSE_VEHICLES = 24  # as many tell sizes
 _NO_LANES = 25.0  # what it costs a camera at most through which the tracks keep to no lanes
 
 
@@ -107,10 +110,10 @@ def _scaled_by_lanes(problem: Problem, camera: RoadCamera) -> RoadCamera | None:
     fit = fit_tracks(camera, problem.tracks, problem.config, _COARSE_PX)
     if not np.isfinite(fit.motion).all():
         return None
-    cost = [_lane_cost(problem, fit, float(factor)) for factor in _HEIGHT_FACTORS]
-    best = int(np.argmin(cost))
-    if cost[best] >= _NO_LANES:
+    lanes = np.array([_lane_cost(problem, fit, float(factor)) for factor in _HEIGHT_FACTORS])
+    if lanes.min() >= _NO_LANES and not problem.needs_sizes:
         return None
+    best = int(np.argmin(lanes + _size_costs(problem, camera, _HEIGHT_FACTORS)))
     change = np.zeros(12)
     change[11] = camera.position[2] * (_HEIGHT_FACTORS[best] - 1.0)
     return camera.moved(change)
@@ -125,6 +128,16 @@ def _lane_cost(problem: Problem, fit: TrackFit, factor: float = 1.0) -> float:
         return _NO_LANES
     off = math.log(pitch / problem.config.lane_m) / problem.config.lane_log_sd
     return min(off**2, _NO_LANES)
+
+
+def _size_costs(problem: Problem, camera: RoadCamera, factors: FloatArray) -> FloatArray:
+    """What vehicles' sizes speak (F,) against a camera so many times as high; nothing where none counts."""
+    tracks = problem.tracks
+    if not problem.needs_sizes or tracks is None or tracks.sides is None:
+        return np.zeros(len(factors))
+    few = slice(None, None, max(len(tracks) // _COARSE_VEHICLES, 1))
+    some = TrackNodes(tracks.t[few], tracks.pixels[few], tracks.sides[few])
+    return size_costs(size_ratios(camera, some), factors, problem.config) * _COARSE_VEHICLES
 
 
 def _cost(camera: RoadCamera, problem: Problem) -> float:
@@ -148,6 +161,7 @@ def _cost(camera: RoadCamera, problem: Problem) -> float:
                 else math.inf
             )
             cost += min(off**2, _NO_LANES)
+            cost += float(_size_costs(problem, camera, np.ones(1))[0])
     return cost
 
 
