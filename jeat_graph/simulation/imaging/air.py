@@ -22,7 +22,7 @@ def airlight(lights: Lights) -> FloatArray:
     return level * tint
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def through(depth: float, beta: float) -> float:
     """Part of the light that comes through `depth` m of air."""
     return math.exp(-beta * depth) if beta > 0.0 else 1.0

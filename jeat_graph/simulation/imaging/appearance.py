@@ -11,6 +11,7 @@ from jeat_graph.simulation.imaging.lamps import (
     BRAKE,
     COMMON_LAMPS,
     HEAD,
+    INDICATOR,
     LAMPS,
     MARKER,
     NONE,
@@ -23,6 +24,8 @@ from jeat_graph.simulation.world.scene import Scene
 from jeat_graph.simulation.world.vehicles import KIND_NAMES, Fleet
 
 _LONG_M = 13.0  # lorries from here on are articulated or have a trailer
+_BLINK_HZ = (1.35, 1.65)  # UN R6: 60 to 120 a minute
+_HAZARD, _LED = 0.5, 0.5  # shares of vehicles
 _DEFECTIVE = 0.02  # share of lamps that do not work
 # How often each colour of `PALETTE` is seen on roads: white, silver, grey and black are four fifths.
 _COMMONNESS = np.array([0.26, 0.13, 0.19, 0.19, 0.09, 0.06, 0.02, 0.03, 0.02, 0.01])
@@ -36,12 +39,18 @@ class Appearance(NamedTuple):
         shape: (V, PARTS, 9) see `shapes`.
         lamps: (V, LAMPS, 4) see `lamps`.
         lit: (V,) whether its lights are on in the dark.
+        blink_hz: (V,) rate of its indicators.
+        hazard: (V,) whether both flash while it stands where nobody should.
+        led: (V,) whether its tail lamps are LED.
     """
 
     colour: FloatArray
     shape: FloatArray
     lamps: FloatArray
     lit: BoolArray
+    blink_hz: FloatArray
+    hazard: BoolArray
+    led: BoolArray
 
 
 def appearance_of(scene: Scene, rng: np.random.Generator, varied: bool) -> Appearance:
@@ -71,7 +80,9 @@ def appearance_of(scene: Scene, rng: np.random.Generator, varied: bool) -> Appea
     kinds = fleet.kind if len(fleet) else np.zeros(1, dtype=np.int64)
     shape = np.stack([shape_of(str(KIND_NAMES[k]), int(n)) for k, n in zip(kinds, variant, strict=True)])
     lit = rng.random(count) < scene.light.config.lit_share
-    return Appearance(np.clip(colour, 0.015, 0.85), shape, lamps, lit)
+    blink_hz = rng.uniform(*_BLINK_HZ, count)
+    hazard, led = rng.random(count) < _HAZARD, rng.random(count) < _LED
+    return Appearance(np.clip(colour, 0.015, 0.85), shape, lamps, lit, blink_hz, hazard, led)
 
 
 def _variants(fleet: Fleet, rng: np.random.Generator) -> IntArray:
@@ -105,6 +116,8 @@ def _lamps(fleet: Fleet, variant: IntArray, rng: np.random.Generator) -> FloatAr
                 rows += [(s * 0.46, top - 0.12, MARKER, 1.0) for s in (-1, 1)]
             elif rng.random() < 0.8:
                 rows.append((0.0, rng.uniform(0.62, 0.95) * high, BRAKE, 0.5))
+        # Indicators are beside head and tail lamps, at one height for both ends.
+        rows += [(s * (across + 0.05), 0.5 * (head + tail), INDICATOR, 1.0) for s in (-1, 1)]
         out[v, : len(rows)] = rows
     out[rng.random(out.shape[:2]) < _DEFECTIVE, 2:] = (NONE, 0.0)
     out[..., STRENGTH] *= out[..., 2] != NONE

@@ -19,6 +19,7 @@ from jeat_graph.simulation.imaging.trace import trace
 from jeat_graph.simulation.imaging.wet_road import mirror_ground, mirror_lamps
 from jeat_graph.simulation.world.camera import Camera
 from jeat_graph.simulation.world.scene import Scene
+from jeat_graph.simulation.world.surroundings import FIXED
 
 _LAMP_SIGMA_M = 0.22
 _LAMP_STRAY = 0.02  # share of a lamp's intensity that it sends towards the horizon (EN 13201: cut-off)
@@ -83,7 +84,7 @@ def pack(background: Background, lights: Lights, view: View, channels: int) -> F
     return np.concatenate([*flat, np.stack(wall, axis=2), through, *planes], axis=2)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def ground_extents(packed: FloatArray) -> FloatArray:
     """Circles about the lit ground in each tile of a flat static picture.
 
@@ -111,7 +112,7 @@ def make_background(scene: Scene, lights: Lights, optics: Optics, config: Render
     """Render all that stands still."""
     camera = scene.camera
     land = landscape_of(scene.road.config, scene.around)
-    layers = trace(view_of(camera), land, lights)
+    layers = trace(view_of(camera), land, lights, scene.around == FIXED)
     back, albedo, place, lux, front, front_albedo, cover, depth = layers
     view = view_of(camera)
     if config.wet > 0.0:

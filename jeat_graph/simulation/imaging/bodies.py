@@ -23,6 +23,7 @@ from jeat_graph.simulation.imaging.moments import (
     FAR,
     HULL,
     LAMP_FLUX,
+    LAMP_PULSE,
     LAMP_REACH,
     LAMP_SEEN,
     NEAR,
@@ -48,7 +49,7 @@ _LAMP_AHEAD_M = 0.4
 _GLASS_MIRROR = 0.10
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def add_body(
     tile: Tile, body: FloatArray, pose: FloatArray, fade: float, skin: FloatArray, camera: FloatArray,
     scene: FloatArray, canvas: TileLayers,
@@ -156,7 +157,7 @@ def add_body(
             insert(filled, value, r * TILE_W + c, depth, cover, red, green, blue)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _active(body: FloatArray, first: int, count: int, tile: Tile, active: IntArray) -> int:
     """List the half-planes that cut a tile, by their places in the record; -1 if one leaves nothing of it."""
     left, top = tile.column + 0.5, tile.row + 0.5
@@ -174,7 +175,7 @@ def _active(body: FloatArray, first: int, count: int, tile: Tile, active: IntArr
     return found
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def add_lamps(tile: Tile, lamps: FloatArray, optics: Optics, filled: IntArray, value: FloatArray) -> None:
     """Add the images of a vehicle's lamps (LAMPS, LAMP_RECORD), just before its body."""
     row0, column0 = tile.row, tile.column
@@ -184,6 +185,8 @@ def add_lamps(tile: Tile, lamps: FloatArray, optics: Optics, filled: IntArray, v
             continue
         u, w, Z, sigma = lamps[k, 0], lamps[k, 1], lamps[k, 2], lamps[k, 3]
         reach = 4.0 * sigma
+        pulse = lamps[k, LAMP_PULSE]
+        red, green, blue = pulse * red, pulse * green, pulse * blue
         for r in range(max(0, int(w - reach) - row0), min(tile.rows, int(w + reach) + 1 - row0)):
             for c in range(max(0, int(u - reach) - column0), min(tile.columns, int(u + reach) + 1 - column0)):
                 part = core_at((column0 + c + 0.5 - u) ** 2 + (row0 + r + 0.5 - w) ** 2, sigma, optics)
@@ -192,7 +195,7 @@ def add_lamps(tile: Tile, lamps: FloatArray, optics: Optics, filled: IntArray, v
                     insert(filled, value, p, Z - _LAMP_AHEAD_M, 0.0, part * red, part * green, part * blue)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def add_glow(tile: Tile, lamps: FloatArray, optics: Optics, light: FloatArray) -> None:
     """Add the glow of a vehicle's lamps (LAMPS, LAMP_RECORD), which lies over everything, to `light`."""
     row0, column0 = tile.row, tile.column

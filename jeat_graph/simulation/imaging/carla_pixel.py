@@ -83,7 +83,7 @@ def make_carla_state(model: CarlaModel, luminance: FloatArray, rng: np.random.Ge
     return CarlaState(noisy, noisy.copy(), np.full(len(luminance), -1.0), clean, clean.copy(), random)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _first_look(
     luminance: FloatArray, model: CarlaModel, random: npt.NDArray[np.uint64]
 ) -> tuple[FloatArray, FloatArray]:
@@ -93,7 +93,7 @@ def _first_look(
     return clean, noisy
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def look_at(
     i: int, luminance: float, model: CarlaModel, random: npt.NDArray[np.uint64]
 ) -> tuple[float, float]:
@@ -104,7 +104,7 @@ def look_at(
     return math.log(model.epsilon + level / 255.0), math.log(model.epsilon + rounded / 255.0)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def carla_advance(
     pixels: IntArray, luminance: FloatArray, start: float, end: float, model: CarlaModel, state: CarlaState,
     sink: EventSink,

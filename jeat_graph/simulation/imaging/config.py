@@ -31,6 +31,23 @@ class RenderConfig:
     taillight_candela: float = number(8.0, "cd", "one tail light (UN R7: 4 to 17 cd)")
     brakelight_candela: float = number(80.0, "cd", "one brake light (UN R7: 60 to 260 cd)")
     parking_candela: float = number(1.5, "cd", "one light of a parked vehicle, steady")
+    indicator_candela: float = number(
+        180.0, "cd", "one indicator (UN R6: 175 cd or more in front, 50 or more behind); varied worlds only"
+    )
+    lamp_flicker: float = number(
+        0.0,
+        "1",
+        "depth by which street lamps flicker, for the event camera; costs several times as much",
+        0.0,
+        1.0,
+    )
+    lamp_flicker_hz: float = number(
+        100.0, "Hz", "at which they do: twice the mains' (120 in America)", 10.0, 400.0
+    )
+    led_pulse_hz: float = number(
+        0.0, "Hz", "at which LED tail lamps are dimmed by pulses, for the event camera; 0: steady", 0.0, 400.0
+    )
+    led_pulse_share: float = number(0.3, "1", "share of the time that a pulse lasts", 0.05, 0.95)
     glare_share: float = number(
         0.08, "1", "share of a light's image that the lens scatters around it (glow)", 0.0, 0.9
     )

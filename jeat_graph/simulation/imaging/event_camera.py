@@ -24,6 +24,7 @@ from jeat_graph.simulation.imaging.event_pixel import (
 )
 from jeat_graph.simulation.imaging.event_run import Interval, fill, light_all, read_luminance, run_physical
 from jeat_graph.simulation.imaging.event_sink import EventSink, make_sink, to_events, with_room
+from jeat_graph.simulation.imaging.lamp_flicker import LampFlicker
 from jeat_graph.simulation.imaging.layers import GLOW
 from jeat_graph.simulation.imaging.lighting import LUMINANCE
 from jeat_graph.simulation.imaging.painter import light_tile, paint_tile, take_ground
@@ -77,6 +78,7 @@ class EventCamera:
         self._quiet = np.zeros(len(renderer.tiles), dtype=np.bool_)
         self._glowing = np.zeros(len(renderer.tiles), dtype=np.bool_)
         self._light = np.zeros((len(renderer.tiles), TILE, GLOW + 1))
+        self._lamps = LampFlicker(renderer, not self._carla)
         self._begin()
         self._now_us = 0
         self._ticks = 0
@@ -92,7 +94,10 @@ class EventCamera:
             times_us = period * np.arange(self._ticks, last + 1, dtype=np.float64)
             self._ticks = last
             return self._run(self.renderer.plan(1e-6 * times_us[0], 1e-6 * times_us[-1]), times_us)
-        plan = self.renderer.plan(1e-6 * self._now_us, 1e-6 * until_us)
+        plan = self.renderer.plan(1e-6 * self._now_us, 1e-6 * until_us, for_events=True)
+        flickers = self._lamps.steps(1e-6 * (until_us - self._now_us))
+        if flickers > plan.most:
+            plan = plan._replace(most=flickers, every=plan.every * (flickers // plan.most))
         share = np.arange(plan.most + 1, dtype=np.float64) / plan.most
         times_us = self._now_us + (until_us - self._now_us) * share
         self._now_us = until_us
@@ -108,12 +113,12 @@ class EventCamera:
     def _run(self, plan: Plan, times_us: FloatArray) -> EventArray:
         r = self.renderer
         every = None if self._carla else plan.every
-        moments = r.moments(1e-6 * times_us[1:], plan.look, every)
+        moments = r.moments(1e-6 * times_us[1:], plan.look, every, for_events=True)
         steps = np.where(plan.steps > 0, len(times_us) - 1, 0) if self._carla else plan.steps
         run = _run_carla if self._carla else run_physical
         work = Interval(
             *(r.tiles, plan.boxes, steps, plan.lit, times_us, self._static),
-            *(self._quiet, self._glowing, self._light),
+            *(self._quiet, self._glowing, self._light, self._lamps.within(1e-6 * times_us)),
         )
         sink = make_sink(max(1 << 18, 2 * self._room))
         stage = r.stage(moments, plan.look, channels=1)
@@ -122,12 +127,12 @@ class EventCamera:
         return to_events(sink, self._width)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _run_carla(
     work: Interval, stage: Stage, model: CarlaModel, state: CarlaState, sink: EventSink, room: int
 ) -> tuple[EventSink, int]:
     """Take all pixels from tick to tick, tile by tile; as `run_physical`."""
-    tiles, boxes, steps, lit, times_us, static, _, _, _ = work
+    tiles, boxes, steps, lit, times_us, static, _, _, _, _ = work
     who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)
     counts = np.zeros(3, dtype=np.int64)
     pixels, luminance = np.zeros(TILE, dtype=np.int64), np.zeros(TILE)

@@ -141,7 +141,7 @@ def make_state(model: PixelModel, luminance: FloatArray, rng: np.random.Generato
     return PixelState(table, random)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _first_shots(random: npt.NDArray[np.uint64], rate: FloatArray) -> FloatArray:
     out = np.empty(len(rate))
     for i in range(len(rate)):
@@ -149,7 +149,7 @@ def _first_shots(random: npt.NDArray[np.uint64], rate: FloatArray) -> FloatArray
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def photoreceptor(
     output: float, before: float, after: float, duration: float, luminance: float, model: PixelModel
 ) -> float:
@@ -167,7 +167,7 @@ def photoreceptor(
     return after - lag + (output - before + lag) * math.exp(-k)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def shot_share(luminance: float, model: PixelModel) -> float:
     """Rate of shot noise at a luminance (cd/m²), as a share of that in the dark."""
     falling = 1.0 / (1.0 + (luminance / model.shot_half) ** model.shot_power)
@@ -175,27 +175,27 @@ def shot_share(luminance: float, model: PixelModel) -> float:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def advance(
-    pixels: IntArray, luminance: FloatArray, start: float, end: float, settled: bool, model: PixelModel,
+    pixels: IntArray, luminance: FloatArray, since: FloatArray, end: float, settled: bool, model: PixelModel,
     state: PixelState, sink: EventSink,
 ) -> None:  # fmt: skip
-    """Take pixels from time `start` to `end`, and put their events.
+    """Take pixels from times of their own to `end`, and put their events.
 
     Args:
         pixels: (P,) which.
         luminance: (P,) what they see at `end` (cd/m²).
-        start: µs.
+        since: (P,) from when on (µs).
         end: µs.
         settled: the caller knows that neither luminance nor the photoreceptors' outputs change.
         model: constants of all pixels.
         state: of all pixels; changed.
         sink: where events go; it must have room.
     """
-    duration = end - start
     constants, memory, random = model.table, state.table, state.random
     for n in range(len(pixels)):
-        i = pixels[n]
+        i, start = pixels[n], since[n]
+        duration = end - start
         first = memory[i, OUTPUT]
         last = first
         if not settled:
@@ -272,7 +272,7 @@ def advance(
         memory[i, REFERENCE] = reference - leak * duration
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def unsettled(pixels: IntArray, luminance: FloatArray, model: PixelModel, state: PixelState) -> float:
     """Greatest distance (ln) of the pixels' outputs from what they see."""
     most = 0.0

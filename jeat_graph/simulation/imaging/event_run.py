@@ -28,6 +28,20 @@ _BEND = 0.02  # relative distance of beams' and glow's light from a straight lin
 _FAINT_CD_M2 = 0.005
 
 
+class Flicker(NamedTuple):
+    """Street lamps that flicker within an interval.
+
+    Attributes:
+        share: (N,) part of each pixel's light in the static picture that is theirs; (0,) for steady lamps.
+        change: (J + 1,) relative change of their light at the interval's times.
+        steps: how often their light is looked at, a power of two; 1 for steady lamps.
+    """
+
+    share: FloatArray
+    change: FloatArray
+    steps: int
+
+
 class Interval(NamedTuple):
     """What the pixels see within an interval of time.
 
@@ -41,6 +55,7 @@ class Interval(NamedTuple):
         quiet: (T,) true where a tile's pixels see the static picture and have settled; changed.
         glowing: (T,) true where beams or glow were on a tile at the interval's beginning; changed.
         light: (T, P, 3) that light; changed.
+        flicker: street lamps that flicker.
     """
 
     tiles: IntArray
@@ -52,9 +67,10 @@ class Interval(NamedTuple):
     quiet: BoolArray
     glowing: BoolArray
     light: FloatArray
+    flicker: Flicker
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def light_all(
     tiles: IntArray, boxes: FloatArray, lit: IntArray, stage: Stage, glowing: BoolArray, light: FloatArray
 ) -> None:
@@ -70,7 +86,7 @@ def light_all(
             light_tile(tile, 0, who, counts, stage, light[n])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def fill(row0: int, column0: int, static: FloatArray, pixels: IntArray, luminance: FloatArray) -> int:
     """Pixels of a tile and what they see while nothing moves; returns how many there are."""
     height, width = static.shape
@@ -83,7 +99,7 @@ def fill(row0: int, column0: int, static: FloatArray, pixels: IntArray, luminanc
     return count
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def read_luminance(patch: FloatArray, tile: Tile, luminance: FloatArray) -> None:
     """Luminance of a painted tile, in the order of `_fill`."""
     count = 0
@@ -93,7 +109,7 @@ def read_luminance(patch: FloatArray, tile: Tile, luminance: FloatArray) -> None
             count += 1
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def key_lights(
     tile: Tile, most: int, who: IntArray, counts: IntArray, stage: Stage, now: FloatArray, keys: FloatArray
 ) -> int:
@@ -146,18 +162,18 @@ def key_lights(
     return count
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def run_physical(
     work: Interval, stage: Stage, model: PixelModel, state: PixelState, sink: EventSink, room: int
 ) -> tuple[EventSink, int]:
     """Take all pixels through an interval, tile by tile; returns the sink and how many tiles were painted."""
-    tiles, boxes, steps, lit, times_us, static, quiet, glowing, light_now = work
+    tiles, boxes, steps, lit, times_us, static, quiet, glowing, light_now, flicker = work
     who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)
     counts = np.zeros(3, dtype=np.int64)
     pixels, luminance = np.zeros(TILE, dtype=np.int64), np.zeros(TILE)
     keys = np.zeros((1 + MAX_KEYS, TILE, GLOW + 1))
     light = np.zeros((TILE, GLOW + 1))
-    seen, still = np.zeros((4, TILE)), np.zeros(TILE)
+    seen, still, since = np.zeros((4, TILE)), np.zeros(TILE), np.zeros(TILE)
     stack, painted = np.zeros(4, dtype=np.int64), np.zeros(4, dtype=np.bool_)
     available = len(times_us) - 1
     start, end = times_us[0], times_us[available]
@@ -168,14 +184,20 @@ def run_physical(
         count = fill(row0, column0, static, pixels, luminance)
         sink = with_room(sink, room)
         if steps[n] == 0 and lit[n] == 0 and not glowing[n]:
-            pieces = 1
-            if not quiet[n]:
+            pieces = flicker.steps
+            if flicker.steps > 1:
+                quiet[n] = False
+            elif not quiet[n]:
                 apart = unsettled(pixels[:count], luminance[:count], model, state)
                 pieces = SETTLE_STEPS if apart > _FOLLOWING else 1
                 quiet[n] = apart < _SETTLED
             for k in range(pieces):
                 a, b = start + (end - start) * k / pieces, start + (end - start) * (k + 1) / pieces
-                advance(pixels[:count], luminance[:count], a, b, quiet[n], model, state, sink)
+                since[:] = a
+                seen[0, :count] = luminance[:count]
+                if flicker.steps > 1:
+                    _flicker(seen[0, :count], pixels, flicker, (k + 1) * (available // pieces))
+                advance(pixels[:count], seen[0, :count], since, b, quiet[n], model, state, sink)
             continue
         quiet[n] = False
         who_touches(row0, column0, boxes, who, counts)
@@ -189,11 +211,11 @@ def run_physical(
         else:
             keys[:2] = 0.0
             constant = True
-        samples = max(steps[n], key_count, 1)
+        samples = max(steps[n], key_count, flicker.steps)
         stride = available // samples
         # Samples are taken coarsely first, and where they differ, those between them too. Nothing as wide as
         # a vehicle passes a tile unseen within four steps; its lamps might, and so might light.
-        coarse = min(samples, COARSE if constant else COARSE // 2)
+        coarse = min(samples, COARSE if constant else COARSE // 2) if flicker.steps == 1 else 1
         for k in range(0, samples, coarse):
             top, stack[0] = 0, k + coarse
             done = k
@@ -213,6 +235,8 @@ def run_physical(
                         paint_tile(tile, here * stride - 1, who, counts, stage, light)
                         read_luminance(canvas.out, tile, seen[top])
                         rendered += 1
+                    if flicker.steps > 1:
+                        _flicker(seen[top, :count], pixels, flicker, here * stride)
                     painted[top] = True
                 if here - done > 1 and _differ(seen[top, :count], pixels, model, state):
                     top += 1
@@ -221,14 +245,22 @@ def run_physical(
                     continue
                 sink = with_room(sink, room)
                 a, b = times_us[done * stride], times_us[here * stride]
-                advance(pixels[:count], seen[top, :count], a, b, False, model, state, sink)
+                since[:] = a
+                advance(pixels[:count], seen[top, :count], since, b, False, model, state, sink)
                 painted[top] = False
                 done = here
                 top -= 1
     return sink, rendered
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
+def _flicker(luminance: FloatArray, pixels: IntArray, flicker: Flicker, at: int) -> None:
+    """Change the luminance of pixels as lamps do at one of the interval's times."""
+    for n in range(len(luminance)):
+        luminance[n] *= 1.0 + flicker.share[pixels[n]] * flicker.change[at]
+
+
+@njit(cache=True, error_model="numpy")
 def any_touch(j: int, who: IntArray, counts: IntArray, moments: Moments, row0: int, column0: int) -> bool:
     """Say whether any body or shadow may be on the tile that begins at (row0, column0) at time `j`."""
     touch = moments.touch
@@ -240,7 +272,7 @@ def any_touch(j: int, who: IntArray, counts: IntArray, moments: Moments, row0: i
     return False
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _differ(luminance: FloatArray, pixels: IntArray, model: PixelModel, state: PixelState) -> bool:
     """Say whether what pixels see differs from what they saw last by more than would go unnoticed."""
     for n in range(len(luminance)):

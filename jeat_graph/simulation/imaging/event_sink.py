@@ -30,7 +30,7 @@ class EventSink(NamedTuple):
     by_motion: BoolArray
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def make_sink(capacity: int) -> EventSink:
     """Make room for `capacity` events."""
     return EventSink(
@@ -42,7 +42,7 @@ def make_sink(capacity: int) -> EventSink:
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def with_room(sink: EventSink, more: int) -> EventSink:
     """Return the sink, or a larger copy if it has no room for `more` events."""
     used = sink.used[0]
@@ -57,7 +57,7 @@ def with_room(sink: EventSink, more: int) -> EventSink:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def put(sink: EventSink, t_us: float, pixel: int, brighter: bool, by_motion: bool) -> None:
     """Add an event at the nearest microsecond; whoever calls has made room."""
     n = sink.used[0]

@@ -23,7 +23,7 @@ _BLOCKED_M = 0.5  # way through a vehicle after which a beam is blocked
 _BACK_LUX = 0.3  # what the road before a vehicle gives back of its own beams to its front
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def light_face(
     out: Moments, j: int, v: int, look: Look, at: Surface, lights: Lights, light: FloatArray
 ) -> None:
@@ -59,7 +59,7 @@ def light_face(
         )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _free(
     out: Moments, j: int, v: int, w: int, look: Look, at: Surface, lamp_x: float, lamp_y: float
 ) -> float:

@@ -73,7 +73,7 @@ def layout_of(road: RoadConfig, look: Surroundings) -> GroundLayout:
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def ramp_width(x: float, y: float, layout: GroundLayout) -> float:
     """How much wider the pavement is beside a ramp (m)."""
     begin, end = layout.ramp
@@ -82,7 +82,7 @@ def ramp_width(x: float, y: float, layout: GroundLayout) -> float:
     return layout.lane_width * clamp01(min(y - begin, end - y) / _TAPER_M)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def ground_albedo(x: float, y: float, layout: GroundLayout) -> tuple[float, float, float]:
     """Albedo (red, green, blue) of the ground at a place; value noise at several scales is the texture.
 

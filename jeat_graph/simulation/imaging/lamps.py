@@ -8,12 +8,22 @@ from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.simulation.imaging.lighting import LAMP_HEIGHT_M, Lights, beam_candela
-from jeat_graph.simulation.imaging.moments import LAMP_FLUX, LAMP_REACH, LAMP_SEEN, Look, Moments
+from jeat_graph.simulation.imaging.moments import (
+    BRAKES,
+    LAMP_FLUX,
+    LAMP_PULSE,
+    LAMP_REACH,
+    LAMP_SEEN,
+    LEFT_ON,
+    PULSE,
+    Look,
+    Moments,
+)
 from jeat_graph.simulation.imaging.optics import Optics
 from jeat_graph.simulation.imaging.tiles import View
 
-LAMPS = 7
-NONE, HEAD, TAIL, BRAKE, MARKER = range(5)
+LAMPS = 9
+NONE, HEAD, TAIL, BRAKE, MARKER, INDICATOR = range(6)
 STRENGTH = 3  # column of a lamp's strength, after across, height and kind
 # Across (of the width), height (m), kind and strength of the lamps that every vehicle has.
 COMMON_LAMPS = (
@@ -21,7 +31,7 @@ COMMON_LAMPS = (
     (0.39, LAMP_HEIGHT_M, HEAD, 1.0),
     (-0.39, LAMP_HEIGHT_M + 0.2, TAIL, 1.0),
     (0.39, LAMP_HEIGHT_M + 0.2, TAIL, 1.0),
-    *((0.0, 0.0, NONE, 0.0),) * 3,
+    *((0.0, 0.0, NONE, 0.0),) * 5,
 )
 _LAMP_SIGMA_M = 0.07
 _MARKER_SHARE = 0.25  # of a tail lamp's intensity (UN R7: end-outline markers)
@@ -30,9 +40,12 @@ _FAINT = 0.002  # of the luminance there is: glow below it is left out
 _INVERSE_POWER = 0.8  # 1 / 1.25, of the glow's power in the squared distance
 
 
-@njit(cache=True)
-def light_lamps(out: Moments, j: int, v: int, brake: float, look: Look, view: View, lights: Lights) -> None:
-    """Place the lamps of a vehicle in the picture."""
+@njit(cache=True, error_model="numpy")
+def light_lamps(
+    out: Moments, j: int, v: int, signal: FloatArray, look: Look, view: View, lights: Lights
+) -> None:
+    """Place the lamps of a vehicle, with its signals (4,), in the picture."""
+    brake = signal[BRAKES]
     x, y, sin, cos = out.pose[j, v]
     length, wide = look.size[v, 0], look.size[v, 1]
     fx, fy, cx, cy = view.lens[0], view.lens[1], view.lens[2], view.lens[3]
@@ -41,7 +54,12 @@ def light_lamps(out: Moments, j: int, v: int, brake: float, look: Look, view: Vi
         kind = int(look.lamps[v, k, 2])
         if kind == NONE:
             continue
+        if not lights.on and kind in (HEAD, MARKER):
+            continue
         ahead = 1.0 if kind == HEAD else -1.0
+        if kind == INDICATOR:
+            # It is one in front and one behind, of which the camera sees one.
+            ahead = 1.0 if (eye[0] - x) * sin + (eye[1] - y) * cos > 0.0 else -1.0
         across = look.lamps[v, k, 0] * wide
         along = 0.5 * length * ahead
         z = look.lamps[v, k, 1]
@@ -54,18 +72,28 @@ def light_lamps(out: Moments, j: int, v: int, brake: float, look: Look, view: Vi
             continue
         distance2 = dx * dx + dy * dy + dz * dz
         facing = forward / math.sqrt(distance2)
-        if look.parked[v]:
-            power = lights.parking_candela * facing
+        pulse = 1.0
+        if kind == INDICATOR:
+            on = signal[LEFT_ON] if look.lamps[v, k, 0] < 0.0 else signal[LEFT_ON + 1]
+            power = lights.indicator_candela * on * facing
+        elif look.parked[v]:
+            power = lights.parking_candela * facing if lights.on else 0.0
         elif kind == HEAD:
             right = -(dx * cos - dy * sin)
             power = 0.5 * beam_candela(forward, right, -dz, lights.beam_candela, lights.beam_stray)
         elif kind == TAIL:
-            power = (lights.tail_candela + (lights.brake_candela - lights.tail_candela) * brake) * facing
+            # A brake light is not dimmed.
+            pulse = signal[PULSE] + (1.0 - signal[PULSE]) * brake
+            steady = lights.tail_candela if lights.on else 0.0
+            power = (steady + (lights.brake_candela - steady) * brake) * facing
         elif kind == BRAKE:
             power = lights.brake_candela * brake * facing
         else:
             power = _MARKER_SHARE * lights.tail_candela * facing
+        if power <= 0.0:
+            continue
         at = out.lamp[j, v, k]
+        at[LAMP_PULSE] = pulse
         at[0] = fx * (rotation[0, 0] * dx + rotation[0, 1] * dy + rotation[0, 2] * dz) / Z + cx
         at[1] = fy * (rotation[1, 0] * dx + rotation[1, 1] * dy + rotation[1, 2] * dz) / Z + cy
         at[2] = Z
@@ -73,13 +101,14 @@ def light_lamps(out: Moments, j: int, v: int, brake: float, look: Look, view: Vi
         power *= look.lamps[v, k, STRENGTH] * math.exp(-lights.beta * Z)
         for c in range(3):
             tint = lights.head_tint[c] if kind == HEAD else lights.tail_tint[c]
+            tint = lights.amber_tint[c] if kind == INDICATOR else tint
             at[LAMP_FLUX + c] = out.fade[j, v] * power * fx * fy / distance2 * tint
         box, reach = out.touch[j, v, 0], 4.0 * at[3]
         box[0], box[1] = min(box[0], at[0] - reach), min(box[1], at[1] - reach)
         box[2], box[3] = max(box[2], at[0] + reach), max(box[3], at[1] + reach)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def hide_lamps(
     out: Moments, j: int, look: Look, eye: FloatArray, lights: Lights, optics: Optics, every: IntArray
 ) -> None:
@@ -94,7 +123,10 @@ def hide_lamps(
             if at[LAMP_FLUX] <= 0.0:
                 continue
             x, y, sin, cos = out.pose[j, v]
-            along = (0.5 if look.lamps[v, k, 2] == HEAD else -0.5) * look.size[v, 0]
+            front = look.lamps[v, k, 2] == HEAD
+            if look.lamps[v, k, 2] == INDICATOR:
+                front = (eye[0] - x) * sin + (eye[1] - y) * cos > 0.0
+            along = (0.5 if front else -0.5) * look.size[v, 0]
             across = look.lamps[v, k, 0] * look.size[v, 1]
             px, py = x + along * sin + across * cos, y + along * cos - across * sin
             pz = look.lamps[v, k, 1]
@@ -117,7 +149,7 @@ def hide_lamps(
                 box[2], box[3] = max(box[2], at[0] + reach), max(box[3], at[1] + reach)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def chord(
     ax: float, ay: float, az: float, bx: float, by: float, bz: float, pose: FloatArray, size: FloatArray
 ) -> float:

@@ -49,7 +49,7 @@ def make_canvas(channels: int) -> TileLayers:
     )
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def insert(
     filled: IntArray, value: FloatArray, p: int, depth: float, cover: float, r: float, g: float, b: float
 ) -> None:
@@ -72,7 +72,7 @@ def insert(
             value[p, at, 2], value[p, at, 3], value[p, at, 4] = r, g, b
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def meets(left: float, top: float, right: float, low: float, row0: int, column0: int) -> bool:
     """Say whether a box (px) meets the tile that begins at (row0, column0).
 

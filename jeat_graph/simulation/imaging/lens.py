@@ -71,11 +71,14 @@ class Lens:
         _add_drops(self.rays, config, camera, rng)
         self._lens = np.array([self.canvas.fx, self.canvas.fy, self.canvas.cx, self.canvas.cy])
 
-    def homography(self, t: float) -> FloatArray:
-        """Matrix (3, 3) that takes a ray (X / Z, Y / Z, 1) of time t (s) to the canvas (px, homogeneous)."""
+    def homography(self, t: float | FloatArray) -> FloatArray:
+        """Matrix (3, 3) that takes a ray (X / Z, Y / Z, 1) of time t (s) to the canvas (px, homogeneous).
+
+        Of J times there are as many (J, 3, 3).
+        """
         fx, fy, cx, cy = self._lens
         matrix: FloatArray = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
-        return matrix @ turn(self.sway.angles(t))
+        return matrix @ turn(self.sway.angles(np.asarray(t)[..., None, None]))
 
     def look(self, picture: FloatArray, t: float, exposure_s: float, readout_s: float) -> FloatArray:
         """What the pixels see of a picture (Hc, Wc, C) on the canvas: (H, W, C).
@@ -96,7 +99,7 @@ class Lens:
                 + readout_s * ((np.arange(rows) + 0.5) / rows - 0.5)
             )
             if self.config.sway_deg > 0.0:
-                maps = np.stack([self.homography(float(one)) for one in moment])
+                maps = self.homography(moment)
             else:
                 maps = np.broadcast_to(self.homography(t), (rows, 3, 3))
             _look(picture, self.rays, np.ascontiguousarray(maps), out)
@@ -242,7 +245,7 @@ def _add_drops(rays: FloatArray, config: LensConfig, camera: Camera, rng: np.ran
         rays[..., 1] += power * (v - at[1]) / camera.fy
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def place_on_canvas(x: float, y: float, m: FloatArray, height: int, width: int) -> tuple[float, float]:
     """Row and column, pixels' centres at whole numbers, of a ray on the canvas, within it."""
     z = m[2, 0] * x + m[2, 1] * y + m[2, 2]
@@ -251,7 +254,7 @@ def place_on_canvas(x: float, y: float, m: FloatArray, height: int, width: int) 
     return min(max(v, 0.0), height - 1.001), min(max(u, 0.0), width - 1.001)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _look(picture: FloatArray, rays: FloatArray, maps: FloatArray, out: FloatArray) -> None:
     """Add what each pixel sees, between the four nearest places of the canvas, by one map (3, 3) a row."""
     height, width, channels = picture.shape

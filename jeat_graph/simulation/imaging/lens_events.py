@@ -13,6 +13,7 @@ from jeat_graph.simulation.imaging.config import ImagingConfig
 from jeat_graph.simulation.imaging.event_pixel import make_model, make_state
 from jeat_graph.simulation.imaging.event_run import SETTLE_STEPS, light_all
 from jeat_graph.simulation.imaging.event_sink import make_sink, to_events
+from jeat_graph.simulation.imaging.lamp_flicker import LampFlicker
 from jeat_graph.simulation.imaging.layers import GLOW
 from jeat_graph.simulation.imaging.lens import Lens
 from jeat_graph.simulation.imaging.lens_interval import LensInterval, Pictures, Sight, light_canvas
@@ -22,7 +23,7 @@ from jeat_graph.simulation.imaging.renderer import Renderer
 from jeat_graph.simulation.imaging.tiles import TILE, TILE_H, TILE_W, tile_raster
 from jeat_graph.simulation.streams import stream
 
-_SWAY_STEP_PX = 1.0  # the mount turns no farther from one sample to the next
+_SWAY_STEP = 0.5  # the mount turns no farther from one sample to the next than this part of a vehicle's step
 _MOST_SWAY_STEPS = 32
 _LARGEST_CHANGE = 45.0  # ln of the largest ratio of luminances, with room to spare
 
@@ -56,36 +57,55 @@ class LensEventCamera:
         self._state = make_state(self._model, first, stream(segment_seed, "evt.noise"))
         least = float(min(self._model.on.min(), self._model.off.min()))
         self._room = TILE * math.ceil(_LARGEST_CHANGE / least + 100.0)
-        self._sight = _sight(lens)
+        self._static = np.ascontiguousarray(renderer.background.whole @ LUMINANCE)
+        self._sight = _sight(lens, _contrast(self._static, self._model.dark))
         self._busy = np.ones(len(self._sight.tiles), dtype=np.bool_)
+        self._seen: tuple[FloatArray, FloatArray] = np.zeros(width * height), np.zeros(width * height)
+        self._lamps = LampFlicker(renderer, True, lens)
         self._begin(picture)
         self._now_us = 0
 
     def advance(self, until_us: int) -> EventArray:
         """Return the events from where the call before ended up to `until_us`."""
         r, start, end = self.renderer, 1e-6 * self._now_us, 1e-6 * until_us
-        plan = r.plan(start, end)
-        path = self.lens.canvas.fx * self.lens.sway.speed() * (end - start)
-        shakes = 1
-        while shakes < path / _SWAY_STEP_PX and shakes < _MOST_SWAY_STEPS:
-            shakes *= 2
+        plan = r.plan(start, end, for_events=True)
+        shakes = max(self._shakes(start, end), self._lamps.steps(end - start))
         count = max(plan.most, shakes, SETTLE_STEPS)
         times = self._now_us + (until_us - self._now_us) * np.arange(count + 1, dtype=np.float64) / count
-        moments = r.moments(1e-6 * times[1:], plan.look, plan.every * (count // plan.most))
+        moments = r.moments(1e-6 * times[1:], plan.look, plan.every * (count // plan.most), for_events=True)
         stage = r.stage(moments, plan.look, channels=1)
         keys = light_canvas(r.tiles, plan.boxes, plan.lit, stage, self._glowing, self._light)
-        maps = np.stack([self.lens.homography(1e-6 * float(t)) for t in times[1:]])
-        work = LensInterval(r.tiles, plan.boxes, plan.steps, *keys, times, maps, shakes, self._busy)
+        maps = self.lens.homography(1e-6 * times)
+        work = LensInterval(
+            r.tiles,
+            plan.boxes,
+            plan.steps,
+            *keys,
+            times,
+            maps,
+            shakes,
+            self._busy,
+            *self._seen,
+            self._lamps.within(1e-6 * times),
+        )
         sink = make_sink(max(1 << 18, 2 * self._room))
         sink = run_lens(work, self._pictures, self._sight, stage, self._model, self._state, sink, self._room)
         self._now_us = until_us
         return to_events(sink, self._width)
 
+    def _shakes(self, start: float, end: float) -> int:
+        """How often all pixels look from one time to another (s), a power of two."""
+        turns = self.lens.sway.angles(np.linspace(start, end, _MOST_SWAY_STEPS + 1)[:, None, None])
+        path = self.lens.canvas.fx * np.hypot(*np.diff(turns[:, :2], axis=0).T)
+        shakes, most = 1, self.renderer.config.max_step_px * _SWAY_STEP
+        while shakes < _MOST_SWAY_STEPS and path.reshape(shakes, -1).sum(axis=1).max() > most:
+            shakes *= 2
+        return shakes
+
     def _begin(self, first: FloatArray) -> None:
         """Take picture (H, W) and light that there are at the beginning."""
         r = self.renderer
-        static = np.ascontiguousarray(r.background.whole @ LUMINANCE)
-        self._pictures = Pictures(static, first.copy(), first.copy(), first.copy(), first.copy())
+        self._pictures = Pictures(self._static, first.copy(), first.copy(), first.copy(), first.copy())
         self._glowing = np.zeros(len(r.tiles), dtype=np.bool_)
         self._light = np.zeros((len(r.tiles), TILE, GLOW + 1))
         plan = r.plan(0.0, 0.0)
@@ -93,8 +113,21 @@ class LensEventCamera:
         light_all(r.tiles, plan.boxes, plan.lit, stage, self._glowing, self._light)
 
 
-def _sight(lens: Lens) -> Sight:
-    """Where the tiles of pixels look."""
+def _contrast(static: FloatArray, dark: float) -> FloatArray:
+    """Relative change of luminance between neighbours in a picture (H, W), by rows and columns of tiles."""
+    level = np.log(static + dark)
+    change = np.zeros_like(level)
+    np.maximum(change[:, :-1], np.abs(np.diff(level, axis=1)), out=change[:, :-1])
+    np.maximum(change[:-1], np.abs(np.diff(level, axis=0)), out=change[:-1])
+    high, wide = -(-level.shape[0] // TILE_H), -(-level.shape[1] // TILE_W)
+    padded = np.zeros((high * TILE_H, wide * TILE_W))
+    padded[: level.shape[0], : level.shape[1]] = change
+    out: FloatArray = padded.reshape(high, TILE_H, wide, TILE_W).max(axis=(1, 3))
+    return out
+
+
+def _sight(lens: Lens, contrast: FloatArray) -> Sight:
+    """Where the tiles of pixels look; `contrast` is of the canvas, by its rows and columns of tiles."""
     tiles = tile_raster(lens.rays.shape[1], lens.rays.shape[0])
     reach = _reach(lens, tiles)
     across, down = -(-lens.canvas.width // TILE_W), -(-lens.canvas.height // TILE_H)
@@ -105,7 +138,20 @@ def _sight(lens: Lens) -> Sight:
                 seen_by[row * across + column].append(s)
     first = np.cumsum([0, *(len(those) for those in seen_by)], dtype=np.int64)
     flat = np.array([s for those in seen_by for s in those], dtype=np.int64)
-    return Sight(tiles, np.ascontiguousarray(lens.rays), reach, first, flat)
+    middle, spread = _spread(lens, tiles)
+    return Sight(tiles, np.ascontiguousarray(lens.rays), reach, first, flat, middle, spread, contrast)
+
+
+def _spread(lens: Lens, tiles: IntArray) -> tuple[FloatArray, FloatArray]:
+    """`middle` and `spread` of a sight."""
+    rest = np.array([[lens.canvas.fx, 0.0, lens.canvas.cx], [0.0, lens.canvas.fy, lens.canvas.cy]])
+    place = lens.rays @ rest[:, :2].T + rest[:, 2]
+    at = np.minimum(tiles + np.array([TILE_H // 2, TILE_W // 2]), np.array(place.shape[:2]) - 1)
+    middle, spread = lens.rays[at[:, 0], at[:, 1]], np.zeros((len(tiles), 4))
+    for n, (row, column) in enumerate(tiles.tolist()):
+        part = place[row : row + TILE_H, column : column + TILE_W].reshape(-1, 2) - place[at[n, 0], at[n, 1]]
+        spread[n] = part[:, 1].min(), part[:, 1].max(), part[:, 0].min(), part[:, 0].max()
+    return np.ascontiguousarray(middle), spread
 
 
 def _reach(lens: Lens, tiles: IntArray) -> IntArray:

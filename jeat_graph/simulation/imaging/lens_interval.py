@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
-from jeat_graph.simulation.imaging.event_run import MAX_KEYS, key_lights
+from jeat_graph.simulation.imaging.event_run import MAX_KEYS, Flicker, key_lights
 from jeat_graph.simulation.imaging.layers import GLOW
 from jeat_graph.simulation.imaging.painter import take_ground
 from jeat_graph.simulation.imaging.plan import who_touches
@@ -35,6 +35,11 @@ class Sight(NamedTuple):
         reach: (S, 4) first and last row and column of the canvas's tiles that each may look at.
         first: (T + 1,) where in `seen_by` those begin that may look at a tile of the canvas.
         seen_by: tiles of pixels.
+        middle: (S, 2) ray of a pixel in the middle of each tile.
+        spread: (S, 4) from the place of that pixel to the first and last row and column that the tile's
+            pixels look at, the mount at rest (px).
+        contrast: relative change of luminance from one pixel of the static canvas to the next, at most, by
+            rows and columns of its tiles.
     """
 
     tiles: IntArray
@@ -42,6 +47,9 @@ class Sight(NamedTuple):
     reach: IntArray
     first: IntArray
     seen_by: IntArray
+    middle: FloatArray
+    spread: FloatArray
+    contrast: FloatArray
 
 
 class LensInterval(NamedTuple):
@@ -54,9 +62,12 @@ class LensInterval(NamedTuple):
         first: (T + 1,) where each tile's keys of light begin.
         light: (K, P, 3) keys of light of beams and glow, evenly spaced over the interval.
         times_us: (J + 1,) beginning, and ends of the steps (µs).
-        maps: (J, 3, 3) from rays to the canvas at the ends of the steps.
+        maps: (J + 1, 3, 3) from rays to the canvas at those times.
         shakes: how often all pixels look.
-        busy: (S,) tiles whose pixels saw something move in the interval before; changed.
+        busy: (S,) tiles whose photoreceptors still followed at the end of the interval before; changed.
+        since: (N,) from when on each pixel is still to be taken (µs); changed.
+        before: (N,) luminance that each saw when its tile looked last (cd/m²); changed.
+        flicker: street lamps that flicker.
     """
 
     tiles: IntArray
@@ -68,9 +79,12 @@ class LensInterval(NamedTuple):
     maps: FloatArray
     shakes: int
     busy: BoolArray
+    since: FloatArray
+    before: FloatArray
+    flicker: Flicker
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def light_canvas(
     tiles: IntArray, boxes: FloatArray, lit: IntArray, stage: Stage, glowing: BoolArray, now: FloatArray
 ) -> tuple[IntArray, FloatArray]:

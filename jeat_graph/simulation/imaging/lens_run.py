@@ -11,7 +11,8 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.simulation.imaging.event_pixel import PixelModel, PixelState, advance
+from jeat_graph.simulation.imaging.event_pixel import LUMINANCE as SEEN
+from jeat_graph.simulation.imaging.event_pixel import OUTPUT, SIGNAL, PixelModel, PixelState, advance
 from jeat_graph.simulation.imaging.event_run import COARSE, SETTLE_STEPS, UNNOTICED, any_touch
 from jeat_graph.simulation.imaging.event_sink import EventSink, with_room
 from jeat_graph.simulation.imaging.lens import place_on_canvas
@@ -21,8 +22,11 @@ from jeat_graph.simulation.imaging.plan import who_touches
 from jeat_graph.simulation.imaging.stage import Stage
 from jeat_graph.simulation.imaging.tiles import TILE, TILE_H, TILE_W
 
+_LATER = 0.04  # relative change of a pixel that may wait: a fifth of what makes an event
+_SLACK_PX = 1.5  # about what a tile of pixels looks at: the step of the mount's turn and what its roll does
 
-@njit(cache=True)
+
+@njit(cache=True, error_model="numpy")
 def copy_tile(row0: int, column0: int, source: FloatArray, target: FloatArray) -> None:
     """Copy a tile of one picture (H, W) to another."""
     for row in range(row0, min(row0 + TILE_H, source.shape[0])):
@@ -30,7 +34,7 @@ def copy_tile(row0: int, column0: int, source: FloatArray, target: FloatArray) -
             target[row, column] = source[row, column]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def run_lens(
     work: LensInterval, pictures: Pictures, sight: Sight, stage: Stage, model: PixelModel, state: PixelState,
     sink: EventSink, room: int,
@@ -52,11 +56,20 @@ def run_lens(
             end[n] = -1
             copy_tile(tiles[n, 0], tiles[n, 1], pictures.static, pictures.now)
             copy_tile(tiles[n, 0], tiles[n, 1], pictures.static, pictures.after)
+    touched = np.zeros(len(busy), dtype=np.bool_)
+    for s in range(len(busy)):
+        for row in range(reach[s, 0], reach[s, 1] + 1):
+            for column in range(reach[s, 2], reach[s, 3] + 1):
+                touched[s] |= end[row * across + column] >= 0
+    work.since[:] = times_us[0]
+    flickers = work.flicker.steps > 1
+    foot = np.zeros((len(busy), 4), dtype=np.int64)
     last = np.zeros(len(sight.tiles), dtype=np.int64)
     due, waiting = np.empty(len(sight.tiles), dtype=np.int64), np.zeros(len(sight.tiles), dtype=np.bool_)
     for step in range(1, count + 1):
         dues = 0
         everywhere = step % (count // work.shakes) == 0
+        _footprints(work.maps[step], sight, pictures.now, foot)
         for k in range(actives):
             n = active[k]
             if end[n] == step - 1:
@@ -65,11 +78,21 @@ def run_lens(
             if end[n] == step and not everywhere:
                 for at in range(sight.first[n], sight.first[n + 1]):
                     s = sight.seen_by[at]
-                    if not waiting[s]:
+                    here = foot[s, 0] <= n // across <= foot[s, 1] and foot[s, 2] <= n % across <= foot[s, 3]
+                    if here and not waiting[s]:
                         waiting[s] = True
                         due[dues] = s
                         dues += 1
         for s in range(len(due)):
+            if everywhere and step < count and not touched[s] and not busy[s] and not flickers:
+                # What is plain shows nothing new to a mount that turns a little.
+                way = _way(s, work.maps[last[s]], work.maps[step], sight, pictures.now)
+                most = 0.0
+                for row in range(foot[s, 0], foot[s, 1] + 1):
+                    for column in range(foot[s, 2], foot[s, 3] + 1):
+                        most = max(most, sight.contrast[row, column])
+                if most * way < _LATER:
+                    continue
             # Photoreceptors follow for a while after what they saw.
             if everywhere or (busy[s] and step % (count // SETTLE_STEPS) == 0 and not waiting[s]):
                 due[dues] = s
@@ -77,34 +100,21 @@ def run_lens(
         for k in range(dues):
             s = due[k]
             waiting[s] = False
-            for row in range(reach[s, 0], reach[s, 1] + 1):
-                for column in range(reach[s, 2], reach[s, 3] + 1):
+            for row in range(foot[s, 0], foot[s, 1] + 1):
+                for column in range(foot[s, 2], foot[s, 3] + 1):
                     n = row * across + column
                     if end[n] >= 0 and fresh[n] != step:
                         fresh[n] = step
                         _bring(tiles[n, 0], tiles[n, 1], (step - begin[n]) / (end[n] - begin[n]), pictures)
             sink = with_room(sink, room)
-            _look(
-                s,
-                times_us[last[s]],
-                times_us[step],
-                work.maps[step - 1],
-                sight,
-                pictures.now,
-                model,
-                state,
-                sink,
-            )
+            following = _look(s, last[s], step, work, sight, pictures.now, model, state, sink)
+            if step == count:
+                busy[s] = following
             last[s] = step
-    for s in range(len(busy)):
-        busy[s] = False
-        for row in range(reach[s, 0], reach[s, 1] + 1):
-            for column in range(reach[s, 2], reach[s, 3] + 1):
-                busy[s] |= end[row * across + column] >= 0
     return sink
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _next_painting(
     n: int, start: int, count: int, work: LensInterval, pictures: Pictures, stage: Stage, dark: float,
     until: IntArray,
@@ -134,7 +144,7 @@ def _next_painting(
     return start + stride
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _paint(
     n: int, step: int, keys: int, work: LensInterval, static: FloatArray, stage: Stage, picture: FloatArray
 ) -> None:
@@ -161,7 +171,7 @@ def _paint(
             picture[row0 + r, column0 + c] = canvas.out[r * TILE_W + c, 0]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _differ(row0: int, column0: int, one: FloatArray, other: FloatArray, dark: float) -> bool:
     """Say whether a tile of two pictures differs by more than would go unnoticed."""
     for row in range(row0, min(row0 + TILE_H, one.shape[0])):
@@ -171,7 +181,7 @@ def _differ(row0: int, column0: int, one: FloatArray, other: FloatArray, dark: f
     return False
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _bring(row0: int, column0: int, share: float, pictures: Pictures) -> None:
     """Bring a tile of the canvas to its place between two paintings."""
     before, after, now = pictures.before, pictures.after, pictures.now
@@ -180,18 +190,48 @@ def _bring(row0: int, column0: int, share: float, pictures: Pictures) -> None:
             now[row, column] = before[row, column] + share * (after[row, column] - before[row, column])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
+def _footprints(m: FloatArray, sight: Sight, now: FloatArray, foot: IntArray) -> None:
+    """First and last row and column of the canvas's tiles (S, 4) that tiles of pixels look at by a map."""
+    high, wide = now.shape
+    for s in range(len(foot)):
+        v, u = place_on_canvas(sight.middle[s, 0], sight.middle[s, 1], m, high, wide)
+        spread = sight.spread[s]
+        foot[s, 0] = max(int(v + spread[0] - _SLACK_PX), 0) // TILE_H
+        foot[s, 1] = min(int(v + spread[1] + _SLACK_PX) + 1, high - 1) // TILE_H
+        foot[s, 2] = max(int(u + spread[2] - _SLACK_PX), 0) // TILE_W
+        foot[s, 3] = min(int(u + spread[3] + _SLACK_PX) + 1, wide - 1) // TILE_W
+
+
+@njit(cache=True, error_model="numpy")
+def _way(s: int, before: FloatArray, after: FloatArray, sight: Sight, now: FloatArray) -> float:
+    """How far (px along rows and columns) the middle of a tile of pixels has gone over the canvas."""
+    x, y = sight.middle[s, 0], sight.middle[s, 1]
+    v0, u0 = place_on_canvas(x, y, before, now.shape[0], now.shape[1])
+    v1, u1 = place_on_canvas(x, y, after, now.shape[0], now.shape[1])
+    return abs(v1 - v0) + abs(u1 - u0)
+
+
+@njit(cache=True, error_model="numpy")
 def _look(
-    s: int, start: float, end: float, m: FloatArray, sight: Sight, now: FloatArray, model: PixelModel,
+    s: int, last: int, step: int, work: LensInterval, sight: Sight, now: FloatArray, model: PixelModel,
     state: PixelState, sink: EventSink,
-) -> None:  # fmt: skip
-    """Let a tile of pixels see the canvas, and put their events. Nine parameters: the kernels' own tables."""
-    rays = sight.rays
+) -> bool:  # fmt: skip
+    """Let a tile of pixels see the canvas, and put their events. Nine parameters: the kernels' own tables.
+
+    It says whether any photoreceptor still follows what it saw. Pixels that see next to nothing new wait:
+    their change is taken at once when it is enough to be noticed, or at the interval's end.
+    """
+    rays, memory, dark = sight.rays, state.table, model.dark
     height, width = rays.shape[:2]
     high, wide = now.shape
-    pixels, luminance = np.empty(TILE, dtype=np.int64), np.empty(TILE)
+    m, since, before, flicker = work.maps[step], work.since, work.before, work.flicker
+    start, end, all_of_them = work.times_us[last], work.times_us[step], step == len(work.times_us) - 1
+    late, pixels = np.empty(TILE, dtype=np.int64), np.empty(TILE, dtype=np.int64)
+    first, luminance = np.empty(TILE), np.empty(TILE)
+    begun, going = np.empty(TILE), np.empty(TILE)
     row0, column0 = sight.tiles[s]
-    used = 0
+    lates = used = 0
     for row in range(row0, min(row0 + TILE_H, height)):
         for column in range(column0, min(column0 + TILE_W, width)):
             v, u = place_on_canvas(rays[row, column, 0], rays[row, column, 1], m, high, wide)
@@ -199,7 +239,25 @@ def _look(
             a, b = v - r, u - c
             top = now[r, c] + b * (now[r, c + 1] - now[r, c])
             low = now[r + 1, c] + b * (now[r + 1, c + 1] - now[r + 1, c])
-            pixels[used] = row * width + column
-            luminance[used] = top + a * (low - top)
-            used += 1
-    advance(pixels[:used], luminance[:used], start, end, False, model, state, sink)
+            seen, i = top + a * (low - top), row * width + column
+            if flicker.steps > 1:
+                seen *= 1.0 + flicker.share[i] * flicker.change[step]
+            old = memory[i, SEEN]
+            same = abs(seen - old) <= _LATER * (old + dark)
+            same = same and abs(memory[i, OUTPUT] - memory[i, SIGNAL]) <= _LATER
+            if not same and since[i] < start:
+                late[lates], first[lates], begun[lates] = i, before[i], since[i]
+                lates += 1
+                since[i] = start
+            before[i] = seen
+            if not same or all_of_them:
+                pixels[used], luminance[used], going[used] = i, seen, since[i]
+                used += 1
+                since[i] = end
+    if lates:
+        advance(late[:lates], first[:lates], begun, start, False, model, state, sink)
+    advance(pixels[:used], luminance[:used], going, end, False, model, state, sink)
+    following = 0.0
+    for n in range(used):
+        following = max(following, abs(memory[pixels[n], OUTPUT] - memory[pixels[n], SIGNAL]))
+    return following > _LATER

@@ -13,6 +13,7 @@ from jeat_graph.simulation.imaging.config import RenderConfig
 from jeat_graph.simulation.imaging.smooth import clamp01
 from jeat_graph.simulation.world.bend import bend_points
 from jeat_graph.simulation.world.scene import Scene
+from jeat_graph.simulation.world.surroundings import FIXED
 
 _RED, _GREEN, _BLUE = 0.2126, 0.7152, 0.0722  # of linear sRGB primaries (ITU-R BT.709)
 LUMINANCE = np.array([_RED, _GREEN, _BLUE])
@@ -24,7 +25,7 @@ _FLOOR_CD_M2 = 0.005  # what a pixel's dark current is worth
 _BEAM_SHARE, _BEAM_MIN_M, _BEAM_MAX_M = 0.005, 6.0, 90.0
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def luminance(red: float, green: float, blue: float) -> float:
     """Luminance of a colour in linear sRGB."""
     return _RED * red + _GREEN * green + _BLUE * blue
@@ -55,6 +56,7 @@ class Lights(NamedTuple):
         lamp_candela: intensity of one lamp (cd).
         beta: extinction of the air (1/m).
         on: whether vehicles have their lights on.
+        signals: whether any lamps are drawn; by day those that brake or turn show.
         beam_candela: peak of a vehicle's low beams (cd).
         beam_stray: share of it above the cut-off.
         beam_range_m: distance at which beams are cut off.
@@ -62,11 +64,13 @@ class Lights(NamedTuple):
         tail_candela: of one tail light (cd).
         brake_candela: of one brake light (cd).
         parking_candela: of one light of a parked vehicle (cd).
+        indicator_candela: of one indicator (cd).
         sky_tint: (3,) colour of the sky's light, luminance 1.
         sun_tint: (3,) the same of the sun.
         lamp_tint: (3,) the same of the lamps.
         head_tint: (3,) the same of headlights.
         tail_tint: (3,) the same of tail lights.
+        amber_tint: (3,) the same of indicators.
     """
 
     sky_lux: float
@@ -76,6 +80,7 @@ class Lights(NamedTuple):
     lamp_candela: float
     beta: float
     on: bool
+    signals: bool
     beam_candela: float
     beam_stray: float
     beam_range_m: float
@@ -83,11 +88,13 @@ class Lights(NamedTuple):
     tail_candela: float
     brake_candela: float
     parking_candela: float
+    indicator_candela: float
     sky_tint: FloatArray
     sun_tint: FloatArray
     lamp_tint: FloatArray
     head_tint: FloatArray
     tail_tint: FloatArray
+    amber_tint: FloatArray
 
 
 class Surface(NamedTuple):
@@ -136,6 +143,7 @@ def lights_of(scene: Scene, config: RenderConfig) -> Lights:
         lamp_candela=light.lamp_candela,
         beta=_KOSCHMIEDER / config.fog_m if config.fog_m > 0.0 else 0.0,
         on=not day or config.fog_m > 0.0,
+        signals=not day or config.fog_m > 0.0 or scene.around != FIXED,
         beam_candela=config.headlight_candela,
         beam_stray=config.headlight_stray,
         beam_range_m=min(max(reach, _BEAM_MIN_M), _BEAM_MAX_M),
@@ -143,15 +151,17 @@ def lights_of(scene: Scene, config: RenderConfig) -> Lights:
         tail_candela=config.taillight_candela,
         brake_candela=config.brakelight_candela,
         parking_candela=config.parking_candela,
+        indicator_candela=config.indicator_candela,
         sky_tint=_sky_tint(day, share),
         sun_tint=_tint(1.05 + 0.6 * low, 1.0, 0.9 - 0.5 * low),
         lamp_tint=_tint(1.0, 0.78, 0.45),
         head_tint=_tint(1.0, 1.0, 0.95),
         tail_tint=_tint(1.0, 0.06, 0.04),
+        amber_tint=_tint(1.0, 0.32, 0.01),
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def lamp_lux(at: Surface, lights: Lights) -> float:
     """Illuminance of a surface by all street lamps (lux)."""
     total = 0.0
@@ -164,7 +174,7 @@ def lamp_lux(at: Surface, lights: Lights) -> float:
     return total
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def beam_candela(forward: float, right: float, up: float, peak: float, stray: float) -> float:
     """Intensity of a vehicle's low beams towards a place, given from the lamps along the vehicle's axes (m).
 
@@ -185,7 +195,7 @@ def beam_candela(forward: float, right: float, up: float, peak: float, stray: fl
     return peak * (stray * wide + (1.0 - stray) * edge * steep * across)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def beam_lux(at: Surface, lamps: Headlamps, lights: Lights) -> float:
     """Illuminance of a surface by one vehicle's beams (lux)."""
     dx, dy, dz = at.x - lamps.x, at.y - lamps.y, at.z - LAMP_HEIGHT_M

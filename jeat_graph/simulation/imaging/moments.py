@@ -26,6 +26,9 @@ class Look(NamedTuple):
         shape: (V, PARTS, 9) bodies as fractions of the size, and their paint (see `shapes`).
         lamps: (V, LAMPS, 4) across (of the width), height (m), kind and strength (see `lamps`).
         beams: (V,) true where headlights shine on the road.
+        blink_hz: (V,) rate of the indicators.
+        hazard: (V,) true where both flash while the vehicle stands.
+        led: (V,) true where the tail lamps are LED.
     """
 
     kind: IntArray
@@ -38,6 +41,9 @@ class Look(NamedTuple):
     shape: FloatArray
     lamps: FloatArray
     beams: BoolArray
+    blink_hz: FloatArray
+    hazard: BoolArray
+    led: BoolArray
 
 
 # A body's record: sides and faces seen, box, nearest and farthest depth, outline, then a record a face.
@@ -47,7 +53,10 @@ FACE_PLANE, FACE_LIGHT, FACE_SLANT, FACE_SIDE, FACE_RECORD = 1, 4, 7, 8, 20
 PAINT = FACE + 3 * FACE_RECORD  # what it is painted as
 BODY_RECORD = PAINT + 1
 # A lamp's record: u, v (px), depth (m), size (px), flux in three channels, part seen, reach of its glow (px).
-LAMP_FLUX, LAMP_SEEN, LAMP_REACH, LAMP_RECORD = 4, 7, 8, 9
+# and the part of the mean flux that a pulsed lamp has now (its glow is that of the mean).
+LAMP_FLUX, LAMP_SEEN, LAMP_REACH, LAMP_PULSE, LAMP_RECORD = 4, 7, 8, 9, 10
+# Of a vehicle's signals: how hard it brakes, how bright its left and right indicators are, its LED's pulse.
+BRAKES, LEFT_ON, PULSE = 0, 1, 3
 
 
 class Moments(NamedTuple):
@@ -86,13 +95,14 @@ class Placed(NamedTuple):
         times: (J,) s.
         pose: (J, V, 4) x, y (m), sine and cosine of the direction of the vehicle's front.
         fade: (J, V) how visible each is, 0 where it is not there or out of range, up to 1.
-        brake: (J, V) how hard it brakes, 0 to 1.
+        signal: (J, V, 4) how hard it brakes, how bright its left and right indicators are (0 to 1), and the
+            pulse of its LED lamps (of their mean).
     """
 
     times: FloatArray
     pose: FloatArray
     fade: FloatArray
-    brake: FloatArray
+    signal: FloatArray
 
 
 def line_up(states: VehicleStates, number: IntArray, times: FloatArray, far_m: float) -> Placed:
@@ -106,7 +116,8 @@ def line_up(states: VehicleStates, number: IntArray, times: FloatArray, far_m: f
     """
     column = np.minimum(np.searchsorted(number, states.object_id), max(len(number) - 1, 0))
     shape = (len(times), len(number))
-    out = Placed(times, np.zeros((*shape, 4)), np.zeros(shape), np.zeros(shape))
+    out = Placed(times, np.zeros((*shape, 4)), np.zeros(shape), np.zeros((*shape, 4)))
+    out.signal[..., PULSE] = 1.0
     if not len(number):
         return out
     known = number[column] == states.object_id
@@ -122,5 +133,5 @@ def line_up(states: VehicleStates, number: IntArray, times: FloatArray, far_m: f
     # Who stands in a lane has a foot on the brake.
     speed = np.hypot(states.velocity[:, 0], states.velocity[:, 1])
     held = np.where(states.parked, 0.0, np.clip(1.5 - speed, 0.0, 1.0))
-    out.brake[at] = np.maximum(np.clip((-ahead - 0.6) / 0.8, 0.0, 1.0), held)[known]
+    out.signal[(*at, BRAKES)] = np.maximum(np.clip((-ahead - 0.6) / 0.8, 0.0, 1.0), held)[known]
     return out

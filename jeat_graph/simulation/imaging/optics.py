@@ -34,7 +34,7 @@ def optics_of(camera: Camera, config: RenderConfig) -> Optics:
     return Optics(config.glare_share, core, reach, config.glare_share / total)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def glow_at(r2: float, optics: Optics) -> float:
     """Part of a source's light that glow puts into a pixel at squared distance `r2` (px²)."""
     limit = optics.reach_px * optics.reach_px
@@ -45,7 +45,7 @@ def glow_at(r2: float, optics: Optics) -> float:
     return part * window * window
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def core_at(r2: float, sigma: float, optics: Optics) -> float:
     """Part of a source's light in a pixel at squared distance `r2` of its image of size `sigma` (px)."""
     variance = sigma * sigma
@@ -57,7 +57,7 @@ def core_at(r2: float, sigma: float, optics: Optics) -> float:
     return part * window * window
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def splat_glow(out: FloatArray, u: float, v: float, sigma: float, flux: FloatArray, optics: Optics) -> None:
     """Add core and glow of a source at (u, v) with radiance sum `flux` (3,) to a picture (H, W, 3)."""
     height, width = out.shape[:2]

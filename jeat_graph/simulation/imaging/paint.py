@@ -54,7 +54,7 @@ class Body(NamedTuple):
     salt: int
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def paint(
     body: Body, face: int, along: float, across: float, z: float, soft: float
 ) -> tuple[float, float, float, float]:
@@ -163,7 +163,7 @@ def paint(
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _coach(
     face: int, along: float, w: float, h: float, length: float, width: float, height: float, soft: float,
     colour: tuple[float, float, float],

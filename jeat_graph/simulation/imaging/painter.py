@@ -21,7 +21,7 @@ from jeat_graph.simulation.imaging.streaks import add_streaks
 from jeat_graph.simulation.imaging.tiles import TILE_H, TILE_W, Tile
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def take_ground(row0: int, column0: int, packed: FloatArray, ground: FloatArray) -> Tile:
     """Copy a tile's part of the static picture to where it is at hand; returns the tile."""
     height, width = packed.shape[:2]
@@ -32,7 +32,7 @@ def take_ground(row0: int, column0: int, packed: FloatArray, ground: FloatArray)
     return tile
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def light_tile(tile: Tile, j: int, who: IntArray, counts: IntArray, stage: Stage, light: FloatArray) -> None:
     """Light of beams and glow over a tile at time `j`.
 
@@ -52,7 +52,7 @@ def light_tile(tile: Tile, j: int, who: IntArray, counts: IntArray, stage: Stage
         add_glow(tile, moments.lamp[j, who[1, n]], stage.optics, light)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def paint_tile(tile: Tile, j: int, who: IntArray, counts: IntArray, stage: Stage, light: FloatArray) -> bool:
     """Render a tile at time `j` onto the canvas; says whether any vehicle touched it.
 
@@ -108,7 +108,7 @@ def paint_tile(tile: Tile, j: int, who: IntArray, counts: IntArray, stage: Stage
     return touched
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def compose(tile: Tile, shaded: bool, scene: FloatArray, light: FloatArray, canvas: TileLayers) -> None:
     """Lay everything over the ground, from far to near.
 
@@ -153,7 +153,7 @@ def compose(tile: Tile, shaded: bool, scene: FloatArray, light: FloatArray, canv
                 out[p, k] = (level + ground[p, glow + k] + light[p, GLOW + k]) * ground[p, GAIN]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def _airlight(scene: FloatArray, channel: int, channels: int) -> float:
     """Radiance of endless fog in a channel (cd/m²)."""
     out: float = scene[AIR + channel]

@@ -12,7 +12,7 @@ _STEP, _MIX1, _MIX2 = (np.uint64(v) for v in (0x9E3779B97F4A7C15, 0xBF58476D1CE4
 _S30, _S27, _S31, _S11 = (np.uint64(v) for v in (30, 27, 31, 11))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def uniform(state: npt.NDArray[np.uint64], i: int) -> float:
     """Next number in [0, 1) of stream `i` (SplitMix64: Steele, Lea, Flood 2014)."""
     state[i] += _STEP
@@ -23,7 +23,7 @@ def uniform(state: npt.NDArray[np.uint64], i: int) -> float:
     return float(z >> _S11) * (1.0 / 9007199254740992.0)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def exponential(state: npt.NDArray[np.uint64], i: int, rate: float) -> float:
     """Waiting time of a Poisson process with `rate`; infinite for rate 0."""
     if rate <= 0.0:
@@ -31,7 +31,7 @@ def exponential(state: npt.NDArray[np.uint64], i: int, rate: float) -> float:
     return -math.log(1.0 - uniform(state, i)) / rate
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def normal(state: npt.NDArray[np.uint64], i: int) -> float:
     """Standard normal number (Box, Muller 1958)."""
     radius = math.sqrt(-2.0 * math.log(1.0 - uniform(state, i)))

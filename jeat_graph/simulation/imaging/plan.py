@@ -52,7 +52,8 @@ def make_plan(
 
     Args:
         moments: the vehicles at the interval's beginning, middle and end.
-        velocity: (V, 2) greatest speed across and along each vehicle's way (m/s).
+        velocity: (V, 3) greatest speed across and along each vehicle's way (m/s), and how often it is
+            painted at least.
         look: the vehicles.
         tiles: (T, 2) first row and column of the tiles.
         view: the camera.
@@ -71,7 +72,7 @@ def make_plan(
     way = np.zeros((len(look.kind), 2))
     for j in range(len(moments.times)):
         way = np.where(moments.fade[j][:, None] > 0.0, moments.pose[j, :, 2:], way)
-    motion = np.column_stack([velocity, way])
+    motion = np.column_stack([velocity[:, :2], way, velocity[:, 2]])
     steps, lit, needed = _plan(
         tiles, boxes, motion, near, np.ascontiguousarray(look.size[:, 2]), view, duration_s, step_px
     )
@@ -79,7 +80,7 @@ def make_plan(
     return Plan(look, boxes, steps, lit, count, count // np.maximum(needed, 1))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def who_touches(row0: int, column0: int, boxes: FloatArray, who: IntArray, counts: IntArray) -> int:
     """List the vehicles whose bodies, glow and beams may touch a tile.
 
@@ -107,7 +108,7 @@ def who_touches(row0: int, column0: int, boxes: FloatArray, who: IntArray, count
     return int(counts[0] + counts[1] + counts[2])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _plan(
     tiles: IntArray, boxes: FloatArray, motion: FloatArray, near: FloatArray, top: FloatArray, view: View,
     duration: float, step_px: float,
@@ -152,7 +153,7 @@ def _plan(
                     flow /= _GLOW_EASE
                 elif kind == 2:
                     flow = min(flow / _BEAM_EASE, duration * along / (_BEAM_STEP_M * step_px))
-                most = max(most, flow)
+                most = max(most, flow, motion[v, 4] if kind < 2 else 1.0)
             count = 1
             while count < most and count < MAX_STEPS:
                 count *= 2

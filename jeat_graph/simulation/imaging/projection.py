@@ -63,13 +63,13 @@ def project_moments(
         lamp=np.zeros((count, vehicles, LAMPS, LAMP_RECORD)),
         touch=np.zeros((count, vehicles, 3, 4)),
     )
-    _project(out, placed.brake, look, every, view, lights, optics)
+    _project(out, placed.signal, look, every, view, lights, optics)
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _project(
-    out: Moments, brake: FloatArray, look: Look, every: IntArray, view: View, lights: Lights, optics: Optics
+    out: Moments, signal: FloatArray, look: Look, every: IntArray, view: View, lights: Lights, optics: Optics
 ) -> None:
     fx, fy, cx, cy = view.lens[0], view.lens[1], view.lens[2], view.lens[3]
     eye, rotation = view.eye, view.rotation
@@ -155,13 +155,13 @@ def _project(
                         sides += 1
                 record[SIDES] = sides
             touch(out, j, v, look, view, lights)
-            if lights.on:
-                light_lamps(out, j, v, brake[j, v], look, view, lights)
+            if lights.signals:
+                light_lamps(out, j, v, signal[j, v], look, view, lights)
         if lights.on:
             hide_lamps(out, j, look, eye, lights, optics, every)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _in_front(
     x: float, y: float, sin: float, cos: float, wide: float, high: float, eye: FloatArray, forward: FloatArray
 ) -> tuple[float, float]:
@@ -177,7 +177,7 @@ def _in_front(
     return (np.inf if base < NEAR_M else -np.inf), np.inf
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _face_plane(plane: FloatArray, face: Surface, facing: float, view: View) -> None:
     """Write the depth plane (3,) of a face whose plane lies `facing` m before the eye."""
     fx, fy, cx, cy = view.lens[0], view.lens[1], view.lens[2], view.lens[3]
@@ -191,7 +191,7 @@ def _face_plane(plane: FloatArray, face: Surface, facing: float, view: View) -> 
     plane[2] = scale * (n2 - n0 * cx / fx - n1 * cy / fy)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _face_sides(sides: FloatArray, f: int, pixel: FloatArray) -> None:
     """Write the half-planes (12,) of face `f` from the pixels (8, 3) of its body's corners."""
     centre = (pixel[FACE_CORNERS[f, 0]] + pixel[FACE_CORNERS[f, 2]]) / 2.0
@@ -200,7 +200,7 @@ def _face_sides(sides: FloatArray, f: int, pixel: FloatArray) -> None:
         _half_plane(start, end, centre, sides[3 * k : 3 * k + 3])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _half_plane(p: FloatArray, q: FloatArray, inside: FloatArray, out: FloatArray) -> None:
     """Write the half-plane beyond the line through two pixels, on the side of a third."""
     a, b = p[1] - q[1], q[0] - p[0]

@@ -12,7 +12,7 @@ from jeat_graph.data.arrays import FloatArray
 LEAST_M = 0.5  # nothing is seen that is nearer to the camera
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def road_place(x: float, y: float, curvature: float) -> tuple[float, float]:
     """Place across and along the road of a place in the world (m)."""
     if curvature == 0.0:
@@ -23,7 +23,7 @@ def road_place(x: float, y: float, curvature: float) -> tuple[float, float]:
     return radius - side * math.hypot(dx, dy), math.atan2(dy, dx) / abs(curvature)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def wall_hits(eye: FloatArray, dx: float, dy: float, across: float, curvature: float) -> tuple[float, float]:
     """Where a ray meets the upright wall at a place across the road: twice, infinite for nowhere."""
     if curvature == 0.0:
@@ -44,7 +44,7 @@ def wall_hits(eye: FloatArray, dx: float, dy: float, across: float, curvature: f
     return (first if first > LEAST_M else np.inf), (second if second > LEAST_M else np.inf)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def box_hit(
     eye: FloatArray, dx: float, dy: float, dz: float, box: FloatArray
 ) -> tuple[float, float, float, float]:

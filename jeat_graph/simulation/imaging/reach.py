@@ -13,7 +13,7 @@ from jeat_graph.simulation.imaging.tiles import View
 SHADOW_M = 0.9  # how far beside a vehicle its body keeps the sky's light off the road
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def touch(out: Moments, j: int, v: int, look: Look, view: View, lights: Lights) -> None:
     """Boxes of what a vehicle changes in the picture."""
     x, y, sin, cos = out.pose[j, v]
@@ -56,7 +56,7 @@ def touch(out: Moments, j: int, v: int, look: Look, view: View, lights: Lights) 
             beam[0], beam[2], beam[3] = 0.0, view.lens[4], view.lens[5]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _grow(box: FloatArray, px: float, py: float, pz: float, view: View) -> bool:
     """Grow a box by the image of a point; false where the point is behind the camera."""
     lens, eye, rotation = view.lens, view.eye, view.rotation

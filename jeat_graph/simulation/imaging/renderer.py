@@ -5,23 +5,27 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.simulation.imaging.appearance import appearance_of
 from jeat_graph.simulation.imaging.background import Background, make_background
 from jeat_graph.simulation.imaging.config import RenderConfig
 from jeat_graph.simulation.imaging.lighting import lights_of
-from jeat_graph.simulation.imaging.moments import Look, Moments, line_up
+from jeat_graph.simulation.imaging.moments import LEFT_ON, PULSE, Look, Moments, line_up
 from jeat_graph.simulation.imaging.optics import optics_of
 from jeat_graph.simulation.imaging.painter import light_tile, paint_tile, take_ground
-from jeat_graph.simulation.imaging.plan import Plan, make_plan, who_touches
+from jeat_graph.simulation.imaging.plan import MAX_STEPS, Plan, make_plan, who_touches
 from jeat_graph.simulation.imaging.projection import project_moments
 from jeat_graph.simulation.imaging.stage import Setting, Stage, make_setting
 from jeat_graph.simulation.imaging.streaks import reach_streaks
 from jeat_graph.simulation.imaging.tiles import TILE_W, tile_raster, view_of
 from jeat_graph.simulation.streams import stream
 from jeat_graph.simulation.world.scene import Scene, VehicleStates
+from jeat_graph.simulation.world.signals import blink
 
 _NEAR_M = -25.0
+_BLINK_STEPS = 8.0  # of an interval in which an indicator may go on or off
+_PULSE_STEPS = 8.0  # of a period of pulsed or flickering light
+_PHASE = 0.7548776662  # from one vehicle's lamps to the next's, in periods
 
 
 class Renderer:
@@ -44,10 +48,16 @@ class Renderer:
         self.background: Background = make_background(scene, self.lights, self.optics, config)
         self.tiles = tile_raster(scene.camera.width, scene.camera.height)
         self._settings: dict[int, Setting] = {}
+        self._varied = varied
         self._appearance = appearance_of(scene, stream(seed, "paint"), varied)
 
     def plan(
-        self, start_s: float, end_s: float, duration_s: float | None = None, step_px: float | None = None
+        self,
+        start_s: float,
+        end_s: float,
+        duration_s: float | None = None,
+        step_px: float | None = None,
+        for_events: bool = False,
     ) -> Plan:
         """Plan what is to be rendered from `start_s` to `end_s`.
 
@@ -56,6 +66,7 @@ class Renderer:
             end_s: s.
             duration_s: time in which the steps are taken, if not all of it (s).
             step_px: how far an edge may move in a step, if not as configured (px).
+            for_events: lamps that blink or pulse ask for steps, too.
         """
         times = np.array([start_s, 0.5 * (start_s + end_s), end_s])
         states = self.scene.states_at(times, self.config.far_m, _NEAR_M)
@@ -70,17 +81,28 @@ class Renderer:
         np.maximum.at(velocity, column, way)
         duration = end_s - start_s if duration_s is None else duration_s
         step = self.config.max_step_px if step_px is None else step_px
-        return make_plan(moments, velocity, look, self.tiles, self.view, step, duration, self.lights.on)
+        least = np.ones(len(look.number))
+        if for_events:
+            least[self._flashes(times, look).any(axis=(0, 2))] = _BLINK_STEPS
+            if self.config.led_pulse_hz > 0.0:
+                least[look.led] = steps_for(self.config.led_pulse_hz, duration)
+        motion = np.column_stack([velocity, least])
+        return make_plan(moments, motion, look, self.tiles, self.view, step, duration, self.lights.on)
 
     def look(self, time_s: float) -> Look:
         """Say which vehicles there are at a time (s), and what they look like."""
         return self._look(self.scene.states_at(np.array([time_s]), self.config.far_m, _NEAR_M))[0]
 
-    def moments(self, times: FloatArray, look: Look, every: IntArray | None = None) -> Moments:
-        """Project the vehicles of a plan at `times` (J,) (s), each as often as `every` (V,) says."""
+    def moments(
+        self, times: FloatArray, look: Look, every: IntArray | None = None, for_events: bool = False
+    ) -> Moments:
+        """Project the vehicles of a plan at `times` (J,) (s), each as often as `every` (V,) says.
+
+        LED lamps are pulsed `for_events` alone: exposures see their mean.
+        """
         states = self.scene.states_at(times, self.config.far_m, _NEAR_M)
         stride = np.ones(len(look.number), dtype=np.int64) if every is None else every
-        return self._project(states, times, look, stride)
+        return self._project(states, times, look, stride, for_events)
 
     def stage(self, moments: Moments, look: Look, channels: int = 3) -> Stage:
         """Put together what tiles are painted from, in three channels or in luminance alone (1)."""
@@ -114,18 +136,44 @@ class Renderer:
             shape=looks.shape[which],
             lamps=looks.lamps[which] * lit[:, None, None],
             beams=~parked & lit,
+            blink_hz=looks.blink_hz[which],
+            hazard=looks.hazard[which],
+            led=looks.led[which],
         )
         return look, first.astype(np.int64)
 
-    def _project(self, states: VehicleStates, times: FloatArray, look: Look, every: IntArray) -> Moments:
+    def _flashes(self, times: FloatArray, look: Look) -> BoolArray:
+        """Which vehicles use their left and right indicators at times (T,): (T, V, 2)."""
+        if not self._varied:
+            return np.zeros((len(times), len(look.number), 2), dtype=np.bool_)
+        return self.scene.turning_at(times, look.number) | (look.hazard & look.parked)[:, None]
+
+    def _project(
+        self, states: VehicleStates, times: FloatArray, look: Look, every: IntArray, for_events: bool = False
+    ) -> Moments:
         placed = line_up(states, look.number, times, self.config.far_m)
+        if self._varied:
+            bright = blink(times, look.blink_hz, _PHASE * look.salt.astype(np.float64))
+            placed.signal[..., LEFT_ON : LEFT_ON + 2] = self._flashes(times, look) * bright[..., None]
+        if for_events and self.config.led_pulse_hz > 0.0:
+            share = self.config.led_pulse_share
+            on = (times[:, None] * self.config.led_pulse_hz + look.salt * _PHASE) % 1.0 < share
+            placed.signal[..., PULSE] = np.where(look.led, on / share, 1.0)
         moments = project_moments(placed, look, every, self.view, self.lights, self.optics)
         if self.config.wet > 0.0 and self.lights.on:
             reach_streaks(moments, float(self.view.lens[1]))
         return moments
 
 
-@njit(cache=True)
+def steps_for(rate_hz: float, duration_s: float) -> int:
+    """Steps, a power of two, that show light of a rate (Hz) go on and off for `duration_s`."""
+    steps = 1
+    while steps < _PULSE_STEPS * rate_hz * duration_s and steps < MAX_STEPS:
+        steps *= 2
+    return steps
+
+
+@njit(cache=True, error_model="numpy")
 def paint_all(out: FloatArray, tiles: IntArray, boxes: FloatArray, stage: Stage) -> None:
     """Paint the tiles that vehicles touch, at the first of the moments, into a picture (H, W, C)."""
     who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)

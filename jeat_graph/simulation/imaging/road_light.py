@@ -26,7 +26,7 @@ _BLOCKERS = 4  # vehicles that may stand before one vehicle's beams
 _CORNER = 5  # where a vehicle's light at the four corners begins among what is kept of it
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def cast_beams(tile: Tile, j: int, who: IntArray, stage: Stage, light: FloatArray) -> None:
     """Add the light of the beams of some vehicles on the ground and on barriers at time `j`.
 
@@ -49,7 +49,7 @@ def cast_beams(tile: Tile, j: int, who: IntArray, stage: Stage, light: FloatArra
                 light[p, ON_WALL] = _on_barrier(ground[p], who, pose, fade, skin, scene)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _on_ground(
     tile: Tile, extent: tuple[float, float, float], who: IntArray, pose: FloatArray, fade: FloatArray,
     skin: FloatArray, scene: FloatArray, ground: FloatArray, light: FloatArray,
@@ -143,7 +143,7 @@ def _on_ground(
                 light[r * TILE_W + c, ON_GROUND] += above + down * (below - above)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _spread(nodes: FloatArray, row: int, column: int, step: int, lux: float) -> None:
     """Add the light of one of every `step`-th nodes to it and, in straight lines, to those around it."""
     for r in range(max(0, row - step + 1), min(len(nodes), row + step)):
@@ -159,7 +159,7 @@ def _spread(nodes: FloatArray, row: int, column: int, step: int, lux: float) -> 
             nodes[r, c] += down * right * lux
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _beam_at(dx: float, dy: float, sin: float, cos: float, limit2: float, peak: float, stray: float) -> float:
     """Illuminance of the ground by headlamps that stand (dx, dy) m before it, and shine to (sin, cos)."""
     lift = LAMP_HEIGHT_M
@@ -173,7 +173,7 @@ def _beam_at(dx: float, dy: float, sin: float, cos: float, limit2: float, peak: 
     return candela * lift / (r2 * math.sqrt(r2)) * window * window
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _let_through(
     x: float, y: float, dx: float, dy: float, pose: FloatArray, skin: FloatArray, blockers: IntArray, n: int
 ) -> float:
@@ -186,7 +186,7 @@ def _let_through(
     return left
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _before(
     v: int, x: float, y: float, reach: float, pose: FloatArray, fade: FloatArray, skin: FloatArray,
     blockers: IntArray,
@@ -208,7 +208,7 @@ def _before(
     return count
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _way_within(
     x: float, y: float, dx: float, dy: float, outline: tuple[float, float, float, float, float, float]
 ) -> float:
@@ -233,7 +233,7 @@ def _way_within(
     return max(0.0, high - low) * math.sqrt(dx * dx + dy * dy)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _on_barrier(
     ground: FloatArray, who: IntArray, pose: FloatArray, fade: FloatArray, skin: FloatArray, scene: FloatArray
 ) -> float:

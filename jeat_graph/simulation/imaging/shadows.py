@@ -17,7 +17,7 @@ _SHADOW_DEPTH = 0.75
 _SUN_EDGE_M = 0.3
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def cast_shadow(
     tile: Tile, extent: tuple[float, float, float], pose: FloatArray, size: FloatArray, scene: FloatArray,
     ground: FloatArray, shade: FloatArray,

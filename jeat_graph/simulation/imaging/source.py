@@ -14,7 +14,7 @@ from jeat_graph.config.section_tree import plain
 from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.events import EventArray
-from jeat_graph.simulation.imaging.config import ImagingConfig
+from jeat_graph.simulation.imaging.config import ImagingConfig, RenderConfig
 from jeat_graph.simulation.imaging.contrast import contrast_to_noise, tight_boxes
 from jeat_graph.simulation.imaging.event_camera import EventCamera
 from jeat_graph.simulation.imaging.lens import Lens
@@ -35,6 +35,8 @@ from jeat_graph.simulation.world.camera import Camera
 from jeat_graph.simulation.world.scene import Scene
 from jeat_graph.simulation.world.surroundings import FIXED
 
+# Settings that came after the first recordings: they are stated where they are not as they were then.
+_LATER = ("wet", "indicator_candela", "lamp_flicker", "lamp_flicker_hz", "led_pulse_hz", "led_pulse_share")
 _BEFORE = 2  # periods before the first frame, so that it has all the events of its own before it
 WORLDS = ("fixed", "varied")
 SENSORS = ("pictures", "rgb", "events")
@@ -210,6 +212,7 @@ def _stated(imaging: ImagingConfig) -> dict[str, Any]:
     assert isinstance(tree, dict)
     if imaging.lens == LensConfig():
         del tree["lens"]
-    if not imaging.render.wet:
-        del tree["render"]["wet"]
+    for name in _LATER:
+        if getattr(imaging.render, name) == getattr(RenderConfig(), name):
+            del tree["render"][name]
     return tree

@@ -81,7 +81,7 @@ def make_setting(
     """Lay a scene's constants flat, for pictures of 3 channels or of luminance alone (1)."""
     scene = [
         *(lights.sky_lux, lights.sun_lux, *lights.sun),
-        *(lights.beam_range_m, lights.beam_candela, lights.beam_stray, float(lights.on)),
+        *(lights.beam_range_m, lights.beam_candela, lights.beam_stray, float(lights.signals)),
         *lights.sky_tint,
         lights.beta,
         *airlight(lights),

@@ -35,7 +35,7 @@ def reach_streaks(moments: Moments, fy: float) -> None:
     box[..., 2] = np.maximum(box[..., 2], np.where(there, lamp[..., 0] + side, -np.inf).max(axis=2))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def add_streaks(
     tile: Tile, lamps: FloatArray, camera: FloatArray, scene: FloatArray, ground: FloatArray,
     filled: IntArray, value: FloatArray,

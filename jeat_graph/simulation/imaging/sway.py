@@ -29,9 +29,9 @@ class Sway(NamedTuple):
     angular: FloatArray
     phase: FloatArray
 
-    def angles(self, t: float) -> FloatArray:
-        """Turns (3,) at a time (s), in rad."""
-        out: FloatArray = (self.amplitude * np.sin(self.angular * t + self.phase)).sum(axis=1)
+    def angles(self, t: float | FloatArray) -> FloatArray:
+        """Turns (3,) at a time (s), or (J, 3) at times (J, 1, 1), in rad."""
+        out: FloatArray = (self.amplitude * np.sin(self.angular * t + self.phase)).sum(axis=-1)
         return out
 
     def most(self) -> FloatArray:
@@ -54,10 +54,16 @@ def draw_sway(config: LensConfig, rng: np.random.Generator) -> Sway:
 
 
 def turn(angles: FloatArray) -> FloatArray:
-    """Rotation (3, 3) that takes a direction from the turned camera's axes to the unturned one's."""
-    (sx, sy, sz), (cx, cy, cz) = np.sin(angles), np.cos(angles)
-    about_x = np.array([[1.0, 0.0, 0.0], [0.0, cx, sx], [0.0, -sx, cx]])
-    about_y = np.array([[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]])
-    about_z = np.array([[cz, -sz, 0.0], [sz, cz, 0.0], [0.0, 0.0, 1.0]])
-    out: FloatArray = about_y @ about_x @ about_z
+    """Rotations (..., 3, 3) that take a direction from the turned camera's axes to the unturned one's."""
+    sines, cosines = np.moveaxis(np.sin(angles), -1, 0), np.moveaxis(np.cos(angles), -1, 0)
+    matrix: list[FloatArray] = []
+    for axis in range(3):
+        other, last = (axis + 1) % 3, (axis + 2) % 3
+        one = np.zeros((*np.shape(angles)[:-1], 3, 3))
+        one[..., axis, axis] = 1.0
+        one[..., other, other] = one[..., last, last] = cosines[axis]
+        sign = 1.0 if axis == 0 else -1.0  # about X it goes down, the other way round
+        one[..., other, last], one[..., last, other] = sign * sines[axis], -sign * sines[axis]
+        matrix.append(one)
+    out: FloatArray = matrix[1] @ matrix[0] @ matrix[2]
     return out

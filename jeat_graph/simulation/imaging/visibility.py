@@ -49,7 +49,7 @@ def buffers(
     return depth, number[instance], seen / np.maximum(whole, 1)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _fill(depth: FloatArray, instance: IntArray, whole: IntArray, moments: Moments, look: Look) -> None:
     height, width = depth.shape
     for v in range(len(look.number)):
@@ -72,7 +72,7 @@ def _fill(depth: FloatArray, instance: IntArray, whole: IntArray, moments: Momen
                     instance[row, column] = v + 1
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _depth_at(u: float, w: float, body: FloatArray) -> float:
     """Depth of a body (its record) along the ray through a place in the picture; infinite where it misses."""
     sides = int(body[SIDES])

@@ -31,20 +31,20 @@ _FACETS_M = 25.0  # distance from which single facets are no longer told apart
 _DOWNWARDS = 0.1  # share of a street lamp's intensity that it sends at low angles to a wet road
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def fresnel(cosine: float) -> float:
     """Reflectance of water at an angle of incidence (Schlick 1994)."""
     return _WATER + (1.0 - _WATER) * (1.0 - min(max(cosine, 0.0), 1.0)) ** 5
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def film(x: float, y: float, wet: float, salt: int) -> float:
     """How whole the film of water is at a place (m), 0 to 1: puddles where the road is worn."""
     patch = 0.6 * value_noise(0.35 * x, 0.06 * y, salt + 21) + 0.4 * value_noise(2.0 * x, 0.7 * y, salt + 22)
     return clamp01(wet * (0.85 + 0.5 * patch))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def mirror_ground(
     view: View, land: Landscape, lights: Lights, wet: float, place: FloatArray, back: FloatArray,
     albedo: FloatArray,

@@ -67,7 +67,7 @@ def sticky_uniform(
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _gauss_markov(phi: FloatArray, shock: FloatArray) -> FloatArray:
     out = np.empty_like(shock)
     for i in range(len(shock)):

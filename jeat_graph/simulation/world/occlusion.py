@@ -25,7 +25,7 @@ def visible_fraction(boxes: FloatArray, distance: FloatArray, frame: IntArray) -
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _visible(boxes: FloatArray, frame: IntArray) -> FloatArray:
     """Visible fraction of boxes sorted by frame, then from near to far."""
     n = len(boxes)

@@ -13,6 +13,7 @@ from jeat_graph.simulation.world.camera import Camera, CameraConfig
 from jeat_graph.simulation.world.light import Light, LightConfig
 from jeat_graph.simulation.world.parking import park
 from jeat_graph.simulation.world.road import Road, RoadConfig
+from jeat_graph.simulation.world.signals import turning
 from jeat_graph.simulation.world.surroundings import FIXED, Surroundings
 from jeat_graph.simulation.world.traffic import Traffic, TrafficConfig, simulate_traffic
 from jeat_graph.simulation.world.vehicles import Fleet, FleetConfig, draw_fleet
@@ -129,6 +130,15 @@ class Scene:
             parked_pose=park(stream(seed, "parked"), standing, lanes, *traffic.parked_m),
             traffic_config=traffic,
         )
+
+    def turning_at(self, times: FloatArray, number: IntArray) -> BoolArray:
+        """Say which vehicles (V,) signal a change of lane at times (T,) (s), to left and right: (T, V, 2)."""
+        vehicle = (number - 1) % (len(self.fleet) + len(self.parked_fleet))
+        facing = self.traffic.direction.astype(np.float64)
+        out = np.zeros((len(times), len(number), 2), dtype=np.bool_)
+        drives = vehicle < len(self.fleet)
+        out[:, drives] = turning(self.traffic.paths, facing, times)[:, vehicle[drives]]
+        return out
 
     def states_at(self, times: FloatArray, far_m: float, near_m: float = -15.0) -> VehicleStates:
         """State of every vehicle whose centre lies between `near_m` and `far_m` along the road.

@@ -24,7 +24,7 @@ def still(sensor: str, luminance: float, pixels: int, seconds: int) -> EventArra
     state = make_state(model, seen, rng)
     sink = make_sink(4_000_000)
     for k in range(seconds):
-        advance(np.arange(pixels), seen, 1e6 * k, 1e6 * (k + 1), True, model, state, sink)
+        advance(np.arange(pixels), seen, np.full(len(seen), 1e6 * k), 1e6 * (k + 1), True, model, state, sink)
     return to_events(sink, WIDTH)
 
 

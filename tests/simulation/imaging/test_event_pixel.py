@@ -31,7 +31,8 @@ def run(
     sink = make_sink(2_000_000)
     for k in range(1, len(times_us)):
         seen = np.ascontiguousarray(luminance[k][pixels])
-        advance(pixels, seen, float(times_us[k - 1]), float(times_us[k]), False, model, state, sink)
+        since = np.full(len(seen), float(times_us[k - 1]))
+        advance(pixels, seen, since, float(times_us[k]), False, model, state, sink)
     return to_events(sink, count)
 
 

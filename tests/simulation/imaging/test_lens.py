@@ -133,6 +133,20 @@ def test_a_still_scene_makes_events_only_while_the_mount_sways():
     assert 0 < little < much
 
 
+@pytest.mark.parametrize("name", ["day", "night"])
+def test_steps_of_the_mount_are_short_enough_for_its_events(name):
+    """The default against steps a fourth as long, in which pixels hardly ever wait."""
+    lens = {**BARREL, "sway_deg": 0.15, "sway_hz": 2.5}
+    counts = []
+    for step in (2.0, 0.5):
+        made = source(lens, name, 2, evt=QUIET, render={"max_step_px": step})
+        events = [one.events for one in made.segment(1)]
+        place = np.concatenate([(e.polarity.astype(int) * 12 + e.y // 8) * 20 + e.x // 8 for e in events])
+        counts.append(np.bincount(place, minlength=480))
+    assert np.corrcoef(*counts)[0, 1] > 0.99
+    assert abs(counts[0].sum() / counts[1].sum() - 1.0) < 0.1
+
+
 def test_boxes_lie_where_the_lens_and_the_mount_put_the_corners():
     lens = {**BARREL, "sway_deg": 0.4}
     made = source(lens)
