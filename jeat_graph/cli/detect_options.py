@@ -50,7 +50,7 @@ def add_detecting(parser: argparse._ActionsContainer) -> None:
         "--event-rate",
         type=positive,
         metavar="HZ",
-        help="scans of the events per second (default: 50; of networks 20)",
+        help="scans of the events per second (default: 50; of networks beside frames 20)",
     )
     add(
         "--event-size",

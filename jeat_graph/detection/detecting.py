@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,7 @@ from jeat_graph.detection.binned import BinnedDetector
 from jeat_graph.detection.event_detector import EventDetector
 from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION, network_file
 from jeat_graph.detection.picture_detector import PictureDetector
-from jeat_graph.detection.settings import DetectionSettings
+from jeat_graph.detection.settings import BESIDE_RATE_HZ, DetectionSettings
 
 if TYPE_CHECKING:
     from jeat_graph.io.events.reader import EventReader
@@ -213,7 +213,10 @@ def _event_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str], 
         from jeat_graph.detection.models.events import ModelEventDetector
 
         network = network_file(request.detector_events, EVENTS)
-        model = ModelEventDetector(network, size_px, EVENTS_SENSOR, settings.events, settings.model_events)
+        times = settings.events
+        if request.frames is not None:
+            times = replace(times, rate_hz=times.rate(BESIDE_RATE_HZ))
+        model = ModelEventDetector(network, size_px, EVENTS_SENSOR, times, settings.model_events)
         say(model.description)
         detector = model
     else:

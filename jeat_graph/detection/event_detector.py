@@ -22,7 +22,7 @@ from jeat_graph.data.detections import Scan
 from jeat_graph.detection.binned import BinnedDetector
 from jeat_graph.detection.components import Components, linked, measured, weights, without_inner
 from jeat_graph.detection.memory import CloudMemory
-from jeat_graph.detection.settings import MOTION_RATE_HZ, EventSettings
+from jeat_graph.detection.settings import USUAL_RATE_HZ, EventSettings
 from jeat_graph.detection.windows import EventBins
 
 _US_PER_S = 1e6
@@ -43,7 +43,7 @@ class EventDetector(BinnedDetector):
         self.settings = settings or EventSettings()
         bins = self.settings.bins(self.settings.window_s)
         ring = EventBins(size_px, bins, self.settings.bin_s)
-        self._rate_hz = self.settings.rate(MOTION_RATE_HZ)
+        self._rate_hz = self.settings.rate(USUAL_RATE_HZ)
         super().__init__(size_px, sensor, self._rate_hz, ring, bins, self.settings)
         diagonal = math.hypot(*size_px)
         self._steps = max(1, round(self.settings.apart_s * self._rate_hz))

@@ -30,13 +30,13 @@ _TRIM = (
     "its box"
 )
 _INSIDE = "a group is part of a heavier one if this share of its box lies in the other's"
-#: Scans of events per second where nothing is said, of the detector without weights and of networks. More
-#: scans of a network, whose windows overlap, repeat its false boxes: 20 Hz are better tracked than 50 Hz, and
+#: Scans of events per second where nothing is said, and of networks beside pictures. More scans of a network,
+#: whose windows overlap, repeat its false boxes: beside pictures 20 Hz are better tracked than 50 Hz, and
 #: cost two fifths (`docs/benchmarks/raw.md`).
-MOTION_RATE_HZ, NETWORK_RATE_HZ = 50.0, 20.0
+USUAL_RATE_HZ, BESIDE_RATE_HZ = 50.0, 20.0
 _RATE = (
-    f"scans per second; a step is a whole number of bins; null: {MOTION_RATE_HZ:g} of what moves, "
-    f"{NETWORK_RATE_HZ:g} of networks"
+    f"scans per second; a step is a whole number of bins; null: {USUAL_RATE_HZ:g}, and {BESIDE_RATE_HZ:g} of "
+    "networks beside pictures"
 )
 _APART = "two groups that run together stay two if they were there, and moved apart, for so long"
 

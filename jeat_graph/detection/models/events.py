@@ -17,7 +17,7 @@ from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.models.onnx_head import CARD, OnnxHead, Port, read_onnx_head
 from jeat_graph.detection.models.output_reader import OutputReader, scan_within
 from jeat_graph.detection.noise import NoiseSettings
-from jeat_graph.detection.settings import NETWORK_RATE_HZ, EventSettings
+from jeat_graph.detection.settings import USUAL_RATE_HZ, EventSettings
 from jeat_graph.detection.windows import EventBins
 
 _US_PER_S = 1e6
@@ -35,7 +35,7 @@ class ModelEventDetector(BinnedDetector):
         path: the ONNX file.
         size_px: width and height of the camera's picture.
         sensor: name of the sensor in the scans.
-        times: rate and bins of the windows; by default 20 a second.
+        times: rate and bins of the windows; by default 50 a second.
         settings: how the network is read.
 
     Attributes:
@@ -46,6 +46,8 @@ class ModelEventDetector(BinnedDetector):
         DataError: no ONNX file, or one that does not fit.
     """
 
+    #: Scans per second where the settings do not say.
+    _usual_hz = USUAL_RATE_HZ
     #: Inputs that are neither windows nor memory.
     _beside: tuple[str, ...] = ()
 
@@ -65,7 +67,7 @@ class ModelEventDetector(BinnedDetector):
         head = read_onnx_head(path)
         self._input = _window_input(head, self._path)
         bins = (self._input.shape[1] or 0) // 2
-        ring, rate_hz = EventBins(size_px, bins, times.bin_s), times.rate(NETWORK_RATE_HZ)
+        ring, rate_hz = EventBins(size_px, bins, times.bin_s), times.rate(self._usual_hz)
         super().__init__(size_px, sensor, rate_hz, ring, bins, times)
         width, height = size_px
         self._side = (self._input.shape[3] or width, self._input.shape[2] or height)

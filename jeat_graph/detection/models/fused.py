@@ -20,7 +20,7 @@ from jeat_graph.detection.models.events import ModelEventDetector
 from jeat_graph.detection.models.feeding import picture_input
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.models.onnx_head import OnnxHead, read_onnx_head
-from jeat_graph.detection.settings import EventSettings
+from jeat_graph.detection.settings import BESIDE_RATE_HZ, EventSettings
 from jeat_graph.io.decoders import RgbImage
 
 PICTURE, GIVEN = "picture", "given"
@@ -38,7 +38,7 @@ class FusedDetector(ModelEventDetector):
         path: the ONNX file.
         size_px: width and height of both cameras' picture.
         sensor: name of the sensor in the scans.
-        times: rate and bins of the windows.
+        times: rate and bins of the windows; by default 20 a second.
         settings: how the network is read.
         pictures: times (s, ascending) and pictures (H, W, 3), red, green, blue; 8 bit.
 
@@ -50,6 +50,7 @@ class FusedDetector(ModelEventDetector):
         DataError: no ONNX file, or not of such a network.
     """
 
+    _usual_hz = BESIDE_RATE_HZ
     _beside = (PICTURE, GIVEN)
 
     def __init__(

@@ -190,6 +190,11 @@ def test_a_network_takes_the_place_of_a_detector(net, tmp_path, capsys):
     found = read_detections(out)
     assert found.sensors == ("evt", "rgb")
     assert {len(scan) for scan in found.scans() if scan.sensor == "rgb"} == {3}
+    # Beside pictures a network of events is asked 20 times a second, alone 50 times.
+    assert np.diff(found.sensor_times("evt")) == pytest.approx(0.05)
+    alone = ["detect", "--events", str(tmp_path / "e.raw"), "--detector-events", str(rnn), "--out", str(out)]
+    assert main(alone) == 0
+    assert np.diff(read_detections(out).sensor_times("evt")) == pytest.approx(0.02)
 
 
 @pytest.mark.skipif(not MODELS.is_dir(), reason=f"{MODELS} is not there")
