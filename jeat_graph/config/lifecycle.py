@@ -87,6 +87,32 @@ class LifecycleConfig(Section):
 
     method: str = choice("existence", ("existence", "hits"), "Bernoulli existence, or the paper's hit counts")
     confirm_existence: float = number(0.95, "1", "confirmed at this probability of existence", 0.0, 1.0)
+    min_worth: float = number(
+        0.0,
+        "1",
+        "what one sensor alone has seen is confirmed and reported only while boxes of such scores are found "
+        "to last with at least this probability (`filters.worth`); 0: not asked",
+        0.0,
+        0.999,
+    )
+    worth_of_usual: float = number(
+        0.8,
+        "1",
+        "or with this share of the probability for the usual box of what lasts, if that is less",
+        0.0,
+        1.0,
+    )
+    lasting_s: float = number(1.0, "s", "what is tracked for so long has lasted", open_low=True)
+    worth_half: float = number(
+        0.65, "1", "probability that boxes of score one half last, before it is learnt", 0.001, 0.999
+    )
+    worth_slope: float = number(
+        1.0, "1", "how its log odds rise with those of the score, before it is learnt"
+    )
+    worth_std: float = number(1.0, "1", "standard deviation of both assumptions", open_low=True)
+    worth_memory_s: float = number(
+        1000.0, "s", "time after which what was learnt of them is as uncertain as at first", open_low=True
+    )
     delete_existence: float = number(0.001, "1", "deleted below this probability of existence", 0.0, 1.0)
     lifetime_s: float = number(
         20.0, "s", "mean time a vehicle stays in the picture (decay of existence)", open_low=True
@@ -164,6 +190,11 @@ class LifecycleConfig(Section):
     def usual_blindness(self) -> float:
         """Probability that a sensor is blind as a whole where nothing is known: its share of the time."""
         return self.blind_scans / (self.sight_scans + self.blind_scans) if self.judges_sight else 0.0
+
+    @property
+    def judges_worth(self) -> bool:
+        """Whether tracks of one sensor alone have to be worth something."""
+        return self.by_existence and self.min_worth > 0.0
 
     @property
     def first_doubt(self) -> float:

@@ -13,6 +13,7 @@ from jeat_graph.config.kernel_form import Model
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.filters.cut_boxes import LOW_CUT, cut_of
 from jeat_graph.filters.noise import score_weight
+from jeat_graph.filters.worth import score_odds
 
 # A calibrated precision is never certain, or a single score would outweigh all else that is known.
 _LEAST_PRECISION, _MOST_PRECISION = 0.002, 0.998
@@ -46,6 +47,7 @@ class Batch(NamedTuple):
         boxes: (M, 4) the corresponding left, top, width, height (px).
         precision: (M,) calibrated precision.
         log_score: (M,) ln of the score's likelihood ratio.
+        score_odds: (M,) log odds of the score itself.
         weight: (M,) factor on the measurement variance (g of the paper).
         sensor: (M,) sensor index.
         present: (S,) which sensors looked, including those that found nothing.
@@ -59,6 +61,7 @@ class Batch(NamedTuple):
     boxes: FloatArray
     precision: FloatArray
     log_score: FloatArray
+    score_odds: FloatArray
     weight: FloatArray
     sensor: IntArray
     present: BoolArray
@@ -107,6 +110,7 @@ def prepare(arrivals: Arrivals, model: Model) -> Batch:
     corrected = np.empty((num, 4))
     precision = np.empty(num)
     log_score = np.empty(num)
+    odds = np.empty(num)
     weight = np.empty(num)
     cut = np.zeros((num, 2), dtype=np.int64)
     seen_side = np.zeros((num, 2))
@@ -130,6 +134,7 @@ def prepare(arrivals: Arrivals, model: Model) -> Batch:
         calibrated = interpolate(scores[j], sensors.curve_score[s], sensors.curve_precision[s])
         precision[j] = min(max(calibrated, _LEAST_PRECISION), _MOST_PRECISION)
         log_score[j] = log_score_ratio(precision[j], sensors.precision[s])
+        odds[j] = score_odds(scores[j])
         weight[j] = score_weight(scores[j], noise.score_floor) if noise.score_weighting else 1.0
-    found = z, log_size, corrected, precision, log_score, weight
+    found = z, log_size, corrected, precision, log_score, odds, weight
     return Batch(arrivals.t, *found, sensor, arrivals.present, cut, seen_side)

@@ -48,6 +48,9 @@ def keep_rows(tracks: TrackArrays, rows: IntArray) -> None:
     _shift(tracks.t_update, rows, first)
     _shift(tracks.used, rows, first)
     _shift(tracks.seen_by, rows, first)
+    _shift(tracks.score_odds, rows, first)
+    _shift(tracks.lasting, rows, first)
+    _shift(tracks.worthy, rows, first)
 
 
 @njit(cache=True)

@@ -88,7 +88,7 @@ def report(
     rows = np.empty(num_tracks, dtype=np.int64)
     count = 0
     for i in range(num_tracks):
-        if not tracks.confirmed[i]:
+        if not (tracks.confirmed[i] and tracks.worthy[i]):
             continue
         gap = t - tracks.t_update[i]
         if gap > max_gap_s and not tracks.standing[i]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,9 @@ import numpy.typing as npt
 from jeat_graph.config.kernel_form import SensorArrays
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray
+
+# What lasts usually has scores of about .9; that is held to be known from five seconds of a track.
+_USUAL_ODDS, _USUAL_WEIGHT = 2.2, 5.0
 
 
 class TrackArrays(NamedTuple):
@@ -38,6 +42,9 @@ class TrackArrays(NamedTuple):
         t_update: (C,) time of the last one (s).
         used: (C,) bit s is set where sensor s's detection was taken in the last step.
         seen_by: (C,) bit s is set where sensor s's detection was ever taken.
+        score_odds: (C,) mean log odds of the scores of its detections.
+        lasting: (C,) whether it has lasted (`filters.worth`).
+        worthy: (C,) whether things of such scores last often enough to be believed of one sensor alone.
     """
 
     mean: FloatArray
@@ -61,6 +68,9 @@ class TrackArrays(NamedTuple):
     t_update: FloatArray
     used: IntArray
     seen_by: IntArray
+    score_odds: FloatArray
+    lasting: npt.NDArray[np.bool_]
+    worthy: npt.NDArray[np.bool_]
 
 
 class SceneState(NamedTuple):
@@ -81,6 +91,11 @@ class SceneState(NamedTuple):
         looked: (S,) scans full of confirmed tracks that `p_detect` rests on.
         blind: (S,) probability that each sensor is blind as a whole for now.
         unproven: (S,) probability that it has never found a vehicle.
+        first_look: (S,) time of each sensor's first scan (s); infinity before it.
+        lasting_odds: (S,) mean log odds of the scores of what has lasted.
+        lasting_seen: (S,) what that mean rests on, in seconds of a track.
+        worth_mean: (S, 2) what its scores say of what lasts (`filters.worth`): a, b.
+        worth_cov: (S, 2, 2) covariance of the two.
     """
 
     clutter: FloatArray
@@ -94,12 +109,19 @@ class SceneState(NamedTuple):
     looked: FloatArray
     blind: FloatArray
     unproven: FloatArray
+    first_look: FloatArray
+    lasting_odds: FloatArray
+    lasting_seen: FloatArray
+    worth_mean: FloatArray
+    worth_cov: FloatArray
 
 
 def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
     """Return what is held of a scene of S sensors before the first scan."""
     num_sensors = len(sensors.p_detect)
     # Of a sensor that is the only one, nothing can be told but by itself.
+    half = config.lifecycle.worth_half
+    assumed = [math.log(half / (1.0 - half)), config.lifecycle.worth_slope]
     doubt = config.lifecycle.first_doubt if num_sensors > 1 else 0.0
     return SceneState(
         clutter=sensors.clutter_per_scan.copy(),
@@ -113,6 +135,11 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
         looked=np.zeros(num_sensors),
         blind=np.full(num_sensors, config.lifecycle.usual_blindness),
         unproven=np.full(num_sensors, doubt),
+        first_look=np.full(num_sensors, np.inf),
+        lasting_odds=np.full(num_sensors, _USUAL_ODDS),
+        lasting_seen=np.full(num_sensors, _USUAL_WEIGHT),
+        worth_mean=np.tile(assumed, (num_sensors, 1)),
+        worth_cov=np.tile(config.lifecycle.worth_std**2 * np.eye(2), (num_sensors, 1, 1)),
     )
 
 
@@ -141,6 +168,9 @@ def allocate(capacity: int, num_sensors: int, num_errors: int = 0) -> TrackArray
         t_update=np.zeros(capacity),
         used=np.zeros(capacity, dtype=np.int64),
         seen_by=np.zeros(capacity, dtype=np.int64),
+        score_odds=np.zeros(capacity),
+        lasting=np.zeros(capacity, dtype=np.bool_),
+        worthy=np.ones(capacity, dtype=np.bool_),
     )
 
 

@@ -14,6 +14,7 @@ from jeat_graph.tracking.stages.learning import count_misses, learn_scene, learn
 from jeat_graph.tracking.stages.predicting import current_p_detect, expect_detections, occlusion, predict_all
 from jeat_graph.tracking.stages.sight import judge_sight
 from jeat_graph.tracking.stages.updating import take_second_views, update_matched
+from jeat_graph.tracking.stages.worth import judge_worth, learn_lasting
 from jeat_graph.tracking.state import SceneState, TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog
 
@@ -57,9 +58,11 @@ def step(
     update_matched(tracks, n, batch, expectation, association, scene, model, log)
     if settings.association.second_views:
         take_second_views(tracks, n, batch, association, model, log)
+    learn_lasting(tracks, n, batch, association, scene, model)
     learn_trust(tracks, n, batch, association, scene, model)
     learn_scene(tracks, n, dt, batch, association, p_detect, scene, model)
     count_misses(tracks, n, batch, association, p_detect, scene, settings)
+    judge_worth(tracks, n, scene, model)
     confirm(tracks, n, batch.t, settings)
     n = remove_ended(tracks, n, batch.t, scene, model)
     n, next_id = give_birth(tracks, n, next_id, batch, association, scene, model, log)

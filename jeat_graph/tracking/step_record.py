@@ -11,6 +11,10 @@ from jeat_graph.tracking.classes import Votes
 from jeat_graph.tracking.state import TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog
 
+# Factor on the existence of what one sensor alone sees and its scores do not bear out: less likely a vehicle
+# than not. In hindsight the last such word counts for all that came before it.
+_UNWORTHY = 0.25
+
 
 class StepRecord(NamedTuple):
     """One step, N living tracks after it.
@@ -67,7 +71,7 @@ def record_step(
         t,
         births,
         ids,
-        tracks.existence[:n].copy(),
+        np.where(tracks.worthy[:n], 1.0, _UNWORTHY) * tracks.existence[:n],
         tracks.used[:n].copy(),
         tracks.confirmed[:n].copy(),
         held,

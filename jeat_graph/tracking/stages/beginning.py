@@ -28,6 +28,7 @@ from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.stages.learning import scan_weight
 from jeat_graph.tracking.stages.predicting import jerk_of, split_noise
 from jeat_graph.tracking.stages.updating import update_track
+from jeat_graph.tracking.stages.worth import judge_worth
 from jeat_graph.tracking.state import SceneState, TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog, log_birth, log_update
 
@@ -72,6 +73,7 @@ def give_birth(
             update_track(tracks, i, batch, j, second_view(tracks, i, batch, j, model.sensors), model, log)
             # Two sensors' false boxes seldom coincide: each view's chance to be false remains.
             tracks.existence[i] = 1.0 - (1.0 - tracks.existence[i]) * (1.0 - batch.precision[j])
+    judge_worth(tracks, n + len(parents), scene, model)
     confirm(tracks, n + len(parents), batch.t, settings)
     return n + len(parents), next_id + len(parents)
 
@@ -194,6 +196,9 @@ def start_track(
     tracks.confirmed[i] = False
     tracks.track_id[i] = track_id
     tracks.hits[i] = 1
+    tracks.score_odds[i] = batch.score_odds[j]
+    tracks.lasting[i] = False
+    tracks.worthy[i] = True
     tracks.t_birth[i] = t
     tracks.t_update[i] = t
     tracks.used[i] = 1 << s

@@ -13,6 +13,7 @@ from jeat_graph.config.kernel_form import Model, Settings
 from jeat_graph.tracking.compaction import keep_rows
 from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.stages.learning import scan_weight
+from jeat_graph.tracking.stages.worth import learn_ended
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
 
@@ -22,7 +23,8 @@ def confirm(tracks: TrackArrays, n: int, t: float, settings: Settings) -> None:
     lifecycle = settings.lifecycle
     for i in range(n):
         if lifecycle.by_existence:
-            earned = tracks.existence[i] >= lifecycle.confirm_existence
+            believed = tracks.existence[i] >= lifecycle.confirm_existence
+            earned = believed and tracks.worthy[i]
         else:
             old = t - tracks.t_birth[i] >= lifecycle.confirm_age_s
             earned = old and tracks.hits[i] >= lifecycle.confirm_hits
@@ -70,6 +72,8 @@ def remove_ended(tracks: TrackArrays, n: int, t: float, scene: SceneState, model
         # A state that overflowed (a coasting track on wild input) must not survive as NaN.
         broken = not (math.isfinite(x) and math.isfinite(y))
         if remove[i] or gap > most or doubted or broken or (lifecycle.leave_picture and outside):
+            if not (remove[i] or outside or broken):
+                learn_ended(tracks, i, scene, model)
             if not (tracks.confirmed[i] or remove[i] or outside or broken):
                 _count_fruitless(tracks.hits[i], tracks.seen_by[i], scene, model)
             continue

@@ -146,6 +146,7 @@ def update_track(
             size,
         )
     tracks.hits[i] += 1
+    tracks.score_odds[i] += (batch.score_odds[j] - tracks.score_odds[i]) / tracks.hits[i]
     tracks.t_update[i] = batch.t
     tracks.used[i] |= 1 << s
     tracks.seen_by[i] |= 1 << s

@@ -1,0 +1,97 @@
+"""What the tracks are worth that one sensor alone has seen, by what became of others with such scores."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from jeat_graph.config.kernel_form import Model
+from jeat_graph.filters.worth import doubt_worth, learn_worth, worth_of
+from jeat_graph.tracking.batch import Batch
+from jeat_graph.tracking.stages.associating import Association
+from jeat_graph.tracking.stages.inner import inner
+from jeat_graph.tracking.state import SceneState, TrackArrays
+
+# Fewer detections have not lasted, however far they lie apart.
+_LEAST_HITS = 5
+_ROUNDING_S = 1e-9
+
+
+@inner
+def only_sensor(seen_by: int, num_sensors: int) -> int:
+    """Return the one sensor that has seen a track, or -1 where there are several."""
+    for s in range(num_sensors):
+        if seen_by == 1 << s:
+            return s
+    return -1
+
+
+@inner
+def learn_lasting(
+    tracks: TrackArrays, n: int, batch: Batch, association: Association, scene: SceneState, model: Model
+) -> None:
+    """Learn from the tracks that last what the scores of the present sensors are worth, in place.
+
+    `learn_ended` says the rest. A track's detections of before it had lasted count when it has. Each
+    detection weighs as much as the time between two scans, in seconds: those of one track are no independent
+    witnesses.
+    """
+    lifecycle = model.settings.lifecycle
+    if not lifecycle.judges_worth:
+        return
+    for s in range(len(batch.present)):
+        if batch.present[s]:
+            scene.first_look[s] = min(scene.first_look[s], batch.t)
+            step = model.sensors.period_s[s] / lifecycle.worth_memory_s
+            doubt_worth(scene.worth_cov[s], lifecycle.worth_std * lifecycle.worth_std, step)
+    for i in range(n):
+        old = batch.t - tracks.t_birth[i] >= lifecycle.lasting_s - _ROUNDING_S
+        for s in range(len(batch.present)):
+            j = association.match[i, s]
+            if j < 0:
+                continue
+            mean, cov, weight = scene.worth_mean[s], scene.worth_cov[s], model.sensors.period_s[s]
+            if tracks.lasting[i]:
+                learn_worth(mean, cov, batch.score_odds[j], True, weight)
+                seen = min(scene.lasting_seen[s] + weight, lifecycle.worth_memory_s)
+                scene.lasting_seen[s] = seen
+                scene.lasting_odds[s] += weight / seen * (batch.score_odds[j] - scene.lasting_odds[s])
+            elif old and tracks.hits[i] >= _LEAST_HITS:
+                tracks.lasting[i] = True
+                if tracks.seen_by[i] == 1 << s:
+                    learn_worth(mean, cov, tracks.score_odds[i], True, weight * tracks.hits[i])
+
+
+@inner
+def learn_ended(tracks: TrackArrays, i: int, scene: SceneState, model: Model) -> None:
+    """Learn from track `i`, which ends and was seen by one sensor alone, unless it has lasted; in place.
+
+    What ends before anything can have lasted says nothing.
+    """
+    lifecycle = model.settings.lifecycle
+    s = only_sensor(tracks.seen_by[i], len(scene.first_look))
+    if not lifecycle.judges_worth or s < 0 or tracks.lasting[i]:
+        return
+    if tracks.t_update[i] >= scene.first_look[s] + lifecycle.lasting_s:
+        weight = model.sensors.period_s[s] * tracks.hits[i]
+        learn_worth(scene.worth_mean[s], scene.worth_cov[s], tracks.score_odds[i], False, weight)
+
+
+@njit(cache=True)
+def judge_worth(tracks: TrackArrays, n: int, scene: SceneState, model: Model) -> None:
+    """Say of each of the first `n` tracks, in place, whether it is worth something: always if two see it.
+
+    What is worth nearly as much as the usual box of what lasts is as good as this sensor's scores can tell.
+    """
+    lifecycle = model.settings.lifecycle
+    if not lifecycle.judges_worth:
+        return
+    least = np.empty(len(scene.first_look))
+    for s in range(len(least)):
+        usual = worth_of(scene.worth_mean[s], scene.lasting_odds[s])
+        least[s] = min(lifecycle.min_worth, lifecycle.worth_of_usual * usual)
+    for i in range(n):
+        s = only_sensor(tracks.seen_by[i], len(scene.first_look))
+        # No branch that writes a flag, as in `confirm`.
+        worth = worth_of(scene.worth_mean[s], tracks.score_odds[i])
+        tracks.worthy[i] = s < 0 or worth >= least[s]
