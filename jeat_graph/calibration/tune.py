@@ -206,6 +206,7 @@ def cut_scans(detections: Detections, first: int, end: int) -> Detections:
         boxes=detections.boxes[low:high],
         scores=detections.scores[low:high],
         classes=None if detections.classes is None else detections.classes[low:high],
+        embeddings=None if detections.embeddings is None else detections.embeddings[low:high],
     )
 
 

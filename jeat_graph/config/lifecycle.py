@@ -49,6 +49,13 @@ class AssociationConfig(Section):
     log_size_range: float = number(
         3.0, "ln px", "range of ln width and of ln height over which false boxes spread", open_low=True
     )
+    most_alike: float = number(
+        4.0,
+        "1",
+        "greatest ln likelihood ratio by how alike embeddings are; 0: they do not count",
+        0.0,
+        30.0,
+    )
 
     @property
     def method_code(self) -> int:

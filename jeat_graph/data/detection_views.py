@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, TextArray
+from jeat_graph.data.embeddings import EmbeddingArray
 from jeat_graph.data.interop import boxes_of, columns_of, from_xyxy, supervision_of
 
 if TYPE_CHECKING:
@@ -28,6 +29,9 @@ class DetectionViews:
         def to_rows(self) -> tuple[FloatArray, TextArray, FloatArray, FloatArray, BoolArray, TextArray]:
             """One row a detection or empty scan."""
 
+        def embedding_rows(self) -> EmbeddingArray | None:
+            """What each row of `to_rows` looks like."""
+
         @staticmethod
         def from_rows(*columns: Any) -> Detections:
             """Group rows into scans."""
@@ -42,6 +46,9 @@ class DetectionViews:
         columns["score"] = scores
         if self.classes is not None:
             columns["class"] = classes
+        looks = self.embedding_rows()
+        if looks is not None:
+            columns["embedding"] = list(looks)
         return pd.DataFrame(columns)
 
     @classmethod
@@ -50,8 +57,8 @@ class DetectionViews:
 
         Args:
             frame: `t` (s); `left, top, width, height`, or `left, top, right, bottom` (px); `score` (1 where
-                there is none), `sensor` and `class` where there are such. A row without a box is a scan that
-                found nothing.
+                there is none), `sensor`, `class` and `embedding` (an array of numbers each) where there are
+                such. A row without a box is a scan that found nothing.
             sensor: name of the sensor where the frame has no such column.
 
         Raises:
@@ -69,6 +76,7 @@ class DetectionViews:
             c.get("score", np.ones(len(frame))),
             empty,
             c.get("class"),
+            np.stack(list(c["embedding"])) if "embedding" in c and len(box) else None,
         )
 
     @classmethod

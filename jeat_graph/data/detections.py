@@ -1,8 +1,4 @@
-"""Detections: what the sensors' detectors reported, scan by scan.
-
-A *scan* is everything one sensor reported at one time. A scan without boxes is data too: it says that
-the sensor looked and found nothing.
-"""
+"""Detections: what the sensors' detectors reported, scan by scan (see `scan`)."""
 
 from __future__ import annotations
 
@@ -13,59 +9,15 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, TextArray
-from jeat_graph.data.boxes import check_boxes, class_texts, find_bad_row
+from jeat_graph.data.boxes import class_texts, find_bad_row
 from jeat_graph.data.class_columns import rows_of_class
 from jeat_graph.data.detection_views import DetectionViews
+from jeat_graph.data.embeddings import EmbeddingArray, join_embeddings, spread_embeddings, unit_embeddings
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.grouping import group_rows
-from jeat_graph.data.interop import from_xyxy
+from jeat_graph.data.scan import Scan, trusted_scan
 
-
-@dataclass(frozen=True, eq=False)
-class Scan:
-    """All detections of one sensor at one time.
-
-    Attributes:
-        t: time (s), finite.
-        sensor: name of the sensor.
-        boxes: (M, 4) left, top, width, height (px); M may be 0.
-        scores: (M,) confidence in [0, 1].
-        classes: (M,) class names, empty text where unknown, or None.
-
-    Raises:
-        DataError: if any value is not valid (see `check_boxes`).
-    """
-
-    t: float
-    sensor: str
-    boxes: FloatArray
-    scores: FloatArray
-    classes: TextArray | None = None
-
-    def __post_init__(self) -> None:
-        t = float(self.t)
-        if not np.isfinite(t):
-            raise DataError(f"the time of a scan must be finite, got {self.t}")
-        boxes, scores = check_boxes(self.boxes, self.scores)
-        object.__setattr__(self, "t", t)
-        object.__setattr__(self, "boxes", boxes)
-        object.__setattr__(self, "scores", scores)
-        if self.classes is not None:
-            object.__setattr__(self, "classes", class_texts(self.classes, len(scores)))
-
-    def __len__(self) -> int:
-        return len(self.scores)
-
-    @staticmethod
-    def from_xyxy(
-        t: float,
-        sensor: str,
-        corners: npt.ArrayLike,
-        scores: npt.ArrayLike,
-        classes: TextArray | None = None,
-    ) -> Scan:
-        """Make a scan of boxes (M, 4) that are given as left, top, right, bottom (px)."""
-        return Scan(t, sensor, from_xyxy(corners), np.asarray(scores, dtype=np.float64), classes)
+__all__ = ["Detections", "Scan"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +33,7 @@ class Detections(DetectionViews):
         scores: (N,) confidence in [0, 1].
         classes: (N,) class names (empty text where unknown), or None if no class is known.
         dropped: boxes without area that a reader has left out; their scans are there.
+        embeddings: (N, E) what each looks like, of unit length; NaN where unknown; or None.
     """
 
     sensors: tuple[str, ...]
@@ -91,6 +44,7 @@ class Detections(DetectionViews):
     scores: FloatArray
     classes: TextArray | None = None
     dropped: int = 0
+    embeddings: EmbeddingArray | None = None
 
     @staticmethod
     def from_rows(
@@ -100,6 +54,7 @@ class Detections(DetectionViews):
         scores: npt.ArrayLike,
         empty: npt.ArrayLike | None = None,
         classes: Sequence[str] | TextArray | None = None,
+        embeddings: npt.ArrayLike | None = None,
     ) -> Detections:
         """Group rows, in any order, into scans. Rows of one scan keep their order.
 
@@ -110,9 +65,10 @@ class Detections(DetectionViews):
             scores: (R,) confidence; ignored where `empty`.
             empty: (R,) true where the row only says that the scan took place; none by default.
             classes: (R,) class of each row, optional.
+            embeddings: (R, E) what each row looks like, NaN where that is not known, optional.
 
         Raises:
-            DataError: a time or a box that is not valid; the message names the row.
+            DataError: a time, a box or an embedding that is not valid; the message names the row.
         """
         time = np.array(t, dtype=np.float64).reshape(-1)
         names = np.asarray(sensor, dtype=np.str_).reshape(-1)
@@ -130,7 +86,8 @@ class Detections(DetectionViews):
             raise DataError(f"row {np.arange(len(time))[rows][bad[0]]}: {bad[1]}")
         sensors, code = np.unique(names, return_inverse=True)
         kinds = None if classes is None else class_texts(classes, len(time)).copy()
-        return Detections.from_checked(time, sensors.tolist(), code.reshape(-1), (b, s, kinds), gap)
+        looks = None if embeddings is None else unit_embeddings(embeddings, len(time))
+        return Detections.from_checked(time, sensors.tolist(), code.reshape(-1), (b, s, kinds), gap, looks)
 
     @staticmethod
     def from_checked(
@@ -139,6 +96,7 @@ class Detections(DetectionViews):
         code: IntArray,
         found: tuple[FloatArray, FloatArray, TextArray | None],
         empty: BoolArray,
+        embeddings: EmbeddingArray | None = None,
     ) -> Detections:
         """Group rows that are known to be good, as `from_rows`; their arrays may become the detections' own.
 
@@ -148,6 +106,7 @@ class Detections(DetectionViews):
             code: (R,) index into them.
             found: boxes (R, 4), scores (R,), and classes (R,) or None.
             empty: (R,) true where the row only says that the scan took place.
+            embeddings: (R, E) what each row looks like, or None.
         """
         groups = group_rows(t, code, empty)
         boxes, scores, classes = found
@@ -160,6 +119,7 @@ class Detections(DetectionViews):
             boxes=np.ascontiguousarray(boxes[rows]),
             scores=np.ascontiguousarray(scores[rows]),
             classes=None if classes is None else classes[rows],
+            embeddings=None if embeddings is None else embeddings[rows],
         )
 
     @staticmethod
@@ -177,6 +137,7 @@ class Detections(DetectionViews):
             ),
             empty=np.repeat([len(scan) == 0 for scan in items], rows),
             classes=_classes_of_rows(items),
+            embeddings=join_embeddings([scan.embeddings for scan in items], rows),
         )
 
     @staticmethod
@@ -188,7 +149,11 @@ class Detections(DetectionViews):
         columns = [np.concatenate(column) for column in zip(*(p.to_rows() for p in parts), strict=True)]
         has_class = any(part.classes is not None for part in parts)
         t, sensor, boxes, scores, empty, classes = columns
-        whole = Detections.from_rows(t, sensor, boxes, scores, empty, classes if has_class else None)
+        looks = [part.embedding_rows() for part in parts]
+        whole = Detections.from_rows(
+            *(t, sensor, boxes, scores, empty, classes if has_class else None),
+            join_embeddings(looks, [len(part.to_rows()[0]) for part in parts]),
+        )
         return replace(whole, dropped=sum(part.dropped for part in parts))
 
     def to_rows(
@@ -215,6 +180,11 @@ class Detections(DetectionViews):
         sensor = names[self.scan_sensor[scan]] if len(scan) else np.zeros(0, dtype=np.str_)
         return self.scan_t[scan], sensor, boxes, scores, empty, classes
 
+    def embedding_rows(self) -> EmbeddingArray | None:
+        """Return the embeddings (R, E) of the rows of `to_rows`, NaN where there is none; or None."""
+        count = np.diff(self.scan_start)
+        return spread_embeddings(self.embeddings, np.repeat(count > 0, np.maximum(count, 1)))
+
     @property
     def num_scans(self) -> int:
         """Number of scans K, the empty ones included."""
@@ -226,12 +196,13 @@ class Detections(DetectionViews):
     def scan(self, k: int) -> Scan:
         """Return scan `k` (0 <= k < num_scans)."""
         rows = slice(int(self.scan_start[k]), int(self.scan_start[k + 1]))
-        return _trusted_scan(
+        return trusted_scan(
             float(self.scan_t[k]),
             self.sensors[self.scan_sensor[k]],
             self.boxes[rows],
             self.scores[rows],
             None if self.classes is None else self.classes[rows],
+            None if self.embeddings is None else self.embeddings[rows],
         )
 
     def sensor_times(self, sensor: str) -> FloatArray:
@@ -269,6 +240,7 @@ class Detections(DetectionViews):
             boxes=self.boxes[keep],
             scores=self.scores[keep],
             classes=None if self.classes is None else self.classes[keep],
+            embeddings=None if self.embeddings is None else self.embeddings[keep],
         )
 
 
@@ -281,16 +253,3 @@ def _classes_of_rows(scans: Sequence[Scan]) -> TextArray | None:
         for scan in scans
     ]
     return np.concatenate(texts)
-
-
-def _trusted_scan(
-    t: float, sensor: str, boxes: FloatArray, scores: FloatArray, classes: TextArray | None
-) -> Scan:
-    """Make a scan of arrays that were checked already, without checking them again."""
-    scan = object.__new__(Scan)
-    object.__setattr__(scan, "t", t)
-    object.__setattr__(scan, "sensor", sensor)
-    object.__setattr__(scan, "boxes", boxes)
-    object.__setattr__(scan, "scores", scores)
-    object.__setattr__(scan, "classes", classes)
-    return scan

@@ -44,11 +44,20 @@ def to_numpy(column: Any, missing: float | None = None) -> npt.NDArray[Any]:
 def from_numpy(values: npt.NDArray[Any]) -> Any:
     """Return an array (R,) of numbers, truth values or text as Arrow's; NaN and masked entries are missing.
 
+    Vectors (R, E) become lists, missing where the first number is NaN.
+
     Raises:
         DataError: a text that UTF-8 cannot hold.
     """
     import pyarrow as pa
 
+    if values.ndim == 2:
+        there = ~np.isnan(values[:, 0])
+        ends = np.cumsum([0, *np.where(there, values.shape[1], 0)], dtype=np.int32)
+        numbers = from_numpy(values[there].reshape(-1))
+        none = None if there.all() else _bits(there)
+        buffers = [none, pa.py_buffer(ends)]
+        return pa.Array.from_buffers(pa.list_(numbers.type), len(values), buffers, children=[numbers])
     if values.dtype.kind == "U":
         distinct, index = np.unique(values, return_inverse=True)
         return _texts(distinct.tolist()).take(from_numpy(index.reshape(-1)))

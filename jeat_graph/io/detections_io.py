@@ -3,31 +3,38 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from jeat_graph.data.arrays import BoolArray, FloatArray
-from jeat_graph.data.boxes import find_bad_row
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.io import coco, kitti, motchallenge, prophesee
-from jeat_graph.io.column_names import NUMBER_COLUMNS, boxes_of, standing_in, times_of
+from jeat_graph.io.column_names import NUMBER_COLUMNS, boxes_of, times_of
 from jeat_graph.io.csv_text import NUMBER, WORD
+from jeat_graph.io.detection_rows import (
+    BOX,
+    assemble,
+    check_rows,
+    embeddings_of,
+    rows_without_box,
+    without_area,
+)
 from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.formats import recognise
-from jeat_graph.io.frames import check_rate, fill_frames, gap_times, scale_scores, score_hint
+from jeat_graph.io.frames import check_rate, fill_frames, gap_times, scale_scores
 from jeat_graph.io.plain_text import frames_of
 from jeat_graph.io.rounding import round_decimals
 from jeat_graph.io.table_writer import write_columns
 from jeat_graph.io.tables import read_table
 
 DEFAULT_SENSOR = "rgb"
-_BOX = ("left", "top", "width", "height")
-_COLUMNS = ("t", "sensor", *_BOX, "score")
+_COLUMNS = ("t", "sensor", *BOX, "score")
+_OPTIONAL = ("class", "sensor", "embedding")
 _KINDS = {**dict.fromkeys((*NUMBER_COLUMNS, "score"), NUMBER), "sensor": WORD, "class": WORD}
 
 
@@ -104,7 +111,7 @@ def read_detections(
         scores = _scores(table, "class_confidence", "the field class_confidence (or confidence)")
         if fill_empty and rate_hz is not None:
             missing = gap_times(t, rate_hz, path)
-    return _assemble(t, name, boxes, scale_scores(scores, score_scale, path), kinds, missing, table.error)
+    return assemble(t, name, boxes, scale_scores(scores, score_scale, path), kinds, missing, table.error)
 
 
 def read_many(paths: Sequence[str | Path], **options: Any) -> Detections:
@@ -163,10 +170,13 @@ def write_detections(detections: Detections, path: str | Path, decimals: int | N
     if decimals is not None:
         boxes = round_decimals(boxes, decimals)
     columns: dict[str, Any] = {"t": t, "sensor": sensor}
-    columns |= {name: boxes[:, k] for k, name in enumerate(_BOX)}
+    columns |= {name: boxes[:, k] for k, name in enumerate(BOX)}
     columns["score"] = scores
     if detections.classes is not None:
         columns["class"] = classes
+    looks = detections.embedding_rows()
+    if looks is not None:
+        columns["embedding"] = looks
     write_columns(columns, path)
 
 
@@ -176,7 +186,12 @@ def _read_contract(
     required = _COLUMNS if sensor is None else tuple(name for name in _COLUMNS if name != "sensor")
     try:
         table = read_table(
-            path, required, ("class", "sensor"), short=("t", "sensor"), aliases=True, kinds=_KINDS
+            path,
+            required,
+            ("class", "sensor", "embedding"),
+            short=("t", "sensor"),
+            aliases=True,
+            kinds=_KINDS,
         )
     except DataError as error:
         if error.message.startswith("column 'sensor' is missing;"):
@@ -194,32 +209,18 @@ def _read_contract(
         if len(names) > 1:
             raise DataError(f"holds the sensors {', '.join(names)}; none can be renamed to {sensor}", path)
         names = [sensor] if len(t) else []
-    empty = _rows_without_box(table)
+    empty = rows_without_box(table)
     boxes, scores = boxes_of(table), table.number("score", blank_ok=True)
     scores = scale_scores(scores, score_scale, path)
     classes = table.text("class", blank_ok=True) if "class" in table else None
     if classes is not None and not (classes != "").any():
         classes = None
-    flat = _without_area(boxes) & ~empty
-    _check(boxes, scores, empty | flat, table.error)
+    looks = embeddings_of(table) if "embedding" in table else None
+    flat = without_area(boxes) & ~empty
+    check_rows(boxes, scores, empty | flat, table.error)
     del table  # the file's own columns are in the way of what is to come
-    found = Detections.from_checked(t, names, code, (boxes, scores, classes), empty | flat)
+    found = Detections.from_checked(t, names, code, (boxes, scores, classes), empty | flat, looks)
     return replace(found, dropped=int(flat.sum()))
-
-
-def _rows_without_box(table: FileTable) -> BoolArray:
-    """Which rows (R,) only say that a scan took place; a row with part of a box is an error."""
-    values = [*standing_in(table.names, _BOX), "score"]
-    if not any(table.blank(name).any() for name in values):
-        return np.zeros(len(table), dtype=bool)
-    blanks = np.stack([table.blank(name) for name in values], axis=1)
-    empty: BoolArray = np.asarray(blanks.all(axis=1))
-    torn = blanks.any(axis=1) & ~empty
-    if torn.any():
-        row = int(np.argmax(torn))
-        which = values[int(np.argmax(blanks[row]))]
-        raise table.error(row, f"{which} is missing; a scan that found nothing has only t and sensor")
-    return empty
 
 
 def _read_coco(
@@ -241,55 +242,10 @@ def _read_coco(
         return DataError(f"entry {row + 1}: {message}", path)
 
     scores = scale_scores(found.scores, score_scale, path)
-    return _assemble(found.t, sensor, found.boxes, scores, found.classes, missing, error)
+    return assemble(found.t, sensor, found.boxes, scores, found.classes, missing, error)
 
 
 def _scores(table: FileTable, name: str, spoken: str) -> FloatArray:
     if name not in table:
         raise DataError(f"{spoken} is missing; detections need a score", table.path)
     return table.number(name)
-
-
-def _without_area(boxes: FloatArray) -> BoolArray:
-    """Which boxes (M, 4) a detector has clipped to nothing: no side is negative and one is zero."""
-    side = boxes[:, 2:]
-    if len(boxes) == 0 or side.min() > 0.0:
-        return np.zeros(len(boxes), dtype=bool)
-    finite = np.isfinite(boxes).all(axis=1)
-    return np.asarray(finite & (side >= 0.0).all(axis=1) & (side == 0.0).any(axis=1))
-
-
-def _check(
-    boxes: FloatArray, scores: FloatArray, passed_over: BoolArray, error: Callable[[int, str], DataError]
-) -> None:
-    """Refuse the first row that is no detection, at its place in the file, but for those passed over."""
-    index = np.flatnonzero(~passed_over) if passed_over.any() else None
-    bad = find_bad_row(boxes, scores) if index is None else find_bad_row(boxes[index], scores[index])
-    if bad is not None:
-        row = bad[0] if index is None else int(index[bad[0]])
-        what = score_hint(float(scores[row])) if bad[1].startswith("score") else bad[1]
-        raise error(row, what)
-
-
-def _assemble(
-    t: FloatArray,
-    sensor: str,
-    boxes: FloatArray,
-    scores: FloatArray,
-    classes: Any,
-    missing: FloatArray,
-    error: Callable[[int, str], DataError],
-) -> Detections:
-    """Check boxes of one sensor and put empty scans at the `missing` times."""
-    n, gaps = len(t), len(missing)
-    flat = _without_area(boxes)
-    _check(boxes, scores, flat, error)
-    if gaps:
-        t, flat = np.concatenate([t, missing]), np.concatenate([flat, np.ones(gaps, dtype=bool)])
-        boxes = np.concatenate([boxes, np.full((gaps, 4), np.nan)])
-        scores = np.concatenate([scores, np.full(gaps, np.nan)])
-        classes = None if classes is None else np.concatenate([classes, np.zeros(gaps, dtype="U1")])
-    names = [sensor] if n + gaps else []
-    code = np.zeros(n + gaps, dtype=np.int64)
-    found = Detections.from_checked(t, names, code, (boxes, scores, classes), flat)
-    return replace(found, dropped=int(flat[:n].sum()))

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.arrow_arrays import to_numpy
+from jeat_graph.io.vector_columns import read_vectors
 
 _LARGEST_EXACT = 2.0**53  # beyond it a float cannot tell neighbouring whole numbers apart
 
@@ -155,6 +156,14 @@ class FileTable:
         if not blank_ok and "" in place:
             raise self.error(int(np.argmax(index == place[""])), f"{name} is missing")
         return words, index
+
+    def vectors(self, name: str) -> FloatArray:
+        """Convert a column of vectors (R, E), NaN in rows that have none (see `vector_columns`).
+
+        Raises:
+            DataError: names the first line or row that is no vector of as many numbers as the others.
+        """
+        return read_vectors(self._columns[name], lambda row, what: self.error(row, f"{name} {what}"))
 
     def _floats(self, name: str) -> tuple[FloatArray, BoolArray]:
         import pyarrow as pa

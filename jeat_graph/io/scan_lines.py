@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple, TypeVar
 
@@ -15,6 +16,8 @@ from jeat_graph.io.stream_text import decode_line
 
 _KEYS = ("t", "sensor", "boxes", "scores")
 _CLASSES = "classes"  # may follow: names, one a box
+_EMBEDDINGS = "embeddings"  # likewise: lists of numbers, or null
+_MORE = (_CLASSES, _EMBEDDINGS)
 _Result = TypeVar("_Result")
 _COLUMNS = ("t", "sensor", "left", "top", "width", "height", "score")
 _CLASS = "class"  # a column that may be there
@@ -145,9 +148,9 @@ def _scan_of(item: Any, name: str, number: int) -> Scan:
     example = '{"t": 0.05, "sensor": "rgb", "boxes": [[10, 20, 30, 40]], "scores": [0.9]}'
     if not isinstance(item, dict):
         raise DataError(f"a scan is an object such as {example}", name, number)
-    strange = next((key for key in item if key not in (*_KEYS, _CLASSES)), None)
+    strange = next((key for key in item if key not in (*_KEYS, *_MORE)), None)
     if strange is not None:
-        known = ", ".join((*_KEYS, _CLASSES))
+        known = ", ".join((*_KEYS, *_MORE))
         raise DataError(f"unknown key {strange!r}; a scan has {known}", name, number)
     missing = next((key for key in _KEYS if key not in item), None)
     if missing is not None:
@@ -158,7 +161,8 @@ def _scan_of(item: Any, name: str, number: int) -> Scan:
     if not isinstance(sensor, str) or not sensor:
         raise DataError(f"sensor must be a name, got {sensor!r}", name, number)
     try:
-        return Scan(t, sensor, item["boxes"], item["scores"], _class_names(item.get(_CLASSES), name, number))
+        kinds = _class_names(item.get(_CLASSES), name, number)
+        return Scan(t, sensor, item["boxes"], item["scores"], kinds, _with_blanks(item.get(_EMBEDDINGS)))
     except DataError as error:
         raise DataError(error.message, name, number) from None
     except OverflowError:
@@ -176,6 +180,14 @@ def _class_names(found: Any, name: str, number: int) -> Any:
     if not isinstance(found, list) or not all(one is None or isinstance(one, str) for one in found):
         raise DataError(f"{_CLASSES} must be a list of names, one a box, got {found!r}", name, number)
     return np.array([one or "" for one in found], dtype=np.str_)
+
+
+def _with_blanks(found: Any) -> Any:
+    """Lists of numbers, one a box, with NaN in place of null."""
+    if not isinstance(found, list) or None not in found:
+        return found
+    numbers = next((len(one) for one in found if isinstance(one, list)), 1)
+    return [[math.nan] * numbers if one is None else one for one in found]
 
 
 class _Row(NamedTuple):

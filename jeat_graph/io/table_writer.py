@@ -13,6 +13,7 @@ from jeat_graph.io.arrow_arrays import from_numpy
 from jeat_graph.io.atomic import atomic_path
 from jeat_graph.io.piecewise import PiecewiseWriter
 from jeat_graph.io.tables import PARQUET_SUFFIXES
+from jeat_graph.io.vector_columns import lists_as_text
 
 # Rows kept in memory, and a Parquet row group. Fixed, because the bytes of a Parquet file depend on it.
 _CHUNK_ROWS = 1 << 16
@@ -114,6 +115,9 @@ def _csv_bytes(table: Any, delimiter: str) -> bytes:
     import pyarrow as pa
     from pyarrow import csv as arrow_csv
 
+    for k, field in enumerate(table.schema):
+        if pa.types.is_list(field.type):
+            table = table.set_column(k, field.name, lists_as_text(table.column(k)))
     # Arrow quotes either all text or none, and refuses "none" where a text holds a comma or a quote.
     for style in ("none", "needed"):
         buffer = pa.BufferOutputStream()

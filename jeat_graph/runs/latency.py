@@ -23,4 +23,4 @@ def at_measurement(detections: Detections, config: Config) -> Detections:
     of_row = dict(zip(detections.sensors, latency.tolist(), strict=True))
     earlier = t - np.array([of_row[name] for name in sensor.tolist()])
     named = None if detections.classes is None else classes
-    return Detections.from_rows(earlier, sensor, boxes, scores, empty, named)
+    return Detections.from_rows(earlier, sensor, boxes, scores, empty, named, detections.embedding_rows())

@@ -28,6 +28,7 @@ class Arrivals(NamedTuple):
         scores: (M,) in [0, 1].
         sensor: (M,) sensor index of each.
         present: (S,) which sensors looked, including those that found nothing.
+        alike: (N, M) ln of the likelihood ratio by how alike a track and a detection look; (0, 0) if unknown.
     """
 
     t: float
@@ -35,6 +36,7 @@ class Arrivals(NamedTuple):
     scores: FloatArray
     sensor: IntArray
     present: BoolArray
+    alike: FloatArray
 
 
 class Batch(NamedTuple):
@@ -53,6 +55,7 @@ class Batch(NamedTuple):
         present: (S,) which sensors looked, including those that found nothing.
         cut: (M, 2) which sides the edges of the picture cut, along x and y (`filters.cut_boxes`).
         side: (M, 2) coordinate of the side that shows where one is cut (px).
+        alike: (N, M) as in `Arrivals`.
     """
 
     t: float
@@ -67,6 +70,7 @@ class Batch(NamedTuple):
     present: BoolArray
     cut: IntArray
     side: FloatArray
+    alike: FloatArray
 
 
 class Measured(NamedTuple):
@@ -137,4 +141,4 @@ def prepare(arrivals: Arrivals, model: Model) -> Batch:
         odds[j] = score_odds(scores[j])
         weight[j] = score_weight(scores[j], noise.score_floor) if noise.score_weighting else 1.0
     found = z, log_size, corrected, precision, log_score, odds, weight
-    return Batch(arrivals.t, *found, sensor, arrivals.present, cut, seen_side)
+    return Batch(arrivals.t, *found, sensor, arrivals.present, cut, seen_side, arrivals.alike)

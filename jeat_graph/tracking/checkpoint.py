@@ -25,6 +25,7 @@ from jeat_graph.smoothers.engine import WholeTrackSmoother
 from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
 from jeat_graph.smoothers.track_data import Prior, SmoothedTrack
 from jeat_graph.smoothers.window import Window
+from jeat_graph.tracking.appearance import Looks
 from jeat_graph.tracking.classes import ClassTally, Votes
 from jeat_graph.tracking.smoothing.behind import InProcessSmoothing
 from jeat_graph.tracking.smoothing.history import TrackHistory
@@ -46,6 +47,7 @@ _MAGIC = "jeat-graph tracker"
 _PLAIN = (
     ClassTally,
     InProcessSmoothing,
+    Looks,
     ObservationTimes,
     Prior,
     Scan,

@@ -19,6 +19,7 @@ ScanLike: TypeAlias = (
     Scan
     | tuple[float, str, npt.ArrayLike, npt.ArrayLike]
     | tuple[float, str, npt.ArrayLike, npt.ArrayLike, Any]
+    | tuple[float, str, npt.ArrayLike, npt.ArrayLike, Any, Any]
 )
 
 
@@ -38,7 +39,7 @@ def as_scans(scans: Any) -> list[Scan]:
 def _listed(scans: Any) -> list[Scan]:
     if isinstance(scans, Scan):
         return [scans]
-    if isinstance(scans, tuple) and len(scans) in (4, 5) and isinstance(scans[1], str):
+    if isinstance(scans, tuple) and 4 <= len(scans) <= 6 and isinstance(scans[1], str):
         return [Scan(*scans)]
     if isinstance(scans, Iterable):
         out = [scan if isinstance(scan, Scan) else Scan(*scan) for scan in scans]
@@ -67,7 +68,7 @@ def arrivals_of(batch: Sequence[Scan], sensor_names: Sequence[str]) -> Arrivals:
         sensor = np.repeat(np.array(codes, dtype=np.int64), [len(scan) for scan in batch])
     present = np.zeros(len(sensor_names), dtype=np.bool_)
     present[codes] = True
-    return Arrivals(batch[0].t, boxes, scores, sensor, present)
+    return Arrivals(batch[0].t, boxes, scores, sensor, present, np.zeros((0, 0)))
 
 
 def _plain(values: FloatArray, ndim: int) -> FloatArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from jeat_graph.tracking.appearance import Looks
 from jeat_graph.tracking.classes import ClassTally
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
@@ -17,6 +18,7 @@ class Snapshot(NamedTuple):
         tracks: the N living tracks.
         scene: what is learnt of the scene.
         classes: votes on the tracks' classes, or None before the first.
+        looks: what the tracks look like, or None before the first embedding.
     """
 
     t: float | None
@@ -24,6 +26,7 @@ class Snapshot(NamedTuple):
     tracks: TrackArrays
     scene: SceneState
     classes: ClassTally | None = None
+    looks: Looks | None = None
 
     @staticmethod
     def of(

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,18 +15,20 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import BoolArray, IntArray, RecordArray
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.diagnostics import Diagnostics
+from jeat_graph.data.embeddings import EmbeddingArray, unit_embeddings
 from jeat_graph.data.errors import JeatGraphError, TimeOrderError
 from jeat_graph.data.interop import boxes_of
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.tracking.appearance import Compared, Looks, compare, embeddings_of, remember
 from jeat_graph.tracking.classes import ClassTally, check_names, count_votes
 from jeat_graph.tracking.direct_call import DirectCall
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.notice import notice_if_cold
 from jeat_graph.tracking.prediction import Prediction, predict_reported
 from jeat_graph.tracking.reporting import as_table, longest_gap_s, report
+from jeat_graph.tracking.saving import SavedTracks
 from jeat_graph.tracking.scans import ScanLike, arrivals_of, as_scans
 from jeat_graph.tracking.sensor_state import SensorState, sensor_states
-from jeat_graph.tracking.smoothing.access import SmoothedTracks
 from jeat_graph.tracking.snapshot import Snapshot
 from jeat_graph.tracking.state import allocate, grow, start_scene
 from jeat_graph.tracking.step import step
@@ -37,7 +38,7 @@ from jeat_graph.tracking.update_log import allocate_log
 _FIRST_CAPACITY = 64
 
 
-class Tracker(SmoothedTracks):
+class Tracker(SavedTracks):
     """Joint tracker of all vehicles over any number of asynchronous sensors (paper algorithm 1).
 
     Feed it scans in time order. Each step sees only what has arrived: the table it returns is causal. Memory
@@ -78,6 +79,7 @@ class Tracker(SmoothedTracks):
         # Of a step's arguments `arrivals_of` alone comes from outside, and it sees to their types.
         self._step, self._report = DirectCall(step), DirectCall(report)
         self._classes: ClassTally | None = None
+        self._looks: Looks | None = None
         self._watch = InputWatch(config)
         notice_if_cold()
 
@@ -101,7 +103,8 @@ class Tracker(SmoothedTracks):
 
         Args:
             scans: a `Scan` or a tuple (t, sensor, boxes (M, 4), scores (M,)), also with names of classes (M,)
-                behind, or a sequence of these. A scan that found nothing (M = 0) is information too.
+                and embeddings (M, E) behind, or a sequence of these. A scan that found nothing (M = 0) is
+                information too.
 
         Returns:
             The tracks that are reported now, one row each.
@@ -134,23 +137,30 @@ class Tracker(SmoothedTracks):
         if self._t is not None and t < self._t:
             raise TimeOrderError(f"scan at t = {t} s is older than the last one at {self._t} s")
         check_names(self._classes, batch)
+        embeddings = embeddings_of(self._looks, batch)
         longest = self.config.lifecycle.max_silence_s
         dt = 0.0 if self._t is None else min(t - self._t, longest)
         if dt == longest:
             self._num_tracks = 0
         self._tracks = grow(self._tracks, self._num_tracks, self._num_tracks + count)
-        logs = self._diagnostics or self._smoothers is not None or any(s.classes is not None for s in batch)
+        told = embeddings is not None or any(s.classes is not None for s in batch)
+        logs = self._diagnostics or self._smoothers is not None or told
         if logs and count > len(self._log.rows):
             self._log = allocate_log(2 * count)
+        compared = None
+        if embeddings is not None:
+            compared = self._compare(embeddings, arrivals.sensor)
+            arrivals = arrivals._replace(alike=compared.log_ratio)
         first_id = self._next_id
         self._num_tracks, self._next_id = self._step(
             self._tracks, self._num_tracks, self._next_id, dt, arrivals, self._scene, self._model, self._log
         )
         self._t = t
         self._watch.look(batch)
-        self._classes, votes = count_votes(
-            self._classes, batch, self._log, self._tracks.track_id[: self._num_tracks]
-        )
+        living = self._tracks.track_id[: self._num_tracks]
+        self._classes, votes = count_votes(self._classes, batch, self._log, living)
+        if compared is not None:
+            self._looks = remember(compared, self._log, living)
         if self._smoothers is None:
             return None
         n, births = self._num_tracks, self._next_id - first_id
@@ -158,6 +168,12 @@ class Tracker(SmoothedTracks):
         standing = bool(self._tracks.standing[:n].any())
         reported = self.causal().track_id if standing else np.zeros(0, dtype=np.int64)
         return record_step(t, self._tracks, n, births, self._log, reported, votes)
+
+    def _compare(self, embeddings: EmbeddingArray, sensor: IntArray) -> Compared:
+        """Compare the embeddings (M, E) of a step's detections with the living tracks."""
+        looks = self._looks or Looks.start(len(self.sensor_names), embeddings.shape[1])
+        living = self._tracks.track_id[: self._num_tracks]
+        return compare(looks.of(living), embeddings, sensor, self.config.association.most_alike)
 
     def hand_over(self, taken: StepRecord | None) -> None:
         """Give the smoothers what a step took in; in order of time, and once."""
@@ -167,56 +183,14 @@ class Tracker(SmoothedTracks):
     def snapshot(self) -> Snapshot:
         """Copy all that the next step depends on; the smoothers are not part of it."""
         now = Snapshot.of(self._t, self._next_id, self._tracks, self._num_tracks, self._scene)
-        return now._replace(classes=self._classes)
+        return now._replace(classes=self._classes, looks=self._looks)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to a snapshot of this tracker."""
         self._t, self._next_id, self._num_tracks = snapshot.t, snapshot.next_id, snapshot.num_tracks
-        self._classes = snapshot.classes
+        self._classes, self._looks = snapshot.classes, snapshot.looks
         self._tracks = grow(self._tracks, 0, self._num_tracks)
         snapshot.copy_to(self._tracks, self._scene)
-
-    def save(self, path: str | Path) -> None:
-        """Write the whole state to a file (`.npz`), smoothers included, for `load` to go on from.
-
-        This tracker and the loaded one give the same bytes from here on.
-
-        Raises:
-            JeatGraphError: the smoothers are in a process of their own (`smoother.worker`).
-        """
-        from jeat_graph.tracking.checkpoint import save_state
-
-        save_state(path, self.config, self.state())
-
-    @classmethod
-    def load(cls, path: str | Path, config: Config | None = None) -> Self:
-        """Return the tracker that was saved to a file.
-
-        Args:
-            path: the file.
-            config: the configuration that it must have had; None takes the file's.
-
-        Raises:
-            DataError: no such file, or one that holds no tracker.
-            JeatGraphError: it was saved by another version, or with other settings.
-        """
-        from jeat_graph.tracking.checkpoint import load_state
-
-        return cls.from_state(*load_state(path, config))
-
-    def state(self, snapshot: Snapshot | None = None) -> dict[str, Any]:
-        """Return what `from_state` takes: the state now, or at a snapshot; the smoothers' is not copied."""
-        now = self.snapshot() if snapshot is None else snapshot
-        return {"diagnostics": self._diagnostics, "now": now, "smoothing": self._smoothers}
-
-    @classmethod
-    def from_state(cls, config: Config, state: dict[str, Any]) -> Self:
-        """Make a tracker of what `state` returned."""
-        without = replace(config, smoother=replace(config.smoother, engine="none"))
-        tracker = cls(without, diagnostics=state["diagnostics"])
-        tracker.config, tracker._smoothers = config, state["smoothing"]
-        tracker.restore(state["now"])
-        return tracker
 
     def sensor_states(self) -> dict[str, SensorState]:
         """Return what has been learnt of each sensor: clutter, detection probability, noise."""
@@ -239,7 +213,13 @@ class Tracker(SmoothedTracks):
         return predict_reported(self.snapshot(), t, self._model, self.sensor_names)
 
     def update(
-        self, source: Any, *, t: float, sensor: str, scores: npt.ArrayLike | None = None
+        self,
+        source: Any,
+        *,
+        t: float,
+        sensor: str,
+        scores: npt.ArrayLike | None = None,
+        embeddings: npt.ArrayLike | None = None,
     ) -> Trajectories:
         """Take in what a detector returned for one picture.
 
@@ -249,11 +229,13 @@ class Tracker(SmoothedTracks):
             t: time (s).
             sensor: name of the sensor.
             scores: (M,) confidence in [0, 1], for boxes that come without.
+            embeddings: (M, E) what each looks like, of a network for re-identification; NaN where unknown.
 
         Returns and raises as `step`; also a DataError where it cannot be told what `source` is.
         """
         found = boxes_of(source, scores)
-        return self.step(Scan(t, sensor, found.boxes, found.scores, found.classes))
+        looks = None if embeddings is None else unit_embeddings(embeddings, len(found.scores))
+        return self.step(Scan(t, sensor, found.boxes, found.scores, found.classes, looks))
 
     def causal(self) -> Trajectories:
         """Return the tracks that are reported now, as the last step did."""

@@ -68,7 +68,11 @@ def associate(
         log_clutter[s] = math.log(scene.clutter[s]) - model.settings.log_clutter_volume
     pair_evidence = log_evidence(pairs, p_detect, batch.log_score, log_clutter, batch.sensor)
     if settings.by_likelihood:
-        costs = likelihood_cost(rows, cols, pair_evidence, tracks.existence, p_detect, batch.sensor)
+        judged = pair_evidence.copy()
+        if len(batch.alike):  # who looks like whom says nothing of false boxes, so only here
+            for p in range(len(rows)):
+                judged[p] += batch.alike[rows[p], cols[p]]
+        costs = likelihood_cost(rows, cols, judged, tracks.existence, p_detect, batch.sensor)
     else:
         costs = pairs.d2
     unassigned = settings.unassigned_cost

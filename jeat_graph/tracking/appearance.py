@@ -1,0 +1,175 @@
+"""What living tracks look like, by the embeddings of their detections, and how much that tells them apart.
+
+A track is remembered, for each sensor, by the fading mean of the embeddings that it took in; a detection is
+compared with it by the cosine between them. What a cosine is worth is learnt from the stream itself: cosines
+between tracks and the detections they took, and between tracks and what others took, are held to be normal,
+with means of their own and one variance. The logarithm of their likelihood ratio is then linear in the
+cosine (Fisher, "The use of multiple measurements in taxonomic problems", Annals of Eugenics 7, 1936).
+Embeddings that tell nothing come to count for nothing.
+
+The ratio speaks for one vehicle against another. It says nothing of false boxes, which look alike too: so it
+decides who takes a detection, and not whether there is a vehicle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.embeddings import EmbeddingArray, join_embeddings
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.scan import Scan
+from jeat_graph.tracking.update_log import UpdateLog
+
+_KEPT = 0.9  # of a track's mean from one detection to the next
+# Before anything was seen, cosines of one vehicle and of two are alike: this many of each, spread so widely.
+_PRIOR_WEIGHT, _PRIOR_STD = 20.0, 0.2
+_MOST_WEIGHT = 4096.0  # of cosines that are remembered; then all count half
+_SAME, _OTHER = 0, 1
+
+
+class Looks(NamedTuple):
+    """What has been seen so far. Its arrays are never written to: a step makes others.
+
+    Attributes:
+        track_id: (N,) the living tracks, ascending.
+        mean: (N, S, E) what each looks like to each sensor; 0 where it has not been seen.
+        moments: (S, 2, 3) weight, sum and sum of squares of the cosines of one vehicle and of two.
+    """
+
+    track_id: IntArray
+    mean: FloatArray
+    moments: FloatArray
+
+    @staticmethod
+    def start(num_sensors: int, numbers: int) -> Looks:
+        """Return what is known before the first embedding of so many numbers."""
+        none = np.zeros(0, dtype=np.int64)
+        return Looks(none, np.zeros((0, num_sensors, numbers)), np.zeros((num_sensors, 2, 3)))
+
+    def of(self, living: IntArray) -> Looks:
+        """Return the same of the tracks that live now (N,), ascending."""
+        if np.array_equal(living, self.track_id):
+            return self
+        living = living.copy()
+        mean = np.zeros((len(living), *self.mean.shape[1:]))
+        _, now, before = np.intersect1d(living, self.track_id, assume_unique=True, return_indices=True)
+        mean[now] = self.mean[before]
+        return Looks(living, mean, self.moments)
+
+    def ratio(self) -> tuple[FloatArray, FloatArray]:
+        """Return the slope (S,) of ln of the likelihood ratio over the cosine, and where (S,) that is 0."""
+        weight, total, squares = np.moveaxis(self.moments, -1, 0)  # (S, 2) each
+        both = weight.sum(axis=1, keepdims=True)
+        middle = total.sum(axis=1, keepdims=True) / np.maximum(both, 1.0)
+        mean = (total + _PRIOR_WEIGHT * middle) / (weight + _PRIOR_WEIGHT)
+        within = squares - total**2 / np.maximum(weight, 1.0)
+        var = (within.sum(axis=1) + _PRIOR_WEIGHT * _PRIOR_STD**2) / (both[:, 0] + _PRIOR_WEIGHT)
+        return np.maximum(mean[:, _SAME] - mean[:, _OTHER], 0.0) / var, mean.mean(axis=1)
+
+
+class Compared(NamedTuple):
+    """The detections of one time beside the tracks before it.
+
+    Attributes:
+        looks: of these tracks.
+        embeddings: (M, E) of the detections; 0 where there is none.
+        sensor: (M,) their sensors.
+        cosine: (N, M) of each pair, NaN where one of both is unknown.
+        log_ratio: (N, M) ln of the likelihood ratio, 0 where it is unknown.
+    """
+
+    looks: Looks
+    embeddings: FloatArray
+    sensor: IntArray
+    cosine: FloatArray
+    log_ratio: FloatArray
+
+
+def embeddings_of(looks: Looks | None, batch: Sequence[Scan]) -> EmbeddingArray | None:
+    """Return the embeddings (M, E) of the detections of a batch, None if none has any.
+
+    Raises:
+        DataError: they have more or fewer numbers than those before.
+    """
+    found = join_embeddings([scan.embeddings for scan in batch], [len(scan) for scan in batch])
+    if found is None or looks is None or found.shape[1] == looks.mean.shape[2]:
+        return found
+    before = looks.mean.shape[2]
+    raise DataError(f"embeddings must have {before} numbers as those before, not {found.shape[1]}")
+
+
+def compare(looks: Looks, embeddings: EmbeddingArray, sensor: IntArray, most: float) -> Compared:
+    """Compare detections with the living tracks.
+
+    Args:
+        looks: of these tracks.
+        embeddings: (M, E) of unit length, NaN where there is none.
+        sensor: (M,) sensor index of each.
+        most: greatest absolute value of ln of the ratio.
+    """
+    found = np.nan_to_num(embeddings.astype(np.float64))
+    length = np.sqrt(np.einsum("nse,nse->ns", looks.mean, looks.mean))[:, sensor]
+    known = (length > 0.0) & found.any(axis=1)
+    cosine = np.full(known.shape, np.nan)
+    for s in np.unique(sensor):
+        columns = sensor == s
+        cosine[:, columns] = looks.mean[:, s] @ found[columns].T
+    cosine = np.where(known, cosine / np.where(known, length, 1.0), np.nan)
+    slope, middle = looks.ratio()
+    ratio = np.where(known, slope[sensor] * (np.where(known, cosine, 0.0) - middle[sensor]), 0.0)
+    return Compared(looks, found, sensor, cosine, np.clip(ratio, -most, most))
+
+
+def remember(compared: Compared, log: UpdateLog, living: IntArray) -> Looks:
+    """Return what is known after a step.
+
+    Args:
+        compared: its detections beside the tracks before it.
+        log: what the tracks took in of them.
+        living: (N,) the tracks after it, ascending.
+    """
+    taken = int(log.count[0])
+    takers, detection = log.rows["track_id"][:taken], log.detection[:taken]
+    now = compared.looks.of(living)
+    mean, found = now.mean.copy(), compared.embeddings
+    row, there = _places(takers, living)
+    use = np.flatnonzero(there & found[detection].any(axis=1))
+    row, used = row[use], detection[use]
+    sensor = compared.sensor[used]
+    known: BoolArray = np.any(mean[row, sensor], axis=1, keepdims=True)
+    mean[row, sensor] = np.where(known, _KEPT * mean[row, sensor] + (1.0 - _KEPT) * found[used], found[used])
+    return Looks(now.track_id, mean, _learnt(compared, takers, detection))
+
+
+def _learnt(compared: Compared, takers: IntArray, detection: IntArray) -> FloatArray:
+    """The moments with this step's cosines; all tracks that did not take a detection weigh as one."""
+    moments = compared.looks.moments.copy()
+    row, there = _places(takers, compared.looks.track_id)
+    row, detection = row[there], detection[there]
+    place = np.arange(len(row))
+    cosine = compared.cosine[:, detection]
+    same = cosine[row, place]
+    cosine[row, place] = np.nan
+    number = np.maximum((~np.isnan(cosine)).sum(axis=0), 1)
+    others = np.stack([np.nansum(cosine, axis=0) / number, np.nansum(cosine**2, axis=0) / number], axis=-1)
+    known = ~np.isnan(same)
+    alone = np.isnan(cosine).all(axis=0)
+    s = compared.sensor[detection]
+    one = np.ones(len(same))
+    np.add.at(moments[:, _SAME], s[known], np.column_stack([one, same, same**2])[known])
+    np.add.at(moments[:, _OTHER], s[~alone], np.column_stack([one, others])[~alone])
+    full = moments[:, :, 0].max(axis=1) > _MOST_WEIGHT
+    moments[full] *= 0.5
+    return moments
+
+
+def _places(identity: IntArray, among: IntArray) -> tuple[IntArray, BoolArray]:
+    """Return where each identity stands among ascending ones, and whether it is there at all."""
+    row = np.minimum(np.searchsorted(among, identity), max(len(among) - 1, 0))
+    if not len(among):
+        return row, np.zeros(len(identity), dtype=np.bool_)
+    return row, np.asarray(among[row] == identity)

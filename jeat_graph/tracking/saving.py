@@ -1,0 +1,70 @@
+"""What a tracker offers to be saved and to go on later (see `checkpoint`)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+from jeat_graph.config.schema import Config
+from jeat_graph.tracking.smoothing.access import SmoothedTracks
+from jeat_graph.tracking.snapshot import Snapshot
+
+
+class SavedTracks(SmoothedTracks):
+    """A tracker's state to and from files; see `Tracker`."""
+
+    if TYPE_CHECKING:
+        config: Config
+        _diagnostics: bool
+
+        def __init__(self, config: Config, *, diagnostics: bool = False) -> None:
+            """Make a tracker."""
+
+        def snapshot(self) -> Snapshot:
+            """Copy all that the next step depends on."""
+
+        def restore(self, snapshot: Snapshot) -> None:
+            """Go back to a snapshot."""
+
+    def save(self, path: str | Path) -> None:
+        """Write the whole state to a file (`.npz`), smoothers included, for `load` to go on from.
+
+        This tracker and the loaded one give the same bytes from here on.
+
+        Raises:
+            JeatGraphError: the smoothers are in a process of their own (`smoother.worker`).
+        """
+        from jeat_graph.tracking.checkpoint import save_state
+
+        save_state(path, self.config, self.state())
+
+    @classmethod
+    def load(cls, path: str | Path, config: Config | None = None) -> Self:
+        """Return the tracker that was saved to a file.
+
+        Args:
+            path: the file.
+            config: the configuration that it must have had; None takes the file's.
+
+        Raises:
+            DataError: no such file, or one that holds no tracker.
+            JeatGraphError: it was saved by another version, or with other settings.
+        """
+        from jeat_graph.tracking.checkpoint import load_state
+
+        return cls.from_state(*load_state(path, config))
+
+    def state(self, snapshot: Snapshot | None = None) -> dict[str, Any]:
+        """Return what `from_state` takes: the state now, or at a snapshot; the smoothers' is not copied."""
+        now = self.snapshot() if snapshot is None else snapshot
+        return {"diagnostics": self._diagnostics, "now": now, "smoothing": self._smoothers}
+
+    @classmethod
+    def from_state(cls, config: Config, state: dict[str, Any]) -> Self:
+        """Make a tracker of what `state` returned."""
+        without = replace(config, smoother=replace(config.smoother, engine="none"))
+        tracker = cls(without, diagnostics=state["diagnostics"])
+        tracker.config, tracker._smoothers = config, state["smoothing"]
+        tracker.restore(state["now"])
+        return tracker
