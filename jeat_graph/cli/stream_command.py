@@ -177,7 +177,8 @@ def _with_road(
 
     def both(t: float, table: Trajectories, message: ScanMessage, late_s: float) -> None:
         tracks(t, table, message, late_s)
-        road.take(t, live.tracker.last_measurements()[0], table.track_id)
+        for when, measured in live.measured:  # sensors of other delays are steps of their own
+            road.take(when, measured, table.track_id)
 
     return both
 
@@ -244,7 +245,9 @@ def _take(
 
     try:
         session.accept(in_seconds(message, unit), place)
-    except (UnknownSensorError, TimeOrderError) as error:
+    except (DataError, UnknownSensorError, TimeOrderError) as error:
+        if isinstance(error, DataError) and error.path is not None:
+            raise  # of a file that is written, not of the message
         name, _, line = place.removesuffix(": ").rpartition(":")
         trouble = DataError(str(error), name, int(line))
         if bad is None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, TextArray
-from jeat_graph.data.embeddings import EmbeddingArray
+from jeat_graph.data.embeddings import EmbeddingArray, embeddings_of_objects
 from jeat_graph.data.interop import boxes_of, columns_of, from_xyxy, supervision_of
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ class DetectionViews:
             c.get("score", np.ones(len(frame))),
             empty,
             c.get("class"),
-            np.stack(list(c["embedding"])) if "embedding" in c and len(box) else None,
+            embeddings_of_objects(list(c["embedding"])) if "embedding" in c else None,
         )
 
     @classmethod

@@ -61,6 +61,23 @@ def find_bad_embedding(values: FloatArray) -> int | None:
     return None if good.all() else int(np.argmin(good))
 
 
+def embeddings_of_objects(column: Sequence[object]) -> npt.NDArray[np.float64] | None:
+    """Return the vectors (R, E) of a data frame's column, NaN where None, NaN or nothing stands; or None.
+
+    Raises:
+        DataError: vectors of several lengths, or what is none.
+    """
+    rows = [np.atleast_1d(np.asarray(np.nan if one is None else one, dtype=np.float64)) for one in column]
+    there = [row.ndim == 1 and len(row) > 0 and not np.isnan(row).all() for row in rows]
+    lengths = {len(row) for row, known in zip(rows, there, strict=True) if known}
+    if len(lengths) > 1 or any(row.ndim > 1 for row in rows):
+        raise DataError("embeddings must be vectors of equally many numbers")
+    if not lengths:
+        return None
+    none = np.full(lengths.pop(), np.nan)
+    return np.stack([row if known else none for row, known in zip(rows, there, strict=True)])
+
+
 def missing_embeddings(count: int, numbers: int) -> EmbeddingArray:
     """Return embeddings (M, E) of detections that have none."""
     return np.full((count, numbers), np.nan, dtype=np.float32)
@@ -85,7 +102,9 @@ def join_embeddings(parts: Sequence[EmbeddingArray | None], counts: Sequence[int
     Raises:
         DataError: some have more numbers than others.
     """
-    lengths = {part.shape[1] for part in parts if part is not None and len(part)}
+    # A row is missing as a whole, and of what is missing nobody knows how long it would be.
+    parts = [None if part is None or np.isnan(part[:, :1]).all() else part for part in parts]
+    lengths = {part.shape[1] for part in parts if part is not None}
     if not lengths:
         return None
     if len(lengths) > 1:
@@ -95,7 +114,7 @@ def join_embeddings(parts: Sequence[EmbeddingArray | None], counts: Sequence[int
     numbers = lengths.pop()
     return np.concatenate(
         [
-            missing_embeddings(count, numbers) if part is None or not len(part) else part
+            missing_embeddings(count, numbers) if part is None else part
             for part, count in zip(parts, counts, strict=True)
         ]
     )

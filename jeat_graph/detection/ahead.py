@@ -52,6 +52,10 @@ def ahead(scans: Iterator[Scan]) -> Generator[Scan, None, None]:
                     return
         except BaseException as error:
             end = _End(error)
+        finally:
+            close = getattr(scans, "close", None)  # a generator's: what it has open is closed here
+            if close is not None:
+                close()
         ready.put(end)
 
     thread = threading.Thread(target=contextvars.copy_context().run, args=(work,), daemon=True)

@@ -47,7 +47,8 @@ class EventBins:
         self._ring = np.zeros((bins, 2, height, width), dtype=np.uint8)
         self._total = np.zeros((height, width), dtype=np.uint16)
         self._newest = bins - 1
-        self._filled = [EventArray.empty()] * bins
+        none = EventArray.empty()
+        self._filled = [(len(none), none.x, none.y)] * bins
 
     @property
     def total(self) -> npt.NDArray[np.uint16]:
@@ -61,20 +62,25 @@ class EventBins:
             events: those with `end_us` <= t < `end_us` + bin; others must not be given.
         """
         self._newest = (self._newest + 1) % len(self._ring)
-        slot, old = self._ring[self._newest], self._filled[self._newest]
-        if len(old) > _SPARSE_SHARE * slot.size:
+        slot = self._ring[self._newest]
+        most = _SPARSE_SHARE * slot.size
+        count, x, y = self._filled[self._newest]
+        if count > most:
             _clear_all(slot, self._total)
         else:
-            _clear(old.x, old.y, slot, self._total)
+            _clear(x, y, slot, self._total)
         _count(events.x, events.y, events.polarity, slot, self._total)
-        self._filled[self._newest] = events
+        # Copies, for who gives the events may use their memory again.
+        few = slice(len(events) if len(events) <= most else 0)
+        self._filled[self._newest] = (len(events), events.x[few].copy(), events.y[few].copy())
         self.end_us += self.bin_us
 
     def skip_to(self, end_us: int) -> None:
         """Empty the window and let it end at `end_us`, a whole multiple of the bin."""
         self._ring[:] = 0
         self._total[:] = 0
-        self._filled = [EventArray.empty()] * len(self._ring)
+        none = EventArray.empty()
+        self._filled = [(0, none.x, none.y)] * len(self._ring)
         self.end_us = end_us
 
     def stack(self, by_polarity: bool = False) -> npt.NDArray[np.uint8]:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.decoders import quietly, without_a_word
+from jeat_graph.io.video import count_frames
 
 
 def as_png(picture: npt.NDArray[np.uint8 | np.uint16]) -> bytes:
@@ -31,12 +32,15 @@ def as_png(picture: npt.NDArray[np.uint8 | np.uint16]) -> bytes:
     return bytes(data.tobytes())
 
 
-def open_video(stack: ExitStack, path: Path, codec: str, rate_hz: float, size_px: tuple[int, int]) -> Any:
+def open_video(
+    stack: ExitStack, path: Path, shown: Path, codec: str, rate_hz: float, size_px: tuple[int, int]
+) -> Any:
     """Open a video to which frames are written, let go when the stack is left.
 
     Args:
         stack: what lets go of it.
         path: the file.
+        shown: its name in messages.
         codec: its four characters.
         rate_hz: frames per second.
         size_px: width and height.
@@ -53,5 +57,21 @@ def open_video(stack: ExitStack, path: Path, codec: str, rate_hz: float, size_px
     video = without_a_word(lambda: cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, rate_hz, size_px))
     stack.callback(lambda: quietly(video.release))
     if not video.isOpened():
-        raise DataError(f"cannot be written: this OpenCV has no encoder {codec}, or the disk is full", path)
+        raise DataError(f"cannot be written: this OpenCV has no encoder {codec}, or the disk is full", shown)
     return video
+
+
+def check_video(path: Path, shown: Path, count: int) -> None:
+    """Read a video again: the library that writes it says nothing of a disk that was full.
+
+    Args:
+        path: the file.
+        shown: its name in messages.
+        count: number of pictures that it should have.
+
+    Raises:
+        DataError: it has fewer.
+    """
+    there = count_frames(path)
+    if there != count:
+        raise DataError(f"only {there} of {count} pictures could be written; is the disk full?", shown)

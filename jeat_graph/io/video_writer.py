@@ -9,7 +9,7 @@ import numpy as np
 
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.io.atomic import atomic_path
-from jeat_graph.io.pictures import as_png, open_video
+from jeat_graph.io.pictures import as_png, check_video, open_video
 from jeat_graph.io.piecewise import PiecewiseWriter
 from jeat_graph.io.video import FRAME_TIMES, VIDEO_FILES, RgbImage, quietly
 from jeat_graph.io.webm import settle_webm
@@ -36,29 +36,35 @@ class FrameWriter(PiecewiseWriter):
         if video not in VIDEO_FILES:
             raise ConfigError(f"video must be one of {', '.join(VIDEO_FILES)}, not {video!r}")
         self._folder, self._video, self._size_px, self._rate_hz = Path(folder), video, size_px, rate_hz
+        self._path = self._folder / VIDEO_FILES[video]
         self._times: list[int] = []
         self._target = Path()
         self._sink: Any = None
 
     def _begin(self) -> None:
-        target = self._folder / VIDEO_FILES[self._video]
+        self._stack.push(self._write_times)  # last of all, when the video has its name
         if self._video == "png":
-            target.mkdir(parents=True, exist_ok=True)
-            self._target = target
-        else:
-            self._target = self._stack.enter_context(atomic_path(target))
-            size_px, codec = self._size_px, _CODECS[self._video]
-            self._sink = open_video(self._stack, self._target, codec, self._rate_hz, size_px)
+            self._path.mkdir(parents=True, exist_ok=True)
+            self._target = self._path
+            return
+        self._target = self._stack.enter_context(atomic_path(self._path))
+        codec, size_px = _CODECS[self._video], self._size_px
+        self._sink = open_video(self._stack, self._target, self._path, codec, self._rate_hz, size_px)
 
     def _finish(self) -> None:
+        if self._sink is None:
+            return
+        quietly(self._sink.release)
+        check_video(self._target, self._path, len(self._times))
+        if self._video == "webm":
+            settle_webm(self._target)
+
+    def _write_times(self, kind: type[BaseException] | None, *_: object) -> None:
         from jeat_graph.io.table_writer import write_columns
 
-        if self._sink is not None:
-            quietly(self._sink.release)
-            if self._video == "webm":
-                settle_webm(self._target)
-        t_us = np.array(self._times, dtype=np.int64)
-        write_columns({"index": np.arange(len(t_us)), "t_us": t_us}, self._folder / FRAME_TIMES)
+        if kind is None:
+            t_us = np.array(self._times, dtype=np.int64)
+            write_columns({"index": np.arange(len(t_us)), "t_us": t_us}, self._folder / FRAME_TIMES)
 
     def append(self, t_us: int, rgb: RgbImage) -> None:
         """Add a frame.

@@ -11,11 +11,13 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from jeat_graph.config.schema import Config
+from jeat_graph.data.arrays import RecordArray
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import ConfigError, DataError, TimeOrderError
 from jeat_graph.data.trajectories import Trajectories
@@ -82,6 +84,8 @@ class LiveTracker:
         lateness: how late scans came, by sensor.
         steps: the steps that may still be taken again, by time.
         replayed: how many steps have been taken again so far.
+        measured: times of the steps of the last arrival and what they gave to the tracks, if the tracker has
+            diagnostics and no step can be taken again.
     """
 
     def __init__(self, tracker: Tracker, policy: str = REWIND) -> None:
@@ -93,6 +97,7 @@ class LiveTracker:
         self.lateness = LatenessCounter(tracker.sensor_names)
         self.steps: list[TakenStep] = []
         self.replayed = 0
+        self.measured: list[tuple[float, RecordArray]] = []
         self._again_until: float | None = None  # after a restart: time of the newest scan that was known then
         self._newest: list[str] = []  # where nothing is taken again: sensors of the scans at the newest time
         self._settled = -math.inf  # time of the last step that the smoothers have been told of
@@ -118,6 +123,7 @@ class LiveTracker:
         batch = [self._corrected(scan) for scan in as_scans(scans)]
         for scan in batch:
             sensor_index(scan.sensor, self.tracker.sensor_names)  # refused before anything is done
+        self.measured = []
         now = self.tracker.time
         late_s = 0.0
         repeated = [scan for scan in batch if self._comes_again(scan)]
@@ -241,25 +247,32 @@ class LiveTracker:
         """Put scans of one time where they belong, and take all steps from there on again."""
         if self.policy != REWIND:
             earlier = self._newest if scans[0].t == self.tracker.time else []
+            taken = self.tracker.take_in(scans)
             self._newest = earlier + [scan.sensor for scan in scans]
-            self.tracker.hand_over(self.tracker.take_in(scans))
+            self.tracker.hand_over(taken)
+            if self.tracker.has_diagnostics:
+                self.measured.append((scans[0].t, self.tracker.last_measurements()[0]))
             return
-        t = scans[0].t
+        t, now = scans[0].t, self.tracker.snapshot()
         k = self._place(t)
-        if k < len(self.steps):
-            before = self.steps[k].before
+        later = [copy(step) for step in self.steps[k:]]
+        before = self.steps[k].before if later else now
+        if later:
             self.tracker.restore(before)
-        else:
-            before = self.tracker.snapshot()
         if k < len(self.steps) and self.steps[k].t == t:
             scans = self.steps[k].scans + scans
             del self.steps[k]
         # As files are read: the order of arrival must not show.
         self.steps.insert(k, TakenStep(t, sorted(scans, key=lambda scan: scan.sensor), before, None))
-        for step in self.steps[k:]:
-            if step is not self.steps[k]:
-                step.before = self.tracker.snapshot()
-            step.taken = self.tracker.take_in(step.scans)
+        try:
+            for step in self.steps[k:]:
+                if step is not self.steps[k]:
+                    step.before = self.tracker.snapshot()
+                step.taken = self.tracker.take_in(step.scans)
+        except Exception:
+            self.steps[k:] = later
+            self.tracker.restore(now)
+            raise
         self.replayed += len(self.steps) - k - 1
         newest = self.tracker.time
         assert newest is not None

@@ -45,6 +45,7 @@ from jeat_graph.smoothers.gtsam.shared_chain import (
 )
 
 _ANY_SIZE_M = 100.0
+_SAME_S = 1e-6  # two sensors that look so closely together share a state
 # Of a state of the graph, in the order of the causal filter's: x, its speed, y, its speed and acceleration.
 _AS_CAUSAL = np.array([0, 1, 3, 4, 5])
 
@@ -171,9 +172,11 @@ class RoadFixedLag:
             track.waiting = [log] if track.window is None else []
             return track.window is None or self._solve(track.window)
         track.waiting, window = [], track.window
-        keys = self._keys(window.keys[-1], rows.t[-1])[1:]
-        window.coefficients = _extended(window, keys)
-        window.keys = np.concatenate([window.keys, keys])
+        # What another sensor saw at the time of the last state needs no state of its own.
+        if rows.t[-1] > window.keys[-1] + _SAME_S:
+            keys = self._keys(window.keys[-1], rows.t[-1])[1:]
+            window.coefficients = _extended(window, keys)
+            window.keys = np.concatenate([window.keys, keys])
         window.rows = window.rows.followed_by(rows)
         return self._solve(window)
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
-from jeat_graph.data.errors import DataError
+from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.io.table_writer import csv_lines
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.causal import CalibrationShare, columns_of_rows
@@ -91,9 +91,13 @@ class RoadFile:
         self._file.flush()
         return self
 
-    def __exit__(self, *error: object) -> None:
-        self._append(self._table.finish())
-        self._file.close()
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        try:
+            # After an error the vehicles may be in no state to be finished; being interrupted is none.
+            if kind is None or not issubclass(kind, Exception) or issubclass(kind, JeatGraphError):
+                self._append(self._table.finish())
+        finally:
+            self._file.close()
 
     def take(self, t: float, rows: RecordArray, reported: IntArray) -> None:
         """Take in a step, and hand the rows that are final to the system at once.

@@ -94,6 +94,11 @@ class Tracker(SavedTracks):
         return self._next_id - 1
 
     @property
+    def has_diagnostics(self) -> bool:
+        """Whether `last_updates` and `last_measurements` have something to say."""
+        return self._diagnostics
+
+    @property
     def time(self) -> float | None:
         """Time of the last step (s), or None before the first."""
         return self._t

@@ -255,6 +255,19 @@ def test_bad_lines_are_passed_over_and_counted_if_asked(monkeypatch, capsys, tmp
     assert "3 messages could not be read" in err
 
 
+def test_a_scan_that_the_tracker_refuses_is_passed_over_like_a_bad_line(monkeypatch, capsys):
+    looks = [[[1.0, 2.0, 3.0]]] * 6
+    looks[3] = [[1.0, 2.0]]
+    text = "".join(line(0.05 * k, embeddings=one) for k, one in enumerate(looks))
+    code, out, err = stream(text, monkeypatch, capsys, "--on-error", "skip")
+    assert code == 0
+    assert [json.loads(text)["t"] for text in out.splitlines()] == [0.05 * k for k in (0, 1, 2, 4, 5)]
+    assert "<stdin>:4: embeddings must have 3 numbers" in err
+    code, out, err = stream(text, monkeypatch, capsys)
+    assert code == 2
+    assert "<stdin>:4: embeddings must have 3 numbers" in err
+
+
 def test_bad_rows_of_csv_are_passed_over_too(monkeypatch, capsys):
     text = "nonsense\nt,sensor,left,top,width,height,score\n0,rgb,1,2,3,4,x\n0,rgb\n0.1,rgb\n"
     code, out, err = stream(text, monkeypatch, capsys, "--on-error", "skip")

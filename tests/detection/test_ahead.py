@@ -45,3 +45,18 @@ def test_whoever_stops_asking_stops_the_work():
     stream.close()
     assert threading.active_count() == before
     assert len(made) < 100
+
+
+def test_what_a_stream_has_open_is_closed_in_its_thread_before_anything_else_ends():
+    closed = []
+
+    def opened():
+        try:
+            yield from scans(100)
+        finally:
+            closed.append(threading.current_thread() is not threading.main_thread())
+
+    stream = ahead(opened())
+    next(stream)
+    stream.close()
+    assert closed == [True]

@@ -71,3 +71,17 @@ def test_many_events_of_one_pixel_do_not_overflow():
 def test_a_window_needs_bins():
     with pytest.raises(ConfigError, match="windows need bins"):
         EventBins(SIZE, bins=0)
+
+
+def test_whoever_gives_events_may_use_their_memory_again():
+    ring, again = EventBins(SIZE, bins=4), EventBins(SIZE, bins=4)
+    rng = np.random.default_rng(0)
+    events = events_of(THINGS, 0.2, noise_hz_px=5.0, size=SIZE).take(slice(None, None, 20))
+    for k in range(20):
+        part = events.between(k * 5000, (k + 1) * 5000)
+        ring.advance(part)
+        own = part.take(np.arange(len(part)))
+        again.advance(own)
+        own.x[:], own.y[:] = rng.integers(0, SIZE[0], len(own)), rng.integers(0, SIZE[1], len(own))
+        np.testing.assert_array_equal(ring.stack(), again.stack())
+        np.testing.assert_array_equal(ring.total, again.total)

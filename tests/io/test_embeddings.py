@@ -7,6 +7,7 @@ import pyarrow as pa
 import pytest
 from pyarrow import parquet
 
+from jeat_graph import Tracker
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.detections_io import read_detections, write_detections
@@ -50,7 +51,7 @@ def test_parts_of_a_recording_keep_theirs():
         np.testing.assert_array_equal(one.embeddings, other.embeddings)
     frame = whole.to_pandas()
     np.testing.assert_array_equal(Detections.from_pandas(frame).embeddings, whole.embeddings)
-    assert np.isnan(whole.select(["evt"]).embeddings).all()
+    assert whole.select(["evt"]).embeddings is None
 
 
 def test_lists_of_all_kinds_are_read_from_parquet(tmp_path):
@@ -101,3 +102,30 @@ def test_a_stream_has_them_as_lists_or_null():
     np.testing.assert_allclose(batch.scans[0].embeddings, [[np.nan] * 2, [0.6, 0.8]], rtol=1e-6)
     with pytest.raises(DataError, match="embeddings must have shape"):
         batch_of({**item, "embeddings": "many"}, "stdin", 1)
+
+
+def test_what_is_missing_has_no_length():
+    item = {"t": 0.0, "sensor": "rgb", "boxes": [[1, 2, 3, 4]], "scores": [0.5]}
+    unknown = batch_of({**item, "embeddings": [None]}, "stdin", 1).scans[0]
+    known = Scan(1.0, "rgb", [[1, 2, 3, 4]], [0.5], None, np.ones((1, 3)))
+    both = Detections.from_scans([unknown, known])
+    np.testing.assert_array_equal(np.isnan(both.embeddings).all(axis=1), [True, False])
+    assert Detections.from_scans([unknown]).embeddings is None
+    tracker = Tracker("default", image=(100, 100))
+    for scan in (unknown, known):
+        tracker.step(scan)  # and no complaint of another length
+
+
+@pytest.mark.parametrize("none", [None, float("nan"), []])
+def test_data_frames_say_in_many_ways_that_there_is_none(none):
+    frame = recording().to_pandas().drop(columns="embedding")
+    count = len(frame)
+    frame["embedding"] = [none] * (count - 1) + [np.array([3.0, 4.0])]
+    found = Detections.from_pandas(frame).embeddings
+    np.testing.assert_allclose(found[-1], [0.6, 0.8], rtol=1e-6)
+    assert np.isnan(found[:-1]).all()
+    frame["embedding"] = [none] * count
+    assert Detections.from_pandas(frame).embeddings is None
+    frame["embedding"] = [np.ones(2)] + [np.ones(3)] * (count - 1)
+    with pytest.raises(DataError, match="equally many numbers"):
+        Detections.from_pandas(frame)

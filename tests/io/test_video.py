@@ -140,3 +140,23 @@ def test_an_unknown_kind_of_video_is_refused(tmp_path: Path) -> None:
 def test_nothing_is_said_on_stderr(tmp_path: Path, video: str, capfd: pytest.CaptureFixture[str]) -> None:
     write(tmp_path, video, [RED] * 3)
     assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("video", ["mp4", "webm", "lossless"])
+def test_a_video_that_is_not_whole_is_told_of_and_leaves_nothing(tmp_path: Path, video: str) -> None:
+    """The library that writes it says nothing of a disk that is full."""
+
+    class Deaf:
+        def __init__(self, sink) -> None:
+            self.write, self.release, self.isOpened = lambda _: None, sink.release, sink.isOpened
+
+    def half_written() -> None:
+        with FrameWriter(tmp_path, video, SIZE, 20.0) as writer:
+            for k, frame in enumerate(pictures(5)):
+                writer.append(50_000 * k, frame)
+                if k == 1:
+                    writer._sink = Deaf(writer._sink)
+
+    with pytest.raises(DataError, match=r"frames\.\w+: only 2 of 5 pictures could be written; is the disk"):
+        half_written()
+    assert list(tmp_path.iterdir()) == []

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Scan
-from jeat_graph.data.errors import TimeOrderError, UnknownSensorError
+from jeat_graph.data.errors import DataError, TimeOrderError, UnknownSensorError
 from jeat_graph.io.trajectories_io import write_trajectories
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.simulation.scenario import load_scenario
@@ -269,3 +269,37 @@ def test_predict_at_the_present_is_what_was_reported():
     same = tracker.predict(now.t[0])
     for name in ("track_id", "boxes", "mean", "var", "existence"):
         np.testing.assert_array_equal(getattr(same, name), getattr(now, name))
+
+
+def test_a_scan_that_is_refused_leaves_what_may_be_taken_again_as_it_was():
+    """Embeddings of another length are found out in the middle of a step, in order, late or taken again."""
+
+    def scan(t, numbers=3):
+        looks = None if numbers is None else np.ones((1, numbers))
+        return Scan(t, "rgb", [[100.0 + 40.0 * t, 100.0, 40.0, 30.0]], [0.9], None, looks)
+
+    config = load_config("default", ["smoother.engine=none", "live.late_s=1"])
+    asked, plain = LiveTracker(Tracker(config)), LiveTracker(Tracker(config))
+    for k, numbers in enumerate([None, 3, 3, 3]):
+        asked.step(scan(0.1 * k, numbers))
+        plain.step(scan(0.1 * k, numbers))
+    for bad in (0.4, 0.25, 0.05):
+        with pytest.raises(DataError, match="numbers"):
+            asked.step(scan(bad, 4))
+        assert_same_state(asked.tracker.snapshot(), plain.tracker.snapshot())
+        assert [step.t for step in asked.steps] == [step.t for step in plain.steps]
+    for good in (0.15, 0.5):
+        np.testing.assert_array_equal(asked.step(scan(good)).table.mean, plain.step(scan(good)).table.mean)
+
+
+def test_sensors_of_other_delays_are_steps_of_their_own_and_none_is_lost():
+    late = ["sensors.rgb.latency_s=0.02", "smoother.engine=none"]
+    live = LiveTracker(Tracker(load_config("highway", late), diagnostics=True), "skip")
+    box, found = [[300.0, 300.0, 40.0, 30.0]], []
+    for k in range(20):
+        live.step([(0.05 * k, name, box, [0.9]) for name in ("evt", "rgb")])
+        found += [(t, int(row["sensor"])) for t, rows in live.measured for row in rows]
+    times = np.array([t for t, s in found if s == 1])  # evt, rgb
+    assert len(times) > 10
+    np.testing.assert_allclose(np.diff(times), 0.05)
+    assert len(found) - len(times) > 10

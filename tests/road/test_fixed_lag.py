@@ -119,3 +119,21 @@ def test_a_vehicle_that_leaves_the_view_is_forgotten_with_its_boxes() -> None:
     for t in np.arange(3.0, 9.0, 0.5):
         smoother.step(float(t), log[:0])
     assert not len(smoother.finish())
+
+
+def test_a_second_sensor_at_the_time_of_the_last_state_is_taken_in_too() -> None:
+    """Two messages of one time are two steps, of which the first may have made a state of that time."""
+    log = _log(4)
+    steps, end = _follow(log, RoadLagConfig())
+    twice = RoadFixedLag(camera(), load_config("highway"), RoadLagConfig())
+    found = []
+    for k in range(len(log)):
+        for part in (log[k : k + 1], log[k : k + 1]):
+            found.append(twice.step(float(part["t"][0]), part))
+    rows = np.concatenate([*found, twice.finish()])
+    once = np.concatenate([*steps, end])
+    assert np.isfinite(rows["mean"]).all()
+    assert rows["t"][-1] == pytest.approx(once["t"][-1], abs=0.05)
+    # What is seen twice is known better, and nowhere else than once.
+    assert np.median(rows["var"][:, 1]) < np.median(once["var"][:, 1])
+    assert np.abs(np.interp(rows["t"], once["t"], once["mean"][:, 1]) - rows["mean"][:, 1]).max() < 1.0

@@ -13,11 +13,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from jeat_graph.data.errors import DataError
 from jeat_graph.io.atomic import atomic_path
-from jeat_graph.io.pictures import as_png, open_video
+from jeat_graph.io.pictures import as_png, check_video, open_video
 from jeat_graph.io.piecewise import PiecewiseWriter
-from jeat_graph.io.video import RgbImage, count_frames, quietly
+from jeat_graph.io.video import RgbImage, quietly
 from jeat_graph.io.webm import settle_webm
 
 CODECS = {".mp4": "vp09", ".webm": "VP80"}
@@ -45,11 +44,11 @@ class MovieWriter(PiecewiseWriter):
     def _begin(self) -> None:
         codec = CODECS[self._path.suffix.lower()]
         self._temporary = self._stack.enter_context(atomic_path(self._path))
-        self._sink = open_video(self._stack, self._temporary, codec, self._rate_hz, self._size_px)
+        self._sink = open_video(self._stack, self._temporary, self._path, codec, self._rate_hz, self._size_px)
 
     def _finish(self) -> None:
         quietly(self._sink.release)
-        self._check()
+        check_video(self._temporary, self._path, self._count)
         if self._path.suffix.lower() == ".webm":
             settle_webm(self._temporary)
 
@@ -60,14 +59,6 @@ class MovieWriter(PiecewiseWriter):
         picture = cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR)
         quietly(lambda: self._sink.write(picture))  # a full disk is told of once, at the end
         self._count += 1
-
-    def _check(self) -> None:
-        """Read the film again: the video library says nothing of a disk that was full."""
-        there = count_frames(self._temporary)
-        if there != self._count:
-            raise DataError(
-                f"only {there} of {self._count} pictures could be written; is the disk full?", self._path
-            )
 
 
 def write_png(path: str | Path, rgb: RgbImage) -> None:
