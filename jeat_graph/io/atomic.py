@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import glob
 import os
+import secrets
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -45,10 +46,13 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
     prefix = f".{target.stem}.unfinished-"
-    handle, temporary = _make(target.parent, prefix, target.suffix)
+    # The name is known before there is a file, so that whatever comes in between takes it away.
+    temporary = target.with_name(f"{prefix}{secrets.token_hex(4)}{target.suffix}")
+    handle: int | None = None
     try:
+        handle = _make(temporary)
         yield temporary
-        # mkstemp files are private (0600); a result file gets the permissions any other new file would.
+        # The unfinished file is private (0600); a result file gets the permissions any other new file would.
         mask = os.umask(0)
         os.umask(mask)
         temporary.chmod(0o666 & ~mask)
@@ -61,16 +65,16 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
             os.close(handle)
 
 
-def _make(folder: Path, prefix: str, suffix: str) -> tuple[int | None, Path]:
+def _make(temporary: Path) -> int | None:
     """Make a new file and hold it until its handle (None: it cannot be held here) is closed."""
     while True:
-        handle, name = tempfile.mkstemp(dir=folder, prefix=prefix, suffix=suffix)
-        if suffix in _LOCKED_BY_WRITER or try_lock(handle) is None:
+        handle = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o600)
+        if temporary.suffix in _LOCKED_BY_WRITER or try_lock(handle) is None:
             os.close(handle)
-            return None, Path(name)
+            return None
         # Between its making and its locking another process may have taken it for a leftover.
-        if os.path.exists(name) and os.path.samestat(os.stat(name), os.fstat(handle)):
-            return handle, Path(name)
+        if temporary.exists() and os.path.samestat(temporary.stat(), os.fstat(handle)):
+            return handle
         os.close(handle)
 
 
