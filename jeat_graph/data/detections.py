@@ -146,13 +146,14 @@ class Detections(DetectionViews):
 
         Rows of one sensor at one time that stand in several parts become one scan.
         """
-        columns = [np.concatenate(column) for column in zip(*(p.to_rows() for p in parts), strict=True)]
+        rows = [part.to_rows() for part in parts]
+        columns = [np.concatenate(column) for column in zip(*rows, strict=True)]
         has_class = any(part.classes is not None for part in parts)
         t, sensor, boxes, scores, empty, classes = columns
         looks = [part.embedding_rows() for part in parts]
         whole = Detections.from_rows(
             *(t, sensor, boxes, scores, empty, classes if has_class else None),
-            join_embeddings(looks, [len(part.to_rows()[0]) for part in parts]),
+            join_embeddings(looks, [len(t) for t, *_ in rows]),
         )
         return replace(whole, dropped=sum(part.dropped for part in parts))
 

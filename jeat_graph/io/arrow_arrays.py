@@ -5,6 +5,7 @@ Arrow's own conversions import pandas first, and that takes longer than anything
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -89,3 +90,23 @@ def _texts(texts: list[str]) -> Any:
     return pa.Array.from_buffers(
         pa.string(), len(texts), [None, pa.py_buffer(ends), pa.py_buffer(b"".join(coded))]
     )
+
+
+def first_refused(column: Any, convert: Callable[[Any], Any]) -> int:
+    """Find the first entry of an Arrow column that cannot be converted, by halving; there must be one.
+
+    Args:
+        column: (R,) of which `convert` refuses the whole.
+        convert: raises an error of Arrow's.
+    """
+    import pyarrow as pa
+
+    good, bad = 0, len(column)  # the entries before `good` convert, those before `bad` do not all
+    while bad - good > 1:
+        middle = (good + bad) // 2
+        try:
+            convert(column.slice(good, middle - good))
+            good = middle
+        except pa.ArrowException:
+            bad = middle
+    return good

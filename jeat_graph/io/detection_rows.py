@@ -20,7 +20,7 @@ from jeat_graph.io.frames import score_hint
 BOX = ("left", "top", "width", "height")
 
 
-def embeddings_of(table: FileTable) -> EmbeddingArray | None:
+def read_embeddings(table: FileTable) -> EmbeddingArray | None:
     """What the rows (R, E) look like; None where no row says it."""
     vectors = table.vectors("embedding")
     bad = find_bad_embedding(vectors)
@@ -33,16 +33,7 @@ def embeddings_of(table: FileTable) -> EmbeddingArray | None:
 def rows_without_box(table: FileTable) -> BoolArray:
     """Which rows (R,) only say that a scan took place; a row with part of a box is an error."""
     values = [*standing_in(table.names, BOX), "score"]
-    if not any(table.blank(name).any() for name in values):
-        return np.zeros(len(table), dtype=bool)
-    blanks = np.stack([table.blank(name) for name in values], axis=1)
-    empty: BoolArray = np.asarray(blanks.all(axis=1))
-    torn = blanks.any(axis=1) & ~empty
-    if torn.any():
-        row = int(np.argmax(torn))
-        which = values[int(np.argmax(blanks[row]))]
-        raise table.error(row, f"{which} is missing; a scan that found nothing has only t and sensor")
-    return empty
+    return table.bare(values, "a scan that found nothing has only t and sensor")
 
 
 def without_area(boxes: FloatArray) -> BoolArray:

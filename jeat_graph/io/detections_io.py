@@ -20,7 +20,7 @@ from jeat_graph.io.detection_rows import (
     BOX,
     assemble,
     check_rows,
-    embeddings_of,
+    read_embeddings,
     rows_without_box,
     without_area,
 )
@@ -215,7 +215,7 @@ def _read_contract(
     classes = table.text("class", blank_ok=True) if "class" in table else None
     if classes is not None and not (classes != "").any():
         classes = None
-    looks = embeddings_of(table) if "embedding" in table else None
+    looks = read_embeddings(table) if "embedding" in table else None
     flat = without_area(boxes) & ~empty
     check_rows(boxes, scores, empty | flat, table.error)
     del table  # the file's own columns are in the way of what is to come

@@ -6,7 +6,7 @@ in one place which columns it needs, of which kind, and what may be blank.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.arrow_arrays import to_numpy
+from jeat_graph.io.arrow_arrays import first_refused, to_numpy
 from jeat_graph.io.vector_columns import read_vectors
 
 _LARGEST_EXACT = 2.0**53  # beyond it a float cannot tell neighbouring whole numbers apart
@@ -64,6 +64,27 @@ class FileTable:
     def blank(self, name: str) -> BoolArray:
         """Tell where a column has no value (R,)."""
         return to_numpy(self._columns[name].is_null())
+
+    def bare(self, names: Sequence[str], what: str) -> BoolArray:
+        """Tell which rows (R,) have no value in any of some columns.
+
+        Args:
+            names: the columns.
+            what: of an error, what a row without values stands for.
+
+        Raises:
+            DataError: names the first line or row that has a part of them.
+        """
+        columns = [self.blank(name) for name in names]
+        if not any(column.any() for column in columns):
+            return np.zeros(len(self), dtype=np.bool_)
+        blanks = np.stack(columns, axis=1)
+        none: BoolArray = np.asarray(blanks.all(axis=1))
+        torn = blanks.any(axis=1) & ~none
+        if torn.any():
+            row = int(np.argmax(torn))
+            raise self.error(row, f"{names[int(np.argmax(blanks[row]))]} is missing; {what}")
+        return none
 
     def number(self, name: str, *, blank_ok: bool = False, nan_ok: bool = False) -> FloatArray:
         """Convert a column to numbers.
@@ -183,19 +204,12 @@ class FileTable:
         return to_numpy(numbers, missing=np.nan).copy(), is_null
 
     def _not_a_number(self, name: str, column: Any) -> DataError:
-        """Find the first field of a column that is no number, by halving."""
+        """Make an error that names the first field of a column that is no number."""
         import pyarrow as pa
 
         if not (pa.types.is_string(column.type) or pa.types.is_large_string(column.type)):
             return DataError(f"column {name} must hold numbers, not {column.type}", self.path)
-        good, bad = 0, len(column)  # the rows before `good` are numbers, those before `bad` are not all
-        while bad - good > 1:
-            middle = (good + bad) // 2
-            try:
-                _cast(column.slice(good, middle - good), self._decimal_comma)
-                good = middle
-            except pa.ArrowException:
-                bad = middle
+        good = first_refused(column, lambda part: _cast(part, self._decimal_comma))
         return self.error(good, f"{name} must be a number, got {column[good].as_py()[:40]!r}")
 
 

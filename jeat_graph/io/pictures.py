@@ -12,6 +12,7 @@ import numpy.typing as npt
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.decoders import quietly, without_a_word
 from jeat_graph.io.video import count_frames
+from jeat_graph.io.webm import settle_webm
 
 
 def as_png(picture: npt.NDArray[np.uint8 | np.uint16]) -> bytes:
@@ -61,10 +62,11 @@ def open_video(
     return video
 
 
-def check_video(path: Path, shown: Path, count: int) -> None:
-    """Read a video again: the library that writes it says nothing of a disk that was full.
+def finish_video(video: Any, path: Path, shown: Path, count: int) -> None:
+    """End a video, and read it again: the library that writes it says nothing of a disk that was full.
 
     Args:
+        video: what `open_video` returned.
         path: the file.
         shown: its name in messages.
         count: number of pictures that it should have.
@@ -72,6 +74,9 @@ def check_video(path: Path, shown: Path, count: int) -> None:
     Raises:
         DataError: it has fewer.
     """
+    quietly(video.release)
     there = count_frames(path)
     if there != count:
         raise DataError(f"only {there} of {count} pictures could be written; is the disk full?", shown)
+    if path.suffix.lower() == ".webm":
+        settle_webm(path)

@@ -128,13 +128,7 @@ def _read_contract(path: str | Path, rate_hz: float | None, time_unit: str) -> G
     table = read_table(path, _REQUIRED, _OPTIONAL, short=("t",), aliases=True)
     all_t = times_of(table, time_unit, rate_hz)
     values = standing_in(table.names, _REQUIRED[1:])
-    blanks = np.stack([table.blank(name) for name in values], axis=1)
-    bare: BoolArray = np.asarray(blanks.all(axis=1))
-    torn = blanks.any(axis=1) & ~bare
-    if torn.any():
-        row = int(np.argmax(torn))
-        which = values[int(np.argmax(blanks[row]))]
-        raise table.error(row, f"{which} is missing; a frame without objects has only t")
+    bare = table.bare(values, "a frame without objects has only t")
     rows = np.flatnonzero(~bare)
     boxes = boxes_of(table)
     check_sizes(table, np.where(bare[:, None], 1.0, boxes))

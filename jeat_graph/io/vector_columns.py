@@ -9,7 +9,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.arrow_arrays import to_numpy
+from jeat_graph.io.arrow_arrays import first_refused, to_numpy
 
 
 def read_vectors(column: Any, fault: Callable[[int, str], DataError]) -> FloatArray:
@@ -42,7 +42,7 @@ def read_vectors(column: Any, fault: Callable[[int, str], DataError]) -> FloatAr
     try:
         numbers = words.cast(pa.float64())
     except pa.ArrowException:
-        at = _first_bad(words)
+        at = first_refused(words, lambda part: part.cast(pa.float64()))
         row = int(np.searchsorted(np.cumsum(counts), at, side="right"))
         raise fault(row, f"must hold numbers, got {str(words[at])[:40]!r}") from None
     there = counts > 0
@@ -54,21 +54,6 @@ def read_vectors(column: Any, fault: Callable[[int, str], DataError]) -> FloatAr
     vectors = np.full((len(counts), size), np.nan)
     vectors[there] = to_numpy(numbers, missing=np.nan).reshape(-1, size)
     return vectors
-
-
-def _first_bad(words: Any) -> int:
-    """Find the first of some texts that is no number, by halving."""
-    import pyarrow as pa
-
-    good, bad = 0, len(words)  # the texts before `good` are numbers, those before `bad` are not all
-    while bad - good > 1:
-        middle = (good + bad) // 2
-        try:
-            words.slice(good, middle - good).cast(pa.float64())
-            good = middle
-        except pa.ArrowException:
-            bad = middle
-    return good
 
 
 def lists_as_text(column: Any) -> Any:

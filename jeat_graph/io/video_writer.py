@@ -9,10 +9,9 @@ import numpy as np
 
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.io.atomic import atomic_path
-from jeat_graph.io.pictures import as_png, check_video, open_video
+from jeat_graph.io.pictures import as_png, finish_video, open_video
 from jeat_graph.io.piecewise import PiecewiseWriter
 from jeat_graph.io.video import FRAME_TIMES, VIDEO_FILES, RgbImage, quietly
-from jeat_graph.io.webm import settle_webm
 
 # MPEG-4 part 2 is written in a tenth of the time of VP8, but browsers do not play it.
 _CODECS = {"mp4": "mp4v", "webm": "VP80", "lossless": "FFV1"}
@@ -52,12 +51,8 @@ class FrameWriter(PiecewiseWriter):
         self._sink = open_video(self._stack, self._target, self._path, codec, self._rate_hz, size_px)
 
     def _finish(self) -> None:
-        if self._sink is None:
-            return
-        quietly(self._sink.release)
-        check_video(self._target, self._path, len(self._times))
-        if self._video == "webm":
-            settle_webm(self._target)
+        if self._sink is not None:
+            finish_video(self._sink, self._target, self._path, len(self._times))
 
     def _write_times(self, kind: type[BaseException] | None, *_: object) -> None:
         from jeat_graph.io.table_writer import write_columns

@@ -22,6 +22,7 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.embeddings import EmbeddingArray, join_embeddings
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.scan import Scan
+from jeat_graph.tracking.by_track import carried_over, places
 from jeat_graph.tracking.update_log import UpdateLog
 
 _KEPT = 0.9  # of a track's mean from one detection to the next
@@ -55,10 +56,7 @@ class Looks(NamedTuple):
         if np.array_equal(living, self.track_id):
             return self
         living = living.copy()
-        mean = np.zeros((len(living), *self.mean.shape[1:]))
-        _, now, before = np.intersect1d(living, self.track_id, assume_unique=True, return_indices=True)
-        mean[now] = self.mean[before]
-        return Looks(living, mean, self.moments)
+        return Looks(living, carried_over(self.mean, self.track_id, living), self.moments)
 
     def ratio(self) -> tuple[FloatArray, FloatArray]:
         """Return the slope (S,) of ln of the likelihood ratio over the cosine, and where (S,) that is 0."""
@@ -136,7 +134,7 @@ def remember(compared: Compared, log: UpdateLog, living: IntArray) -> Looks:
     takers, detection = log.rows["track_id"][:taken], log.detection[:taken]
     now = compared.looks.of(living)
     mean, found = now.mean.copy(), compared.embeddings
-    row, there = _places(takers, living)
+    row, there = places(takers, living)
     use = np.flatnonzero(there & found[detection].any(axis=1))
     row, used = row[use], detection[use]
     sensor = compared.sensor[used]
@@ -148,7 +146,7 @@ def remember(compared: Compared, log: UpdateLog, living: IntArray) -> Looks:
 def _learnt(compared: Compared, takers: IntArray, detection: IntArray) -> FloatArray:
     """The moments with this step's cosines; all tracks that did not take a detection weigh as one."""
     moments = compared.looks.moments.copy()
-    row, there = _places(takers, compared.looks.track_id)
+    row, there = places(takers, compared.looks.track_id)
     row, detection = row[there], detection[there]
     place = np.arange(len(row))
     cosine = compared.cosine[:, detection]
@@ -165,11 +163,3 @@ def _learnt(compared: Compared, takers: IntArray, detection: IntArray) -> FloatA
     full = moments[:, :, 0].max(axis=1) > _MOST_WEIGHT
     moments[full] *= 0.5
     return moments
-
-
-def _places(identity: IntArray, among: IntArray) -> tuple[IntArray, BoolArray]:
-    """Return where each identity stands among ascending ones, and whether it is there at all."""
-    row = np.minimum(np.searchsorted(among, identity), max(len(among) - 1, 0))
-    if not len(among):
-        return row, np.zeros(len(identity), dtype=np.bool_)
-    return row, np.asarray(among[row] == identity)

@@ -16,6 +16,7 @@ from jeat_graph.data.arrays import FloatArray, IntArray, TextArray
 from jeat_graph.data.class_columns import unknown_classes
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError
+from jeat_graph.tracking.by_track import carried_over, places
 from jeat_graph.tracking.update_log import UpdateLog
 
 #: Most names of classes that are kept; the largest data sets of detectors have 1,200.
@@ -94,9 +95,7 @@ class ClassTally(NamedTuple):
         tally = self._aligned(living)
         if votes is None or not len(takers):
             return tally
-        row = np.searchsorted(living, takers)
-        there = row < len(living)
-        there[there] = living[row[there]] == takers[there]
+        row, there = places(takers, living)
         said = np.flatnonzero(there & (votes.classes != ""))
         if not len(said):
             return tally
@@ -118,10 +117,7 @@ class ClassTally(NamedTuple):
         if np.array_equal(living, self.track_id):
             return self
         living = living.copy()
-        weight = np.zeros((len(living), len(self.names)))
-        _, mine, theirs = np.intersect1d(living, self.track_id, assume_unique=True, return_indices=True)
-        weight[mine] = self.weight[theirs]
-        return ClassTally(self.names, living, weight)
+        return ClassTally(self.names, living, carried_over(self.weight, self.track_id, living))
 
     def columns(self, track_id: IntArray) -> tuple[TextArray, FloatArray]:
         """Return class (R,) and probability (R,) of some living tracks, as `Trajectories` has them.

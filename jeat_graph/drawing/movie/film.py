@@ -14,10 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from jeat_graph.io.atomic import atomic_path
-from jeat_graph.io.pictures import as_png, check_video, open_video
+from jeat_graph.io.pictures import as_png, finish_video, open_video
 from jeat_graph.io.piecewise import PiecewiseWriter
 from jeat_graph.io.video import RgbImage, quietly
-from jeat_graph.io.webm import settle_webm
 
 CODECS = {".mp4": "vp09", ".webm": "VP80"}
 
@@ -47,10 +46,7 @@ class MovieWriter(PiecewiseWriter):
         self._sink = open_video(self._stack, self._temporary, self._path, codec, self._rate_hz, self._size_px)
 
     def _finish(self) -> None:
-        quietly(self._sink.release)
-        check_video(self._temporary, self._path, self._count)
-        if self._path.suffix.lower() == ".webm":
-            settle_webm(self._temporary)
+        finish_video(self._sink, self._temporary, self._path, self._count)
 
     def append(self, rgb: RgbImage) -> None:
         """Add a frame (H, W, 3)."""
