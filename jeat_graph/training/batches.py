@@ -67,6 +67,10 @@ class Batches:
         settings: TrainSettings,
     ) -> None:
         self._members, self._net, self._settings = members, net, settings
+        by_group: dict[str | int, list[int]] = {}
+        for k, member in enumerate(members):
+            by_group.setdefault(member.group if settings.by_segment else k, []).append(k)
+        self._groups = list(by_group.values())
         self._pool = ThreadPoolExecutor(1)
         self._ahead: tuple[int, Future[ShownBatch]] | None = None
         self._kept: dict[tuple[int, int], RgbImage] = {}
@@ -105,9 +109,11 @@ class Batches:
 
     def _drawn(self, number: int) -> tuple[int, np.random.Generator]:
         """Return the member of a cut-out or sequence, and its random numbers."""
-        seed, count = self._settings.seed, len(self._members)
+        seed, count = self._settings.seed, len(self._groups)
         order = np.random.default_rng([seed, _ORDER, number // count]).permutation(count)
-        return int(order[number % count]), np.random.default_rng([seed, _CHANGES, number])
+        rng = np.random.default_rng([seed, _CHANGES, number])
+        group = self._groups[int(order[number % count])]
+        return group[int(rng.integers(len(group))) if len(group) > 1 else 0], rng
 
     def _fused(self, number: int) -> FusedSequence:
         index, rng = self._drawn(number)

@@ -14,7 +14,7 @@ from jeat_graph.data.interop import from_xyxy
 from jeat_graph.detection.models.choosing import choose
 from jeat_graph.detection.models.feeding import picture_input, place, usual_feed
 from jeat_graph.detection.models.layouts import decode
-from jeat_graph.detection.models.model_settings import ModelSettings
+from jeat_graph.detection.models.model_settings import OWN_OVERLAPS, ModelSettings
 from jeat_graph.eval.detection_ap import average_precision, match_greedily
 from jeat_graph.io.events_dsec import EventFile
 from jeat_graph.training.data_sets import EventSegment, FusedSegment, Picture
@@ -200,6 +200,6 @@ class _Reader:
         """Return corners (M, 4) and scores (M,)."""
         table = served_boxes(rows, self._places, self._strides).cpu().numpy()
         corners, scores, _ = choose(
-            decode(LAYOUT, {"boxes": table}, self._side), None, _LEAST_SCORE, ModelSettings().overlap
+            decode(LAYOUT, {"boxes": table}, self._side), None, _LEAST_SCORE, *OWN_OVERLAPS
         )
         return corners, scores

@@ -19,8 +19,6 @@ from jeat_graph.training.network import centred_boxes, corners_of
 
 #: α and β of the alignment, and how many cells stand for one vehicle.
 SCORE_POWER, IOU_POWER, CELLS = 0.5, 6.0, 10
-#: Weight of the boxes beside that of the scores.
-BOX_WEIGHT = 2.5
 _TINY = 1e-9
 
 
@@ -106,7 +104,7 @@ def assign(corners: Tensor, scores: Tensor, places: Tensor, strides: Tensor, box
     return Assigned(vehicle, (fit * scale).amax(dim=0))
 
 
-def cost_of(rows: Tensor, targets: list[Target], places: Tensor, strides: Tensor) -> Cost:
+def cost_of(rows: Tensor, targets: list[Target], places: Tensor, strides: Tensor, box_weight: float) -> Cost:
     """Say what a batch's mistakes cost.
 
     Args:
@@ -114,10 +112,11 @@ def cost_of(rows: Tensor, targets: list[Target], places: Tensor, strides: Tensor
         targets: of each picture.
         places: (N, 2) column and row of each cell.
         strides: (N,) px.
+        box_weight: of the boxes beside that of the scores.
     """
     corners = corners_of(centred_boxes(rows, places, strides))
     logits = rows[..., 4]
-    asked, weight, box_cost, box_weight = [], [], [], []
+    asked, weight, box_cost, box_score = [], [], [], []
     for k, target in enumerate(targets):
         given = assign(corners[k].detach(), logits[k].detach().sigmoid(), places, strides, target.boxes)
         mine = torch.nonzero(given.vehicle >= 0).squeeze(1)
@@ -125,15 +124,15 @@ def cost_of(rows: Tensor, targets: list[Target], places: Tensor, strides: Tensor
         weight.append(_counts(given.vehicle >= 0, places, strides, target.ignored))
         _, giou = paired_overlaps(corners[k][mine], target.boxes[given.vehicle[mine]])
         box_cost.append(1.0 - giou)
-        box_weight.append(given.score[mine])
+        box_score.append(given.score[mine])
     wanted = torch.stack(asked)
     share = wanted.sum().clamp(min=1.0)
     entropy = torch.nn.functional.binary_cross_entropy_with_logits(
         logits, wanted, torch.stack(weight), reduction="sum"
     )
     of_scores = entropy / share
-    of_boxes = (torch.cat(box_cost) * torch.cat(box_weight)).sum() / share
-    return Cost(of_scores + BOX_WEIGHT * of_boxes, of_scores, of_boxes)
+    of_boxes = (torch.cat(box_cost) * torch.cat(box_score)).sum() / share
+    return Cost(of_scores + box_weight * of_boxes, of_scores, of_boxes)
 
 
 def _counts(taken: Tensor, places: Tensor, strides: Tensor, ignored: Tensor) -> Tensor:

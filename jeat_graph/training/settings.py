@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from jeat_graph.config.fields import Section, choice, number
+from jeat_graph.config.fields import Section, choice, flag, number
 from jeat_graph.data.errors import ConfigError
 
 FRAMES, EVENTS, FUSED = "frames", "events", "fused"
@@ -114,6 +114,14 @@ class TrainSettings(Section):
         1.0,
     )
     weight_decay: float = number(0.02, "1", "of AdamW", 0.0, 1.0)
+    box_weight: float = number(
+        2.5, "1", "what boxes that do not fit cost beside scores that are wrong", 0.0, open_low=True
+    )
+    by_segment: bool = flag(
+        False,
+        "whether each segment of pictures is shown alike often, not each picture: worlds of many pictures, "
+        "which are much alike, do not outweigh those of few",
+    )
     clip: float = number(10.0, "1", "longest gradient", open_low=True)
     average_steps: float = number(500.0, "1", "steps that the averaged weights go back", 1.0)
     kept_mb: float = number(2000.0, "MB", "so much of the pictures is kept in memory once it was read")

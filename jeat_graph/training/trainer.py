@@ -173,7 +173,7 @@ class Trainer:
             with torch.autocast(device, torch.bfloat16, enabled=settings.precision == BFLOAT16):
                 rows, state = self.net(shown, state, length, *batch.seen(part, device))
             state = tuple(one.detach().float() for one in state)
-            cost = cost_of(rows.float(), targets, self._places, self._strides)
+            cost = cost_of(rows.float(), targets, self._places, self._strides, settings.box_weight)
             if not bool(torch.isfinite(cost.total)):
                 raise DataError(
                     f"the loss is no number any more at step {self.step}: train with a lower learning rate "

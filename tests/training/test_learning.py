@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 torch = pytest.importorskip("torch", reason="training needs PyTorch, the extra `train`")
 
 from jeat_graph.training.learning import (  # noqa: E402
-    BOX_WEIGHT,
     CELLS,
     IOU_POWER,
     SCORE_POWER,
@@ -112,7 +111,7 @@ def test_cells_are_assigned_as_by_loops(seed):
 def test_a_picture_without_vehicles_asks_for_nothing():
     places, strides = cell_places(SIDE)
     rows = torch.zeros(1, len(strides), 5)
-    cost = cost_of(rows, [Target(torch.zeros(0, 4), torch.zeros(0, 4))], places, strides)
+    cost = cost_of(rows, [Target(torch.zeros(0, 4), torch.zeros(0, 4))], places, strides, 2.5)
     assert cost.boxes.item() == 0.0
     assert cost.total.item() == pytest.approx(len(strides) * math.log(2.0), rel=1e-5)
 
@@ -121,7 +120,7 @@ def test_cells_in_what_is_ignored_cost_nothing():
     places, strides = cell_places(SIDE)
     rows = torch.zeros(1, len(strides), 5)
     half = torch.tensor([[0.0, 0.0, SIDE[0] / 2.0, float(SIDE[1])]])
-    cost = cost_of(rows, [Target(torch.zeros(0, 4), half)], places, strides)
+    cost = cost_of(rows, [Target(torch.zeros(0, 4), half)], places, strides, 2.5)
     assert cost.total.item() == pytest.approx(len(strides) / 2.0 * math.log(2.0), rel=1e-5)
 
 
@@ -130,7 +129,7 @@ def test_the_cost_of_one_vehicle_is_that_of_its_formula():
     rows = torch.randn(1, len(strides), 5, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
     places, strides = places.double(), strides.double()
     box = torch.tensor([[9.0, 3.0, 21.0, 12.0]], dtype=torch.float64)
-    cost = cost_of(rows, [Target(box, torch.zeros(0, 4))], places, strides)
+    cost = cost_of(rows, [Target(box, torch.zeros(0, 4))], places, strides, 4.0)
     corners = corners_of(centred_boxes(rows, places, strides))[0]
     given = assign(corners, rows[0, :, 4].sigmoid(), places, strides, box)
     share = max(float(given.score.sum()), 1.0)
@@ -141,7 +140,7 @@ def test_the_cost_of_one_vehicle_is_that_of_its_formula():
         if given.vehicle[n] >= 0:
             boxes += y * (1.0 - float(paired_overlaps(corners[n], box[0])[1]))
     assert cost.scores.item() == pytest.approx(entropy / share, rel=1e-6)
-    assert cost.total.item() == pytest.approx((entropy + BOX_WEIGHT * boxes) / share, rel=1e-6)
+    assert cost.total.item() == pytest.approx((entropy + 4.0 * boxes) / share, rel=1e-6)
 
 
 def test_boxes_that_fit_and_are_sure_cost_least():
@@ -158,7 +157,7 @@ def test_boxes_that_fit_and_are_sure_cost_least():
         rows[0, n, 2:4] = math.log(2.0)
         rows[0, n, 4] = 12.0
     target = [Target(box, torch.zeros(0, 4))]
-    right = cost_of(rows, target, places, strides)
+    right = cost_of(rows, target, places, strides, 2.5)
     rows[..., 4] = -20.0
     assert right.total.item() < 1e-3
-    assert cost_of(rows, target, places, strides).scores.item() > 5.0
+    assert cost_of(rows, target, places, strides, 2.5).scores.item() > 5.0

@@ -15,6 +15,7 @@ from jeat_graph.data.trajectories import GroundTruth  # noqa: E402
 from jeat_graph.training.batches import Batches  # noqa: E402
 from jeat_graph.training.coco_pictures import read_coco_pictures  # noqa: E402
 from jeat_graph.training.data_sets import (  # noqa: E402
+    Picture,
     read_event_segments,
     read_pictures,
     split_by_segment,
@@ -126,6 +127,28 @@ def test_a_batch_is_the_same_whoever_asks_and_when(small_set):
     assert not torch.equal(direct.steps[0], b.get(4).steps[0])
     a.close()
     b.close()
+
+
+def test_segments_are_shown_alike_often_where_that_is_asked_for():
+    """One world of nine pictures and one of a single one: each makes half of what is shown."""
+    loaded = []
+
+    def picture(group, number):
+        def load():
+            loaded.append(group)
+            return np.zeros((32, 32, 3), dtype=np.uint8)
+
+        return Picture(group, "set", load, TrueBoxes(np.zeros((0, 4)), np.zeros(0, bool), np.zeros(0, int)))
+
+    members = [picture("long", k) for k in range(9)] + [picture("short", 0)]
+    for by_segment, share in ((True, 0.5), (False, 0.1)):
+        loaded.clear()
+        settings = TrainSettings(crop_px=(32, 32), batch=10, by_segment=by_segment, kept_mb=0.0)
+        batches = Batches(members, NetSettings(), settings)
+        for step in range(4):
+            batches.get(step)
+        batches.close()
+        assert np.mean([group == "short" for group in loaded[:40]]) == share
 
 
 def test_no_segment_is_both_learned_from_and_judged(tmp_path):

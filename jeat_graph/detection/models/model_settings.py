@@ -6,6 +6,10 @@ from dataclasses import dataclass
 
 from jeat_graph.config.fields import Section, choice, flag, number
 
+#: Overlap (IoU) above which one of two boxes goes, and from which on boxes are averaged: of networks that
+#: `train` made (chosen on two of theirs, of pictures and of events, in seeds 1001 and 3001), and of others.
+OWN_OVERLAPS = (0.55, 0.65)
+_OTHERS_OVERLAPS = (0.65, 1.0)
 LAYOUTS = (
     "auto",
     "yolox",
@@ -47,8 +51,20 @@ class ModelSettings(Section):
     height: int = number(0, "px", "of the network's input where its file leaves it open; 0: 640", 0, 8192)
     classes: tuple[str, ...] = ()
     score: float = number(0.1, "1", "detections below are left out; the tracker weighs the others", 0.0, 1.0)
-    overlap: float = number(
-        0.65, "1", "of two boxes that overlap by more (IoU) the better one stays", 0.0, 1.0
+    overlap: float | None = number(
+        None,
+        "1",
+        "of two boxes that overlap by more (IoU) the better stays; null: .55 for files of `train`, else .65",
+        0.0,
+        1.0,
+    )
+    average: float | None = number(
+        None,
+        "1",
+        "and becomes the mean of all that overlap it by so much or more, weighed by scores; 1: it stays "
+        "as it is; null: .65 for files of `train`, else 1",
+        0.0,
+        1.0,
     )
 
     noise_filter: bool = flag(
@@ -61,6 +77,14 @@ class ModelSettings(Section):
         "order in a histogram of events: by polarity (all bins of the darker ones, then of the brighter), or "
         "by time (both polarities of each bin); auto: by time for files of `train`, else by polarity (RVT)",
     )
+
+    def overlaps(self, *, own: bool) -> tuple[float, float]:
+        """Return `overlap` and `average` of a network that `train` made, or of another."""
+        overlap, average = OWN_OVERLAPS if own else _OTHERS_OVERLAPS
+        return (
+            overlap if self.overlap is None else self.overlap,
+            average if self.average is None else self.average,
+        )
 
     @property
     def open_side(self) -> tuple[int, int]:

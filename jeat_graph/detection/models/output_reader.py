@@ -15,7 +15,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.detection.models.choosing import choose, class_names, wanted_classes
 from jeat_graph.detection.models.layouts import LAYOUT_NAMES, decode, is_raw, recognise
 from jeat_graph.detection.models.model_settings import ModelSettings
-from jeat_graph.detection.models.onnx_head import Port
+from jeat_graph.detection.models.onnx_head import CARD, Port
 
 _COCO = 80
 
@@ -52,6 +52,7 @@ class OutputReader:
     ) -> None:
         self._side = side
         self._settings = settings
+        self._overlaps = settings.overlaps(own=CARD in notes)
         self.layout = layout_of(outputs, side, notes, settings.layout, path)
         # Whether YOLOX's outputs are raw is seen in the first of them.
         self._unsure = self.layout == "yolox" and settings.layout == "auto"
@@ -70,7 +71,7 @@ class OutputReader:
             self.layout = "yolox-raw" if is_raw(only[0], self._side) else "yolox"
             self._unsure = False
         found = decode(self.layout, outputs, self._side)
-        corners, scores, _ = choose(found, self._wanted, self._settings.score, self._settings.overlap)
+        corners, scores, _ = choose(found, self._wanted, self._settings.score, *self._overlaps)
         return corners, scores
 
 
