@@ -80,8 +80,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     pictures.add_argument(
         "--event-camera",
-        choices=("davis346", "imx636", "iebcs", "ideal"),
-        help="whose noise the event camera has (default davis346)",
+        choices=("v2e", "davis346", "imx636", "iebcs", "ideal"),
+        help="whose thresholds and noise the event camera has (default v2e)",
     )
     pictures.add_argument(
         "--masks",

@@ -1,4 +1,4 @@
-"""Draws lens and mount of a segment (none in two of three: they cost time), and whether its road is wet."""
+"""Draws lens and mount of a segment (none in two of three: they cost time), a wet road, and insects."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ _SWAY_PX = (0.1, 2.0)  # rms, in a picture as wide as this:
 _WIDE_PX = 640.0
 _SWAY_HZ = (0.6, 3.5)
 _DROPS_SHARE = 0.2
+_INSECTS_SHARE = 0.08  # of segments
+_INSECTS_HZ = (0.05, 1.0)
 _WET_SHARE = (0.6, 0.1)  # of segments: in fog or rain, and in clear air, after rain
 
 
@@ -46,3 +48,11 @@ def vary_wet(rng: np.random.Generator, render: RenderConfig) -> RenderConfig:
     share = _WET_SHARE[0] if render.fog_m > 0.0 else _WET_SHARE[1]
     wet = float(rng.uniform(0.4, 1.0)) if rng.random() < share else 0.0
     return render if render.wet > 0.0 else replace(render, wet=wet)
+
+
+def vary_insects(rng: np.random.Generator, render: RenderConfig) -> RenderConfig:
+    """Draw how many insects there are, unless the settings say so."""
+    rate = 0.0
+    if rng.random() < _INSECTS_SHARE:
+        rate = math.exp(rng.uniform(math.log(_INSECTS_HZ[0]), math.log(_INSECTS_HZ[1])))
+    return render if render.insects_hz > 0.0 else replace(render, insects_hz=rate)

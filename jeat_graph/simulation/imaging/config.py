@@ -68,6 +68,9 @@ class RenderConfig:
     wet: float = number(
         0.0, "1", "how wet the road is: a darker surface that mirrors sky and lamps", 0.0, 1.0
     )
+    insects_hz: float = number(
+        0.0, "Hz", "insects that cross the view near the lens, on average; they have no truth", 0.0, 20.0
+    )
     far_m: float = number(230.0, "m", "vehicles beyond are not drawn", 30.0)
 
     def __post_init__(self) -> None:
@@ -113,7 +116,7 @@ class EventCameraConfig:
 
     mode: str = choice("physical", ("physical", "carla"), "which model")
     sensor: str = choice(
-        "davis346", tuple(SENSORS), "whose noise it has; the settings below are those of davis346"
+        "v2e", tuple(SENSORS), "whose thresholds and noise it has; the settings below are those of v2e"
     )
     threshold_on: float = number(0.2, "ln", "contrast threshold of brighter events (v2e: 0.2)", 0.01)
     threshold_off: float = number(0.2, "ln", "contrast threshold of darker events (v2e: 0.2)", 0.01)

@@ -107,7 +107,7 @@ class EventCamera:
         """Take the light of beams and glow that there is at the beginning."""
         r = self.renderer
         plan = r.plan(0.0, 0.0)
-        stage = r.stage(r.moments(np.zeros(1), plan.look), plan.look, channels=1)
+        stage = r.stage(r.moments(np.zeros(1), plan.look), plan, channels=1)
         light_all(r.tiles, plan.boxes, plan.lit, stage, self._glowing, self._light)
 
     def _run(self, plan: Plan, times_us: FloatArray) -> EventArray:
@@ -121,7 +121,7 @@ class EventCamera:
             *(self._quiet, self._glowing, self._light, self._lamps.within(1e-6 * times_us)),
         )
         sink = make_sink(max(1 << 18, 2 * self._room))
-        stage = r.stage(moments, plan.look, channels=1)
+        stage = r.stage(moments, plan, channels=1)
         sink, rendered = run(work, stage, self._model, self._state, sink, self._room)
         self.rendered += rendered
         return to_events(sink, self._width)

@@ -12,8 +12,8 @@ from jeat_graph.simulation.imaging.background import PACKED
 from jeat_graph.simulation.imaging.event_pixel import LUMINANCE as SEEN
 from jeat_graph.simulation.imaging.event_pixel import PixelModel, PixelState, advance, unsettled
 from jeat_graph.simulation.imaging.event_sink import EventSink, with_room
+from jeat_graph.simulation.imaging.insects import insect_meets
 from jeat_graph.simulation.imaging.layers import GLOW, ON_GROUND, ON_WALL, meets
-from jeat_graph.simulation.imaging.moments import Moments
 from jeat_graph.simulation.imaging.painter import light_tile, paint_tile, take_ground
 from jeat_graph.simulation.imaging.plan import who_touches
 from jeat_graph.simulation.imaging.stage import Stage
@@ -222,9 +222,7 @@ def run_physical(
             while top >= 0:
                 here = stack[top]
                 if not painted[top]:
-                    if constant and not any_touch(
-                        here * stride - 1, who, counts, stage.moments, row0, column0
-                    ):
+                    if constant and not any_touch(here * stride - 1, who, counts, stage, row0, column0):
                         seen[top, :count] = still[:count]
                     else:
                         if not constant:
@@ -261,11 +259,16 @@ def _flicker(luminance: FloatArray, pixels: IntArray, flicker: Flicker, at: int)
 
 
 @njit(cache=True, error_model="numpy")
-def any_touch(j: int, who: IntArray, counts: IntArray, moments: Moments, row0: int, column0: int) -> bool:
-    """Say whether any body or shadow may be on the tile that begins at (row0, column0) at time `j`."""
-    touch = moments.touch
+def any_touch(j: int, who: IntArray, counts: IntArray, stage: Stage, row0: int, column0: int) -> bool:
+    """Say whether any body, shadow or insect may be on the tile at (row0, column0) at time `j`."""
+    touch = stage.moments.touch
+    vehicles = touch.shape[1]
     for n in range(counts[0]):
         v = who[0, n]
+        if v >= vehicles:
+            if insect_meets(stage.insects[j, v - vehicles], row0, column0):
+                return True
+            continue
         box = (touch[j, v, 0, 0], touch[j, v, 0, 1], touch[j, v, 0, 2], touch[j, v, 0, 3])
         if meets(box[0], box[1], box[2], box[3], row0, column0):
             return True

@@ -73,7 +73,7 @@ class LensEventCamera:
         count = max(plan.most, shakes, SETTLE_STEPS)
         times = self._now_us + (until_us - self._now_us) * np.arange(count + 1, dtype=np.float64) / count
         moments = r.moments(1e-6 * times[1:], plan.look, plan.every * (count // plan.most), for_events=True)
-        stage = r.stage(moments, plan.look, channels=1)
+        stage = r.stage(moments, plan, channels=1)
         keys = light_canvas(r.tiles, plan.boxes, plan.lit, stage, self._glowing, self._light)
         maps = self.lens.homography(1e-6 * times)
         work = LensInterval(
@@ -109,7 +109,7 @@ class LensEventCamera:
         self._glowing = np.zeros(len(r.tiles), dtype=np.bool_)
         self._light = np.zeros((len(r.tiles), TILE, GLOW + 1))
         plan = r.plan(0.0, 0.0)
-        stage = r.stage(r.moments(np.zeros(1), plan.look), plan.look, channels=1)
+        stage = r.stage(r.moments(np.zeros(1), plan.look), plan, channels=1)
         light_all(r.tiles, plan.boxes, plan.lit, stage, self._glowing, self._light)
 
 

@@ -155,7 +155,7 @@ def _paint(
     who_touches(row0, column0, work.boxes, who, counts)
     light, canvas = stage.canvas.light, stage.canvas
     if keys == 0:
-        if not any_touch(step - 1, who, counts, stage.moments, row0, column0):
+        if not any_touch(step - 1, who, counts, stage, row0, column0):
             copy_tile(row0, column0, static, picture)
             return
         light[:] = 0.0

@@ -10,6 +10,7 @@ from numba import njit
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.simulation.imaging.background import CLEAR, COVER, DEPTH, GAIN, LUX, PACKED
 from jeat_graph.simulation.imaging.bodies import add_body, add_glow, add_lamps
+from jeat_graph.simulation.imaging.insects import add_insect, insect_meets
 from jeat_graph.simulation.imaging.layers import GLOW, ON_GROUND, ON_WALL, TileLayers, meets
 from jeat_graph.simulation.imaging.lighting import luminance
 from jeat_graph.simulation.imaging.moments import BOX, SIDES
@@ -54,12 +55,12 @@ def light_tile(tile: Tile, j: int, who: IntArray, counts: IntArray, stage: Stage
 
 @njit(cache=True, error_model="numpy")
 def paint_tile(tile: Tile, j: int, who: IntArray, counts: IntArray, stage: Stage, light: FloatArray) -> bool:
-    """Render a tile at time `j` onto the canvas; says whether any vehicle touched it.
+    """Render a tile at time `j` onto the canvas; says whether anything touched it.
 
     Args:
         tile: whose ground is on the canvas.
         j: index of the time.
-        who: (3, V) vehicles whose bodies, glow and beams may touch the tile.
+        who: (3, V) vehicles whose bodies, glow and beams may touch the tile; insects follow among the first.
         counts: (3,) how many of each.
         stage: what there is.
         light: (P, 2 + C) of beams and glow, as from `light_tile`.
@@ -71,8 +72,11 @@ def paint_tile(tile: Tile, j: int, who: IntArray, counts: IntArray, stage: Stage
     extent = (at[0], at[1], at[2])
     canvas.filled[:] = 0
     shaded = touched = False
+    vehicles = fades.shape[1]
     for n in range(counts[0]):
         v = who[0, n]
+        if v >= vehicles:
+            continue
         fade = fades[j, v]
         box = (touch[j, v, 0, 0], touch[j, v, 0, 1], touch[j, v, 0, 2], touch[j, v, 0, 3])
         if fade > 0.0 and meets(box[0], box[1], box[2], box[3], row, column):
@@ -105,6 +109,14 @@ def paint_tile(tile: Tile, j: int, who: IntArray, counts: IntArray, stage: Stage
                         canvas.value,
                     )
     compose(tile, shaded, scene, light, canvas)
+    # Insects come last among those who may touch a tile, and are nearer than all else.
+    for n in range(counts[0] - 1, -1, -1):
+        which = who[0, n] - vehicles
+        if which < 0:
+            break
+        if insect_meets(stage.insects[j, which], row, column):
+            add_insect(tile, stage.insects[j, which], canvas)
+            touched = True
     return touched
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.simulation.imaging.insects import Insects
 from jeat_graph.simulation.imaging.moments import NEAR, SIDES, Look, Moments
 from jeat_graph.simulation.imaging.tiles import TILE_H, TILE_W, View
 
@@ -18,16 +19,28 @@ _BEAM_EASE = 0.33
 _MARGIN_PX = 3.0
 
 
+class Pace(NamedTuple):
+    """How far an edge may move from one rendering to the next (px), and the time of all steps (s).
+
+    That time may be a part of the interval.
+    """
+
+    step_px: float
+    duration_s: float
+
+
 class Plan(NamedTuple):
     """Work of one interval.
 
     Attributes:
         look: the V vehicles there are in it.
-        boxes: (V, 3, 4) what each changes in the picture (px): body and shadow, glow, beams' light.
+        boxes: (V + I, 3, 4) what each vehicle changes in the picture (px), by body and shadow, glow, beams;
+            then what each insect does.
         steps: (T,) how often each tile's bodies are painted, a power of two; 0 where there are none.
         lit: (T,) how often its beams and glow are at most, a power of two; 0 where there are none.
         most: the greatest of them, at least 1.
         every: (V,) stride at which a vehicle is needed among `most` times.
+        insects: the I insects there are in it.
     """
 
     look: Look
@@ -36,16 +49,17 @@ class Plan(NamedTuple):
     lit: IntArray
     most: int
     every: IntArray
+    insects: Insects
 
 
 def make_plan(
     moments: Moments,
     velocity: FloatArray,
     look: Look,
+    insects: Insects,
     tiles: IntArray,
     view: View,
-    step_px: float,
-    duration_s: float,
+    pace: Pace,
     on: bool,
 ) -> Plan:
     """Plan an interval.
@@ -55,10 +69,10 @@ def make_plan(
         velocity: (V, 3) greatest speed across and along each vehicle's way (m/s), and how often it is
             painted at least.
         look: the vehicles.
+        insects: those before the lens.
         tiles: (T, 2) first row and column of the tiles.
         view: the camera.
-        step_px: how far an edge may move from one rendering to the next (px).
-        duration_s: time in which the steps are taken (s); it may be a part of the interval.
+        pace: of the renderings.
         on: whether vehicles have their lights on.
     """
     there = (moments.fade > 0.0)[..., None, None]
@@ -73,11 +87,39 @@ def make_plan(
     for j in range(len(moments.times)):
         way = np.where(moments.fade[j][:, None] > 0.0, moments.pose[j, :, 2:], way)
     motion = np.column_stack([velocity[:, :2], way, velocity[:, 2]])
-    steps, lit, needed = _plan(
-        tiles, boxes, motion, near, np.ascontiguousarray(look.size[:, 2]), view, duration_s, step_px
-    )
+    top = np.ascontiguousarray(look.size[:, 2])
+    if len(insects.middle):
+        path = insects.path(float(moments.times[0]), float(moments.times[-1]), view)
+        boxes, motion, near, top = _with_insects(path, view, boxes, motion, near, top)
+    steps, lit, needed = _plan(tiles, boxes, motion, near, top, view, pace.duration_s, pace.step_px)
+    needed = needed[: len(look.kind)]
     count = int(max(steps.max(initial=1), lit.max(initial=1), 1))
-    return Plan(look, boxes, steps, lit, count, count // np.maximum(needed, 1))
+    return Plan(look, boxes, steps, lit, count, count // np.maximum(needed, 1), insects)
+
+
+def _with_insects(
+    path: tuple[FloatArray, FloatArray],
+    view: View,
+    boxes: FloatArray,
+    motion: FloatArray,
+    near: FloatArray,
+    top: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Append insects to what `_plan` knows of vehicles: each as a thing 1 m away that moves across only."""
+    where, speed = path
+    count = len(where)
+    more = np.full((count, 3, 4), -np.inf)
+    more[:, 0] = where
+    moving = np.zeros((count, 5))
+    moving[:, 0], moving[:, 4] = speed / view.lens[0], 1.0
+    flat = float(np.hypot(*view.rotation[2, :2]))
+    moving[:, 2:4] = view.rotation[2, :2] / flat if flat > 0.0 else (0.0, 1.0)
+    return (
+        np.concatenate([boxes, more]),
+        np.concatenate([motion, moving]),
+        np.concatenate([near, np.ones(count)]),
+        np.concatenate([top, np.full(count, view.eye[2])]),
+    )
 
 
 @njit(cache=True, error_model="numpy")

@@ -9,11 +9,12 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.simulation.imaging.appearance import appearance_of
 from jeat_graph.simulation.imaging.background import Background, make_background
 from jeat_graph.simulation.imaging.config import RenderConfig
+from jeat_graph.simulation.imaging.insects import draw_insects
 from jeat_graph.simulation.imaging.lighting import lights_of
 from jeat_graph.simulation.imaging.moments import LEFT_ON, PULSE, Look, Moments, line_up
 from jeat_graph.simulation.imaging.optics import optics_of
 from jeat_graph.simulation.imaging.painter import light_tile, paint_tile, take_ground
-from jeat_graph.simulation.imaging.plan import MAX_STEPS, Plan, make_plan, who_touches
+from jeat_graph.simulation.imaging.plan import MAX_STEPS, Pace, Plan, make_plan, who_touches
 from jeat_graph.simulation.imaging.projection import project_moments
 from jeat_graph.simulation.imaging.stage import Setting, Stage, make_setting
 from jeat_graph.simulation.imaging.streaks import reach_streaks
@@ -47,6 +48,7 @@ class Renderer:
         self.view = view_of(scene.camera)
         self.background: Background = make_background(scene, self.lights, self.optics, config)
         self.tiles = tile_raster(scene.camera.width, scene.camera.height)
+        self._insects = draw_insects(stream(seed, "insects"), config.insects_hz, self.view, self.lights)
         self._settings: dict[int, Setting] = {}
         self._varied = varied
         self._appearance = appearance_of(scene, stream(seed, "paint"), varied)
@@ -87,7 +89,8 @@ class Renderer:
             if self.config.led_pulse_hz > 0.0:
                 least[look.led] = steps_for(self.config.led_pulse_hz, duration)
         motion = np.column_stack([velocity, least])
-        return make_plan(moments, motion, look, self.tiles, self.view, step, duration, self.lights.on)
+        insects, pace = self._insects.during(start_s, end_s), Pace(step, duration)
+        return make_plan(moments, motion, look, insects, self.tiles, self.view, pace, self.lights.on)
 
     def look(self, time_s: float) -> Look:
         """Say which vehicles there are at a time (s), and what they look like."""
@@ -104,19 +107,20 @@ class Renderer:
         stride = np.ones(len(look.number), dtype=np.int64) if every is None else every
         return self._project(states, times, look, stride, for_events)
 
-    def stage(self, moments: Moments, look: Look, channels: int = 3) -> Stage:
-        """Put together what tiles are painted from, in three channels or in luminance alone (1)."""
+    def stage(self, moments: Moments, plan: Plan, channels: int = 3) -> Stage:
+        """Put together what tiles of a plan are painted from, in three channels or in luminance alone (1)."""
         if channels not in self._settings:
             self._settings[channels] = make_setting(
                 self.background, self.lights, self.optics, self.view, channels, self.config.wet
             )
-        return self._settings[channels].stage(moments, look)
+        insects = plan.insects.at(moments.times, self.view)
+        return self._settings[channels].stage(moments, plan.look, insects)
 
     def picture(self, time_s: float) -> FloatArray:
         """Render the whole picture at one time: radiance (H, W, 3) in cd/m²."""
         plan = self.plan(time_s, time_s)
         out = self.background.whole.copy()
-        stage = self.stage(self.moments(np.array([time_s]), plan.look), plan.look)
+        stage = self.stage(self.moments(np.array([time_s]), plan.look), plan)
         paint_all(out, self.tiles, plan.boxes, stage)
         return out
 

@@ -67,7 +67,7 @@ def expose(renderer: Renderer, time_s: float, exposure_s: float, readout_s: floa
     first = np.round(extra * middle / height).astype(np.int64)
     out = renderer.background.whole.copy()
     steps = np.where((plan.steps == 0) & (plan.lit > 0), 1, plan.steps)
-    _expose(out, renderer.tiles, plan.boxes, steps, first, plan.most, renderer.stage(moments, plan.look))
+    _expose(out, renderer.tiles, plan.boxes, steps, first, plan.most, renderer.stage(moments, plan))
     return out
 
 

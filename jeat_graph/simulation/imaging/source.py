@@ -26,7 +26,7 @@ from jeat_graph.simulation.imaging.rgb_camera import choose_exposure, develop, e
 from jeat_graph.simulation.imaging.scaling import scaled_camera
 from jeat_graph.simulation.imaging.truth import ImageViews, frame_truth
 from jeat_graph.simulation.imaging.visibility import buffers
-from jeat_graph.simulation.lens_variety import vary_lens, vary_wet
+from jeat_graph.simulation.lens_variety import vary_insects, vary_lens, vary_wet
 from jeat_graph.simulation.scenario import Scenario
 from jeat_graph.simulation.segment import SegmentStep
 from jeat_graph.simulation.streams import stream
@@ -36,7 +36,10 @@ from jeat_graph.simulation.world.scene import Scene
 from jeat_graph.simulation.world.surroundings import FIXED
 
 # Settings that came after the first recordings: they are stated where they are not as they were then.
-_LATER = ("wet", "indicator_candela", "lamp_flicker", "lamp_flicker_hz", "led_pulse_hz", "led_pulse_share")
+_LATER = (
+    *("wet", "indicator_candela", "lamp_flicker", "lamp_flicker_hz", "led_pulse_hz", "led_pulse_share"),
+    "insects_hz",
+)
 _BEFORE = 2  # periods before the first frame, so that it has all the events of its own before it
 WORLDS = ("fixed", "varied")
 SENSORS = ("pictures", "rgb", "events")
@@ -133,7 +136,7 @@ class RenderedSource:
             s, imaging, around = vary(stream(self.seed, f"segment.{index}.world.{light}"), s, imaging)
             rng = stream(self.seed, f"segment.{index}.lens.{light}")
             imaging = replace(imaging, lens=vary_lens(rng, imaging.lens, s.camera))
-            imaging = replace(imaging, render=vary_wet(rng, imaging.render))
+            imaging = replace(imaging, render=vary_insects(rng, vary_wet(rng, imaging.render)))
         seed = self._segment_seed(index)
         duration = (self.frames + _BEFORE) / imaging.rgb.rate_hz + 1.0
         camera = scaled_camera(s.camera, imaging.render.width, imaging.render.height)

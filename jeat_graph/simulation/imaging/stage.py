@@ -45,6 +45,7 @@ class Stage(NamedTuple):
         scene: (17,) light of sky and sun, headlights, fog, how wet the road is.
         optics: glow of the lens.
         canvas: room to work.
+        insects: (J, I, RECORD) before the lens at those times (see `insects`).
     """
 
     packed: FloatArray
@@ -55,6 +56,7 @@ class Stage(NamedTuple):
     scene: FloatArray
     optics: Optics
     canvas: TileLayers
+    insects: FloatArray
 
 
 class Setting(NamedTuple):
@@ -67,12 +69,11 @@ class Setting(NamedTuple):
     optics: Optics
     canvas: TileLayers
 
-    def stage(self, moments: Moments, look: Look) -> Stage:
-        """Put the vehicles of some times on it."""
+    def stage(self, moments: Moments, look: Look, insects: FloatArray) -> Stage:
+        """Put the vehicles of some times on it, and the insects (J, I, RECORD) that there are then."""
         skin = np.column_stack([look.size, look.colour, look.kind, look.salt]).astype(np.float64)
-        return Stage(
-            self.packed, self.extent, moments, skin, self.camera, self.scene, self.optics, self.canvas
-        )
+        own = self.camera, self.scene, self.optics, self.canvas
+        return Stage(self.packed, self.extent, moments, skin, *own, insects)
 
 
 def make_setting(
