@@ -58,8 +58,14 @@ class Insects(NamedTuple):
     def during(self, start_s: float, end_s: float) -> Insects:
         """Those that may be in sight at some time from `start_s` to `end_s`."""
         there = (self.middle > start_s - _NEAR_S) & (self.middle < end_s + _NEAR_S)
-        rows = (self.middle, self.place, self.velocity, self.wave, self.turn, self.radius)
-        return Insects(*(row[there] for row in rows), self.colour)
+        return self._replace(
+            middle=self.middle[there],
+            place=self.place[there],
+            velocity=self.velocity[there],
+            wave=self.wave[there],
+            turn=self.turn[there],
+            radius=self.radius[there],
+        )
 
     def at(self, times: FloatArray, view: View) -> FloatArray:
         """Place the insects in the picture at times (J,) (s): (J, I, RECORD), radius 0 behind the lens."""
@@ -98,11 +104,11 @@ def draw_insects(rng: np.random.Generator, rate_hz: float, view: View, lights: L
     """
     middle = np.sort(rng.uniform(0.0, HORIZON_S, rng.poisson(rate_hz * HORIZON_S)))
     count = len(middle)
-    depth = np.exp(rng.uniform(*np.log(_DISTANCE_M), count))
+    depth = _spread(rng, _DISTANCE_M, count)
     within = rng.uniform(0.1, 0.9, (count, 2)) * view.lens[4:6] - view.lens[2:4]
     place = np.column_stack([within / view.lens[:2] * depth[:, None], depth])
     heading = rng.uniform(0.0, 2.0 * math.pi, count)
-    speed = np.exp(rng.uniform(*np.log(_SPEED_M_S), count))
+    speed = _spread(rng, _SPEED_M_S, count)
     # Mostly across the view: what flies towards the lens does so for longer than it is near it.
     velocity = speed[:, None] * np.column_stack(
         [np.cos(heading), 0.5 * np.sin(heading), 0.1 * np.sin(heading)]
@@ -117,19 +123,22 @@ def draw_insects(rng: np.random.Generator, rate_hz: float, view: View, lights: L
         velocity=velocity,
         wave=_WAVE_M * rng.uniform(0.0, 1.0, (count, 1)) * across,
         turn=turn,
-        radius=np.exp(rng.uniform(*np.log(_RADIUS_M), count)),
+        radius=_spread(rng, _RADIUS_M, count),
         colour=_colour(view, lights),
     )
 
 
+def _spread(rng: np.random.Generator, limits: tuple[float, float], count: int) -> FloatArray:
+    """Draw numbers whose logarithm is even between limits (count,)."""
+    return np.exp(rng.uniform(math.log(limits[0]), math.log(limits[1]), count))
+
+
 def _colour(view: View, lights: Lights) -> FloatArray:
     """Luminance in three channels of an insect at the lens, by light from ahead, behind and above."""
-    ahead = view.rotation[2]
-    lamps = 0.0
-    for way in (1.0, -1.0):
-        facing = Surface(*(float(v) for v in view.eye), *(way * float(v) for v in ahead))
-        lamps += 0.5 * lamp_lux(facing, lights)
-    lamps += 0.5 * lamp_lux(Surface(*(float(v) for v in view.eye), 0.0, 0.0, 1.0), lights)
+    x, y, z = (float(v) for v in view.eye)
+    nx, ny, nz = (float(v) for v in view.rotation[2])
+    faces = Surface(x, y, z, nx, ny, nz), Surface(x, y, z, -nx, -ny, -nz), Surface(x, y, z, 0.0, 0.0, 1.0)
+    lamps = 0.5 * sum(lamp_lux(face, lights) for face in faces)
     light = 0.5 * lights.sky_lux * lights.sky_tint + 0.25 * lights.sun_lux * lights.sun_tint
     out: FloatArray = _ALBEDO / math.pi * (light + lamps * lights.lamp_tint)
     return out
