@@ -26,6 +26,8 @@ from jeat_graph.training.data_sets import (
 from jeat_graph.training.export import write_onnx
 from jeat_graph.training.judging import Precision, judge
 from jeat_graph.training.log_files import draw_log, write_log
+from jeat_graph.training.making import settings_of
+from jeat_graph.training.quantising import write_int8
 from jeat_graph.training.settings import FRAMES, FUSED, NetSettings, TrainSettings, padded
 from jeat_graph.training.trainer import Trainer, TrainingJob
 from jeat_graph.version import __version__
@@ -139,6 +141,27 @@ def train(
     write_onnx(trainer.average, side, card, request.out)
     checkpoint.unlink(missing_ok=True)
     return Trained((request.out, log, plot), card)
+
+
+def bring_to_int8(source: Path, request: TrainRequest) -> int:
+    """Write a network of 8-bit numbers, by what it sees of the data that a request learns from.
+
+    Args:
+        source: a network that `train` made.
+        request: data and the file to write; nothing is learned.
+
+    Returns:
+        How many pictures or windows it has looked at.
+
+    Raises:
+        ConfigError: a package is missing, or the network is of another kind than the request.
+        DataError: data or network that cannot be read.
+    """
+    kind = settings_of(source).kind
+    if kind != request.net.kind:
+        raise ConfigError(f"--int8: the network is of {kind}, not of {request.net.kind}")
+    split = split_by_segment(_read(request, request.data), request.data)
+    return write_int8(source, split.learned, [_described(path) for path in request.data], request.out)
 
 
 def _read(request: TrainRequest, paths: Sequence[Path]) -> Any:

@@ -94,10 +94,17 @@ class ModelEventDetector(BinnedDetector):
         self._state = {}
 
     def _look(self) -> Scan:
+        return self._scan(self._bins.end_us / _US_PER_S, self._window(), {})
+
+    def _window(self) -> npt.NDArray[Any]:
+        """Return the histogram as the network takes it; one of bytes is taken as it is, without a copy."""
+        stacked = self._bins.stack(self._by_polarity)[None]
         width, height = self.size_px
+        if (width, height) == self._side:
+            return stacked.astype(self._input.kind, copy=False)
         window = self._empty_window()
-        window[0, :, :height, :width] = self._bins.stack(self._by_polarity)
-        return self._scan(self._bins.end_us / _US_PER_S, window, {})
+        window[:, :, :height, :width] = stacked
+        return window
 
     def _empty_window(self) -> npt.NDArray[Any]:
         shape = (1, self._input.shape[1] or 0, self._side[1], self._side[0])

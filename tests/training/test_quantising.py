@@ -1,0 +1,74 @@
+"""A network of 8-bit numbers says nearly what the network said, and takes events as bytes."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="training needs PyTorch, the extra `train`")
+pytest.importorskip("onnxruntime", reason="the extra `onnxruntime` is not installed")
+
+from jeat_graph.cli.main import main  # noqa: E402
+from jeat_graph.data.errors import DataError  # noqa: E402
+from jeat_graph.detection.models.engine import open_engine  # noqa: E402
+from jeat_graph.detection.models.onnx_head import read_onnx_head  # noqa: E402
+from jeat_graph.training.export import write_onnx  # noqa: E402
+from jeat_graph.training.network import DetectionNet  # noqa: E402
+from jeat_graph.training.quantising import write_int8  # noqa: E402
+from jeat_graph.training.settings import NetSettings  # noqa: E402
+
+from .small_sets import SIZE as SIDE  # noqa: E402
+
+
+def network(kind, path):
+    """A network that has seen something: its layers are not of one scale."""
+    torch.manual_seed(4)
+    settings = NetSettings(kind=kind, width=6)
+    net = DetectionNet(settings)
+    state = net.empty_state(2, SIDE)
+    for _ in range(3):
+        _, state = net(torch.rand(2, settings.channels, SIDE[1], SIDE[0]), state)
+        state = tuple(one.detach() for one in state)
+    card = {"net": {"kind": kind, "width": 6}, "side": list(SIDE), "tested": {}}
+    write_onnx(net.eval(), SIDE, card, path)
+    return path
+
+
+@pytest.mark.parametrize("kind", ["frames", "events"])
+def test_it_says_nearly_what_the_network_said(kind, small_set, tmp_path, capsys):
+    source, out = network(kind, tmp_path / "net.onnx"), tmp_path / "small.onnx"
+    assert main(["train", kind, str(small_set), "--int8", str(source), "--out", str(out)]) == 0
+    assert "wrote" in capsys.readouterr().out
+    heads = [read_onnx_head(path) for path in (source, out)]
+    assert [port.name for port in heads[1].inputs] == [port.name for port in heads[0].inputs]
+    assert heads[1].inputs[0].kind == ("uint8" if kind == "events" else "float32")
+    engines = [
+        open_engine(path, head, "onnxruntime", 1) for path, head in zip((source, out), heads, strict=True)
+    ]
+    rng = np.random.default_rng(1)
+    shape = heads[0].inputs[0].shape
+    # Sparse counts, as of events, or light that changes slowly, as in pictures.
+    shown = rng.poisson(0.1, shape) if kind == "events" else rng.random(shape)
+    states = {p.name: np.zeros(p.shape, dtype=np.float32) for p in heads[0].inputs[1:]}
+    whole, small = (
+        engine.run({head.inputs[0].name: shown.astype(head.inputs[0].kind), **states})["boxes"]
+        for engine, head in zip(engines, heads, strict=True)
+    )
+    # 8 bits a layer leave a few per cent of what a layer's features spread over.
+    assert np.abs(whole[:, :4] - small[:, :4]).mean() < 0.1 * whole[:, :4].std()
+    assert np.abs(whole[:, 4] - small[:, 4]).max() < 0.05
+    card = json.loads(heads[1].notes["card"])
+    assert card["net"] == {"kind": kind, "width": 6}
+    assert card["int8"]["looks"] > 0
+    assert card["int8"]["data"][0]["name"] == small_set.name
+
+
+def test_what_does_not_fit_is_refused(small_set, tmp_path, capsys):
+    source, out = network("frames", tmp_path / "net.onnx"), tmp_path / "small.onnx"
+    assert main(["train", "events", str(small_set), "--int8", str(source), "--out", str(out)]) == 2
+    assert "--int8: the network is of frames, not of events" in capsys.readouterr().err
+    with pytest.raises(DataError, match="nothing to look at"):
+        write_int8(source, [], [], out)
+    assert not out.exists()
