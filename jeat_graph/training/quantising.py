@@ -34,9 +34,8 @@ from jeat_graph.training.settings import EVENTS, FUSED, NetSettings
 MOST_LOOKS = 64
 #: Of a recording, so many windows are run, and each so many-th is looked at, so that the memory is full.
 _WINDOWS, _EACH = 12, 4
-#: What becomes 8-bit numbers. The layers behind the last convolutions (`row`) are no part of it.
+#: What becomes 8-bit numbers. The last convolutions and what is behind them are no part of it.
 _LAYERS = ["Conv", "Relu", "Add", "Concat", "Resize"]
-_LAST = "/net/row"
 _BOXES = "boxes"
 _US = 1e6
 _Feed = dict[str, npt.NDArray[Any]]
@@ -182,10 +181,15 @@ def _widen(model: Any) -> None:
 
 
 def _behind_rows(model: Any) -> list[str]:
-    """Return the names of the last convolutions and of all that comes after them."""
+    """Return the names of the convolutions that no other comes after, and of all that comes after them."""
+    nodes = list(model.graph.node)
+    before_another = set[str]()
+    for node in reversed(nodes):
+        if node.op_type == "Conv" or any(one in before_another for one in node.output):
+            before_another.update(node.input)
     names, tensors = [], set[str]()
-    for node in model.graph.node:
-        last = node.op_type == "Conv" and node.name.startswith(_LAST)
+    for node in nodes:
+        last = node.op_type == "Conv" and not any(one in before_another for one in node.output)
         if last or any(one in tensors for one in node.input):
             names.append(node.name)
             tensors.update(node.output)

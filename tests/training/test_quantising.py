@@ -9,6 +9,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs PyTorch, the extra `train`")
 pytest.importorskip("onnxruntime", reason="the extra `onnxruntime` is not installed")
+onnx = pytest.importorskip("onnx", reason="training needs onnx, the extra `train`")
 
 from jeat_graph.cli.main import main  # noqa: E402
 from jeat_graph.data.errors import DataError  # noqa: E402
@@ -59,6 +60,12 @@ def test_it_says_nearly_what_the_network_said(kind, small_set, tmp_path, capsys)
     # 8 bits a layer leave a few per cent of what a layer's features spread over.
     assert np.abs(whole[:, :4] - small[:, :4]).mean() < 0.1 * whole[:, :4].std()
     assert np.abs(whole[:, 4] - small[:, 4]).max() < 0.05
+    # The last layers, one for each of three strides, stay as they are: boxes are told to fractions of px.
+    graph = onnx.load(str(out)).graph
+    scaled = {name for node in graph.node if node.op_type == "DequantizeLinear" for name in node.output}
+    layers = [node for node in graph.node if node.op_type == "Conv"]
+    assert sum(node.input[1] not in scaled for node in layers) == 3 < len(layers)
+    assert all(node.input[1] not in scaled for node in layers[-1:])
     card = json.loads(heads[1].notes["card"])
     assert card["net"] == {"kind": kind, "width": 6}
     assert card["int8"]["looks"] > 0
