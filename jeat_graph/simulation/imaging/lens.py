@@ -23,7 +23,8 @@ _SPARE_PX = 3  # of the canvas beyond what is looked at
 _NEWTON = 30
 _STEP_S = 1e-3  # of differences in time, for image motion
 _DROP_POWER = -1.6  # a drop is a lens: it shows its middle small and upside down
-_BLUR_TIMES = 3  # of the mount's turn within an exposure
+_BLUR_TIMES = 3  # of the mount's turn within an exposure,
+_BLUR_PX = 0.1  # if it takes the picture as far as this meanwhile
 
 
 class Lens:
@@ -91,7 +92,7 @@ class Lens:
         """
         rows = self.camera.height
         out = np.zeros((*self.rays.shape[:2], picture.shape[2]))
-        times = _BLUR_TIMES if self.config.sway_deg > 0.0 else 1
+        times = _BLUR_TIMES if self._moves(t, exposure_s) > _BLUR_PX else 1
         for k in range(times):
             moment = (
                 t
@@ -104,6 +105,11 @@ class Lens:
                 maps = np.broadcast_to(self.homography(t), (rows, 3, 3))
             _look(picture, self.rays, np.ascontiguousarray(maps), out)
         return out / times
+
+    def _moves(self, t: float, exposure_s: float) -> float:
+        """How far the mount takes the picture within an exposure (px)."""
+        turns = self.sway.angles(np.array([t - 0.5 * exposure_s, t + 0.5 * exposure_s])[:, None, None])
+        return self.canvas.fx * float(np.hypot(*np.diff(turns[:, :2], axis=0).ravel()))
 
     def nearest(self, picture: IntArray, t: float) -> IntArray:
         """What the pixels' centres see at a time (s) of numbers (Hc, Wc) on the canvas: (H, W)."""

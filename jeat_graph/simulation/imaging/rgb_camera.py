@@ -22,7 +22,8 @@ from jeat_graph.simulation.imaging.renderer import Renderer
 from jeat_graph.simulation.imaging.stage import Stage
 from jeat_graph.simulation.imaging.tiles import TILE_H, TILE_W
 
-_POISSON_BELOW_E = 60.0
+_POISSON_BELOW_E = 16.0
+_SKEWED_BELOW_E = 60.0
 _OVER = 1.0 / np.maximum(np.arange(1000), 1)  # a product is much faster than a quotient
 _LEAST_PART = 1e-27  # of a distribution: exp(-60) is larger, and it is far out in the tail beyond
 
@@ -74,8 +75,9 @@ def expose(renderer: Renderer, time_s: float, exposure_s: float, readout_s: floa
 def electrons(radiance: FloatArray, time_s: float, config: RGBConfig, rng: np.random.Generator) -> FloatArray:
     """Charge that is read from each pixel (e-): Poisson photoelectrons up to full well, plus read noise.
 
-    From 60 electrons on a normal distribution stands for the Poisson one, whose skewness is then below 0.13;
-    below it is drawn by inversion (Devroye 1986, X.3).
+    From 60 electrons on a normal distribution stands for the Poisson one, whose skewness is then below 0.13,
+    from 16 on one with its skewness (Cornish and Fisher 1938); below it is drawn by inversion (Devroye 1986,
+    X.3).
     """
     noise = rng.standard_normal(radiance.shape, dtype=np.float32)
     draw = rng.random(radiance.shape, dtype=np.float32)
@@ -97,15 +99,19 @@ def _charge(
                 mean = max(radiance[r, c, k], 0.0) * scale
                 if mean >= _POISSON_BELOW_E:
                     # Two normal numbers add up to one.
-                    out[r, c, k] = min(mean + math.sqrt(mean + read * read) * noise[r, c, k], most)
+                    variance, z = mean + read * read, noise[r, c, k]
+                    drawn = mean + math.sqrt(variance) * z
+                    if mean < _SKEWED_BELOW_E:
+                        drawn += mean / (6.0 * variance) * (z * z - 1.0)
+                    out[r, c, k] = min(drawn, most)
                 else:
-                    left, drawn = float(draw[r, c, k]), 0
+                    left, count = float(draw[r, c, k]), 0
                     part = math.exp(-mean)
                     while left >= part and part > _LEAST_PART:
                         left -= part
-                        drawn += 1
-                        part *= mean * _OVER[drawn]
-                    out[r, c, k] = min(float(drawn), most) + read * noise[r, c, k]
+                        count += 1
+                        part *= mean * _OVER[count]
+                    out[r, c, k] = min(float(count), most) + read * noise[r, c, k]
     return out
 
 
