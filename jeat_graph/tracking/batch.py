@@ -16,7 +16,7 @@ from jeat_graph.filters.noise import score_weight
 from jeat_graph.filters.worth import score_odds
 
 # A calibrated precision is never certain, or a single score would outweigh all else that is known.
-_LEAST_PRECISION, _MOST_PRECISION = 0.002, 0.998
+LEAST_PRECISION, _MOST_PRECISION = 0.002, 0.998
 
 
 class Arrivals(NamedTuple):
@@ -136,7 +136,7 @@ def prepare(arrivals: Arrivals, model: Model) -> Batch:
             corrected[j, 2 + axis] = true_side
             corrected[j, axis] = z[j, axis] - 0.5 * true_side
         calibrated = interpolate(scores[j], sensors.curve_score[s], sensors.curve_precision[s])
-        precision[j] = min(max(calibrated, _LEAST_PRECISION), _MOST_PRECISION)
+        precision[j] = min(max(calibrated, LEAST_PRECISION), _MOST_PRECISION)
         log_score[j] = log_score_ratio(precision[j], sensors.precision[s])
         odds[j] = score_odds(scores[j])
         weight[j] = score_weight(scores[j], noise.score_floor) if noise.score_weighting else 1.0

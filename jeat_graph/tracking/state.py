@@ -39,6 +39,7 @@ class TrackArrays(NamedTuple):
         track_id: (C,) identity, ascending.
         hits: (C,) number of detections taken.
         t_birth: (C,) time of the first detection (s).
+        born_at: (C, 2) place of its centre then (px).
         t_update: (C,) time of the last one (s).
         used: (C,) bit s is set where sensor s's detection was taken in the last step.
         seen_by: (C,) bit s is set where sensor s's detection was ever taken.
@@ -65,6 +66,7 @@ class TrackArrays(NamedTuple):
     track_id: IntArray
     hits: IntArray
     t_birth: FloatArray
+    born_at: FloatArray
     t_update: FloatArray
     used: IntArray
     seen_by: IntArray
@@ -84,7 +86,14 @@ class SceneState(NamedTuple):
         claims: (S,) recent detections of each sensor on lasting tracks while another sensor looked too, in
             seconds of a track.
         agreed: (S,) those of them on tracks that another sensor has seen.
-        trust: (S,) what the ratio of the two says of the sensor: factor on its evidence, in (0, 1].
+        agreed_odds: (S,) mean log odds of the scores of the detections borne out so.
+        agreed_high: (S,) those of them that have a higher score, on tracks that have moved (s).
+        lonely_high: (S,) the same of the detections on tracks that it alone has seen (s).
+        score_spread: (S,) recent sum of the squares of the tracks' deviations from that mean (log odds² s).
+        score_square: (S,) the same of the squares of all deviations.
+        score_kept: (S,) the same of their products with those of the next detection.
+        agreed_without: (S, S) detections of the first on tracks that a sensor besides the two has seen (s).
+        trust: (S,) what all that says of the sensor: factor on its evidence, in (0, 1].
         fruitless: (S,) recent mean number, a scan, of each sensor's detections on tracks that ended without
             having been confirmed, and of those that no track took where there was such a track; all on tracks
             that no other sensor saw.
@@ -104,6 +113,13 @@ class SceneState(NamedTuple):
     last_look: FloatArray
     claims: FloatArray
     agreed: FloatArray
+    agreed_odds: FloatArray
+    agreed_high: FloatArray
+    lonely_high: FloatArray
+    score_spread: FloatArray
+    score_square: FloatArray
+    score_kept: FloatArray
+    agreed_without: FloatArray
     trust: FloatArray
     fruitless: FloatArray
     looked: FloatArray
@@ -130,6 +146,13 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
         last_look=np.full(num_sensors, -np.inf),
         claims=np.zeros(num_sensors),
         agreed=np.zeros(num_sensors),
+        agreed_odds=np.zeros(num_sensors),
+        agreed_high=np.zeros(num_sensors),
+        lonely_high=np.zeros(num_sensors),
+        score_spread=np.zeros(num_sensors),
+        score_square=np.zeros(num_sensors),
+        score_kept=np.zeros(num_sensors),
+        agreed_without=np.zeros((num_sensors, num_sensors)),
         trust=sensors.prior_trust.copy(),
         fruitless=np.zeros(num_sensors),
         looked=np.zeros(num_sensors),
@@ -165,6 +188,7 @@ def allocate(capacity: int, num_sensors: int, num_errors: int = 0) -> TrackArray
         track_id=np.zeros(capacity, dtype=np.int64),
         hits=np.zeros(capacity, dtype=np.int64),
         t_birth=np.zeros(capacity),
+        born_at=np.zeros((capacity, 2)),
         t_update=np.zeros(capacity),
         used=np.zeros(capacity, dtype=np.int64),
         seen_by=np.zeros(capacity, dtype=np.int64),

@@ -10,11 +10,12 @@ from jeat_graph.tracking.batch import Arrivals, prepare
 from jeat_graph.tracking.stages.associating import associate
 from jeat_graph.tracking.stages.beginning import give_birth
 from jeat_graph.tracking.stages.ending import confirm, remove_ended
-from jeat_graph.tracking.stages.learning import count_misses, learn_scene, learn_trust
+from jeat_graph.tracking.stages.learning import count_misses, learn_scene
 from jeat_graph.tracking.stages.predicting import current_p_detect, expect_detections, occlusion, predict_all
 from jeat_graph.tracking.stages.sight import judge_sight
+from jeat_graph.tracking.stages.trust import learn_trust
 from jeat_graph.tracking.stages.updating import take_second_views, update_matched
-from jeat_graph.tracking.stages.worth import judge_worth, learn_lasting
+from jeat_graph.tracking.stages.worth import doubt_scores, judge_worth, learn_lasting
 from jeat_graph.tracking.state import SceneState, TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog
 
@@ -49,6 +50,7 @@ def step(
     log.count[0] = 0
     predict_all(tracks, n, dt, scene, model)
     batch = prepare(arrivals, model)
+    doubt_scores(batch, scene, model)
     occluded = occlusion(tracks, n)
     p_detect = current_p_detect(tracks, n, batch.present, occluded, model)
     expectation = expect_detections(tracks, n, model.sensors)

@@ -93,6 +93,20 @@ def test_scores_that_mean_nothing_take_no_vehicle():
     assert on_cars > without - 0.5
 
 
+def test_what_always_stays_at_one_place_is_no_proof_that_its_scores_are_worth_something():
+    """A spot on the lens of middling score, there from the start: it lasts longest of all."""
+    on_spot, on_cars, _ = follow(told_by_score, until=0.0, seconds=15.0)
+    assert on_spot == 0.0
+    assert on_cars > 3.0
+
+
+def test_where_all_scores_are_one_most_of_what_comes_and_goes_is_not_reported():
+    """Three false boxes a scan, each somewhere else: a tenth at most may be taken for vehicles at once."""
+    _, shown, tracker = follow(lambda kind, rng: 1.0, second=("two",), until=20.0)
+    assert shown < 4.3
+    assert tracker.sensor_states()["one"].clutter > 1.5
+
+
 def test_a_saved_tracker_goes_on_with_what_it_learnt(tmp_path):
     _, _, tracker = follow(told_by_score, seconds=10.0, until=3.0)
     tracker.save(tmp_path / "state.npz")

@@ -200,6 +200,7 @@ def start_track(
     tracks.lasting[i] = False
     tracks.worthy[i] = True
     tracks.t_birth[i] = t
+    tracks.born_at[i] = view.z
     tracks.t_update[i] = t
     tracks.used[i] = 1 << s
     tracks.seen_by[i] = 1 << s

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from jeat_graph.config.kernel_form import Model, Settings
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.filters.existence import existence_after_miss, hidden_after_miss
@@ -21,10 +19,6 @@ _GROSS = 10.0
 _LOOK_WEIGHT = 0.1
 # What is assumed of a sensor's P_D weighs as much as so many scans full of tracks.
 _PRIOR_SCANS = 10.0
-# A track of so many detections has lasted; before that, others have hardly had the time to see it.
-_LASTING_HITS = 4
-# What is known of a sensor beforehand weighs as much as so many seconds of a track.
-_PRIOR_CLAIMS = 5.0
 
 
 @inner
@@ -32,12 +26,6 @@ def scan_weight(s: int, model: Model) -> float:
     """Weight of one scan of sensor `s` in what is learnt of the scene; 0 where nothing is."""
     memory_s = model.settings.lifecycle.scene_memory_s
     return min(model.sensors.period_s[s] / memory_s, 1.0) if memory_s > 0.0 else 0.0
-
-
-@inner
-def looks_too(other: int, s: int, t: float, scene: SceneState, model: Model) -> bool:
-    """Whether a sensor is another one than `s` and has looked of late, at time `t` (s)."""
-    return other != s and t - scene.last_look[other] <= model.settings.lifecycle.max_gap_confirmed_s
 
 
 @inner
@@ -71,44 +59,6 @@ def count_misses(
             tracks.p_detect[i, s] = max(
                 own - lifecycle.p_detect_weight * visible * own, lifecycle.p_detect_min
             )
-
-
-@inner
-def learn_trust(
-    tracks: TrackArrays, n: int, batch: Batch, association: Association, scene: SceneState, model: Model
-) -> None:
-    """Follow how far each present sensor is borne out by the others, in place.
-
-    A detection on a track that has lasted is borne out where another sensor has ever seen that track. A
-    sensor that is mostly alone where others look and see vehicles takes false things for vehicles again and
-    again. A look at a moment when the others are blind (their P_D is low) counts little; while a sensor is
-    the only one that looks, nothing is learnt of it.
-    """
-    lifecycle, sensors = model.settings.lifecycle, model.sensors
-    for s in range(len(batch.present)):
-        if batch.present[s]:
-            scene.last_look[s] = batch.t
-    for s in range(len(batch.present)):
-        if not batch.present[s] or sensors.disagreement[s] <= 0.0:
-            continue
-        sharpest = 0.0
-        for other in range(len(batch.present)):
-            if looks_too(other, s, batch.t, scene, model):
-                sharpest = max(sharpest, scene.p_detect[other] * (1.0 - scene.blind[other]))
-        if sharpest == 0.0:
-            continue
-        kept = math.exp(-sensors.period_s[s] / lifecycle.disagreement_memory_s)
-        scene.claims[s] *= kept
-        scene.agreed[s] *= kept
-        # Detections of one track are no independent witnesses: a second of them is one.
-        weight = sharpest * sensors.period_s[s]
-        for i in range(n):
-            if association.match[i, s] >= 0 and tracks.hits[i] >= _LASTING_HITS:
-                scene.claims[s] += weight
-                if tracks.seen_by[i] & ~(1 << s):
-                    scene.agreed[s] += weight
-        agreed = scene.agreed[s] + _PRIOR_CLAIMS * lifecycle.agreement_prior
-        scene.trust[s] = (agreed / (scene.claims[s] + _PRIOR_CLAIMS)) ** sensors.disagreement[s]
 
 
 @inner

@@ -23,7 +23,7 @@ from jeat_graph.tracking.state import SceneState, TrackArrays
 # A small rest remains: what should be invisible is still taken if it is detected.
 _LEAST_VISIBLE = 1e-5
 # A size beyond e^12 px, from a runaway extrapolation, must not overflow.
-_MOST_LOG_SIZE = 12.0
+MOST_LOG_SIZE = 12.0
 
 
 @inlined
@@ -77,7 +77,7 @@ def predict_all(tracks: TrackArrays, n: int, dt: float, scene: SceneState, model
     sensors, settings = model.sensors, model.settings
     jerk = np.empty(n)
     for i in range(n):
-        side = math.exp(min(0.5 * (tracks.size_mean[i, 0, 0] + tracks.size_mean[i, 1, 0]), _MOST_LOG_SIZE))
+        side = math.exp(min(0.5 * (tracks.size_mean[i, 0, 0] + tracks.size_mean[i, 1, 0]), MOST_LOG_SIZE))
         jerk[i] = jerk_of(tracks, i, settings)
         drift = settings.standing.drift_per_size * side
         tracks.rest_var[i] += drift * drift * dt
@@ -135,9 +135,9 @@ def current_p_detect(
 @inner
 def detection_variance(tracks: TrackArrays, i: int, s: int, axis: int, sensors: SensorArrays) -> float:
     """Variance (px²) of a detection of sensor `s` on track `i`, one axis, at weight 1: s · R_base(size)."""
-    side = math.exp(min(tracks.size_mean[i, axis, 0], _MOST_LOG_SIZE))
+    side = math.exp(min(tracks.size_mean[i, axis, 0], MOST_LOG_SIZE))
     half_log_area = 0.5 * (tracks.size_mean[i, 0, 0] + tracks.size_mean[i, 1, 0])
-    size = math.exp(min(half_log_area, _MOST_LOG_SIZE))
+    size = math.exp(min(half_log_area, MOST_LOG_SIZE))
     base = base_variance(sensors.sigma_px[s], sensors.rho[s, axis], side, sensors.rho_size[s], size)
     return float(tracks.scale[i, s] * base)
 

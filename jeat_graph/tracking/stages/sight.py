@@ -17,7 +17,7 @@ from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.beginning import birth_existence
 from jeat_graph.tracking.stages.inner import inner
-from jeat_graph.tracking.stages.learning import looks_too
+from jeat_graph.tracking.stages.trust import looks_too
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
 

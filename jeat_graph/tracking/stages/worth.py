@@ -2,19 +2,35 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 
+from jeat_graph.association.costs import log_score_ratio
 from jeat_graph.config.kernel_form import Model
 from jeat_graph.filters.worth import doubt_worth, learn_worth, worth_of
-from jeat_graph.tracking.batch import Batch
+from jeat_graph.tracking.batch import LEAST_PRECISION, Batch
 from jeat_graph.tracking.stages.associating import Association
-from jeat_graph.tracking.stages.inner import inner
+from jeat_graph.tracking.stages.inner import inlined, inner
+from jeat_graph.tracking.stages.predicting import MOST_LOG_SIZE
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
 # Fewer detections have not lasted, however far they lie apart.
 _LEAST_HITS = 5
 _ROUNDING_S = 1e-9
+# A track so far from its first detection, as a share of its size, has left the place: five times the error
+# of a usual detector.
+_MOVED = 0.25
+
+
+@inlined
+def has_moved(tracks: TrackArrays, i: int) -> bool:
+    """Whether track `i` is further from where it began than a share of its size."""
+    half_log_area = 0.5 * (tracks.size_mean[i, 0, 0] + tracks.size_mean[i, 1, 0])
+    size = math.exp(min(half_log_area, MOST_LOG_SIZE))
+    x, y = tracks.mean[i, 0, 0] - tracks.born_at[i, 0], tracks.mean[i, 1, 0] - tracks.born_at[i, 1]
+    return bool(x * x + y * y > _MOVED * _MOVED * size * size)
 
 
 @inner
@@ -32,9 +48,9 @@ def learn_lasting(
 ) -> None:
     """Learn from the tracks that last what the scores of the present sensors are worth, in place.
 
-    `learn_ended` says the rest. A track's detections of before it had lasted count when it has. Each
-    detection weighs as much as the time between two scans, in seconds: those of one track are no independent
-    witnesses.
+    `learn_ended` says the rest. What stays at its place says nothing: false things that come back do so at
+    one place. A track's detections of before it had lasted count when it has. Each detection weighs as much
+    as the time between two scans, in seconds: those of one track are no independent witnesses.
     """
     lifecycle = model.settings.lifecycle
     if not lifecycle.judges_worth:
@@ -51,6 +67,8 @@ def learn_lasting(
             if j < 0:
                 continue
             mean, cov, weight = scene.worth_mean[s], scene.worth_cov[s], model.sensors.period_s[s]
+            if not has_moved(tracks, i):
+                continue
             if tracks.lasting[i]:
                 learn_worth(mean, cov, batch.score_odds[j], True, weight)
                 seen = min(scene.lasting_seen[s] + weight, lifecycle.worth_memory_s)
@@ -75,6 +93,19 @@ def learn_ended(tracks: TrackArrays, i: int, scene: SceneState, model: Model) ->
     if tracks.t_update[i] >= scene.first_look[s] + lifecycle.lasting_s:
         weight = model.sensors.period_s[s] * tracks.hits[i]
         learn_worth(scene.worth_mean[s], scene.worth_cov[s], tracks.score_odds[i], False, weight)
+
+
+@inner
+def doubt_scores(batch: Batch, scene: SceneState, model: Model) -> None:
+    """Believe no score of a batch more than what lasts has borne out so far, in place."""
+    if not model.settings.lifecycle.judges_worth:
+        return
+    for j in range(len(batch.precision)):
+        s = batch.sensor[j]
+        worth = worth_of(scene.worth_mean[s], batch.score_odds[j])
+        if worth < batch.precision[j]:
+            batch.precision[j] = max(worth, LEAST_PRECISION)
+            batch.log_score[j] = log_score_ratio(batch.precision[j], model.sensors.precision[s])
 
 
 @njit(cache=True)

@@ -1,0 +1,162 @@
+"""What one instant teaches of how far each sensor is to be believed beside the others."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from jeat_graph.config.kernel_form import Model, SensorArrays
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.filters.agreement import (
+    high_as_often,
+    score_persistence,
+    score_variety,
+    share_of_kind,
+    trust_in,
+)
+from jeat_graph.filters.existence import motion_visibility
+from jeat_graph.filters.worth import worth_of
+from jeat_graph.tracking.batch import Batch
+from jeat_graph.tracking.stages.associating import Association
+from jeat_graph.tracking.stages.inner import inner
+from jeat_graph.tracking.stages.worth import has_moved
+from jeat_graph.tracking.state import SceneState, TrackArrays
+
+# A track of so many detections has lasted; before that, others have hardly had the time to see it.
+_LASTING_HITS = 4
+# What is known of a sensor beforehand weighs as much as so many seconds of a track.
+_PRIOR_CLAIMS = 5.0
+
+
+@inner
+def looks_too(other: int, s: int, t: float, scene: SceneState, model: Model) -> bool:
+    """Whether a sensor is another one than `s` and has looked of late, at time `t` (s)."""
+    return other != s and t - scene.last_look[other] <= model.settings.lifecycle.max_gap_confirmed_s
+
+
+@inner
+def learn_trust(
+    tracks: TrackArrays, n: int, batch: Batch, association: Association, scene: SceneState, model: Model
+) -> None:
+    """Follow how far each present sensor is borne out by the others, in place.
+
+    A detection on a track that has lasted is borne out where another sensor has ever seen that track. A
+    sensor that is mostly alone where others look and see vehicles takes false things for vehicles again and
+    again, unless the scores say that what it alone sees is of the same kind (`filters.agreement`). A look at
+    a moment when the others are blind (their P_D is low), or at what is too slow for them, counts little;
+    while a sensor is the only one that looks, nothing is learnt of it.
+    """
+    lifecycle, sensors = model.settings.lifecycle, model.sensors
+    for s in range(len(batch.present)):
+        if batch.present[s]:
+            scene.last_look[s] = batch.t
+    judged = np.max(sensors.disagreement) > 0.0
+    for s in range(len(batch.present)):
+        # What bears others out is counted of sensors too that are always believed.
+        if not (batch.present[s] and judged):
+            continue
+        sight = np.zeros(len(batch.present))
+        for other in range(len(sight)):
+            if looks_too(other, s, batch.t, scene, model):
+                sight[other] = scene.p_detect[other] * (1.0 - scene.blind[other])
+        if np.max(sight) == 0.0:
+            continue
+        _forget(s, math.exp(-sensors.period_s[s] / lifecycle.disagreement_memory_s), scene)
+        for i in range(n):
+            j = association.match[i, s]
+            if j >= 0 and tracks.hits[i] >= _LASTING_HITS:
+                # Detections of one track are no independent witnesses: a second of them is one.
+                weight = sharpest_sight(tracks, i, sight, sensors) * sensors.period_s[s]
+                if weight <= 0.0:
+                    continue
+                before = (tracks.hits[i] * tracks.score_odds[i] - batch.score_odds[j]) / (tracks.hits[i] - 1)
+                _claim(s, tracks.seen_by[i], before, batch.score_odds[j], weight, has_moved(tracks, i), scene)
+        lonely = scene.claims[s] - scene.agreed[s]
+        kind = share_of_kind(
+            high_as_often(scene.lonely_high[s], lonely, scene.agreed_high[s], scene.agreed[s]),
+            score_persistence(scene.score_kept[s], scene.score_spread[s]),
+            score_variety(scene.score_square[s], scene.claims[s]),
+            worth_of(scene.worth_mean[s], scene.agreed_odds[s]),
+        )
+        scene.trust[s] = trust_in(
+            scene.agreed[s] + lonely * kind * (1.0 - _others_agreement(s, scene)),
+            scene.claims[s],
+            lifecycle.agreement_prior,
+            _PRIOR_CLAIMS,
+            sensors.disagreement[s],
+        )
+
+
+@inner
+def sharpest_sight(tracks: TrackArrays, i: int, sight: FloatArray, sensors: SensorArrays) -> float:
+    """Return the greatest probability with which one of `sight` (S,) would see something like track `i`."""
+    most = 0.0
+    for other in range(len(sight)):
+        if sight[other] > most:
+            seen = motion_visibility(tracks.mean[i], sensors.blind_speed[other])
+            most = max(most, sight[other] * seen)
+    return most
+
+
+@inner
+def _forget(s: int, kept: float, scene: SceneState) -> None:
+    """Let what is known of sensor `s` age, in place."""
+    scene.claims[s] *= kept
+    scene.agreed[s] *= kept
+    scene.agreed_high[s] *= kept
+    scene.lonely_high[s] *= kept
+    scene.score_kept[s] *= kept
+    scene.score_spread[s] *= kept
+    scene.score_square[s] *= kept
+    scene.agreed_without[s] *= kept
+
+
+@inner
+def _claim(
+    s: int, seen_by: int, before: float, odds: float, weight: float, moved: bool, scene: SceneState
+) -> None:
+    """Count one detection of sensor `s` on a track that has lasted, in place.
+
+    What stays at its place is never taken for a vehicle for its scores' sake: a bush keeps its score too.
+
+    Args:
+        s: the sensor.
+        seen_by: bit o is set where sensor o has ever seen the track.
+        before: mean log odds of the track's scores before.
+        odds: log odds of this score.
+        weight: of the claim (s).
+        moved: whether the track has left the place where it began.
+        scene: what is learnt.
+    """
+    others = seen_by & ~(1 << s)
+    scene.claims[s] += weight
+    if others:
+        scene.agreed[s] += weight
+        scene.agreed_odds[s] += weight / scene.agreed[s] * (odds - scene.agreed_odds[s])
+    high = weight if moved and odds > scene.agreed_odds[s] else 0.0
+    if others:
+        scene.agreed_high[s] += high
+        for o in range(len(scene.claims)):
+            if others & ~(1 << o):
+                scene.agreed_without[s, o] += weight
+    else:
+        scene.lonely_high[s] += high
+    deviation = before - scene.agreed_odds[s]
+    now = odds - scene.agreed_odds[s]
+    scene.score_spread[s] += weight * deviation * deviation
+    scene.score_square[s] += weight * now * now
+    scene.score_kept[s] += weight * deviation * now
+
+
+@inner
+def _others_agreement(s: int, scene: SceneState) -> float:
+    """Return the greatest share of another sensor's claims that sensors besides the two bear out.
+
+    Without a third sensor it is none.
+    """
+    most = 0.0
+    for o in range(len(scene.claims)):
+        if o != s:
+            most = max(most, scene.agreed_without[o, s] / (scene.claims[o] + _PRIOR_CLAIMS))
+    return most
