@@ -45,7 +45,7 @@ clip: $(VENV)/.run
 
 test: $(VENV)/.test $(VENV)/.compiled
 	@echo "make: running the tests"
-	@$(BIN)/python -m pytest -p no:randomly -n 2
+	@$(BIN)/python -m pytest -p no:randomly -n 2 --dist worksteal
 	@$(BIN)/python -m pytest -p no:randomly -n 0 tests/performance
 
 test-portable: $(VENV)/.test $(VENV)/.compiled
@@ -118,9 +118,8 @@ $(VENV)/.lint: pyproject.toml | $(BIN)/python
 	@$(PIP) -r $(VENV)/lint.txt
 	@touch $@
 
-# numba does not notice that a function called from another file has changed: new sources, all code anew.
+# Code that no longer fits its sources is thrown away at the first import (config/stale_kernels.py).
 $(VENV)/.compiled: $(SOURCES) $(VENV)/.run
-	@find jeat_graph filters association smoothers eval \( -name '*.nbi' -o -name '*.nbc' \) -delete
 	@$(BIN)/python -m jeat_graph.tracking.warm_up
 	@touch $@
 

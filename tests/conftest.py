@@ -8,6 +8,10 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+# The tests share the cores: the threads of one's linear algebra would only wait for those of the others.
+# This is before anything that loads it.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 # The first call of a compiled function compiles it, which no deadline of a test should include. Examples
 # follow from the test and from the constants in the modules that are loaded, not from a clock: what a test
 # counts over its examples still differs a little with what ran before it, and its bound must allow for that.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -14,6 +16,10 @@ ENGINES = ("local", "ray")
 _Job = TypeVar("_Job")
 _Result = TypeVar("_Result")
 _WAIT_S = 0.5  # between looks at whether an interrupt has come
+
+
+class _Ended(BaseException):
+    """A worker was asked to end while it worked."""
 
 
 def run_local(
@@ -53,7 +59,7 @@ def run_local(
                 (index, tries), slot = waiting.pop(), free.pop()
                 if slot not in pools:
                     pools[slot] = pool()
-                at_work[pools[slot].submit(work, jobs[index])] = (index, tries, slot)
+                at_work[pools[slot].submit(_in_good_order, work, jobs[index])] = (index, tries, slot)
             done, _ = wait(at_work, _WAIT_S, FIRST_COMPLETED)
             for future in done:
                 index, tries, slot = at_work.pop(future)
@@ -73,6 +79,22 @@ def run_local(
         for child in set(active_children()) - before:
             child.terminate()
             child.join()
+
+
+def _in_good_order(work: Callable[[_Job], _Result], job: _Job) -> _Result:
+    """Work on a job; a worker that is asked to end (SIGTERM) first takes away what it has not finished."""
+
+    def on_signal(number: int, _: object) -> None:
+        signal.signal(number, signal.SIG_IGN)  # a second one must not interrupt the tidying up
+        raise _Ended
+
+    signal.signal(signal.SIGTERM, on_signal)
+    try:
+        return work(job)
+    except _Ended:
+        os._exit(128 + signal.SIGTERM)  # to the pool a death like any other
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 def run_on_ray(
