@@ -15,6 +15,8 @@ from jeat_graph.io.detections_io import read_detections
 from jeat_graph.io.truth_io import read_truth
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from jeat_graph.eval.compare import Comparison
 
 PathLike: TypeAlias = str | Path
@@ -47,7 +49,7 @@ class Run(NamedTuple):
 
 
 def track(
-    detections: Detections | PathLike,
+    detections: Detections | pd.DataFrame | PathLike,
     config: Config | PathLike = "default",
     *,
     image: tuple[float, float] | None = None,
@@ -55,7 +57,8 @@ def track(
     """Track a recording from beginning to end.
 
     Args:
-        detections: the recording, or a file that `read_detections` knows.
+        detections: the recording, a data frame that `Detections.from_pandas` takes, or a file that
+            `read_detections` knows.
         config: a configuration, the name of a preset, or a YAML file.
         image: width and height of the picture (px), if not those of the configuration.
 
@@ -63,18 +66,31 @@ def track(
         The causal table, and the smoothed one unless the configuration asks for no smoother.
 
     Raises:
-        JeatGraphError: what the file or the configuration has wrong.
+        JeatGraphError: what the detections, the file or the configuration have wrong.
     """
     from jeat_graph.runs.declaring import fit_input
+    from jeat_graph.runs.input_checks import check_units
     from jeat_graph.runs.latency import at_measurement
     from jeat_graph.tracking.tracker import Tracker
 
-    recording = detections if isinstance(detections, Detections) else read_detections(detections)
-    tracker = Tracker(fit_input(as_config(config, image), recording)[0])
+    recording = _recording(detections)
+    settings = as_config(config, image)
+    check_units(recording, settings, "the detections")  # before rates are taken for what they seem
+    tracker = Tracker(fit_input(settings, recording)[0])
     recording = at_measurement(recording, tracker.config)
     causal = Trajectories.concatenate(list(tracker.run(recording)) or [Trajectories.empty()])
     wanted = tracker.config.smoother.engine != "none"
     return Tracks(causal, tracker.finish() if wanted else None)
+
+
+def _recording(detections: Detections | pd.DataFrame | PathLike) -> Detections:
+    if isinstance(detections, Detections):
+        return detections
+    return (
+        read_detections(detections)
+        if isinstance(detections, (str, Path))
+        else Detections.from_pandas(detections)
+    )
 
 
 def evaluate(

@@ -8,7 +8,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, TextArray
 from jeat_graph.data.embeddings import EmbeddingArray, embeddings_of_objects
-from jeat_graph.data.interop import boxes_of, columns_of, from_xyxy, supervision_of
+from jeat_graph.data.interop import boxes_of, columns_of, from_xyxy, seconds_of, supervision_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,9 +56,10 @@ class DetectionViews:
         """Read a data frame, one row a detection.
 
         Args:
-            frame: `t` (s); `left, top, width, height`, or `left, top, right, bottom` (px); `score` (1 where
-                there is none), `sensor`, `class` and `embedding` (an array of numbers each) where there are
-                such. A row without a box is a scan that found nothing.
+            frame: `t` (s, or dates or spans of time); `left, top, width, height`, or
+                `left, top, right, bottom` (px); `score` (1 where there is none), `sensor`, `class` and
+                `embedding` (an array of numbers each) where there are such. A row without a box is a scan
+                that found nothing.
             sensor: name of the sensor where the frame has no such column.
 
         Raises:
@@ -70,7 +71,7 @@ class DetectionViews:
         box = np.column_stack([np.asarray(c[name], dtype=np.float64) for name in sides])
         empty = np.isnan(box).all(axis=1)
         return cls.from_rows(
-            c["t"],
+            seconds_of(frame["t"]),
             [sensor] * len(frame) if "sensor" not in c else [str(name) for name in c["sensor"]],
             from_xyxy(box) if corners else box,
             c.get("score", np.ones(len(frame))),

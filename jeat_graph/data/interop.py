@@ -142,6 +142,21 @@ def _array(values: Any) -> FloatArray:
     return np.asarray(values, dtype=np.float64)
 
 
+def seconds_of(times: Any) -> npt.NDArray[Any]:
+    """Return a column of times in seconds: dates (those without a zone are UTC) since 1970, spans as such.
+
+    Args:
+        times: (N,) as a data frame has them; numbers stay as they are.
+    """
+    if hasattr(times, "dt") and getattr(times.dt, "tz", None) is not None:
+        times = times.dt.tz_convert("UTC").dt.tz_localize(None)
+    column = np.asarray(times)
+    if column.dtype.kind not in "mM":
+        return column
+    since = column - np.datetime64(0, "s") if column.dtype.kind == "M" else column
+    return np.where(np.isnat(since), np.nan, since / np.timedelta64(1, "s"))
+
+
 def columns_of(table: pd.DataFrame, needed: tuple[str, ...], what: str) -> dict[str, npt.NDArray[Any]]:
     """Columns of a data frame by name.
 

@@ -69,7 +69,11 @@ def read_results(path: str | Path, rate_hz: float | None, images: str | Path | N
     recorded = None
     if time_of is None:
         if rate_hz is None:
-            raise DataError("COCO results have image ids only; give the frame rate (rate_hz) or images", path)
+            raise DataError(
+                "COCO results have image ids only; give the frame rate (--rate, in Python rate_hz) "
+                "or the list of images (--images)",
+                path,
+            )
         t = (image / check_rate(rate_hz, path))[of_entry]
     else:
         recorded = np.unique(np.array(list(time_of.values()), dtype=np.float64))
@@ -161,7 +165,9 @@ def _image_times(images: Any, rate_hz: float | None, path: str | Path) -> dict[i
         except (TypeError, ValueError, OverflowError):
             raise DataError(f"image {k + 1}: timestamp and frame_id must be finite numbers", path) from None
         if rate_hz is None:
-            raise DataError(f"image {k + 1} has no `timestamp`; give the frame rate (rate_hz)", path)
+            raise DataError(
+                f"image {k + 1} has no `timestamp`; give the frame rate (--rate, in Python rate_hz)", path
+            )
         times[image["id"]] = frame / check_rate(rate_hz, path)
     return times
 

@@ -6,6 +6,7 @@ in one place which columns it needs, of which kind, and what may be blank.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -210,7 +211,17 @@ class FileTable:
         if not (pa.types.is_string(column.type) or pa.types.is_large_string(column.type)):
             return DataError(f"column {name} must hold numbers, not {column.type}", self.path)
         good = first_refused(column, lambda part: _cast(part, self._decimal_comma))
-        return self.error(good, f"{name} must be a number, got {column[good].as_py()[:40]!r}")
+        text = column[good].as_py()
+        return self.error(good, f"{name} must be a number, got {text[:40]!r}{_advice(text)}")
+
+
+def _advice(text: str) -> str:
+    """What to do about a field that is no number, where that can be told."""
+    if re.fullmatch(r"\s*[\d.,]+\s*%\s*", text):
+        return "; leave the sign away, and give --score-scale percent"
+    if re.match(r"\s*\d{4}-\d\d-\d\d", text):
+        return "; dates are not read: give seconds, such as those since 1970"
+    return ""
 
 
 def _cast(column: Any, decimal_comma: bool = False) -> Any:

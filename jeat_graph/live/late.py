@@ -210,10 +210,10 @@ class LiveTracker:
                 f"scan at t = {t} s is older than the last one at {now} s, and late scans are refused"
             )
         good = [scan for scan in batch if self._may_come(scan, late_s)]
-        for scan in batch:
-            self.lateness.add(scan.sensor, late_s, scan not in good)
         if good:
             self._insert(good)
+        for scan in batch:  # what the tracker refuses has not come
+            self.lateness.add(scan.sensor, late_s, scan not in good)
         return [scan for scan in batch if scan not in good]
 
     def _comes_again(self, scan: Scan) -> bool:

@@ -59,6 +59,7 @@ class RoadLagConfig:
     chunk_s: float = number(0.5, "s", "time between two solutions", open_low=True)
     steps: int = number(2, "steps", "Gauss-Newton steps of each", 1)
     silence_s: float = number(2.0, "s", "a track without a box for longer has ended", open_low=True)
+    begin_s: float = number(10.0, "s", "of its boxes a track begins with the newest so long", open_low=True)
 
     def __post_init__(self) -> None:
         check(self)
@@ -169,7 +170,9 @@ class RoadFixedLag:
         rows = rows_of_log(log, self._errors, (self._camera.width, self._camera.height), BoxConfig())
         if track.window is None:
             track.window = self._begun(rows)
-            track.waiting = [log] if track.window is None else []
+            # What never makes a vehicle, such as a false box in the sky, must not be kept for ever.
+            recent = log[log["t"] > log["t"][-1] - self._config.begin_s]
+            track.waiting = [recent] if track.window is None else []
             return track.window is None or self._solve(track.window)
         track.waiting, window = [], track.window
         # What another sensor saw at the time of the last state needs no state of its own.

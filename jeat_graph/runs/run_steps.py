@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+import warnings
 from contextlib import ExitStack
 from typing import Any
 
@@ -13,7 +14,7 @@ from jeat_graph.config.reading import config_to_dict
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
-from jeat_graph.data.errors import ConfigError
+from jeat_graph.data.errors import ConfigError, InputWarning
 from jeat_graph.data.progress import heard, ticking
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.piecewise import PiecewiseWriter
@@ -27,6 +28,8 @@ from jeat_graph.tracking.tracker import Tracker
 STEPS_PER_DRAIN = 256
 #: So many before the state is saved (some ten seconds of work); a shorter run is not worth it.
 STEPS_PER_SAVE = 40 * STEPS_PER_DRAIN
+# Of so many detections most belong to vehicles: a smaller share than this in tracks is said aloud.
+_MANY, _LEAST_TRACKED = 100, 0.05
 
 
 class RunSteps:
@@ -180,6 +183,13 @@ class RunSteps:
         record.counts |= {"tracks_born": self._tracker.num_born, "tracks_reported": len(self._reported)}
         record.learnt = {name: one._asdict() for name, one in self._tracker.sensor_states().items()}
         record.counts["causal_rows"] = self._rows["causal"]
+        detections = len(self._detections)
+        if detections >= _MANY and self._rows["causal"] < _LEAST_TRACKED * detections:
+            record.warnings.append(
+                f"{self._rows['causal']} rows of tracks from {detections} detections: nearly all of them are "
+                "taken for false; are the sensors' rates and the picture's size right?"
+            )
+            warnings.warn(record.warnings[-1], InputWarning, stacklevel=2)
         if self._smooths:
             record.counts["smoothed_rows"] = self._rows["smoothed"]
             record.smoother = {"engine": self._config.smoother.engine, **self._tracker.smoother_counts}

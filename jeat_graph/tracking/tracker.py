@@ -143,6 +143,7 @@ class Tracker(SavedTracks):
             raise TimeOrderError(f"scan at t = {t} s is older than the last one at {self._t} s")
         check_names(self._classes, batch)
         embeddings = embeddings_of(self._looks, batch)
+        self._watch.look(batch)  # before anything changes: a user may have made warnings errors
         longest = self.config.lifecycle.max_silence_s
         dt = 0.0 if self._t is None else min(t - self._t, longest)
         if dt == longest:
@@ -161,7 +162,6 @@ class Tracker(SavedTracks):
             self._tracks, self._num_tracks, self._next_id, dt, arrivals, self._scene, self._model, self._log
         )
         self._t = t
-        self._watch.look(batch)
         living = self._tracks.track_id[: self._num_tracks]
         self._classes, votes = count_votes(self._classes, batch, self._log, living)
         if compared is not None:
@@ -233,7 +233,7 @@ class Tracker(SavedTracks):
                 height in px; none (M = 0) if the sensor looked and found nothing.
             t: time (s).
             sensor: name of the sensor.
-            scores: (M,) confidence in [0, 1], for boxes that come without.
+            scores: (M,) confidence in [0, 1], for boxes that come without; 1 where neither says it.
             embeddings: (M, E) what each looks like, of a network for re-identification; NaN where unknown.
 
         Returns and raises as `step`; also a DataError where it cannot be told what `source` is.

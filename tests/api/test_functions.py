@@ -112,3 +112,12 @@ def test_the_size_of_the_picture_may_be_written_as_on_the_command_line():
 def test_what_is_no_size_of_a_picture_is_said_to_be_none(size):
     with pytest.raises(ConfigError, match="image must be"):
         Tracker("default", image=size)
+
+
+def test_a_data_frame_is_tracked_as_it_is_and_times_in_ms_are_refused():
+    pd = pytest.importorskip("pandas")
+    frame = pd.DataFrame({"t": np.arange(40) / 20, "left": 100.0 + 3 * np.arange(40)})
+    frame = frame.assign(top=100.0, width=60.0, height=40.0, score=0.9)
+    assert len(track(frame).causal) >= 38
+    with pytest.raises(DataError, match="are the times in ms"):
+        track(frame.assign(t=1e3 * frame["t"]))

@@ -231,6 +231,22 @@ def test_a_data_frame_may_have_corners_and_nothing_more_than_boxes():
         Detections.from_pandas(frame.drop(columns="t"))
 
 
+@pytest.mark.parametrize("unit", ["s", "us", "ns"])
+def test_dates_and_spans_of_a_data_frame_are_seconds(unit):
+    pd = pytest.importorskip("pandas")
+    times = 1.7e9 + np.array([0.0, 1.0, 3.0] if unit == "s" else [0.0, 0.25, 1.5])
+    boxes = {name: [10.0] * 3 for name in ("left", "top", "width", "height")}
+    dates = pd.to_datetime(np.round(times * 1e6).astype(np.int64), unit="us")
+    for column in (dates.astype(f"datetime64[{unit}]"), dates.tz_localize("UTC").tz_convert("Asia/Tokyo")):
+        found = Detections.from_pandas(pd.DataFrame({"t": column, **boxes}))
+        np.testing.assert_allclose(found.scan_t, times, rtol=0, atol=1e-6)
+    spans = (dates - dates[0]).astype(f"timedelta64[{unit}]")
+    found = Detections.from_pandas(pd.DataFrame({"t": spans, **boxes}))
+    np.testing.assert_allclose(found.scan_t, times - times[0], rtol=0, atol=1e-6)
+    with pytest.raises(DataError, match="finite"):
+        Detections.from_pandas(pd.DataFrame({"t": dates.where(dates != dates[1]), **boxes}))
+
+
 def test_supervision_and_detections_are_two_ways_to_say_one_thing():
     sv = pytest.importorskip("supervision")
     source = sv.Detections(

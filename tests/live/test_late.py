@@ -178,6 +178,15 @@ def test_a_scan_that_is_refused_leaves_everything_as_it_was():
     assert live.lateness.summary()["rgb"].scans == 20
 
 
+def test_a_scan_that_the_tracker_refuses_is_not_counted():
+    live = LiveTracker(Tracker(CAUSAL))
+    looks = np.eye(3)[:1]
+    live.step(replace(scan(0.0), embeddings=looks))
+    with pytest.raises(DataError):
+        live.step(replace(scan(0.05), embeddings=np.eye(5)[:1]))
+    assert live.lateness.summary()["rgb"].scans == 1
+
+
 def busy_scans(count, seconds):
     """Pictures at 20 Hz and events at 100 Hz of so many vehicles that stay in the picture, by time."""
     rng = np.random.default_rng(3)

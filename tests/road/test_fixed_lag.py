@@ -137,3 +137,18 @@ def test_a_second_sensor_at_the_time_of_the_last_state_is_taken_in_too() -> None
     # What is seen twice is known better, and nowhere else than once.
     assert np.median(rows["var"][:, 1]) < np.median(once["var"][:, 1])
     assert np.abs(np.interp(rows["t"], once["t"], once["mean"][:, 1]) - rows["mean"][:, 1]).max() < 1.0
+
+
+def test_what_never_makes_a_vehicle_is_not_kept_for_ever() -> None:
+    """A false box outside of the picture, for a quarter of a minute."""
+    t = np.arange(0.0, 15.0, 0.05)
+    rows = np.zeros(len(t), dtype=MEASUREMENT)
+    rows["t"], rows["track_id"], rows["scale"] = t, 1, 1.0
+    rows["z"], rows["log_size"] = (640.0, -150.0), np.log((80.0, 15.0))
+    rows["r"], rows["size_var"] = 1.0, 1e-3
+    smoother = RoadFixedLag(camera(), load_config("highway"), RoadLagConfig(begin_s=5.0))
+    for k in range(len(rows)):
+        assert not len(smoother.step(float(t[k]), rows[k : k + 1]))
+    (track,) = smoother._tracks.values()
+    assert track.window is None
+    assert 95 <= sum(len(part) for part in track.waiting) <= 101

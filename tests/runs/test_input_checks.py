@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
+from jeat_graph.cli.main import main
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
@@ -40,3 +43,17 @@ def test_corners_taken_for_sizes_are_named_before_the_size_of_the_picture():
     config = load_config("default", ["image.width=1280", "image.height=720"])
     with pytest.raises(DataError, match="det: boxes look like x1, y1, x2, y2"):
         check_detections(rows, config, "det")
+
+
+def test_a_recording_of_which_next_to_nothing_is_tracked_is_told_of(tmp_path, capsys):
+    """Boxes that are never twice at one place."""
+    rng = np.random.default_rng(0)
+    rows = [
+        f"{k / 20},rgb,{x:.1f},{y:.1f},30,20,.3" for k, (x, y) in enumerate(rng.uniform(0, 600, (150, 2)))
+    ]
+    path = tmp_path / "clutter.csv"
+    path.write_text("t,sensor,left,top,width,height,score\n" + "\n".join(rows) + "\n")
+    assert main(["track", str(path), "--out", str(tmp_path / "run")]) == 0
+    assert "from 150 detections" in capsys.readouterr().err
+    record = json.loads((tmp_path / "run" / "run.json").read_text())
+    assert any("from 150 detections" in text for text in record["warnings"])

@@ -11,6 +11,7 @@ from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import InputWarning
 from jeat_graph.tracking.input_watch import STEP_SCANS, InputWatch, look_like_corners
+from jeat_graph.tracking.tracker import Tracker
 
 BOX = (300.0, 200.0, 60.0, 40.0)
 
@@ -91,3 +92,19 @@ def test_one_vehicle_in_the_corner_of_the_picture_is_no_slip():
 def test_few_boxes_are_no_ground_for_a_word_about_corners():
     assert not look_like_corners(corners_of(5), 2000.0, 2000.0)
     assert not look_like_corners(np.zeros((0, 4)), 2000.0, 2000.0)
+
+
+def test_a_warning_that_is_made_an_error_leaves_the_tracker_as_it_was():
+    tracker = Tracker(load_config("default", ["smoother.engine=rts"]))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", InputWarning)
+        for k in range(12):
+            before = tracker.time
+            try:
+                tracker.update([BOX], t=50.0 * k, sensor="rgb", scores=[0.9])
+            except InputWarning:
+                assert tracker.time == before
+                tracker.update([BOX], t=50.0 * k, sensor="rgb", scores=[0.9])
+                raised = k
+    assert raised == STEP_SCANS - 1
+    assert tracker.time == 550.0
