@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 
 from jeat_graph.data.arrays import FloatArray
@@ -60,14 +61,52 @@ def hidden_after_miss(hidden: float, p_detect: float) -> float:
 
 
 @njit(cache=True)
-def motion_visibility(mean: FloatArray, blind_speed: float) -> float:
+def motion_visibility(velocity: FloatArray, blind_speed: float) -> float:
     """Factor on P_D of a sensor that is blind to what stands still: 1 − exp(−(|v| / v_blind)²).
 
     Args:
-        mean: (2, 3) per axis [p, v, a].
+        velocity: (2,) px/s.
+        blind_speed: v_blind (px/s); 0 for a sensor that sees still things as well.
+    """
+    return 1.0 - _unseen(velocity, np.zeros(2), blind_speed)
+
+
+@njit(cache=True)
+def unsure_visibility(
+    velocity: FloatArray, variance: FloatArray, prior_variance: float, blind_speed: float
+) -> float:
+    """`motion_visibility` of a vehicle whose velocity is an estimate: it stands still, or it has that one.
+
+    Of a new track nothing is known but its place: it is as likely to stand still as to move at any speed.
+    With v ~ N(0, V) of what moves, the track's estimate N(m, P) says how the two compare, by the ratio of its
+    density at zero to the prior's (Dickey, "The weighted likelihood ratio", Ann. Math. Stat. 42(1), 1971):
+    still : moving = N(0; m, P) : N(0; 0, V). What moves is seen with the mean of 1 − exp(−(|v| / v_blind)²).
+
+    Args:
+        velocity: (2,) m (px/s).
+        variance: (2,) diagonal of P (px²/s²).
+        prior_variance: V of each axis (px²/s²).
         blind_speed: v_blind (px/s); 0 for a sensor that sees still things as well.
     """
     if blind_speed <= 0.0:
         return 1.0
-    speed2 = mean[0, 1] * mean[0, 1] + mean[1, 1] * mean[1, 1]
-    return 1.0 - math.exp(-speed2 / (blind_speed * blind_speed))
+    log_odds = 0.0
+    for axis in range(2):
+        var = max(variance[axis], 1e-12)
+        log_odds += (
+            0.5 * math.log(max(prior_variance, 1e-12) / var) - 0.5 * velocity[axis] * velocity[axis] / var
+        )
+    moves = 1.0 / (1.0 + math.exp(min(log_odds, 500.0)))
+    return moves * (1.0 - _unseen(velocity, variance, blind_speed))
+
+
+@njit(cache=True)
+def _unseen(velocity: FloatArray, variance: FloatArray, blind_speed: float) -> float:
+    """Mean of exp(−(|v| / v_blind)²) over v ~ N(velocity, variance); 0 for a sensor that is never blind."""
+    if blind_speed <= 0.0:
+        return 0.0
+    unseen, square = 1.0, blind_speed * blind_speed
+    for axis in range(2):
+        wide = square + 2.0 * max(variance[axis], 0.0)
+        unseen *= math.sqrt(square / wide) * math.exp(-velocity[axis] * velocity[axis] / wide)
+    return unseen

@@ -11,7 +11,7 @@ from jeat_graph.cli.options import add_classes, add_rate
 from jeat_graph.cli.progress import stages
 from jeat_graph.config.argument_types import positive, share
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.progress import told
+from jeat_graph.data.progress import told, write_line
 
 if TYPE_CHECKING:
     from jeat_graph.data.trajectories import GroundTruth
@@ -83,6 +83,10 @@ def run(args: argparse.Namespace) -> int:
             table, values = _detections(args, [one.truth for one in runs])
             tables.append(table)
             result["detections"] = values
+    behind = {kind: sum(getattr(one, kind) is not None for one in runs) for kind in judged}
+    if len(set(behind.values())) > 1:
+        counts = ", ".join(f"{kind} {count}" for kind, count in behind.items())
+        write_line(f"jeat-graph eval: the rows pool different RUNs, so compare them with care: {counts}")
     if args.json is not None:
         _write(args.json, to_json(result))
     if args.json != "-":

@@ -52,10 +52,10 @@ def step(
     batch = prepare(arrivals, model)
     doubt_scores(batch, scene, model)
     occluded = occlusion(tracks, n)
-    p_detect = current_p_detect(tracks, n, batch.present, occluded, model)
+    p_found, p_detect = current_p_detect(tracks, n, batch, occluded, scene, model)
     expectation = expect_detections(tracks, n, model.sensors)
     widen_hidden(expectation.white, expectation.coloured_std, occluded, settings.noise.hidden_growth)
-    association = associate(tracks, n, batch, expectation, p_detect, scene, model)
+    association = associate(tracks, n, batch, expectation, p_found, scene, model)
     judge_sight(tracks, n, batch, association, p_detect, scene, model)
     update_matched(tracks, n, batch, expectation, association, scene, model, log)
     if settings.association.second_views:

@@ -104,6 +104,13 @@ def test_several_runs_are_pooled(run, truth, capsys):
     assert two["causal"]["sequences"] == 2
 
 
+def test_rows_that_pool_different_runs_say_so(run, truth, capsys):
+    message = call(capsys, run, run / "causal.csv", "--gt", truth, truth, "--json", "-")[2]
+    assert "rows pool different RUNs" in message
+    assert "causal 2, smoothed 1" in message
+    assert "different" not in call(capsys, run, run, "--gt", truth, truth, "--json", "-")[2]
+
+
 def test_classes_not_asked_for_are_ignored(run, truth, tmp_path, capsys):
     mixed = tmp_path / "mixed.csv"
     more = [f"{t:.2f},2,500,0,80,40,540,20,0,0,0,0,Truck" for t in times()]

@@ -13,6 +13,7 @@ from jeat_graph.filters.existence import (
     existence_after_miss,
     hidden_after_miss,
     motion_visibility,
+    unsure_visibility,
 )
 
 PROBABILITY = st.floats(0.001, 0.999)
@@ -57,13 +58,34 @@ def test_being_hidden_after_a_miss_is_bayes_rule(h, p_detect):
 
 @given(vx=st.floats(-500, 500), vy=st.floats(-500, 500), blind=st.floats(0.1, 100))
 def test_an_event_camera_sees_by_image_speed(vx, vy, blind):
-    mean = np.array([[0.0, vx, 3.0], [0.0, vy, -2.0]])
     expected = 1 - math.exp(-(vx**2 + vy**2) / blind**2)
-    assert motion_visibility(mean, blind) == pytest.approx(expected, abs=1e-12)
+    assert motion_visibility(np.array([vx, vy]), blind) == pytest.approx(expected, abs=1e-12)
+
+
+def test_where_the_speed_is_not_known_it_is_the_mean_over_all_that_it_may_be():
+    """Against Gauss-Hermite quadrature over both axes, and Bayes' rule written out."""
+    velocity, std, blind, prior = np.array([4.0, -15.0]), np.array([12.0, 5.0]), 10.0, 40.0
+    nodes, weights = np.polynomial.hermite_e.hermegauss(80)
+    v = velocity + std * np.stack(np.meshgrid(nodes, nodes), axis=-1)
+    sees = 1.0 - np.exp(-(v**2).sum(axis=-1) / blind**2)
+    expected = (np.outer(weights, weights) * sees).sum() / (2.0 * np.pi)
+    # A velocity measured as z with variance R, of what moves with N(0, V), gives the estimate.
+    R = 1.0 / (1.0 / std**2 - 1.0 / prior**2)
+    z = velocity * R / std**2
+    still = np.exp(-0.5 * (z**2 / R + np.log(R)).sum())
+    moving = np.exp(-0.5 * (z**2 / (R + prior**2) + np.log(R + prior**2)).sum())
+    found = unsure_visibility(velocity, std**2, prior**2, blind)
+    assert found == pytest.approx(moving / (still + moving) * expected, rel=1e-9)
+
+
+def test_a_new_track_is_as_likely_to_move_as_to_stand_still():
+    assert unsure_visibility(np.zeros(2), np.full(2, 4e4), 4e4, 10.0) == pytest.approx(0.5, abs=2e-3)
+    assert unsure_visibility(np.zeros(2), np.zeros(2), 4e4, 10.0) < 1e-9
+    assert unsure_visibility(np.zeros(2), np.zeros(2), 4e4, 0.0) == 1.0
 
 
 def test_what_stands_still_is_invisible_to_events_and_visible_to_a_camera():
-    still = np.zeros((2, 3))
+    still = np.zeros(2)
     assert motion_visibility(still, 10.0) == 0.0
     assert motion_visibility(still, 0.0) == 1.0
 

@@ -136,3 +136,22 @@ def test_the_chain_goes_on_after_a_checkpoint(tmp_path):
     again = Tracker.load(tmp_path / "state.npz")
     assert again.sensor_states() == tracker.sensor_states()
     assert again.sensor_states()["evt"].blind > 0.5
+
+
+@pytest.mark.parametrize("preset", ["default", "highway", "sehn"])
+@pytest.mark.parametrize(("rate_hz", "speed"), [(10.0, 60.0), (20.0, 30.0), (100.0, 60.0)])
+@pytest.mark.parametrize("dark", [False, True])
+def test_events_alone_make_tracks_of_what_moves(preset, rate_hz, speed, dark):
+    """A new track's speed is not known, which is not to stand still; a camera in the dark does not help."""
+    tracker = Tracker(
+        load_config(preset, ["smoother.engine=none", f"sensors.evt.rate_hz={rate_hz}"]), image=(640, 480)
+    )
+    rng, rows = np.random.default_rng(2), 0
+    for k in range(100):
+        boxes = np.array([[20.0 + speed * k / rate_hz, 20.0 + 60.0 * v, 60.0, 40.0] for v in range(2)])
+        boxes[:, :2] += rng.standard_normal((2, 2))
+        if dark:
+            tracker.update(np.zeros((0, 4)), t=k / rate_hz, sensor="rgb")
+        rows += len(tracker.update(boxes, t=k / rate_hz, sensor="evt", scores=[0.9, 0.9]))
+    assert rows > (120 if dark else 180)
+    assert tracker.num_born <= 3 or dark

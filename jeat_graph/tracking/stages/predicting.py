@@ -10,13 +10,14 @@ from numba import njit
 
 from jeat_graph.association.boxes import occluded_fraction, track_boxes, visible_fraction
 from jeat_graph.config.kernel_form import Model, SensorArrays, Settings
-from jeat_graph.data.arrays import BoolArray, FloatArray
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.filters.coasting import forget
 from jeat_graph.filters.coloured_noise import expected, predict_errors
-from jeat_graph.filters.existence import motion_visibility
+from jeat_graph.filters.existence import motion_visibility, unsure_visibility
 from jeat_graph.filters.jerk import track_jerk
 from jeat_graph.filters.kalman import predict, predict_size
 from jeat_graph.filters.noise import base_variance
+from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.inner import inlined, inner
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
@@ -112,24 +113,57 @@ def occlusion(tracks: TrackArrays, n: int) -> FloatArray:
 
 @inner
 def current_p_detect(
-    tracks: TrackArrays, n: int, present: BoolArray, occluded: FloatArray, model: Model
-) -> FloatArray:
-    """Probability (n, S) that each sensor detects each track now; 0 for sensors that did not look.
+    tracks: TrackArrays, n: int, batch: Batch, occluded: FloatArray, scene: SceneState, model: Model
+) -> tuple[FloatArray, FloatArray]:
+    """Probability (n, S) that each sensor detects each track now, twice; 0 for sensors that did not look.
 
     The track's own running P_D times what is known of this moment: the part of the box inside the picture and
     not hidden by nearer vehicles, and for an event camera the image speed.
+
+    Returns:
+        For a detection, and for a miss. They differ for an event camera that is alone: a new track's speed is
+        not known, which is not to stand still, and nobody else will find it. A miss goes by the most likely
+        speed: misses in a row all follow from one and the same unknown speed, and to count the doubt anew
+        with each would soon end a vehicle that is far and slow.
     """
-    sensors, image = model.sensors, model.settings.image
-    out = np.zeros((n, len(present)))
+    sensors, image, present = model.sensors, model.settings.image, batch.present
+    found, missed = np.zeros((n, len(present))), np.zeros((n, len(present)))
     boxes = track_boxes(tracks.mean[:n], tracks.size_mean[:n])
+    alone = not _somebody_sees_still(batch, scene, model)
     for i in range(n):
         inside = visible_fraction(boxes[i], image.width, image.height) * (1.0 - occluded[i])
         for s in range(len(present)):
             if present[s]:
-                seen = motion_visibility(tracks.mean[i], sensors.blind_speed[s])
-                visible = inside * seen * (1.0 - tracks.hidden[i, s])
-                out[i, s] = tracks.p_detect[i, s] * max(visible, _LEAST_VISIBLE)
-    return out
+                v, blind_speed = tracks.mean[i, :, 1], sensors.blind_speed[s]
+                here, own = inside * (1.0 - tracks.hidden[i, s]), tracks.p_detect[i, s]
+                likely = motion_visibility(v, blind_speed)
+                missed[i, s] = found[i, s] = own * max(here * likely, _LEAST_VISIBLE)
+                if alone:
+                    prior_var = _velocity_variance(tracks, i, model)
+                    unsure = unsure_visibility(v, tracks.cov[i, :, 1, 1], prior_var, blind_speed)
+                    found[i, s] = own * max(here * max(likely, unsure), _LEAST_VISIBLE)
+    return found, missed
+
+
+@inner
+def _somebody_sees_still(batch: Batch, scene: SceneState, model: Model) -> bool:
+    """Whether a sensor looks, or has of late, that sees what stands still and is not blind as a whole."""
+    longest = model.settings.lifecycle.max_gap_confirmed_s
+    for s in range(len(batch.present)):
+        looks = batch.present[s] or batch.t - scene.last_look[s] <= longest
+        sees = max(scene.blind[s], scene.unproven[s]) < 0.5
+        if looks and sees and model.sensors.blind_speed[s] <= 0.0:
+            return True
+    return False
+
+
+@inner
+def _velocity_variance(tracks: TrackArrays, i: int, model: Model) -> float:
+    """Variance (px²/s²) of the velocity of a new track of this size, as `start_track` has it."""
+    half_log_area = 0.5 * (tracks.size_mean[i, 0, 0] + tracks.size_mean[i, 1, 0])
+    side, motion = math.exp(min(half_log_area, MOST_LOG_SIZE)), model.settings.motion
+    std = motion.velocity_std_px + motion.velocity_std_per_size * side
+    return std * std
 
 
 @inner

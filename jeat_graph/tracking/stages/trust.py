@@ -94,7 +94,7 @@ def sharpest_sight(tracks: TrackArrays, i: int, sight: FloatArray, sensors: Sens
     most = 0.0
     for other in range(len(sight)):
         if sight[other] > most:
-            seen = motion_visibility(tracks.mean[i], sensors.blind_speed[other])
+            seen = motion_visibility(tracks.mean[i, :, 1], sensors.blind_speed[other])
             most = max(most, sight[other] * seen)
     return most
 
