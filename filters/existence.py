@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba import njit
 
 from jeat_graph.data.arrays import FloatArray
@@ -68,7 +67,10 @@ def motion_visibility(velocity: FloatArray, blind_speed: float) -> float:
         velocity: (2,) px/s.
         blind_speed: v_blind (px/s); 0 for a sensor that sees still things as well.
     """
-    return 1.0 - _unseen(velocity, np.zeros(2), blind_speed)
+    if blind_speed <= 0.0:
+        return 1.0
+    speed2 = velocity[0] * velocity[0] + velocity[1] * velocity[1]
+    return 1.0 - math.exp(-speed2 / (blind_speed * blind_speed))
 
 
 @njit(cache=True)
@@ -90,23 +92,13 @@ def unsure_visibility(
     """
     if blind_speed <= 0.0:
         return 1.0
-    log_odds = 0.0
+    log_odds, unseen, square = 0.0, 1.0, blind_speed * blind_speed
     for axis in range(2):
         var = max(variance[axis], 1e-12)
+        wide = square + 2.0 * var
+        unseen *= math.sqrt(square / wide) * math.exp(-velocity[axis] * velocity[axis] / wide)
         log_odds += (
             0.5 * math.log(max(prior_variance, 1e-12) / var) - 0.5 * velocity[axis] * velocity[axis] / var
         )
     moves = 1.0 / (1.0 + math.exp(min(log_odds, 500.0)))
-    return moves * (1.0 - _unseen(velocity, variance, blind_speed))
-
-
-@njit(cache=True)
-def _unseen(velocity: FloatArray, variance: FloatArray, blind_speed: float) -> float:
-    """Mean of exp(−(|v| / v_blind)²) over v ~ N(velocity, variance); 0 for a sensor that is never blind."""
-    if blind_speed <= 0.0:
-        return 0.0
-    unseen, square = 1.0, blind_speed * blind_speed
-    for axis in range(2):
-        wide = square + 2.0 * max(variance[axis], 0.0)
-        unseen *= math.sqrt(square / wide) * math.exp(-velocity[axis] * velocity[axis] / wide)
-    return unseen
+    return moves * (1.0 - unseen)

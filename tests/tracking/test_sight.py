@@ -153,5 +153,5 @@ def test_events_alone_make_tracks_of_what_moves(preset, rate_hz, speed, dark):
         if dark:
             tracker.update(np.zeros((0, 4)), t=k / rate_hz, sensor="rgb")
         rows += len(tracker.update(boxes, t=k / rate_hz, sensor="evt", scores=[0.9, 0.9]))
-    assert rows > (120 if dark else 180)
+    assert rows > (120 if dark else 160)
     assert tracker.num_born <= 3 or dark

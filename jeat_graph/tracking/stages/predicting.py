@@ -25,6 +25,10 @@ from jeat_graph.tracking.state import SceneState, TrackArrays
 _LEAST_VISIBLE = 1e-5
 # A size beyond e^12 px, from a runaway extrapolation, must not overflow.
 MOST_LOG_SIZE = 12.0
+# Probability of blindness from which on a camera that finds nothing counts as none.
+_SURELY = 0.99
+# A camera that has not looked in so many of its periods is not there.
+_LATE_PERIODS = 3.0
 
 
 @inlined
@@ -127,9 +131,10 @@ def current_p_detect(
         with each would soon end a vehicle that is far and slow.
     """
     sensors, image, present = model.sensors, model.settings.image, batch.present
-    found, missed = np.zeros((n, len(present))), np.zeros((n, len(present)))
+    missed = np.zeros((n, len(present)))
     boxes = track_boxes(tracks.mean[:n], tracks.size_mean[:n])
     alone = not _somebody_sees_still(batch, scene, model)
+    found = np.zeros((n, len(present))) if alone else missed
     for i in range(n):
         inside = visible_fraction(boxes[i], image.width, image.height) * (1.0 - occluded[i])
         for s in range(len(present)):
@@ -137,7 +142,7 @@ def current_p_detect(
                 v, blind_speed = tracks.mean[i, :, 1], sensors.blind_speed[s]
                 here, own = inside * (1.0 - tracks.hidden[i, s]), tracks.p_detect[i, s]
                 likely = motion_visibility(v, blind_speed)
-                missed[i, s] = found[i, s] = own * max(here * likely, _LEAST_VISIBLE)
+                missed[i, s] = own * max(here * likely, _LEAST_VISIBLE)
                 if alone:
                     prior_var = _velocity_variance(tracks, i, model)
                     unsure = unsure_visibility(v, tracks.cov[i, :, 1, 1], prior_var, blind_speed)
@@ -147,12 +152,18 @@ def current_p_detect(
 
 @inner
 def _somebody_sees_still(batch: Batch, scene: SceneState, model: Model) -> bool:
-    """Whether a sensor looks, or has of late, that sees what stands still and is not blind as a whole."""
-    longest = model.settings.lifecycle.max_gap_confirmed_s
+    """Whether a sensor looks, or has of late, that sees what stands still and may not be blind."""
+    longest, sensors, begin = (
+        model.settings.lifecycle.max_gap_confirmed_s,
+        model.sensors,
+        np.min(scene.first_look),
+    )
     for s in range(len(batch.present)):
         looks = batch.present[s] or batch.t - scene.last_look[s] <= longest
-        sees = max(scene.blind[s], scene.unproven[s]) < 0.5
-        if looks and sees and model.sensors.blind_speed[s] <= 0.0:
+        # One that has not looked at all may still begin.
+        looks = looks or batch.t - begin <= _LATE_PERIODS * sensors.period_s[s]
+        sees = max(scene.blind[s], scene.unproven[s]) < _SURELY
+        if looks and sees and sensors.blind_speed[s] <= 0.0:
             return True
     return False
 

@@ -50,6 +50,7 @@ def learn_trust(
     lifecycle, sensors = model.settings.lifecycle, model.sensors
     for s in range(len(batch.present)):
         if batch.present[s]:
+            scene.first_look[s] = min(scene.first_look[s], batch.t)
             scene.last_look[s] = batch.t
     judged = np.max(sensors.disagreement) > 0.0
     for s in range(len(batch.present)):

@@ -57,7 +57,6 @@ def learn_lasting(
         return
     for s in range(len(batch.present)):
         if batch.present[s]:
-            scene.first_look[s] = min(scene.first_look[s], batch.t)
             step = model.sensors.period_s[s] / lifecycle.worth_memory_s
             doubt_worth(scene.worth_cov[s], lifecycle.worth_std * lifecycle.worth_std, step)
     for i in range(n):
