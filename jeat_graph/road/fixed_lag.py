@@ -144,6 +144,10 @@ class RoadFixedLag:
         """Return all that is not final yet, (K,) records, and forget the vehicles."""
         return self._advance(math.inf)
 
+    def held(self) -> set[int]:
+        """Return the identities of the tracks of which rows may still come."""
+        return set(self._tracks).union(*(part["track_id"].tolist() for part in self._pending))
+
     def _advance(self, t: float) -> RecordArray:
         if self._pending:
             log = np.concatenate(self._pending)

@@ -22,6 +22,8 @@ from jeat_graph.road.fixed_lag import RoadFixedLag, RoadLagConfig
 from jeat_graph.road.results import empty_road_columns
 
 Columns = dict[str, npt.NDArray[Any]]
+# So many identities may be remembered without a look at which are still needed.
+_FEW = 1000
 
 
 class RoadLagTable:
@@ -45,6 +47,10 @@ class RoadLagTable:
             Columns of `road_smoothed.csv` with the rows that are final now, by track and time.
         """
         return columns_of_rows(self._lag.step(t, rows), self._share)
+
+    def held(self) -> set[int]:
+        """Return the identities of the tracks of which rows may still come."""
+        return self._lag.held()
 
     def finish(self) -> Columns:
         """Return the rows that are not final yet, and forget the vehicles."""
@@ -81,6 +87,7 @@ class RoadFile:
     def __init__(self, path: str | Path, table: RoadLagTable) -> None:
         self._path, self._table = Path(path), table
         self._reported: set[int] = set()
+        self._look_again_at = _FEW
         if self._path.is_dir():
             raise DataError("is a folder; --road must name a file", path)
 
@@ -109,6 +116,9 @@ class RoadFile:
         """
         self._reported.update(reported.tolist())
         self._append(self._table.step(t, rows))
+        if len(self._reported) > self._look_again_at:  # those that are gone are not remembered for ever
+            self._reported &= self._table.held().union(reported.tolist())
+            self._look_again_at = max(2 * len(self._reported), _FEW)
 
     def _append(self, columns: Columns) -> None:
         known = np.array([k in self._reported for k in columns["track_id"].tolist()], dtype=np.bool_)

@@ -6,6 +6,7 @@ import io
 import json
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,9 +14,12 @@ from numpy.testing import assert_allclose
 
 from jeat_graph import Tracker, load_config, read_detections
 from jeat_graph.cli.main import main
+from jeat_graph.filters.measurement import MEASUREMENT
 from jeat_graph.io.tables import read_table
 from jeat_graph.road.camera_file import read_camera
 from jeat_graph.road.fixed_lag import RoadFixedLag, RoadLagConfig
+from jeat_graph.road.lag_table import RoadFile
+from jeat_graph.road.results import empty_road_columns
 
 LAG_S = 0.75
 SETTINGS = (f"smoother.lag_s={LAG_S}",)
@@ -115,3 +119,15 @@ def test_what_cannot_be_had_is_said(
     camera = str(scene / "camera.yaml")
     assert _stream(scene, monkeypatch, *(camera if part == "CAMERA" else part for part in more)) == 2
     assert message in capsys.readouterr().err
+
+
+def test_who_has_driven_by_is_not_remembered_for_ever(tmp_path) -> None:
+    """A day has a million vehicles; rows of those that are still before the camera come all the same."""
+    table = SimpleNamespace(
+        step=lambda t, rows: empty_road_columns(), held=lambda: {1}, finish=empty_road_columns
+    )
+    with RoadFile(tmp_path / "road.csv", table) as file:
+        for k in range(1, 5000):
+            file.take(0.1 * k, np.zeros(0, dtype=MEASUREMENT), np.array([k, k + 1]))
+            assert len(file._reported) <= 1002
+    assert {1, 4999, 5000} <= file._reported
