@@ -49,5 +49,5 @@ class Snapshot(NamedTuple):
         """Write the copy into arrays of at least N rows, and into a scene."""
         for source, target in zip(self.tracks, tracks, strict=True):
             target[: len(source)] = source
-        for source, target in zip(self.scene, scene, strict=True):
-            target[:] = source
+        for learnt, known in zip(self.scene, scene, strict=True):
+            known[:] = learnt

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from jeat_graph.config.kernel_form import SensorArrays
 from jeat_graph.config.schema import Config
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 
 # What lasts usually has scores of about .9; that is held to be known from five seconds of a track.
 _USUAL_ODDS, _USUAL_WEIGHT = 2.2, 5.0
@@ -75,6 +75,28 @@ class TrackArrays(NamedTuple):
     worthy: npt.NDArray[np.bool_]
 
 
+#: What is counted of a sensor's recent detections on lasting tracks while another sensor looked too, in
+#: seconds of a track: all; those on tracks that another sensor has seen, the mean log odds of their scores,
+#: and those of them that have a higher one and are on tracks that have moved; the same of the detections on
+#: tracks that the sensor alone has seen. The sums of the squares of the tracks' deviations from that mean
+#: (log odds² s), of the squares of all deviations, and of their products with those of the next detection.
+CLAIMS = np.dtype(
+    [
+        (name, np.float64)
+        for name in (
+            "all",
+            "agreed",
+            "agreed_odds",
+            "agreed_high",
+            "lonely_high",
+            "score_spread",
+            "score_square",
+            "score_kept",
+        )
+    ]
+)
+
+
 class SceneState(NamedTuple):
     """What is learnt of the scene as a whole.
 
@@ -83,15 +105,7 @@ class SceneState(NamedTuple):
         p_detect: (S,) each sensor's mean probability of detecting a confirmed track: light and darkness.
         undetected: (1,) expected number of vehicles in the scene that have no track yet.
         last_look: (S,) time of each sensor's last scan (s); minus infinity before the first.
-        claims: (S,) recent detections of each sensor on lasting tracks while another sensor looked too, in
-            seconds of a track.
-        agreed: (S,) those of them on tracks that another sensor has seen.
-        agreed_odds: (S,) mean log odds of the scores of the detections borne out so.
-        agreed_high: (S,) those of them that have a higher score, on tracks that have moved (s).
-        lonely_high: (S,) the same of the detections on tracks that it alone has seen (s).
-        score_spread: (S,) recent sum of the squares of the tracks' deviations from that mean (log odds² s).
-        score_square: (S,) the same of the squares of all deviations.
-        score_kept: (S,) the same of their products with those of the next detection.
+        claims: (S,) records of `CLAIMS`, how far others bear out each sensor's detections.
         agreed_without: (S, S) detections of the first on tracks that a sensor besides the two has seen (s).
         trust: (S,) what all that says of the sensor: factor on its evidence, in (0, 1].
         fruitless: (S,) recent mean number, a scan, of each sensor's detections on tracks that ended without
@@ -111,14 +125,7 @@ class SceneState(NamedTuple):
     p_detect: FloatArray
     undetected: FloatArray
     last_look: FloatArray
-    claims: FloatArray
-    agreed: FloatArray
-    agreed_odds: FloatArray
-    agreed_high: FloatArray
-    lonely_high: FloatArray
-    score_spread: FloatArray
-    score_square: FloatArray
-    score_kept: FloatArray
+    claims: RecordArray
     agreed_without: FloatArray
     trust: FloatArray
     fruitless: FloatArray
@@ -144,14 +151,7 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
         p_detect=sensors.p_detect.copy(),
         undetected=np.array([config.birth.initial]),
         last_look=np.full(num_sensors, -np.inf),
-        claims=np.zeros(num_sensors),
-        agreed=np.zeros(num_sensors),
-        agreed_odds=np.zeros(num_sensors),
-        agreed_high=np.zeros(num_sensors),
-        lonely_high=np.zeros(num_sensors),
-        score_spread=np.zeros(num_sensors),
-        score_square=np.zeros(num_sensors),
-        score_kept=np.zeros(num_sensors),
+        claims=np.zeros(num_sensors, dtype=CLAIMS),
         agreed_without=np.zeros((num_sensors, num_sensors)),
         trust=sensors.prior_trust.copy(),
         fruitless=np.zeros(num_sensors),

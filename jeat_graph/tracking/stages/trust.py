@@ -73,16 +73,17 @@ def learn_trust(
                     continue
                 before = (tracks.hits[i] * tracks.score_odds[i] - batch.score_odds[j]) / (tracks.hits[i] - 1)
                 _claim(s, tracks.seen_by[i], before, batch.score_odds[j], weight, has_moved(tracks, i), scene)
-        lonely = scene.claims[s] - scene.agreed[s]
+        known = scene.claims[s]
+        lonely = known["all"] - known["agreed"]
         kind = share_of_kind(
-            high_as_often(scene.lonely_high[s], lonely, scene.agreed_high[s], scene.agreed[s]),
-            score_persistence(scene.score_kept[s], scene.score_spread[s]),
-            score_variety(scene.score_square[s], scene.claims[s]),
-            worth_of(scene.worth_mean[s], scene.agreed_odds[s]),
+            high_as_often(known["lonely_high"], lonely, known["agreed_high"], known["agreed"]),
+            score_persistence(known["score_kept"], known["score_spread"]),
+            score_variety(known["score_square"], known["all"]),
+            worth_of(scene.worth_mean[s], known["agreed_odds"]),
         )
         scene.trust[s] = trust_in(
-            scene.agreed[s] + lonely * kind * (1.0 - _others_agreement(s, scene)),
-            scene.claims[s],
+            known["agreed"] + lonely * kind * (1.0 - _others_agreement(s, scene)),
+            known["all"],
             lifecycle.agreement_prior,
             _PRIOR_CLAIMS,
             sensors.disagreement[s],
@@ -103,13 +104,14 @@ def sharpest_sight(tracks: TrackArrays, i: int, sight: FloatArray, sensors: Sens
 @inner
 def _forget(s: int, kept: float, scene: SceneState) -> None:
     """Let what is known of sensor `s` age, in place."""
-    scene.claims[s] *= kept
-    scene.agreed[s] *= kept
-    scene.agreed_high[s] *= kept
-    scene.lonely_high[s] *= kept
-    scene.score_kept[s] *= kept
-    scene.score_spread[s] *= kept
-    scene.score_square[s] *= kept
+    known = scene.claims[s]
+    known["all"] *= kept
+    known["agreed"] *= kept
+    known["agreed_high"] *= kept
+    known["lonely_high"] *= kept
+    known["score_kept"] *= kept
+    known["score_spread"] *= kept
+    known["score_square"] *= kept
     scene.agreed_without[s] *= kept
 
 
@@ -131,23 +133,24 @@ def _claim(
         scene: what is learnt.
     """
     others = seen_by & ~(1 << s)
-    scene.claims[s] += weight
+    known = scene.claims[s]
+    known["all"] += weight
     if others:
-        scene.agreed[s] += weight
-        scene.agreed_odds[s] += weight / scene.agreed[s] * (odds - scene.agreed_odds[s])
-    high = weight if moved and odds > scene.agreed_odds[s] else 0.0
+        known["agreed"] += weight
+        known["agreed_odds"] += weight / known["agreed"] * (odds - known["agreed_odds"])
+    high = weight if moved and odds > known["agreed_odds"] else 0.0
     if others:
-        scene.agreed_high[s] += high
-        for o in range(len(scene.claims)):
+        known["agreed_high"] += high
+        for o in range(len(scene.trust)):
             if others & ~(1 << o):
                 scene.agreed_without[s, o] += weight
     else:
-        scene.lonely_high[s] += high
-    deviation = before - scene.agreed_odds[s]
-    now = odds - scene.agreed_odds[s]
-    scene.score_spread[s] += weight * deviation * deviation
-    scene.score_square[s] += weight * now * now
-    scene.score_kept[s] += weight * deviation * now
+        known["lonely_high"] += high
+    deviation = before - known["agreed_odds"]
+    now = odds - known["agreed_odds"]
+    known["score_spread"] += weight * deviation * deviation
+    known["score_square"] += weight * now * now
+    known["score_kept"] += weight * deviation * now
 
 
 @inner
@@ -157,7 +160,7 @@ def _others_agreement(s: int, scene: SceneState) -> float:
     Without a third sensor it is none.
     """
     most = 0.0
-    for o in range(len(scene.claims)):
+    for o in range(len(scene.trust)):
         if o != s:
-            most = max(most, scene.agreed_without[o, s] / (scene.claims[o] + _PRIOR_CLAIMS))
+            most = max(most, scene.agreed_without[o, s] / (scene.claims[o]["all"] + _PRIOR_CLAIMS))
     return most

@@ -7,7 +7,6 @@ import math
 import numpy as np
 from numba import njit
 
-from jeat_graph.association.costs import log_score_ratio
 from jeat_graph.config.kernel_form import Model
 from jeat_graph.filters.worth import doubt_worth, learn_worth, worth_of
 from jeat_graph.tracking.batch import LEAST_PRECISION, Batch
@@ -22,6 +21,7 @@ _ROUNDING_S = 1e-9
 # A track so far from its first detection, as a share of its size, has left the place: five times the error
 # of a usual detector.
 _MOVED = 0.25
+_LEAST_ODDS = math.log(LEAST_PRECISION / (1.0 - LEAST_PRECISION))
 
 
 @inlined
@@ -99,12 +99,17 @@ def doubt_scores(batch: Batch, scene: SceneState, model: Model) -> None:
     """Believe no score of a batch more than what lasts has borne out so far, in place."""
     if not model.settings.lifecycle.judges_worth:
         return
+    overall = np.empty(len(batch.present))
+    for s in range(len(overall)):
+        overall[s] = math.log(model.sensors.precision[s] / (1.0 - model.sensors.precision[s]))
     for j in range(len(batch.precision)):
         s = batch.sensor[j]
-        worth = worth_of(scene.worth_mean[s], batch.score_odds[j])
-        if worth < batch.precision[j]:
-            batch.precision[j] = max(worth, LEAST_PRECISION)
-            batch.log_score[j] = log_score_ratio(batch.precision[j], model.sensors.precision[s])
+        mean = scene.worth_mean[s]
+        # Log odds of the worth, and so of a precision, compared as `log_score_ratio` has them.
+        odds = max(mean[0] + mean[1] * batch.score_odds[j], _LEAST_ODDS)
+        if odds - overall[s] < batch.log_score[j]:
+            batch.precision[j] = 1.0 / (1.0 + math.exp(-odds))
+            batch.log_score[j] = odds - overall[s]
 
 
 @njit(cache=True)
