@@ -15,6 +15,7 @@ import math
 from numba import njit
 
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.filters.sides import MOST_LOG_SIZE
 
 #: What the edges of the picture leave of one axis of a box.
 WHOLE, LOW_CUT, HIGH_CUT, BOTH_CUT = 0, 1, 2, 3
@@ -28,8 +29,6 @@ FIRST_LOG_GROWTH_STD = 0.5
 LEAST_KNOWN_LOG_STD = 1.0
 #: Variance (px², ln²) that stands for "not measured".
 UNKNOWN = 1e10
-
-_MOST_LOG_SIZE = 12.0
 
 
 @njit(cache=True)
@@ -63,7 +62,7 @@ def centre_from_side(cut: int, side: float, log_size: float, log_size_var: float
         log_size: ln of the whole width or height (ln px).
         log_size_var: its variance.
     """
-    half = 0.5 * math.exp(min(log_size, _MOST_LOG_SIZE))
+    half = 0.5 * math.exp(min(log_size, MOST_LOG_SIZE))
     centre = side - half if cut == LOW_CUT else side + half
     return centre, half * half * log_size_var
 

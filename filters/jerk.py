@@ -7,9 +7,9 @@ import math
 from numba import njit
 
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.filters.sides import mean_side
 
-# Beyond these a size is no vehicle's, and a growth none that a picture shows for longer than a moment.
-_MOST_LOG_SIZE = 12.0
+# Beyond this a growth is none that a picture shows for longer than a moment.
 _MOST_GROWTH = 4.0  # 1/s
 
 
@@ -70,7 +70,6 @@ def track_jerk(
         jerk_per_growth: as there.
         factor: 1, or less while the track stands.
     """
-    # A runaway extrapolation of a size must not overflow, as in `association.boxes.track_boxes`.
-    side = math.exp(min(0.5 * (size_mean[0, 0] + size_mean[1, 0]), _MOST_LOG_SIZE))
+    side = mean_side(size_mean)
     growth = common_growth(size_mean[0, 1], size_mean[1, 1])
     return factor * jerk_density(side, growth, jerk_px, jerk_per_size, jerk_per_growth)

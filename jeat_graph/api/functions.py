@@ -84,13 +84,9 @@ def track(
 
 
 def _recording(detections: Detections | pd.DataFrame | PathLike) -> Detections:
-    if isinstance(detections, Detections):
-        return detections
-    return (
-        read_detections(detections)
-        if isinstance(detections, (str, Path))
-        else Detections.from_pandas(detections)
-    )
+    if isinstance(detections, (str, Path)):
+        return read_detections(detections)
+    return detections if isinstance(detections, Detections) else Detections.from_pandas(detections)
 
 
 def evaluate(
@@ -142,7 +138,7 @@ def evaluate(
 
 
 def compare(
-    detections: Detections | PathLike,
+    detections: Detections | pd.DataFrame | PathLike,
     config: Config | PathLike = "default",
     truth: GroundTruth | PathLike | None = None,
     *,
@@ -151,7 +147,7 @@ def compare(
     """Compare the filter with smoothers of several lags on one recording.
 
     Args:
-        detections: the recording, or a file that `read_detections` knows.
+        detections: as for `track`.
         config: a configuration, the name of a preset, or a YAML file.
         truth: truth with motion, or its file; without it only consistency is judged.
         lags_s: lags (s); 0 is the filter.
@@ -166,7 +162,7 @@ def compare(
     from jeat_graph.runs.latency import at_measurement
     from jeat_graph.runs.measured import compare_run, track_measured
 
-    recording = detections if isinstance(detections, Detections) else read_detections(detections)
+    recording = _recording(detections)
     objects = truth if isinstance(truth, GroundTruth) or truth is None else read_truth(truth)
     settings = fit_input(as_config(config), recording)[0]
     return compare_run(track_measured(settings, at_measurement(recording, settings)), objects, lags_s)

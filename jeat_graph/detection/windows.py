@@ -21,6 +21,8 @@ _US_PER_S = 1e6
 _MOST = 255
 #: A bin with fewer events than this share of its cells is emptied event by event, a fuller one as a whole.
 _SPARSE_SHARE = 0.01
+# Of a bin: how many events, and where.
+_NOTHING = (0, EventArray.empty().x, EventArray.empty().y)
 
 
 class EventBins:
@@ -47,8 +49,7 @@ class EventBins:
         self._ring = np.zeros((bins, 2, height, width), dtype=np.uint8)
         self._total = np.zeros((height, width), dtype=np.uint16)
         self._newest = bins - 1
-        none = EventArray.empty()
-        self._filled = [(len(none), none.x, none.y)] * bins
+        self._filled = [_NOTHING] * bins
 
     @property
     def total(self) -> npt.NDArray[np.uint16]:
@@ -79,8 +80,7 @@ class EventBins:
         """Empty the window and let it end at `end_us`, a whole multiple of the bin."""
         self._ring[:] = 0
         self._total[:] = 0
-        none = EventArray.empty()
-        self._filled = [(0, none.x, none.y)] * len(self._ring)
+        self._filled = [_NOTHING] * len(self._ring)
         self.end_us = end_us
 
     def stack(self, by_polarity: bool = False) -> npt.NDArray[np.uint8]:

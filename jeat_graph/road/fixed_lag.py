@@ -174,10 +174,12 @@ class RoadFixedLag:
         rows = rows_of_log(log, self._errors, (self._camera.width, self._camera.height), BoxConfig())
         if track.window is None:
             track.window = self._begun(rows)
-            # What never makes a vehicle, such as a false box in the sky, must not be kept for ever.
-            recent = log[log["t"] > log["t"][-1] - self._config.begin_s]
-            track.waiting = [recent] if track.window is None else []
-            return track.window is None or self._solve(track.window)
+            if track.window is None:
+                # What never makes a vehicle, such as a false box in the sky, must not be kept for ever.
+                track.waiting = [log[log["t"] > log["t"][-1] - self._config.begin_s]]
+                return True
+            track.waiting = []
+            return self._solve(track.window)
         track.waiting, window = [], track.window
         # What another sensor saw at the time of the last state needs no state of its own.
         if rows.t[-1] > window.keys[-1] + _SAME_S:

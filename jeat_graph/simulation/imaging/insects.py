@@ -58,14 +58,7 @@ class Insects(NamedTuple):
     def during(self, start_s: float, end_s: float) -> Insects:
         """Those that may be in sight at some time from `start_s` to `end_s`."""
         there = (self.middle > start_s - _NEAR_S) & (self.middle < end_s + _NEAR_S)
-        return self._replace(
-            middle=self.middle[there],
-            place=self.place[there],
-            velocity=self.velocity[there],
-            wave=self.wave[there],
-            turn=self.turn[there],
-            radius=self.radius[there],
-        )
+        return Insects._make((*(column[there] for column in self[:-1]), self.colour))
 
     def at(self, times: FloatArray, view: View) -> FloatArray:
         """Place the insects in the picture at times (J,) (s): (J, I, RECORD), radius 0 behind the lens."""

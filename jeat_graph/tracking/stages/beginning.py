@@ -26,7 +26,7 @@ from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.ending import confirm
 from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.stages.learning import scan_weight
-from jeat_graph.tracking.stages.predicting import jerk_of, split_noise
+from jeat_graph.tracking.stages.predicting import jerk_of, new_velocity_var, split_noise
 from jeat_graph.tracking.stages.updating import update_track
 from jeat_graph.tracking.stages.worth import judge_worth
 from jeat_graph.tracking.state import SceneState, TrackArrays
@@ -173,10 +173,9 @@ def start_track(
     sensors, motion, t = model.sensors, model.settings.motion, batch.t
     s = batch.sensor[j]
     side = math.sqrt(batch.boxes[j, 2] * batch.boxes[j, 3])
-    velocity_std = motion.velocity_std_px + motion.velocity_std_per_size * side
     acceleration_std = motion.acceleration_std_px + motion.acceleration_std_per_size * side
-    # Products, not powers: compiled and plain code then round alike.
-    velocity_var = np.full(2, velocity_std * velocity_std)
+    # A product, not a power, as in `new_velocity_var`.
+    velocity_var = np.full(2, new_velocity_var(side, model.settings))
     acceleration_var = np.full(2, acceleration_std * acceleration_std)
     rate_var = model.settings.size.rate_std * model.settings.size.rate_std
     view = first_view(batch, j, sensors)

@@ -17,14 +17,13 @@ from jeat_graph.filters.existence import motion_visibility, unsure_visibility
 from jeat_graph.filters.jerk import track_jerk
 from jeat_graph.filters.kalman import predict, predict_size
 from jeat_graph.filters.noise import base_variance
+from jeat_graph.filters.sides import MOST_LOG_SIZE, mean_side
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.inner import inlined, inner
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
 # A small rest remains: what should be invisible is still taken if it is detected.
 _LEAST_VISIBLE = 1e-5
-# A size beyond e^12 px, from a runaway extrapolation, must not overflow.
-MOST_LOG_SIZE = 12.0
 # Probability of blindness from which on a camera that finds nothing counts as none.
 _SURELY = 0.99
 # A camera that has not looked in so many of its periods is not there.
@@ -63,6 +62,12 @@ def most_trusted(seen_by: int, trust: FloatArray) -> float:
 
 
 @inner
+def has_looked(s: int, t: float, scene: SceneState, model: Model) -> bool:
+    """Whether sensor `s` has looked of late, before time `t` (s)."""
+    return bool(t - scene.last_look[s] <= model.settings.lifecycle.max_gap_confirmed_s)
+
+
+@inner
 def last_sight(scene: SceneState) -> float:
     """Return the time of the last scan (s) of a sensor that sees as likely as not, compared to the others."""
     sharpest = 1.0 - np.min(scene.blind)
@@ -82,7 +87,7 @@ def predict_all(tracks: TrackArrays, n: int, dt: float, scene: SceneState, model
     sensors, settings = model.sensors, model.settings
     jerk = np.empty(n)
     for i in range(n):
-        side = math.exp(min(0.5 * (tracks.size_mean[i, 0, 0] + tracks.size_mean[i, 1, 0]), MOST_LOG_SIZE))
+        side = mean_side(tracks.size_mean[i])
         jerk[i] = jerk_of(tracks, i, settings)
         drift = settings.standing.drift_per_size * side
         tracks.rest_var[i] += drift * drift * dt
@@ -144,7 +149,7 @@ def current_p_detect(
                 likely = motion_visibility(v, blind_speed)
                 missed[i, s] = own * max(here * likely, _LEAST_VISIBLE)
                 if alone:
-                    prior_var = _velocity_variance(tracks, i, model)
+                    prior_var = new_velocity_var(mean_side(tracks.size_mean[i]), model.settings)
                     unsure = unsure_visibility(v, tracks.cov[i, :, 1, 1], prior_var, blind_speed)
                     found[i, s] = own * max(here * max(likely, unsure), _LEAST_VISIBLE)
     return found, missed
@@ -153,13 +158,9 @@ def current_p_detect(
 @inner
 def _somebody_sees_still(batch: Batch, scene: SceneState, model: Model) -> bool:
     """Whether a sensor looks, or has of late, that sees what stands still and may not be blind."""
-    longest, sensors, begin = (
-        model.settings.lifecycle.max_gap_confirmed_s,
-        model.sensors,
-        np.min(scene.first_look),
-    )
+    sensors, begin = model.sensors, np.min(scene.first_look)
     for s in range(len(batch.present)):
-        looks = batch.present[s] or batch.t - scene.last_look[s] <= longest
+        looks = batch.present[s] or has_looked(s, batch.t, scene, model)
         # One that has not looked at all may still begin.
         looks = looks or batch.t - begin <= _LATE_PERIODS * sensors.period_s[s]
         sees = max(scene.blind[s], scene.unproven[s]) < _SURELY
@@ -168,21 +169,19 @@ def _somebody_sees_still(batch: Batch, scene: SceneState, model: Model) -> bool:
     return False
 
 
-@inner
-def _velocity_variance(tracks: TrackArrays, i: int, model: Model) -> float:
-    """Variance (px²/s²) of the velocity of a new track of this size, as `start_track` has it."""
-    half_log_area = 0.5 * (tracks.size_mean[i, 0, 0] + tracks.size_mean[i, 1, 0])
-    side, motion = math.exp(min(half_log_area, MOST_LOG_SIZE)), model.settings.motion
-    std = motion.velocity_std_px + motion.velocity_std_per_size * side
-    return std * std
+@inlined
+def new_velocity_var(side: float, settings: Settings) -> float:
+    """Variance (px²/s²) of the velocity of a new track whose box has this size (px)."""
+    std = settings.motion.velocity_std_px + settings.motion.velocity_std_per_size * side
+    # A product, not a power: compiled and plain code then round alike.
+    return float(std * std)
 
 
 @inner
 def detection_variance(tracks: TrackArrays, i: int, s: int, axis: int, sensors: SensorArrays) -> float:
     """Variance (px²) of a detection of sensor `s` on track `i`, one axis, at weight 1: s · R_base(size)."""
     side = math.exp(min(tracks.size_mean[i, axis, 0], MOST_LOG_SIZE))
-    half_log_area = 0.5 * (tracks.size_mean[i, 0, 0] + tracks.size_mean[i, 1, 0])
-    size = math.exp(min(half_log_area, MOST_LOG_SIZE))
+    size = mean_side(tracks.size_mean[i])
     base = base_variance(sensors.sigma_px[s], sensors.rho[s, axis], side, sensors.rho_size[s], size)
     return float(tracks.scale[i, s] * base)
 

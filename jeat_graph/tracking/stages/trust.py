@@ -20,6 +20,7 @@ from jeat_graph.filters.worth import worth_of
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.inner import inner
+from jeat_graph.tracking.stages.predicting import has_looked
 from jeat_graph.tracking.stages.worth import has_moved
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
@@ -32,7 +33,7 @@ _PRIOR_CLAIMS = 5.0
 @inner
 def looks_too(other: int, s: int, t: float, scene: SceneState, model: Model) -> bool:
     """Whether a sensor is another one than `s` and has looked of late, at time `t` (s)."""
-    return other != s and t - scene.last_look[other] <= model.settings.lifecycle.max_gap_confirmed_s
+    return other != s and has_looked(other, t, scene, model)
 
 
 @inner
@@ -52,10 +53,11 @@ def learn_trust(
         if batch.present[s]:
             scene.first_look[s] = min(scene.first_look[s], batch.t)
             scene.last_look[s] = batch.t
-    judged = np.max(sensors.disagreement) > 0.0
+    if np.max(sensors.disagreement) <= 0.0:
+        return
     for s in range(len(batch.present)):
         # What bears others out is counted of sensors too that are always believed.
-        if not (batch.present[s] and judged):
+        if not batch.present[s]:
             continue
         sight = np.zeros(len(batch.present))
         for other in range(len(sight)):

@@ -8,11 +8,11 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.config.kernel_form import Model
+from jeat_graph.filters.sides import mean_side
 from jeat_graph.filters.worth import doubt_worth, learn_worth, worth_of
 from jeat_graph.tracking.batch import LEAST_PRECISION, Batch
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.inner import inlined, inner
-from jeat_graph.tracking.stages.predicting import MOST_LOG_SIZE
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
 # Fewer detections have not lasted, however far they lie apart.
@@ -27,8 +27,7 @@ _LEAST_ODDS = math.log(LEAST_PRECISION / (1.0 - LEAST_PRECISION))
 @inlined
 def has_moved(tracks: TrackArrays, i: int) -> bool:
     """Whether track `i` is further from where it began than a share of its size."""
-    half_log_area = 0.5 * (tracks.size_mean[i, 0, 0] + tracks.size_mean[i, 1, 0])
-    size = math.exp(min(half_log_area, MOST_LOG_SIZE))
+    size = mean_side(tracks.size_mean[i])
     x, y = tracks.mean[i, 0, 0] - tracks.born_at[i, 0], tracks.mean[i, 1, 0] - tracks.born_at[i, 1]
     return bool(x * x + y * y > _MOVED * _MOVED * size * size)
 
