@@ -46,9 +46,9 @@ class NumberWriter:
     def _parts(self, flat: npt.NDArray[Any]) -> Any:
         """Write a flat array (N,), of records field by field."""
         words = _words(flat.dtype)
-        if words is not None and len(flat):
+        if words is not None:
             # All words of one place side by side, and all of them judged at once.
-            columns = np.ascontiguousarray(flat.view(np.int64).reshape(len(flat), -1).T)
+            columns = np.ascontiguousarray(flat.view(np.int64).reshape(len(flat), len(words)).T)
             alike = (columns == columns[:, :1]).all(axis=1).tolist()
             return [
                 self._part(column[:1] if same else column, kind, len(flat))

@@ -87,6 +87,12 @@ def test_records_keep_every_bit_and_constant_fields_are_kept_once():
     assert len(block) < 200 * (2 * 8 + 1) + 30 * 8
 
 
+@pytest.mark.parametrize("shapes", [[(0,)], [(0,), (0,)], [(0, 3)], [(2, 0), (1, 4)], [(1,)]])
+def test_records_of_which_there_are_none_come_back_as_none(shapes):
+    tree = [np.ones(shape, dtype=MEASUREMENT) for shape in shapes]
+    assert_same(unpack(*pack(tree, {}), {}), tree)
+
+
 def test_an_object_that_stands_in_several_places_is_one_object_again():
     shared = Box([np.arange(3)])
     first, (second,), third = unpack(*pack((shared, [shared], Point(shared, 1)), CODECS), CODECS)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from jeat_graph.config.reading import load_config
+from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.live.late import LiveTracker
@@ -61,6 +62,19 @@ def test_a_loaded_tracker_goes_on_with_the_same_bytes(engine, batches, tmp_path)
     # Saving has GTSAM build its windows anew: the same solution, to its last digits.
     np.testing.assert_array_equal(smoothed.track_id, plain_smoothed.track_id)
     np.testing.assert_allclose(smoothed.boxes, plain_smoothed.boxes, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_tracker_of_an_empty_road_is_saved_and_goes_on(engine, batches, tmp_path):
+    config = load_config("highway", [*OVERRIDES, f"smoother.engine={engine}"])
+    empty = [[Scan(scan.t, scan.sensor, scan.boxes[:0], scan.scores[:0]) for scan in b] for b in batches]
+    # Nobody has come yet; vehicles have come and gone; and nobody ever comes.
+    for some in (batches[:40], [*batches[:60], *empty[60:]], empty[:40]):
+        road = [*empty[:3], *some[3:]]
+        moments = (0, 2, len(road) - 1)
+        again = run(road, config, moments, tmp_path, resume=True)
+        for one, other in zip(again, run(road, config, moments, tmp_path), strict=True):
+            assert_equal(one, other)
 
 
 def test_a_live_tracker_is_saved_with_the_scans_that_may_be_taken_again(batches, tmp_path):
