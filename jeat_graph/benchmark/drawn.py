@@ -51,10 +51,11 @@ def from_model(seed: int, memory: bool, duration_s: float = 8.0, jerk: float = 1
     t, sensor = _looks(rng, duration_s)
     x = np.zeros((len(t), 2, 3))
     x[0] = rng.normal(size=(2, 3)) * [0.0, _VELOCITY_STD, _ACCELERATION_STD]
-    for k in range(1, len(t)):
-        dt = float(t[k] - t[k - 1])
-        root = np.linalg.cholesky(process_noise(dt, jerk))
-        x[k] = x[k - 1] @ transition(dt).T + rng.normal(size=(2, 3)) @ root.T
+    steps = np.diff(t).tolist()
+    root = np.linalg.cholesky(np.array([process_noise(dt, jerk) for dt in steps]))
+    push = rng.normal(size=(len(steps), 2, 3)) @ root.mT
+    for k, dt in enumerate(steps):
+        x[k + 1] = x[k] @ transition(dt).T + push[k]
     return DrawnTrack(_measured(rng, t, sensor, x[:, :, 0], jerk, memory), t[1:], x[1:])
 
 

@@ -44,8 +44,9 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.tracking.notice import notice_if_cold
 
     notice_if_cold()
-    # The first child may have to compile; its time counts nowhere.
-    ask({"job": "start_up"})
+    if not args.quick:
+        # The first child may have to compile; its time counts nowhere.
+        ask({"job": "start_up"})
     result: dict[str, Any] = {"steps": _steps(args), "start_up": _start_up(args)}
     result["real_time"] = _real_time(args)
     if args.hour:

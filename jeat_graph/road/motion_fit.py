@@ -150,7 +150,7 @@ def fit_motion(
     A = np.einsum("nij,njkc->nikc", inverse_px, design).reshape(n, 2, 2 * C)
     b = np.einsum("nij,nj->ni", inverse_px, xy - middle)
     size = np.sqrt(np.diag(errors))
-    weight = agreed_weights(s, xy, inverse_px / size[:, None, None], config.soft)
+    weight = agreed_weights(s[None], xy[None], (inverse_px / size[:, None, None])[None], config.soft)[0]
     stiff = prior.copy()
     if len(knots):
         # First without the jerks: a motion that can bend would follow a point that leaves the vehicle.

@@ -75,7 +75,7 @@ def fit_tracks(
     pull = prior * np.array([0.0, 0.0, 0.0, 0.0, common_acceleration]) * along[:, None]
     A, b = whiten @ design, (whiten @ xy[..., None])[..., 0]
     fixed = weight is not None
-    w = _agreed(s, xy, whiten) if weight is None else weight
+    w = agreed_weights(s, xy, whiten, _SOFT) if weight is None else weight
     for _ in range(1 if fixed else _ROBUST_PASSES):
         wA = A * w[..., None, None]
         normal = np.einsum("kmij,kmil->kjl", wA, A) + prior[:, :, None] * np.eye(5)
@@ -99,8 +99,3 @@ def track_scale(camera: RoadCamera, tracks: TrackNodes) -> FloatArray:
     way = camera.to_road(tracks.pixels[:, -1]) - camera.to_road(tracks.pixels[:, 0])
     size = np.stack([np.linalg.norm(J[:, 0], axis=1), np.abs(way[:, 1])], axis=1)
     return np.where(seen[:, None] & np.isfinite(size) & (size > 0.0), size, 1.0)
-
-
-def _agreed(s: FloatArray, xy: FloatArray, whiten: FloatArray) -> FloatArray:
-    rows = [agreed_weights(*one, _SOFT) for one in zip(s, xy, whiten, strict=True)]
-    return np.stack(rows) if rows else np.ones(s.shape)

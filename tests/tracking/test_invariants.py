@@ -127,7 +127,7 @@ def test_what_is_drawn_is_more_than_empty_tables(preset):
 
     @given(recording=recordings())
     @settings(
-        max_examples=100 if by_existence else 400, database=None, suppress_health_check=list(HealthCheck)
+        max_examples=100 if by_existence else 250, database=None, suppress_health_check=list(HealthCheck)
     )
     def count(recording):
         tracker = Tracker(CONFIGS[preset])
