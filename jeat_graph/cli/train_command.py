@@ -157,6 +157,9 @@ def _request(args: argparse.Namespace) -> TrainRequest:
     if out.suffix.lower() != ".onnx":
         raise ConfigError(f"--out: {args.out} must end in .onnx")
     tree = tree_of_changes(args.overrides)
+    net = {"kind": args.kind, "width": WIDTHS[args.net]}
+    if isinstance(tree.get("net"), dict):
+        net = tree.pop("net") | net
     given = {
         "crop_px": args.crop and list(args.crop),
         "batch": args.batch,
@@ -168,7 +171,7 @@ def _request(args: argparse.Namespace) -> TrainRequest:
     return TrainRequest(
         data=tuple(Path(path) for path in args.data),
         out=out,
-        net=NetSettings(kind=args.kind, width=WIDTHS[args.net]),
+        net=build(NetSettings, net, "net."),
         settings=build(TrainSettings, tree, ""),
         tested=tuple(Path(path) for path in args.test),
         pictures=Path(args.pictures) if args.pictures else None,

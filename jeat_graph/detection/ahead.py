@@ -1,8 +1,8 @@
-"""Lets the detectors of two cameras work at once: each stream of scans is made by a thread of its own.
+"""Lets the detectors of two cameras work at once, and files be read meanwhile: each by a thread of its own.
 
-What takes long in a detector (compiled loops, OpenCV, a network's engine) lets other threads run, so two
-streams take two cores. A thread works at most a few scans ahead, so memory does not grow with the files; the
-scans come in the order and with the values that they have without it.
+What takes long (compiled loops, OpenCV, a network's engine, unpacking) lets other threads run, so two
+streams take two cores. A thread works at most a few items ahead, so memory does not grow with the files; they
+come in the order and with the values that they have without it.
 """
 
 from __future__ import annotations
@@ -11,8 +11,9 @@ import contextvars
 import queue
 import threading
 from collections.abc import Generator, Iterator
+from typing import TypeVar
 
-from jeat_graph.data.detections import Scan
+_Item = TypeVar("_Item")
 
 #: Scans that a thread may be ahead.
 _MOST_AHEAD = 16
@@ -31,29 +32,30 @@ class _End:
         self.error = error
 
 
-def ahead(scans: Iterator[Scan]) -> Generator[Scan, None, None]:
-    """Yield scans that a thread makes; whoever stops asking stops it, too.
+def ahead(items: Iterator[_Item], most: int = _MOST_AHEAD) -> Generator[_Item, None, None]:
+    """Yield what a thread makes; whoever stops asking stops it, too.
 
     Args:
-        scans: made in the thread, and closed there.
+        items: made in the thread, and closed there.
+        most: how many it may be ahead.
 
     Raises:
-        Exception: whatever `scans` raises, at the same place.
+        Exception: whatever `items` raises, at the same place.
     """
-    ready: queue.Queue[Scan | _End] = queue.Queue(_MOST_AHEAD)
+    ready: queue.Queue[_Item | _End] = queue.Queue(most)
     stopped = threading.Event()
 
     def work() -> None:
         end = _End()
         try:
-            for scan in scans:
-                ready.put(scan)
+            for made in items:
+                ready.put(made)
                 if stopped.is_set():
                     return
         except BaseException as error:
             end = _End(error)
         finally:
-            close = getattr(scans, "close", None)  # a generator's: what it has open is closed here
+            close = getattr(items, "close", None)  # a generator's: what it has open is closed here
             if close is not None:
                 close()
         ready.put(end)

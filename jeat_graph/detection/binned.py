@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from jeat_graph.data.detections import Scan
@@ -12,6 +14,20 @@ from jeat_graph.detection.settings import EventSettings
 from jeat_graph.detection.windows import EventBins
 
 _US_PER_S = 1e6
+
+
+class Signal(NamedTuple):
+    """Events without noise.
+
+    Attributes:
+        events: what is left.
+        first_us: time of the first event with noise (µs).
+        last_us: time of the last one (µs).
+    """
+
+    events: EventArray
+    first_us: int
+    last_us: int
 
 
 class BinnedDetector:
@@ -43,6 +59,7 @@ class BinnedDetector:
         self._noise = NoiseFilter(size_px, settings.noise)
         self._rest = EventArray.empty()
         self._last_us: int | None = None
+        self._begun = False
         self._until_scan = 0
 
     def push(self, events: EventArray) -> list[Scan]:
@@ -54,18 +71,37 @@ class BinnedDetector:
         Raises:
             DataError: they begin before the last ones.
         """
+        return self.look(self.without_noise(events))
+
+    def without_noise(self, events: EventArray) -> Signal | None:
+        """Do the first half of `push`, which another thread may do ahead of `look`; arguments as `push`.
+
+        Returns:
+            What `look` takes; None of no events.
+
+        Raises:
+            DataError: they begin before the last ones.
+        """
         if not len(events):
-            return []
+            return None
         first_us, last_us = int(events.t_us[0]), int(events.t_us[-1])
-        if self._last_us is None:
-            self._begin(first_us)
-        elif first_us < self._last_us:
+        if self._last_us is not None and first_us < self._last_us:
             raise DataError(f"events begin at {first_us} µs, before the last ones at {self._last_us} µs")
         self._last_us = last_us
         signal = EventArray.trusted(events.t_us, events.x, events.y, events.polarity)
         if self._noise.settings.background or self._noise.settings.hot_pixels:
             signal = self._noise.keep(signal)
-        waiting = _joined(self._rest, signal)
+        return Signal(signal, first_us, last_us)
+
+    def look(self, signal: Signal | None) -> list[Scan]:
+        """Return the scans that are complete with the next events."""
+        if signal is None:
+            return []
+        events, first_us, last_us = signal
+        if not self._begun:
+            self._begun = True
+            self._begin(first_us)
+        waiting = _joined(self._rest, events)
         times = waiting.t_us
         scans: list[Scan] = []
         first = 0

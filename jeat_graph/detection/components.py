@@ -10,6 +10,9 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 
+#: Whole numbers of 32 bits: half of the memory that has to be gone through.
+Whole = npt.NDArray[np.int32]
+
 
 class Components(NamedTuple):
     """What was found.
@@ -33,16 +36,16 @@ class Marked(NamedTuple):
     """Marked pixels, row by row: few of a picture's, so that what is asked of them costs little.
 
     Attributes:
-        x: (P,) columns (px).
+        x: (P,) columns (px); all four are of 32 bits.
         y: (P,) rows (px).
         group: (P,) number of the group that each belongs to, from 1; 0 for none.
         weight: (P,) its mark.
     """
 
-    x: IntArray
-    y: IntArray
-    group: IntArray
-    weight: IntArray
+    x: Whole
+    y: Whole
+    group: Whole
+    weight: Whole
 
     def renumbered(self, number: IntArray) -> Marked:
         """Return the pixels of groups g with `number[g]` > 0, which is their new number."""
@@ -112,18 +115,27 @@ def weights(count: int, marked: Marked) -> FloatArray:
     return np.asarray(_weights(count, marked))
 
 
+# Neighbours in a row are mostly of one group: what is said of such a run is said once, for a number in memory
+# that is added to pixel by pixel waits for itself each time.
+
+
 @numba.njit(cache=True, nogil=True)
 def _weights(count: int, marked: Marked) -> Any:
     found = np.zeros(count + 1)
+    group, total = 0, np.int64(0)
     for p in range(len(marked.group)):
-        found[marked.group[p]] += marked.weight[p]
+        if marked.group[p] != group:
+            found[group] += total
+            group, total = marked.group[p], np.int64(0)
+        total += marked.weight[p]
+    found[group] += total
     return found[1:]
 
 
 @numba.njit(cache=True, nogil=True)
 def _renumbered(marked: Marked, number: IntArray) -> tuple[Any, Any, Any, Any]:
     """Column, row, new group and mark of the pixels whose group has a new number above 0."""
-    found = np.empty((4, len(marked.group)), dtype=np.int64)
+    found = np.empty((4, len(marked.group)), dtype=np.int32)
     k = 0
     for p in range(len(marked.group)):
         new = number[marked.group[p]]
@@ -138,9 +150,12 @@ def _renumbered(marked: Marked, number: IntArray) -> tuple[Any, Any, Any, Any]:
 def _gathered(places: IntArray, labels: Any, marks: Any) -> tuple[Any, Any, Any, Any]:
     """Column, row, group and mark (P,) of pixels by their number, row by row."""
     width = marks.shape[1]
-    found = np.empty((4, len(places)), dtype=np.int64)
+    found = np.empty((4, len(places)), dtype=np.int32)
+    row, begin = 0, 0
     for k in range(len(places)):
-        row, column = places[k] // width, places[k] % width
+        while places[k] >= begin + width:
+            row, begin = row + 1, begin + width
+        column = places[k] - begin
         found[0, k], found[1, k] = column, row
         found[2, k], found[3, k] = labels[row, column], marks[row, column]
     return found[0], found[1], found[2], found[3]
@@ -154,16 +169,25 @@ def _measure(count: int, marked: Marked) -> tuple[Any, Any, Any]:
     corners[:, 2:] = 0
     weight = np.zeros(count)
     pixels = np.zeros(count, dtype=np.int64)
-    for p in range(len(marked.x)):
-        k = marked.group[p] - 1
-        if marked.weight[p] > 0 and k >= 0:
-            column, row = marked.x[p], marked.y[p]
-            corners[k, 0] = min(corners[k, 0], column)
+    p, end = 0, len(marked.x)
+    while p < end:
+        k, row = marked.group[p] - 1, marked.y[p]
+        first, last, total, number = -1, -1, np.int64(0), 0
+        while p < end and marked.group[p] - 1 == k and marked.y[p] == row:
+            if marked.weight[p] > 0:
+                if first < 0:
+                    first = marked.x[p]
+                last = marked.x[p]
+                total += marked.weight[p]
+                number += 1
+            p += 1
+        if number and k >= 0:
+            corners[k, 0] = min(corners[k, 0], first)
             corners[k, 1] = min(corners[k, 1], row)
-            corners[k, 2] = max(corners[k, 2], column + 1)
+            corners[k, 2] = max(corners[k, 2], last + 1)
             corners[k, 3] = max(corners[k, 3], row + 1)
-            weight[k] += marked.weight[p]
-            pixels[k] += 1
+            weight[k] += total
+            pixels[k] += number
     return corners, weight, pixels
 
 
@@ -177,11 +201,18 @@ def _trim(marked: Marked, corners: Any, share: float) -> None:
         start[k + 1, 1] = start[k, 1] + max(corners[k, 3] - corners[k, 1], 0)
     columns = np.zeros(start[count, 0], dtype=np.int64)
     rows = np.zeros(start[count, 1], dtype=np.int64)
-    for p in range(len(marked.x)):
-        k = marked.group[p] - 1
-        if marked.weight[p] > 0 and k >= 0:
-            columns[start[k, 0] + marked.x[p] - corners[k, 0]] += 1
-            rows[start[k, 1] + marked.y[p] - corners[k, 1]] += 1
+    p, end = 0, len(marked.x)
+    while p < end:
+        k, row = marked.group[p] - 1, marked.y[p]
+        left = start[k, 0] - corners[k, 0] if k >= 0 else 0
+        number = 0
+        while p < end and marked.group[p] - 1 == k and marked.y[p] == row:
+            if marked.weight[p] > 0 and k >= 0:
+                columns[left + marked.x[p]] += 1
+                number += 1
+            p += 1
+        if number:
+            rows[start[k, 1] + row - corners[k, 1]] += number
     for k in range(count):
         for axis, filled in ((0, columns), (1, rows)):
             low, high = start[k, axis], start[k + 1, axis]

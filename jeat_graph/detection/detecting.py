@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,7 +16,7 @@ from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.data.progress import told
 from jeat_graph.detection.ahead import ahead
-from jeat_graph.detection.binned import BinnedDetector
+from jeat_graph.detection.binned import BinnedDetector, Signal
 from jeat_graph.detection.event_detector import EventDetector
 from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION, network_file
 from jeat_graph.detection.picture_detector import PictureDetector
@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 
 FRAMES_SENSOR, EVENTS_SENSOR, FUSED_SENSOR = "rgb", "evt", "fused"
 _US_PER_S = 1e6
+#: Pieces of a file of events that are read ahead.
+_PIECES_AHEAD = 2
+_Scans = Generator[Scan, None, None]
 
 
 @dataclass(frozen=True)
@@ -85,7 +88,7 @@ def detect_scans(
         DataError: a file cannot be read, or does not say what is needed.
     """
     with ExitStack() as stack:
-        streams = []
+        streams: list[_Scans] = []
         if request.detector_fused is not None:
             streams.append(_fused_scans(request, stack, say))
         elif request.frames is not None:
@@ -93,7 +96,9 @@ def detect_scans(
         if request.detector_fused is None and request.events is not None:
             streams.append(_event_scans(request, stack, say))
         if len(streams) > 1:
-            streams = [stack.enter_context(closing(ahead(stream))) for stream in streams]
+            streams = [ahead(stream) for stream in streams]
+        for stream in streams:
+            stack.enter_context(closing(stream))
         for scan in heapq.merge(*streams, key=lambda scan: scan.t):
             on_time(scan.t)
             yield scan
@@ -138,7 +143,7 @@ def _frames(request: DetectRequest, stack: ExitStack, say: Callable[[str], objec
     return source
 
 
-def _picture_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str], object]) -> Iterator[Scan]:
+def _picture_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str], object]) -> _Scans:
     source = _frames(request, stack, say)
     if request.detector_frames != MOTION:
         from jeat_graph.detection.models.pictures import ModelPictureDetector
@@ -164,7 +169,7 @@ def _prime(detector: PictureDetector, source: Any, request: DetectRequest) -> No
     detector.prime([source.frame(int(k)) for k in chosen])
 
 
-def _fused_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str], object]) -> Iterator[Scan]:
+def _fused_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str], object]) -> _Scans:
     from jeat_graph.detection.models.fused import FusedDetector
 
     assert request.detector_fused is not None
@@ -205,7 +210,7 @@ def _events(
     return reader, reader.size_px
 
 
-def _event_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str], object]) -> Iterator[Scan]:
+def _event_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str], object]) -> _Scans:
     reader, size_px = _events(request, stack, say)
     settings = request.settings
     detector: BinnedDetector
@@ -226,12 +231,19 @@ def _event_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str], 
 
 def _pushed(
     detector: BinnedDetector, reader: EventReader, request: DetectRequest, say: Callable[[str], object]
-) -> Iterator[Scan]:
+) -> _Scans:
     """Yield what a detector finds in the events, and say at their end what is wrong with the file."""
     later_us = reader.t_offset_us + round(request.events_later_s * _US_PER_S)
-    for piece in reader.pieces():
-        moved = EventArray.trusted(piece.t_us + later_us, piece.x, piece.y, piece.polarity)
-        yield from detector.push(moved)
+
+    def signals() -> Iterator[Signal | None]:
+        for piece in reader.pieces():
+            moved = EventArray.trusted(piece.t_us + later_us, piece.x, piece.y, piece.polarity)
+            yield detector.without_noise(moved)
+
+    # Reading and unpacking take as long as looking where events are many.
+    with closing(ahead(signals(), _PIECES_AHEAD)) as coming:
+        for signal in coming:
+            yield from detector.look(signal)
     yield from detector.finish()
     for note in reader.damage.notes():
         say(f"{request.events}: {note}")

@@ -12,7 +12,7 @@ import numba
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.detection.components import Marked
+from jeat_graph.detection.components import Marked, Whole
 
 # A box is found again where it overlaps its place by this (intersection over union).
 _SAME_IOU = 0.3
@@ -63,25 +63,22 @@ class CloudMemory:
         expected = self.expected()
         cloud = marked.group
         if len(expected) and len(cloud):
-            places = np.empty((len(cloud), 2))
-            places[:, 0], places[:, 1] = marked.x, marked.y
-            places += 0.5
-            cloud = self._assign(cloud, places, expected)
+            cloud = self._assign(marked, expected)
         there = np.bincount(cloud) > 0
-        return int(there.sum()), marked._replace(group=np.cumsum(there, dtype=np.int64)[cloud])
+        return int(there.sum()), marked._replace(group=np.cumsum(there, dtype=np.int32)[cloud])
 
-    def _assign(self, cloud: IntArray, places: FloatArray, expected: FloatArray) -> IntArray:
+    def _assign(self, marked: Marked, expected: FloatArray) -> Whole:
         """Name the cloud of each marked pixel (P,): as before, or a new name for each remembered box.
 
         Args:
-            cloud: (P,) name so far.
-            places: (P, 2) middle of each pixel (px).
+            marked: pixels; their clouds have the names so far.
             expected: (K, 4) where the remembered boxes should be.
         """
         old = self._age >= self._apart_steps
+        cloud = marked.group
         base = int(cloud.max()) + 1
-        share = _shares(cloud, places, expected)
-        near = _shares(cloud, places, _grown(expected, self._link_px))
+        both = np.concatenate([expected, _grown(expected, self._link_px)])
+        share, near = np.split(_shares(marked, both, base), 2, axis=1)
         touch = old & (share >= _TOUCHED)
         pieces: dict[int, list[int]] = {}
         new = cloud.copy()
@@ -90,20 +87,21 @@ class CloudMemory:
             touched = self._apart(np.flatnonzero(touch[m]))
             if len(touched) > 1:
                 rows = np.flatnonzero(cloud == m)
-                new[rows] = base + touched[_nearest(places[rows], expected[touched])]
+                places = np.column_stack([marked.x[rows], marked.y[rows]]).astype(np.float64) + 0.5
+                new[rows] = base + touched[_nearest(places, expected[touched])]
                 divided[m] = True
                 for k in touched.tolist():
                     pieces.setdefault(k, []).insert(0, base + k)
         fit = np.where(old & (near >= _INSIDE), share + near, -1.0)
         for m in np.flatnonzero(~divided & (fit.max(axis=1) > 0.0)).tolist():
             pieces.setdefault(int(fit[m].argmax()), []).append(m)
-        extents, sizes = _extents(new, places, base + len(expected))
+        extents, sizes = _extents(marked._replace(group=new), base + len(expected))
         table = np.arange(base + len(expected))
         for k, names in pieces.items():
             # A dark body fires at its ends only: pieces may be far apart, but within what it was.
             most_px = expected[k, 2:] + 2.0 * self._link_px
             _join(table, list(dict.fromkeys(names)), extents, sizes, most_px)
-        return np.asarray(table[new])
+        return np.asarray(table[new], dtype=np.int32)
 
     def remember(self, boxes: FloatArray) -> None:
         """Keep the boxes (M, 4) of this step for the next."""
@@ -173,43 +171,57 @@ def _join(
 
 
 @numba.njit(cache=True, nogil=True)
-def _extents(cloud: IntArray, places: FloatArray, names: int) -> tuple[Any, Any]:
+def _extents(marked: Marked, names: int) -> tuple[Any, Any]:
     """Left, top, right, bottom (names, 4) of the pixels of each cloud (px), and their number (names,)."""
     extents = np.empty((names, 4))
     extents[:, :2] = np.inf
     extents[:, 2:] = -np.inf
     sizes = np.zeros(names, dtype=np.int64)
-    for k in range(len(cloud)):
-        name = cloud[k]
-        sizes[name] += 1
-        for axis in range(2):
-            extents[name, axis] = min(extents[name, axis], places[k, axis] - 0.5)
-            extents[name, axis + 2] = max(extents[name, axis + 2], places[k, axis] + 0.5)
+    p, end = 0, len(marked.x)
+    while p < end:
+        # What lies together in a row is mostly of one cloud.
+        name, row, first = marked.group[p], marked.y[p], p
+        while p < end and marked.group[p] == name and marked.y[p] == row:
+            p += 1
+        sizes[name] += p - first
+        extents[name, 0] = min(extents[name, 0], marked.x[first])
+        extents[name, 1] = min(extents[name, 1], row)
+        extents[name, 2] = max(extents[name, 2], marked.x[p - 1] + 1)
+        extents[name, 3] = max(extents[name, 3], row + 1)
     return extents, sizes
 
 
-def _shares(cloud: IntArray, places: FloatArray, boxes: FloatArray) -> FloatArray:
-    """Share of each cloud's pixels that lie in each box (K, 4): rows by the name of the cloud."""
-    names = int(cloud.max()) + 1
-    inside, count = _count_inside(cloud, places, boxes, names)
+def _shares(marked: Marked, boxes: FloatArray, names: int) -> FloatArray:
+    """Share of each cloud's pixels whose middles lie in each box (K, 4): rows by the name of the cloud."""
+    inside, count = _count_inside(marked, boxes, names)
     return np.asarray(inside / np.maximum(count, 1)[:, None])
 
 
 @numba.njit(cache=True, nogil=True)
-def _count_inside(cloud: IntArray, places: FloatArray, boxes: FloatArray, names: int) -> tuple[Any, Any]:
-    """Pixels of each cloud in each box (names, K), and of each cloud (names,); places are row by row."""
+def _count_inside(marked: Marked, boxes: FloatArray, names: int) -> tuple[Any, Any]:
+    """Pixels of each cloud in each box (names, K), and of each cloud (names,); pixels come row by row."""
+    x, y, cloud = marked.x, marked.y, marked.group
     inside = np.zeros((names, len(boxes)), dtype=np.int64)
     count = np.zeros(names, dtype=np.int64)
-    for name in cloud:
-        count[name] += 1
-    # A pixel is not asked about boxes of other rows: most of them.
-    rows = places[:, 1].copy()
+    # Where each row begins: a box asks but few pixels of its own rows.
+    start = np.zeros(y[len(y) - 1] + 2, dtype=np.int64)
+    for p in range(len(cloud)):
+        count[cloud[p]] += 1
+        start[y[p] + 1] = p + 1
+    for row in range(1, len(start)):
+        start[row] = max(start[row], start[row - 1])
     for j in range(len(boxes)):
-        k = np.searchsorted(rows, boxes[j, 1])
-        while k < len(rows) and rows[k] - boxes[j, 1] <= boxes[j, 3]:
-            if 0.0 <= places[k, 0] - boxes[j, 0] <= boxes[j, 2]:
-                inside[cloud[k], j] += 1
-            k += 1
+        left, top, width, height = boxes[j]
+        row = max(int(np.floor(top - 0.5)), 0)
+        while row < len(start) - 1 and row + 0.5 - top <= height:
+            if row + 0.5 >= top:
+                k, end = start[row], start[row + 1]
+                k += np.searchsorted(x[k:end], left - 1.0)
+                while k < end and x[k] + 0.5 - left <= width:
+                    if x[k] + 0.5 - left >= 0.0:
+                        inside[cloud[k], j] += 1
+                    k += 1
+            row += 1
     return inside, count
 
 

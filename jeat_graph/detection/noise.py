@@ -20,6 +20,10 @@ from jeat_graph.data.events import EventArray
 
 _US_PER_S = 1e6
 _LONG_AGO = -(1 << 62)
+# Times of pixels are kept in 32 bits, from a beginning that follows: half of the memory, which is what the
+# filter waits for. A pixel that never fired did so longest ago.
+_NEVER = -(1 << 31)
+_MOST_LATER_US = 1 << 30
 _NEIGHBOURS = 8
 
 
@@ -33,6 +37,8 @@ class NoiseSettings(Section):
         "s",
         "an event stands alone if no pixel around it fired within this time before it; an edge of 100 px/s "
         "passes from pixel to pixel in 10 ms",
+        0.0,
+        1000.0,
         open_low=True,
     )
     hot_pixels: bool = flag(True, "whether pixels that fire all the time are left out")
@@ -68,13 +74,17 @@ class NoiseFilter:
         self.hot: BoolArray = np.zeros((height, width), dtype=bool)
         self.alone = 0
         # One pixel of margin, so that every pixel has eight around it.
-        self._last = np.full((height + 2, width + 2), _LONG_AGO, dtype=np.int64)
-        self._counts = np.zeros((height, width), dtype=np.int64)
+        self._last = np.full((height + 2, width + 2), _NEVER, dtype=np.int32)
+        self._begin_us = _LONG_AGO
+        self._counts = np.zeros((height, width), dtype=np.int32)
         self._period_end = _LONG_AGO
 
     def keep(self, events: EventArray) -> EventArray:
         """Return the events that are not noise."""
-        return events.take(np.flatnonzero(self.signal(events)))
+        rows = np.flatnonzero(self.signal(events))
+        if events.by_motion is not None:
+            return events.take(rows)
+        return EventArray.trusted(events.t_us[rows], events.x[rows], events.y[rows], events.polarity[rows])
 
     def signal(self, events: EventArray) -> BoolArray:
         """Return which events (N,) are not noise."""
@@ -86,7 +96,9 @@ class NoiseFilter:
             if events.t_us[start] >= self._period_end:
                 self._look_for_hot(settings.period_s if self._period_end > _LONG_AGO else 0.0)
                 self._period_end = int(events.t_us[start]) + period_us
-            end = int(np.searchsorted(events.t_us, self._period_end))
+            self._follow(int(events.t_us[start]))
+            last_us = min(self._period_end, self._begin_us + 2 * _MOST_LATER_US)
+            end = int(np.searchsorted(events.t_us, last_us))
             rows = slice(start, max(end, start + 1))
             alone = _judge(
                 events.t_us[rows],
@@ -95,12 +107,20 @@ class NoiseFilter:
                 self._last,
                 self._counts,
                 self.hot,
-                (round(settings.support_s * _US_PER_S), settings.background),
+                (self._begin_us, round(settings.support_s * _US_PER_S), settings.background),
                 good[rows],
             )
             self.alone += int(alone)
             start = rows.stop
         return good
+
+    def _follow(self, now_us: int) -> None:
+        """Let the beginning of the pixels' times follow, so that they fit in 32 bits."""
+        later_us = now_us - self._begin_us
+        if later_us > _MOST_LATER_US:
+            moved = np.where(self._last == _NEVER, _NEVER, self._last.astype(np.int64) - later_us)
+            self._last = np.maximum(moved, _NEVER).astype(np.int32)
+            self._begin_us = now_us
 
     def _look_for_hot(self, period_s: float) -> None:
         if self.settings.hot_pixels and period_s > 0.0:
@@ -121,24 +141,25 @@ def _judge(
     t: IntArray,
     x: npt.NDArray[np.uint16],
     y: npt.NDArray[np.uint16],
-    last: npt.NDArray[np.int64],
-    counts: npt.NDArray[np.int64],
+    last: npt.NDArray[np.int32],
+    counts: npt.NDArray[np.int32],
     hot: BoolArray,
-    settings: tuple[int, bool],
+    settings: tuple[int, int, bool],
     good: BoolArray,
 ) -> int:
     """Mark the events that are no noise in `good`, keep the last times; return how many stood alone."""
-    support_us, background = settings
+    begin_us, support_us, background = settings
     height, width = counts.shape
     alone = 0
     for k in range(len(t)):
         column, row = np.int64(x[k]), np.int64(y[k])
         if column >= width or row >= height:
             continue
-        counts[row, column] += 1
+        counts[row, column] += np.int32(1)
         if hot[row, column]:
             continue
-        since = t[k] - support_us
+        now = t[k] - begin_us
+        since = np.int32(max(now - support_us, _NEVER + 1))
         # Most events have company; the first that is found will do.
         near = (
             last[row + 1, column] >= since
@@ -150,7 +171,7 @@ def _judge(
             or last[row + 2, column] >= since
             or last[row + 2, column + 2] >= since
         )
-        last[row + 1, column + 1] = t[k]
+        last[row + 1, column + 1] = now
         if not near:
             alone += 1
         good[k] = near or not background

@@ -9,6 +9,8 @@ Source: Gehrig and Scaramuzza, "Recurrent Vision Transformers for Object Detecti
 
 from __future__ import annotations
 
+from typing import Any
+
 import numba
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +18,7 @@ import numpy.typing as npt
 from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.events import EventArray
+from jeat_graph.detection.components import Whole
 
 _US_PER_S = 1e6
 _MOST = 255
@@ -95,7 +98,7 @@ class EventBins:
             stacked = stacked.swapaxes(0, 1)
         return stacked.reshape(-1, *stacked.shape[2:])
 
-    def recent(self, bins: int, y: IntArray, x: IntArray) -> IntArray:
+    def recent(self, bins: int, y: Whole, x: Whole) -> Whole:
         """Return the events (P,) of pixels in the newest `bins`.
 
         Args:
@@ -104,7 +107,7 @@ class EventBins:
             x: (P,) columns (px).
         """
         slots = (self._newest - np.arange(bins)) % len(self._ring)
-        return _summed(self._ring, slots, y, x)
+        return np.asarray(_summed(self._ring, slots, y, x))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -153,9 +156,11 @@ def _clear(
 
 
 @numba.njit(cache=True, nogil=True)
-def _summed(ring: npt.NDArray[np.uint8], slots: IntArray, y: IntArray, x: IntArray) -> npt.NDArray[np.int64]:
-    out = np.zeros(len(x), dtype=np.int64)
-    for slot in slots:
-        for p in range(len(x)):
-            out[p] += np.int64(ring[slot, 0, y[p], x[p]]) + np.int64(ring[slot, 1, y[p], x[p]])
+def _summed(ring: npt.NDArray[np.uint8], slots: IntArray, y: Whole, x: Whole) -> Any:
+    out = np.empty(len(x), dtype=np.int32)
+    for p in range(len(x)):
+        total = np.int32(0)
+        for slot in slots:
+            total += np.int32(ring[slot, 0, y[p], x[p]]) + np.int32(ring[slot, 1, y[p], x[p]])
+        out[p] = total
     return out

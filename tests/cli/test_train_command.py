@@ -44,6 +44,10 @@ def test_without_pytorch_the_extra_is_named(tmp_path, capsys, monkeypatch):
             "did you mean events.drop_share",
         ),
         (
+            ["events", "{dir}", "--out", "{dir}/n.onnx", "--set", "net.memory_keep=2"],
+            "net.memory_keep: 2.0 is not in",
+        ),
+        (
             ["events", "{dir}", "--out", "{dir}/n.onnx", "--set", "learning_rate"],
             "must read section.key=value",
         ),

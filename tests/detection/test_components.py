@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from jeat_graph.detection.components import linked, measured, weights
+from jeat_graph.detection.components import Marked, linked, measured, weights
 from jeat_graph.detection.memory import _shares
 
 
@@ -48,5 +48,6 @@ def test_pixels_in_boxes_are_counted_one_by_one():
     for name, place in zip(cloud, places, strict=True):
         away = place - boxes[:, :2]
         expected[name] += ((away >= 0.0) & (away <= boxes[:, 2:])).all(axis=1)
-    share = _shares(cloud, places, boxes)
+    marked = Marked(*(column.astype(np.int32) for column in (x, y, cloud, np.ones(len(x)))))
+    share = _shares(marked, boxes, 5)
     np.testing.assert_allclose(share, expected / np.bincount(cloud)[:, None])

@@ -56,6 +56,17 @@ def test_the_pieces_do_not_show():
         np.testing.assert_array_equal(one.scores, other.scores)
 
 
+def test_noise_may_be_left_out_ahead():
+    events = events_of([CAR], 0.5, noise_hz_px=0.1)
+    ahead, found = EventDetector(SIZE), []
+    signals = [ahead.without_noise(events.take(rows)) for rows in np.array_split(np.arange(len(events)), 20)]
+    for signal in [*signals, ahead.without_noise(events.take(slice(0)))]:
+        found += ahead.look(signal)
+    for one, other in zip(found + ahead.finish(), scans_of(events), strict=True):
+        assert one.t == other.t
+        np.testing.assert_array_equal(one.boxes, other.boxes)
+
+
 def test_noise_alone_gives_scans_that_found_nothing():
     scans = scans_of(events_of([], 1.0, noise_hz_px=0.5))
     assert len(scans) > 40

@@ -43,6 +43,20 @@ def test_events_that_stand_alone_are_those_of_a_brute_force_search():
     assert noise.alone == 600 - signal.sum()
 
 
+@pytest.mark.parametrize("gap_us", [1 << 29, 1 << 31, 1 << 40])
+@pytest.mark.parametrize("support_s", [0.01, 1000.0])
+def test_times_of_hours_are_told_apart_as_those_of_seconds(gap_us, support_s):
+    rng = np.random.default_rng(1)
+    rows = [
+        (k * gap_us + int(rng.integers(60_000)), int(rng.integers(40)), int(rng.integers(30)))
+        for k in range(5)
+        for _ in range(60)
+    ]
+    found = events(rows)
+    noise = NoiseFilter(SIZE, NoiseSettings(support_s=support_s, hot_pixels=False))
+    assert noise.signal(found).tolist() == brute_force(found, round(support_s * 1e6))
+
+
 def test_a_hot_pixel_is_found_and_a_busy_edge_is_not():
     hot = [(t, 5, 5) for t in range(0, 3_000_000, 10_000)]
     flicker = [
