@@ -10,11 +10,15 @@ import numpy as np
 
 from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config, InputConfig, SensorConfig
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.rates import median_rate_hz
 
 # A clock that differs more than this from the declared one is another clock.
 _SAME_RATE = 1.1
+# A box tells how far the picture reaches if so many boxes, itself among them, reach at least half as far.
+# Of few boxes none is taken for wild.
+_NEAR, _COMPANY, _COMPANY_SHARE, _FEW = 0.5, 3, 5e-4, 10
 # Fewer scans do not tell a clock.
 LEAST_SCANS = 3
 
@@ -44,11 +48,20 @@ def fit_input(config: Config, detections: Detections) -> tuple[Config, list[str]
 
 def fit_picture(config: Config, recordings: Sequence[Detections]) -> Config:
     """Let the picture reach as far as the boxes of some recordings do (whole px)."""
-    reach = [(d.boxes[:, :2] + d.boxes[:, 2:]).max(axis=0) for d in recordings if len(d)]
+    reach = [d.boxes[:, :2] + d.boxes[:, 2:] for d in recordings if len(d)]
     if not reach:
         return config
-    width, height = (max(math.ceil(v), 1) for v in np.max(reach, axis=0))
+    width, height = (max(math.ceil(_farthest(v)), 1) for v in np.concatenate(reach).T)
     return as_config(config, (width, height))
+
+
+def _farthest(reach: FloatArray) -> float:
+    """How far boxes reach (N,), but for a few wild ones: those that hardly any other comes near."""
+    reach = np.sort(reach)
+    if len(reach) < _FEW:
+        return float(reach[-1])
+    near = len(reach) - np.searchsorted(reach, reach - (1.0 - _NEAR) * np.abs(reach))
+    return float(reach[near >= max(_COMPANY, _COMPANY_SHARE * len(reach))][-1])
 
 
 def _declare_sensors(config: Config, detections: Detections) -> tuple[Config, list[str]]:

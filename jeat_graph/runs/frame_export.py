@@ -9,7 +9,7 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.eval.frames import Kind
-from jeat_graph.eval.resampling import interpolate_to, predict_to
+from jeat_graph.eval.resampling import TIME_TOLERANCE_S, interpolate_to, predict_to
 
 
 def at_frames(table: Trajectories, kind: Kind, instants: FloatArray, rate_hz: float) -> Trajectories:
@@ -27,7 +27,9 @@ def at_frames(table: Trajectories, kind: Kind, instants: FloatArray, rate_hz: fl
     """
     if not len(instants) or not len(table):
         return table.take(np.zeros(0, dtype=np.int64))
-    first, last = np.ceil(instants[0] * rate_hz), np.floor((instants[-1] + 0.5 / rate_hz) * rate_hz)
+    # A frame's time times the rate may come out above its number by a rounding.
+    first = np.ceil((instants[0] - TIME_TOLERANCE_S) * rate_hz)
+    last = np.floor((instants[-1] + 0.5 / rate_hz) * rate_hz)
     times = np.arange(first, last + 1) / rate_hz
     at = predict_to(table, times, instants=instants) if kind == "causal" else interpolate_to(table, times)
     return dataclasses.replace(

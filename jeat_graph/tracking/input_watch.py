@@ -66,11 +66,18 @@ class InputWatch:
         self._count = 0
         self._opinion_at = FIRST_BOXES
         self._times: dict[str, list[float]] = {}
+        self._newest: dict[str, float] = {}
         self._said: set[str] = set()
+        self._ended = False
 
     def look(self, batch: Sequence[Scan]) -> None:
-        """Take notice of the scans of one time."""
+        """Take notice of the scans of one time; those that come again after a late one count once."""
+        if self._ended:
+            return
         for scan in batch:
+            if scan.t <= self._newest.get(scan.sensor, -np.inf):
+                continue
+            self._newest[scan.sensor] = scan.t
             times = self._times.setdefault(scan.sensor, [])
             if len(times) < STEP_SCANS:
                 times.append(scan.t)
@@ -84,6 +91,10 @@ class InputWatch:
             if self._opinion_at == LAST_BOXES:
                 self._boxes = []
             self._opinion_at = LAST_BOXES
+
+    def end(self) -> None:
+        """Look at nothing any more: for a tracker that goes on, whose first scans were looked at."""
+        self._ended = True
 
     def _judge_step(self, sensor: str, times: FloatArray) -> None:
         step = float(np.median(np.diff(times)))

@@ -67,4 +67,6 @@ class SavedTracks(SmoothedTracks):
         tracker = cls(without, diagnostics=state["diagnostics"])
         tracker.config, tracker._smoothers = config, state["smoothing"]
         tracker.restore(state["now"])
+        if state["now"].t is not None:
+            tracker._watch.end()
         return tracker

@@ -43,6 +43,13 @@ def test_there_is_no_frame_before_the_first_instant():
     assert at_frames(uniform_motion(INSTANTS), "causal", INSTANTS, RATE_HZ).t[0] == pytest.approx(0.05)
 
 
+@pytest.mark.parametrize("rate", [24.0, 29.97, 31.0, 60.0])
+def test_a_frame_at_the_very_first_instant_comes_out(rate):
+    for k in range(1, 200):
+        instants = np.arange(k, k + 4) / rate
+        assert at_frames(uniform_motion(instants), "causal", instants, rate).t[0] == instants[0]
+
+
 def test_no_rows_give_no_rows():
     empty = Trajectories.empty(("rgb",))
     assert len(at_frames(empty, "causal", INSTANTS, RATE_HZ)) == 0

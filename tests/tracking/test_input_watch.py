@@ -108,3 +108,27 @@ def test_a_warning_that_is_made_an_error_leaves_the_tracker_as_it_was():
                 raised = k
     assert raised == STEP_SCANS - 1
     assert tracker.time == 550.0
+
+
+def test_scans_that_are_taken_again_after_a_late_one_are_looked_at_once():
+    watch, box = InputWatch(load_config("default")), np.array([[300.0, 200.0, 60.0, 40.0]])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for k in range(3):
+            for j in range(k + 1):
+                watch.look([Scan(1e3 * j, "rgb", box, np.array([0.9]))])
+    assert watch._times == {"rgb": [0.0, 1e3, 2e3]}
+
+
+def test_a_tracker_that_goes_on_after_a_restart_does_not_warn_again(tmp_path):
+    far = np.array([[2000.0, 200.0, 60.0, 40.0]] * 10)
+    tracker = Tracker("default")
+    tracker.step((0.0, "rgb", far, np.full(10, 0.9)))
+    with pytest.warns(InputWarning, match="outside the picture"):
+        tracker.step((0.05, "rgb", far, np.full(10, 0.9)))
+    tracker.save(tmp_path / "state.npz")
+    loaded = Tracker.load(tmp_path / "state.npz")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for k in range(2, 40):
+            loaded.step((0.05 * k, "rgb", far, np.full(10, 0.9)))
