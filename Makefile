@@ -1,7 +1,7 @@
 # Every target does its own set-up in .venv and needs only make and Python 3.11 or later.
 #
 #   make demo    from raw pictures and events to tracks on a film, and a longer simulation judged (in demo/)
-#   make test    run all tests, those of time and memory by themselves
+#   make test    run all tests, those of time by themselves
 #   make test-portable   run the numerical tests with other kernels, in random order (SEED=... repeats one)
 #   make licences   list the licences of everything installed with the package
 #   make fuzz    the long form of the tests that damage files, streams and processes (an hour)
@@ -46,7 +46,7 @@ clip: $(VENV)/.run
 test: $(VENV)/.test $(VENV)/.compiled
 	@echo "make: running the tests"
 	@$(BIN)/python -m pytest -p no:randomly -n 2 --dist worksteal
-	@$(BIN)/python -m pytest -p no:randomly -n 0 tests/performance
+	@$(BIN)/python -m pytest -p no:randomly -n 0 tests/performance/test_time.py
 
 test-portable: $(VENV)/.test $(VENV)/.compiled
 	@rm -rf $(VENV)/numba-generic

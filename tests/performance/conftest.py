@@ -1,7 +1,7 @@
-"""Time and memory, measured where nothing else of ours runs beside them.
+"""Time and memory, measured where nothing else of ours disturbs them.
 
-Parallel runs (`pytest -n 2`) leave this folder out; `make test` runs it by itself afterwards. Memory is read
-in a process of its own, in which no other test has left anything. Time is that of the processor, always
+Memory is read in a process of its own, in which no other test has left anything. Parallel runs (`pytest -n 2`)
+leave time out; `make test` takes it by itself afterwards. Time is that of the processor, always
 compared with something measured in the same run, and of several turns the best counts: other work on the
 machine only ever adds.
 """
@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-collect_ignore_glob = ["test_*.py"] if "PYTEST_XDIST_WORKER" in os.environ else []
+collect_ignore_glob = ["test_time.py"] if "PYTEST_XDIST_WORKER" in os.environ else []
 
 
 @pytest.fixture

@@ -13,16 +13,6 @@ def test_minutes_of_100_hz_input_leave_nothing_behind(measure, preset):
     assert found["memory"][-1] - found["memory"][0] < GAIN_MIB  # over 20,000 steps
 
 
-def test_a_vehicle_that_stays_for_minutes_costs_no_more_at_its_end(measure):
-    found = measure("long_track")
-    assert found["born"] == 1
-    assert found["rebuilds"] == found["fallbacks"] == 0
-    memory = found["memory"]
-    assert memory[-1] - memory[len(memory) // 4] < GAIN_MIB  # over 18,000 steps
-    # A vehicle of 4 to 5 minutes against one of half a minute to one and a half.
-    assert found["late"] < 1.5 * found["early"]
-
-
 def test_many_vehicles_that_come_and_go_leave_nothing_behind(measure):
     found = measure("short_tracks")
     assert found["tracks"] == 150

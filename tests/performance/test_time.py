@@ -188,3 +188,13 @@ def test_boxes_are_read_about_as_fast_as_pandas_reads_their_columns(tmp_path, le
         until=lambda coco, tree: coco < 1.2 * tree,
     )
     assert coco < 1.2 * tree  # .45 measured; three times where entries are looked at one by one
+
+
+def test_a_vehicle_that_stays_for_minutes_costs_no_more_at_its_end(measure):
+    found = measure("long_track")
+    assert found["born"] == 1
+    assert found["rebuilds"] == found["fallbacks"] == 0
+    memory = found["memory"]
+    assert memory[-1] - memory[len(memory) // 4] < 0.5  # over 18,000 steps
+    # A vehicle of 4 to 5 minutes against one of half a minute to one and a half.
+    assert found["late"] < 1.5 * found["early"]
