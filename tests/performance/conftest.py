@@ -1,9 +1,8 @@
 """Time and memory, measured where nothing else of ours disturbs them.
 
-Memory is read in a process of its own, in which no other test has left anything. Parallel runs (`pytest -n 2`)
-leave time out; `make test` takes it by itself afterwards. Time is that of the processor, always
-compared with something measured in the same run, and of several turns the best counts: other work on the
-machine only ever adds.
+Memory is read in a process of its own, in which no other test has left anything. Parallel runs leave time
+out; `make test` takes it by itself afterwards. Time is that of the processor, always compared with something
+measured in the same run, and of several turns the best counts: other work on the machine only ever adds.
 """
 
 import json
