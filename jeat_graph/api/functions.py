@@ -197,7 +197,7 @@ def calibrate(
     from jeat_graph.runs.latency import at_measurement
 
     recordings = [d if isinstance(d, Detections) else read_detections(d) for d in _as_list(detections)]
-    start = fit_input(as_config(base, image), Detections.concatenate(recordings))[0]
+    start = fit_input(as_config(base, image), *recordings)[0]
     recordings = [at_measurement(one, start) for one in recordings]
     if truth is None:
         return calibrate_without_truth(recordings, start).config

@@ -58,7 +58,7 @@ def configs_for(row: OursOnSet, one: RealSet) -> list[Config]:
     if row.how == DEFAULT:
         fitted = [fit_input(base, detections)[0] for detections in seen]
         return [_without_memory(config) for config in fitted] if row.white else fitted
-    whole = fit_input(base, Detections.concatenate(seen))[0]
+    whole = fit_input(base, *seen)[0]
     halves = [_calibrated(row, one, half, seen, whole) for half in range(2)]
     return [halves[k % 2] for k in range(len(seen))]
 

@@ -29,7 +29,6 @@ class SensorMatches:
         scans: number of scans judged.
         score: (D,) score of each judged detection.
         correct: (D,) whether it is of a vehicle.
-        run: (D,) for false ones, how many scans in a row, this one included, had a false box at this place.
         residual: (C, 4) of the correct ones: centre errors over the true width and height, ln of the ratios
             of width and height.
         side: (C, 2) true width and height (px).
@@ -44,7 +43,6 @@ class SensorMatches:
     scans: int
     score: FloatArray
     correct: BoolArray
-    run: IntArray
     residual: FloatArray
     side: FloatArray
     key: IntArray
@@ -105,7 +103,6 @@ def match_sensor(detections: Detections, truth: GroundTruth, sensor: str, sequen
     code = detections.sensors.index(sensor) if sensor in detections.sensors else -1
     chosen = np.flatnonzero(detections.scan_sensor == code)
     columns: dict[str, list[Any]] = {f.name: [] for f in fields(SensorMatches)[1:]}
-    previous_false: tuple[FloatArray, IntArray] = (np.zeros((0, 4)), np.zeros(0, dtype=np.int64))
     scans = 0
     for k in chosen:
         scan = detections.scan(int(k))
@@ -127,14 +124,8 @@ def match_sensor(detections: Detections, truth: GroundTruth, sensor: str, sequen
         found, true = scan.boxes[good], boxes[g]
         seen = np.zeros(len(boxes), dtype=bool)
         seen[g] = True
-        false = scan.boxes[judged & ~hit]
-        run = _false_runs(false, previous_false)
-        previous_false = (false, run)
-        all_runs = np.zeros(len(scan), dtype=np.int64)
-        all_runs[judged & ~hit] = run
         columns["score"].append(scan.scores[judged])
         columns["correct"].append(hit[judged])
-        columns["run"].append(all_runs[judged])
         centre = found[:, :2] + 0.5 * found[:, 2:] - true[:, :2] - 0.5 * true[:, 2:]
         columns["residual"].append(np.hstack([centre / true[:, 2:], np.log(found[:, 2:] / true[:, 2:])]))
         columns["side"].append(true[:, 2:])
@@ -178,9 +169,8 @@ def _truth_between(
     ignored = truth.ignore[a[ia]] | truth.ignore[b[ib]]
     move = truth.boxes[b[ib]] - truth.boxes[a[ia]]
     speed = np.hypot(*(move[:, :2] + 0.5 * move[:, 2:]).T) / span
-    alone = np.setdiff1d(np.arange(len(a)), ia)
-    extra = a[alone]
-    # Present in one frame only: it may or may not be there at `t`, so it is ignored.
+    # Present in one frame only, it enters or leaves between them: it may be there at `t`, so it is ignored.
+    extra = np.concatenate([np.delete(a, ia), np.delete(b, ib)])
     boxes = np.vstack([boxes, truth.boxes[extra]])
     ids = np.concatenate([ids, truth.object_id[extra]])
     ignored = np.concatenate([ignored, np.ones(len(extra), dtype=bool)])
@@ -192,13 +182,3 @@ def _speed(truth: GroundTruth, rows: IntArray) -> FloatArray:
     if truth.motion is None:
         return np.full(len(rows), np.nan)
     return np.asarray(np.hypot(truth.motion[rows, 2], truth.motion[rows, 3]))
-
-
-def _false_runs(false: FloatArray, previous: tuple[FloatArray, IntArray]) -> IntArray:
-    """Length of the run of false boxes at one place that each false box of this scan continues (F,)."""
-    run = np.ones(len(false), dtype=np.int64)
-    boxes, length = previous
-    if len(false) and len(boxes):
-        partner = match(pairwise_iou(boxes, false), 0.3)
-        run[partner >= 0] = length[partner[partner >= 0]] + 1
-    return run

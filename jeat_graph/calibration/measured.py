@@ -13,6 +13,7 @@ from jeat_graph.calibration.matches import SensorMatches
 from jeat_graph.config.kernel_form import error_states
 from jeat_graph.config.schema import SensorConfig
 from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.filters.noise import base_variance
 
 # Motion shows in samples this far apart. The errors of a size, which the filter takes for white, persist over
 # neighbouring scans: taken at every scan of a fast sensor they would pass for growth.
@@ -63,8 +64,8 @@ def measured_tracks(
     box = np.concatenate([m.box for m, _ in parts])
     rows = [len(m.t) for m, _ in parts]
     bias = np.repeat([s.bias for _, s in parts], rows, axis=0)
+    sigma, rho_size = np.repeat([(s.sigma_px, s.rho_size) for _, s in parts], rows, axis=0).T
     rho = np.repeat([(s.rho_x, s.rho_y) for _, s in parts], rows, axis=0)
-    sigma = np.repeat([s.sigma_px for _, s in parts], rows)
     share = np.repeat([s.correlated_share for _, s in parts], rows)
     error, correlation_time = error_states([s for _, s in parts])
     log_sigma = np.repeat([(s.sigma_log_width, s.sigma_log_height) for _, s in parts], rows, axis=0)
@@ -72,7 +73,9 @@ def measured_tracks(
     change = np.any(np.diff(key[order], axis=0) != 0, axis=1)
     start = np.concatenate(([0], np.flatnonzero(change) + 1, [len(order)])).astype(np.int64)
     side = box[:, 2:]
-    variance = sigma[:, None] ** 2 + (rho * side) ** 2
+    size = np.sqrt(side.prod(axis=1))
+    of_axis = np.vectorize(base_variance, otypes=[float])
+    variance = of_axis(sigma[:, None], rho, side, rho_size[:, None], size[:, None])
 
     def sort(column: npt.NDArray[Any]) -> npt.NDArray[Any]:
         return np.ascontiguousarray(column[order])
@@ -84,7 +87,7 @@ def measured_tracks(
         coloured_std=sort(np.sqrt(share[:, None] * variance)),
         error=sort(np.repeat(error, rows)),
         correlation_time=correlation_time,
-        side=sort(np.sqrt(side.prod(axis=1))),
+        side=sort(size),
         start=start,
         log_size=sort(np.log(side) - bias[:, 2:]),
         log_size_var=sort(log_sigma**2),

@@ -18,7 +18,8 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import DataError
 
 _CENTRE, _SIZE, _BIRTHS = "noise and motion", "noise and growth of the size", "births"
-_SENSOR_PARTS = {
+#: Estimates of a sensor that are kept, or go back to the base's, together.
+SENSOR_PARTS = {
     _CENTRE: (
         "sigma_px",
         "rho_x",
@@ -32,7 +33,7 @@ _SENSOR_PARTS = {
     "reliability": ("p_detect", "clutter_per_scan", "precision", "score_precision", "blind_speed"),
 }
 #: The parts, in the order in which they are tried.
-PARTS = (*_SENSOR_PARTS, _BIRTHS)
+PARTS = (*SENSOR_PARTS, _BIRTHS)
 # A part goes only where the base does better by more than this (per cent): less is chance.
 _LEAST_GAIN = 0.2
 
@@ -68,7 +69,7 @@ def with_parts(measured: MatchedSensors, parts: Sequence[str]) -> Config:
     if base is None:
         raise ValueError("there is no base to take parts of")
     sensors = dict(measured.sensors)
-    for part, names in _SENSOR_PARTS.items():
+    for part, names in SENSOR_PARTS.items():
         if part not in parts:
             sensors = {
                 name: replace(s, **{f: getattr(base.sensors[name], f) for f in names})

@@ -68,7 +68,7 @@ def calibrate_with_truth(
     Raises:
         DataError: too little that matches.
     """
-    base = _declared(base, [detections for detections, _ in recordings])
+    base = fit_input(base, *(detections for detections, _ in recordings))[0]
     pairs: list[Recording] = list(recordings)
     lags: list[Lag] = []
     clocks = base
@@ -108,7 +108,7 @@ def calibrate_without_truth(recordings: Sequence[Detections], base: Config) -> C
     """
     if not any(len(detections) for detections in recordings):
         raise DataError("the recordings hold no detection")
-    base = _declared(base, recordings)
+    base = fit_input(base, *recordings)[0]
     lags: list[Lag] = []
     clocks, seen = base, list(recordings)
     for _ in told(range(_ROUNDS)):
@@ -126,10 +126,6 @@ def calibrate_without_truth(recordings: Sequence[Detections], base: Config) -> C
     association = replace(base.association, priority=())
     config = replace(_on_time(base), association=association, input=InputConfig())
     return Calibration(_with_latencies(config, clocks), tuple(lags))
-
-
-def _declared(base: Config, recordings: Sequence[Detections]) -> Config:
-    return fit_input(base, Detections.concatenate(list(recordings)))[0]
 
 
 def _lags_with_truth(recordings: Sequence[Recording], base: Config) -> list[Lag]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.optimize import isotonic_regression, minimize, minimize_scalar
 
@@ -17,20 +19,22 @@ _MAX_KNOTS = 12
 _IN_VIEW = 0.9
 
 
-def calibrate_sensor(matches: SensorMatches, rate_hz: float) -> SensorConfig:
-    """Estimate all that the configuration says of one sensor.
+def calibrate_sensor(matches: SensorMatches, known: SensorConfig) -> SensorConfig:
+    """Estimate what matched detections tell of one sensor.
 
     Args:
-        matches: its detections beside the truth.
-        rate_hz: its rate (Hz).
+        matches: its detections beside the truth; of the correct ones those that the edge cuts are left out.
+        known: its rate, and what detections cannot tell: all that is not estimated stays as it is here.
 
     Raises:
-        DataError: fewer than 20 detections of vehicles.
+        DataError: fewer than 20 detections of vehicles, or of whole ones.
     """
-    if int(matches.correct.sum()) < _MIN_PAIRS:
-        raise DataError(
-            f"only {int(matches.correct.sum())} detections match the truth; at least {_MIN_PAIRS} are needed"
-        )
+    correct, whole = int(matches.correct.sum()), len(matches.residual)
+    if whole < _MIN_PAIRS:
+        found = f"{correct} detections match the truth"
+        if correct >= _MIN_PAIRS:
+            found = f"{whole} of the {found.replace('match', 'that match')} are not cut by the picture's edge"
+        raise DataError(f"only {found}; at least {_MIN_PAIRS} are needed")
     bias = np.median(matches.residual, axis=0)
     centred = matches.residual - bias
     sigma_x, rho_x = fit_noise(centred[:, 0] * matches.side[:, 0], matches.side[:, 0])
@@ -45,13 +49,15 @@ def calibrate_sensor(matches: SensorMatches, rate_hz: float) -> SensorConfig:
     spread = np.hypot(sigma, np.array([rho_x, rho_y]) * matches.side)
     share, memory = fit_memory(centred[:, :2] * matches.side / spread, matches.key, matches.t)
     p_detect, blind = fit_detection(matches.seen, matches.speed, matches.visible)
-    precision = np.clip((matches.correct.sum() + 0.5) / (len(matches.correct) + 1.0), 0.001, 0.999)
+    precision = np.clip((correct + 0.5) / (len(matches.correct) + 1.0), 0.001, 0.999)
     false = ~matches.correct
-    return SensorConfig(
-        rate_hz=rate_hz,
+    return replace(
+        known,
         sigma_px=sigma,
         rho_x=rho_x,
         rho_y=rho_y,
+        # What goes with sqrt(w h) is in the parts that go with the sides.
+        rho_size=0.0,
         correlated_share=share,
         memory_s=memory,
         sigma_log_width=float(max(np.sqrt(np.mean(centred[:, 2] ** 2)), 0.005)),

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from jeat_graph.calibration.matches import SensorMatches, match_sensor
 from jeat_graph.calibration.measured import measured_tracks
 from jeat_graph.calibration.motion import fit_motion, fit_size
-from jeat_graph.calibration.rates import scan_rate
 from jeat_graph.calibration.sensor import calibrate_sensor
 from jeat_graph.config.schema import BirthConfig, Config, ImageConfig, InputConfig, SensorConfig
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.progress import told
 from jeat_graph.data.trajectories import GroundTruth
+from jeat_graph.runs.declaring import scan_rate_hz, undeclared_sensor
 
 Recording = tuple[Detections, GroundTruth]
 
@@ -53,8 +52,9 @@ def measure_sensors(recordings: Sequence[Recording], base: Config | None = None)
             if name in detections.sensors
         ]
         matches[name] = SensorMatches.pool(parts).only_whole(ImageConfig() if base is None else base.image)
-        found = calibrate_sensor(matches[name], scan_rate([d for d, _ in recordings], name))
-        sensors[name] = replace(found, tempering=_tempering(base, name), **_delays(base, name))
+        known = _known(base, name)
+        rate = scan_rate_hz([detections for detections, _ in recordings], name)
+        sensors[name] = calibrate_sensor(matches[name], replace(known, rate_hz=rate or known.rate_hz))
     return MatchedSensors(base, recordings, matches, sensors)
 
 
@@ -131,17 +131,11 @@ def fit_births(
     return replace(config.birth, arrival_rate_hz=arrivals / max(duration, 1.0), initial=initial)
 
 
-def _delays(base: Config | None, name: str) -> dict[str, Any]:
-    """What detections do not tell of a sensor's clock: the base's, where it knows the sensor."""
-    if base is None or name not in base.sensors:
-        return {}
-    return {key: getattr(base.sensors[name], key) for key in ("latency_s", "late_s")}
-
-
-def _tempering(base: Config | None, name: str) -> float:
-    """Tempering cannot be read off single detections: the base's, for a new sensor its most cautious one."""
+def _known(base: Config | None, name: str) -> SensorConfig:
+    """What was known of a sensor before: the base's; of a new one what is assumed, most cautiously."""
     if base is None:
-        return SensorConfig().tempering
+        return SensorConfig()
     if name in base.sensors:
-        return base.sensors[name].tempering
-    return min(s.tempering for s in base.sensors.values())
+        return base.sensors[name]
+    # Tempering cannot be read off single detections.
+    return replace(undeclared_sensor(base.input), tempering=min(s.tempering for s in base.sensors.values()))

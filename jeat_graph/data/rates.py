@@ -10,11 +10,13 @@ from jeat_graph.data.arrays import FloatArray
 ANY_RATE_HZ = 25.0
 
 
-def median_rate_hz(times: FloatArray) -> float | None:
+def median_rate_hz(*clocks: FloatArray) -> float | None:
     """One over the median step of a clock (Hz), or None where it cannot be told.
 
     Args:
-        times: (N,) ascending (s). Of fewer than two, or where most are equal, nothing can be told.
+        clocks: (N,) ascending (s), of each recording of it: the steps of all are pooled. Of fewer than two
+            times, or where most are equal, nothing can be told.
     """
-    step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    steps = np.concatenate([np.diff(times) for times in clocks])
+    step = float(np.median(steps)) if len(steps) else 0.0
     return 1.0 / step if step > 0.0 else None

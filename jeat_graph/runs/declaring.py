@@ -23,21 +23,21 @@ _NEAR, _COMPANY, _COMPANY_SHARE, _FEW = 0.5, 3, 5e-4, 10
 LEAST_SCANS = 3
 
 
-def fit_input(config: Config, detections: Detections) -> tuple[Config, list[str]]:
-    """Declare what a configuration leaves open (`config.input`) by what is seen in a recording.
+def fit_input(config: Config, *recordings: Detections) -> tuple[Config, list[str]]:
+    """Declare what a configuration leaves open (`config.input`) by what is seen in recordings.
 
     Args:
         config: with `input.undeclared` or `input.picture` set, or neither: then it comes back as it is.
-        detections: the whole recording.
+        recordings: the whole of each; their times have nothing to do with each other's.
 
     Returns:
-        The configuration for this recording, and a line for each thing that was found.
+        The configuration for these recordings, and a line for each thing that was found.
     """
     notes: list[str] = []
-    if config.input.undeclared == "declare" and detections.num_scans:
-        config, notes = _declare_sensors(config, detections)
-    if config.input.picture == "seen" and len(detections):
-        config = fit_picture(config, [detections])
+    if config.input.undeclared == "declare" and any(d.num_scans for d in recordings):
+        config, notes = _declare_sensors(config, recordings)
+    if config.input.picture == "seen" and any(len(d) for d in recordings):
+        config = fit_picture(config, recordings)
         notes.append(
             f"the picture is taken for {config.image.width:g} x {config.image.height:g} px, as far as the "
             "boxes reach "
@@ -64,13 +64,13 @@ def _farthest(reach: FloatArray) -> float:
     return float(reach[near >= max(_COMPANY, _COMPANY_SHARE * len(reach))][-1])
 
 
-def _declare_sensors(config: Config, detections: Detections) -> tuple[Config, list[str]]:
+def _declare_sensors(config: Config, recordings: Sequence[Detections]) -> tuple[Config, list[str]]:
     notes: list[str] = []
     sensors: dict[str, SensorConfig] = {}
-    for name in detections.sensors:
+    for name in sorted({name for d in recordings for name in d.sensors}):
         known = config.sensors.get(name)
         sensor = undeclared_sensor(config.input) if known is None else known
-        rate = scan_rate_hz(detections, name)
+        rate = scan_rate_hz(recordings, name)
         other = rate is not None and not 1.0 / _SAME_RATE < rate / sensor.rate_hz < _SAME_RATE
         if rate is not None and (known is None or other):
             sensor = replace(sensor, rate_hz=rate)
@@ -97,13 +97,13 @@ def undeclared_sensor(assumed: InputConfig) -> SensorConfig:
     )
 
 
-def scan_rate_hz(detections: Detections, sensor: str) -> float | None:
+def scan_rate_hz(recordings: Sequence[Detections], sensor: str) -> float | None:
     """Rate (Hz) of a sensor's clock, or None if its scans are too few to judge it by.
 
     Args:
-        detections: the recording.
+        recordings: some of them with this sensor, each with times of its own.
         sensor: its name.
     """
-    times = detections.sensor_times(sensor)
-    rate = median_rate_hz(times) if len(times) >= LEAST_SCANS else None
+    clocks = [d.sensor_times(sensor) for d in recordings if sensor in d.sensors]
+    rate = median_rate_hz(*clocks) if sum(map(len, clocks)) >= LEAST_SCANS else None
     return None if rate is None else round(rate, 6)

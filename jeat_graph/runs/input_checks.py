@@ -56,7 +56,7 @@ def _check_sensors(detections: Detections, config: Config, names: str) -> None:
     fitting = [p for p in preset_names() if set(detections.sensors) <= load_config(p).sensors.keys()]
     settings = []
     for name in unknown:
-        rate = scan_rate_hz(detections, name)
+        rate = scan_rate_hz([detections], name)
         setting = "rate_hz: 20" if rate is None else f"rate_hz: {rate:.3g}"
         settings.append(f"--set 'sensors.{name}={{{setting}}}'")
     several = (
@@ -110,7 +110,7 @@ def _check_picture(detections: Detections, config: Config, names: str) -> list[s
 def _check_rates(detections: Detections, config: Config, names: str) -> list[str]:
     warnings = []
     for name in detections.sensors:
-        rate, declared = scan_rate_hz(detections, name), config.sensors[name].rate_hz
+        rate, declared = scan_rate_hz([detections], name), config.sensors[name].rate_hz
         if rate is not None and not 1.0 / RATE_FACTOR < rate / declared < RATE_FACTOR:
             warnings.append(
                 f"{names}: sensor {name!r} scans at {rate:.3g} Hz, but is declared with {declared:g} Hz "

@@ -47,11 +47,19 @@ def test_a_detection_on_an_ignored_box_counts_neither_way():
     assert m.seen.tolist() == [True]
 
 
-def test_false_boxes_that_repeat_at_one_place_are_counted_as_a_run():
-    g = truth([(k / 10, 1, (0, 0, 40, 40)) for k in range(3)])
-    m = match_sensor(scans(*((k / 10, [(500, 100, 30, 30)]) for k in range(3))), g, "rgb")
-    assert m.run.tolist() == [1, 2, 3]
-    assert m.seen.tolist() == [False, False, False]
+def test_a_false_box_is_no_vehicle_and_sees_none():
+    g = truth([(0.0, 1, (0, 0, 40, 40))])
+    m = match_sensor(scans((0.0, [(500, 100, 30, 30)])), g, "rgb")
+    assert m.correct.tolist() == [False]
+    assert m.seen.tolist() == [False]
+
+
+@pytest.mark.parametrize("there", [0.0, 0.1])
+def test_a_vehicle_that_enters_or_leaves_between_two_frames_counts_neither_way(there):
+    g = truth([(0.0, 1, (0, 0, 40, 40)), (0.1, 1, (0, 0, 40, 40)), (there, 2, (600, 0, 40, 40))])
+    m = match_sensor(scans((0.05, [(0, 0, 40, 40), (605, 0, 40, 40)])), g, "rgb")
+    assert m.correct.tolist() == [True]
+    assert m.seen.tolist() == [True]
 
 
 def test_the_box_behind_another_is_known_to_be_hidden():

@@ -1,12 +1,19 @@
 """Calibration with truth finds what the recordings were made with."""
 
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
 
+from jeat_graph.calibration.matches import match_sensor
+from jeat_graph.calibration.measured import measured_tracks
+from jeat_graph.calibration.parts import SENSOR_PARTS
 from jeat_graph.calibration.supervised import calibrate
 from jeat_graph.config.reading import load_config
+from jeat_graph.config.schema import SensorConfig
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.trajectories import GroundTruth
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +47,18 @@ def test_detection_probability_and_clutter(found, known):
     assert found.sensors["rgb"].blind_speed == 0.0
 
 
+def test_measured_tracks_have_the_noise_that_a_base_with_a_part_by_size_gives_them(recordings):
+    sensor = SensorConfig(sigma_px=1.5, rho_x=0.02, rho_y=0.03, rho_size=0.1, correlated_share=0.25)
+    (detections, truth), *_ = recordings
+    matches = {"rgb": match_sensor(detections, truth, "rgb")}
+    tracks = measured_tracks(matches, {"rgb": sensor})
+    width, height = np.exp(tracks.log_size).T
+    for axis, whole in enumerate(((0.02 * width) ** 2, (0.03 * height) ** 2)):
+        variance = 1.5**2 + whole + 0.1**2 * width * height
+        np.testing.assert_allclose(tracks.R[:, axis], 0.75 * variance)
+        np.testing.assert_allclose(tracks.coloured_std[:, axis] ** 2, 0.25 * variance)
+
+
 def test_rates_of_births(found, recordings):
     truths = [truth for _, truth in recordings]
     vehicles = sum(len(np.unique(truth.object_id)) for truth in truths)
@@ -56,6 +75,44 @@ def test_all_else_is_the_base_configuration(found):
     assert found.image == base.image
 
 
+def test_each_field_of_a_sensor_is_estimated_or_else_the_bases(recordings):
+    """From two bases that agree in nothing: what comes out alike is estimated, all else is carried over."""
+    kept = {"tempering": 0.35, "disagreement": 3.0, "latency_s": 0.01, "late_s": 0.2}
+    estimated = {
+        "rate_hz": 17.0,
+        "sigma_px": 4.0,
+        "rho_x": 0.2,
+        "rho_y": 0.2,
+        "rho_size": 0.1,
+        "correlated_share": 0.5,
+        "memory_s": 0.9,
+        "sigma_log_width": 0.3,
+        "sigma_log_height": 0.3,
+        "bias": (0.2, 0.2, 0.2, 0.2),
+        "p_detect": 0.4,
+        "clutter_per_scan": 7.0,
+        "precision": 0.3,
+        "score_precision": ((0.0, 0.5),),
+        "blind_speed": 40.0,
+    }
+    assert {f.name for f in fields(SensorConfig)} == {*kept, *estimated}
+    plain = SensorConfig()
+    odd = SensorConfig(**kept, **estimated)
+    assert not [name for name in (*kept, *estimated) if getattr(plain, name) == getattr(odd, name)]
+
+    found = [
+        calibrate(recordings[:1], replace(load_config("default"), sensors={"rgb": known})).sensors["rgb"]
+        for known in (plain, odd)
+    ]
+    for known, one in zip((plain, odd), found, strict=True):
+        assert {name: getattr(one, name) for name in kept} == {name: getattr(known, name) for name in kept}
+    assert {name: getattr(found[0], name) for name in estimated} == {
+        name: getattr(found[1], name) for name in estimated
+    }
+    # Where a part of the estimates does worse than the base, all of it goes back.
+    assert {"rate_hz", *(name for names in SENSOR_PARTS.values() for name in names)} == set(estimated)
+
+
 def test_tempering_is_the_bases_and_the_most_cautious_one_for_a_new_sensor(recordings, known):
     base = load_config("default", ["sensors.rgb.tempering=0.3", "sensors.evt.tempering=0.2"])
     assert calibrate(recordings[:1], base).sensors["rgb"].tempering == 0.3
@@ -69,3 +126,12 @@ def test_no_recording_and_no_match_are_refused(recordings):
     far = Detections.from_rows([0.0, 0.1], ["rgb", "rgb"], [[900.0, 600.0, 5, 5]] * 2, [0.5, 0.5])
     with pytest.raises(DataError, match="only 0 detections match"):
         calibrate([(far, recordings[0][1])])
+
+
+def test_vehicles_that_the_edge_cuts_alone_are_refused():
+    t = np.arange(60) / 20.0
+    boxes = np.tile([0.0, 100.0, 40.0, 30.0], (60, 1))
+    found = Detections.from_rows(t, np.full(60, "rgb"), boxes, np.full(60, 0.9))
+    truth = GroundTruth(t, np.ones(60, dtype=np.int64), boxes, None, np.zeros(60, dtype=bool))
+    with pytest.raises(DataError, match="only 0 of the 60 detections that match the truth are not cut"):
+        calibrate([(found, truth)], load_config("default"))

@@ -1,11 +1,12 @@
-"""What a configuration leaves open is found in the recording: the picture's size."""
+"""What a configuration leaves open is found in recordings: the picture's size, sensors and their rates."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from jeat_graph.config.reading import load_config
+from jeat_graph.calibration.procedure import calibrate_without_truth
+from jeat_graph.config.reading import as_config, load_config
 from jeat_graph.data.detections import Detections
 from jeat_graph.runs.declaring import fit_input
 
@@ -39,3 +40,34 @@ def test_a_wild_box_does_not_say_how_far(wild):
 
 def test_boxes_left_of_the_picture_and_above_do_no_harm():
     assert picture(np.array([[-300.0, -200.0, 20.0, 20.0]] * 4)) == (1.0, 1.0)
+
+
+def camera(start, scans=40, rate=20.0, name="cam"):
+    t = start + np.arange(scans) / rate
+    boxes = np.column_stack([100.0 + 60.0 * (t - start), np.tile([200.0, 40.0, 30.0], (scans, 1))])
+    return Detections.from_rows(t, np.full(scans, name), boxes, np.full(scans, 0.9))
+
+
+@pytest.mark.parametrize("starts", [(0.0,), (0.0, 0.02), (0.0, 0.017, 0.033)])
+def test_recordings_of_one_camera_that_begin_at_other_times_have_its_rate(starts):
+    recordings = [camera(start) for start in starts]
+    config, _ = fit_input(load_config("default"), *recordings)
+    assert config.sensors["cam"].rate_hz == pytest.approx(20.0)
+
+
+def test_blind_calibration_finds_the_rate_of_one_camera_in_two_recordings():
+    base = as_config(load_config("default"), (1280, 720))
+    found = calibrate_without_truth([camera(0.0), camera(0.02)], base).config
+    assert found.sensors["cam"].rate_hz == pytest.approx(20.0)
+
+
+def test_sensors_of_any_of_the_recordings_are_declared():
+    config, notes = fit_input(load_config("default"), camera(0.0), camera(5.0, name="radar", rate=12.5))
+    assert config.sensor_names == ("cam", "radar")
+    assert config.sensors["radar"].rate_hz == pytest.approx(12.5)
+    assert len([line for line in notes if "not declared" in line]) == 2
+
+
+def test_two_scans_tell_no_rate():
+    assumed = fit_input(load_config("default"), camera(0.0, scans=2, rate=3.0))[0].sensors["cam"].rate_hz
+    assert assumed == 20.0
