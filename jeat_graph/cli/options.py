@@ -16,11 +16,11 @@ import sys
 from typing import Any
 
 from jeat_graph.config.argument_types import picture_size, positive
+from jeat_graph.config.smoothing import ENGINES
 from jeat_graph.io.time_units import TIME_UNITS
 
 INPUT_FORMATS = ("csv", "parquet", "motchallenge", "kitti", "prophesee", "coco")
 OUTPUT_FORMATS = ("csv", "parquet", "motchallenge", "kitti")
-ENGINES = ("fixed-lag", "full", "rts", "fixed-lag-rts", "none")
 SCORE_SCALES = ("unit", "percent", "logistic")
 
 

@@ -10,11 +10,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from jeat_graph.config.schema import Config, SensorConfig
-from jeat_graph.config.section_tree import build, check_keys, plain, read_tree
-from jeat_graph.config.yaml_text import load_yaml
+from jeat_graph.config.section_tree import build, check_keys, parse_change, plain, read_tree
 from jeat_graph.data.errors import ConfigError
 
 
@@ -113,14 +110,11 @@ def _preset_text(name: str) -> str:
 
 
 def _apply_override(tree: dict[str, Any], text: str) -> None:
-    key, equals, raw = text.partition("=")
-    if not equals or not key.strip():
-        raise ConfigError(f"--set {text!r}: must read key=value")
     try:
-        value = load_yaml(raw)
-    except yaml.YAMLError:
-        raise ConfigError(f"--set {text!r}: the value cannot be read") from None
-    *path, last = key.strip().split(".")
+        (*path, last), value = parse_change(text)
+    except ConfigError as error:
+        raise ConfigError(f"--set {error}") from None
+    key = ".".join((*path, last))
     node = tree
     for step in path:
         child = node.get(step)

@@ -81,19 +81,26 @@ def tree_of_changes(changes: Sequence[str]) -> dict[str, Any]:
     """
     tree: dict[str, Any] = {}
     for text in changes:
-        key, equals, value = text.partition("=")
-        if not equals or not key.strip():
-            raise ConfigError(f"{text!r}: must read section.key=value")
-        try:
-            inner: Any = load_yaml(value)
-        except yaml.YAMLError as error:
-            raise ConfigError(
-                f"{text!r}: not valid YAML: {getattr(error, 'problem', None) or error}"
-            ) from None
-        for step in reversed(key.strip().split(".")):
+        path, inner = parse_change(text)
+        for step in reversed(path):
             inner = {step: inner}
         tree = merge(tree, inner)
     return tree
+
+
+def parse_change(text: str) -> tuple[list[str], Any]:
+    """Return the path of keys and the value of a text `section.key=value`, the value as YAML.
+
+    Raises:
+        ConfigError: no key, no `=`, or a value that is not YAML.
+    """
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip():
+        raise ConfigError(f"{text!r}: must read section.key=value")
+    try:
+        return key.strip().split("."), load_yaml(value)
+    except yaml.YAMLError as error:
+        raise ConfigError(f"{text!r}: not valid YAML: {getattr(error, 'problem', None) or error}") from None
 
 
 def check_keys(tree: Mapping[str, Any], known: Sequence[str], where: str) -> None:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from jeat_graph.config.fields import Section, choice, flag, number
 
+ENGINES = ("fixed-lag", "fixed-lag-rts", "full", "rts", "none")
+
 
 @dataclass(frozen=True)
 class SmootherConfig(Section):
@@ -13,7 +15,7 @@ class SmootherConfig(Section):
 
     engine: str = choice(
         "fixed-lag",
-        ("fixed-lag", "fixed-lag-rts", "full", "rts", "none"),
+        ENGINES,
         "fixed-lag: GTSAM with a window; full: GTSAM over each whole track once it has ended; fixed-lag-rts "
         "and rts: the same by our own Rauch-Tung-Striebel pass; none: no smoothing",
     )
