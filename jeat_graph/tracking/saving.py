@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from jeat_graph.config.schema import Config
+from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.smoothing.access import SmoothedTracks
 from jeat_graph.tracking.snapshot import Snapshot
 
@@ -17,6 +18,7 @@ class SavedTracks(SmoothedTracks):
     if TYPE_CHECKING:
         config: Config
         _diagnostics: bool
+        _watch: InputWatch
 
         def __init__(self, config: Config, *, diagnostics: bool = False) -> None:
             """Make a tracker."""
