@@ -39,7 +39,8 @@ def recognise(path: str | Path, fmt: str | None = None, allowed: Sequence[str] =
         allowed: the formats that make sense here.
 
     Raises:
-        DataError: the file is missing, or the format is unknown or makes no sense here.
+        DataError: the file is missing, holds labels of YOLO, or is of a format that is unknown or makes no
+            sense here.
     """
     if fmt is None:
         fmt = _guess(Path(path))
@@ -48,6 +49,19 @@ def recognise(path: str | Path, fmt: str | None = None, allowed: Sequence[str] =
     if fmt not in allowed:
         raise DataError(f"is {fmt}; here only {', '.join(allowed)} can be read", path)
     return fmt
+
+
+def _is_label_of_yolo(fields: Sequence[str]) -> bool:
+    """Whether the words of a line are a class, four shares of a picture and, if need be, a score and a track."""
+    if len(fields) not in (5, 6, 7) or not all(map(is_number, fields)):
+        return False
+    x, y, width, height = map(float, fields[1:5])
+    return (
+        fields[0].isdigit()
+        and 0.0 < min(width, height)
+        and max(x, y, width, height) <= 1.0
+        and min(x, y) >= 0.0
+    )
 
 
 def _guess(path: Path) -> str:
@@ -70,4 +84,11 @@ def _guess(path: Path) -> str:
     if len(words) >= _KITTI_FIELDS and "," not in line and not is_number(words[2]):
         return "kitti"
     fields = re.split(r"\s*,\s*|\s+", line.strip())
+    if _is_label_of_yolo(fields):
+        raise DataError(
+            "looks like labels of YOLO (class, centre and size in shares of the picture; one file a picture): "
+            "write all pictures into one table with t, sensor, left, top, width, height in px, and score",
+            path,
+            1,
+        )
     return "motchallenge" if len(fields) >= _MOT_FIELDS and all(map(is_number, fields)) else "csv"

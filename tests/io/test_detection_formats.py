@@ -271,6 +271,14 @@ class TestRecognition:
     def test_the_caller_knows_better(self, write):
         assert recognise(write("a.csv", MOT), "motchallenge") == "motchallenge"
 
+    @pytest.mark.parametrize(
+        "line", ["2 0.5 0.4 0.1 0.05", "2 0.5 0.4 0.1 0.05 0.91", "0 0.523438 1 0.013 0.99 0.8 17"]
+    )
+    def test_labels_of_yolo_are_named(self, write, line):
+        with pytest.raises(DataError, match="1: looks like labels of YOLO"):
+            recognise(write("a.txt", f"{line}\n{line}\n"))
+        assert recognise(write("b.txt", "1 -1 1 1 1 1 1\n")) == "motchallenge"
+
     def test_a_format_that_makes_no_sense_is_refused(self, write):
         with pytest.raises(DataError, match="unknown format 'yolo'; known: csv"):
             recognise(write("a.csv", MOT), "yolo")
