@@ -52,13 +52,13 @@ def recognise(path: str | Path, fmt: str | None = None, allowed: Sequence[str] =
 
 
 def _is_label_of_yolo(fields: Sequence[str]) -> bool:
-    """Whether the words of a line are a class, four shares of a picture and, if need be, a score and a track."""
+    """Whether the words of a line are a class, four shares of a picture and perhaps a score and a track."""
     if len(fields) not in (5, 6, 7) or not all(map(is_number, fields)):
         return False
     x, y, width, height = map(float, fields[1:5])
     return (
         fields[0].isdigit()
-        and 0.0 < min(width, height)
+        and min(width, height) > 0.0
         and max(x, y, width, height) <= 1.0
         and min(x, y) >= 0.0
     )
@@ -86,7 +86,7 @@ def _guess(path: Path) -> str:
     fields = re.split(r"\s*,\s*|\s+", line.strip())
     if _is_label_of_yolo(fields):
         raise DataError(
-            "looks like labels of YOLO (class, centre and size in shares of the picture; one file a picture): "
+            "looks like labels of YOLO (class, centre and size in shares of the picture, one file for each): "
             "write all pictures into one table with t, sensor, left, top, width, height in px, and score",
             path,
             1,
