@@ -2,12 +2,12 @@
 
 The boxes of a sensor whose times are late by δ lie δ · v behind a vehicle of image velocity v: the slope of
 the error over the velocity is −δ. With truth that holds for each sensor by itself; without, one sensor is
-compared with another on the tracks that both see, and the earliest is taken to be on time.
+compared with another on the tracks that both see.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -132,25 +132,60 @@ def lags_between(data: TrackedDetections, names: Sequence[str], periods_s: Seque
     return out
 
 
-def with_lags(config: Config, lags: Sequence[Lag]) -> Config:
+def settled(find: Callable[[Mapping[str, float]], list[Lag]], rounds: Iterable[int]) -> list[Lag]:
+    """Find lags, take them off, and find what is left of them, until nothing is.
+
+    Late boxes overlap their vehicles less, so that the fastest are not matched and a lag is found too small.
+
+    Args:
+        find: what it is given are the lags (s) of sensors known so far, early ones negative.
+        rounds: one for each time that it may be called.
+
+    Returns:
+        Of each sensor the sum of all that was found.
+    """
+    lags: dict[str, Lag] = {}
+    for _ in rounds:
+        new = find(found_lags(lags.values()))
+        for lag in new:
+            before = lags.get(lag.sensor)
+            if before is None or not before.found:
+                lags[lag.sensor] = lag
+            elif lag.found:
+                lags[lag.sensor] = replace(lag, lag_s=before.lag_s + lag.lag_s)
+        if not any(lag.found for lag in new):
+            break
+    return list(lags.values())
+
+
+def found_lags(lags: Iterable[Lag]) -> dict[str, float]:
+    """Lags (s) by sensor, of those that are beyond chance and matter."""
+    return {lag.sensor: lag.lag_s for lag in lags if lag.found}
+
+
+def with_lags(config: Config, lags: Iterable[Lag]) -> tuple[Config, float]:
     """Add the lags that were found to the sensors' `latency_s`, so that none is negative.
 
-    Without truth they are relative, and with it a sensor can be early only by an error of the truth's own
-    clock: so the earliest sensor is taken to be on time.
+    To a tracker only the differences between its sensors' clocks matter: where one is early, it is taken to
+    be on time and all others to be later by as much.
 
     Args:
         config: declares the sensors.
         lags: some of them have one.
+
+    Returns:
+        The configuration, and how early its earliest sensor is (s): so much ahead of the clock to which the
+        lags belong are times from which the latencies are taken off.
     """
-    found = {lag.sensor: lag.lag_s for lag in lags if lag.found}
+    found = found_lags(lags)
     if not found:
-        return config
+        return config, 0.0
     latency = {name: s.latency_s + found.get(name, 0.0) for name, s in config.sensors.items()}
-    earliest = min(0.0, *latency.values())
+    early_s = max(0.0, -min(latency.values()))
     sensors = {
-        name: replace(s, latency_s=round(latency[name] - earliest, 4)) for name, s in config.sensors.items()
+        name: replace(s, latency_s=round(latency[name] + early_s, 4)) for name, s in config.sensors.items()
     }
-    return replace(config, sensors=sensors)
+    return replace(config, sensors=sensors), early_s
 
 
 def _neighbours(

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from jeat_graph.calibration.matches import SensorMatches, match_sensor
 from jeat_graph.calibration.noise_scale import scale_noise
-from jeat_graph.calibration.offset import Lag, lags_between, lags_from_truth, with_lags
+from jeat_graph.calibration.offset import Lag, found_lags, lags_between, lags_from_truth, settled, with_lags
 from jeat_graph.calibration.parts import PARTS, PartChoice, choose_parts
 from jeat_graph.calibration.supervised import Recording, calibrate
 from jeat_graph.calibration.tracked import follow
@@ -17,10 +17,9 @@ from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.progress import told
 from jeat_graph.runs.declaring import fit_input
-from jeat_graph.runs.latency import at_measurement
+from jeat_graph.runs.latency import taken_off
 
-# Late boxes overlap their vehicles less, so that the fastest are not matched and a lag is found too small:
-# what remains after it has been taken off is found the next time.
+# How often lags are looked for, each time in what those found before leave.
 _ROUNDS = 4
 _PASSES = 2
 # About so many scans are tracked for each factor on the noise.
@@ -35,12 +34,15 @@ class Calibration:
     Attributes:
         config: what was found; `sensors.*.latency_s` is what was known of their clocks and what was found.
         lags: how late each sensor's times were found to be, beyond what the base knew.
+        early_s: how far ahead of the truth the times of tracks are, because a latency is never negative: of
+            the earliest sensor (s), 0 where all are on time or late.
         parts: which parts of the estimates are kept; empty without truth.
         choices: what was chosen by tracking.
     """
 
     config: Config
     lags: tuple[Lag, ...]
+    early_s: float = 0.0
     parts: tuple[PartChoice, ...] = ()
     choices: tuple[Choice, ...] = ()
 
@@ -69,26 +71,22 @@ def calibrate_with_truth(
         DataError: too little that matches.
     """
     base = fit_input(base, *(detections for detections, _ in recordings))[0]
-    pairs: list[Recording] = list(recordings)
-    lags: list[Lag] = []
-    clocks = base
-    for _ in told(range(_ROUNDS), 2 * _ROUNDS):
-        new = _lags_with_truth(pairs, base)
-        lags = _added(lags, new)
-        shifted = with_lags(_on_time(base), new)
-        if shifted == _on_time(base):
-            break
-        pairs = [(at_measurement(detections, shifted), truth) for detections, truth in pairs]
-        clocks = _with_latencies(clocks, shifted)
+    lags = settled(
+        lambda known: _lags_with_truth(_on_time(recordings, known), base), told(range(_ROUNDS), 2 * _ROUNDS)
+    )
+    # Each sensor by its own lag, early ones too: the truth stays where it is.
+    pairs = _on_time(recordings, found_lags(lags))
     if not tuned:
-        return Calibration(_with_latencies(_on_time(calibrate(pairs, base)), clocks), tuple(lags))
+        config, early_s = with_lags(calibrate(pairs, base), lags)
+        return Calibration(config, tuple(lags), early_s)
     config, parts = choose_parts(pairs, base, progress=progress)
     config, choices = tune(config, pairs, passes=_PASSES, progress=progress)
     config, factor, verdict = scale_noise(config, folds(shorten(pairs, _SCANS)))
     choices = (*choices, Choice(NOISE_FACTOR, factor, verdict.merit))
     if progress is not None:
         progress(NOISE_FACTOR)
-    return Calibration(_with_latencies(_on_time(config), clocks), tuple(lags), parts, choices)
+    config, early_s = with_lags(config, lags)
+    return Calibration(config, tuple(lags), early_s, parts, choices)
 
 
 def calibrate_without_truth(recordings: Sequence[Detections], base: Config) -> Calibration:
@@ -109,23 +107,24 @@ def calibrate_without_truth(recordings: Sequence[Detections], base: Config) -> C
     if not any(len(detections) for detections in recordings):
         raise DataError("the recordings hold no detection")
     base = fit_input(base, *recordings)[0]
-    lags: list[Lag] = []
-    clocks, seen = base, list(recordings)
-    for _ in told(range(_ROUNDS)):
+
+    def find(known: Mapping[str, float]) -> list[Lag]:
         periods = [1.0 / base.sensors[name].rate_hz for name in base.sensor_names]
         try:
-            new = lags_between(follow(seen, base), base.sensor_names, periods)
+            tracked = follow([taken_off(detections, known) for detections in recordings], base)
         except DataError:
-            new = []
-        lags = _added(lags, new)
-        shifted = with_lags(_on_time(base), new)
-        if shifted == _on_time(base):
-            break
-        seen = [at_measurement(detections, shifted) for detections in seen]
-        clocks = _with_latencies(clocks, shifted)
+            return []
+        return lags_between(tracked, base.sensor_names, periods)
+
+    lags = settled(find, told(range(_ROUNDS)))
     association = replace(base.association, priority=())
-    config = replace(_on_time(base), association=association, input=InputConfig())
-    return Calibration(_with_latencies(config, clocks), tuple(lags))
+    # No clock is known beside which all might be early.
+    config, _ = with_lags(replace(base, association=association, input=InputConfig()), lags)
+    return Calibration(config, tuple(lags))
+
+
+def _on_time(recordings: Sequence[Recording], late_s: Mapping[str, float]) -> list[Recording]:
+    return [(taken_off(detections, late_s), truth) for detections, truth in recordings]
 
 
 def _lags_with_truth(recordings: Sequence[Recording], base: Config) -> list[Lag]:
@@ -139,30 +138,3 @@ def _lags_with_truth(recordings: Sequence[Recording], base: Config) -> list[Lag]
         if found:
             matches[name] = SensorMatches.pool(found).only_whole(base.image)
     return lags_from_truth(matches, {name: 1.0 / base.sensors[name].rate_hz for name in matches})
-
-
-def _added(lags: Sequence[Lag], new: Sequence[Lag]) -> list[Lag]:
-    """Lags of a further round on top of those before."""
-    before = {lag.sensor: lag for lag in lags}
-    out = []
-    for lag in new:
-        old = before.get(lag.sensor)
-        if old is not None and old.found:
-            lag = replace(lag, lag_s=old.lag_s + (lag.lag_s if lag.found else 0.0), found=True)
-        out.append(lag)
-    return out or list(lags)
-
-
-def _on_time(config: Config) -> Config:
-    """The same with no latency known: for what is found on top."""
-    return replace(config, sensors={n: replace(s, latency_s=0.0) for n, s in config.sensors.items()})
-
-
-def _with_latencies(config: Config, more: Config) -> Config:
-    """Add the latencies of one configuration to those of another; the earliest sensor is then on time."""
-    total = {
-        name: s.latency_s + (more.sensors[name].latency_s if name in more.sensors else 0.0)
-        for name, s in config.sensors.items()
-    }
-    sensors = {name: replace(s, latency_s=round(total[name], 4)) for name, s in config.sensors.items()}
-    return replace(config, sensors=sensors)

@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
         found = _with_truth(list(zip(recordings, truths, strict=True)), base, not args.no_tune)
     else:
         found = _without_truth(recordings, base)
-    _say_lags(found)
+    _say_lags(found, "the truth" if args.gt else "the sensor that sees most")
     config = rounded(found.config)
     save_config(config, args.out, comment=describe(args, picture, found))
     sys.stdout.write("\n".join(table.render("text") for table in summary(config, found)))
@@ -166,16 +166,29 @@ def _without_truth(recordings: list[Detections], base: Config) -> Calibration:
         return calibrate_without_truth(recordings, base)
 
 
-def _say_lags(found: Calibration) -> None:
-    """Tell of sensors whose clock is off; their latency is in the configuration."""
+def _say_lags(found: Calibration, beside: str) -> None:
+    """Tell of sensors whose clock is off, and what of it is in the configuration.
+
+    Args:
+        found: lags and configuration.
+        beside: what the clocks were compared with.
+    """
+    lines = []
     for lag in found.lags:
         if lag.found:
             late = f"{abs(lag.lag_s) * 1e3:.0f} ms {'late' if lag.lag_s > 0 else 'early'}"
-            print(
-                f"sensor {lag.sensor!r} is {late} (± {lag.std_s * 1e3:.1f} ms): "
-                "taken off its times from now on (sensors.*.latency_s)",
-                file=sys.stderr,
-            )
+            lines.append(f"sensor {lag.sensor!r} is {late} (± {lag.std_s * 1e3:.1f} ms) beside {beside}")
+    if lines:
+        latency = {name: s.latency_s for name, s in sorted(found.config.sensors.items())}
+        taken = [f"sensors.{name}.latency_s {late_s:g}" for name, late_s in latency.items()]
+        lines.append(f"taken off the times from now on: {', '.join(taken)} (s)")
+    if found.early_s:
+        early = f"{found.early_s * 1e3:.0f} ms"
+        lines.append(
+            f"the earliest sensor counts as on time: tracks will be {early} ahead of the truth's clock"
+        )
+    for line in lines:
+        print(line, file=sys.stderr)
 
 
 def describe(args: argparse.Namespace, picture: str, found: Calibration) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from jeat_graph.config.schema import Config
@@ -15,8 +17,17 @@ def at_measurement(detections: Detections, config: Config) -> Detections:
         detections: a recording, as its files have it.
         config: the sensors; one that it does not declare has no latency.
     """
-    known = config.sensors
-    latency = np.array([known[name].latency_s if name in known else 0.0 for name in detections.sensors])
+    return taken_off(detections, {name: sensor.latency_s for name, sensor in config.sensors.items()})
+
+
+def taken_off(detections: Detections, late_s: Mapping[str, float]) -> Detections:
+    """Take what each sensor's times are late off them.
+
+    Args:
+        detections: a recording.
+        late_s: by sensor (s), negative for one whose times are early; one that is not named is on time.
+    """
+    latency = np.array([late_s.get(name, 0.0) for name in detections.sensors])
     if not latency.any():
         return detections
     t, sensor, boxes, scores, empty, classes = detections.to_rows()

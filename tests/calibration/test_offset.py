@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from jeat_graph.calibration.offset import Lag, lag_of, with_lags
+from jeat_graph.calibration.offset import Lag, lag_of, settled, with_lags
 from jeat_graph.calibration.procedure import calibrate_with_truth, calibrate_without_truth
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Detections
@@ -51,12 +51,37 @@ def test_few_vehicles_tell_nothing():
     assert not lag_of("rgb", *observations(np.random.default_rng(0), 0.05, vehicles=3), 0.05).found
 
 
-def test_the_earliest_sensor_is_on_time():
+def test_no_latency_that_is_stored_is_negative_and_what_was_added_to_all_is_told():
     config = load_config("default")
     lags = [Lag("rgb", -0.02, 0.001, True), Lag("evt", 0.01, 0.001, True)]
-    found = with_lags(config, lags)
+    found, early_s = with_lags(config, lags)
     assert found.sensors["rgb"].latency_s == 0.0
     assert found.sensors["evt"].latency_s == pytest.approx(0.03)
+    assert early_s == pytest.approx(0.02)
+
+
+def test_sensors_that_are_all_late_keep_the_clock_of_the_truth():
+    lags = [Lag("rgb", 0.02, 0.001, True), Lag("evt", 0.05, 0.001, True)]
+    found, early_s = with_lags(load_config("default"), lags)
+    assert {name: s.latency_s for name, s in found.sensors.items()} == {"rgb": 0.02, "evt": 0.05}
+    assert early_s == 0.0
+
+
+def test_lags_of_all_rounds_add_up_and_each_sensor_is_moved_by_its_own():
+    true, asked = {"a": -0.04, "b": 0.1, "c": 0.0}, []
+
+    def find(known):
+        asked.append(dict(known))
+        # Of what is left four fifths are found.
+        left = {name: 0.8 * (lag - known.get(name, 0.0)) for name, lag in true.items()}
+        return [Lag(name, lag, 0.001, abs(lag) > 0.004) for name, lag in left.items()]
+
+    found = {lag.sensor: lag for lag in settled(find, range(9))}
+    assert asked[0] == {}
+    assert asked[1] == pytest.approx({"a": -0.032, "b": 0.08})
+    assert {name: lag.lag_s for name, lag in found.items()} == pytest.approx(true, abs=0.005)
+    assert {name: lag.found for name, lag in found.items()} == {"a": True, "b": True, "c": False}
+    assert len(asked) < 9
 
 
 def late(detections, seconds):
@@ -75,14 +100,38 @@ def two_sensors(known):
     return out
 
 
-def test_with_truth_a_late_sensor_is_found_and_its_latency_stored(two_sensors):
-    found = calibrate_with_truth(two_sensors, load_config("default"), tuned=False)
+@pytest.fixture(scope="module")
+def calibrated(two_sensors):
+    return calibrate_with_truth(two_sensors, load_config("default"), tuned=False)
+
+
+def test_with_truth_a_late_sensor_is_found_and_its_latency_stored(calibrated):
+    found = calibrated
     assert [lag.sensor for lag in found.lags if lag.found] == ["far"]
     # Vehicles drive at 150 to 300 px/s and are measured to 2 px: a hundred of them tell 2 ms.
     assert found.config.sensors["far"].latency_s == pytest.approx(0.1, abs=0.005)
     assert found.config.sensors["rgb"].latency_s == 0.0
     # What the lag would have been taken for.
     assert found.config.sensors["far"].sigma_px < 2.0
+
+
+def moved(recordings, seconds):
+    """The same with all sensors' times moved, but not the truth's."""
+    return [(late(detections, seconds), truth) for detections, truth in recordings]
+
+
+def test_with_truth_a_sensor_that_is_early_moves_no_other_off_the_truth(two_sensors, calibrated):
+    found = calibrate_with_truth(moved(two_sensors, -0.1), load_config("default"), tuned=False)
+    lag_s = {lag.sensor: lag.lag_s for lag in found.lags if lag.found}
+    assert lag_s == {"rgb": pytest.approx(-0.1, abs=0.005)}
+    assert found.config.sensors["far"].latency_s == pytest.approx(0.1, abs=0.005)
+    assert found.config.sensors["rgb"].latency_s == 0.0
+    assert found.early_s == pytest.approx(0.1, abs=0.005)
+    for name, sensor in found.config.sensors.items():
+        on_time = calibrated.config.sensors[name]
+        # Nothing of the lag is taken for noise or for bias; fewer boxes lie within the truth's time.
+        assert sensor.sigma_px == pytest.approx(on_time.sigma_px, rel=0.2)
+        assert sensor.bias == pytest.approx(on_time.bias, abs=0.01)
 
 
 def test_without_truth_it_is_found_beside_the_other(two_sensors):
