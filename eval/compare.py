@@ -8,7 +8,7 @@ from typing import Any
 
 from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.measured_track import MeasuredTrack
-from jeat_graph.data.progress import portion
+from jeat_graph.data.progress import progress_span
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.consistency import consistency
 from jeat_graph.eval.samples import (
@@ -70,12 +70,12 @@ def compare(
     """
     lags = tuple(sorted(set(lags_s)))
     values: dict[str, Any] = {"tracks": len(tracks), "sensors": list(sensors)}
-    with portion(0.0, _CONSISTENCY):
+    with progress_span(0.0, _CONSISTENCY):
         values["consistency"], table = consistency(tracks)
     tables = [table]
     samples = None
     if truth is not None and causal is not None and truth.motion is not None:
-        with portion(_CONSISTENCY, 1.0):
+        with progress_span(_CONSISTENCY, 1.0):
             samples = collect_samples(tracks, truth, causal, lags, instants=instants, iou=iou)
         if len(samples):
             errors = {name: errors_of(samples, name) for name in samples.states}

@@ -9,7 +9,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.measured_track import MeasuredTrack
-from jeat_graph.data.progress import told
+from jeat_graph.data.progress import with_progress
 from jeat_graph.eval.lagged import Innovations, States, states_at
 from jeat_graph.eval.tables import Cell, Table
 
@@ -30,7 +30,7 @@ def consistency(tracks: Sequence[MeasuredTrack]) -> tuple[dict[str, Any], Table]
     """
     innovations: list[Innovations] = []
     ratio: list[FloatArray] = []
-    for track in told(tracks):
+    for track in with_progress(tracks):
         filtered, _, full, innovation = states_at(track.data, track.data.t, [])
         innovations.append(innovation)
         ratio.append(_disagreement(filtered, full))

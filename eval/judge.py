@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from jeat_graph.data.progress import portion, told
+from jeat_graph.data.progress import progress_span, with_progress
 from jeat_graph.eval.breakdown import by_distance, by_motion, confirmation_latency, recovery_times
 from jeat_graph.eval.frames import Frames, Kind, build_frames
 from jeat_graph.eval.kinematics import KinematicErrors, kinematic_errors
@@ -62,10 +62,10 @@ def judge_runs(
     """
     kinds: tuple[Kind, ...] = ("causal", "smoothed")
     out: dict[str, Judgement] = {}
-    for kind in told(kinds):
+    for kind in with_progress(kinds):
         sequences = []
-        with portion(0.0, 0.4):
-            for run in told(runs):
+        with progress_span(0.0, 0.4):
+            for run in with_progress(runs):
                 table = run.causal if kind == "causal" else run.smoothed
                 if table is not None:
                     frames = build_frames(
@@ -78,7 +78,7 @@ def judge_runs(
                     )
                     sequences.append(frames)
         if sequences:
-            with portion(0.4, 0.8):
+            with progress_span(0.4, 0.8):
                 scores = score_frames(sequences, iou=iou)
             out[kind] = Judgement(kind, scores, kinematic_errors(sequences, iou=iou), tuple(sequences))
     return out

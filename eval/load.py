@@ -12,7 +12,7 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.class_columns import rows_of_class
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.progress import told
+from jeat_graph.data.progress import with_progress
 from jeat_graph.data.rates import ANY_RATE_HZ, median_rate_hz
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.pairing import check_lives, check_pair, check_truth
@@ -79,7 +79,8 @@ def load_run(
         rate_hz = median_rate_hz(objects.frame_times()) or ANY_RATE_HZ
     instants = objects.frame_times() if form in BY_FRAME else read_instants(path)
     read = {
-        kind: _read_table(file, objects, rate_hz, instants is None) for kind, file in told(tables.items())
+        kind: _read_table(file, objects, rate_hz, instants is None)
+        for kind, file in with_progress(tables.items())
     }
     if classes is not None:
         read = {kind: restrict_tracks(table, classes) for kind, table in read.items()}

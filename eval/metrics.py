@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.progress import portion, told
+from jeat_graph.data.progress import progress_span, with_progress
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.clear import clear_counts, pooled_clear
 from jeat_graph.eval.frames import Frames, Kind, build_frames
@@ -132,12 +132,12 @@ def score_frames(sequences: Sequence[Frames], *, iou: float = 0.5) -> Scores:
         raise DataError("there is no sequence to judge")
     if not 0.0 < iou <= 1.0:
         raise DataError(f"the IoU threshold must be in (0, 1], not {iou:g}")
-    with portion(0.0, 0.4):
-        pairs = [overlapping_pairs(frames) for frames in told(sequences)]
+    with progress_span(0.0, 0.4):
+        pairs = [overlapping_pairs(frames) for frames in with_progress(sequences)]
     clear = pooled_clear([clear_counts(one, iou) for one in pairs])
     identity = pooled_identity([identity_counts(one, iou) for one in pairs])
-    with portion(0.6, 1.0):
-        hota = pooled_hota([hota_counts(one) for one in told(pairs)])
+    with progress_span(0.6, 1.0):
+        hota = pooled_hota([hota_counts(one) for one in with_progress(pairs)])
     counts = {name: getattr(clear, name) for name in COUNTS}
     return Scores(
         MOTA=100.0 * clear.mota,

@@ -10,7 +10,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.measured_track import MeasuredTrack
-from jeat_graph.data.progress import told
+from jeat_graph.data.progress import with_progress
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.breakdown import DISTANCE_BINS_M
 from jeat_graph.eval.consistency import PARTS, chi2_bounds
@@ -82,7 +82,7 @@ def collect_samples(
     t = truth.t[row]
     names = ["filter", *(lag_name(lag) for lag in lags_s), "full"]
     parts: list[tuple[IntArray, IntArray, list[States]]] = []
-    for track in told(tracks):
+    for track in with_progress(tracks):
         mine = np.flatnonzero(identity == track.track_id)
         mine = mine[(t[mine] >= track.data.t[0]) & (t[mine] <= track.data.t[-1])]
         if len(mine):

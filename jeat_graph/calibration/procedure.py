@@ -15,7 +15,7 @@ from jeat_graph.calibration.tune import Choice, folds, knobs, shorten, tune
 from jeat_graph.config.schema import Config, InputConfig
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.progress import told
+from jeat_graph.data.progress import with_progress
 from jeat_graph.runs.declaring import fit_input
 from jeat_graph.runs.latency import taken_off
 
@@ -72,7 +72,7 @@ def calibrate_with_truth(
     """
     base = fit_input(base, *(detections for detections, _ in recordings))[0]
     lags = settled(
-        lambda known: _lags_with_truth(_on_time(recordings, known), base), told(range(_ROUNDS), 2 * _ROUNDS)
+        lambda known: _lags_with_truth(_on_time(recordings, known), base), with_progress(range(_ROUNDS), 2 * _ROUNDS)
     )
     # Each sensor by its own lag, early ones too: the truth stays where it is.
     pairs = _on_time(recordings, found_lags(lags))
@@ -116,7 +116,7 @@ def calibrate_without_truth(recordings: Sequence[Detections], base: Config) -> C
             return []
         return lags_between(tracked, base.sensor_names, periods)
 
-    lags = settled(find, told(range(_ROUNDS)))
+    lags = settled(find, with_progress(range(_ROUNDS)))
     association = replace(base.association, priority=())
     # No clock is known beside which all might be early.
     config, _ = with_lags(replace(base, association=association, input=InputConfig()), lags)

@@ -14,7 +14,7 @@ from jeat_graph.calibration.sensor import calibrate_sensor
 from jeat_graph.config.schema import BirthConfig, Config, ImageConfig, InputConfig, SensorConfig
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.progress import told
+from jeat_graph.data.progress import with_progress
 from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.runs.declaring import scan_rate_hz, undeclared_sensor
 
@@ -45,7 +45,7 @@ def measure_sensors(recordings: Sequence[Recording], base: Config | None = None)
         raise DataError("the recordings hold no scan")
     matches: dict[str, SensorMatches] = {}
     sensors: dict[str, SensorConfig] = {}
-    for name in told(names):
+    for name in with_progress(names):
         parts = [
             match_sensor(detections, truth, name, sequence)
             for sequence, (detections, truth) in enumerate(recordings)

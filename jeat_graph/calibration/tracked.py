@@ -11,7 +11,7 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.progress import portion, told
+from jeat_graph.data.progress import progress_span, with_progress
 from jeat_graph.tracking.whole import track
 
 _MIN_ROWS = 50
@@ -52,8 +52,8 @@ def follow(recordings: Sequence[Detections], config: Config) -> TrackedDetection
     names = config.sensor_names
     cols: dict[str, list[FloatArray]] = {name: [] for name in ("t", "track", "sensor", "box")}
     first_track = 0
-    for detections in told(recordings):
-        with portion(0.0, 0.6):
+    for detections in with_progress(recordings):
+        with progress_span(0.0, 0.6):
             table = track(eager, detections)
         sure = table.existence >= config.lifecycle.confirm_existence
         kept = np.isin(table.track_id, np.unique(table.track_id[sure]))

@@ -15,7 +15,7 @@ from jeat_graph.cli.detect_options import add_detecting, detect_request
 from jeat_graph.cli.options import add_rate
 from jeat_graph.cli.terminal import one_line
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.progress import heard, ticking, write_line
+from jeat_graph.data.progress import progress_to, refreshing, write_line
 
 if TYPE_CHECKING:
     from jeat_graph.data.detections import Detections
@@ -98,13 +98,13 @@ def detect_with_bar(request: DetectRequest, command: str) -> Detections:
         form = "{desc}: {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
         with (
             tqdm(total=1.0, desc="detect", bar_format=form, disable=hidden, leave=False) as bar,
-            ticking(bar),
-            heard(lambda share: bar.update(share - bar.n)),
+            refreshing(bar),
+            progress_to(lambda share: bar.update(share - bar.n)),
         ):
             return detect_files(request, say)
     # How long a file of events lasts is known at its end only.
     form = "{desc}: {n:.1f} s of the recording [{elapsed}]"
-    with tqdm(desc="detect", bar_format=form, disable=hidden, leave=False) as bar, ticking(bar):
+    with tqdm(desc="detect", bar_format=form, disable=hidden, leave=False) as bar, refreshing(bar):
 
         def on_time(t: float) -> None:
             bar.update(max(t - bar.n, 0.0))

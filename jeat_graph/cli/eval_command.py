@@ -11,7 +11,7 @@ from jeat_graph.cli.options import add_classes, add_rate
 from jeat_graph.cli.progress import stages
 from jeat_graph.config.argument_types import positive, share
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.progress import told, write_line
+from jeat_graph.data.progress import with_progress, write_line
 
 if TYPE_CHECKING:
     from jeat_graph.data.trajectories import GroundTruth
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
         stage("reading")
         runs = [
             load_run(path, truth, rate_hz=rate_of_truth(path, truth, args.rate), classes=args.classes)
-            for path, truth in told(list(zip(args.runs, args.gt, strict=True)))
+            for path, truth in with_progress(list(zip(args.runs, args.gt, strict=True)))
         ]
         if args.classes is not None:
             check_classes([one.truth for one in runs], args.classes)

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from jeat_graph.data.progress import heard, ticking
+from jeat_graph.data.progress import progress_to, refreshing
 
 
 @contextmanager
@@ -39,9 +39,9 @@ def stages(command: str, total: int) -> Iterator[Callable[[str], None]]:
         def advance(share: float) -> None:
             bar.n = min(max(begun - 1, 0) + share, total)
 
-        with ticking(bar):
+        with refreshing(bar):
             if hidden:
                 yield begin
             else:
-                with heard(advance):
+                with progress_to(advance):
                     yield begin

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from jeat_graph.cli.options import add_rate
 from jeat_graph.cli.progress import stages
 from jeat_graph.cli.terminal import one_line
-from jeat_graph.data.progress import portion
+from jeat_graph.data.progress import progress_span
 
 if TYPE_CHECKING:
     from jeat_graph.drawing.page.figures import ComparedRun
@@ -82,14 +82,14 @@ def _compare(args: argparse.Namespace) -> tuple[ComparedRun | None, str | None]:
     if not folder.is_dir():
         return None, "Filter against smoother is not shown: that needs a run directory with its inputs."
     try:
-        with portion(0.0, 0.3):
+        with progress_span(0.0, 0.3):
             measured = measured_run(folder, args.detections)
     except DataError as error:
         if args.detections is not None:
             raise
         return None, f"Filter against smoother is not shown: {error}."
     truth = None if args.gt is None else read_truth(args.gt, rate_hz=args.rate)
-    with portion(0.3, 0.8):
+    with progress_span(0.3, 0.8):
         comparison = with_road(compare_run(measured, truth), folder, road_truth_beside(folder, args.gt))
-    with portion(0.8, 1.0):
+    with progress_span(0.8, 1.0):
         return compared_run(comparison), None

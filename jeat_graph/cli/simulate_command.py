@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from jeat_graph.config.argument_types import counting, drawn_size
 from jeat_graph.data.errors import ConfigError
-from jeat_graph.data.progress import ticking
+from jeat_graph.data.progress import refreshing
 
 if TYPE_CHECKING:
     from jeat_graph.simulation.dataset.workers import SourceFactory
@@ -186,7 +186,7 @@ def _pictures(args: argparse.Namespace, scenario: Scenario) -> int:
         notice_if_cold(paint_all, "the renderer")
     with (
         tqdm(total=total, desc="simulate", unit=" frames", disable=quiet, leave=False) as bar,
-        ticking(bar),
+        refreshing(bar),
     ):
         manifest = record_dataset(
             factory,

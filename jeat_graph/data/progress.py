@@ -1,8 +1,8 @@
-"""How far long work has come: loops tell it, whoever waits hears it, and nothing in between needs to know.
+"""Progress of long work: loops report it, whoever shows it receives it, and nothing in between needs to know.
 
-A loop over pieces of about equal work says `for piece in told(pieces)`. Who wants to know says
-`with heard(report)` around the work; without that, `told` only passes the pieces on. Loops within loops add
-up: what the inner one tells is a share of the outer one's piece.
+A loop over pieces of about equal work says `for piece in with_progress(pieces)`. Who wants to know says
+`with progress_to(report)` around the work; without that, `with_progress` only passes the pieces on. Of loops
+within loops the inner one reports a share of the outer one's piece.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ def write_line(text: str) -> None:
 
 
 @contextmanager
-def ticking(bar: Bar) -> Iterator[None]:
-    """Draw a bar again and again: its clock goes on where the work tells nothing, as while it is compiled."""
+def refreshing(bar: Bar) -> Iterator[None]:
+    """Draw a bar again and again, so that its clock goes on where the work reports nothing (compiling)."""
     if bar.disable:
         yield
         return
@@ -58,7 +58,7 @@ def ticking(bar: Bar) -> Iterator[None]:
 
 
 class _Listener:
-    """Who waits, as long as he does.
+    """Receives reports of progress, as long as it waits for them.
 
     Args:
         report: is called with the share that is done (0 to 1).
@@ -82,7 +82,7 @@ class _Span(NamedTuple):
         return _Span(self.listener, self.begin + begin * width, self.begin + end * width)
 
     def enter(self) -> None:
-        """Make it the present piece, if anybody still waits: a loop may end later than that."""
+        """Make it the present piece, if its listener still waits: a loop may end later than that."""
         if self.listener.waits:
             _span.set(self)
 
@@ -96,10 +96,10 @@ _span: ContextVar[_Span | None] = ContextVar("span", default=None)
 
 
 @contextmanager
-def heard(report: Callable[[float], object]) -> Iterator[None]:
+def progress_to(report: Callable[[float], object]) -> Iterator[None]:
     """Let `report` be called with the share that is done (0 to 1), as the work in the block goes on.
 
-    Only work in the same thread is heard.
+    Only work in the same thread is reported.
     """
     listener = _Listener(report)
     token = _span.set(_Span(listener, 0.0, 1.0))
@@ -110,8 +110,8 @@ def heard(report: Callable[[float], object]) -> Iterator[None]:
         _span.reset(token)
 
 
-def told(pieces: Iterable[T], count: int | None = None) -> Iterator[T]:
-    """Pass pieces of work on, and tell how many are done.
+def with_progress(pieces: Iterable[T], count: int | None = None) -> Iterator[T]:
+    """Pass pieces of work on, and report how many are done.
 
     Args:
         pieces: of about equal work.
@@ -134,8 +134,8 @@ def told(pieces: Iterable[T], count: int | None = None) -> Iterator[T]:
 
 
 @contextmanager
-def portion(begin: float, end: float) -> Iterator[None]:
-    """Let the work in the block be a portion of the present piece, say its first third.
+def progress_span(begin: float, end: float) -> Iterator[None]:
+    """Let the work in the block be a part of the present piece, say its first third.
 
     Args:
         begin: share of the piece that is done before.

@@ -14,7 +14,7 @@ import numpy as np
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.events import EventArray
-from jeat_graph.data.progress import told
+from jeat_graph.data.progress import with_progress
 from jeat_graph.detection.ahead import ahead
 from jeat_graph.detection.binned import BinnedDetector, Signal
 from jeat_graph.detection.event_detector import EventDetector
@@ -151,10 +151,10 @@ def _picture_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str]
         network = network_file(request.detector_frames, FRAMES)
         model = ModelPictureDetector(network, FRAMES_SENSOR, request.settings.model_frames)
         say(model.description)
-        return (model(frame, t) for t, frame in told(source, len(source)))
+        return (model(frame, t) for t, frame in with_progress(source, len(source)))
     detector = PictureDetector(FRAMES_SENSOR, request.settings.frames)
     _prime(detector, source, request)
-    found = (detector(frame, t) for t, frame in told(source, len(source)))
+    found = (detector(frame, t) for t, frame in with_progress(source, len(source)))
     return (scan for scan in found if scan is not None)
 
 
@@ -180,7 +180,7 @@ def _fused_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str], 
         assert source is not None
         detector = FusedDetector(network, source.size_px, FUSED_SENSOR, *settings)
         say(detector.description)
-        return (detector.look_at(frame, t) for t, frame in told(source, len(source)))
+        return (detector.look_at(frame, t) for t, frame in with_progress(source, len(source)))
     reader, size_px = _events(request, stack, say)
     if source is not None and source.size_px != size_px:
         (width, height), (wide, high) = source.size_px, size_px
@@ -189,7 +189,7 @@ def _fused_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str], 
             "events of the same pixels",
             request.frames,
         )
-    pictures = () if source is None else told(source, len(source))
+    pictures = () if source is None else with_progress(source, len(source))
     detector = FusedDetector(network, size_px, FUSED_SENSOR, *settings, pictures)
     say(detector.description)
     return _pushed(detector, reader, request, say)

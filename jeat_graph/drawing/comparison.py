@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.data.progress import told
+from jeat_graph.data.progress import with_progress
 from jeat_graph.drawing.palette import AXES, FILTER, FULL, GRID, LAGGED, TRUTH
 from jeat_graph.eval.compare import Comparison
 from jeat_graph.eval.samples import Samples, lag_name
@@ -71,9 +71,9 @@ def write_plots(comparison: Comparison, folder: str | Path) -> list[Path]:
                 }
             if on_road.get("by_distance"):
                 figures["road-errors"] = lambda: road_errors(plt, on_road)
-            for name, draw in told(figures.items()):
+            for name, draw in with_progress(figures.items()):
                 figure = draw()
-                for suffix in told((".png", ".svg")):
+                for suffix in with_progress((".png", ".svg")):
                     path = Path(folder) / (name + suffix)
                     with atomic_path(path) as temporary:
                         figure.savefig(temporary, metadata={"Date": None} if suffix == ".svg" else None)

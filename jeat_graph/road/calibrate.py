@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 
 from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.progress import told
+from jeat_graph.data.progress import with_progress
 from jeat_graph.road.camera import PARAMETERS, Georeference, RoadCamera
 from jeat_graph.road.evidence import Points
 from jeat_graph.road.lane_spacing import find_comb
@@ -133,7 +133,7 @@ def _solve(problem: Problem) -> CameraCalibration:
     weighting = Weighting(np.zeros((0, 0)), 1.0, problem.config.track_px, 1.0, np.ones(shape))
     acceleration = 0.0
     covariance = np.zeros((len(PARAMETERS), len(PARAMETERS)))
-    for _ in told(range(_MOST_ROUNDS)):
+    for _ in with_progress(range(_MOST_ROUNDS)):
         weighting = _reweighted(camera, problem, weighting, acceleration)
         start = camera
 

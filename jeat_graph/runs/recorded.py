@@ -11,7 +11,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.diagnostics import Diagnostics
-from jeat_graph.data.progress import portion
+from jeat_graph.data.progress import progress_span
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.eval.judge import Judgement
 from jeat_graph.runs.directory import DIAGNOSTICS, read_record
@@ -91,9 +91,9 @@ def load_run_data(run: str | Path, truth: str | Path | None = None, rate_hz: flo
     files = tables_of(folder)
     judged: dict[str, Judgement] = {}
     if truth is not None:
-        with portion(0.0, 0.4):
+        with progress_span(0.0, 0.4):
             one = load_run(run, truth, rate_hz=rate_hz)
-        with portion(0.4, 1.0):
+        with progress_span(0.4, 1.0):
             judged = judge_runs([one])
         causal, smoothed = one.causal, one.smoothed
     else:

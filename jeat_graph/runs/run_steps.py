@@ -15,7 +15,7 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError, InputWarning
-from jeat_graph.data.progress import heard, ticking
+from jeat_graph.data.progress import progress_to, refreshing
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.piecewise import PiecewiseWriter
 from jeat_graph.runs.directory import DIAGNOSTICS, MEASUREMENTS, RESUME, SUFFIXES, RunDirectory
@@ -88,7 +88,7 @@ class RunSteps:
         with (
             _Files(self._run, self._config, self._options, self._named) as self._files,
             tqdm(total=len(self._instants), desc="track", unit="step", disable=hidden, leave=False) as bar,
-            ticking(bar),
+            refreshing(bar),
         ):
             if self._unfinished is not None:
                 self._unfinished.begin()
@@ -122,8 +122,8 @@ class RunSteps:
         hidden = not self._options.progress
         with (
             tqdm(total=1.0, desc="smooth", bar_format=form, disable=hidden, leave=False) as bar,
-            ticking(bar),
-            heard(lambda share: bar.update(share - bar.n)),
+            refreshing(bar),
+            progress_to(lambda share: bar.update(share - bar.n)),
         ):
             return self._tracker.finish()
 

@@ -10,7 +10,7 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import RecordArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.measured_track import MeasuredTrack
-from jeat_graph.data.progress import told
+from jeat_graph.data.progress import with_progress
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.measured import ConfirmedMeasurements, measured_tracks
 from jeat_graph.tracking.tracker import Tracker
@@ -51,7 +51,7 @@ def record_measurements(
     with tqdm(
         total=detections.num_scans, desc="track", unit="scan", disable=not progress, leave=False
     ) as bar:
-        for batch in told(detections.batches(), len(np.unique(detections.scan_t))):
+        for batch in with_progress(detections.batches(), len(np.unique(detections.scan_t))):
             tables.append(tracker.step(batch))
             measured.add_step()
             bar.update(len(batch))

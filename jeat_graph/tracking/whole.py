@@ -8,7 +8,7 @@ import numpy as np
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
-from jeat_graph.data.progress import told
+from jeat_graph.data.progress import with_progress
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.tracker import Tracker
 
@@ -34,5 +34,5 @@ def track(config: Config, detections: Detections) -> Trajectories:
         detections: the recording.
     """
     causal_only = replace(config, smoother=replace(config.smoother, engine="none"))
-    steps = told(Tracker(causal_only).run(detections), len(np.unique(detections.scan_t)))
+    steps = with_progress(Tracker(causal_only).run(detections), len(np.unique(detections.scan_t)))
     return Trajectories.concatenate(list(steps) or [Trajectories.empty()])

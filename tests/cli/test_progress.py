@@ -20,7 +20,7 @@ from jeat_graph.cli.progress import stages
 from jeat_graph.cli.terminal import in_good_order
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.events import EventArray
-from jeat_graph.data.progress import heard, told, write_line
+from jeat_graph.data.progress import progress_to, with_progress, write_line
 from jeat_graph.detection.detecting import DetectRequest, detect_files
 from jeat_graph.detection.summary import summarise
 from jeat_graph.drawing.page.document import render_page
@@ -71,7 +71,7 @@ def test_the_percentage_moves_within_a_stage(monkeypatch):
     with stages("eval", 2) as stage:
         stage("reading")
         stage("judging")
-        for k in told(range(4)):
+        for k in with_progress(range(4)):
             if k == 2:
                 wait_until(lambda: "eval: judging  75%" in stream.getvalue())
     assert "100%" not in stream.getvalue().split("judging  75%")[0]
@@ -90,7 +90,7 @@ def test_a_tracker_tells_how_many_tracks_it_has_smoothed(smoother, recording):
     for _ in tracker.run(read_detections(recording / "detections.csv")):
         pass
     shares: list[float] = []
-    with heard(shares.append):
+    with progress_to(shares.append):
         tracker.finish()
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
@@ -101,7 +101,7 @@ def test_a_tracker_tells_how_many_tracks_it_has_smoothed(smoother, recording):
 def moves(work: Callable[[], object]) -> list[float]:
     """What a piece of work tells of its progress."""
     shares: list[float] = []
-    with heard(shares.append):
+    with progress_to(shares.append):
         work()
     assert shares == sorted(shares)
     return sorted(set(shares))

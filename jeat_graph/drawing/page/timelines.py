@@ -8,7 +8,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.diagnostics import Diagnostics
-from jeat_graph.data.progress import told
+from jeat_graph.data.progress import with_progress
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.drawing.page.thinning import extremes, milliseconds, occupied, sample, short, spread
 from jeat_graph.eval.resampling import interpolate_to
@@ -43,7 +43,7 @@ def timelines(data: RunData) -> list[dict[str, Any]]:
     chosen = _longest(ids, causal, smoothed)
     points = int(np.clip(_BUDGET // max(len(chosen), 1), _LEAST_POINTS, _MOST_POINTS))
     out = []
-    for track_id in told(chosen):
+    for track_id in with_progress(chosen):
         mine, after = causal.get(track_id), smoothed.get(track_id)
         noted = None
         if data.diagnostics is not None:

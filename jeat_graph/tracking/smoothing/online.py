@@ -9,7 +9,7 @@ import numpy as np
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.data.progress import portion, told
+from jeat_graph.data.progress import progress_span, with_progress
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.smoothers.engine import load_engine
 from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
@@ -177,13 +177,13 @@ class TrackSmoothers:
         histories, self._done = sorted(self._done, key=lambda h: h.track_id), []
         if self._stitch:
             histories = [history for history in histories if history.confirmed]
-            with portion(0.0, _STITCHED):
+            with progress_span(0.0, _STITCHED):
                 histories, joints = stitch_histories(
                     histories, np.concatenate([np.zeros(0), *self._scan_t]), self._config
                 )
             self.stitched += joints
-        with portion(_STITCHED if self._stitch else 0.0, 1.0):
-            for history in told(histories):
+        with progress_span(_STITCHED if self._stitch else 0.0, 1.0):
+            for history in with_progress(histories):
                 self._end(history)
         table = self._gathered([])
         self._ready.drain()

@@ -8,7 +8,7 @@ import numpy as np
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, RecordArray
-from jeat_graph.data.progress import told
+from jeat_graph.data.progress import with_progress
 from jeat_graph.filters.coloured_noise import MOTION
 from jeat_graph.smoothers.linking import FREEDOM, FragmentEnds, link, seeing_time
 from jeat_graph.smoothers.rts import smooth_ends
@@ -60,7 +60,7 @@ def stitch_histories(
 
 def fragment_ends(histories: Sequence[TrackHistory], config: Config) -> FragmentEnds:
     """Smooth each history by itself and return its first and last state."""
-    wholes = [history.whole() for history in told(histories)]
+    wholes = [history.whole() for history in with_progress(histories)]
     errors = ErrorStates.of(config)
     tracks = [track_data(rows, errors) for rows in wholes]
     states = smooth_ends(tracks)
