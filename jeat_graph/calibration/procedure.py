@@ -72,7 +72,8 @@ def calibrate_with_truth(
     """
     base = fit_input(base, *(detections for detections, _ in recordings))[0]
     lags = settled(
-        lambda known: _lags_with_truth(_on_time(recordings, known), base), with_progress(range(_ROUNDS), 2 * _ROUNDS)
+        lambda known: _lags_with_truth(_on_time(recordings, known), base),
+        with_progress(range(_ROUNDS), 2 * _ROUNDS),
     )
     # Each sensor by its own lag, early ones too: the truth stays where it is.
     pairs = _on_time(recordings, found_lags(lags))
