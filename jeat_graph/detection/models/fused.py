@@ -24,15 +24,15 @@ from jeat_graph.detection.settings import BESIDE_RATE_HZ, EventSettings
 from jeat_graph.io.decoders import RgbImage
 
 PICTURE, GIVEN = "picture", "given"
-#: Times of a window's end and of a picture may differ by so much and be the same (s).
-_SAME_S = 1e-4
+_US_PER_S = 1e6
 
 
 class FusedDetector(ModelEventDetector):
     """Turns events, given piece by piece, and pictures into scans by a network that `train fused` made.
 
-    A picture counts from its own time on: give those up to a time before the events that go beyond it, by
-    `see` or as an iterator, which is read no further than the events have come.
+    A picture counts from its own time on, and for a window that ends less than half a bin before it: give
+    those up to a time before the events that go beyond it, by `see` or as an iterator, which is read no
+    further than the events have come.
 
     Args:
         path: the ONNX file.
@@ -65,6 +65,8 @@ class FusedDetector(ModelEventDetector):
         _check(read_onnx_head(path), Path(path))
         super().__init__(path, size_px, sensor, times, settings)
         self._source = iter(pictures)
+        # Windows end with bins, pictures when they come: nearer than half a bin they are of one time.
+        self._same_s = self._bins.bin_us / _US_PER_S / 2.0
         self._coming: deque[tuple[float, RgbImage]] = deque()
         self._shown: npt.NDArray[Any] | None = None
         self._shown_s = 0.0
@@ -98,7 +100,7 @@ class FusedDetector(ModelEventDetector):
                 if following is None:
                     break
                 self._coming.append(following)
-            if self._coming[0][0] > t + _SAME_S:
+            if self._coming[0][0] > t + self._same_s:
                 break
             newest = self._coming.popleft()
         if newest is not None:

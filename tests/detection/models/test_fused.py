@@ -74,6 +74,14 @@ def test_a_window_goes_with_the_newest_picture_and_its_age(net):
     assert scans[-1].boxes[0, 1] > TOP + PER_S * 0.25
 
 
+@pytest.mark.parametrize(("late_s", "age_s"), [(0.0024, 0.0), (0.0026, 0.0974), (-0.001, 0.001)])
+def test_a_picture_half_a_bin_from_a_windows_end_is_of_its_time(net, late_s, age_s):
+    pictures = [(float(t) + late_s, frame()) for t in (0.1, 0.2, 0.3)]
+    for scan in FusedDetector(net, SIDE, times=FAST, pictures=pictures).push(few_events()):
+        if any(abs(scan.t - t) < 1e-6 for t in (0.2, 0.3)):
+            assert scan.boxes[0, 1] == pytest.approx(TOP + PER_S * age_s, abs=1e-3)
+
+
 def test_pictures_are_read_no_further_than_the_events_have_come(net):
     read = []
 
