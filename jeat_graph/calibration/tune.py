@@ -18,6 +18,7 @@ import numpy as np
 from jeat_graph.calibration.supervised import Recording
 from jeat_graph.calibration.verdict import Verdict, better, judge
 from jeat_graph.config.schema import Config
+from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
@@ -168,17 +169,12 @@ def knobs(config: Config) -> list[Knob]:
 
 
 def shorten(recordings: Sequence[Recording], max_scans: int) -> list[Recording]:
-    """Keep the first part of each recording, the same share of all, about `max_scans` scans in all."""
+    """Keep of each recording where most true boxes are: the same share of all, `max_scans` in all or so."""
     total = sum(detections.num_scans for detections, _ in recordings)
     share = max_scans / max(total, 1)
     if share >= 1.0:
         return list(recordings)
-    out = []
-    for detections, truth in recordings:
-        scans = max(int(share * detections.num_scans), 1)
-        end = detections.scan_t[scans - 1]
-        out.append((cut_scans(detections, 0, scans), cut_truth(truth, -np.inf, float(end))))
-    return out
+    return [_fullest(*one, max(int(share * one[0].num_scans), 1)) for one in recordings]
 
 
 def folds(recordings: Sequence[Recording]) -> list[list[Recording]]:
@@ -186,13 +182,33 @@ def folds(recordings: Sequence[Recording]) -> list[list[Recording]]:
     if len(recordings) > 1:
         return [list(recordings[0::2]), list(recordings[1::2])]
     detections, truth = recordings[0]
-    middle = detections.num_scans // 2
-    if middle == 0:
+    instants = instant_starts(detections)
+    if len(instants) < 3:
         return [list(recordings)]
+    middle = int(instants[np.argmin(np.abs(instants - detections.num_scans // 2))])
     t = float(detections.scan_t[middle - 1])
     first = (cut_scans(detections, 0, middle), cut_truth(truth, -np.inf, t))
     second = (cut_scans(detections, middle, detections.num_scans), cut_truth(truth, t, np.inf))
     return [[first], [second]] if len(first[1].t) and len(second[1].t) else [list(recordings)]
+
+
+def instant_starts(detections: Detections) -> IntArray:
+    """First scan of each instant, and the number of scans: scans of one time are taken in together."""
+    return np.searchsorted(detections.scan_t, np.append(np.unique(detections.scan_t), np.inf))
+
+
+def _fullest(detections: Detections, truth: GroundTruth, scans: int) -> Recording:
+    """Cut a recording to about so many scans, where it has most true boxes that are to be found."""
+    instants = instant_starts(detections)
+    first = instants[: max(int(np.searchsorted(instants, detections.num_scans - scans, side="right")), 1)]
+    end = instants[np.searchsorted(instants, first + scans)]
+    there = np.sort(truth.t[~truth.ignore])
+    since = np.searchsorted(there, detections.scan_t[first])
+    until = np.searchsorted(there, detections.scan_t[end - 1], side="right")
+    k = int(np.argmax(until - since))
+    low, high = int(first[k]), int(end[k])
+    before = float(detections.scan_t[low - 1]) if low else -np.inf
+    return cut_scans(detections, low, high), cut_truth(truth, before, float(detections.scan_t[high - 1]))
 
 
 def cut_scans(detections: Detections, first: int, end: int) -> Detections:

@@ -17,6 +17,7 @@ from jeat_graph.calibration.supervised import Recording
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.detections import Detections
+from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.eval.frames import Kind
 from jeat_graph.eval.metrics import evaluate
@@ -38,12 +39,19 @@ class Verdict:
         weight: (N,) number of true boxes of each.
         fold: (N,) the half of the recordings to which it belongs.
         charge: price of untrue variances (per cent).
+
+    Raises:
+        DataError: nothing to be judged by.
     """
 
     accuracy: FloatArray
     weight: FloatArray
     fold: IntArray
     charge: float
+
+    def __post_init__(self) -> None:
+        if not len(self.accuracy):
+            raise DataError("no truth has a box that is to be found, so that tracking cannot be judged")
 
     @property
     def mean(self) -> float:

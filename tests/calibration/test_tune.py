@@ -8,10 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.calibration.supervised import calibrate
-from jeat_graph.calibration.tune import folds, knobs, plateau, shorten, tune
+from jeat_graph.calibration.tune import cut_truth, folds, knobs, plateau, shorten, tune
 from jeat_graph.calibration.verdict import Verdict, judge
 from jeat_graph.config.reading import load_config
+from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.trajectories import GroundTruth
 
 
 def test_the_middle_of_a_plateau_beats_a_higher_peak():
@@ -26,12 +28,51 @@ def test_plateau_keeps_between_the_extremes(scores):
     assert np.all(out <= max(scores) + 1e-9)
 
 
-def test_shortened_recordings_hold_the_beginning_of_each(recordings):
-    short = shorten(recordings, 400)
-    assert sum(d.num_scans for d, _ in short) == pytest.approx(400, abs=2)
-    for (part, truth), (whole, _) in zip(short, recordings, strict=True):
-        np.testing.assert_array_equal(part.boxes, whole.boxes[: len(part)])
-        assert truth.frame_times()[-1] == part.scan_t[-1]
+def two_sensors(instants, busy=()):
+    """Scans of two sensors at each instant; three vehicles to be found where it is busy, else two."""
+    t = np.arange(instants) / 20.0
+    rows = np.repeat(t, 2)
+    sensors = np.tile(["evt", "rgb"], instants)
+    boxes = np.tile([100.0, 100.0, 40.0, 30.0], (len(rows), 1))
+    detections = Detections.from_rows(rows, sensors, boxes, np.full(len(rows), 0.9))
+    there = np.repeat(t, 3)
+    ids = np.tile(np.arange(3), instants)
+    ignore = (ids == 2) & ~np.isin(np.arange(instants).repeat(3), busy)
+    truth = GroundTruth(there, ids, np.tile([100.0, 100.0, 40.0, 30.0], (len(there), 1)), None, ignore)
+    return detections, truth
+
+
+def test_shortened_recordings_hold_the_stretch_of_each_with_most_truth():
+    early, late = two_sensors(60, busy=range(20)), two_sensors(60, busy=range(40, 60))
+    short = shorten([early, late], 80)
+    for (part, truth), (first, last) in zip(short, ((0, 20), (40, 60)), strict=True):
+        np.testing.assert_array_equal(np.unique(part.scan_t), np.arange(first, last) / 20.0)
+        np.testing.assert_array_equal(truth.frame_times(), np.unique(part.scan_t))
+        assert not truth.ignore.any()
+
+
+def test_truth_that_begins_late_is_not_cut_off():
+    detections, truth = two_sensors(60)
+    late = cut_truth(truth, 2.0, np.inf)
+    ((part, kept),) = shorten([(detections, late)], 30)
+    assert len(kept.t)
+    assert part.scan_t[0] > 2.0
+    assert kept.t.min() >= part.scan_t[0]
+
+
+@pytest.mark.parametrize("scans", [1, 7, 33, 61])
+def test_scans_of_one_instant_stay_together(scans):
+    (recording,) = shorten([two_sensors(61)], scans)
+    pieces = [one for half in folds([recording]) for one in half]
+    assert sum(detections.num_scans for detections, _ in pieces) == recording[0].num_scans
+    assert recording[0].num_scans == pytest.approx(scans, abs=1)
+    for detections, _ in pieces:
+        assert np.all(np.unique(detections.scan_t, return_counts=True)[1] == 2)
+
+
+def test_one_instant_is_not_split():
+    detections, truth = two_sensors(1)
+    assert folds([(detections, truth)]) == [[(detections, truth)]]
 
 
 def merit(config, training):

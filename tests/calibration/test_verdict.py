@@ -9,6 +9,7 @@ from jeat_graph import load_config
 from jeat_graph.calibration.tune import folds, shorten
 from jeat_graph.calibration.verdict import Verdict, better, judge, judge_both, standard_error
 from jeat_graph.data.detections import Detections
+from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.eval.metrics import evaluate
 from jeat_graph.tracking.whole import track
@@ -76,6 +77,11 @@ def test_accuracy_is_the_mean_of_three_scores_of_each_recording(recordings):
         s = evaluate([(truth, track(config, detections))], instants=[np.unique(detections.scan_t)])
         assert found.accuracy[k] == pytest.approx((s.MOTA + s.IDF1 + s.HOTA) / 3.0)
         assert found.weight[k] == s.truth_boxes
+
+
+def test_nothing_to_find_is_no_verdict():
+    with pytest.raises(DataError, match="no truth has a box"):
+        verdict([])
 
 
 def test_a_recording_without_a_vehicle_is_judged_with_the_one_before(recordings):
