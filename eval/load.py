@@ -49,6 +49,7 @@ def load_run(
     truth: str | Path,
     *,
     rate_hz: float | None = None,
+    time_unit: str = "s",
     classes: Sequence[str] | None = None,
 ) -> JudgedRun:
     """Read a run and its truth, and check that they belong together.
@@ -58,6 +59,7 @@ def load_run(
             causal), or a MOTChallenge or KITTI result.
         truth: the truth, in any format that `read_truth` knows.
         rate_hz: frame rate of files that count frames; by default that of the truth.
+        time_unit: unit of the truth's column `t`, of `io.time_units`; runs are in seconds.
         classes: classes of objects to be found; others are ignored, and so are tracks that have another
             class. All by default.
 
@@ -72,7 +74,7 @@ def load_run(
     truth_form = recognise(truth_path)
     if rate_hz is None and truth_form == "motchallenge":
         rate_hz = _motchallenge_rate(truth_path, form == "motchallenge")
-    objects = _read_truth(truth_path, rate_hz, classes)
+    objects = _read_truth(truth_path, rate_hz, time_unit, classes)
     if rate_hz is not None and form in BY_FRAME and truth_form not in BY_FRAME:
         _check_rate(rate_hz, objects, truth_path)
     if rate_hz is None and form in BY_FRAME:
@@ -185,10 +187,12 @@ def _motchallenge_rate(truth: Path, any_will_do: bool) -> float:
         ) from None
 
 
-def _read_truth(path: Path, rate_hz: float | None, classes: Sequence[str] | None) -> GroundTruth:
+def _read_truth(
+    path: Path, rate_hz: float | None, time_unit: str, classes: Sequence[str] | None
+) -> GroundTruth:
     from jeat_graph.io.truth_io import read_truth
 
-    truth = read_truth(path, rate_hz=rate_hz)
+    truth = read_truth(path, rate_hz=rate_hz, time_unit=time_unit)
     try:
         check_truth(truth)
         return truth if classes is None else restrict_classes(truth, classes)

@@ -180,7 +180,7 @@ def calibrate(
 
     Args:
         detections: one recording or several, or their files.
-        truth: the truth of each; without it confirmed tracks take its place.
+        truth: the truth of each; without it only sensors, their rates and their clocks are found.
         base: where all that is not estimated comes from.
         image: width and height of the picture (px), if not those of `base`.
         tuned: with truth, also choose by tracking the recordings what matched detections cannot tell; takes

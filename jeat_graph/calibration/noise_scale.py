@@ -26,7 +26,8 @@ def with_noise(config: Config, factor: float) -> Config:
 def scale_noise(config: Config, folds: Sequence[Sequence[Recording]]) -> tuple[Config, float, Verdict]:
     """Choose the factor on the noise of the centre with which both tables are best and honest.
 
-    Accuracy comes first: of the factors that cost none of it, the one whose variances are truest.
+    Of the factors that cost no accuracy beyond chance it is the one with the greatest merit: accuracy less
+    the price of variances that are not true.
 
     Args:
         config: calibrated.

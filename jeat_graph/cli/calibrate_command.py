@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     picture = _picture_from(args, base, beside)
     base = with_image(base, recordings, args.image or (None if beside is None else beside.size_px))
     if args.gt:
-        truths = [read_truth(path, rate_hz=args.rate) for path in args.gt]
+        truths = [read_truth(path, rate_hz=args.rate, time_unit=args.time_unit) for path in args.gt]
         found = _with_truth(list(zip(recordings, truths, strict=True)), base, not args.no_tune)
     else:
         found = _without_truth(recordings, base)

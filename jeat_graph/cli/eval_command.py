@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jeat_graph.cli.options import add_classes, add_rate
+from jeat_graph.cli.options import add_classes, add_rate, add_time_unit
 from jeat_graph.cli.progress import stages
 from jeat_graph.config.argument_types import positive, share
 from jeat_graph.data.errors import DataError
@@ -33,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--iou", type=share, default=0.5, help="smallest IoU of a match (0.5)")
     add_classes(parser, "classes to be found; others are ignored, and so are tracks of another class")
     add_rate(parser)
+    add_time_unit(parser, " of --gt and --detections; RUN is in seconds")
     add("--max-age", type=positive, metavar="S", help="how far to predict causal rows (0.15)")
     add("--max-gap", type=positive, metavar="S", help="join no smoothed rows further apart than this")
     add("--breakdown", action="store_true", help="also by motion and distance, and waiting times")
@@ -58,7 +59,13 @@ def run(args: argparse.Namespace) -> int:
     with stages("eval", 2 + args.breakdown + bool(args.detections)) as stage:
         stage("reading")
         runs = [
-            load_run(path, truth, rate_hz=rate_of_truth(path, truth, args.rate), classes=args.classes)
+            load_run(
+                path,
+                truth,
+                rate_hz=rate_of_truth(path, truth, args.rate),
+                time_unit=args.time_unit,
+                classes=args.classes,
+            )
             for path, truth in with_progress(list(zip(args.runs, args.gt, strict=True)))
         ]
         if args.classes is not None:
@@ -121,7 +128,9 @@ def _detections(
 
     if len(args.detections) != len(truths):
         raise DataError(f"{len(truths)} RUN and {len(args.detections)} --detections given; give one for each")
-    detections = [read_detections(path, rate_hz=args.rate) for path in args.detections]
+    detections = [
+        read_detections(path, rate_hz=args.rate, time_unit=args.time_unit) for path in args.detections
+    ]
     found = detection_ap(list(zip(truths, detections, strict=True)))
     values = {sensor: one.as_dict() for sensor, one in found.items()}
     records: list[dict[str, Cell]] = [{"sensor": sensor, **one} for sensor, one in values.items()]

@@ -124,10 +124,10 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     add_classes(parser, "take detections of these classes only, and those without a class")
 
 
-def add_time_unit(parser: argparse.ArgumentParser) -> None:
-    """Declare `--time-unit`."""
-    units = tuple(TIME_UNITS)
-    parser.add_argument("--time-unit", choices=units, default="s", help="unit of the column t (default: s)")
+def add_time_unit(parser: argparse.ArgumentParser, where: str = "") -> None:
+    """Declare `--time-unit` of the column t `where` it is not that of every file."""
+    text = f"unit of the column t{where} (default: s)"
+    parser.add_argument("--time-unit", choices=tuple(TIME_UNITS), default="s", help=text)
 
 
 def add_classes(parser: argparse.ArgumentParser, text: str) -> None:

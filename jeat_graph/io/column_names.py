@@ -83,14 +83,19 @@ def times_of(table: FileTable, unit: str, rate_hz: float | None) -> FloatArray:
 
     Args:
         table: with one of these columns.
-        unit: of the column `t`.
+        unit: of the column `t`; `s` also where nobody said anything.
         rate_hz: frames per second; frame k is at k / rate.
 
     Raises:
-        DataError: the first row without a time; or frames without a rate.
+        DataError: the first row without a time; frames without a rate; or a column that names another unit.
     """
     name = standing_in(table.names, ["t"])[0]
     if name in TIME_COLUMNS:
+        if unit not in ("s", TIME_COLUMNS[name]):
+            raise DataError(
+                f"column {name!r} is in {TIME_COLUMNS[name]}, but --time-unit says {unit}; leave it out",
+                table.path,
+            )
         return in_seconds(table.number(name), TIME_COLUMNS[name])
     if name != "frame":
         return in_seconds(table.number(name), unit)

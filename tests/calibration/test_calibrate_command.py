@@ -1,6 +1,7 @@
 """The command `jeat-graph calibrate`."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -33,6 +34,23 @@ def test_with_truth_a_configuration_is_written_that_loads(files, tmp_path, capsy
     assert "Sensors" in table
     assert "jerk_per_size" in table
     assert "not tuned" in out.read_text().split("sensors:")[0]
+
+
+def test_detections_and_truth_may_be_in_another_unit_of_time(files, tmp_path):
+    out = [tmp_path / name for name in ("s.yaml", "ms.yaml")]
+    d, g = files[0]
+    scaled = []
+    for path in (d, g):
+        head, *lines = Path(path).read_text().splitlines()
+        rows = [line.split(",", 1) for line in lines]
+        scaled.append(tmp_path / Path(path).name)
+        scaled[-1].write_text(
+            "\n".join([head, *(f"{1000 * float(t):.0f},{rest}" for t, rest in rows)]) + "\n"
+        )
+    in_ms = ["calibrate", str(scaled[0]), "--gt", str(scaled[1]), "--time-unit", "ms"]
+    for path, args in zip(out, (["calibrate", d, "--gt", g], in_ms), strict=True):
+        assert main([*args, "--no-tune", "--out", str(path)]) == 0
+    assert load_config(out[0]) == load_config(out[1])
 
 
 def test_without_truth_the_head_of_the_file_says_so(files, tmp_path):

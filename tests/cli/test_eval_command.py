@@ -132,6 +132,21 @@ def test_breakdown_and_detections_are_added_when_asked_for(run, truth, tmp_path,
     assert result["detections"]["rgb"]["AP"] == 100.0
 
 
+def test_truth_and_detections_may_be_in_another_unit_of_time(run, truth, tmp_path, capsys):
+    detections = tmp_path / "detections.csv"
+    rows = [f"{t:.2f},rgb,{100 * t:.3f},0,40,20,0.9" for t in times()]
+    detections.write_text("t,sensor,left,top,width,height,score\n" + "\n".join(rows) + "\n")
+    arguments = (run, "--gt", truth, "--detections", detections, "--json", "-")
+    seconds = call(capsys, *arguments)[1]
+    for path in (truth, detections):
+        head, *lines = path.read_text().splitlines()
+        fields = [line.split(",") for line in lines]
+        scaled = [",".join([f"{round(1000 * float(first))}", *rest]) for first, *rest in fields]
+        path.write_text("\n".join([head, *scaled]) + "\n")
+    assert call(capsys, *arguments, "--time-unit", "ms") == (0, seconds, "")
+    assert call(capsys, *arguments)[0] == 2
+
+
 def test_a_motchallenge_result_has_its_known_scores(capsys):
     folder = need(DATA / "tud" / "TUD-Campus")
     out = call(capsys, folder / "test.txt", "--gt", folder / "gt.txt", "--json", "-")[1]

@@ -81,6 +81,13 @@ def test_a_unit_of_time_can_be_told(write):
     same(write("d.csv", PLAIN.replace("0.55,", "550,").replace("\n0.5,", "\n500,")), time_unit="ms")
 
 
+def test_a_unit_of_time_that_a_column_contradicts_is_refused(write):
+    text = PLAIN.replace("t,", "t_ms,", 1).replace("0.55,", "550,").replace("\n0.5,", "\n500,")
+    same(write("d.csv", text), time_unit="ms")
+    with pytest.raises(DataError, match=r"d\.csv: column 't_ms' is in ms, but --time-unit says us"):
+        read_detections(write("d.csv", text), time_unit="us")
+
+
 def test_truth_understands_the_same_names(write):
     text = "Timestamp;ID;x1;y1;x2;y2;Label\n0,5;7;10,5;20;40,5;60;car\n"
     truth = read_truth(write("gt.csv", text))
