@@ -170,12 +170,28 @@ def _truth_between(
     move = truth.boxes[b[ib]] - truth.boxes[a[ia]]
     speed = np.hypot(*(move[:, :2] + 0.5 * move[:, 2:]).T) / span
     # Present in one frame only, it enters or leaves between them: it may be there at `t`, so it is ignored.
-    extra = np.concatenate([np.delete(a, ia), np.delete(b, ib)])
-    boxes = np.vstack([boxes, truth.boxes[extra]])
+    leaving, entering = np.delete(a, ia), np.delete(b, ib)
+    extra = np.concatenate([leaving, entering])
+    before = order[start[left - 1] : stop[left - 1]] if left else order[:0]
+    after = order[start[right + 1] : stop[right + 1]] if right + 1 < len(frames) else order[:0]
+    gone_on = [_moved_on(truth, leaving, before, t), _moved_on(truth, entering, after, t)]
+    boxes = np.vstack([boxes, *gone_on])
     ids = np.concatenate([ids, truth.object_id[extra]])
     ignored = np.concatenate([ignored, np.ones(len(extra), dtype=bool)])
     speed = np.concatenate([speed, np.full(len(extra), np.nan)])
     return boxes, ids, ignored, speed
+
+
+def _moved_on(truth: GroundTruth, rows: IntArray, beyond: IntArray, t: float) -> FloatArray:
+    """Boxes (R, 4) of a frame at `t`, as they move between it and the frame beyond it; else held still."""
+    boxes = truth.boxes[rows]
+    # Ids of ignored regions need not be unique.
+    own = np.flatnonzero(~truth.ignore[rows])
+    _, mine, theirs = np.intersect1d(truth.object_id[rows[own]], truth.object_id[beyond], return_indices=True)
+    mine, theirs = own[mine], beyond[theirs]
+    share = (t - truth.t[rows[mine]]) / (truth.t[rows[mine]] - truth.t[theirs])
+    boxes[mine, :2] += share[:, None] * (boxes[mine, :2] - truth.boxes[theirs, :2])
+    return boxes
 
 
 def _speed(truth: GroundTruth, rows: IntArray) -> FloatArray:

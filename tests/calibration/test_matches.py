@@ -62,6 +62,15 @@ def test_a_vehicle_that_enters_or_leaves_between_two_frames_counts_neither_way(t
     assert m.seen.tolist() == [True]
 
 
+@pytest.mark.parametrize("entering", [True, False])
+def test_one_that_drives_further_than_its_length_between_two_frames_counts_neither_way(entering):
+    rows = [(k / 10, 1, (0, 0, 40, 40)) for k in range(4)]
+    rows += [(k / 10, 2, (200 + 60 * k, 0, 40, 40)) for k in ((1, 2, 3) if entering else (0, 1, 2))]
+    t = 0.02 if entering else 0.28
+    m = match_sensor(scans((t, [(0, 0, 40, 40), (200 + 600 * t, 0, 40, 40)])), truth(sorted(rows)), "rgb")
+    assert m.correct.tolist() == [True]
+
+
 def test_the_box_behind_another_is_known_to_be_hidden():
     # The second reaches further down, so it stands nearer; it covers half of the first.
     g = truth([(0.0, 1, (0, 0, 40, 40)), (0.0, 2, (20, 0, 40, 60))])
