@@ -75,6 +75,34 @@ class SizeConfig(Section):
 
 
 @dataclass(frozen=True)
+class BoxesConfig(Section):
+    """What is learnt of each sensor's boxes beside those of other sensors (`filters.box_offsets`)."""
+
+    centre_share: float = number(
+        0.5,
+        "1",
+        "std of a systematic error of the centre, as a share of the side, next to sensors.*.bias_std",
+    )
+    centre_px: float = number(
+        20.0, "px", "std of a systematic error of the centre that all boxes have, next to sensors.*.bias_std"
+    )
+    pair_s: float = number(0.1, "s", "two sensors' boxes so close in time are compared")
+    witness_s: float = number(
+        1.0, "s", "boxes of one vehicle are one independent witness in so much time", open_low=True
+    )
+    tail_freedom: float = number(
+        4.0, "1", "degrees of freedom of Student's t for the difference of two boxes", 0.5
+    )
+    prior_s: float = number(
+        1.0,
+        "s",
+        "what is assumed of the noise of these differences weighs as much as so long a look at a vehicle",
+        open_low=True,
+    )
+    memory_s: float = number(1000.0, "s", "memory of what was learnt", open_low=True)
+
+
+@dataclass(frozen=True)
 class NoiseConfig(Section):
     """Adaptive measurement noise R = s R_base / g (paper eq. 5 and section on adaptive noise)."""
 

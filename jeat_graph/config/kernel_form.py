@@ -74,6 +74,7 @@ class SensorArrays(NamedTuple):
         correlation_time_s: (B,) correlation time of each error state (s).
         size_var: (S, 2) variances of ln width, ln height.
         bias: (S, 4) centre x / width, centre y / height, ln width, ln height.
+        bias_std: (S,) standard deviation of ln width and ln height beyond it; 0: there is none.
         p_detect: (S,) prior of a new track.
         clutter_per_scan: (S,) expected false boxes a scan.
         period_s: (S,) nominal time between scans (s).
@@ -94,6 +95,7 @@ class SensorArrays(NamedTuple):
     correlation_time_s: FloatArray
     size_var: FloatArray
     bias: FloatArray
+    bias_std: FloatArray
     p_detect: FloatArray
     clutter_per_scan: FloatArray
     period_s: FloatArray

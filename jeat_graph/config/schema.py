@@ -10,7 +10,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from jeat_graph.config.filtering import ImageConfig, MotionConfig, NoiseConfig, SizeConfig, StandingConfig
+from jeat_graph.config.filtering import (
+    BoxesConfig,
+    ImageConfig,
+    MotionConfig,
+    NoiseConfig,
+    SizeConfig,
+    StandingConfig,
+)
 from jeat_graph.config.lifecycle import (
     AssociationConfig,
     BirthConfig,
@@ -26,6 +33,7 @@ from jeat_graph.data.errors import ConfigError
 __all__ = [
     "AssociationConfig",
     "BirthConfig",
+    "BoxesConfig",
     "Config",
     "ImageConfig",
     "InputConfig",
@@ -53,6 +61,7 @@ class Config:
     standing: StandingConfig = field(default_factory=StandingConfig)
     size: SizeConfig = field(default_factory=SizeConfig)
     noise: NoiseConfig = field(default_factory=NoiseConfig)
+    boxes: BoxesConfig = field(default_factory=BoxesConfig)
     association: AssociationConfig = field(default_factory=AssociationConfig)
     lifecycle: LifecycleConfig = field(default_factory=LifecycleConfig)
     birth: BirthConfig = field(default_factory=BirthConfig)

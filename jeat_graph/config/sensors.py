@@ -33,6 +33,12 @@ class SensorConfig(Section):
         low=-1.0,
         high=1.0,
     )
+    bias_std: float = number(
+        0.0,
+        "ln px",
+        "standard deviation of a systematic error of ln width and ln height beyond `bias`, which is learnt "
+        "where other sensors see the same vehicles; 0: there is none",
+    )
     p_detect: float = number(0.9, "1", "probability that a visible vehicle is detected", 0.01, 0.999)
     clutter_per_scan: float = number(0.3, "boxes", "mean number of false boxes a scan", open_low=True)
     precision: float = number(0.9, "1", "fraction of its boxes that are vehicles", 0.001, 0.999)
@@ -84,6 +90,7 @@ class InputConfig(Section):
     correlated_share: float = number(0.0, "1", "of such a sensor", 0.0, 0.99)
     memory_s: float = number(0.2, "s", "of such a sensor", 1e-3, 1e4)
     disagreement: float | None = number(None, "1", "of such a sensor", 0.0)
+    bias_std: float = number(0.0, "ln px", "of such a sensor")
     picture: str = choice(
         "given",
         ("given", "seen"),

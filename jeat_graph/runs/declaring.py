@@ -94,6 +94,7 @@ def undeclared_sensor(assumed: InputConfig) -> SensorConfig:
         correlated_share=assumed.correlated_share,
         memory_s=assumed.memory_s,
         disagreement=assumed.disagreement,
+        bias_std=assumed.bias_std,
     )
 
 

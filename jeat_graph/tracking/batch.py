@@ -46,6 +46,7 @@ class Batch(NamedTuple):
         t: time (s).
         z: (M, 2) box centre, the sensor's bias removed (px).
         log_size: (M, 2) ln width, ln height, the sensor's bias removed.
+        plain: (M, 4) centre (px) and ln width, ln height before what was learnt of the sensor was removed.
         boxes: (M, 4) the corresponding left, top, width, height (px).
         precision: (M,) calibrated precision.
         log_score: (M,) ln of the score's likelihood ratio.
@@ -61,6 +62,7 @@ class Batch(NamedTuple):
     t: float
     z: FloatArray
     log_size: FloatArray
+    plain: FloatArray
     boxes: FloatArray
     precision: FloatArray
     log_score: FloatArray
@@ -104,13 +106,20 @@ def interpolate(x: float, knots: FloatArray, values: FloatArray) -> float:
 
 
 @njit(cache=True)
-def prepare(arrivals: Arrivals, model: Model) -> Batch:
-    """Turn the detections of one instant into measurements: bias removed, scores calibrated."""
+def prepare(arrivals: Arrivals, offsets: FloatArray, model: Model) -> Batch:
+    """Turn the detections of one instant into measurements: bias removed, scores calibrated.
+
+    Args:
+        arrivals: the detections.
+        offsets: (S, 2, 3) what was learnt of the sensors' systematic errors beyond the configured ones.
+        model: sensors and settings.
+    """
     sensors, noise, image = model.sensors, model.settings.noise, model.settings.image
     boxes, scores, sensor = arrivals.boxes, arrivals.scores, arrivals.sensor
     num = len(scores)
     z = np.empty((num, 2))
     log_size = np.empty((num, 2))
+    plain = np.empty((num, 4))
     corrected = np.empty((num, 4))
     precision = np.empty(num)
     log_score = np.empty(num)
@@ -128,11 +137,15 @@ def prepare(arrivals: Arrivals, model: Model) -> Batch:
                 # The detector's bias is that of whole boxes.
                 seen_side[j, axis] = high if cut[j, axis] == LOW_CUT else low
                 log_size[j, axis], z[j, axis] = math.log(side), low + 0.5 * side
+                plain[j, axis], plain[j, 2 + axis] = z[j, axis], log_size[j, axis]
                 corrected[j, axis], corrected[j, 2 + axis] = low, side
                 continue
             log_size[j, axis] = math.log(side) - sensors.bias[s, 2 + axis]
             z[j, axis] = boxes[j, axis] + (0.5 - sensors.bias[s, axis]) * side
+            plain[j, axis], plain[j, 2 + axis] = z[j, axis], log_size[j, axis]
+            log_size[j, axis] -= offsets[s, axis, 2]
             true_side = math.exp(log_size[j, axis])
+            z[j, axis] -= offsets[s, axis, 0] * true_side + offsets[s, axis, 1]
             corrected[j, 2 + axis] = true_side
             corrected[j, axis] = z[j, axis] - 0.5 * true_side
         calibrated = interpolate(scores[j], sensors.curve_score[s], sensors.curve_precision[s])
@@ -140,5 +153,5 @@ def prepare(arrivals: Arrivals, model: Model) -> Batch:
         log_score[j] = log_score_ratio(precision[j], sensors.precision[s])
         odds[j] = score_odds(scores[j])
         weight[j] = score_weight(scores[j], noise.score_floor) if noise.score_weighting else 1.0
-    found = z, log_size, corrected, precision, log_score, odds, weight
+    found = z, log_size, plain, corrected, precision, log_score, odds, weight
     return Batch(arrivals.t, *found, sensor, arrivals.present, cut, seen_side, arrivals.alike)

@@ -51,6 +51,7 @@ def keep_rows(tracks: TrackArrays, rows: IntArray) -> None:
     _shift(tracks.seen_by, rows, first)
     _shift(tracks.score_odds, rows, first)
     _shift(tracks.lasting, rows, first)
+    _shift(tracks.last_box, rows, first)
     _shift(tracks.worthy, rows, first)
 
 

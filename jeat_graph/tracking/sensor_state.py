@@ -16,6 +16,9 @@ class SensorState(NamedTuple):
         trust: factor on the weight of its evidence, as far as the other sensors bear it out, in (0, 1].
         blind: probability that it is blind as a whole now: finds nothing, whatever is there.
         noise_scale: mean factor on its noise variance over the confirmed tracks (paper eq. 5), 1 without any.
+        offset_centre_share: what its centres are off by beside those of others, as a share of the side;
+        offset_centre_px: and by so much whatever the size (px).
+        offset_log_size: what its ln width and ln height are off by. All of it is taken off its boxes.
     """
 
     clutter: float
@@ -23,6 +26,9 @@ class SensorState(NamedTuple):
     trust: float
     blind: float
     noise_scale: float
+    offset_centre_share: tuple[float, float] = (0.0, 0.0)
+    offset_centre_px: tuple[float, float] = (0.0, 0.0)
+    offset_log_size: tuple[float, float] = (0.0, 0.0)
 
 
 def sensor_states(now: Snapshot, sensors: tuple[str, ...]) -> dict[str, SensorState]:
@@ -35,6 +41,7 @@ def sensor_states(now: Snapshot, sensors: tuple[str, ...]) -> dict[str, SensorSt
             float(now.scene.trust[s]),
             float(now.scene.blind[s]),
             float(scale[:, s].mean()) if len(scale) else 1.0,
+            *[(float(x), float(y)) for x, y in now.scene.offsets[s].T],
         )
         for s, name in enumerate(sensors)
     }

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from jeat_graph.config.kernel_form import SensorArrays
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
+from jeat_graph.filters.box_offsets import NUM_SUMS
 
 # What lasts usually has scores of about .9; that is held to be known from five seconds of a track.
 _USUAL_ODDS, _USUAL_WEIGHT = 2.2, 5.0
@@ -45,6 +46,8 @@ class TrackArrays(NamedTuple):
         seen_by: (C,) bit s is set where sensor s's detection was ever taken.
         score_odds: (C,) mean log odds of the scores of its detections.
         lasting: (C,) whether it has lasted (`filters.worth`).
+        last_box: (C, S, 5) each sensor's last whole box, as it saw it: time (s), centre (px), ln width and ln
+            height.
         worthy: (C,) whether things of such scores last often enough to be believed of one sensor alone.
     """
 
@@ -72,6 +75,7 @@ class TrackArrays(NamedTuple):
     seen_by: IntArray
     score_odds: FloatArray
     lasting: npt.NDArray[np.bool_]
+    last_box: FloatArray
     worthy: npt.NDArray[np.bool_]
 
 
@@ -119,6 +123,9 @@ class SceneState(NamedTuple):
         lasting_seen: (S,) what that mean rests on, in seconds of a track.
         worth_mean: (S, 2) what its scores say of what lasts (`filters.worth`): a, b.
         worth_cov: (S, 2, 2) covariance of the two.
+        pair_sums: (S, S, 2, 10) what pairs of boxes of a sensor and a later one said (`filters.box_offsets`).
+        offsets: (S, 2, 3) what each sensor is off by along each axis: share of the side, px, ln side.
+        pair_factors: (S, S, 2, 2) factors on the variances that are assumed of their differences.
     """
 
     clutter: FloatArray
@@ -137,6 +144,9 @@ class SceneState(NamedTuple):
     lasting_seen: FloatArray
     worth_mean: FloatArray
     worth_cov: FloatArray
+    pair_sums: FloatArray
+    offsets: FloatArray
+    pair_factors: FloatArray
 
 
 def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
@@ -163,6 +173,9 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
         lasting_seen=np.full(num_sensors, _USUAL_WEIGHT),
         worth_mean=np.tile(assumed, (num_sensors, 1)),
         worth_cov=np.tile(config.lifecycle.worth_std**2 * np.eye(2), (num_sensors, 1, 1)),
+        pair_sums=np.zeros((num_sensors, num_sensors, 2, NUM_SUMS)),
+        offsets=np.zeros((num_sensors, 2, 3)),
+        pair_factors=np.ones((num_sensors, num_sensors, 2, 2)),
     )
 
 
@@ -194,6 +207,7 @@ def allocate(capacity: int, num_sensors: int, num_errors: int = 0) -> TrackArray
         seen_by=np.zeros(capacity, dtype=np.int64),
         score_odds=np.zeros(capacity),
         lasting=np.zeros(capacity, dtype=np.bool_),
+        last_box=np.full((capacity, num_sensors, 5), -np.inf),
         worthy=np.ones(capacity, dtype=np.bool_),
     )
 

@@ -9,6 +9,7 @@ from jeat_graph.filters.noise import widen_hidden
 from jeat_graph.tracking.batch import Arrivals, prepare
 from jeat_graph.tracking.stages.associating import associate
 from jeat_graph.tracking.stages.beginning import give_birth
+from jeat_graph.tracking.stages.comparing import learn_boxes
 from jeat_graph.tracking.stages.ending import confirm, remove_ended
 from jeat_graph.tracking.stages.learning import count_misses, learn_scene
 from jeat_graph.tracking.stages.predicting import current_p_detect, expect_detections, occlusion, predict_all
@@ -49,7 +50,7 @@ def step(
     n, settings = num_tracks, model.settings
     log.count[0] = 0
     predict_all(tracks, n, dt, scene, model)
-    batch = prepare(arrivals, model)
+    batch = prepare(arrivals, scene.offsets, model)
     doubt_scores(batch, scene, model)
     occluded = occlusion(tracks, n)
     p_found, p_detect = current_p_detect(tracks, n, batch, occluded, scene, model)
@@ -60,6 +61,7 @@ def step(
     update_matched(tracks, n, batch, expectation, association, scene, model, log)
     if settings.association.second_views:
         take_second_views(tracks, n, batch, association, model, log)
+    learn_boxes(tracks, n, batch, association, scene, model)
     learn_lasting(tracks, n, batch, association, scene, model)
     learn_trust(tracks, n, batch, association, scene, model)
     learn_scene(tracks, n, dt, batch, association, p_detect, scene, model)

@@ -23,6 +23,7 @@ from jeat_graph.filters.noise import base_variance
 from jeat_graph.filters.prior import write_prior, write_size_prior
 from jeat_graph.tracking.batch import Batch, Measured
 from jeat_graph.tracking.stages.associating import Association
+from jeat_graph.tracking.stages.comparing import remember_box
 from jeat_graph.tracking.stages.ending import confirm
 from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.stages.learning import scan_weight
@@ -71,6 +72,7 @@ def give_birth(
         if partner[j] >= 0:
             i = n + partner[j]
             update_track(tracks, i, batch, j, second_view(tracks, i, batch, j, model.sensors), model, log)
+            remember_box(tracks, i, batch, j)
             # Two sensors' false boxes seldom coincide: each view's chance to be false remains.
             tracks.existence[i] = 1.0 - (1.0 - tracks.existence[i]) * (1.0 - batch.precision[j])
     judge_worth(tracks, n + len(parents), scene, model)
@@ -200,6 +202,8 @@ def start_track(
     tracks.worthy[i] = True
     tracks.t_birth[i] = t
     tracks.born_at[i] = view.z
+    tracks.last_box[i] = -np.inf
+    remember_box(tracks, i, batch, j)
     tracks.t_update[i] = t
     tracks.used[i] = 1 << s
     tracks.seen_by[i] = 1 << s
