@@ -28,6 +28,7 @@ SENSOR_PARTS = {
         "correlated_share",
         "memory_s",
         "bias",
+        "bias_std",
     ),
     _SIZE: ("sigma_log_width", "sigma_log_height"),
     "reliability": ("p_detect", "clutter_per_scan", "precision", "score_precision", "blind_speed"),

@@ -63,6 +63,8 @@ def calibrate_sensor(matches: SensorMatches, known: SensorConfig) -> SensorConfi
         sigma_log_width=float(max(np.sqrt(np.mean(centred[:, 2] ** 2)), 0.005)),
         sigma_log_height=float(max(np.sqrt(np.mean(centred[:, 3] ** 2)), 0.005)),
         bias=(float(bias[0]), float(bias[1]), float(bias[2]), float(bias[3])),
+        # With truth it is known, and nothing is left to be learnt.
+        bias_std=0.0,
         p_detect=float(np.clip(p_detect, 0.05, 0.99)),
         clutter_per_scan=float((false.sum() + 0.5) / matches.scans),
         precision=float(precision),
