@@ -89,6 +89,7 @@ def test_each_field_of_a_sensor_is_estimated_or_else_the_bases(recordings):
         "sigma_log_width": 0.3,
         "sigma_log_height": 0.3,
         "bias": (0.2, 0.2, 0.2, 0.2),
+        "bias_std": 0.2,
         "p_detect": 0.4,
         "clutter_per_scan": 7.0,
         "precision": 0.3,
