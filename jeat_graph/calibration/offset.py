@@ -163,29 +163,32 @@ def found_lags(lags: Iterable[Lag]) -> dict[str, float]:
     return {lag.sensor: lag.lag_s for lag in lags if lag.found}
 
 
-def with_lags(config: Config, lags: Iterable[Lag]) -> tuple[Config, float]:
-    """Add the lags that were found to the sensors' `latency_s`, so that none is negative.
-
-    To a tracker only the differences between its sensors' clocks matter: where one is early, it is taken to
-    be on time and all others to be later by as much.
+def with_lags(config: Config, lags: Iterable[Lag]) -> Config:
+    """Add the lags that were found to the sensors' `latency_s`; a sensor that is early has a negative one.
 
     Args:
         config: declares the sensors.
         lags: some of them have one.
-
-    Returns:
-        The configuration, and how early its earliest sensor is (s): so much ahead of the clock to which the
-        lags belong are times from which the latencies are taken off.
     """
     found = found_lags(lags)
-    if not found:
-        return config, 0.0
-    latency = {name: s.latency_s + found.get(name, 0.0) for name, s in config.sensors.items()}
-    early_s = max(0.0, -min(latency.values()))
     sensors = {
-        name: replace(s, latency_s=round(latency[name] + early_s, 4)) for name, s in config.sensors.items()
+        name: replace(s, latency_s=round(s.latency_s + found[name], 4)) if name in found else s
+        for name, s in config.sensors.items()
     }
-    return replace(config, sensors=sensors), early_s
+    return replace(config, sensors=sensors)
+
+
+def earliest_on_time(config: Config) -> Config:
+    """Make no sensor early: the earliest is on time, and all others are later by as much.
+
+    To a tracker only the differences between its sensors' clocks matter. Without truth nothing else is known
+    of them, and a detector gives its boxes late rather than early.
+    """
+    early_s = min(0.0, *(s.latency_s for s in config.sensors.values()))
+    sensors = {
+        name: replace(s, latency_s=round(s.latency_s - early_s, 4)) for name, s in config.sensors.items()
+    }
+    return replace(config, sensors=sensors)
 
 
 def _neighbours(

@@ -7,7 +7,15 @@ from dataclasses import dataclass, replace
 
 from jeat_graph.calibration.matches import SensorMatches, match_sensor
 from jeat_graph.calibration.noise_scale import scale_noise
-from jeat_graph.calibration.offset import Lag, found_lags, lags_between, lags_from_truth, settled, with_lags
+from jeat_graph.calibration.offset import (
+    Lag,
+    earliest_on_time,
+    found_lags,
+    lags_between,
+    lags_from_truth,
+    settled,
+    with_lags,
+)
 from jeat_graph.calibration.parts import PARTS, PartChoice, choose_parts
 from jeat_graph.calibration.supervised import Recording, calibrate
 from jeat_graph.calibration.tracked import follow
@@ -34,15 +42,12 @@ class Calibration:
     Attributes:
         config: what was found; `sensors.*.latency_s` is what was known of their clocks and what was found.
         lags: how late each sensor's times were found to be, beyond what the base knew.
-        early_s: how far ahead of the truth the times of tracks are, because a latency is never negative: of
-            the earliest sensor (s), 0 where all are on time or late.
         parts: which parts of the estimates are kept; empty without truth.
         choices: what was chosen by tracking.
     """
 
     config: Config
     lags: tuple[Lag, ...]
-    early_s: float = 0.0
     parts: tuple[PartChoice, ...] = ()
     choices: tuple[Choice, ...] = ()
 
@@ -78,16 +83,14 @@ def calibrate_with_truth(
     # Each sensor by its own lag, early ones too: the truth stays where it is.
     pairs = _on_time(recordings, found_lags(lags))
     if not tuned:
-        config, early_s = with_lags(calibrate(pairs, base), lags)
-        return Calibration(config, tuple(lags), early_s)
+        return Calibration(with_lags(calibrate(pairs, base), lags), tuple(lags))
     config, parts = choose_parts(pairs, base, progress=progress)
     config, choices = tune(config, pairs, passes=_PASSES, progress=progress)
     config, factor, verdict = scale_noise(config, folds(shorten(pairs, _SCANS)))
     choices = (*choices, Choice(NOISE_FACTOR, factor, verdict.merit))
     if progress is not None:
         progress(NOISE_FACTOR)
-    config, early_s = with_lags(config, lags)
-    return Calibration(config, tuple(lags), early_s, parts, choices)
+    return Calibration(with_lags(config, lags), tuple(lags), parts, choices)
 
 
 def calibrate_without_truth(recordings: Sequence[Detections], base: Config) -> Calibration:
@@ -119,8 +122,9 @@ def calibrate_without_truth(recordings: Sequence[Detections], base: Config) -> C
 
     lags = settled(find, with_progress(range(_ROUNDS)))
     association = replace(base.association, priority=())
-    # No clock is known beside which all might be early.
-    config, _ = with_lags(replace(base, association=association, input=InputConfig()), lags)
+    config = replace(base, association=association, input=InputConfig())
+    if found_lags(lags):
+        config = earliest_on_time(with_lags(config, lags))
     return Calibration(config, tuple(lags))
 
 

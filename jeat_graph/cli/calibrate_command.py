@@ -182,11 +182,6 @@ def _say_lags(found: Calibration, beside: str) -> None:
         latency = {name: s.latency_s for name, s in sorted(found.config.sensors.items())}
         taken = [f"sensors.{name}.latency_s {late_s:g}" for name, late_s in latency.items()]
         lines.append(f"taken off the times from now on: {', '.join(taken)} (s)")
-    if found.early_s:
-        early = f"{found.early_s * 1e3:.0f} ms"
-        lines.append(
-            f"the earliest sensor counts as on time: tracks will be {early} ahead of the truth's clock"
-        )
     for line in lines:
         print(line, file=sys.stderr)
 

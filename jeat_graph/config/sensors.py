@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass, field
 
-from jeat_graph.config.fields import Section, choice, number
+from jeat_graph.config.fields import LARGEST, Section, choice, number
 from jeat_graph.data.errors import ConfigError
 
 
@@ -58,7 +58,11 @@ class SensorConfig(Section):
         None, "1", "`lifecycle.disagreement` for this sensor, if another than for all", 0.0
     )
     latency_s: float = number(
-        0.0, "s", "known constant delay of its times: so much is taken off the time of every scan"
+        0.0,
+        "s",
+        "known constant delay of its times: so much is taken off the time of every scan; negative where they "
+        "are early",
+        low=-LARGEST,
     )
     late_s: float | None = number(
         None, "s", "how late its scans may come in live use, if not as live.late_s says"

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from jeat_graph.calibration.offset import Lag, lag_of, settled, with_lags
+from jeat_graph.calibration.offset import Lag, earliest_on_time, lag_of, settled, with_lags
 from jeat_graph.calibration.procedure import calibrate_with_truth, calibrate_without_truth
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Detections
@@ -51,20 +51,28 @@ def test_few_vehicles_tell_nothing():
     assert not lag_of("rgb", *observations(np.random.default_rng(0), 0.05, vehicles=3), 0.05).found
 
 
-def test_no_latency_that_is_stored_is_negative_and_what_was_added_to_all_is_told():
-    config = load_config("default")
-    lags = [Lag("rgb", -0.02, 0.001, True), Lag("evt", 0.01, 0.001, True)]
-    found, early_s = with_lags(config, lags)
-    assert found.sensors["rgb"].latency_s == 0.0
-    assert found.sensors["evt"].latency_s == pytest.approx(0.03)
-    assert early_s == pytest.approx(0.02)
+EARLY = (Lag("rgb", -0.02, 0.001, True), Lag("evt", 0.01, 0.001, True))
 
 
-def test_sensors_that_are_all_late_keep_the_clock_of_the_truth():
-    lags = [Lag("rgb", 0.02, 0.001, True), Lag("evt", 0.05, 0.001, True)]
-    found, early_s = with_lags(load_config("default"), lags)
-    assert {name: s.latency_s for name, s in found.sensors.items()} == {"rgb": 0.02, "evt": 0.05}
-    assert early_s == 0.0
+def latencies(config):
+    return {name: s.latency_s for name, s in config.sensors.items()}
+
+
+def test_lags_add_to_what_is_known_and_one_that_was_not_found_counts_for_nothing():
+    config = load_config("default", ["sensors.rgb.latency_s=0.05"])
+    lags = (EARLY[0], replace(EARLY[1], found=False))
+    assert latencies(with_lags(config, lags)) == pytest.approx({"rgb": 0.03, "evt": 0.0})
+
+
+def test_beside_the_truth_a_sensor_may_be_early():
+    assert latencies(with_lags(load_config("default"), EARLY)) == pytest.approx({"rgb": -0.02, "evt": 0.01})
+
+
+def test_where_nothing_else_is_known_the_earliest_sensor_is_on_time():
+    found = earliest_on_time(with_lags(load_config("default"), EARLY))
+    assert latencies(found) == pytest.approx({"rgb": 0.0, "evt": 0.03})
+    late = load_config("default", ["sensors.rgb.latency_s=0.02", "sensors.evt.latency_s=0.05"])
+    assert earliest_on_time(late) == late
 
 
 def test_lags_of_all_rounds_add_up_and_each_sensor_is_moved_by_its_own():
@@ -124,9 +132,7 @@ def test_with_truth_a_sensor_that_is_early_moves_no_other_off_the_truth(two_sens
     found = calibrate_with_truth(moved(two_sensors, -0.1), load_config("default"), tuned=False)
     lag_s = {lag.sensor: lag.lag_s for lag in found.lags if lag.found}
     assert lag_s == {"rgb": pytest.approx(-0.1, abs=0.005)}
-    assert found.config.sensors["far"].latency_s == pytest.approx(0.1, abs=0.005)
-    assert found.config.sensors["rgb"].latency_s == 0.0
-    assert found.early_s == pytest.approx(0.1, abs=0.005)
+    assert latencies(found.config) == {"rgb": pytest.approx(-0.1, abs=0.005), "far": 0.0}
     for name, sensor in found.config.sensors.items():
         on_time = calibrated.config.sensors[name]
         # Nothing of the lag is taken for noise or for bias; fewer boxes lie within the truth's time.

@@ -18,10 +18,10 @@ LATENCY_S = 0.0625  # exact in binary, so that times come back to the last bit
 SETTING = f"sensors.rgb.latency_s={LATENCY_S}"
 
 
-def delayed(detections):
+def delayed(detections, by=LATENCY_S):
     """The recording as a computer stamps it: pictures are marked when they arrive."""
     t, sensor, boxes, scores, empty, _ = detections.to_rows()
-    return Detections.from_rows(t + np.where(sensor == "rgb", LATENCY_S, 0.0), sensor, boxes, scores, empty)
+    return Detections.from_rows(t + np.where(sensor == "rgb", by, 0.0), sensor, boxes, scores, empty)
 
 
 @pytest.fixture(scope="module")
@@ -32,9 +32,11 @@ def recorded():
     return detections, truth
 
 
-def test_times_come_back(recorded):
+@pytest.mark.parametrize("by", [LATENCY_S, -LATENCY_S])
+def test_times_come_back(recorded, by):
     detections, _ = recorded
-    back = at_measurement(delayed(detections), load_config("default", [SETTING]))
+    config = load_config("default", [f"sensors.rgb.latency_s={by}"])
+    back = at_measurement(delayed(detections, by), config)
     np.testing.assert_array_equal(back.scan_t, detections.scan_t)
     np.testing.assert_array_equal(back.boxes, detections.boxes)
     assert at_measurement(detections, load_config("default")) is detections
