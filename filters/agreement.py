@@ -86,6 +86,21 @@ def share_of_kind(as_often: float, persistence: float, variety: float, worth: fl
 
 
 @njit(cache=True)
+def trust_alone(repeated: float, usual: float, least: float) -> float:
+    """Factor on the weight of the evidence of a sensor that no other looks beside; in [least, 1].
+
+    False things that come again pass for vehicles by their number of detections; the rest do not. So evidence
+    weighs in full where next to nothing of what came again came to nothing.
+
+    Args:
+        repeated: share of its detections that came again on tracks that did not last.
+        usual: such a share at which it is believed as little as one of which nothing is known.
+        least: factor on that one.
+    """
+    return math.pow(least, min(repeated / usual, 1.0))
+
+
+@njit(cache=True)
 def trust_in(borne_out: float, claims: float, prior: float, prior_weight: float, power: float) -> float:
     """Factor on the weight of a sensor's evidence: the share that is borne out, to some power; in (0, 1].
 

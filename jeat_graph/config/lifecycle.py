@@ -117,6 +117,15 @@ class LifecycleConfig(Section):
         1.0, "1", "how its log odds rise with those of the score, before it is learnt"
     )
     worth_std: float = number(1.0, "1", "standard deviation of both assumptions", open_low=True)
+    usual_vain: float = number(
+        0.02,
+        "1",
+        "a sensor that no other looks beside is believed in full if none of its repeated detections came to "
+        "nothing, and from this share on as little as one of which nothing is known",
+        0.0,
+        1.0,
+        open_low=True,
+    )
     worth_memory_s: float = number(
         1000.0, "s", "time after which what was learnt of them is as uncertain as at first", open_low=True
     )

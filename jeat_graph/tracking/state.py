@@ -15,6 +15,8 @@ from jeat_graph.filters.box_offsets import NUM_SUMS
 
 # What lasts usually has scores of about .9; that is held to be known from five seconds of a track.
 _USUAL_ODDS, _USUAL_WEIGHT = 2.2, 5.0
+# The share of what comes again in vain is held to be known from ten.
+_USUAL_VAIN_WEIGHT = 10.0
 
 
 class TrackArrays(NamedTuple):
@@ -121,6 +123,8 @@ class SceneState(NamedTuple):
         first_look: (S,) time of each sensor's first scan (s); infinity before it.
         lasting_odds: (S,) mean log odds of the scores of what has lasted.
         lasting_seen: (S,) what that mean rests on, in seconds of a track.
+        vain: (S,) share of each sensor's detections that came again on tracks that did not last.
+        vain_seen: (S,) what that share rests on, in seconds of a track.
         worth_mean: (S, 2) what its scores say of what lasts (`filters.worth`): a, b.
         worth_cov: (S, 2, 2) covariance of the two.
         pair_sums: (S, S, 2, 10) what pairs of boxes of a sensor and a later one said (`filters.box_offsets`).
@@ -142,6 +146,8 @@ class SceneState(NamedTuple):
     first_look: FloatArray
     lasting_odds: FloatArray
     lasting_seen: FloatArray
+    vain: FloatArray
+    vain_seen: FloatArray
     worth_mean: FloatArray
     worth_cov: FloatArray
     pair_sums: FloatArray
@@ -171,6 +177,8 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
         first_look=np.full(num_sensors, np.inf),
         lasting_odds=np.full(num_sensors, _USUAL_ODDS),
         lasting_seen=np.full(num_sensors, _USUAL_WEIGHT),
+        vain=np.full(num_sensors, config.lifecycle.usual_vain),
+        vain_seen=np.full(num_sensors, _USUAL_VAIN_WEIGHT),
         worth_mean=np.tile(assumed, (num_sensors, 1)),
         worth_cov=np.tile(config.lifecycle.worth_std**2 * np.eye(2), (num_sensors, 1, 1)),
         pair_sums=np.zeros((num_sensors, num_sensors, 2, NUM_SUMS)),

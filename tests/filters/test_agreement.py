@@ -10,6 +10,7 @@ from jeat_graph.filters.agreement import (
     score_persistence,
     score_variety,
     share_of_kind,
+    trust_alone,
     trust_in,
 )
 
@@ -69,3 +70,9 @@ def test_the_share_of_a_kind_is_a_share_and_grows_with_how_often_it_scores_high(
 def test_trust_is_the_share_borne_out_to_a_power(claims, share, power):
     expected = ((share * claims + 5.0 * 0.9) / (claims + 5.0)) ** power
     assert trust_in(share * claims, claims, 0.9, 5.0, power) == pytest.approx(expected)
+
+
+def test_a_sensor_alone_is_believed_between_not_at_all_better_and_in_full():
+    assert trust_alone(0.0, 0.02, 0.3) == 1.0
+    assert trust_alone(0.01, 0.02, 0.3) == pytest.approx(np.sqrt(0.3))
+    assert trust_alone(0.02, 0.02, 0.3) == trust_alone(0.9, 0.02, 0.3) == 0.3

@@ -102,10 +102,50 @@ def test_where_all_scores_are_one_nothing_tells_whose_fault_it_is():
     assert believed < 0.1
 
 
-def test_of_a_sensor_alone_nothing_is_learnt():
+def alone(false_per_s: float, repeats: int) -> tuple[float, float]:
+    """Trust in the only sensor, which sees cars pass, and the share of its repeated boxes that were in vain.
+
+    Boxes of nothing come as often as asked, each so many scans in a row at one place.
+    """
+    rng = np.random.default_rng(5)
+    tracker = Tracker(
+        load_config("default", [f"sensors.only={{rate_hz: {RATE_HZ}}}", "smoother.engine=none"])
+    )
+    ghosts: list[tuple[int, np.ndarray]] = []
+    for k in range(600):
+        t = k / RATE_HZ
+        cars = np.array(
+            [[100.0 + 60.0 * ((t + 5.0 * n) % 15.0), 60.0 + 70.0 * n, 60.0, 40.0] for n in range(3)]
+        )
+        ghosts = [(left - 1, box) for left, box in ghosts if left > 1]
+        if rng.random() < false_per_s / RATE_HZ:
+            ghosts.append((repeats, np.array([rng.uniform(50, 1150), rng.uniform(300, 650), 60.0, 40.0])))
+        boxes = np.concatenate([cars, *([box[None] for _, box in ghosts] or [cars[:0]])])
+        noisy = boxes + rng.normal(0.0, 1.0, boxes.shape)
+        tracker.step((t, "only", noisy, np.full(len(noisy), 0.8)))
+    vain = tracker.snapshot().scene.vain[tracker.sensor_names.index("only")]
+    return trust(tracker)["only"], float(vain)
+
+
+def test_a_sensor_alone_is_believed_in_full_where_nothing_comes_again_in_vain():
+    assert alone(0.0, 1)[0] > 0.85
+    # Of false boxes that come once each a few lie where another has been by chance.
+    assert alone(5.0, 1)[0] > 1.25 * alone(2.0, 3)[0]
+
+
+def test_a_sensor_alone_is_believed_no_more_than_before_where_much_comes_again_in_vain():
     lifecycle = load_config("default").lifecycle
-    tracker, _ = follow(("poor",))
-    assert trust(tracker)["poor"] == pytest.approx(lifecycle.agreement_prior**lifecycle.disagreement)
+    believed, vain = alone(2.0, 3)
+    assert vain > lifecycle.usual_vain
+    assert believed == pytest.approx(lifecycle.agreement_prior**lifecycle.disagreement)
+
+
+def test_of_a_sensor_that_falls_silent_the_other_is_not_judged_anew():
+    tracker, _ = follow(("good", "other"), false=())
+    before = trust(tracker)["good"]
+    for k in range(STEPS, STEPS + 100):
+        tracker.step((k / RATE_HZ, "good", np.array([[600.0, 300.0, 60.0, 40.0]]), np.array([0.8])))
+    assert trust(tracker)["good"] > 0.8 * before
 
 
 def test_a_sensor_may_be_believed_whatever_the_others_say():

@@ -13,6 +13,7 @@ from jeat_graph.filters.agreement import (
     score_persistence,
     score_variety,
     share_of_kind,
+    trust_alone,
     trust_in,
 )
 from jeat_graph.filters.existence import motion_visibility
@@ -46,7 +47,8 @@ def learn_trust(
     sensor that is mostly alone where others look and see vehicles takes false things for vehicles again and
     again, unless the scores say that what it alone sees is of the same kind (`filters.agreement`). A look at
     a moment when the others are blind (their P_D is low), or at what is too slow for them, counts little;
-    while a sensor is the only one that looks, nothing is learnt of it.
+    while a sensor is the only one that looks, nothing is learnt of it; where no other ever has, what came
+    of its tracks tells (`trust_alone`).
     """
     lifecycle, sensors = model.settings.lifecycle, model.sensors
     for s in range(len(batch.present)):
@@ -64,6 +66,8 @@ def learn_trust(
             if looks_too(other, s, batch.t, scene, model):
                 sight[other] = scene.p_detect[other] * (1.0 - scene.blind[other])
         if np.max(sight) == 0.0:
+            if lifecycle.judges_worth and _is_alone(s, scene):
+                scene.trust[s] = trust_alone(scene.vain[s], lifecycle.usual_vain, sensors.prior_trust[s])
             continue
         _forget(s, math.exp(-sensors.period_s[s] / lifecycle.disagreement_memory_s), scene)
         for i in range(n):
@@ -90,6 +94,15 @@ def learn_trust(
             _PRIOR_CLAIMS,
             sensors.disagreement[s],
         )
+
+
+@inner
+def _is_alone(s: int, scene: SceneState) -> bool:
+    """Whether no other sensor than `s` has ever looked."""
+    for other in range(len(scene.first_look)):
+        if other != s and scene.first_look[other] < np.inf:
+            return False
+    return True
 
 
 @inner

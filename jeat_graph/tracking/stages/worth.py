@@ -69,6 +69,7 @@ def learn_lasting(
                 continue
             if tracks.lasting[i]:
                 learn_worth(mean, cov, batch.score_odds[j], True, weight)
+                _count_vain(s, 0.0, weight, scene, model)
                 seen = min(scene.lasting_seen[s] + weight, lifecycle.worth_memory_s)
                 scene.lasting_seen[s] = seen
                 scene.lasting_odds[s] += weight / seen * (batch.score_odds[j] - scene.lasting_odds[s])
@@ -91,6 +92,17 @@ def learn_ended(tracks: TrackArrays, i: int, scene: SceneState, model: Model) ->
     if tracks.t_update[i] >= scene.first_look[s] + lifecycle.lasting_s:
         weight = model.sensors.period_s[s] * tracks.hits[i]
         learn_worth(scene.worth_mean[s], scene.worth_cov[s], tracks.score_odds[i], False, weight)
+        # What stood there for longer may be a vehicle that stands: it counts neither way.
+        if tracks.t_update[i] - tracks.t_birth[i] < lifecycle.lasting_s:
+            _count_vain(s, 1.0, weight - model.sensors.period_s[s], scene, model)
+
+
+@inner
+def _count_vain(s: int, vain: float, weight: float, scene: SceneState, model: Model) -> None:
+    """Count detections of sensor `s` as in vain (1) or not (0), by so many seconds of a track, in place."""
+    seen = min(scene.vain_seen[s] + weight, model.settings.lifecycle.worth_memory_s)
+    scene.vain_seen[s] = seen
+    scene.vain[s] += weight / seen * (vain - scene.vain[s])
 
 
 @inner
