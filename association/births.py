@@ -23,7 +23,9 @@ def choose_births(
 
     A detection that coincides with a living track, or with a birth by the same sensor, is a duplicate and
     starts none. One that coincides with a birth by another sensor is a second view of the new vehicle and
-    joins it.
+    joins it, if it is the first of its sensor: a vehicle has one box of each. A further one of that sensor is
+    a duplicate if it coincides with the box that joined or, as closely as with a living track, with the birth
+    itself; else it may join another birth or start a track of its own.
 
     Args:
         boxes: (M, 4) left, top, width, height (px).
@@ -43,6 +45,8 @@ def choose_births(
     parents = np.empty(num, dtype=np.int64)
     partner = np.full(num, -1, dtype=np.int64)
     double = np.full(num, -1, dtype=np.int64)
+    # The box that each birth has of each sensor.
+    view = np.empty((num, np.max(sensor) + 1 if num > 0 else 0), dtype=np.int64)
     count = 0
     order = np.argsort(-existence, kind="mergesort")
     by_left = np.argsort(track_boxes[:, 0], kind="mergesort")
@@ -63,14 +67,21 @@ def choose_births(
             if refused:
                 continue
             for b in range(count):
-                # Two sensors see one vehicle less exactly than one sensor sees it twice.
-                other = sensor[parents[b]] != sensor[j]
-                if overlap(boxes[j], boxes[parents[b]]) > (0.5 * max_overlap if other else max_overlap):
-                    refused = True
-                    if other:
+                common = overlap(boxes[j], boxes[parents[b]])
+                earlier = view[b, sensor[j]]
+                if earlier < 0:
+                    # Two sensors see one vehicle less exactly than one sensor sees it twice.
+                    if common > 0.5 * max_overlap:
+                        refused = True
                         partner[j] = b
+                        view[b, sensor[j]] = j
+                        break
+                elif common > max_overlap or overlap(boxes[j], boxes[earlier]) > max_overlap:
+                    refused = True
                     break
         if not refused:
+            view[count] = -1
+            view[count, sensor[j]] = j
             parents[count] = j
             count += 1
     return parents[:count], partner, double

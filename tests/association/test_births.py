@@ -29,31 +29,6 @@ def births(boxes, existence, sensor, taken=None, tracks=(), least=0.01, most=0.5
     return parents.tolist(), partner.tolist(), double.tolist()
 
 
-def by_definition(boxes, existence, sensor, taken, tracks, least, most):
-    """The rule in plain words: the surest first; refuse, join, or start."""
-    parents, partner, double = [], [-1] * len(boxes), [-1] * len(boxes)
-    for j in sorted(range(len(boxes)), key=lambda j: (-existence[j], j)):
-        if taken[j] or existence[j] < least:
-            continue
-        if most < 1.0:
-            over = [i for i, track in enumerate(tracks) if iou(boxes[j], track) > most]
-            if over:
-                # Where several refuse it, the leftmost does.
-                double[j] = min(over, key=lambda i: (tracks[i][0], i))
-                continue
-            near = [
-                b
-                for b, parent in enumerate(parents)
-                if iou(boxes[j], boxes[parent]) > (most if sensor[parent] == sensor[j] else most / 2)
-            ]
-            if near:
-                if sensor[parents[near[0]]] != sensor[j]:
-                    partner[j] = near[0]
-                continue
-        parents.append(j)
-    return parents, partner, double
-
-
 @st.composite
 def boxes(draw, most):
     n = draw(st.integers(0, most))
@@ -78,13 +53,38 @@ def test_overlap_is_intersection_over_union(a, b):
     most=st.sampled_from([0.2, 0.5, 0.8, 1.0]),
 )
 @settings(max_examples=200, deadline=None)
-def test_births_are_those_of_the_definition(dets, tracks, seed, least, most):
+def test_every_detection_has_a_reason_for_what_became_of_it(dets, tracks, seed, least, most):
     rng = np.random.default_rng(seed)
     # Few distinct probabilities, so that ties occur: the earlier detection is first.
     existence = rng.integers(0, 5, len(dets)) / 4
-    sensor, taken = rng.integers(0, 2, len(dets)), rng.integers(0, 2, len(dets))
-    expected = by_definition(dets, existence, sensor, taken, tracks, least, most)
-    assert births(dets, existence, sensor, taken, tracks, least, most) == expected
+    sensor, taken = rng.integers(0, 3, len(dets)), rng.integers(0, 2, len(dets))
+    parents, partner, double = births(dets, existence, sensor, taken, tracks, least, most)
+    free = [j for j in range(len(dets)) if not taken[j] and existence[j] >= least]
+    surer = {j: {k for k in free if (-existence[k], k) < (-existence[j], j)} for j in free}
+    assert parents == sorted(parents, key=lambda j: (-existence[j], j))
+    views = [[parent, *(j for j in free if partner[j] == b)] for b, parent in enumerate(parents)]
+    for view in views:
+        assert len({sensor[j] for j in view}) == len(view), "a vehicle has one box of each sensor"
+        assert all(iou(dets[j], dets[view[0]]) > most / 2 and view[0] in surer[j] for j in view[1:])
+    for j in range(len(dets)):
+        on_track = [i for i, track in enumerate(tracks) if most < 1.0 and iou(dets[j], track) > most]
+        if j not in free or on_track:
+            assert j not in parents
+            assert partner[j] == -1
+            # Where several tracks refuse it, the leftmost does.
+            assert double[j] == (min(on_track, key=lambda i: (tracks[i][0], i)) if j in free else -1)
+            continue
+        assert double[j] == -1
+        near = []  # the births before it that it cannot be told from
+        for b, view in enumerate(views):
+            own = [k for k in view if sensor[k] == sensor[j] and k in surer[j]]
+            if own and max(iou(dets[j], dets[k]) for k in [view[0], *own]) > most:
+                near.append(-1)  # a second box of what this sensor shows already
+            elif not own and view[0] in surer[j] and iou(dets[j], dets[view[0]]) > most / 2:
+                near.append(b)
+        near = near if most < 1.0 else []
+        assert (j in parents) == (not near)
+        assert partner[j] == (near[0] if near else -1)
 
 
 def test_the_surest_detection_is_born_first():
@@ -107,6 +107,22 @@ def test_two_sensors_views_of_one_vehicle_are_one_birth():
 
 def test_two_boxes_of_one_sensor_on_one_place_are_one_birth_and_no_second_view():
     assert births([[0, 0, 10, 10], [1, 0, 10, 10]], [0.4, 0.9], [0, 0])[:2] == ([1], [-1, -1])
+
+
+def test_a_box_over_two_vehicles_of_another_sensor_swallows_only_one_of_them():
+    wide, left, right = [0, 0, 120, 60], [0, 0, 60, 60], [60, 0, 60, 60]
+    assert births([wide, left, right], [0.9, 0.8, 0.8], [0, 1, 1])[:2] == ([0, 2], [-1, 0, -1])
+    # The other way round the wide box joins the first vehicle.
+    assert births([wide, left, right], [0.7, 0.8, 0.8], [0, 1, 1])[:2] == ([1, 2], [0, -1, -1])
+
+
+def test_a_second_box_of_what_has_joined_a_birth_is_a_duplicate():
+    first, joins, again = [0, 0, 10, 10], [4, 0, 10, 10], [6, 0, 10, 10]
+    assert births([first, joins, again], [0.9, 0.8, 0.7], [0, 1, 1])[:2] == ([0], [-1, 0, -1])
+
+
+def test_a_third_sensors_view_joins_as_well():
+    assert births([[0, 0, 10, 10]] * 3, [0.9, 0.8, 0.7], [0, 1, 2])[:2] == ([0], [-1, 0, 0])
 
 
 def test_what_a_track_took_and_what_is_too_doubtful_start_none():
