@@ -9,7 +9,7 @@ import numpy as np
 from jeat_graph.config.kernel_form import Model
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.tracking.reporting import as_table, longest_gap_s, report
+from jeat_graph.tracking.reporting import as_table, columns_of, longest_gap_s, reported_rows
 from jeat_graph.tracking.snapshot import Snapshot
 from jeat_graph.tracking.stages.predicting import predict_all
 
@@ -28,7 +28,7 @@ class Prediction(Trajectories):
 
 
 def predict_reported(now: Snapshot, t: float, model: Model, sensors: tuple[str, ...]) -> Prediction:
-    """Predict the tracks that are reported now to time `t`.
+    """Predict the tracks that are reported now to time `t`, but those that will have left the picture.
 
     Args:
         now: the state; it is used up.
@@ -37,18 +37,15 @@ def predict_reported(now: Snapshot, t: float, model: Model, sensors: tuple[str, 
         sensors: names of the sensors.
     """
     here = 0.0 if now.t is None else now.t
-    n = now.num_tracks
-    settings = model.settings
+    settings, tracks = model.settings, now.tracks
+    sections = (settings.image, settings.output)
     gap = longest_gap_s(now.scene, model)
-    how = (gap, settings.image, settings.output, settings.lifecycle.by_existence)
-    reported = report(now.tracks, n, here, *how)[1]
-    predict_all(now.tracks, n, max(t - here, 0.0), now.scene, model)
-    # Nobody has looked in between, so nobody can have missed a track either: what counts is the gap now.
-    now.tracks.t_update[:] += t - here
-    columns = as_table(report(now.tracks, n, t, *how), sensors, now.classes)
-    table = columns.take(np.isin(columns.track_id, reported))
-    rows = np.searchsorted(now.tracks.track_id, table.track_id)
+    # Who is reported is decided now: what has just been detected is no less there for looking ahead.
+    rows = reported_rows(tracks, now.num_tracks, here, gap, *sections, settings.lifecycle.by_existence)
+    predict_all(tracks, now.num_tracks, max(t - here, 0.0), now.scene, model)
+    table = as_table(columns_of(tracks, rows, t, *sections), sensors, now.classes)
+    rows = rows[np.isin(tracks.track_id[rows], table.track_id)]
     cov = np.zeros((len(table), 6, 6))
     for axis in range(2):
-        cov[:, axis::2, axis::2] = now.tracks.cov[rows, axis, :_MOTION, :_MOTION]
+        cov[:, axis::2, axis::2] = tracks.cov[rows, axis, :_MOTION, :_MOTION]
     return Prediction(**vars(table), cov=cov)

@@ -68,7 +68,22 @@ def report(
     output: OutputConfig,
     by_existence: bool,
 ) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray, FloatArray, IntArray, FloatArray]:
-    """Collect the confirmed tracks that are alive now.
+    """Collect the confirmed tracks that are alive now: `columns_of` the `reported_rows`."""
+    rows = reported_rows(tracks, num_tracks, t, max_gap_s, image, output, by_existence)
+    return columns_of(tracks, rows, t, image, output)
+
+
+@njit(cache=True)
+def reported_rows(
+    tracks: TrackArrays,
+    num_tracks: int,
+    t: float,
+    max_gap_s: float,
+    image: ImageConfig,
+    output: OutputConfig,
+    by_existence: bool,
+) -> IntArray:
+    """Choose the tracks that are reported: confirmed and alive now.
 
     Args:
         tracks: state of all tracks.
@@ -80,11 +95,9 @@ def report(
         by_existence: whether tracks live by their probability of existence.
 
     Returns:
-        Columns of `Trajectories`: t (R,), track_id (R,), boxes (R, 4), existence (R,), mean (R, 6),
-        var (R, 6), used (R,), size_var (R, 2).
+        (R,) their rows.
     """
     boxes = track_boxes(tracks.mean[:num_tracks], tracks.size_mean[:num_tracks])
-    width, height = image.width, image.height
     rows = np.empty(num_tracks, dtype=np.int64)
     count = 0
     for i in range(num_tracks):
@@ -96,40 +109,68 @@ def report(
         if by_existence and tracks.existence[i] < output.min_existence:
             continue
         if output.clip:
-            visible = visible_fraction(boxes[i], width, height)
+            visible = visible_fraction(boxes[i], image.width, image.height)
             # What was detected just now does show, however little of it.
             shown = image.edge_px > 0.0 and tracks.used[i] != 0
             if visible <= 0.0 or (visible < output.min_visible and not shown):
                 continue
         rows[count] = i
         count += 1
-    out_boxes = np.empty((count, 4))
-    mean = np.empty((count, 6))
-    var = np.empty((count, 6))
-    size_var = np.empty((count, 2))
-    for r in range(count):
-        i = rows[r]
+    return rows[:count]
+
+
+@njit(cache=True)
+def columns_of(
+    tracks: TrackArrays, rows: IntArray, t: float, image: ImageConfig, output: OutputConfig
+) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray, FloatArray, IntArray, FloatArray]:
+    """Write some tracks as columns of a table, but those of which nothing is left after clipping.
+
+    Args:
+        tracks: state of all tracks, at time `t`.
+        rows: (R,) which of them, ascending.
+        t: that time (s).
+        image: the kernels' form of that section.
+        output: the same.
+
+    Returns:
+        Columns of `Trajectories`: t (R,), track_id (R,), boxes (R, 4), existence (R,), mean (R, 6),
+        var (R, 6), used (R,), size_var (R, 2).
+    """
+    width, height = image.width, image.height
+    boxes = track_boxes(tracks.mean[rows], tracks.size_mean[rows])
+    out_boxes = np.empty((len(rows), 4))
+    mean = np.empty((len(rows), 6))
+    var = np.empty((len(rows), 6))
+    size_var = np.empty((len(rows), 2))
+    chosen = np.empty(len(rows), dtype=np.int64)
+    count = 0
+    for k in range(len(rows)):
+        if output.clip and visible_fraction(boxes[k], width, height) <= 0.0:
+            continue
+        i, r = rows[k], count
+        chosen[r] = i
+        count += 1
         for axis in range(2):
-            low = boxes[i, axis]
-            high = low + boxes[i, 2 + axis]
+            low = boxes[k, axis]
+            high = low + boxes[k, 2 + axis]
             if output.clip:
                 low = max(low, 0.0)
                 high = min(high, width if axis == 0 else height)
             out_boxes[r, axis] = low
             out_boxes[r, 2 + axis] = high - low
             # Of e^s where ln e^s = s is what is estimated: to first order e^2s times the variance of s.
-            size_var[r, axis] = boxes[i, 2 + axis] * boxes[i, 2 + axis] * tracks.size_cov[i, axis, 0, 0]
+            size_var[r, axis] = boxes[k, 2 + axis] * boxes[k, 2 + axis] * tracks.size_cov[i, axis, 0, 0]
             for d in range(3):
                 mean[r, 2 * d + axis] = tracks.mean[i, axis, d]
                 var[r, 2 * d + axis] = tracks.cov[i, axis, d, d]
-    chosen = rows[:count]
+    chosen = chosen[:count]
     return (
         np.full(count, t),
         tracks.track_id[chosen],
-        out_boxes,
+        out_boxes[:count],
         tracks.existence[chosen],
-        mean,
-        var,
+        mean[:count],
+        var[:count],
         tracks.used[chosen],
-        size_var,
+        size_var[:count],
     )

@@ -280,6 +280,20 @@ def test_predict_at_the_present_is_what_was_reported():
         np.testing.assert_array_equal(getattr(same, name), getattr(now, name))
 
 
+def test_predict_at_the_present_keeps_what_has_nearly_left_the_picture():
+    tracker = Tracker(CAUSAL)
+    for k in range(54):
+        left = 800.0 + 9.0 * k
+        boxes = [[left, 300.0, min(200.0, CAUSAL.image.width - left), 80.0]]
+        now = tracker.step((0.05 * k, "rgb", boxes, [0.95]))
+    # Less of it shows than would do for one that nobody detects.
+    assert now.boxes[0, 2] < 200.0 * CAUSAL.output.min_visible
+    same = tracker.predict(now.t[0])
+    np.testing.assert_array_equal(same.track_id, now.track_id)
+    np.testing.assert_array_equal(same.boxes, now.boxes)
+    assert len(tracker.predict(now.t[0] + 1.0)) == 0, "by then nothing of it shows"
+
+
 def test_a_scan_that_is_refused_leaves_what_may_be_taken_again_as_it_was():
     """Embeddings of another length are found out in the middle of a step, in order, late or taken again."""
 
