@@ -11,7 +11,7 @@ from jeat_graph.tracking.stages.associating import associate
 from jeat_graph.tracking.stages.beginning import give_birth
 from jeat_graph.tracking.stages.comparing import learn_boxes
 from jeat_graph.tracking.stages.ending import confirm, remove_ended
-from jeat_graph.tracking.stages.learning import count_misses, learn_scene
+from jeat_graph.tracking.stages.learning import count_looks, learn_scene
 from jeat_graph.tracking.stages.predicting import current_p_detect, expect_detections, occlusion, predict_all
 from jeat_graph.tracking.stages.sight import judge_sight
 from jeat_graph.tracking.stages.trust import learn_trust
@@ -65,7 +65,7 @@ def step(
     learn_lasting(tracks, n, batch, association, scene, model)
     learn_trust(tracks, n, batch, association, scene, model)
     learn_scene(tracks, n, dt, batch, association, p_detect, scene, model)
-    count_misses(tracks, n, batch, association, p_detect, scene, settings)
+    count_looks(tracks, n, batch, association, p_detect, scene, settings)
     judge_worth(tracks, n, scene, model)
     confirm(tracks, n, batch.t, settings)
     n = remove_ended(tracks, n, batch.t, scene, model)

@@ -1,4 +1,4 @@
-"""What one instant teaches of the tracks that a sensor missed, and of clutter and detection as a whole."""
+"""What one instant teaches of each track a sensor looked for, and of clutter and detection as a whole."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def scan_weight(s: int, model: Model) -> float:
 
 
 @inner
-def count_misses(
+def count_looks(
     tracks: TrackArrays,
     n: int,
     batch: Batch,
@@ -38,27 +38,34 @@ def count_misses(
     scene: SceneState,
     settings: Settings,
 ) -> None:
-    """Lower existence and P_D of the tracks that a sensor looked for and did not find, as far as it sees."""
+    """Follow each track's P_D, and whether it is hidden, by who has found it; a miss lowers its existence.
+
+    Called after `learn_scene`, which weighs the looks by the P_D of before them.
+    """
     lifecycle = settings.lifecycle
-    if not lifecycle.by_existence:
-        return
     match, present = association.match, batch.present
     for i in range(n):
         for s in range(len(present)):
-            if not present[s] or match[i, s] >= 0:
+            if not present[s]:
+                continue
+            own = tracks.p_detect[i, s]
+            if match[i, s] >= 0:
+                tracks.hidden[i, s] = 0.0
+                more = own + lifecycle.p_detect_weight * (1.0 - own)
+                tracks.p_detect[i, s] = min(more, lifecycle.p_detect_max)
+                continue
+            if not lifecycle.by_existence:
                 continue
             tracks.existence[i] = existence_after_miss(tracks.existence[i], p_detect[i, s], scene.blind[s])
             # Only as far as the miss was to be expected does it say anything about the sensor.
-            own = tracks.p_detect[i, s]
             sees = 1.0 - scene.blind[s]
             visible = p_detect[i, s] / own * sees
             if tracks.hidden[i, s] < 1.0:
                 awake = min(p_detect[i, s] / (1.0 - tracks.hidden[i, s]), 0.999)
                 hidden = min(hidden_after_miss(tracks.hidden[i, s], awake), 0.999)
                 tracks.hidden[i, s] += sees * (hidden - tracks.hidden[i, s])
-            tracks.p_detect[i, s] = max(
-                own - lifecycle.p_detect_weight * visible * own, lifecycle.p_detect_min
-            )
+            less = own - lifecycle.p_detect_weight * visible * own
+            tracks.p_detect[i, s] = max(less, lifecycle.p_detect_min)
 
 
 @inner

@@ -180,9 +180,6 @@ def update_matched(
                     association.evidence[i, s],
                     sensors.tempering[s] * scene.trust[s],
                 )
-            tracks.hidden[i, s] = 0.0
-            p = tracks.p_detect[i, s] + lifecycle.p_detect_weight * (1.0 - tracks.p_detect[i, s])
-            tracks.p_detect[i, s] = min(p, lifecycle.p_detect_max)
 
 
 @inner
