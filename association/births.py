@@ -24,8 +24,8 @@ def choose_births(
     A detection that coincides with a living track, or with a birth by the same sensor, is a duplicate and
     starts none. One that coincides with a birth by another sensor is a second view of the new vehicle and
     joins it, if it is the first of its sensor: a vehicle has one box of each. A further one of that sensor is
-    a duplicate if it coincides with the box that joined or, as closely as with a living track, with the birth
-    itself; else it may join another birth or start a track of its own.
+    a duplicate if it coincides with the box that joined or with the birth as closely as with a living track,
+    or half as closely with both; else it may join another birth or start a track of its own.
 
     Args:
         boxes: (M, 4) left, top, width, height (px).
@@ -76,9 +76,13 @@ def choose_births(
                         partner[j] = b
                         view[b, sensor[j]] = j
                         break
-                elif common > max_overlap or overlap(boxes[j], boxes[earlier]) > max_overlap:
-                    refused = True
-                    break
+                else:
+                    again = overlap(boxes[j], boxes[earlier])
+                    # Who joined fits less exactly, and so does a second box of what joined.
+                    both = earlier != parents[b] and min(common, again) > 0.5 * max_overlap
+                    if both or common > max_overlap or again > max_overlap:
+                        refused = True
+                        break
         if not refused:
             view[count] = -1
             view[count, sensor[j]] = j

@@ -39,7 +39,7 @@ def log_evidence(
 ) -> FloatArray:
     """Log likelihood ratio that a detection is the track's rather than clutter.
 
-    ln Λ = ln P_D + ln N(y; 0, S) + ln N(size residual) + ln LR(score) − ln λ.
+    ln Λ = ln P_D + ln p(y) + ln p(size residual) + ln LR(score) − ln λ, with p normal or Student's t.
 
     Args:
         pairs: the P pairs inside the gates.

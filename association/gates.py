@@ -10,7 +10,7 @@ from numba import njit
 
 from jeat_graph.association.densities import Likelihood, log_constants, log_density_of
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.filters.cut_boxes import BOTH_CUT, HIGH_CUT, centre_from_side
+from jeat_graph.filters.cut_boxes import BOTH_CUT, HIGH_CUT, WHOLE, centre_from_part
 
 
 class Expected(NamedTuple):
@@ -62,8 +62,8 @@ class Pairs(NamedTuple):
         rows: (P,) tracks.
         cols: (P,) detections.
         d2: (P,) squared Mahalanobis distance of the centres (paper eq. 6).
-        log_density: (P,) ln N(y; 0, S), per px².
-        log_size_density: (P,) ln N of the size residual, per (ln px)².
+        log_density: (P,) ln p(y) of its difference y, normal or Student's t (`densities`), per px².
+        log_size_density: (P,) ln p of the difference in size, per (ln px)².
     """
 
     rows: IntArray
@@ -139,13 +139,16 @@ def _fill(
     heaviest = np.max(weight)
     constants = log_constants(likelihood.freedom)
     unseen_density = -math.log(likelihood.log_size_range)
-    cut_x, cut_y = bool(np.max(cut[:, 0]) > 0), bool(np.max(cut[:, 1]) > 0)
+    longest_x, longest_y = (
+        _longest_part(cut[:, 0], z_log_size[:, 0]),
+        _longest_part(cut[:, 1], z_log_size[:, 1]),
+    )
     for i in range(num_tracks):
         left, right = np.inf, -np.inf
         top, bottom = np.inf, -np.inf
         # The middle of the part that shows lies within half a size of the centre.
-        reach_x, open_x = _reach(cut_x, log_size[i, 0], log_size_var[i, 0])
-        reach_y, open_y = _reach(cut_y, log_size[i, 1], log_size_var[i, 1])
+        reach_x, open_x = _reach(longest_x, log_size[i, 0], log_size_var[i, 0])
+        reach_y, open_y = _reach(longest_y, log_size[i, 1], log_size_var[i, 1])
         for s in range(noise.shape[1]):
             # A hair wider than any gate, so that rounding never decides here.
             half = 1.000001 * math.sqrt(gate * (position_var[i, s, 0] + noise[i, s, 0] * heaviest + open_x))
@@ -225,11 +228,21 @@ def _fill(
 
 
 @njit(cache=True)
-def _reach(some_cut: bool, log_size: float, log_size_var: float) -> tuple[float, float]:
+def _longest_part(cut: IntArray, shown: FloatArray) -> float:
+    """Return the greatest ln length that shows of the boxes that are cut, or -inf where none is."""
+    longest = -np.inf
+    for j in range(len(cut)):
+        if cut[j] != WHOLE:
+            longest = max(longest, shown[j])
+    return longest
+
+
+@njit(cache=True)
+def _reach(longest: float, log_size: float, log_size_var: float) -> tuple[float, float]:
     """How far the middle of a cut box may lie from the centre of a track, and the variance its size adds."""
-    if not some_cut:
+    if longest == -np.inf:
         return 0.0, 0.0
-    half, var = centre_from_side(HIGH_CUT, 0.0, log_size, log_size_var)
+    half, var = centre_from_part(HIGH_CUT, 0.0, longest, log_size, log_size_var)
     return half, var
 
 
@@ -269,4 +282,4 @@ def centre_of_cut(
     """
     if cut == BOTH_CUT:
         return 0.0, math.exp(2.0 * shown) / (2.0 * math.pi)
-    return centre_from_side(cut, side, log_size, log_size_var)
+    return centre_from_part(cut, side, shown, log_size, log_size_var)

@@ -3,8 +3,10 @@
 A constant acceleration, and a constant rate of growth, are good for the moments between two looks. Held for
 a second behind another vehicle, they throw a track across the picture: what the filter takes for them is
 half noise, and vehicles do not brake, nor people swing their arms, for that long. So while a track is not
-seen, both die away, and the velocity stays: the first-order model of Singer, "Estimating optimal tracking
-filter performance for manned maneuvering targets", IEEE T-AES 6(4), 1970, for just that time.
+seen, both die away, and the velocity stays. That an acceleration dies away is in the model of Singer,
+"Estimating optimal tracking filter performance for manned maneuvering targets", IEEE T-AES 6(4), 1970; here
+it is done apart, after a whole step at constant acceleration. With steps that are short beside the memory the
+two are alike; with longer ones a track goes further than in his model, so it depends on the steps.
 """
 
 from __future__ import annotations

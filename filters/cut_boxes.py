@@ -68,6 +68,22 @@ def centre_from_side(cut: int, side: float, log_size: float, log_size_var: float
 
 
 @njit(cache=True)
+def centre_from_part(
+    cut: int, side: float, shown: float, log_size: float, log_size_var: float
+) -> tuple[float, float]:
+    """`centre_from_side` of a vehicle of which a part shows: the whole is no smaller than the part.
+
+    Args:
+        cut: `LOW_CUT` or `HIGH_CUT`.
+        side: coordinate of the side that shows (px).
+        shown: ln of the length that shows (ln px).
+        log_size: ln of the whole width or height by what is known (ln px).
+        log_size_var: its variance.
+    """
+    return centre_from_side(cut, side, max(log_size, shown), log_size_var)
+
+
+@njit(cache=True)
 def bound_unmeasured(P: FloatArray) -> None:
     """Bound the variance of a size that is not measured, in place, to what is known of any vehicle.
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from numba import njit
 
-from jeat_graph.data.arrays import FloatArray
-
 
 @njit(cache=True)
 def base_variance(sigma_px: float, rho: float, side: float, rho_size: float, size: float) -> float:
@@ -50,24 +48,15 @@ def adapt_scale(scale: float, nis: float, rate: float, low: float, high: float) 
 
 
 @njit(cache=True)
-def widen_hidden(white: FloatArray, coloured_std: FloatArray, hidden: FloatArray, growth: float) -> None:
-    """Widen the noise of what stands partly behind others, in place: std · (1 + growth · hidden part).
+def hidden_excess(hidden: float, growth: float) -> float:
+    """By how much the variance of what stands partly behind others grows, as a share of it.
 
-    A detector guesses the sides that it does not see. How it guesses changes with the part that is hidden,
-    so what is added is white.
+    The standard deviation grows by 1 + growth · hidden part: a detector guesses the sides that it does not
+    see. How it guesses changes with the part that is hidden, so what is added is white.
 
     Args:
-        white: (N, S, 2) variances of the white noise (px²).
-        coloured_std: (N, S, 2) standard deviation of the coloured noise (px).
-        hidden: (N,) part of each box that others hide.
+        hidden: part of the box that others hide.
         growth: >= 0.
     """
-    if growth <= 0.0:
-        return
-    for i in range(len(hidden)):
-        more = (1.0 + growth * hidden[i]) * (1.0 + growth * hidden[i]) - 1.0
-        if more > 0.0:
-            for s in range(white.shape[1]):
-                for axis in range(2):
-                    h = coloured_std[i, s, axis]
-                    white[i, s, axis] += more * (white[i, s, axis] + h * h)
+    more = 1.0 + growth * hidden
+    return more * more - 1.0

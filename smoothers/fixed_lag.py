@@ -20,7 +20,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.smoothers.gains import fill_back
 from jeat_graph.smoothers.gtsam.linear_graph import LinearGraph
 from jeat_graph.smoothers.gtsam.whitened import prior_rows, segment_rows
-from jeat_graph.smoothers.gtsam.window import GtsamWindow
+from jeat_graph.smoothers.gtsam.window import GtsamError, GtsamWindow
 from jeat_graph.smoothers.measurements import (
     COINCIDENT_S,
     by_time,
@@ -33,9 +33,6 @@ from jeat_graph.smoothers.window import Window
 
 #: GTSAM solves for one state in so many. More would hardly be faster: what is left is the cost of a chunk.
 STRIDE = 24
-
-#: What GTSAM's C++ exceptions become in Python.
-_GTSAM_ERRORS = (RuntimeError, IndexError, ValueError)
 
 
 class FixedLagSmoother:
@@ -194,7 +191,7 @@ class FixedLagSmoother:
         try:
             gtsam.update(graph, first, self._next - first, range(self._oldest, oldest))
             self._oldest = oldest
-        except _GTSAM_ERRORS:
+        except GtsamError:
             self.rebuilds += 1
             self._rebuild()
 
@@ -219,7 +216,7 @@ class FixedLagSmoother:
             gtsam = GtsamWindow(window.size)
             gtsam.update(graph, self._oldest, self._next - self._oldest, range(0))
             self._gtsam = gtsam
-        except (*_GTSAM_ERRORS, np.linalg.LinAlgError):
+        except (GtsamError, np.linalg.LinAlgError):
             self.fallbacks += 1
 
     def _smoothed(self, keys: IntArray, count: int) -> SmoothedTrack:
@@ -251,7 +248,7 @@ class FixedLagSmoother:
         window = self._live()
         try:
             known = gtsam.means(window.gtsam_key[solved].tolist(), window.reference[solved])
-        except _GTSAM_ERRORS:
+        except GtsamError:
             self.rebuilds += 1
             self.fallbacks += 1
             self._rebuild()

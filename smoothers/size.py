@@ -19,7 +19,8 @@ class SmoothedSize:
 
     Attributes:
         t: (K,) times (s), ascending.
-        rate_density: (K,) root spectral density of the rate over the interval that ends there (1/s^1.5).
+        rate_density: (K,) root spectral density of the rate over the interval that ends there (1/s^1.5); of
+            the first key, over the time before it.
         mean: (K, 2, 2) for width and height, [ln size, rate] (ln px, 1/s).
         cov: (K, 2, 2, 2) covariances.
         cross: (K, 2, 2, 2) covariance of each key with the next; of the last, nothing.
@@ -61,7 +62,7 @@ def _sizes_at(
         if query[i] <= t[0] or query[i] >= t[last]:
             edge = 0 if query[i] <= t[0] else last
             d = query[i] - t[edge]
-            grown = rate_density[last] * rate_density[last] * abs(d * d * d) / 3.0
+            grown = rate_density[edge] * rate_density[edge] * abs(d * d * d) / 3.0
             for axis in range(2):
                 out[i, axis] = math.exp(mean[edge, axis, 0] + d * mean[edge, axis, 1])
                 C = cov[edge, axis]
@@ -96,11 +97,12 @@ def _smooth(
     z: FloatArray,
     r: FloatArray,
     drift: FloatArray,
+    prior_drift: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Filter and smooth [ln size, rate]; see `smooth_size`, whose measurements are in order of time here."""
     t, rate_density = np.empty(len(times) + 1), np.empty(len(times) + 1)
     key = np.empty(len(times), dtype=np.int64)
-    t[0], rate_density[0], keys = prior_t, 0.0, 1
+    t[0], rate_density[0], keys = prior_t, prior_drift, 1
     for i in range(len(times)):
         if times[i] - t[keys - 1] > COINCIDENT_S:
             t[keys], rate_density[keys] = times[i], drift[i]
@@ -169,6 +171,7 @@ def smooth_size(
     log_size: FloatArray,
     r: FloatArray,
     rate_density: FloatArray,
+    prior_density: float,
 ) -> SmoothedSize:
     """Smooth the sizes of one whole track (Rauch-Tung-Striebel, nearly constant rate).
 
@@ -182,6 +185,7 @@ def smooth_size(
         log_size: (M, 2) measured ln w and ln h (ln px).
         r: (M, 2) their variances.
         rate_density: (M,) root spectral density of the rate since the measurement before (1/s^1.5).
+        prior_density: that of the time before the prior, and after it where there is no measurement.
 
     Returns:
         The smoothed sizes, at the keys that `TrackData` would give to the same times.
@@ -195,4 +199,5 @@ def smooth_size(
         times, z, var, drift = times[order], z[order], var[order], drift[order]
     if len(times) and times[0] < prior_t - COINCIDENT_S:
         raise DataError(f"a size at {times[0]} s is older than the track's prior at {prior_t} s")
-    return SmoothedSize(*_smooth(float(prior_t), prior_mean, prior_cov, times, z, var, drift))
+    prior = float(prior_t), prior_mean, prior_cov
+    return SmoothedSize(*_smooth(*prior, times, z, var, drift, float(prior_density)))

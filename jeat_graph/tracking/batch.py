@@ -84,6 +84,7 @@ class Measured(NamedTuple):
         white: (2,) variances of the white part of the centre's noise (px²).
         coloured_std: (2,) standard deviations of the part that is correlated in time (px), 0 for none.
         log_size_var: (2,) variances of ln width and ln height.
+        noise: (2,) what of `white` is the noise of boxes, and not what an unknown size adds (px²).
     """
 
     z: FloatArray
@@ -91,6 +92,7 @@ class Measured(NamedTuple):
     white: FloatArray
     coloured_std: FloatArray
     log_size_var: FloatArray
+    noise: FloatArray
 
 
 @njit(cache=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from numba import njit
 
 from jeat_graph.config.kernel_form import Model
-from jeat_graph.filters.noise import widen_hidden
 from jeat_graph.tracking.batch import Arrivals, prepare
 from jeat_graph.tracking.stages.associating import associate
 from jeat_graph.tracking.stages.beginning import give_birth
@@ -54,13 +53,12 @@ def step(
     doubt_scores(batch, scene, model)
     occluded = occlusion(tracks, n)
     p_found, p_detect = current_p_detect(tracks, n, batch, occluded, scene, model)
-    expectation = expect_detections(tracks, n, model.sensors)
-    widen_hidden(expectation.white, expectation.coloured_std, occluded, settings.noise.hidden_growth)
+    expectation = expect_detections(tracks, n, occluded, model)
     association = associate(tracks, n, batch, expectation, p_found, scene, model)
     judge_sight(tracks, n, batch, association, p_detect, scene, model)
     update_matched(tracks, n, batch, expectation, association, scene, model, log)
     if settings.association.second_views:
-        take_second_views(tracks, n, batch, association, model, log)
+        take_second_views(tracks, n, batch, association, p_found, scene, model, log)
     learn_boxes(tracks, n, batch, association, scene, model)
     learn_lasting(tracks, n, batch, association, scene, model)
     learn_trust(tracks, n, batch, association, scene, model)

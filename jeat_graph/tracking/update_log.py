@@ -79,6 +79,7 @@ def log_update(
     for axis in range(2):
         row["z"][axis] = measured.z[axis]
         row["r"][axis] = measured.white[axis]
+        row["noise"][axis] = measured.noise[axis]
         row["coloured_std"][axis] = measured.coloured_std[axis]
         row["log_size"][axis] = measured.log_size[axis]
         row["size_var"][axis] = measured.log_size_var[axis]

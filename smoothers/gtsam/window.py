@@ -19,11 +19,18 @@ from jeat_graph.smoothers.gtsam.scaling import unscale_mean
 #: Timestamps as GTSAM sees them: with a lag of one, a state at -2 is out of the window.
 _STAYS, _LEAVES, _LAG = 0.0, -2.0, 1.0
 
+# What GTSAM's C++ exceptions become in Python.
+_GTSAM_ERRORS = (RuntimeError, IndexError, ValueError)
+
+
+class GtsamError(Exception):
+    """GTSAM could not do what it was asked for; its window is not to be used again."""
+
 
 class GtsamWindow:
     """The window of one track inside GTSAM, in px and s at its interface.
 
-    Every method may raise GTSAM's RuntimeError; after that the object is not to be used again.
+    Every method may raise `GtsamError`; after that the object is not to be used again.
 
     Args:
         size: components of a state per axis, n.
@@ -50,15 +57,23 @@ class GtsamWindow:
         stamps = dict.fromkeys(range(first, first + count), _STAYS)
         stamps.update(dict.fromkeys(leaving, _LEAVES))
         values = zero_values(range(first, first + count), self._size)
-        self._smoother.update(graph.as_nonlinear(), values, stamps)
+        factors = graph.as_nonlinear()
+        try:
+            self._smoother.update(factors, values, stamps)
+        except _GTSAM_ERRORS as error:
+            raise GtsamError(str(error)) from error
 
     def means(self, keys: Sequence[int], reference: FloatArray) -> FloatArray:
         """Return the means (N, 2, n) of states of the window, given their references (N, 2, n).
 
         Raises:
-            RuntimeError: also if a mean is not finite.
+            GtsamError: also if a mean is not finite.
         """
-        vectors = self._smoother.getDelta().vector(list(keys))
+        wanted = list(keys)
+        try:
+            vectors = self._smoother.getDelta().vector(wanted)
+        except _GTSAM_ERRORS as error:
+            raise GtsamError(str(error)) from error
         if not np.isfinite(vectors).all():
-            raise RuntimeError("GTSAM gave a mean that is not finite")
+            raise GtsamError("GTSAM gave a mean that is not finite")
         return unscale_mean(vectors, reference)

@@ -78,7 +78,9 @@ def test_every_detection_has_a_reason_for_what_became_of_it(dets, tracks, seed, 
         near = []  # the births before it that it cannot be told from
         for b, view in enumerate(views):
             own = [k for k in view if sensor[k] == sensor[j] and k in surer[j]]
-            if own and max(iou(dets[j], dets[k]) for k in [view[0], *own]) > most:
+            common = [iou(dets[j], dets[k]) for k in [view[0], *own]]
+            joined = bool(own) and own[0] != view[0]
+            if own and (max(common) > most or (joined and min(common) > most / 2)):
                 near.append(-1)  # a second box of what this sensor shows already
             elif not own and view[0] in surer[j] and iou(dets[j], dets[view[0]]) > most / 2:
                 near.append(b)
@@ -119,6 +121,8 @@ def test_a_box_over_two_vehicles_of_another_sensor_swallows_only_one_of_them():
 def test_a_second_box_of_what_has_joined_a_birth_is_a_duplicate():
     first, joins, again = [0, 0, 10, 10], [4, 0, 10, 10], [6, 0, 10, 10]
     assert births([first, joins, again], [0.9, 0.8, 0.7], [0, 1, 1])[:2] == ([0], [-1, 0, -1])
+    # Not so of one sensor alone, which sees each thing more exactly than two see it together.
+    assert births([first, again], [0.9, 0.7], [1, 1])[:2] == ([0, 1], [-1, -1])
 
 
 def test_a_third_sensors_view_joins_as_well():

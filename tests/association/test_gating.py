@@ -177,3 +177,51 @@ def test_the_side_is_known_no_better_than_a_box_measures_it():
     same = one_cut(HIGH_CUT, 60.0, 60.0, last_cut=HIGH_CUT, size_var=0.25, position_var=400.0)
     y_part = -0.5 * np.log(2.0 * np.pi * 405.0)
     assert same.log_density[0] == pytest.approx(y_part - 0.5 * np.log(2.0 * np.pi * 10.0), rel=1e-9)
+
+
+@pytest.mark.parametrize(("cut", "side"), [(LOW_CUT, 140.0), (HIGH_CUT, 60.0)])
+def test_of_a_vehicle_that_shows_more_than_its_known_size_the_centre_is_that_of_what_shows(cut, side):
+    """Known to be 20 px wide, it shows 80 px: where the filter takes it in, the gate looks for it."""
+    there = one_cut(cut, side, 80.0, centre=100.0, width=20.0, size_var=0.3)
+    assert there.d2 == pytest.approx(0.0, abs=1e-20)
+    off = one_cut(cut, side, 80.0, centre=97.0, width=20.0, size_var=0.3)
+    assert off.d2[0] == pytest.approx(9.0 / (4.0 + 5.0 + 40.0**2 * 0.3))
+
+
+def cut_residual(scene, i, j, axis):
+    """Difference of detection j from track i along an axis, and its variance, for one that is cut or not."""
+    expected, found, _ = scene
+    s, weight = found.sensor[j], found.weight[j]
+    var = expected.position_var[i, s, axis] + expected.noise[i, s, axis] * weight
+    centre, cut = found.z[j, axis], found.cut[j, axis]
+    if cut == BOTH_CUT:
+        return 0.0, var + np.exp(found.log_size[j, axis]) ** 2 / (2.0 * np.pi)
+    if cut:
+        half = 0.5 * np.exp(max(expected.log_size[i, axis], found.log_size[j, axis]))
+        centre = found.side[j, axis] + (half if cut == HIGH_CUT else -half)
+        var += half**2 * expected.log_size_var[i, axis]
+    return centre - expected.position[i, s, axis], var
+
+
+def test_no_pair_with_a_box_that_is_cut_lies_outside_the_window():
+    """The sweep over sorted places must reach as far as the gates do, whatever shows of whatever size."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        expected, found, _ = scene = random_scene(rng, 15, 15)
+        expected.log_size[:] = rng.uniform(2.5, 5.0, expected.log_size.shape)
+        expected.log_size_var[:] = rng.uniform(0.001, 0.5, expected.log_size.shape)
+        found.log_size[:] = rng.uniform(2.5, 5.0, found.log_size.shape)
+        found.cut[:] = rng.choice([0, LOW_CUT, HIGH_CUT], found.cut.shape)
+        sign = np.where(found.cut == LOW_CUT, 0.5, -0.5)
+        found.side[:] = found.z + sign * np.exp(found.log_size)
+        expect = []
+        for i in range(15):
+            for j in range(15):
+                parts = [cut_residual(scene, i, j, axis) for axis in range(2)]
+                d2 = sum(y * y / S for y, S in parts)
+                if d2 <= 9.21:
+                    expect.append((i, j, d2))
+        rows, cols, d2, *_ = gated_pairs(*scene, 9.21, np.inf)
+        assert list(zip(rows, cols, strict=True)) == [pair[:2] for pair in expect]
+        assert np.allclose(d2, [pair[2] for pair in expect], rtol=1e-9)
+        assert len(expect) > 0

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from jeat_graph.filters.noise import adapt_scale, base_variance, score_weight, widen_hidden
+from jeat_graph.filters.noise import adapt_scale, base_variance, hidden_excess, score_weight
 
 PAPER = (0.1, 0.5, 5.0)
 
@@ -56,10 +56,8 @@ def test_adaptation_by_hand(scale, nis, after):
     growth=st.floats(0.0, 5.0),
 )
 def test_the_error_of_a_box_grows_with_the_part_that_others_hide(white, coloured, hidden, growth):
-    before = np.full((2, 3, 2), white)
-    after, std = before.copy(), np.full((2, 3, 2), coloured)
-    widen_hidden(after, std, np.array([0.0, hidden]), growth)
-    assert (after[0] == before[0]).all()
-    whole_std = np.sqrt(white + coloured**2) * (1.0 + growth * hidden)
-    assert np.sqrt(after[1] + coloured**2) == pytest.approx(np.full((3, 2), whole_std))
-    assert (std == coloured).all()
+    assert hidden_excess(0.0, growth) == hidden_excess(hidden, 0.0) == 0.0
+    whole = white + coloured**2
+    # What is added is white, so that the whole standard deviation grows by that factor.
+    std = np.sqrt(white + hidden_excess(hidden, growth) * whole + coloured**2)
+    assert std == pytest.approx(np.sqrt(whole) * (1.0 + growth * hidden))

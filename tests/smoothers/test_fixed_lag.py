@@ -226,6 +226,18 @@ def test_an_indeterminate_system_is_met_by_a_rebuild(sampled, scaled, monkeypatc
     assert scaled(left.mean, exact.mean[-len(left) :]) < 1e-4
 
 
+@pytest.mark.parametrize("error", [IndexError, ValueError, RuntimeError])
+def test_a_fault_of_our_own_is_no_failure_of_gtsam(sampled, monkeypatch, error):
+    track, _ = sampled(8, seconds=2.0)
+
+    def faulty(*_):
+        raise error("ours")
+
+    monkeypatch.setattr("jeat_graph.smoothers.fixed_lag.segment_rows", faulty)
+    with pytest.raises(error, match="ours"):
+        start(track).feed(some(track))
+
+
 @pytest.mark.parametrize("correlation_time", COLOURS)
 def test_a_rebuild_keeps_late_measurements(sampled, scaled, correlation_time):
     track, _ = sampled(9, seconds=2.5, correlation_time=correlation_time)

@@ -6,6 +6,9 @@ import pytest
 from jeat_graph import Tracker
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.tracking.smoothing.cut_sides import place_by_sides
+from jeat_graph.tracking.smoothing.priors import size_prior_of
+from jeat_graph.tracking.smoothing.sizes import SizeWindow
 
 WIDTH, HEIGHT = 400.0, 200.0
 CAR = np.array([120.0, 60.0])
@@ -123,3 +126,39 @@ def test_a_size_that_nobody_measures_stays_within_that_of_vehicles():
     snapshot = tracker.snapshot().tracks
     assert np.sqrt(snapshot.size_cov[0, 1, 0, 0]) <= 1.05
     assert np.sqrt(snapshot.cov[0, 1, 0, 0]) < 200.0
+
+
+@pytest.mark.parametrize(("edge_px", "tracks"), [(3.0, 1), (0.0, 0)])
+def test_a_vehicle_begins_where_it_would_not_end(edge_px, tracks):
+    """A detector that guesses the whole of a car at the edge: its centre is outside, a part of it shows."""
+    config = load_config("default", [f"image.edge_px={edge_px}", "smoother.engine=none"])
+    tracker = Tracker(config, image=(1280, 720))
+    for k in range(3):
+        tracker.step((0.05 * k, "rgb", [[-60.0 + k, 300.0, 90.0, 50.0]], [0.9]))
+        assert tracker.num_tracks == tracks
+
+
+def test_smoothed_anew_the_side_that_shows_is_as_exact_as_the_filter_took_it_for():
+    """By score and by sensor; what is added is what the size leaves open now."""
+    settings = ["noise.score_weighting=true", "smoother.engine=none", "image.edge_px=3"]
+    tracker = Tracker(load_config("default", settings), image=(640, 360), diagnostics=True)
+    parts = []
+    for k in range(30):
+        left, right = max(-40.0 + 4.0 * k, 0.0), 40.0 + 4.0 * k
+        score = 0.3 if k < 6 else 0.9
+        tracker.step((0.05 * k, "rgb", [[left, 100.0, right - left, 50.0]], [score]))
+        parts.append(tracker.last_measurements()[0])
+    rows = np.concatenate(parts)
+    rows = rows[rows["track_id"] == 1]
+    cut = np.flatnonzero(rows["cut"][:, 0] != 0)
+    assert len(cut) > 5
+    window = SizeWindow(size_prior_of(rows[0]), tracker.config.size.rate_density)
+    window.append(rows[1:])
+    sizes = window.smooth()
+    placed = place_by_sides(rows, sizes)
+    at = np.searchsorted(sizes.t, rows["t"][cut])
+    half = 0.5 * np.exp(sizes.mean[at, 0, 0])
+    # The same noise along both axes here, and nothing cuts the box along y.
+    np.testing.assert_allclose(placed["r"][cut, 0], rows["r"][cut, 1] + half**2 * sizes.cov[at, 0, 0, 0])
+    np.testing.assert_allclose(placed["z"][cut, 0], 40.0 + 4.0 * cut - half)
+    np.testing.assert_array_equal(placed["coloured_std"], rows["coloured_std"])

@@ -9,10 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import BoolArray, RecordArray
 from jeat_graph.filters.cut_boxes import BOTH_CUT, FIRST_LOG_GROWTH_STD, WHOLE, centre_from_side
-from jeat_graph.filters.noise import base_variance
 from jeat_graph.smoothers.size import SmoothedSize
 
 # Variance of ln size that leaves it to the whole boxes: a factor of e² to either side.
@@ -67,13 +65,14 @@ def sizes_by_parts(rows: RecordArray) -> RecordArray:
     return out
 
 
-def place_by_sides(rows: RecordArray, sizes: SmoothedSize, config: Config) -> RecordArray:
+def place_by_sides(rows: RecordArray, sizes: SmoothedSize) -> RecordArray:
     """Write the centres of cut boxes anew, by the side that shows and the smoothed size.
+
+    The side is as exact as the filter took it for; the size is what it is known to be now.
 
     Args:
         rows: (M,) records of one track, the birth too if it is among them.
         sizes: its smoothed sizes.
-        config: what is known of the sensors' noise.
 
     Returns:
         (M,) records.
@@ -83,17 +82,9 @@ def place_by_sides(rows: RecordArray, sizes: SmoothedSize, config: Config) -> Re
     if not one_sided.any():
         return rows
     out = rows.copy()
-    sensors = [config.sensors[name] for name in config.sensor_names]
     at = np.clip(np.searchsorted(sizes.t, rows["t"]), 0, len(sizes.t) - 1)
-    for i in np.flatnonzero(one_sided.any(axis=1)).tolist():
-        row, log_size, log_var = rows[i], sizes.mean[at[i], :, 0], sizes.cov[at[i], :, 0, 0]
-        sensor, side = sensors[int(row["sensor"])], np.exp(log_size)
-        whole = float(np.sqrt(side.prod()))
-        for axis in np.flatnonzero(one_sided[i]).tolist():
-            rho = sensor.rho_x if axis == 0 else sensor.rho_y
-            base = base_variance(sensor.sigma_px, rho, float(side[axis]), sensor.rho_size, whole)
-            white = row["scale"] * (1.0 - sensor.correlated_share) * base
-            code = int(row["cut"][axis])
-            found = centre_from_side(code, row["side"][axis], log_size[axis], log_var[axis])
-            out["z"][i, axis], out["r"][i, axis] = found[0], white + found[1]
+    for i, axis in np.argwhere(one_sided).tolist():
+        log_size, log_var = sizes.mean[at[i], axis, 0], sizes.cov[at[i], axis, 0, 0]
+        z, var = centre_from_side(int(cut[i, axis]), rows["side"][i, axis], log_size, log_var)
+        out["z"][i, axis], out["r"][i, axis] = z, rows["noise"][i, axis] + var
     return out

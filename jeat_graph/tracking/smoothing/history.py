@@ -118,7 +118,7 @@ class TrackHistory:
         else:
             self._sizes.append(rows)
         if self._whole and any_cut(rows):
-            rows = place_by_sides(rows, self._sizes.smooth(), self._config)
+            rows = place_by_sides(rows, self._sizes.smooth())
         if self.smoother is None:
             settings = self._config.smoother
             self.smoother = make_smoother(

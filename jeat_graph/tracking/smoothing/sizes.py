@@ -51,4 +51,4 @@ class SizeWindow:
         return self._parts[0]
 
     def _solve(self, t: FloatArray, log_size: FloatArray, var: FloatArray) -> SmoothedSize:
-        return smooth_size(*self._base, t, log_size, var, np.full(len(t), self._density))
+        return smooth_size(*self._base, t, log_size, var, np.full(len(t), self._density), self._density)

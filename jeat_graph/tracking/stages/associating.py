@@ -9,7 +9,7 @@ import numpy as np
 
 from jeat_graph.association.costs import likelihood_cost, log_evidence
 from jeat_graph.association.densities import Likelihood
-from jeat_graph.association.gates import Expected, Found, gated_pairs
+from jeat_graph.association.gates import Expected, Found, Pairs, gated_pairs
 from jeat_graph.association.joint import associate_joint, associate_sequential, associate_slots
 from jeat_graph.association.methods import JOINT, SLOTS
 from jeat_graph.config.kernel_form import Model
@@ -35,7 +35,7 @@ class Association(NamedTuple):
 
 
 @inner
-def associate(
+def judge_pairs(
     tracks: TrackArrays,
     n: int,
     batch: Batch,
@@ -43,10 +43,9 @@ def associate(
     p_detect: FloatArray,
     scene: SceneState,
     model: Model,
-) -> Association:
-    """Associate a batch with the first `n` tracks, predicted to its time; nothing counts as taken yet."""
+) -> tuple[Pairs, FloatArray]:
+    """List the pairs of the first `n` tracks and a batch inside the gates, and the evidence ln Λ of each."""
     sensors, settings = model.sensors, model.settings.association
-    num_sensors = len(sensors.sigma_px)
     pairs = gated_pairs(
         Expected(
             expectation.centre,
@@ -62,11 +61,26 @@ def associate(
         settings.gate_bound,
         settings.size_gate_bound,
     )
-    rows, cols = pairs.rows, pairs.cols
-    log_clutter = np.empty(num_sensors)
-    for s in range(num_sensors):
+    log_clutter = np.empty(len(sensors.sigma_px))
+    for s in range(len(log_clutter)):
         log_clutter[s] = math.log(scene.clutter[s]) - model.settings.log_clutter_volume
-    pair_evidence = log_evidence(pairs, p_detect, batch.log_score, log_clutter, batch.sensor)
+    return pairs, log_evidence(pairs, p_detect, batch.log_score, log_clutter, batch.sensor)
+
+
+@inner
+def associate(
+    tracks: TrackArrays,
+    n: int,
+    batch: Batch,
+    expectation: Expectation,
+    p_detect: FloatArray,
+    scene: SceneState,
+    model: Model,
+) -> Association:
+    """Associate a batch with the first `n` tracks, predicted to its time; nothing counts as taken yet."""
+    settings, num_sensors = model.settings.association, len(model.sensors.sigma_px)
+    pairs, pair_evidence = judge_pairs(tracks, n, batch, expectation, p_detect, scene, model)
+    rows, cols = pairs.rows, pairs.cols
     if settings.by_likelihood:
         judged = pair_evidence.copy()
         if len(batch.alike):  # who looks like whom says nothing of false boxes, so only here

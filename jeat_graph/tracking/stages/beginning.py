@@ -17,6 +17,7 @@ from jeat_graph.filters.cut_boxes import (
     HIGH_CUT,
     UNKNOWN,
     WHOLE,
+    centre_from_part,
     centre_from_side,
 )
 from jeat_graph.filters.noise import base_variance
@@ -24,7 +25,7 @@ from jeat_graph.filters.prior import write_prior, write_size_prior
 from jeat_graph.tracking.batch import Batch, Measured
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.comparing import remember_box
-from jeat_graph.tracking.stages.ending import confirm
+from jeat_graph.tracking.stages.ending import confirm, has_left
 from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.stages.learning import scan_weight
 from jeat_graph.tracking.stages.predicting import jerk_of, new_velocity_var, split_noise
@@ -73,6 +74,7 @@ def give_birth(
             i = n + partner[j]
             update_track(tracks, i, batch, j, second_view(tracks, i, batch, j, model.sensors), model, log)
             remember_box(tracks, i, batch, j)
+            tracks.hidden[i, batch.sensor[j]] = 0.0
             # Two sensors' false boxes seldom coincide: each view's chance to be false remains.
             tracks.existence[i] = 1.0 - (1.0 - tracks.existence[i]) * (1.0 - batch.precision[j])
     judge_worth(tracks, n + len(parents), scene, model)
@@ -84,14 +86,15 @@ def give_birth(
 def first_view(batch: Batch, j: int, sensors: SensorArrays) -> Measured:
     """Say what detection `j` measures where no track's size is known; one that is cut may be much larger."""
     s = batch.sensor[j]
-    white, coloured_std = np.empty(2), np.empty(2)
+    white, coloured_std, noise = np.empty(2), np.empty(2), np.empty(2)
     z, log_size, log_size_var = batch.z[j].copy(), batch.log_size[j].copy(), sensors.size_var[s].copy()
     size = math.sqrt(batch.boxes[j, 2] * batch.boxes[j, 3])
     for axis in range(2):
         side = batch.boxes[j, 2 + axis]
         base = base_variance(sensors.sigma_px[s], sensors.rho[s, axis], side, sensors.rho_size[s], size)
         r, h = split_noise(base, s, sensors)
-        white[axis], coloured_std[axis] = r * batch.weight[j], h
+        noise[axis], coloured_std[axis] = r * batch.weight[j], h
+        white[axis] = noise[axis]
         cut = batch.cut[j, axis]
         if cut != WHOLE:
             log_size[axis] += FIRST_LOG_GROWTH
@@ -100,7 +103,7 @@ def first_view(batch: Batch, j: int, sensors: SensorArrays) -> Measured:
             if cut != BOTH_CUT:
                 z[axis], _ = centre_from_side(cut, batch.side[j, axis], log_size[axis], 0.0)
             white[axis] += half_var
-    return Measured(z, log_size, white, coloured_std, log_size_var)
+    return Measured(z, log_size, white, coloured_std, log_size_var, noise)
 
 
 @inner
@@ -115,7 +118,8 @@ def second_view(tracks: TrackArrays, i: int, batch: Batch, j: int, sensors: Sens
         if cut == BOTH_CUT:
             own.z[axis] = tracks.mean[i, axis, 0]
         else:
-            own.z[axis], _ = centre_from_side(cut, batch.side[j, axis], known, 0.0)
+            shown = batch.log_size[j, axis]
+            own.z[axis], _ = centre_from_part(cut, batch.side[j, axis], shown, known, 0.0)
         # Both views guess the part that does not show in the same way.
         own.log_size[axis], own.log_size_var[axis] = known, UNKNOWN
     return own
@@ -142,7 +146,7 @@ def birth_existence(batch: Batch, scene: SceneState, model: Model) -> FloatArray
     for j in range(len(out)):
         s = batch.sensor[j]
         x, y = batch.z[j]
-        if lifecycle.leave_picture and not (0.0 <= x <= image.width and 0.0 <= y <= image.height):
+        if lifecycle.leave_picture and has_left(x, y, batch.boxes[j], image):
             out[j] = -1.0  # it would end in the same step
             continue
         if covers_picture(batch, j, image.width * image.height, model.settings.birth.max_picture_share):

@@ -10,6 +10,8 @@ from numba import njit
 from jeat_graph.association.boxes import clip_boxes, track_boxes, visible_fraction
 from jeat_graph.association.merging import find_duplicates
 from jeat_graph.config.kernel_form import Model, Settings
+from jeat_graph.config.schema import ImageConfig
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.tracking.compaction import keep_rows
 from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.stages.learning import scan_weight
@@ -32,6 +34,22 @@ def confirm(tracks: TrackArrays, n: int, t: float, settings: Settings) -> None:
         tracks.confirmed[i] = tracks.confirmed[i] or earned
         if not lifecycle.by_existence:
             tracks.existence[i] = 1.0 if tracks.confirmed[i] else 0.5
+
+
+@inner
+def has_left(x: float, y: float, box: FloatArray, image: ImageConfig) -> bool:
+    """Whether a vehicle has left the picture: its centre has, or all of it where boxes may be cut.
+
+    Args:
+        x: of its centre (px).
+        y: of its centre (px).
+        box: (4,) left, top, width, height (px).
+        image: the kernels' form of that section.
+    """
+    if image.edge_px > 0.0:
+        # The centre may be outside while a part still shows.
+        return bool(visible_fraction(box, image.width, image.height) <= 0.0)
+    return bool(x < 0.0 or y < 0.0 or x > image.width or y > image.height)
 
 
 @inner
@@ -64,10 +82,7 @@ def remove_ended(tracks: TrackArrays, n: int, t: float, scene: SceneState, model
         if tracks.confirmed[i] and tracks.standing[i]:
             most = max(most, settings.standing.max_gap_s)
         x, y = tracks.mean[i, 0, 0], tracks.mean[i, 1, 0]
-        outside = x < 0.0 or y < 0.0 or x > image.width or y > image.height
-        if image.edge_px > 0.0:
-            # The centre may be outside while a part still shows.
-            outside = visible_fraction(boxes[i], image.width, image.height) <= 0.0
+        outside = has_left(x, y, boxes[i], image)
         doubted = lifecycle.by_existence and tracks.existence[i] < lifecycle.delete_existence
         # A state that overflowed (a coasting track on wild input) must not survive as NaN.
         broken = not (math.isfinite(x) and math.isfinite(y))

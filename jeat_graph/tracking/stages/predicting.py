@@ -16,7 +16,7 @@ from jeat_graph.filters.coloured_noise import expected, predict_errors
 from jeat_graph.filters.existence import motion_visibility, unsure_visibility
 from jeat_graph.filters.jerk import track_jerk
 from jeat_graph.filters.kalman import predict, predict_size
-from jeat_graph.filters.noise import base_variance
+from jeat_graph.filters.noise import base_variance, hidden_excess
 from jeat_graph.filters.sides import MOST_LOG_SIZE, mean_side
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.inner import inlined, inner
@@ -210,15 +210,24 @@ class Expectation(NamedTuple):
 
 
 @inner
-def expect_detections(tracks: TrackArrays, n: int, sensors: SensorArrays) -> Expectation:
-    """Say where each sensor would find each of the first `n` tracks, and with what noise."""
+def expect_detections(tracks: TrackArrays, n: int, occluded: FloatArray, model: Model) -> Expectation:
+    """Say where each sensor would find each of the first `n` tracks, and with what noise.
+
+    Args:
+        tracks: state of all tracks.
+        n: number of living ones.
+        occluded: (n,) part of each box that others hide.
+        model: sensors and settings.
+    """
+    sensors, growth = model.sensors, model.settings.noise.hidden_growth
     shape = (n, len(sensors.sigma_px), 2)
     centre, var, white, coloured_std = np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape)
     for i in range(n):
+        more = hidden_excess(occluded[i], growth)
         for s in range(shape[1]):
             for axis in range(2):
                 r, h = split_noise(detection_variance(tracks, i, s, axis, sensors), s, sensors)
-                white[i, s, axis], coloured_std[i, s, axis] = r, h
+                white[i, s, axis], coloured_std[i, s, axis] = r + more * (r + h * h), h
                 z, V = expected(tracks.mean[i, axis], tracks.cov[i, axis], h, sensors.error[s])
                 centre[i, s, axis], var[i, s, axis] = z, V
     return Expectation(centre, var, white, coloured_std)

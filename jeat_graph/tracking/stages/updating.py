@@ -14,7 +14,7 @@ from jeat_graph.filters.cut_boxes import (
     UNKNOWN,
     WHOLE,
     bound_unmeasured,
-    centre_from_side,
+    centre_from_part,
     floor_of_centre,
 )
 from jeat_graph.filters.existence import existence_after_hit
@@ -28,9 +28,9 @@ from jeat_graph.filters.standing import (
     update_rest_point,
 )
 from jeat_graph.tracking.batch import Batch, Measured
-from jeat_graph.tracking.stages.associating import Association
+from jeat_graph.tracking.stages.associating import Association, judge_pairs
 from jeat_graph.tracking.stages.inner import inlined, inner
-from jeat_graph.tracking.stages.predicting import Expectation, expect_detections, jerk_of
+from jeat_graph.tracking.stages.predicting import Expectation, expect_detections, jerk_of, occlusion
 from jeat_graph.tracking.state import SceneState, TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog, log_innovation, log_update
 
@@ -41,10 +41,11 @@ def measured_by(
 ) -> Measured:
     """Say what detection `j` measures of track `i`; a box that is cut only what its visible sides tell."""
     s = batch.sensor[j]
-    white = expectation.white[i, s] * batch.weight[j]
+    noise = expectation.white[i, s] * batch.weight[j]
     coloured_std, log_size_var = expectation.coloured_std[i, s], sensors.size_var[s]
     if batch.cut[j, 0] == WHOLE and batch.cut[j, 1] == WHOLE:
-        return Measured(batch.z[j], batch.log_size[j], white, coloured_std, log_size_var)
+        return Measured(batch.z[j], batch.log_size[j], noise, coloured_std, log_size_var, noise)
+    white = noise.copy()
     z, log_size, log_size_var = batch.z[j].copy(), batch.log_size[j].copy(), log_size_var.copy()
     for axis in range(2):
         cut = batch.cut[j, axis]
@@ -54,12 +55,10 @@ def measured_by(
         if cut == BOTH_CUT:
             z[axis], white[axis] = tracks.mean[i, axis, 0], UNKNOWN
         else:
-            # The whole is no smaller than the part.
-            at_least = max(known, log_size[axis])
-            z[axis], var = centre_from_side(cut, batch.side[j, axis], at_least, known_var)
+            z[axis], var = centre_from_part(cut, batch.side[j, axis], log_size[axis], known, known_var)
             white[axis] += var
         log_size[axis], log_size_var[axis] = max(known, log_size[axis]), UNKNOWN
-    return Measured(z, log_size, white, coloured_std, log_size_var)
+    return Measured(z, log_size, white, coloured_std, log_size_var, noise)
 
 
 @inlined
@@ -153,6 +152,29 @@ def update_track(
 
 
 @inner
+def take_detection(
+    tracks: TrackArrays,
+    i: int,
+    batch: Batch,
+    j: int,
+    measured: Measured,
+    evidence: float,
+    model: Model,
+    log: UpdateLog,
+) -> None:
+    """Let track `i` take detection `j`, of tempered `evidence`: update its state and its existence."""
+    update_track(tracks, i, batch, j, measured, model, log)
+    if model.settings.lifecycle.by_existence:
+        tracks.existence[i] = existence_after_hit(tracks.existence[i], evidence, 1.0)
+
+
+@inner
+def tempered(association: Association, i: int, s: int, scene: SceneState, model: Model) -> float:
+    """Return the evidence of sensor `s` for track `i` as far as it is believed."""
+    return float(model.sensors.tempering[s] * scene.trust[s] * association.evidence[i, s])
+
+
+@inner
 def update_matched(
     tracks: TrackArrays,
     n: int,
@@ -163,23 +185,21 @@ def update_matched(
     model: Model,
     log: UpdateLog,
 ) -> None:
-    """Take the matched detections in, one sensor after another (equal to a stacked update); mark `taken`."""
-    sensors, lifecycle = model.sensors, model.settings.lifecycle
-    match, taken = association.match, association.taken
+    """Take the matched detections in, one sensor after another.
+
+    That is a stacked update where all is linear: where no box is cut, the track does not stand, and the
+    sensors have no error states, which are measured in the order of the sensors.
+    """
+    match = association.match
     for i in range(n):
         for s in range(match.shape[1]):
             j = match[i, s]
             if j < 0:
                 continue
-            taken[j] = 1
-            measured = measured_by(tracks, i, batch, j, expectation, sensors)
-            update_track(tracks, i, batch, j, measured, model, log)
-            if lifecycle.by_existence:
-                tracks.existence[i] = existence_after_hit(
-                    tracks.existence[i],
-                    association.evidence[i, s],
-                    sensors.tempering[s] * scene.trust[s],
-                )
+            association.taken[j] = 1
+            measured = measured_by(tracks, i, batch, j, expectation, model.sensors)
+            evidence = tempered(association, i, s, scene, model)
+            take_detection(tracks, i, batch, j, measured, evidence, model, log)
 
 
 @inner
@@ -188,18 +208,22 @@ def take_second_views(
     n: int,
     batch: Batch,
     association: Association,
+    p_detect: FloatArray,
+    scene: SceneState,
     model: Model,
     log: UpdateLog,
 ) -> None:
     """Second pass of algorithm 1: each matched track takes the nearest gated leftover of another sensor.
 
-    The distance is that to the track as the first detection has updated it. Entries of `match` are set.
+    The distance is that to the track as the first detection has updated it, and so is the evidence. Entries
+    of `match` and `evidence` are set.
     """
     match, taken = association.match, association.taken
-    leftover = np.flatnonzero(taken == 0)
-    if not len(leftover):
+    if np.all(taken != 0):
         return
-    expectation = expect_detections(tracks, n, model.sensors)
+    expectation = expect_detections(tracks, n, occlusion(tracks, n), model)
+    pairs, evidence = judge_pairs(tracks, n, batch, expectation, p_detect, scene, model)
+    first_pair = np.searchsorted(pairs.rows, np.arange(n + 1))
     for i in range(n):
         first = -1
         for s in range(match.shape[1]):
@@ -210,22 +234,16 @@ def take_second_views(
         for s in range(match.shape[1]):
             if s == first:
                 continue
-            best = model.settings.association.gate_bound
+            best = np.inf
             # Not the literal -1, for which all that follows would be compiled a second time.
             chosen = np.int64(-1)
-            for j in leftover:
-                if taken[j] or batch.sensor[j] != s:
-                    continue
-                d2 = 0.0
-                for axis in range(2):
-                    y = batch.z[j, axis] - expectation.centre[i, s, axis]
-                    R = expectation.white[i, s, axis] * batch.weight[j]
-                    d2 += y * y / (expectation.var[i, s, axis] + R)
-                if d2 <= best:
-                    best = d2
-                    chosen = j
+            for p in range(first_pair[i], first_pair[i + 1]):
+                j = pairs.cols[p]
+                if not taken[j] and batch.sensor[j] == s and pairs.d2[p] <= best:
+                    best, chosen = pairs.d2[p], p
             if chosen >= 0:
-                measured = measured_by(tracks, i, batch, int(chosen), expectation, model.sensors)
-                update_track(tracks, i, batch, int(chosen), measured, model, log)
-                match[i, s] = chosen
-                taken[chosen] = 1
+                j = pairs.cols[chosen]
+                match[i, s], association.evidence[i, s], taken[j] = j, evidence[chosen], 1
+                measured = measured_by(tracks, i, batch, j, expectation, model.sensors)
+                believed = tempered(association, i, s, scene, model)
+                take_detection(tracks, i, batch, j, measured, believed, model, log)
