@@ -240,7 +240,7 @@ def take_second_views(
             for p in range(first_pair[i], first_pair[i + 1]):
                 j = pairs.cols[p]
                 if not taken[j] and batch.sensor[j] == s and pairs.d2[p] <= best:
-                    best, chosen = pairs.d2[p], p
+                    best, chosen = pairs.d2[p], np.int64(p)
             if chosen >= 0:
                 j = pairs.cols[chosen]
                 match[i, s], association.evidence[i, s], taken[j] = j, evidence[chosen], 1
