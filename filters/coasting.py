@@ -54,6 +54,26 @@ def forget(
             _scale(size_mean[i, axis], size_cov[i, axis], _RATE, kept)
 
 
+@njit(cache=True)
+def forget_acceleration(
+    mean: FloatArray, cov: FloatArray, unseen: BoolArray, dt: float, memory_s: float
+) -> None:
+    """Let the acceleration alone die away, in place: `forget` for filters that know nothing of sizes.
+
+    Args:
+        mean: (N, 2, 3 + B) as there.
+        cov: (N, 2, 3 + B, 3 + B) as there.
+        unseen: (N,) as there.
+        dt: time step (s), >= 0.
+        memory_s: τ (s), > 0.
+    """
+    kept = math.exp(-min(dt / memory_s, _MOST_MEMORIES))
+    for i in range(len(unseen)):
+        if unseen[i]:
+            for axis in range(2):
+                _scale(mean[i, axis], cov[i, axis], _ACCELERATION, kept)
+
+
 @njit(cache=True, forceinline=True)
 def _scale(mean: FloatArray, cov: FloatArray, k: int, factor: float) -> None:
     """Scale component `k` of a block by a factor, in place."""

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from jeat_graph.config.fields import Section, flag, number
 from jeat_graph.data.errors import ConfigError
 
+# Densities of jerk between which innovations choose: that of calm traffic, of turns, of sport.
+_DENSITIES = 3
+
 
 @dataclass(frozen=True)
 class ImageConfig(Section):
@@ -33,6 +36,22 @@ class MotionConfig(Section):
     jerk_per_growth: float = number(
         0.0, "1", "root spectral density of jerk by perspective, in units of box size · growth rate^2.5"
     )
+    manoeuvre_step: float = number(
+        1.0,
+        "1",
+        "factor from one to the next of three densities of jerk between which a track's innovations choose; "
+        "1: no choice",
+        1.0,
+        100.0,
+    )
+    manoeuvre_memory_s: float = number(2.0, "s", "how long a manoeuvre lasts", open_low=True)
+    manoeuvre_prior: float = number(
+        0.05,
+        "1",
+        "probability of each of them before anything is known, as a part of the one before",
+        0.0,
+        1.0,
+    )
     velocity_std_px: float = number(20.0, "px/s", "std of a new track's velocity")
     velocity_std_per_size: float = number(3.0, "1/s", "std of a new track's velocity per px of box size")
     acceleration_std_px: float = number(1.0, "px/s²", "std of a new track's acceleration", open_low=True)
@@ -40,6 +59,11 @@ class MotionConfig(Section):
     unseen_memory_s: float = number(
         0.0, "s", "time constant with which acceleration and growth of an unseen track die away; 0: they stay"
     )
+
+    @property
+    def densities(self) -> int:
+        """Number of densities of jerk between which a track's innovations choose; 0: there is no choice."""
+        return _DENSITIES if self.manoeuvre_step > 1.0 else 0
 
 
 @dataclass(frozen=True)

@@ -50,6 +50,11 @@ def keep_rows(tracks: TrackArrays, rows: IntArray) -> None:
     _shift(tracks.used, rows, first)
     _shift(tracks.seen_by, rows, first)
     _shift(tracks.score_odds, rows, first)
+    if tracks.jerk_weight.shape[1]:
+        _shift(tracks.jerk_mean, rows, first)
+        _shift(tracks.jerk_cov, rows, first)
+        _shift(tracks.jerk_weight, rows, first)
+        _shift(tracks.jerk_factor, rows, first)
     _shift(tracks.lasting, rows, first)
     _shift(tracks.last_box, rows, first)
     _shift(tracks.worthy, rows, first)

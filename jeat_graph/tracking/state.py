@@ -12,11 +12,14 @@ from jeat_graph.config.kernel_form import SensorArrays
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 from jeat_graph.filters.box_offsets import NUM_SUMS
+from jeat_graph.filters.manoeuvre import prior_weights
 
 # What lasts usually has scores of about .9; that is held to be known from five seconds of a track.
 _USUAL_ODDS, _USUAL_WEIGHT = 2.2, 5.0
 # The share of what comes again in vain is held to be known from ten.
 _USUAL_VAIN_WEIGHT = 10.0
+#: How hard the tracks of a scene usually manoeuvre is the mean of so many seconds of a track.
+USUAL_JERK_S = 30.0
 
 
 class TrackArrays(NamedTuple):
@@ -47,6 +50,10 @@ class TrackArrays(NamedTuple):
         used: (C,) bit s is set where sensor s's detection was taken in the last step.
         seen_by: (C,) bit s is set where sensor s's detection was ever taken.
         score_odds: (C,) mean log odds of the scores of its detections.
+        jerk_mean: (C, K, 2, 3 + B) its motion under K densities of jerk (`filters/manoeuvre.py`).
+        jerk_cov: (C, K, 2, 3 + B, 3 + B) covariance of each.
+        jerk_weight: (C, K) probability of each density.
+        jerk_factor: (C,) factor on the density of the jerk that follows from them.
         lasting: (C,) whether it has lasted (`filters.worth`).
         last_box: (C, S, 5) each sensor's last whole box, as it saw it: time (s), centre (px), ln width and ln
             height.
@@ -76,6 +83,10 @@ class TrackArrays(NamedTuple):
     used: IntArray
     seen_by: IntArray
     score_odds: FloatArray
+    jerk_mean: FloatArray
+    jerk_cov: FloatArray
+    jerk_weight: FloatArray
+    jerk_factor: FloatArray
     lasting: npt.NDArray[np.bool_]
     last_box: FloatArray
     worthy: npt.NDArray[np.bool_]
@@ -130,6 +141,7 @@ class SceneState(NamedTuple):
         pair_sums: (S, S, 2, 10) what pairs of boxes of a sensor and a later one said (`filters.box_offsets`).
         offsets: (S, 2, 3) what each sensor is off by along each axis: share of the side, px, ln side.
         pair_factors: (S, S, 2, 2) factors on the variances that are assumed of their differences.
+        usual_jerk: (K,) recent mean weight of each density of jerk over the confirmed tracks.
     """
 
     clutter: FloatArray
@@ -153,6 +165,7 @@ class SceneState(NamedTuple):
     pair_sums: FloatArray
     offsets: FloatArray
     pair_factors: FloatArray
+    usual_jerk: FloatArray
 
 
 def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
@@ -184,11 +197,12 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
         pair_sums=np.zeros((num_sensors, num_sensors, 2, NUM_SUMS)),
         offsets=np.zeros((num_sensors, 2, 3)),
         pair_factors=np.ones((num_sensors, num_sensors, 2, 2)),
+        usual_jerk=prior_weights(config.motion.manoeuvre_prior, config.motion.densities),
     )
 
 
-def allocate(capacity: int, num_sensors: int, num_errors: int = 0) -> TrackArrays:
-    """Allocate zeroed arrays for `capacity` tracks, `num_sensors` sensors and `num_errors` error states."""
+def allocate(capacity: int, num_sensors: int, num_errors: int = 0, densities: int = 0) -> TrackArrays:
+    """Allocate zeroed arrays for `capacity` tracks, S sensors, B error states and K densities of jerk."""
     dim = 3 + num_errors
     return TrackArrays(
         mean=np.zeros((capacity, 2, dim)),
@@ -214,6 +228,10 @@ def allocate(capacity: int, num_sensors: int, num_errors: int = 0) -> TrackArray
         used=np.zeros(capacity, dtype=np.int64),
         seen_by=np.zeros(capacity, dtype=np.int64),
         score_odds=np.zeros(capacity),
+        jerk_mean=np.zeros((capacity, densities, 2, dim)),
+        jerk_cov=np.zeros((capacity, densities, 2, dim, dim)),
+        jerk_weight=np.zeros((capacity, densities)),
+        jerk_factor=np.ones(capacity),
         lasting=np.zeros(capacity, dtype=np.bool_),
         last_box=np.full((capacity, num_sensors, 5), -np.inf),
         worthy=np.ones(capacity, dtype=np.bool_),
@@ -228,7 +246,8 @@ def grow(tracks: TrackArrays, num_tracks: int, capacity: int) -> TrackArrays:
     old = len(tracks.existence)
     if capacity <= old:
         return tracks
-    larger = allocate(max(capacity, 2 * old), tracks.scale.shape[1], tracks.mean.shape[2] - 3)
+    errors, densities = tracks.mean.shape[2] - 3, tracks.jerk_weight.shape[1]
+    larger = allocate(max(capacity, 2 * old), tracks.scale.shape[1], errors, densities)
     for source, target in zip(tracks, larger, strict=True):
         target[:num_tracks] = source[:num_tracks]
     return larger

@@ -70,7 +70,9 @@ class Tracker(SavedTracks):
         self._diagnostics = diagnostics
         self._model = kernel_model(config)
         sensors = self._model.sensors
-        self._tracks = allocate(_FIRST_CAPACITY, len(self.sensor_names), len(sensors.correlation_time_s))
+        self._tracks = allocate(
+            _FIRST_CAPACITY, len(self.sensor_names), len(sensors.correlation_time_s), config.motion.densities
+        )
         self._scene = start_scene(sensors, config)
         self._num_tracks = 0
         self._next_id = 1

@@ -28,6 +28,7 @@ from jeat_graph.tracking.stages.comparing import remember_box
 from jeat_graph.tracking.stages.ending import confirm, has_left
 from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.stages.learning import scan_weight
+from jeat_graph.tracking.stages.manoeuvring import start_jerk
 from jeat_graph.tracking.stages.predicting import jerk_of, new_velocity_var, split_noise
 from jeat_graph.tracking.stages.updating import update_track
 from jeat_graph.tracking.stages.worth import judge_worth
@@ -65,6 +66,7 @@ def give_birth(
             scene.fruitless[s] += scan_weight(s, model)
     for b in range(len(parents)):
         start_track(tracks, n + b, next_id + b, batch, parents[b], model, log)
+        start_jerk(tracks, n + b, scene)
         tracks.existence[n + b] = existence[parents[b]]
         tracks.p_detect[n + b] = scene.p_detect
         tracks.hidden[n + b] = settings.lifecycle.hidden_prior * scene.trust[batch.sensor[parents[b]]]

@@ -20,6 +20,7 @@ from jeat_graph.filters.noise import base_variance, hidden_excess
 from jeat_graph.filters.sides import MOST_LOG_SIZE, mean_side
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.inner import inlined, inner
+from jeat_graph.tracking.stages.manoeuvring import choose_jerk, predict_manoeuvring
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
 # A small rest remains: what should be invisible is still taken if it is detected.
@@ -33,7 +34,9 @@ _LATE_PERIODS = 3.0
 @inlined
 def jerk_of(tracks: TrackArrays, i: int, settings: Settings) -> float:
     """Root spectral density of the jerk of track `i` now (px/s^2.5)."""
-    factor = settings.standing.jerk_factor if tracks.standing[i] else 1.0
+    factor = tracks.jerk_factor[i]
+    if tracks.standing[i]:
+        factor *= settings.standing.jerk_factor
     return track_jerk(
         tracks.size_mean[i],
         settings.motion.jerk_px,
@@ -85,6 +88,9 @@ def predict_all(tracks: TrackArrays, n: int, dt: float, scene: SceneState, model
     if dt <= 0.0:
         return
     sensors, settings = model.sensors, model.settings
+    manoeuvring = tracks.jerk_weight.shape[1] > 0
+    if manoeuvring:
+        choose_jerk(tracks, n, dt, scene, model)
     jerk = np.empty(n)
     for i in range(n):
         side = mean_side(tracks.size_mean[i])
@@ -95,8 +101,10 @@ def predict_all(tracks: TrackArrays, n: int, dt: float, scene: SceneState, model
     if len(sensors.correlation_time_s):
         predict_errors(tracks.mean[:n], tracks.cov[:n], sensors.correlation_time_s, dt)
     predict_size(tracks.size_mean[:n], tracks.size_cov[:n], settings.size.rate_density, dt)
+    unseen = tracks.t_update[:n] < last_sight(scene)
+    if manoeuvring:
+        predict_manoeuvring(tracks, n, dt, unseen, scene, model)
     if settings.motion.unseen_memory_s > 0.0:
-        unseen = tracks.t_update[:n] < last_sight(scene)
         memory_s = settings.motion.unseen_memory_s
         forget(
             tracks.mean[:n], tracks.cov[:n], tracks.size_mean[:n], tracks.size_cov[:n], unseen, dt, memory_s

@@ -30,6 +30,7 @@ from jeat_graph.filters.standing import (
 from jeat_graph.tracking.batch import Batch, Measured
 from jeat_graph.tracking.stages.associating import Association, judge_pairs
 from jeat_graph.tracking.stages.inner import inlined, inner
+from jeat_graph.tracking.stages.manoeuvring import weigh_jerk
 from jeat_graph.tracking.stages.predicting import Expectation, expect_detections, jerk_of, occlusion
 from jeat_graph.tracking.state import SceneState, TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog, log_innovation, log_update
@@ -106,6 +107,9 @@ def update_track(
         judge_standing(tracks, i, batch.t, z, R + coloured_std * coloured_std, settings)
     nis = update_centre(tracks.mean[i], tracks.cov[i], z, R, coloured_std, sensors.error[s])
     log_innovation(log, nis, tracks.scale[i, s])
+    if tracks.jerk_weight.shape[1]:
+        # A lag behind what turns is no noise of the boxes.
+        nis = min(nis, weigh_jerk(tracks, i, batch, j, measured, sensors.error[s]))
     tracks.scale[i, s] = adapt_scale(
         tracks.scale[i, s],
         nis,

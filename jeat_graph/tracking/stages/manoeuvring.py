@@ -1,0 +1,93 @@
+"""How hard each track manoeuvres, and how hard tracks of this scene usually do."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jeat_graph.config.kernel_form import Model
+from jeat_graph.data.arrays import BoolArray
+from jeat_graph.filters.cut_boxes import WHOLE, floor_of_centre
+from jeat_graph.filters.jerk import track_jerk
+from jeat_graph.filters.manoeuvre import mean_factor, predict_manoeuvres, relax_weights, weigh_manoeuvres
+from jeat_graph.tracking.batch import Batch, Measured
+from jeat_graph.tracking.stages.inner import inner
+from jeat_graph.tracking.state import USUAL_JERK_S, SceneState, TrackArrays
+
+
+@inner
+def choose_jerk(tracks: TrackArrays, n: int, dt: float, scene: SceneState, model: Model) -> None:
+    """Say by which factor each track's jerk is greater than usual over the next `dt` seconds, in place.
+
+    False boxes jump about, which is no manoeuvre: a track that followed them would take in ever more
+    of them. So tracks that are not confirmed have the usual jerk.
+    """
+    motion = model.settings.motion
+    relax_weights(tracks.jerk_weight[:n], scene.usual_jerk, dt, motion.manoeuvre_memory_s)
+    for i in range(n):
+        factor = mean_factor(tracks.jerk_weight[i], motion.manoeuvre_step)
+        tracks.jerk_factor[i] = factor if tracks.confirmed[i] else 1.0
+
+
+@inner
+def predict_manoeuvring(
+    tracks: TrackArrays, n: int, dt: float, unseen: BoolArray, scene: SceneState, model: Model
+) -> None:
+    """Predict the first `n` tracks under every density, and learn what is usual of the confirmed ones."""
+    motion = model.settings.motion
+    K = tracks.jerk_weight.shape[1]
+    jerk, lost = np.empty(n * K), np.empty(n * K, dtype=np.bool_)
+    confirmed, share = 0, np.zeros(K)
+    for i in range(n):
+        density = track_jerk(
+            tracks.size_mean[i], motion.jerk_px, motion.jerk_per_size, motion.jerk_per_growth, 1.0
+        )
+        confirmed += 1 if tracks.confirmed[i] else 0
+        for k in range(K):
+            jerk[i * K + k] = density
+            density *= motion.manoeuvre_step
+            lost[i * K + k] = unseen[i]
+            if tracks.confirmed[i]:
+                share[k] += tracks.jerk_weight[i, k]
+    mean, cov, time = tracks.jerk_mean[:n], tracks.jerk_cov[:n], model.sensors.correlation_time_s
+    predict_manoeuvres(mean, cov, jerk, time, dt, lost, motion.unseen_memory_s)
+    if confirmed:
+        # Each confirmed track counts for the seconds that it lasts; what is older than a while is forgotten.
+        gain = confirmed * dt / (USUAL_JERK_S + confirmed * dt)
+        for k in range(K):
+            scene.usual_jerk[k] += gain * (share[k] / confirmed - scene.usual_jerk[k])
+
+
+@inner
+def weigh_jerk(tracks: TrackArrays, i: int, batch: Batch, j: int, measured: Measured, error: int) -> float:
+    """Weigh the densities by detection `j`, which track `i` has just taken, in place.
+
+    Returns:
+        What of the normalised innovation squared no manoeuvre explains.
+    """
+    mean, cov, cut = tracks.jerk_mean[i], tracks.jerk_cov[i], batch.cut[j]
+    nis = weigh_manoeuvres(
+        mean,
+        cov,
+        tracks.jerk_weight[i],
+        measured.z,
+        measured.white,
+        measured.coloured_std,
+        error,
+        cut == WHOLE,
+    )
+    for axis in range(2):
+        if cut[axis] != WHOLE:
+            size, size_var = tracks.size_mean[i, axis, 0], tracks.size_cov[i, axis, 0, 0]
+            for k in range(len(mean)):
+                floor_of_centre(cut[axis], size, size_var, cov[k, axis])
+    return float(nis)
+
+
+@inner
+def start_jerk(tracks: TrackArrays, i: int, scene: SceneState) -> None:
+    """Start the filters of a new track `i` with its own state, and the weights that are usual."""
+    tracks.jerk_factor[i] = 1.0
+    tracks.jerk_weight[i] = scene.usual_jerk
+    for k in range(tracks.jerk_weight.shape[1]):
+        tracks.jerk_mean[i, k] = tracks.mean[i]
+        tracks.jerk_cov[i, k] = tracks.cov[i]
