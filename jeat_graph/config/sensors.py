@@ -87,6 +87,12 @@ class InputConfig(Section):
         "a sensor that is not declared is an error, or is declared by what is seen of it; then the rates of "
         "all sensors are those of the recording too",
     )
+    slow_scans: str = choice(
+        "as_set",
+        ("as_set", "bound"),
+        "where scans come less than five times a second, motion and patience are as set, or bounded by what "
+        "can be told apart from one scan to the next (`config.slow_scans`)",
+    )
     sigma_px: float = number(2.0, "px", "of a sensor that is declared by what is seen of it", open_low=True)
     rho_x: float = number(0.03, "1", "of such a sensor")
     rho_y: float = number(0.03, "1", "of such a sensor")
