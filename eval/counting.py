@@ -1,13 +1,15 @@
 """Count the vehicles that cross a line in the picture, by direction, and say how sure the counts are.
 
-A track crosses a line if it begins on one side and ends on the other. A vehicle that wavers on the line, or a
-box that jitters over it, counts once or not at all.
+A track crosses a line if it passes from one side to the other between its ends. A vehicle that wavers on
+the line, or a box that jitters over it, counts once or not at all; one that has gone round and comes again
+counts again.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,15 +51,15 @@ class Line:
 
 @dataclass(frozen=True)
 class LineCrossing:
-    """One track that crossed one line.
+    """One crossing of one line by a track.
 
     Attributes:
         line: name of the line.
         track_id: the track.
         t: time of the crossing (s), by linear interpolation between rows.
         direction: `left` or `right` (see `Line`).
-        probability: that a vehicle really crossed: that it exists, and that it began on one side and ended on
-            the other, given the uncertainty of its position; NaN where the table does not know that.
+        probability: that a vehicle really crossed: that it exists, and that it was on one side before and on
+            the other after, given the uncertainty of its position; NaN where the table does not know that.
         vehicle_class: class of the track, empty where unknown.
     """
 
@@ -70,7 +72,7 @@ class LineCrossing:
 
 
 def crossings(table: Trajectories, line: Line, classes: dict[int, str] | None = None) -> list[LineCrossing]:
-    """Find the tracks that cross a line.
+    """Find where tracks cross a line.
 
     Args:
         table: causal or smoothed rows, in any order.
@@ -88,41 +90,44 @@ def crossings(table: Trajectories, line: Line, classes: dict[int, str] | None = 
     found = []
     for start, end in zip(starts, np.append(starts[1:], len(ids)), strict=True):
         rows = order[start:end]
-        one = _crossing_of(table, rows, line)
-        if one is not None:
-            t, direction, probability = one
-            track = int(ids[start])
-            name = (classes or {}).get(track, "")
-            found.append(LineCrossing(line.name, track, t, direction, probability, name))
+        track = int(ids[start])
+        name = (classes or {}).get(track, "")
+        found += [
+            LineCrossing(line.name, track, t, direction, probability, name)
+            for t, direction, probability in _crossings_of(table, rows, line)
+        ]
     return sorted(found, key=lambda c: (c.t, c.track_id))
 
 
-def _crossing_of(table: Trajectories, rows: IntArray, line: Line) -> tuple[float, str, float] | None:
-    """Time, direction and probability of a track's crossing, or None if it ends on the side it began on."""
+def _crossings_of(table: Trajectories, rows: IntArray, line: Line) -> Iterator[tuple[float, str, float]]:
+    """Time, direction and probability of each crossing of one track, its rows in order of time."""
     direction = np.array([line.x2 - line.x1, line.y2 - line.y1]) / line.length
     normal = np.array([-direction[1], direction[0]])  # to the right of the line, with y pointing down
     centre = table.mean[rows, :2] - (line.x1, line.y1)
     side, along = centre @ normal, centre @ direction
     change = np.flatnonzero((side[:-1] < 0.0) != (side[1:] < 0.0))
     if not len(change):
-        return None
+        return
     share = side[change] / (side[change] - side[change + 1])
     place = along[change] + share * (along[change + 1] - along[change])
     within = (place >= 0.0) & (place <= line.length)
-    change, share = change[within], share[within]
-    # An even number of changes leaves the track where it was.
-    if len(change) % 2 == 0:
-        return None
-    k, part = int(change[-1]), float(share[-1])
-    times = table.t[rows]
-    t = float(times[k] + part * (times[k + 1] - times[k]))
-    std = np.sqrt(np.maximum(table.var[rows, :2] @ normal**2, 1e-12))
-    to_right = bool(side[k] < 0.0)
-    sign = 1.0 if to_right else -1.0
-    before = _phi(-sign * float(side[0] / std[0]))
-    after = _phi(sign * float(side[-1] / std[-1]))
-    existence = float(table.existence[rows].max())
-    return t, "right" if to_right else "left", existence * before * after
+    sure = side / np.sqrt(np.maximum(table.var[rows, :2] @ normal**2, 1e-12))
+    times, existence = table.t[rows], float(table.existence[rows].max())
+    # Who passes the line beyond its ends comes back as anew: what is over there does not count with the rest.
+    beyond = np.concatenate([[-1], np.flatnonzero(~within), [len(change)]])
+    for last_beyond, next_beyond in itertools.pairwise(beyond.tolist()):
+        group = np.arange(last_beyond + 1, next_beyond)
+        # An even number of changes leaves the track where it was.
+        if len(group) % 2 == 0:
+            continue
+        k, part = int(change[group[-1]]), float(share[group[-1]])
+        begin = change[last_beyond] + 1 if last_beyond >= 0 else 0
+        end = change[next_beyond] + 1 if next_beyond < len(change) else len(rows)
+        sign = 1.0 if side[k] < 0.0 else -1.0
+        before = _phi(float((-sign * sure[begin : change[group[0]] + 1]).max()))
+        after = _phi(float((sign * sure[k + 1 : end]).max()))
+        t = float(times[k] + part * (times[k + 1] - times[k]))
+        yield t, "right" if sign > 0.0 else "left", existence * before * after
 
 
 def _phi(z: float) -> float:

@@ -91,5 +91,10 @@ def sensor_index(name: str, names: Sequence[str]) -> int:
     if name in names:
         return names.index(name)
     near = difflib.get_close_matches(name, names, 1)
-    hint = f"did you mean {near[0]!r}?" if near else f"declared: {', '.join(names)}"
+    hint = (
+        f"did you mean {near[0]!r}?"
+        if near
+        else f"declared: {', '.join(names)}; declare it with --set 'sensors.{name}={{rate_hz: 20}}' "
+        '(in Python load_config("default", [...]) of the same text)'
+    )
     raise UnknownSensorError(f"sensor {name!r} is not declared in the configuration; {hint}")

@@ -92,3 +92,16 @@ def test_the_interval_is_that_of_all_outcomes_counted_one_by_one(probability):
 def test_a_line_needs_two_ends(ends):
     with pytest.raises(DataError, match="gate"):
         Line(*ends, name="gate")
+
+
+def test_who_goes_round_is_counted_each_time_and_surely():
+    """Two rounds about the middle of the picture, over a line from the middle upwards and one downwards."""
+    angle = 2.0 * np.pi * np.arange(0.0, 20.0, 0.1) / 8.0 + 0.3
+    rounds = table([np.column_stack([400.0 + 200.0 * np.cos(angle), 300.0 + 200.0 * np.sin(angle)])])
+    up, down = Line(400.0, 300.0, 400.0, 0.0), Line(400.0, 300.0, 400.0, 600.0)
+    for line, first in ((down, 2.0 - 0.3 * 8.0 / (2.0 * np.pi)), (up, 6.0 - 0.3 * 8.0 / (2.0 * np.pi))):
+        found = crossings(rounds, line)
+        want = np.arange(first, 20.0, 8.0)
+        np.testing.assert_allclose([one.t for one in found], want, atol=0.01)
+        assert {one.direction for one in found} == {"right"}
+        assert all(one.probability > 0.999 for one in found)
