@@ -39,7 +39,7 @@ def predict_reported(now: Snapshot, t: float, model: Model, sensors: tuple[str, 
     here = 0.0 if now.t is None else now.t
     settings, tracks = model.settings, now.tracks
     sections = (settings.image, settings.output)
-    gap = longest_gap_s(now.scene, model)
+    gap = longest_gap_s(now.scene, model, here)
     # Who is reported is decided now: what has just been detected is no less there for looking ahead.
     rows = reported_rows(tracks, now.num_tracks, here, gap, *sections, settings.lifecycle.by_existence)
     predict_all(tracks, now.num_tracks, max(t - here, 0.0), now.scene, model)

@@ -15,34 +15,58 @@ from jeat_graph.tracking.state import SceneState, TrackArrays
 
 # A sensor of less than this share of the greatest trust, or that sees so much less likely, is not waited for.
 _TRUSTED = 0.5
+# A scan that is so many periods after the last has not come.
+_OVERDUE = 1.5
 
 
-def longest_gap_s(scene: SceneState, model: Model) -> float:
+def longest_gap_s(scene: SceneState, model: Model, t: float) -> float:
     """Time since its last update up to which a track is reported (s).
 
     In scans of the sensor that needs most time: one that finds one vehicle in two has to be given more of
     them than one that finds all (P_D⁻², and as much again because the P_D of tracks that were found is larger
     than that of vehicles). Sensors that the others do not bear out, or that are blind, are not waited for.
+    Until that sensor's next scan is due nothing has been missed, so the time counts from its last.
 
     Args:
         scene: what is learnt of the sensors.
         model: sensors and settings.
+        t: now (s).
     """
     output = model.settings.output
     if output.max_gap_scans == 0.0:
         return float(output.max_gap_s)
-    longest = _longest_wait(scene.p_detect, scene.trust * (1.0 - scene.blind), model.sensors.period_s)
-    return float(min(output.max_gap_scans * longest, output.max_gap_s))
+    believed = scene.trust * (1.0 - scene.blind)
+    scans, most = output.max_gap_scans, output.max_gap_s
+    return float(
+        _longest_wait(scene.p_detect, believed, model.sensors.period_s, t - scene.last_look, scans, most)
+    )
 
 
 @njit(cache=True)
-def _longest_wait(p_detect: FloatArray, trust: FloatArray, period_s: FloatArray) -> float:
-    """Return the longest P_D⁻⁴ periods (s) of the sensors that are waited for."""
+def _longest_wait(
+    p_detect: FloatArray,
+    trust: FloatArray,
+    period_s: FloatArray,
+    since_s: FloatArray,
+    scans: float,
+    most: float,
+) -> float:
+    """Return the longest time (s) of the sensors that are waited for, each from its last scan on.
+
+    Args:
+        p_detect: (S,) probability of detecting a vehicle.
+        trust: (S,) how far each is believed.
+        period_s: (S,) time between two scans.
+        since_s: (S,) time since the last.
+        scans: so many P_D⁻⁴ scans of a sensor are waited for,
+        most: but no more than this time (s).
+    """
     longest = 0.0
     for s in range(len(trust)):
         if trust[s] >= _TRUSTED * trust.max():
             squared = p_detect[s] * p_detect[s]
-            longest = max(longest, period_s[s] / (squared * squared))
+            due = since_s[s] if since_s[s] < _OVERDUE * period_s[s] else 0.0
+            longest = max(longest, min(scans * period_s[s] / (squared * squared), most) + due)
     return longest
 
 

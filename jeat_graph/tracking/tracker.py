@@ -249,7 +249,7 @@ class Tracker(SavedTracks):
         t = 0.0 if self._t is None else self._t
         settings = self._model.settings
         by_existence = settings.lifecycle.by_existence
-        gap = longest_gap_s(self._scene, self._model)
+        gap = longest_gap_s(self._scene, self._model, t)
         columns = self._report(
             self._tracks, self._num_tracks, t, gap, settings.image, settings.output, by_existence
         )

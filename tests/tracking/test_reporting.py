@@ -44,6 +44,23 @@ def test_a_track_is_reported_until_the_longest_gap_has_passed():
         assert len(tracker.step((t + gap, "evt", [], []))) == rows
 
 
+def test_until_the_slowest_sensors_next_scan_nothing_is_missed():
+    """The fast sensor misses it in most of its scans, the slow one in none but the last two."""
+    sensors = ["sensors.slow={rate_hz: 20}", "sensors.fast={rate_hz: 100}", "output.max_gap_scans=0.4"]
+    tracker = Tracker(load_config("default", ["smoother.engine=none", *sensors]))
+    reported = {}
+    for k in range(300):
+        t = 0.01 * k
+        moved = np.array([[100.0 + 60.0 * t, 200.0, 40.0, 30.0]])
+        seen = k < 100 or k % 5 == 1
+        scans = [(t, "fast", moved[:seen], [0.9][:seen])]
+        if k % 5 == 0:
+            scans.append((t, "slow", moved, [0.95]) if k < 290 else (t, "slow", [], []))
+        reported[k] = len(tracker.step(scans))
+    assert all(reported[k] == 1 for k in range(130, 290))
+    assert reported[291] == 0  # the slow sensor has looked, and missed it
+
+
 def test_a_doubted_track_is_not_reported():
     tracker, table, t = follow(
         [*ONLY_BY_TIME, "output.max_gap_s=9", "lifecycle.max_gap_confirmed_s=9"], velocity=(60.0, 0.0)
