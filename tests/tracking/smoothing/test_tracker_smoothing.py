@@ -226,7 +226,7 @@ def test_a_finished_tracker_takes_no_more_scans(one_car):
 
 
 def test_a_failing_gtsam_is_survived_and_counted(one_car, monkeypatch):
-    from jeat_graph.smoothers.gtsam.window import GtsamWindow
+    from jeat_graph.smoothers.gtsam.window import GtsamError, GtsamWindow
 
     plain = make_tracker()
     run(plain, one_car)
@@ -235,7 +235,7 @@ def test_a_failing_gtsam_is_survived_and_counted(one_car, monkeypatch):
 
     def failing(self, *arguments):
         if next(calls) == 5:
-            raise RuntimeError("Indeterminate linear system detected")
+            raise GtsamError("Indeterminate linear system detected")
         update(self, *arguments)
 
     monkeypatch.setattr(GtsamWindow, "update", failing)
