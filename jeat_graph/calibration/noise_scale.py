@@ -24,10 +24,10 @@ def with_noise(config: Config, factor: float) -> Config:
 
 
 def scale_noise(config: Config, folds: Sequence[Sequence[Recording]]) -> tuple[Config, float, Verdict]:
-    """Choose the factor on the noise of the centre with which both tables are best and honest.
+    """Choose the factor on the noise of the centre with which both tables are best and consistent.
 
-    Of the factors that cost no accuracy beyond chance it is the one with the greatest merit: accuracy less
-    the price of variances that are not true.
+    Of the factors that cost no accuracy beyond chance it is the one with the greatest objective: accuracy
+    less the penalty for variances that are not true.
 
     Args:
         config: calibrated.
@@ -40,5 +40,5 @@ def scale_noise(config: Config, folds: Sequence[Sequence[Recording]]) -> tuple[C
     tried = sorted(FACTORS, key=lambda factor: abs(math.log(factor)))
     verdicts = [judge_both(with_noise(config, factor), folds) for factor in tried]
     free = [k for k, one in enumerate(verdicts) if one.mean >= verdicts[0].mean - CHANCE]
-    best = max(free, key=lambda k: (verdicts[k].merit, -k))
+    best = max(free, key=lambda k: (verdicts[k].objective, -k))
     return with_noise(config, tried[best]), tried[best], verdicts[best]

@@ -124,7 +124,7 @@ def choose_parts(
     for part in PARTS:
         without = [one for one in kept if one != part]
         other = judge([with_parts(half, without) for half in halves], parts)
-        gain = now.merit - other.merit
+        gain = now.objective - other.objective
         if better(other, now, _LEAST_GAIN):
             kept, now = without, other
         choices.append(PartChoice(part, part in kept, gain))

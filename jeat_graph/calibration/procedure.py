@@ -19,7 +19,7 @@ from jeat_graph.calibration.offset import (
 from jeat_graph.calibration.parts import PARTS, PartChoice, choose_parts
 from jeat_graph.calibration.supervised import Recording, calibrate
 from jeat_graph.calibration.tracked import follow
-from jeat_graph.calibration.tune import Choice, folds, knobs, shorten, tune
+from jeat_graph.calibration.tune import Choice, folds, shorten, tune, tuned_settings
 from jeat_graph.config.schema import Config, InputConfig
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
@@ -54,7 +54,7 @@ class Calibration:
 
 def steps_with_truth(config: Config) -> int:
     """How often `calibrate_with_truth` calls its `progress` at most."""
-    return len(PARTS) + _PASSES * len(knobs(config)) + 1
+    return len(PARTS) + _PASSES * len(tuned_settings(config)) + 1
 
 
 def calibrate_with_truth(
@@ -87,7 +87,7 @@ def calibrate_with_truth(
     config, parts = choose_parts(pairs, base, progress=progress)
     config, choices = tune(config, pairs, passes=_PASSES, progress=progress)
     config, factor, verdict = scale_noise(config, folds(shorten(pairs, _SCANS)))
-    choices = (*choices, Choice(NOISE_FACTOR, factor, verdict.merit))
+    choices = (*choices, Choice(NOISE_FACTOR, factor, verdict.objective))
     if progress is not None:
         progress(NOISE_FACTOR)
     return Calibration(with_lags(config, lags), tuple(lags), parts, choices)

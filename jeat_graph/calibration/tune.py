@@ -31,7 +31,7 @@ _LEAST_GAIN = 0.1
 
 
 @dataclass(frozen=True)
-class Knob:
+class TunedSetting:
     """One setting that is chosen by tracking.
 
     Attributes:
@@ -70,7 +70,7 @@ def tune(
     max_scans: int = 6000,
     progress: Callable[[str], None] | None = None,
 ) -> tuple[Config, tuple[Choice, ...]]:
-    """Choose the settings of `knobs` by tracking recordings with known truth.
+    """Choose the settings of `tuned_settings` by tracking recordings with known truth.
 
     Args:
         config: calibrated from matched detections; where the search starts.
@@ -99,12 +99,12 @@ def tune(
     chosen: dict[str, Choice] = {}
     for _ in range(passes):
         before = config
-        for knob in knobs(config):
-            config, choice = _turn(knob, config, verdict)
+        for setting in tuned_settings(config):
+            config, choice = _choose_value(setting, config, verdict)
             if choice is not None:
-                chosen[knob.name] = choice
+                chosen[setting.name] = choice
             if progress is not None:
-                progress(knob.name)
+                progress(setting.name)
         if config == before:
             break
     if len(config.sensors) > 1:
@@ -112,45 +112,45 @@ def tune(
     return config, tuple(chosen.values())
 
 
-def knobs(config: Config) -> list[Knob]:
+def tuned_settings(config: Config) -> list[TunedSetting]:
     """List the settings that are tuned, those first on which most depends.
 
     Args:
         config: names the sensors and their rates.
     """
     out = [
-        Knob(
+        TunedSetting(
             "output.max_gap_scans",
             # Half a period: only what was updated just now.
             (0.5, 1.5, 3.0),
             lambda c, v: replace(c, output=replace(c.output, max_gap_scans=v)),
             ordered=False,
         ),
-        Knob("tempering", _TEMPERING, _temper_all),
-        Knob(
+        TunedSetting("tempering", _TEMPERING, _temper_all),
+        TunedSetting(
             "standing.enabled",
             (1.0, 0.0),
             lambda c, v: replace(c, standing=replace(c.standing, enabled=bool(v))),
             ordered=False,
         ),
-        Knob(
+        TunedSetting(
             "lifecycle.confirm_existence",
             (0.3, 0.5, 0.7, 0.85, 0.95),
             lambda c, v: replace(c, lifecycle=replace(c.lifecycle, confirm_existence=v)),
         ),
-        Knob(
+        TunedSetting(
             "lifecycle.hidden_prior",
             (0.0, 0.05, 0.1),
             lambda c, v: replace(c, lifecycle=replace(c.lifecycle, hidden_prior=v)),
         ),
-        Knob(
+        TunedSetting(
             "lifecycle.p_detect_weight",
             (0.02, 0.05, 0.1),
             lambda c, v: replace(c, lifecycle=replace(c.lifecycle, p_detect_weight=v)),
         ),
     ]
     out.append(
-        Knob(
+        TunedSetting(
             "birth.max_overlap",
             (0.3, 0.5, 0.7),
             lambda c, v: replace(c, birth=replace(c.birth, max_overlap=v)),
@@ -158,13 +158,15 @@ def knobs(config: Config) -> list[Knob]:
     )
     if len(config.sensors) > 1:
         out.append(
-            Knob(
+            TunedSetting(
                 "lifecycle.disagreement",
                 (0.0, 2.0, 5.0, 10.0),
                 lambda c, v: replace(c, lifecycle=replace(c.lifecycle, disagreement=v)),
             )
         )
-        out += [Knob(f"sensors.{n}.tempering", _TEMPERING, _temper_one(n)) for n in config.sensor_names]
+        out += [
+            TunedSetting(f"sensors.{n}.tempering", _TEMPERING, _temper_one(n)) for n in config.sensor_names
+        ]
     return out
 
 
@@ -253,24 +255,26 @@ def plateau(scores: Sequence[float]) -> list[float]:
     return [float(v) for v in total / weight]
 
 
-def _turn(knob: Knob, config: Config, verdict: Callable[[Config], Verdict]) -> tuple[Config, Choice | None]:
-    """Choose the best value of one knob; the present setting stays where nothing is better.
+def _choose_value(
+    setting: TunedSetting, config: Config, verdict: Callable[[Config], Verdict]
+) -> tuple[Config, Choice | None]:
+    """Choose the best value of one setting; the present setting stays where nothing is better.
 
-    The choice is None where the present setting, kept, is none of the knob's values.
+    The choice is None where the present setting, kept, is none of the setting's values.
     """
-    candidates = [knob.apply(config, value) for value in knob.values]
+    candidates = [setting.apply(config, value) for value in setting.values]
     verdicts = [verdict(candidate) for candidate in candidates]
-    merits = [one.merit for one in verdicts]
-    stable = plateau(merits) if knob.ordered else merits
+    objectives = [one.objective for one in verdicts]
+    stable = plateau(objectives) if setting.ordered else objectives
     best = int(np.argmax(stable))
     here = candidates.index(config) if config in candidates else None
     now = verdict(config)
-    gain = stable[best] - (now.merit if here is None else stable[here])
+    gain = stable[best] - (now.objective if here is None else stable[here])
     if gain < _LEAST_GAIN or not better(verdicts[best], now, _LEAST_GAIN):
         if here is None:
             return config, None
         best = here
-    return candidates[best], Choice(knob.name, knob.values[best], merits[best])
+    return candidates[best], Choice(setting.name, setting.values[best], objectives[best])
 
 
 def _temper_all(config: Config, value: float) -> Config:

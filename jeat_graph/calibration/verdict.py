@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jeat_graph.calibration.honesty import price
+from jeat_graph.calibration.consistency_penalty import consistency_penalty
 from jeat_graph.calibration.supervised import Recording
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray
@@ -32,13 +32,13 @@ _LEAST_FOR_SPREAD = 3
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """Accuracy and honesty of one configuration.
+    """Accuracy and consistency of one configuration.
 
     Attributes:
         accuracy: (N,) (MOTA + IDF1 + HOTA) / 3 of each recording (per cent).
         weight: (N,) number of true boxes of each.
         fold: (N,) the half of the recordings to which it belongs.
-        charge: price of untrue variances (per cent).
+        penalty: for untrue variances (per cent).
 
     Raises:
         DataError: nothing to be judged by.
@@ -47,7 +47,7 @@ class Verdict:
     accuracy: FloatArray
     weight: FloatArray
     fold: IntArray
-    charge: float
+    penalty: float
 
     def __post_init__(self) -> None:
         if not len(self.accuracy):
@@ -59,9 +59,9 @@ class Verdict:
         return float(np.average(self.accuracy, weights=self.weight))
 
     @property
-    def merit(self) -> float:
-        """Accuracy less the price of untrue variances (per cent)."""
-        return self.mean - self.charge
+    def objective(self) -> float:
+        """Accuracy less the penalty for untrue variances (per cent)."""
+        return self.mean - self.penalty
 
 
 def better(one: Verdict, other: Verdict, least: float) -> bool:
@@ -81,7 +81,7 @@ def better(one: Verdict, other: Verdict, least: float) -> bool:
             return False
     sure = max(least, standard_error(gain, one.weight))
     more = one.mean - other.mean
-    return more >= sure or (more >= -CHANCE and one.merit - other.merit >= sure)
+    return more >= sure or (more >= -CHANCE and one.objective - other.objective >= sure)
 
 
 def standard_error(gain: FloatArray, weight: FloatArray) -> float:
@@ -125,7 +125,7 @@ def _judged(
     tables_of: Callable[[Config, Detections], tuple[Trajectories, ...]],
     kinds: Sequence[Kind],
 ) -> Verdict:
-    accuracy, weight, fold, charge = [], [], [], []
+    accuracy, weight, fold, penalty = [], [], [], []
     for k, (config, recordings) in enumerate(zip(configs, folds, strict=True)):
         tables = [tables_of(config, detections) for detections, _ in recordings]
         for group in _with_truth(recordings):
@@ -141,8 +141,8 @@ def _judged(
             fold.append(k)
         for c, kind in enumerate(kinds):
             pairs = [(truth, one[c]) for (_, truth), one in zip(recordings, tables, strict=True)]
-            charge.append(price(position_nees(pairs, kind).anees))
-    return Verdict(np.array(accuracy), np.array(weight), np.array(fold), float(np.mean(charge)))
+            penalty.append(consistency_penalty(position_nees(pairs, kind).anees))
+    return Verdict(np.array(accuracy), np.array(weight), np.array(fold), float(np.mean(penalty)))
 
 
 def _with_truth(recordings: Sequence[Recording]) -> list[list[int]]:

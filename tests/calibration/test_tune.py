@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.calibration.supervised import calibrate
-from jeat_graph.calibration.tune import cut_truth, folds, knobs, plateau, shorten, tune
+from jeat_graph.calibration.tune import cut_truth, folds, plateau, shorten, tune, tuned_settings
 from jeat_graph.calibration.verdict import Verdict, judge
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Detections
@@ -75,9 +75,9 @@ def test_one_instant_is_not_split():
     assert folds([(detections, truth)]) == [[(detections, truth)]]
 
 
-def merit(config, training):
+def objective(config, training):
     parts = folds(training)
-    return judge([config] * len(parts), parts).merit
+    return judge([config] * len(parts), parts).objective
 
 
 @pytest.fixture(scope="module")
@@ -90,15 +90,15 @@ def tuned(recordings):
 
 def test_tuning_never_ends_below_its_start(tuned):
     training, start, (config, _) = tuned
-    assert merit(config, training) >= merit(start, training)
+    assert objective(config, training) >= objective(start, training)
 
 
 def test_a_harmful_setting_is_repaired(tuned):
     # Vehicles that have left are reported for five seconds: that must not survive.
     training, start, (config, choices) = tuned
     assert config.output.max_gap_scans > 0.0
-    assert {c.name for c in choices} <= {k.name for k in knobs(start)}
-    assert merit(config, training) > merit(start, training) + 0.5
+    assert {c.name for c in choices} <= {k.name for k in tuned_settings(start)}
+    assert objective(config, training) > objective(start, training) + 0.5
 
 
 def test_tuning_is_deterministic(tuned):
@@ -107,7 +107,7 @@ def test_tuning_is_deterministic(tuned):
 
 
 def test_each_sensor_of_several_has_a_tempering_of_its_own():
-    names = [k.name for k in knobs(load_config("default"))]
+    names = [k.name for k in tuned_settings(load_config("default"))]
     assert "sensors.evt.tempering" in names
     assert "sensors.rgb.tempering" in names
 

@@ -17,10 +17,10 @@ from jeat_graph.tracking.whole import track
 LEAST = 0.1
 
 
-def verdict(accuracy, charge=0.0, weight=None):
+def verdict(accuracy, penalty=0.0, weight=None):
     count = len(accuracy)
     weights = np.ones(count) if weight is None else np.asarray(weight, dtype=float)
-    return Verdict(np.asarray(accuracy, dtype=float), weights, np.arange(count) % 2, charge)
+    return Verdict(np.asarray(accuracy, dtype=float), weights, np.arange(count) % 2, penalty)
 
 
 def test_a_gain_on_every_recording_is_better():
@@ -28,17 +28,17 @@ def test_a_gain_on_every_recording_is_better():
 
 
 def test_truer_variances_never_pay_for_accuracy():
-    assert not better(verdict([79, 80, 81, 82], charge=0.0), verdict([80, 81, 82, 83], charge=20.0), LEAST)
+    assert not better(verdict([79, 80, 81, 82], penalty=0.0), verdict([80, 81, 82, 83], penalty=20.0), LEAST)
 
 
 def test_of_two_as_accurate_as_each_other_the_truer_one_is_better():
     same = [80, 81, 82, 83]
-    assert better(verdict(same, charge=0.0), verdict(same, charge=1.0), LEAST)
-    assert not better(verdict(same, charge=1.0), verdict(same, charge=0.0), LEAST)
+    assert better(verdict(same, penalty=0.0), verdict(same, penalty=1.0), LEAST)
+    assert not better(verdict(same, penalty=1.0), verdict(same, penalty=0.0), LEAST)
 
 
 def test_more_accuracy_is_better_whatever_it_charges():
-    assert better(verdict([82, 83, 84, 85], charge=3.0), verdict([80, 81, 82, 83], charge=0.0), LEAST)
+    assert better(verdict([82, 83, 84, 85], penalty=3.0), verdict([80, 81, 82, 83], penalty=0.0), LEAST)
 
 
 def test_a_gain_on_one_half_alone_is_chance():
@@ -64,9 +64,9 @@ def test_standard_error_is_that_of_a_mean():
     st.floats(0.0, 10.0),
     st.floats(0.0, 10.0),
 )
-def test_two_are_never_better_than_each_other(one, other, charge, other_charge):
+def test_two_are_never_better_than_each_other(one, other, penalty, other_penalty):
     count = min(len(one), len(other))
-    a, b = verdict(one[:count], charge), verdict(other[:count], other_charge)
+    a, b = verdict(one[:count], penalty), verdict(other[:count], other_penalty)
     assert not (better(a, b, LEAST) and better(b, a, LEAST))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jeat_graph import load_config
-from jeat_graph.calibration.honesty import HONEST, price
+from jeat_graph.calibration.consistency_penalty import CONSISTENT, consistency_penalty
 from jeat_graph.calibration.noise_scale import FACTORS, scale_noise, with_noise
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.trajectories import GroundTruth
@@ -15,10 +15,10 @@ from jeat_graph.tracking.whole import both_tables
 
 
 def test_within_the_bounds_nothing_is_charged_and_outside_by_the_logarithm():
-    low, high = HONEST
-    assert [price(a) for a in (low, 1.0, high, math.nan)] == [0.0] * 4
-    assert price(high * math.e) == pytest.approx(price(low / math.e))
-    assert price(high * math.e**2) == pytest.approx(2.0 * price(high * math.e))
+    low, high = CONSISTENT
+    assert [consistency_penalty(a) for a in (low, 1.0, high, math.nan)] == [0.0] * 4
+    assert consistency_penalty(high * math.e) == pytest.approx(consistency_penalty(low / math.e))
+    assert consistency_penalty(high * math.e**2) == pytest.approx(2.0 * consistency_penalty(high * math.e))
 
 
 @pytest.fixture(scope="module")

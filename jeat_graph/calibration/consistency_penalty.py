@@ -10,14 +10,14 @@ from __future__ import annotations
 import math
 
 #: Mean squared errors between these multiples of the variance cost nothing.
-HONEST = (0.7, 1.5)
+CONSISTENT = (0.7, 1.5)
 # Points of (MOTA + IDF1 + HOTA) / 3 for each factor of e outside.
-_PRICE = 5.0
+_PER_FACTOR_OF_E = 5.0
 
 
-def price(anees: float) -> float:
+def consistency_penalty(anees: float) -> float:
     """What variances that are wrong by this factor cost (per cent); nothing where nothing matched."""
     if not math.isfinite(anees) or anees <= 0.0:
         return 0.0
-    low, high = HONEST
-    return _PRICE * max(math.log(low / anees), math.log(anees / high), 0.0)
+    low, high = CONSISTENT
+    return _PER_FACTOR_OF_E * max(math.log(low / anees), math.log(anees / high), 0.0)
