@@ -59,7 +59,7 @@ def test_its_events_are_a_burst_along_its_way_and_nowhere_else() -> None:
     path = renderer._insects.at(1e-6 * events.t_us.astype(np.float64), renderer.view)[:, 0]
     away = np.hypot(events.x + 0.5 - path[:, U], events.y + 0.5 - path[:, V])
     assert len(events) > 100
-    # Where the light comes back to just a threshold, rounding, which differs by processor, decides when it is crossed.
+    # Light that comes back to just a threshold crosses it or not by rounding, which differs by processor.
     near = away < path[:, RADIUS] + path[:, SOFT] + 2.5
     assert np.count_nonzero(~near) < 1e-4 * len(events)
     assert (np.abs(events.y + 0.5 - path[:, V]) < path[:, RADIUS] + path[:, SOFT] + 2.5).all()
