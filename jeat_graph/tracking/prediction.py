@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from jeat_graph.association.boxes import track_boxes
 from jeat_graph.config.kernel_form import Model
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.tracking.reporting import as_table, columns_of, longest_gap_s, reported_rows
+from jeat_graph.tracking.reporting import as_table, columns_of, longest_gap_s, remain, reported_rows
 from jeat_graph.tracking.snapshot import Snapshot
 from jeat_graph.tracking.stages.predicting import predict_all
 
@@ -41,10 +42,13 @@ def predict_reported(now: Snapshot, t: float, model: Model, sensors: tuple[str, 
     sections = (settings.image, settings.output)
     gap = longest_gap_s(now.scene, model, here)
     # Who is reported is decided now: what has just been detected is no less there for looking ahead.
-    rows = reported_rows(tracks, now.num_tracks, here, gap, *sections, settings.lifecycle.by_existence)
+    boxes = track_boxes(tracks.mean[: now.num_tracks], tracks.size_mean[: now.num_tracks])
+    rows = reported_rows(tracks, boxes, here, gap, *sections, settings.lifecycle.by_existence)
     predict_all(tracks, now.num_tracks, max(t - here, 0.0), now.scene, model)
-    table = as_table(columns_of(tracks, rows, t, *sections), sensors, now.classes)
-    rows = rows[np.isin(tracks.track_id[rows], table.track_id)]
+    boxes = track_boxes(tracks.mean[rows], tracks.size_mean[rows])
+    left = remain(boxes, *sections)
+    rows, boxes = rows[left], boxes[left]
+    table = as_table(columns_of(tracks, rows, boxes, t, *sections), sensors, now.classes)
     cov = np.zeros((len(table), 6, 6))
     for axis in range(2):
         cov[:, axis::2, axis::2] = tracks.cov[rows, axis, :_MOTION, :_MOTION]

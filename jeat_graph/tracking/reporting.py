@@ -8,7 +8,7 @@ from numba import njit
 from jeat_graph.association.boxes import track_boxes, visible_fraction
 from jeat_graph.config.kernel_form import Model
 from jeat_graph.config.schema import ImageConfig, OutputConfig
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.classes import ClassTally
 from jeat_graph.tracking.state import SceneState, TrackArrays
@@ -93,14 +93,15 @@ def report(
     by_existence: bool,
 ) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray, FloatArray, IntArray, FloatArray]:
     """Collect the confirmed tracks that are alive now: `columns_of` the `reported_rows`."""
-    rows = reported_rows(tracks, num_tracks, t, max_gap_s, image, output, by_existence)
-    return columns_of(tracks, rows, t, image, output)
+    boxes = track_boxes(tracks.mean[:num_tracks], tracks.size_mean[:num_tracks])
+    rows = reported_rows(tracks, boxes, t, max_gap_s, image, output, by_existence)
+    return columns_of(tracks, rows, boxes[rows], t, image, output)
 
 
 @njit(cache=True)
 def reported_rows(
     tracks: TrackArrays,
-    num_tracks: int,
+    boxes: FloatArray,
     t: float,
     max_gap_s: float,
     image: ImageConfig,
@@ -111,7 +112,7 @@ def reported_rows(
 
     Args:
         tracks: state of all tracks.
-        num_tracks: number of living ones.
+        boxes: (n, 4) of the living ones (px).
         t: time of the state (s).
         max_gap_s: time since its last update up to which a track is reported (s).
         image: the kernels' form of that section; two sections are handed over faster than all.
@@ -119,12 +120,11 @@ def reported_rows(
         by_existence: whether tracks live by their probability of existence.
 
     Returns:
-        (R,) their rows.
+        (R,) their rows; of each of their boxes something is left after clipping.
     """
-    boxes = track_boxes(tracks.mean[:num_tracks], tracks.size_mean[:num_tracks])
-    rows = np.empty(num_tracks, dtype=np.int64)
+    rows = np.empty(len(boxes), dtype=np.int64)
     count = 0
-    for i in range(num_tracks):
+    for i in range(len(boxes)):
         if not (tracks.confirmed[i] and tracks.worthy[i]):
             continue
         gap = t - tracks.t_update[i]
@@ -144,14 +144,30 @@ def reported_rows(
 
 
 @njit(cache=True)
+def remain(boxes: FloatArray, image: ImageConfig, output: OutputConfig) -> BoolArray:
+    """Of which boxes (R, 4) something is left after clipping: (R,); of all where nothing is clipped."""
+    left = np.ones(len(boxes), dtype=np.bool_)
+    if output.clip:
+        for k in range(len(boxes)):
+            left[k] = not visible_fraction(boxes[k], image.width, image.height) <= 0.0
+    return left
+
+
+@njit(cache=True)
 def columns_of(
-    tracks: TrackArrays, rows: IntArray, t: float, image: ImageConfig, output: OutputConfig
+    tracks: TrackArrays,
+    rows: IntArray,
+    boxes: FloatArray,
+    t: float,
+    image: ImageConfig,
+    output: OutputConfig,
 ) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray, FloatArray, IntArray, FloatArray]:
-    """Write some tracks as columns of a table, but those of which nothing is left after clipping.
+    """Write some tracks as columns of a table.
 
     Args:
         tracks: state of all tracks, at time `t`.
         rows: (R,) which of them, ascending.
+        boxes: (R, 4) theirs (px); something of each has to be left after clipping.
         t: that time (s).
         image: the kernels' form of that section.
         output: the same.
@@ -161,40 +177,32 @@ def columns_of(
         var (R, 6), used (R,), size_var (R, 2).
     """
     width, height = image.width, image.height
-    boxes = track_boxes(tracks.mean[rows], tracks.size_mean[rows])
     out_boxes = np.empty((len(rows), 4))
     mean = np.empty((len(rows), 6))
     var = np.empty((len(rows), 6))
     size_var = np.empty((len(rows), 2))
-    chosen = np.empty(len(rows), dtype=np.int64)
-    count = 0
-    for k in range(len(rows)):
-        if output.clip and visible_fraction(boxes[k], width, height) <= 0.0:
-            continue
-        i, r = rows[k], count
-        chosen[r] = i
-        count += 1
+    for r in range(len(rows)):
+        i = rows[r]
         for axis in range(2):
-            low = boxes[k, axis]
-            high = low + boxes[k, 2 + axis]
+            low = boxes[r, axis]
+            high = low + boxes[r, 2 + axis]
             if output.clip:
                 low = max(low, 0.0)
                 high = min(high, width if axis == 0 else height)
             out_boxes[r, axis] = low
             out_boxes[r, 2 + axis] = high - low
             # Of e^s where ln e^s = s is what is estimated: to first order e^2s times the variance of s.
-            size_var[r, axis] = boxes[k, 2 + axis] * boxes[k, 2 + axis] * tracks.size_cov[i, axis, 0, 0]
+            size_var[r, axis] = boxes[r, 2 + axis] * boxes[r, 2 + axis] * tracks.size_cov[i, axis, 0, 0]
             for d in range(3):
                 mean[r, 2 * d + axis] = tracks.mean[i, axis, d]
                 var[r, 2 * d + axis] = tracks.cov[i, axis, d, d]
-    chosen = chosen[:count]
     return (
-        np.full(count, t),
-        tracks.track_id[chosen],
-        out_boxes[:count],
-        tracks.existence[chosen],
-        mean[:count],
-        var[:count],
-        tracks.used[chosen],
-        size_var[:count],
+        np.full(len(rows), t),
+        tracks.track_id[rows],
+        out_boxes,
+        tracks.existence[rows],
+        mean,
+        var,
+        tracks.used[rows],
+        size_var,
     )
