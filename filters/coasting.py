@@ -45,13 +45,8 @@ def forget(
         dt: time step (s), >= 0.
         memory_s: τ (s), > 0.
     """
-    kept = math.exp(-min(dt / memory_s, _MOST_MEMORIES))
-    for i in range(len(unseen)):
-        if not unseen[i]:
-            continue
-        for axis in range(2):
-            _scale(mean[i, axis], cov[i, axis], _ACCELERATION, kept)
-            _scale(size_mean[i, axis], size_cov[i, axis], _RATE, kept)
+    forget_acceleration(mean, cov, unseen, dt, memory_s)
+    _fade(size_mean, size_cov, _RATE, unseen, dt, memory_s)
 
 
 @njit(cache=True)
@@ -67,11 +62,19 @@ def forget_acceleration(
         dt: time step (s), >= 0.
         memory_s: τ (s), > 0.
     """
+    _fade(mean, cov, _ACCELERATION, unseen, dt, memory_s)
+
+
+@njit(cache=True)
+def _fade(
+    mean: FloatArray, cov: FloatArray, component: int, unseen: BoolArray, dt: float, memory_s: float
+) -> None:
+    """Let one component of the unseen tracks' blocks (N, 2, D) die away, in place."""
     kept = math.exp(-min(dt / memory_s, _MOST_MEMORIES))
     for i in range(len(unseen)):
         if unseen[i]:
             for axis in range(2):
-                _scale(mean[i, axis], cov[i, axis], _ACCELERATION, kept)
+                _scale(mean[i, axis], cov[i, axis], component, kept)
 
 
 @njit(cache=True, forceinline=True)

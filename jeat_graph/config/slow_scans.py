@@ -24,6 +24,11 @@ _OFTEN_HZ = 4.9
 _TENTATIVE_SCANS, _CONFIRMED_SCANS = 1.5, 5.0
 
 
+def fastest_hz(config: Config) -> float:
+    """Return the rate of the fastest of a configuration's sensors (Hz); there has to be one."""
+    return max(sensor.rate_hz for sensor in config.sensors.values())
+
+
 def for_slow_scans(config: Config) -> Config:
     """Return a configuration whose motion and patience suit the rate of its fastest sensor.
 
@@ -32,7 +37,7 @@ def for_slow_scans(config: Config) -> Config:
     Args:
         config: its sensors with their rates.
     """
-    rate_hz = max(sensor.rate_hz for sensor in config.sensors.values())
+    rate_hz = fastest_hz(config)
     if rate_hz >= _OFTEN_HZ:
         return config
     period_s = 1.0 / rate_hz

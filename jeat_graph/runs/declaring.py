@@ -10,7 +10,7 @@ import numpy as np
 
 from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config, InputConfig, SensorConfig
-from jeat_graph.config.slow_scans import for_slow_scans
+from jeat_graph.config.slow_scans import fastest_hz, for_slow_scans
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.rates import median_rate_hz
@@ -40,10 +40,9 @@ def fit_input(config: Config, *recordings: Detections) -> tuple[Config, list[str
     if config.input.slow_scans == "bound" and config.sensors:
         slow = for_slow_scans(config)
         if slow != config:
-            rate_hz = max(sensor.rate_hz for sensor in config.sensors.values())
             notes.append(
-                f"scans come at {rate_hz:.3g} Hz: what moves further than about its own length between two "
-                "of them is not followed"
+                f"scans come at {fastest_hz(config):.3g} Hz: what moves further than about its own length "
+                "between two of them is not followed"
             )
         config = slow
     if config.input.picture == "seen" and any(len(d) for d in recordings):

@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.config.kernel_form import Model
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.filters.sides import mean_side
 from jeat_graph.filters.worth import doubt_worth, learn_worth, worth_of
 from jeat_graph.tracking.batch import LEAST_PRECISION, Batch
@@ -69,10 +70,9 @@ def learn_lasting(
                 continue
             if tracks.lasting[i]:
                 learn_worth(mean, cov, batch.score_odds[j], True, weight)
-                _count_vain(s, 0.0, weight, scene, model)
-                seen = min(scene.lasting_seen[s] + weight, lifecycle.worth_memory_s)
-                scene.lasting_seen[s] = seen
-                scene.lasting_odds[s] += weight / seen * (batch.score_odds[j] - scene.lasting_odds[s])
+                memory_s = lifecycle.worth_memory_s
+                _average(scene.vain, scene.vain_seen, s, 0.0, weight, memory_s)
+                _average(scene.lasting_odds, scene.lasting_seen, s, batch.score_odds[j], weight, memory_s)
             elif old and tracks.hits[i] >= _LEAST_HITS:
                 tracks.lasting[i] = True
                 if tracks.seen_by[i] == 1 << s:
@@ -94,15 +94,26 @@ def learn_ended(tracks: TrackArrays, i: int, scene: SceneState, model: Model) ->
         learn_worth(scene.worth_mean[s], scene.worth_cov[s], tracks.score_odds[i], False, weight)
         # What stood there for longer may be a vehicle that stands: it counts neither way.
         if tracks.t_update[i] - tracks.t_birth[i] < lifecycle.lasting_s:
-            _count_vain(s, 1.0, weight - model.sensors.period_s[s], scene, model)
+            again = weight - model.sensors.period_s[s]
+            _average(scene.vain, scene.vain_seen, s, 1.0, again, lifecycle.worth_memory_s)
 
 
 @inner
-def _count_vain(s: int, vain: float, weight: float, scene: SceneState, model: Model) -> None:
-    """Count detections of sensor `s` as in vain (1) or not (0), by so many seconds of a track, in place."""
-    seen = min(scene.vain_seen[s] + weight, model.settings.lifecycle.worth_memory_s)
-    scene.vain_seen[s] = seen
-    scene.vain[s] += weight / seen * (vain - scene.vain[s])
+def _average(
+    mean: FloatArray, seen: FloatArray, s: int, value: float, weight: float, memory_s: float
+) -> None:
+    """Take a value into sensor `s`'s running mean, in place.
+
+    Args:
+        mean: (S,) of each sensor.
+        seen: (S,) what each rests on, in seconds of a track.
+        s: the sensor.
+        value: what is taken in.
+        weight: the seconds that it stands for.
+        memory_s: the mean rests on no more than these.
+    """
+    seen[s] = min(seen[s] + weight, memory_s)
+    mean[s] += weight / seen[s] * (value - mean[s])
 
 
 @inner
