@@ -10,21 +10,20 @@ from jeat_graph.data.arrays import FloatArray
 
 
 @njit(cache=True)
-def existence_after_hit(existence: float, evidence: float, tempering: float) -> float:
-    """Probability of existence after a detection was taken: r Λ^β / (1 − r + r Λ^β).
+def existence_after_hit(existence: float, evidence: float) -> float:
+    """Probability of existence after a detection was taken: r Λ / (1 − r + r Λ).
 
     The Bernoulli update of integrated probabilistic data association (Musicki, Evans, Stankovic, "Integrated
-    probabilistic data association", IEEE T-AC 39(6), 1994) with one hypothesis. The exponent β <= 1 allows
-    for false boxes that repeat in time and so are no independent evidence.
+    probabilistic data association", IEEE T-AC 39(6), 1994) with one hypothesis. The evidence is tempered
+    beforehand: false boxes repeat in time and so are no independent witnesses.
 
     Args:
         existence: r before.
         evidence: ln Λ, the log likelihood ratio of the detection being the track's.
-        tempering: β.
     """
     # The log odds are bounded so that neither certainty nor overflow can be reached.
     r = min(max(existence, 1e-9), 1.0 - 1e-9)
-    odds = math.log(r / (1.0 - r)) + min(max(tempering * evidence, -20.0), 20.0)
+    odds = math.log(r / (1.0 - r)) + min(max(evidence, -20.0), 20.0)
     return 1.0 / (1.0 + math.exp(-min(max(odds, -20.0), 20.0)))
 
 

@@ -19,22 +19,22 @@ from jeat_graph.filters.existence import (
 PROBABILITY = st.floats(0.001, 0.999)
 
 
-@given(r=PROBABILITY, evidence=st.floats(-15, 15), tempering=st.floats(0.1, 1.0))
-def test_a_hit_is_bayes_rule_with_tempered_evidence(r, evidence, tempering):
-    ratio = math.exp(tempering * evidence)
+@given(r=PROBABILITY, evidence=st.floats(-15, 15))
+def test_a_hit_is_bayes_rule(r, evidence):
+    ratio = math.exp(evidence)
     expected = r * ratio / (1 - r + r * ratio)
-    assert existence_after_hit(r, evidence, tempering) == pytest.approx(expected, abs=1e-7)
+    assert existence_after_hit(r, evidence) == pytest.approx(expected, abs=1e-7)
 
 
-@given(r=st.floats(0, 1), evidence=st.floats(allow_nan=False), tempering=st.floats(0.01, 1.0))
-def test_no_evidence_makes_existence_certain_or_impossible(r, evidence, tempering):
-    assert 0.0 < existence_after_hit(r, evidence, tempering) < 1.0
+@given(r=st.floats(0, 1), evidence=st.floats(allow_nan=False))
+def test_no_evidence_makes_existence_certain_or_impossible(r, evidence):
+    assert 0.0 < existence_after_hit(r, evidence) < 1.0
 
 
 def test_one_hit_says_no_more_than_twenty_in_log_odds():
     odds = math.log(1e-6 / (1.0 - 1e-6)) + 20.0
-    assert existence_after_hit(1e-6, 1e3, 1.0) == pytest.approx(1.0 / (1.0 + math.exp(-odds)), rel=1e-12)
-    assert existence_after_hit(1e-6, 1e3, 1.0) == existence_after_hit(1e-6, 1e300, 1.0)
+    assert existence_after_hit(1e-6, 1e3) == pytest.approx(1.0 / (1.0 + math.exp(-odds)), rel=1e-12)
+    assert existence_after_hit(1e-6, 1e3) == existence_after_hit(1e-6, 1e300)
 
 
 @given(r=PROBABILITY, p_detect=PROBABILITY)

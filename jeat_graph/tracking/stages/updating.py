@@ -169,7 +169,7 @@ def take_detection(
     """Let track `i` take detection `j`, of tempered `evidence`: update its state and its existence."""
     update_track(tracks, i, batch, j, measured, model, log)
     if model.settings.lifecycle.by_existence:
-        tracks.existence[i] = existence_after_hit(tracks.existence[i], evidence, 1.0)
+        tracks.existence[i] = existence_after_hit(tracks.existence[i], evidence)
 
 
 @inner
