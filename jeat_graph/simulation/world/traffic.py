@@ -172,14 +172,6 @@ def simulate_traffic(
         a = a + dt * j
 
     columns = list(zip(*changes, strict=True)) if changes else [(), (), (), ()]
-    sway = np.stack(
-        [
-            config.sway_m * rng.uniform(0.2, 1.0, count),
-            2.0 * np.pi / rng.uniform(6.0, 15.0, count),
-            rng.uniform(0.0, 2.0 * np.pi, count),
-        ],
-        axis=1,
-    )
     keep = round(_WARM_UP_S / dt)
     paths = Paths(
         start_s=start + keep * dt,
@@ -190,9 +182,16 @@ def simulate_traffic(
         change_start=np.array(columns[1], dtype=np.float64),
         change_duration=np.array(columns[2], dtype=np.float64),
         change_shift=np.array(columns[3], dtype=np.float64),
-        sway=sway,
+        sway=_draw_sway(rng, count, config.sway_m),
     )
     return Traffic(paths=paths, direction=road.direction[lane], cruise=drivers.speed)
+
+
+def _draw_sway(rng: np.random.Generator, count: int, most_m: float) -> FloatArray:
+    """Sway of each vehicle within its lane, (V, 3): amplitude (m), angular rate (rad/s), phase (rad)."""
+    amplitude = most_m * rng.uniform(0.2, 1.0, count)
+    rate = 2.0 * np.pi / rng.uniform(6.0, 15.0, count)
+    return np.stack([amplitude, rate, rng.uniform(0.0, 2.0 * np.pi, count)], axis=1)
 
 
 def _lanes_of(fleet: Fleet, road: Road) -> BoolArray:
