@@ -19,6 +19,12 @@ from jeat_graph.io.coco_columns import read_entries
 from jeat_graph.io.csv_text import read_text
 from jeat_graph.io.frames import check_rate
 
+#: What is read, and what others who have JSON may do.
+_WANTED = (
+    "COCO results are one list of objects with image_id, bbox, score (scans as lines are for `stream`, rows "
+    "with t, sensor, left, top, width, height, score for CSV or Parquet)"
+)
+
 
 @dataclass(frozen=True, eq=False)
 class CocoBoxes:
@@ -55,6 +61,8 @@ def read_results(path: str | Path, rate_hz: float | None, images: str | Path | N
     tree = _load(text, path) if found is None else found.rest
     del text
     entries = tree.get("annotations") if isinstance(tree, dict) else tree
+    if isinstance(tree, dict) and "t" in tree and not isinstance(entries, list):
+        raise DataError(f"holds a scan; {_WANTED}", path)
     if not isinstance(entries, list):
         raise DataError("must be a list of results, or an object with `annotations`", path)
     lists: Any = _load(read_text(images), images) if images is not None else tree
@@ -107,6 +115,8 @@ def _load(text: bytes, path: str | Path) -> Any:
     try:
         return json.loads(text.decode("utf-8"))
     except json.JSONDecodeError as error:
+        if error.msg == "Extra data" and text.lstrip()[:1] == b"{":
+            raise DataError(f"is JSON Lines; {_WANTED}", path, error.lineno) from None
         raise DataError(f"is not JSON: {error.msg}", path, error.lineno) from None
     except (UnicodeDecodeError, RecursionError, ValueError) as error:
         raise DataError(f"is not JSON: {str(error)[:200]}", path) from None
@@ -127,6 +137,8 @@ def _result(entry: Any, k: int, path: str | Path) -> tuple[int, tuple[float, ...
     if not isinstance(entry, dict):
         raise DataError(f"{where} must be an object with image_id, bbox, score, category_id", path)
     for name in ("image_id", "category_id"):
+        if name == "image_id" and name not in entry and "t" in entry:
+            raise DataError(f"{where} has t and no image_id; {_WANTED}", path)
         value = entry.get(name, 0 if name == "category_id" else None)
         if isinstance(value, bool) or not isinstance(value, int) or abs(value) > 2**53:
             raise DataError(f"{where} {name} must be a whole number", path)

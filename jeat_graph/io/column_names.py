@@ -26,6 +26,8 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
     "sensor": ("camera", "sensor_name"),
     "left": ("x1", "xmin", "x_min", "bb_left", "bbox_left", "box_left"),
     "top": ("y1", "ymin", "y_min", "bb_top", "bbox_top", "box_top"),
+    "cx": ("center_x", "centre_x", "x_center", "x_centre", "xc"),
+    "cy": ("center_y", "centre_y", "y_center", "y_centre", "yc"),
     "right": ("x2", "xmax", "x_max", "bb_right", "bbox_right", "box_right"),
     "bottom": ("y2", "ymax", "y_max", "bb_bottom", "bbox_bottom", "box_bottom"),
     "width": ("w", "bb_width", "bbox_width", "box_width"),
@@ -37,8 +39,14 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
 #: Columns that may stand for `t`, with their units.
 TIME_COLUMNS = {"t_ms": "ms", "t_us": "us", "t_ns": "ns"}
 #: Columns of times and boxes that hold numbers, by any of their names.
-NUMBER_COLUMNS = ("t", *TIME_COLUMNS, *BOX, "right", "bottom")
-_STAND_INS = {"t": (*TIME_COLUMNS, "frame"), "width": ("right",), "height": ("bottom",)}
+NUMBER_COLUMNS = ("t", *TIME_COLUMNS, *BOX, "right", "bottom", "cx", "cy")
+_STAND_INS = {
+    "t": (*TIME_COLUMNS, "frame"),
+    "left": ("cx",),
+    "top": ("cy",),
+    "width": ("right",),
+    "height": ("bottom",),
+}
 _CANONICAL = {alias: name for name, aliases in ALIASES.items() for alias in aliases}
 
 
@@ -114,6 +122,11 @@ def boxes_of(table: FileTable) -> FloatArray:
     boxes = np.empty((len(table), 4))
     for k, name in enumerate(names):
         boxes[:, k] = table.number(name, blank_ok=True)
-        if name in ("right", "bottom"):
-            boxes[:, k] -= boxes[:, k - 2]
+    for k in (0, 1):
+        centre = names[k] in ("cx", "cy")
+        if names[k + 2] in ("right", "bottom"):
+            boxes[:, k + 2] -= boxes[:, k]
+            boxes[:, k + 2] *= 2.0 if centre else 1.0
+        if centre:
+            boxes[:, k] -= 0.5 * boxes[:, k + 2]
     return boxes

@@ -120,6 +120,7 @@ def _json_batch(text: str, name: str, number: int) -> ScanBatch:
         content = json.loads(text)
     except (ValueError, RecursionError) as error:
         what = error.msg if isinstance(error, json.JSONDecodeError) else str(error)
+        what += "; a scan must be whole on its line" if text in ("[", "{") else ""
         raise DataError(f"is not JSON: {what}", name, number) from None
     return batch_of(content, name, number)
 

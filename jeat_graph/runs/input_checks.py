@@ -12,7 +12,7 @@ from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError, UnknownSensorError
 from jeat_graph.io.time_units import unit_question
 from jeat_graph.runs.declaring import LEAST_SCANS, scan_rate_hz
-from jeat_graph.tracking.input_watch import CORNERS, look_like_corners
+from jeat_graph.tracking.input_watch import CORNERS, SHARES, look_like_corners, look_like_shares
 
 # A box at the edge may have its centre outside; a recording of another picture size has far more of them.
 MOST_OUTSIDE = 0.05
@@ -72,7 +72,17 @@ def _check_sensors(detections: Detections, config: Config, names: str) -> None:
 
 
 def check_units(detections: Detections, config: Config, names: str) -> None:
-    """Refuse times that cannot be seconds, unless the sensor is declared to be as slow as that."""
+    """Refuse boxes in shares of the picture, and times that cannot be seconds.
+
+    Times are believed where the sensor is declared to be as slow as that.
+
+    Raises:
+        DataError: says what seems to be the unit.
+    """
+    if look_like_shares(detections.boxes):
+        raise DataError(
+            f"{SHARES}; multiply left and width by its width, top and height by its height", names
+        )
     for name in detections.sensors:
         times = np.unique(detections.sensor_times(name))
         step = float(np.median(np.diff(times))) if len(times) >= LEAST_SCANS else 0.0

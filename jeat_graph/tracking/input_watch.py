@@ -21,6 +21,8 @@ STEP_SCANS = 6
 _MOST_OUTSIDE = 0.05
 # Detectors let boxes reach over the edge by a little.
 _OVER_EDGE = 1.1
+# In shares of the picture nothing is larger than 1, but for a box that reaches over the edge.
+_LARGEST_SHARE = 1.5
 # Scatter of the sizes without the corners, over that of the corners, where the one are part of the other.
 _FOLLOWS = 0.5
 
@@ -51,6 +53,15 @@ def look_like_corners(boxes: FloatArray, width: float, height: float) -> bool:
     if len(boxes) < FIRST_BOXES:
         return False
     return bool(((size - corner).std(axis=0) < _FOLLOWS * corner.std(axis=0)).all())
+
+
+#: What is said of boxes in shares of the picture.
+SHARES = "all boxes lie in [0, 1]: they must be in px, not in shares of the picture"
+
+
+def look_like_shares(boxes: FloatArray) -> bool:
+    """Whether boxes (M, 4) are most likely in shares of the picture: all lie in its first px."""
+    return len(boxes) > 0 and float((boxes[:, :2] + boxes[:, 2:]).max()) <= _LARGEST_SHARE
 
 
 class InputWatch:
@@ -109,9 +120,8 @@ class InputWatch:
 
     def _judge_boxes(self, boxes: FloatArray) -> None:
         width, height = self._config.image.width, self._config.image.height
-        far = boxes[:, :2] + boxes[:, 2:]
-        if far.max() <= 1.5:
-            self._say("shares", "all boxes lie in [0, 1]: they must be in px, not in shares of the picture")
+        if look_like_shares(boxes):
+            self._say("shares", SHARES)
         elif look_like_corners(boxes, width, height):
             self._say("corners", CORNERS)
         else:

@@ -185,6 +185,8 @@ def test_no_input_is_no_error(monkeypatch, capsys):
     ("bad", "message"),
     [
         ("{", "is not JSON"),
+        ("[\n", "is not JSON: .*; a scan must be whole on its line"),
+        ('[{"image_id": 1, "bbox": [1, 2, 3, 4], "score": 1}]', "unknown key 'image_id'; a scan has t"),
         ("[]", "at least one"),
         ("3", "is not JSON|an object such as|is missing"),
         ('["a"]', "an object such as"),

@@ -216,6 +216,9 @@ class TestCoco:
             ("[" * 100_000, "is not JSON"),
             ("[" + "9" * 5000 + "]", "is not JSON"),
             ("{}", "must be a list of results"),
+            ('{"t": 0, "sensor": "rgb"}', "holds a scan; COCO results are one list"),
+            ('{"t": 0}\n{"t": 1}\n', ":2: is JSON Lines; COCO results are one list"),
+            ('[{"t": 0, "left": 1}]', "entry 1: has t and no image_id; COCO results are one list"),
             ("[7]", "entry 1: must be an object"),
             (
                 '[{"image_id": "a", "bbox": [1,2,3,4], "score": 1}]',

@@ -37,8 +37,20 @@ def same(path, **options) -> None:
         "timestamp,camera,x1,y1,x2,y2,conf\n0.5,rgb,10.5,20,40.5,60,0.9\n0.55,rgb,,,,,\n",
         "T_MS,Sensor,Left,Top,Width,Height,Score\n500,rgb,10.5,20,30,40,0.9\n550,rgb\n",
         "timestamp_ns,sensor,xmin,ymin,w,h,prob\n500000000,rgb,10.5,20,30,40,.9\n550000000,rgb,,,,,\n",
+        "t,sensor,cx,cy,w,h,score\n0.5,rgb,25.5,40,30,40,0.9\n0.55,rgb\n",
+        "t,sensor,Center_X,Center_Y,right,bottom,score\n0.5,rgb,25.5,40,40.5,60,0.9\n0.55,rgb\n",
     ],
-    ids=["plain", "semicolons", "tabs", "capitals", "corners", "milliseconds", "nanoseconds"],
+    ids=[
+        "plain",
+        "semicolons",
+        "tabs",
+        "capitals",
+        "corners",
+        "milliseconds",
+        "nanoseconds",
+        "centre",
+        "half",
+    ],
 )
 def test_a_table_is_read_by_whatever_name_its_columns_have(write, text):
     same(write("d.csv", text))
@@ -49,6 +61,10 @@ def test_corners_are_understood_in_parquet_too(tmp_path):
     table |= {"x2": [40.5, None], "y2": [60.0, None], "confidence": [0.9, None]}
     parquet.write_table(pa.table(table), tmp_path / "d.parquet")
     same(tmp_path / "d.parquet")
+
+
+def test_the_centre_is_no_corner_where_both_are_given(write):
+    same(write("d.csv", "t,sensor,cx,left,top,width,height,score\n0.5,rgb,99,10.5,20,30,40,0.9\n0.55,rgb\n"))
 
 
 def test_a_file_of_tabs_may_be_called_tsv(write):

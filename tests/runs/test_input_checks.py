@@ -29,6 +29,16 @@ def test_times_in_other_units_are_refused_with_a_question(step, unit):
         check_detections(recording(step), load_config("default"), "det")
 
 
+@pytest.mark.parametrize("size", [(), ("--image", "1280x720")], ids=["as seen", "as told"])
+def test_boxes_in_shares_of_the_picture_are_refused_in_one_line(tmp_path, capsys, size):
+    path = tmp_path / "shares.csv"
+    rows = [f"{k / 20},rgb,{0.1 + 0.01 * k},.2,.05,.06,.9" for k in range(20)]
+    path.write_text("t,sensor,left,top,width,height,score\n" + "\n".join(rows) + "\n")
+    assert main(["track", str(path), *size, "--out", str(tmp_path / "run")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "shares.csv: all boxes lie in [0, 1]: they must be in px" in line
+
+
 def test_a_sensor_that_is_declared_to_be_so_slow_is_believed():
     config = load_config("default", ["sensors.rgb.rate_hz=0.025"])
     assert check_detections(recording(40.0), config, "det") == []
