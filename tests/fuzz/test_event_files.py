@@ -18,7 +18,7 @@ from ..io.events.plain import HEADERS, RANDOM
 from .test_readers import mutated
 
 FULL = bool(os.environ.get("JEAT_GRAPH_FULL"))
-MUTATIONS = 100_000 if FULL else 300
+MUTATIONS = 100_000 if FULL else 100
 #: HDF5's library takes a millisecond a file.
 HDF5_MUTATIONS = 20_000 if FULL else 60
 SEED = 11
