@@ -172,6 +172,13 @@ class LifecycleConfig(Section):
         0.7, "1", "that share before anything is known, and where there is no other sensor", 0.01, 1.0
     )
     disagreement_memory_s: float = number(30.0, "s", "memory of that share", open_low=True)
+    field_doubt: float = number(
+        0.0,
+        "1",
+        "of several sensors each is taken to look as far to the left and right as its boxes reach, once it "
+        "has seen more than so many vehicles there; 0: each looks at all of it",
+    )
+    field_boxes: float = number(1.0, "1", "for so many independent boxes each further vehicle counts in that")
     p_detect_weight: float = number(0.05, "1", "weight of one look in a track's own P_D per sensor", 0.0, 1.0)
     p_detect_min: float = number(0.05, "1", "least P_D of a track", 0.001, 0.999)
     p_detect_max: float = number(0.98, "1", "greatest P_D of a track", 0.001, 0.999)

@@ -18,6 +18,8 @@ from jeat_graph.filters.manoeuvre import prior_weights
 _USUAL_ODDS, _USUAL_WEIGHT = 2.2, 5.0
 # The share of what comes again in vain is held to be known from ten.
 _USUAL_VAIN_WEIGHT = 10.0
+#: Strips of the picture, side by side, by which claims are kept apart.
+PLACES = 16
 #: How hard the tracks of a scene usually manoeuvre is the mean of so many seconds of a track.
 USUAL_JERK_S = 30.0
 
@@ -123,6 +125,7 @@ class SceneState(NamedTuple):
         undetected: (1,) expected number of vehicles in the scene that have no track yet.
         last_look: (S,) time of each sensor's last scan (s); minus infinity before the first.
         claims: (S,) records of `CLAIMS`, how far others bear out each sensor's detections.
+        claims_at: (S, G) the same by place (`stages.looking.place_of`), without the mean.
         agreed_without: (S, S) detections of the first on tracks that a sensor besides the two has seen (s).
         trust: (S,) what all that says of the sensor: factor on its evidence, in (0, 1].
         fruitless: (S,) recent mean number, a scan, of each sensor's detections on tracks that ended without
@@ -142,6 +145,8 @@ class SceneState(NamedTuple):
         offsets: (S, 2, 3) what each sensor is off by along each axis: share of the side, px, ln side.
         pair_factors: (S, S, 2, 2) factors on the variances that are assumed of their differences.
         usual_jerk: (K,) recent mean weight of each density of jerk over the confirmed tracks.
+        field: (S, 2) how far each sensor's boxes reach to the left and to the right (px), from +inf, -inf.
+        field_witnesses: (S,) over how many vehicles they were.
     """
 
     clutter: FloatArray
@@ -149,6 +154,7 @@ class SceneState(NamedTuple):
     undetected: FloatArray
     last_look: FloatArray
     claims: RecordArray
+    claims_at: RecordArray
     agreed_without: FloatArray
     trust: FloatArray
     fruitless: FloatArray
@@ -166,6 +172,8 @@ class SceneState(NamedTuple):
     offsets: FloatArray
     pair_factors: FloatArray
     usual_jerk: FloatArray
+    field: FloatArray
+    field_witnesses: FloatArray
 
 
 def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
@@ -181,6 +189,7 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
         undetected=np.array([config.birth.initial]),
         last_look=np.full(num_sensors, -np.inf),
         claims=np.zeros(num_sensors, dtype=CLAIMS),
+        claims_at=np.zeros((num_sensors, PLACES), dtype=CLAIMS),
         agreed_without=np.zeros((num_sensors, num_sensors)),
         trust=sensors.prior_trust.copy(),
         fruitless=np.zeros(num_sensors),
@@ -198,6 +207,8 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
         offsets=np.zeros((num_sensors, 2, 3)),
         pair_factors=np.ones((num_sensors, num_sensors, 2, 2)),
         usual_jerk=prior_weights(config.motion.manoeuvre_prior, config.motion.densities),
+        field=np.tile([np.inf, -np.inf], (num_sensors, 1)),
+        field_witnesses=np.zeros(num_sensors),
     )
 
 

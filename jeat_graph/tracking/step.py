@@ -11,6 +11,7 @@ from jeat_graph.tracking.stages.beginning import give_birth
 from jeat_graph.tracking.stages.comparing import learn_boxes
 from jeat_graph.tracking.stages.ending import confirm, remove_ended
 from jeat_graph.tracking.stages.learning import count_looks, learn_scene
+from jeat_graph.tracking.stages.looking import count_witnesses, extend_fields
 from jeat_graph.tracking.stages.predicting import current_p_detect, expect_detections, occlusion, predict_all
 from jeat_graph.tracking.stages.sight import judge_sight
 from jeat_graph.tracking.stages.trust import learn_trust
@@ -51,6 +52,7 @@ def step(
     predict_all(tracks, n, dt, scene, model)
     batch = prepare(arrivals, scene.offsets, model)
     doubt_scores(batch, scene, model)
+    extend_fields(batch, scene, model)
     occluded = occlusion(tracks, n)
     p_found, p_detect = current_p_detect(tracks, n, batch, occluded, scene, model)
     expectation = expect_detections(tracks, n, occluded, model)
@@ -61,6 +63,7 @@ def step(
         take_second_views(tracks, n, batch, association, p_found, scene, model, log)
     learn_boxes(tracks, n, batch, association, scene, model)
     learn_lasting(tracks, n, batch, association, scene, model)
+    count_witnesses(tracks, n, association.match, scene, model)
     learn_trust(tracks, n, batch, association, scene, model)
     learn_scene(tracks, n, dt, batch, association, p_detect, scene, model)
     count_looks(tracks, n, batch, association, p_detect, scene, settings)

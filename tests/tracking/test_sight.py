@@ -63,7 +63,9 @@ def test_one_that_goes_blind_for_five_seconds_costs_no_identity_and_is_back_at_o
     ids = [set(table.track_id.tolist()) for table in tables]
     assert np.mean([len(one) for one in ids[80:180]]) > 5.0
     assert set().union(*ids[20:]) == set().union(*ids[20:80])
-    assert all(one["other"].blind > 0.99 for one in states[85:180])
+    assert all(one["other"].blind > 0.99 for one in states[85:120])
+    # The cars drive on beyond where it has ever found one: it may also not look there.
+    assert all(one["other"].blind > 0.8 for one in states[120:180])
     assert all(one["other"].blind < 0.01 for one in states[182:])
     before, after = states[78]["other"], states[181]["other"]
     assert after.p_detect == pytest.approx(before.p_detect, abs=0.05)

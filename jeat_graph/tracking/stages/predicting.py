@@ -20,6 +20,7 @@ from jeat_graph.filters.noise import base_variance, hidden_excess
 from jeat_graph.filters.sides import MOST_LOG_SIZE, mean_side
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.inner import inlined, inner
+from jeat_graph.tracking.stages.looking import looks_at
 from jeat_graph.tracking.stages.manoeuvring import choose_jerk, predict_manoeuvring
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
@@ -135,7 +136,8 @@ def current_p_detect(
     """Probability (n, S) that each sensor detects each track now, twice; 0 for sensors that did not look.
 
     The track's own running P_D times what is known of this moment: the part of the box inside the picture and
-    not hidden by nearer vehicles, and for an event camera the image speed.
+    not hidden by nearer vehicles, whether the sensor looks there at all, and for an event camera the image
+    speed.
 
     Returns:
         For a detection, and for a miss. They differ for an event camera that is alone: a new track's speed is
@@ -155,6 +157,7 @@ def current_p_detect(
                 v, blind_speed = tracks.mean[i, :, 1], sensors.blind_speed[s]
                 here, own = inside * (1.0 - tracks.hidden[i, s]), tracks.p_detect[i, s]
                 likely = motion_visibility(v, blind_speed)
+                here *= looks_at(s, tracks.mean[i, 0, 0], scene, model)
                 missed[i, s] = own * max(here * likely, _LEAST_VISIBLE)
                 if alone:
                     prior_var = new_velocity_var(mean_side(tracks.size_mean[i]), model.settings)

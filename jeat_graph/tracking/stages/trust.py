@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from jeat_graph.config.kernel_form import Model, SensorArrays
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.config.kernel_form import Model
+from jeat_graph.data.arrays import FloatArray, RecordArray
 from jeat_graph.filters.agreement import (
     high_as_often,
     score_persistence,
@@ -21,6 +22,7 @@ from jeat_graph.filters.worth import worth_of
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.inner import inner
+from jeat_graph.tracking.stages.looking import learns_fields, looks_at, place_of, write_looks
 from jeat_graph.tracking.stages.predicting import has_looked
 from jeat_graph.tracking.stages.worth import has_moved
 from jeat_graph.tracking.state import SceneState, TrackArrays
@@ -46,7 +48,8 @@ def learn_trust(
     A detection on a track that has lasted is borne out where another sensor has ever seen that track. A
     sensor that is mostly alone where others look and see vehicles takes false things for vehicles again and
     again, unless the scores say that what it alone sees is of the same kind (`filters.agreement`). A look at
-    a moment when the others are blind (their P_D is low), or at what is too slow for them, counts little;
+    a moment when the others are blind (their P_D is low), or at what is too slow for them or outside the part
+    of the picture that they look at, counts little;
     while a sensor is the only one that looks, nothing is learnt of it; where no other ever has, what came
     of its tracks tells (`trust_alone`).
     """
@@ -69,27 +72,29 @@ def learn_trust(
             if lifecycle.judges_worth and _is_alone(s, scene):
                 scene.trust[s] = trust_alone(scene.vain[s], lifecycle.usual_vain, sensors.prior_trust[s])
             continue
-        _forget(s, math.exp(-sensors.period_s[s] / lifecycle.disagreement_memory_s), scene)
+        _forget(s, math.exp(-sensors.period_s[s] / lifecycle.disagreement_memory_s), scene, model)
         for i in range(n):
             j = association.match[i, s]
             if j >= 0 and tracks.hits[i] >= _LASTING_HITS:
                 # Detections of one track are no independent witnesses: a second of them is one.
-                weight = sharpest_sight(tracks, i, sight, sensors) * sensors.period_s[s]
+                weight = sharpest_sight(tracks, i, sight, scene, model) * sensors.period_s[s]
                 if weight <= 0.0:
                     continue
                 before = (tracks.hits[i] * tracks.score_odds[i] - batch.score_odds[j]) / (tracks.hits[i] - 1)
-                _claim(s, tracks.seen_by[i], before, batch.score_odds[j], weight, has_moved(tracks, i), scene)
-        known = scene.claims[s]
-        lonely = known["all"] - known["agreed"]
+                place = place_of(tracks.mean[i, 0, 0], scene, model)
+                moved = has_moved(tracks, i)
+                _claim(s, place, tracks.seen_by[i], before, batch.score_odds[j], weight, moved, scene)
+        known = _in_sight(s, batch.t, scene, model)
+        lonely = known.all - known.agreed
         kind = share_of_kind(
-            high_as_often(known["lonely_high"], lonely, known["agreed_high"], known["agreed"]),
-            score_persistence(known["score_kept"], known["score_spread"]),
-            score_variety(known["score_square"], known["all"]),
-            worth_of(scene.worth_mean[s], known["agreed_odds"]),
+            high_as_often(known.lonely_high, lonely, known.agreed_high, known.agreed),
+            score_persistence(known.score_kept, known.score_spread),
+            score_variety(known.score_square, known.all),
+            worth_of(scene.worth_mean[s], scene.claims[s]["agreed_odds"]),
         )
         scene.trust[s] = trust_in(
-            known["agreed"] + lonely * kind * (1.0 - _others_agreement(s, scene)),
-            known["all"],
+            known.agreed + lonely * kind * (1.0 - _others_agreement(s, scene)),
+            known.all,
             lifecycle.agreement_prior,
             _PRIOR_CLAIMS,
             sensors.disagreement[s],
@@ -106,33 +111,93 @@ def _is_alone(s: int, scene: SceneState) -> bool:
 
 
 @inner
-def sharpest_sight(tracks: TrackArrays, i: int, sight: FloatArray, sensors: SensorArrays) -> float:
+def sharpest_sight(tracks: TrackArrays, i: int, sight: FloatArray, scene: SceneState, model: Model) -> float:
     """Return the greatest probability with which one of `sight` (S,) would see something like track `i`."""
     most = 0.0
     for other in range(len(sight)):
         if sight[other] > most:
-            seen = motion_visibility(tracks.mean[i, :, 1], sensors.blind_speed[other])
-            most = max(most, sight[other] * seen)
+            seen = motion_visibility(tracks.mean[i, :, 1], model.sensors.blind_speed[other])
+            here = looks_at(other, tracks.mean[i, 0, 0], scene, model)
+            most = max(most, sight[other] * seen * here)
     return most
 
 
+class Claims(NamedTuple):
+    """Sums of `CLAIMS` over the places where another sensor looks."""
+
+    all: float
+    agreed: float
+    agreed_high: float
+    lonely_high: float
+    score_kept: float
+    score_spread: float
+    score_square: float
+
+
 @inner
-def _forget(s: int, kept: float, scene: SceneState) -> None:
+def _in_sight(s: int, t: float, scene: SceneState, model: Model) -> Claims:
+    """Sum the claims of sensor `s` at time `t` (s) over the places where another sensor looks.
+
+    Where the others look is known better with time, and claims of before count by what is known now.
+    """
+    if not learns_fields(scene, model):
+        return _sum_of(scene.claims[s : s + 1], np.ones(1))
+    chance = np.zeros(scene.claims_at.shape[1])
+    for other in range(len(scene.trust)):
+        if looks_too(other, s, t, scene, model):
+            write_looks(other, chance, scene, model)
+    return _sum_of(scene.claims_at[s], chance)
+
+
+@inner
+def _sum_of(claims: RecordArray, weights: FloatArray) -> Claims:
+    """Sum claims (G,), weighted (G,)."""
+    every, agreed, agreed_high, lonely_high, kept, spread, square = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for g in range(len(claims)):
+        here, w = claims[g], weights[g]
+        every += w * here["all"]
+        agreed += w * here["agreed"]
+        agreed_high += w * here["agreed_high"]
+        lonely_high += w * here["lonely_high"]
+        kept += w * here["score_kept"]
+        spread += w * here["score_spread"]
+        square += w * here["score_square"]
+    return Claims(every, agreed, agreed_high, lonely_high, kept, spread, square)
+
+
+@inner
+def _forget(s: int, kept: float, scene: SceneState, model: Model) -> None:
     """Let what is known of sensor `s` age, in place."""
-    known = scene.claims[s]
-    known["all"] *= kept
-    known["agreed"] *= kept
-    known["agreed_high"] *= kept
-    known["lonely_high"] *= kept
-    known["score_kept"] *= kept
-    known["score_spread"] *= kept
-    known["score_square"] *= kept
+    _fade(scene.claims[s : s + 1], kept)
+    if learns_fields(scene, model):
+        _fade(scene.claims_at[s], kept)
     scene.agreed_without[s] *= kept
 
 
 @inner
+def _fade(claims: RecordArray, kept: float) -> None:
+    """Let claims (G,) fade to a share of what they were, in place."""
+    for g in range(len(claims)):
+        known = claims[g]
+        known["all"] *= kept
+        known["agreed"] *= kept
+        known["agreed_high"] *= kept
+        known["lonely_high"] *= kept
+        known["score_kept"] *= kept
+        known["score_spread"] *= kept
+        known["score_square"] *= kept
+
+
+@inner
 def _claim(
-    s: int, seen_by: int, before: float, odds: float, weight: float, moved: bool, scene: SceneState
+    s: int,
+    place: int,
+    seen_by: int,
+    before: float,
+    odds: float,
+    weight: float,
+    moved: bool,
+    scene: SceneState,
 ) -> None:
     """Count one detection of sensor `s` on a track that has lasted, in place.
 
@@ -140,6 +205,7 @@ def _claim(
 
     Args:
         s: the sensor.
+        place: where the track is (`place_of`).
         seen_by: bit o is set where sensor o has ever seen the track.
         before: mean log odds of the track's scores before.
         odds: log odds of this score.
@@ -148,24 +214,32 @@ def _claim(
         scene: what is learnt.
     """
     others = seen_by & ~(1 << s)
-    known = scene.claims[s]
+    known, here = scene.claims[s], scene.claims_at[s, place]
     known["all"] += weight
+    here["all"] += weight
     if others:
         known["agreed"] += weight
+        here["agreed"] += weight
         known["agreed_odds"] += weight / known["agreed"] * (odds - known["agreed_odds"])
     high = weight if moved and odds > known["agreed_odds"] else 0.0
     if others:
         known["agreed_high"] += high
+        here["agreed_high"] += high
         for o in range(len(scene.trust)):
             if others & ~(1 << o):
                 scene.agreed_without[s, o] += weight
     else:
         known["lonely_high"] += high
+        here["lonely_high"] += high
     deviation = before - known["agreed_odds"]
     now = odds - known["agreed_odds"]
-    known["score_spread"] += weight * deviation * deviation
-    known["score_square"] += weight * now * now
-    known["score_kept"] += weight * deviation * now
+    spread, square, kept = weight * deviation * deviation, weight * now * now, weight * deviation * now
+    known["score_spread"] += spread
+    known["score_square"] += square
+    known["score_kept"] += kept
+    here["score_spread"] += spread
+    here["score_square"] += square
+    here["score_kept"] += kept
 
 
 @inner

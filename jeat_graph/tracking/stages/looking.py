@@ -1,0 +1,82 @@
+"""Where each sensor looks: what one instant teaches of it, and what that says of a place."""
+
+from __future__ import annotations
+
+from jeat_graph.config.kernel_form import Model
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.filters.field_of_view import extend_field, in_field
+from jeat_graph.tracking.batch import Batch
+from jeat_graph.tracking.stages.inner import inner
+from jeat_graph.tracking.state import PLACES, SceneState, TrackArrays
+
+# A track of fewer detections may be a false thing that came twice.
+_LEAST_HITS = 4
+
+
+@inner
+def learns_fields(scene: SceneState, model: Model) -> bool:
+    """Whether the sensors may look at different parts of the picture."""
+    return bool(model.settings.lifecycle.field_doubt > 0.0 and len(scene.first_look) > 1)
+
+
+@inner
+def extend_fields(batch: Batch, scene: SceneState, model: Model) -> None:
+    """Let each sensor's field reach as far as its boxes do, in place.
+
+    Called before these boxes are associated: where a sensor finds something for the first time, it looks.
+    """
+    if learns_fields(scene, model):
+        for j in range(len(batch.sensor)):
+            extend_field(batch.boxes[j], scene.field[batch.sensor[j]])
+
+
+@inner
+def count_witnesses(tracks: TrackArrays, n: int, match: IntArray, scene: SceneState, model: Model) -> None:
+    """Count by how many vehicles each sensor has shown where it looks, in place.
+
+    The more of a track is known, the less does one more box of it say: the k-th counts 1 / k.
+
+    Args:
+        tracks: the state, after the update,
+        n: number of those that were asked.
+        match: (n, S) detection that each took of each sensor, or -1.
+        scene: what is learnt.
+        model: sensors and settings.
+    """
+    if not learns_fields(scene, model):
+        return
+    for i in range(n):
+        if tracks.hits[i] >= _LEAST_HITS:
+            for s in range(match.shape[1]):
+                if match[i, s] >= 0:
+                    scene.field_witnesses[s] += 1.0 / tracks.hits[i]
+
+
+@inner
+def looks_at(s: int, x: float, scene: SceneState, model: Model) -> float:
+    """Probability that sensor `s` looks at a place along x (px); a few vehicles do not yet tell.
+
+    Of a vehicle that the picture's edge cuts the centre may lie outside: what counts is where it shows.
+    """
+    lifecycle = model.settings.lifecycle
+    seen = scene.field_witnesses[s] - lifecycle.field_doubt
+    if seen <= 0.0:
+        return 1.0
+    x = min(max(x, 0.0), model.settings.image.width)
+    return float(in_field(x, scene.field[s], lifecycle.field_boxes * seen))
+
+
+@inner
+def place_of(x: float, scene: SceneState, model: Model) -> int:
+    """Return the number of the strip of the picture in which x (px) is; 0 where that is not asked."""
+    if not learns_fields(scene, model):
+        return 0
+    return min(max(int(x / model.settings.image.width * PLACES), 0), PLACES - 1)
+
+
+@inner
+def write_looks(s: int, chance: FloatArray, scene: SceneState, model: Model) -> None:
+    """Raise, in place, the chances (G,) that somebody looks at each strip to those that sensor `s` does."""
+    for g in range(len(chance)):
+        x = (g + 0.5) * model.settings.image.width / PLACES
+        chance[g] = max(chance[g], looks_at(s, x, scene, model))
