@@ -35,17 +35,17 @@ def extend_field(box: FloatArray, field: FloatArray) -> None:
 
 
 @njit(cache=True)
-def in_field(x: float, field: FloatArray, witnesses: float) -> float:
+def in_field(x: float, low: float, high: float, witnesses: float) -> float:
     """Probability that a sensor looks at a place; 1 for one that has found nothing at all so far.
 
     Args:
         x: of the place (px).
-        field: (2,) how far its boxes reach (`extend_field`).
+        low: how far its boxes reach to the left (px, `extend_field`).
+        high: how far to the right (px).
         witnesses: how many independent boxes that rests on.
     """
     if witnesses <= 0.0:
         return 1.0
-    low, high = field
     beyond = max(low - x, x - high)
     if beyond <= 0.0:
         return 1.0

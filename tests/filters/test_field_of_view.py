@@ -32,15 +32,17 @@ def test_beyond_the_boxes_it_is_the_posterior_of_the_end_of_a_uniform_distributi
     tail, whole = (quad(posterior, start, np.inf, epsabs=0.0)[0] for start in (width + beyond, width))
     expected = tail / whole
     field = field_of((100, 100, width, 80))
-    assert in_field(250.0 + beyond, field, seen) == pytest.approx(expected, rel=1e-7)
-    assert in_field(100.0 - beyond, field, seen) == pytest.approx(expected, rel=1e-7)
+    assert in_field(250.0 + beyond, *field, seen) == pytest.approx(expected, rel=1e-7)
+    assert in_field(100.0 - beyond, *field, seen) == pytest.approx(expected, rel=1e-7)
 
 
 def test_inside_it_is_certain_and_more_boxes_tell_more_of_what_is_outside():
     field = field_of((100, 100, 50, 80))
-    assert in_field(100.0, field, 4.0) == in_field(150.0, field, 400.0) == 1.0
-    assert 0.5 > in_field(170.0, field, 2.0) > in_field(170.0, field, 4.0) > in_field(200.0, field, 4.0) > 0.0
+    assert in_field(100.0, *field, 4.0) == in_field(150.0, *field, 400.0) == 1.0
+    assert (
+        0.5 > in_field(170.0, *field, 2.0) > in_field(170.0, *field, 4.0) > in_field(200.0, *field, 4.0) > 0.0
+    )
 
 
 def test_of_a_sensor_that_has_shown_nothing_all_is_taken_to_be_seen():
-    assert in_field(500.0, NOTHING, 0.0) == 1.0
+    assert in_field(500.0, *NOTHING, 0.0) == 1.0

@@ -50,7 +50,7 @@ def looks(tracker, sensor, x):
     lifecycle, scene = tracker.config.lifecycle, tracker.snapshot().scene
     s = tracker.sensor_names.index(sensor)
     seen = lifecycle.field_boxes * (scene.field_witnesses[s] - lifecycle.field_doubt)
-    return in_field(x, scene.field[s], seen)
+    return in_field(x, *scene.field[s], seen)
 
 
 @pytest.mark.parametrize("second", [(640.0, 1280.0), (0.0, 430.0)])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from jeat_graph.config.kernel_form import Model
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.filters.field_of_view import extend_field, in_field
@@ -53,30 +55,41 @@ def count_witnesses(tracks: TrackArrays, n: int, match: IntArray, scene: SceneSt
 
 
 @inner
-def looks_at(s: int, x: float, scene: SceneState, model: Model) -> float:
-    """Probability that sensor `s` looks at a place along x (px); a few vehicles do not yet tell.
+def known_fields(scene: SceneState, model: Model) -> FloatArray:
+    """By how many independent boxes (S,) each sensor's field is known; 0: few vehicles do not tell."""
+    lifecycle = model.settings.lifecycle
+    if not learns_fields(scene, model):
+        return np.zeros(len(scene.field_witnesses))
+    return np.maximum(lifecycle.field_boxes * (scene.field_witnesses - lifecycle.field_doubt), 0.0)
+
+
+@inner
+def looks_at(x: float, field: FloatArray, known: float, width: float) -> float:
+    """Probability that a sensor looks at a place.
 
     Of a vehicle that the picture's edge cuts the centre may lie outside: what counts is where it shows.
+    Neither the scene nor the model is passed: their many arrays would cost more than the answer, and this is
+    asked of every track and sensor.
+
+    Args:
+        x: of the place (px).
+        field: (2,) how far the sensor's boxes reach (px).
+        known: by how many boxes that is known.
+        width: of the picture (px).
     """
-    lifecycle = model.settings.lifecycle
-    seen = scene.field_witnesses[s] - lifecycle.field_doubt
-    if seen <= 0.0:
+    if known <= 0.0:
         return 1.0
-    x = min(max(x, 0.0), model.settings.image.width)
-    return float(in_field(x, scene.field[s], lifecycle.field_boxes * seen))
+    return float(in_field(min(max(x, 0.0), width), field[0], field[1], known))
 
 
 @inner
-def place_of(x: float, scene: SceneState, model: Model) -> int:
-    """Return the number of the strip of the picture in which x (px) is; 0 where that is not asked."""
-    if not learns_fields(scene, model):
-        return 0
-    return min(max(int(x / model.settings.image.width * PLACES), 0), PLACES - 1)
+def place_of(x: float, width: float) -> int:
+    """Return the number of the strip in which x (px) is, of a picture so wide (px)."""
+    return min(max(int(x / width * PLACES), 0), PLACES - 1)
 
 
 @inner
-def write_looks(s: int, chance: FloatArray, scene: SceneState, model: Model) -> None:
-    """Raise, in place, the chances (G,) that somebody looks at each strip to those that sensor `s` does."""
+def write_looks(field: FloatArray, known: float, width: float, chance: FloatArray) -> None:
+    """Raise, in place, the chances (G,) that somebody looks at each strip to those that one sensor does."""
     for g in range(len(chance)):
-        x = (g + 0.5) * model.settings.image.width / PLACES
-        chance[g] = max(chance[g], looks_at(s, x, scene, model))
+        chance[g] = max(chance[g], looks_at((g + 0.5) * width / len(chance), field, known, width))

@@ -20,7 +20,7 @@ from jeat_graph.filters.noise import base_variance, hidden_excess
 from jeat_graph.filters.sides import MOST_LOG_SIZE, mean_side
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.inner import inlined, inner
-from jeat_graph.tracking.stages.looking import looks_at
+from jeat_graph.tracking.stages.looking import known_fields, looks_at
 from jeat_graph.tracking.stages.manoeuvring import choose_jerk, predict_manoeuvring
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
@@ -148,6 +148,7 @@ def current_p_detect(
     sensors, image, present = model.sensors, model.settings.image, batch.present
     missed = np.zeros((n, len(present)))
     boxes = track_boxes(tracks.mean[:n], tracks.size_mean[:n])
+    fields, width = known_fields(scene, model), image.width
     alone = not _somebody_sees_still(batch, scene, model)
     found = np.zeros((n, len(present))) if alone else missed
     for i in range(n):
@@ -157,7 +158,7 @@ def current_p_detect(
                 v, blind_speed = tracks.mean[i, :, 1], sensors.blind_speed[s]
                 here, own = inside * (1.0 - tracks.hidden[i, s]), tracks.p_detect[i, s]
                 likely = motion_visibility(v, blind_speed)
-                here *= looks_at(s, tracks.mean[i, 0, 0], scene, model)
+                here *= looks_at(tracks.mean[i, 0, 0], scene.field[s], fields[s], width)
                 missed[i, s] = own * max(here * likely, _LEAST_VISIBLE)
                 if alone:
                     prior_var = new_velocity_var(mean_side(tracks.size_mean[i]), model.settings)

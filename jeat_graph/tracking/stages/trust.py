@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jeat_graph.config.kernel_form import Model
+from jeat_graph.config.kernel_form import Model, SensorArrays
 from jeat_graph.data.arrays import FloatArray, RecordArray
 from jeat_graph.filters.agreement import (
     high_as_often,
@@ -22,7 +22,7 @@ from jeat_graph.filters.worth import worth_of
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.inner import inner
-from jeat_graph.tracking.stages.looking import learns_fields, looks_at, place_of, write_looks
+from jeat_graph.tracking.stages.looking import known_fields, learns_fields, looks_at, place_of, write_looks
 from jeat_graph.tracking.stages.predicting import has_looked
 from jeat_graph.tracking.stages.worth import has_moved
 from jeat_graph.tracking.state import SceneState, TrackArrays
@@ -60,6 +60,7 @@ def learn_trust(
             scene.last_look[s] = batch.t
     if np.max(sensors.disagreement) <= 0.0:
         return
+    fields, width = known_fields(scene, model), model.settings.image.width
     for s in range(len(batch.present)):
         # What bears others out is counted of sensors too that are always believed.
         if not batch.present[s]:
@@ -77,14 +78,17 @@ def learn_trust(
             j = association.match[i, s]
             if j >= 0 and tracks.hits[i] >= _LASTING_HITS:
                 # Detections of one track are no independent witnesses: a second of them is one.
-                weight = sharpest_sight(tracks, i, sight, scene, model) * sensors.period_s[s]
+                weight = (
+                    sharpest_sight(tracks, i, sight, sensors, scene.field, fields, width)
+                    * sensors.period_s[s]
+                )
                 if weight <= 0.0:
                     continue
                 before = (tracks.hits[i] * tracks.score_odds[i] - batch.score_odds[j]) / (tracks.hits[i] - 1)
-                place = place_of(tracks.mean[i, 0, 0], scene, model)
+                place = place_of(tracks.mean[i, 0, 0], width)
                 moved = has_moved(tracks, i)
                 _claim(s, place, tracks.seen_by[i], before, batch.score_odds[j], weight, moved, scene)
-        known = _in_sight(s, batch.t, scene, model)
+        known = _in_sight(s, batch.t, fields, scene, model)
         lonely = known.all - known.agreed
         kind = share_of_kind(
             high_as_often(known.lonely_high, lonely, known.agreed_high, known.agreed),
@@ -111,13 +115,21 @@ def _is_alone(s: int, scene: SceneState) -> bool:
 
 
 @inner
-def sharpest_sight(tracks: TrackArrays, i: int, sight: FloatArray, scene: SceneState, model: Model) -> float:
+def sharpest_sight(
+    tracks: TrackArrays,
+    i: int,
+    sight: FloatArray,
+    sensors: SensorArrays,
+    field: FloatArray,
+    known: FloatArray,
+    width: float,
+) -> float:
     """Return the greatest probability with which one of `sight` (S,) would see something like track `i`."""
     most = 0.0
     for other in range(len(sight)):
         if sight[other] > most:
-            seen = motion_visibility(tracks.mean[i, :, 1], model.sensors.blind_speed[other])
-            here = looks_at(other, tracks.mean[i, 0, 0], scene, model)
+            seen = motion_visibility(tracks.mean[i, :, 1], sensors.blind_speed[other])
+            here = looks_at(tracks.mean[i, 0, 0], field[other], known[other], width)
             most = max(most, sight[other] * seen * here)
     return most
 
@@ -135,7 +147,7 @@ class Claims(NamedTuple):
 
 
 @inner
-def _in_sight(s: int, t: float, scene: SceneState, model: Model) -> Claims:
+def _in_sight(s: int, t: float, fields: FloatArray, scene: SceneState, model: Model) -> Claims:
     """Sum the claims of sensor `s` at time `t` (s) over the places where another sensor looks.
 
     Where the others look is known better with time, and claims of before count by what is known now.
@@ -145,7 +157,7 @@ def _in_sight(s: int, t: float, scene: SceneState, model: Model) -> Claims:
     chance = np.zeros(scene.claims_at.shape[1])
     for other in range(len(scene.trust)):
         if looks_too(other, s, t, scene, model):
-            write_looks(other, chance, scene, model)
+            write_looks(scene.field[other], fields[other], model.settings.image.width, chance)
     return _sum_of(scene.claims_at[s], chance)
 
 
