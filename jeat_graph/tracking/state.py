@@ -95,8 +95,8 @@ class TrackArrays(NamedTuple):
 
 
 #: What is counted of a sensor's recent detections on lasting tracks while another sensor looked too, in
-#: seconds of a track: all; those on tracks that another sensor has seen, the mean log odds of their scores,
-#: and those of them that have a higher one and are on tracks that have moved; the same of the detections on
+#: seconds of a track: all; those on tracks that another sensor has seen, and those of them whose score is
+#: above the mean log odds of theirs and that are on tracks that have moved; the same of the detections on
 #: tracks that the sensor alone has seen. The sums of the squares of the tracks' deviations from that mean
 #: (log odds² s), of the squares of all deviations, and of their products with those of the next detection.
 CLAIMS = np.dtype(
@@ -105,7 +105,6 @@ CLAIMS = np.dtype(
         for name in (
             "all",
             "agreed",
-            "agreed_odds",
             "agreed_high",
             "lonely_high",
             "score_spread",
@@ -124,8 +123,10 @@ class SceneState(NamedTuple):
         p_detect: (S,) each sensor's mean probability of detecting a confirmed track: light and darkness.
         undetected: (1,) expected number of vehicles in the scene that have no track yet.
         last_look: (S,) time of each sensor's last scan (s); minus infinity before the first.
-        claims: (S,) records of `CLAIMS`, how far others bear out each sensor's detections.
-        claims_at: (S, G) the same by place (`stages.looking.place_of`), without the mean.
+        claims: (S, G) records of `CLAIMS`, how far others bear out each sensor's detections, by strip of the
+            picture (`stages.looking.place_of`); one strip where every sensor is taken to look at all of it.
+        agreed_seen: (S,) how much of them another sensor bears out, over all strips (s).
+        agreed_odds: (S,) mean log odds of the scores of these.
         agreed_without: (S, S) detections of the first on tracks that a sensor besides the two has seen (s).
         trust: (S,) what all that says of the sensor: factor on its evidence, in (0, 1].
         fruitless: (S,) recent mean number, a scan, of each sensor's detections on tracks that ended without
@@ -154,7 +155,8 @@ class SceneState(NamedTuple):
     undetected: FloatArray
     last_look: FloatArray
     claims: RecordArray
-    claims_at: RecordArray
+    agreed_seen: FloatArray
+    agreed_odds: FloatArray
     agreed_without: FloatArray
     trust: FloatArray
     fruitless: FloatArray
@@ -183,13 +185,15 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
     half = config.lifecycle.worth_half
     assumed = [math.log(half / (1.0 - half)), config.lifecycle.worth_slope]
     doubt = config.lifecycle.first_doubt if num_sensors > 1 else 0.0
+    places = PLACES if config.lifecycle.field_doubt > 0.0 and num_sensors > 1 else 1
     return SceneState(
         clutter=sensors.clutter_per_scan.copy(),
         p_detect=sensors.p_detect.copy(),
         undetected=np.array([config.birth.initial]),
         last_look=np.full(num_sensors, -np.inf),
-        claims=np.zeros(num_sensors, dtype=CLAIMS),
-        claims_at=np.zeros((num_sensors, PLACES), dtype=CLAIMS),
+        claims=np.zeros((num_sensors, places), dtype=CLAIMS),
+        agreed_seen=np.zeros(num_sensors),
+        agreed_odds=np.zeros(num_sensors),
         agreed_without=np.zeros((num_sensors, num_sensors)),
         trust=sensors.prior_trust.copy(),
         fruitless=np.zeros(num_sensors),

@@ -9,31 +9,31 @@ from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.filters.field_of_view import extend_field, in_field
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.inner import inner
-from jeat_graph.tracking.state import PLACES, SceneState, TrackArrays
+from jeat_graph.tracking.state import SceneState, TrackArrays
 
 # A track of fewer detections may be a false thing that came twice.
 _LEAST_HITS = 4
 
 
 @inner
-def learns_fields(scene: SceneState, model: Model) -> bool:
-    """Whether the sensors may look at different parts of the picture."""
-    return bool(model.settings.lifecycle.field_doubt > 0.0 and len(scene.first_look) > 1)
+def learns_fields(scene: SceneState) -> bool:
+    """Whether the sensors may look at different parts of the picture: then claims are kept by strip."""
+    return scene.claims.shape[1] > 1
 
 
 @inner
-def extend_fields(batch: Batch, scene: SceneState, model: Model) -> None:
+def extend_fields(batch: Batch, scene: SceneState) -> None:
     """Let each sensor's field reach as far as its boxes do, in place.
 
     Called before these boxes are associated: where a sensor finds something for the first time, it looks.
     """
-    if learns_fields(scene, model):
+    if learns_fields(scene):
         for j in range(len(batch.sensor)):
             extend_field(batch.boxes[j], scene.field[batch.sensor[j]])
 
 
 @inner
-def count_witnesses(tracks: TrackArrays, n: int, match: IntArray, scene: SceneState, model: Model) -> None:
+def count_witnesses(tracks: TrackArrays, n: int, match: IntArray, scene: SceneState) -> None:
     """Count by how many vehicles each sensor has shown where it looks, in place.
 
     The more of a track is known, the less does one more box of it say: the k-th counts 1 / k.
@@ -43,9 +43,8 @@ def count_witnesses(tracks: TrackArrays, n: int, match: IntArray, scene: SceneSt
         n: number of those that were asked.
         match: (n, S) detection that each took of each sensor, or -1.
         scene: what is learnt.
-        model: sensors and settings.
     """
-    if not learns_fields(scene, model):
+    if not learns_fields(scene):
         return
     for i in range(n):
         if tracks.hits[i] >= _LEAST_HITS:
@@ -58,7 +57,7 @@ def count_witnesses(tracks: TrackArrays, n: int, match: IntArray, scene: SceneSt
 def known_fields(scene: SceneState, model: Model) -> FloatArray:
     """By how many independent boxes (S,) each sensor's field is known; 0: few vehicles do not tell."""
     lifecycle = model.settings.lifecycle
-    if not learns_fields(scene, model):
+    if not learns_fields(scene):
         return np.zeros(len(scene.field_witnesses))
     return np.maximum(lifecycle.field_boxes * (scene.field_witnesses - lifecycle.field_doubt), 0.0)
 
@@ -83,9 +82,9 @@ def looks_at(x: float, field: FloatArray, known: float, width: float) -> float:
 
 
 @inner
-def place_of(x: float, width: float) -> int:
-    """Return the number of the strip in which x (px) is, of a picture so wide (px)."""
-    return min(max(int(x / width * PLACES), 0), PLACES - 1)
+def place_of(x: float, width: float, strips: int) -> int:
+    """Return in which of so many strips x (px) is, of a picture so wide (px)."""
+    return min(max(int(x / width * strips), 0), strips - 1)
 
 
 @inner

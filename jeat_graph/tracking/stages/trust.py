@@ -73,7 +73,7 @@ def learn_trust(
             if lifecycle.judges_worth and _is_alone(s, scene):
                 scene.trust[s] = trust_alone(scene.vain[s], lifecycle.usual_vain, sensors.prior_trust[s])
             continue
-        _forget(s, math.exp(-sensors.period_s[s] / lifecycle.disagreement_memory_s), scene, model)
+        _forget(s, math.exp(-sensors.period_s[s] / lifecycle.disagreement_memory_s), scene)
         for i in range(n):
             j = association.match[i, s]
             if j >= 0 and tracks.hits[i] >= _LASTING_HITS:
@@ -85,7 +85,7 @@ def learn_trust(
                 if weight <= 0.0:
                     continue
                 before = (tracks.hits[i] * tracks.score_odds[i] - batch.score_odds[j]) / (tracks.hits[i] - 1)
-                place = place_of(tracks.mean[i, 0, 0], width)
+                place = place_of(tracks.mean[i, 0, 0], width, scene.claims.shape[1])
                 moved = has_moved(tracks, i)
                 _claim(s, place, tracks.seen_by[i], before, batch.score_odds[j], weight, moved, scene)
         known = _in_sight(s, batch.t, fields, scene, model)
@@ -94,7 +94,7 @@ def learn_trust(
             high_as_often(known.lonely_high, lonely, known.agreed_high, known.agreed),
             score_persistence(known.score_kept, known.score_spread),
             score_variety(known.score_square, known.all),
-            worth_of(scene.worth_mean[s], scene.claims[s]["agreed_odds"]),
+            worth_of(scene.worth_mean[s], scene.agreed_odds[s]),
         )
         scene.trust[s] = trust_in(
             known.agreed + lonely * kind * (1.0 - _others_agreement(s, scene)),
@@ -152,13 +152,13 @@ def _in_sight(s: int, t: float, fields: FloatArray, scene: SceneState, model: Mo
 
     Where the others look is known better with time, and claims of before count by what is known now.
     """
-    if not learns_fields(scene, model):
-        return _sum_of(scene.claims[s : s + 1], np.ones(1))
-    chance = np.zeros(scene.claims_at.shape[1])
+    if not learns_fields(scene):
+        return _sum_of(scene.claims[s], np.ones(1))
+    chance = np.zeros(scene.claims.shape[1])
     for other in range(len(scene.trust)):
         if looks_too(other, s, t, scene, model):
             write_looks(scene.field[other], fields[other], model.settings.image.width, chance)
-    return _sum_of(scene.claims_at[s], chance)
+    return _sum_of(scene.claims[s], chance)
 
 
 @inner
@@ -178,19 +178,12 @@ def _sum_of(claims: RecordArray, weights: FloatArray) -> Claims:
 
 
 @inner
-def _forget(s: int, kept: float, scene: SceneState, model: Model) -> None:
+def _forget(s: int, kept: float, scene: SceneState) -> None:
     """Let what is known of sensor `s` age, in place."""
-    _fade(scene.claims[s : s + 1], kept)
-    if learns_fields(scene, model):
-        _fade(scene.claims_at[s], kept)
+    scene.agreed_seen[s] *= kept
     scene.agreed_without[s] *= kept
-
-
-@inner
-def _fade(claims: RecordArray, kept: float) -> None:
-    """Let claims (G,) fade to a share of what they were, in place."""
-    for g in range(len(claims)):
-        known = claims[g]
+    for g in range(scene.claims.shape[1]):
+        known = scene.claims[s, g]
         known["all"] *= kept
         known["agreed"] *= kept
         known["agreed_high"] *= kept
@@ -226,32 +219,25 @@ def _claim(
         scene: what is learnt.
     """
     others = seen_by & ~(1 << s)
-    known, here = scene.claims[s], scene.claims_at[s, place]
+    known = scene.claims[s, place]
     known["all"] += weight
-    here["all"] += weight
     if others:
         known["agreed"] += weight
-        here["agreed"] += weight
-        known["agreed_odds"] += weight / known["agreed"] * (odds - known["agreed_odds"])
-    high = weight if moved and odds > known["agreed_odds"] else 0.0
+        scene.agreed_seen[s] += weight
+        scene.agreed_odds[s] += weight / scene.agreed_seen[s] * (odds - scene.agreed_odds[s])
+    usual = scene.agreed_odds[s]
+    high = weight if moved and odds > usual else 0.0
     if others:
         known["agreed_high"] += high
-        here["agreed_high"] += high
         for o in range(len(scene.trust)):
             if others & ~(1 << o):
                 scene.agreed_without[s, o] += weight
     else:
         known["lonely_high"] += high
-        here["lonely_high"] += high
-    deviation = before - known["agreed_odds"]
-    now = odds - known["agreed_odds"]
-    spread, square, kept = weight * deviation * deviation, weight * now * now, weight * deviation * now
-    known["score_spread"] += spread
-    known["score_square"] += square
-    known["score_kept"] += kept
-    here["score_spread"] += spread
-    here["score_square"] += square
-    here["score_kept"] += kept
+    deviation, now = before - usual, odds - usual
+    known["score_spread"] += weight * deviation * deviation
+    known["score_square"] += weight * now * now
+    known["score_kept"] += weight * deviation * now
 
 
 @inner
@@ -263,5 +249,6 @@ def _others_agreement(s: int, scene: SceneState) -> float:
     most = 0.0
     for o in range(len(scene.trust)):
         if o != s:
-            most = max(most, scene.agreed_without[o, s] / (scene.claims[o]["all"] + _PRIOR_CLAIMS))
+            claimed = scene.claims[o]["all"].sum()
+            most = max(most, scene.agreed_without[o, s] / (claimed + _PRIOR_CLAIMS))
     return most
