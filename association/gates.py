@@ -139,27 +139,22 @@ def _fill(
     heaviest = np.max(weight)
     constants = log_constants(likelihood.freedom)
     unseen_density = -math.log(likelihood.log_size_range)
-    longest_x, longest_y = (
-        _longest_part(cut[:, 0], z_log_size[:, 0]),
-        _longest_part(cut[:, 1], z_log_size[:, 1]),
-    )
+    longest, low, high = np.empty(2), np.empty(2), np.empty(2)
+    for axis in range(2):
+        longest[axis] = _longest_part(cut[:, axis], z_log_size[:, axis])
     for i in range(num_tracks):
-        left, right = np.inf, -np.inf
-        top, bottom = np.inf, -np.inf
-        # The middle of the part that shows lies within half a size of the centre.
-        reach_x, open_x = _reach(longest_x, log_size[i, 0], log_size_var[i, 0])
-        reach_y, open_y = _reach(longest_y, log_size[i, 1], log_size_var[i, 1])
-        for s in range(noise.shape[1]):
-            # A hair wider than any gate, so that rounding never decides here.
-            half = 1.000001 * math.sqrt(gate * (position_var[i, s, 0] + noise[i, s, 0] * heaviest + open_x))
-            half += reach_x
-            left = min(left, position[i, s, 0] - half)
-            right = max(right, position[i, s, 0] + half)
-            half = 1.000001 * math.sqrt(gate * (position_var[i, s, 1] + noise[i, s, 1] * heaviest + open_y))
-            half += reach_y
-            top = min(top, position[i, s, 1] - half)
-            bottom = max(bottom, position[i, s, 1] + half)
-        k = np.searchsorted(x_sorted, left)
+        for axis in range(2):
+            low[axis], high[axis] = np.inf, -np.inf
+            # The middle of the part that shows lies within half a size of the centre.
+            reach, more = _reach(longest[axis], log_size[i, axis], log_size_var[i, axis])
+            for s in range(noise.shape[1]):
+                var = position_var[i, s, axis] + noise[i, s, axis] * heaviest + more
+                # A hair wider than any gate, so that rounding never decides here.
+                half = 1.000001 * math.sqrt(gate * var) + reach
+                low[axis] = min(low[axis], position[i, s, axis] - half)
+                high[axis] = max(high[axis], position[i, s, axis] + half)
+        right, top, bottom = high[0], low[1], high[1]
+        k = np.searchsorted(x_sorted, low[0])
         first = count
         while k < num_dets and x_sorted[k] <= right:
             y = y_sorted[k]
@@ -168,28 +163,22 @@ def _fill(
                 continue
             j = order[k - 1]
             s = sensor[j]
-            dy = y - position[i, s, 1]
-            Sy = position_var[i, s, 1] + noise[i, s, 1] * weight[j]
-            if cut[j, 1]:
-                known = log_size[i, 1], log_size_var[i, 1]
-                shown = cut[j, 1], side[j, 1], z_log_size[j, 1]
-                centre, var = centre_of_cut(*shown, *known)
-                dy = 0.0 if cut[j, 1] == BOTH_CUT else centre - position[i, s, 1]
-                white = noise[i, s, 1] * weight[j]
-                Sy = variance_of_cut(cut[j, 1], last_cut[i, 1], position_var[i, s, 1], white, var)
-            ny = dy * dy / Sy
-            if ny > gate:
-                continue
-            dx = z[j, 0] - position[i, s, 0]
-            Sx = position_var[i, s, 0] + noise[i, s, 0] * weight[j]
-            if cut[j, 0]:
-                known = log_size[i, 0], log_size_var[i, 0]
-                shown = cut[j, 0], side[j, 0], z_log_size[j, 0]
-                centre, var = centre_of_cut(*shown, *known)
-                dx = 0.0 if cut[j, 0] == BOTH_CUT else centre - position[i, s, 0]
-                white = noise[i, s, 0] * weight[j]
-                Sx = variance_of_cut(cut[j, 0], last_cut[i, 0], position_var[i, s, 0], white, var)
-            distance = dx * dx / Sx + ny
+            distance, det = 0.0, 1.0
+            # y first: the detections are sorted by x, so that it rules out more of what is left.
+            for axis in (1, 0):
+                where, var = position[i, s, axis], position_var[i, s, axis]
+                white = noise[i, s, axis] * weight[j]
+                off, S = z[j, axis] - where, var + white
+                if cut[j, axis] != WHOLE:
+                    known = log_size[i, axis], log_size_var[i, axis]
+                    shown = cut[j, axis], side[j, axis], z_log_size[j, axis]
+                    centre, size_var = centre_of_cut(*shown, *known)
+                    off = 0.0 if cut[j, axis] == BOTH_CUT else centre - where
+                    S = variance_of_cut(cut[j, axis], last_cut[i, axis], var, white, size_var)
+                distance += off * off / S
+                det *= S
+                if distance > gate:
+                    break
             if not distance <= gate:
                 continue
             size_distance = 0.0
@@ -218,7 +207,7 @@ def _fill(
             rows[count] = i
             cols[at] = j
             d2[at] = distance
-            log_density[at] = log_density_of(distance, Sx * Sy, 2, likelihood.freedom, constants)
+            log_density[at] = log_density_of(distance, det, 2, likelihood.freedom, constants)
             log_size_density[at] = (
                 log_density_of(size_distance, size_det, seen, likelihood.freedom, constants)
                 + (2 - seen) * unseen_density

@@ -18,7 +18,7 @@ _LEAST_HITS = 4
 @inner
 def learns_fields(scene: SceneState) -> bool:
     """Whether the sensors may look at different parts of the picture: then claims are kept by strip."""
-    return scene.claims.shape[1] > 1
+    return bool(scene.claims.shape[1] > 1)
 
 
 @inner
