@@ -61,7 +61,7 @@ live: $(VENV)/.test $(VENV)/.compiled
 	@JEAT_GRAPH_FULL=1 $(BIN)/python -m pytest tests/live
 
 fuzz: $(VENV)/.test $(VENV)/.compiled
-	@JEAT_GRAPH_FULL=1 $(BIN)/python -m pytest -n 2 tests/fuzz
+	@JEAT_GRAPH_FULL=1 $(BIN)/python -m pytest -n 2 tests/fuzz tests/tracking/test_invariants.py
 
 lint: $(VENV)/.lint $(VENV)/.run
 	@$(BIN)/ruff check
