@@ -8,6 +8,15 @@ from numba import njit
 
 from jeat_graph.data.arrays import FloatArray
 
+# Log odds are kept within this, evidence too: neither certainty, which no later evidence could change, nor
+# overflow can be reached. A probability within 1e-9 of certainty has log odds of 20.7.
+_MOST_LOG_ODDS = 20.0
+_LEAST_DOUBT = 1e-9
+# What is divided by is at least this: a probability, or a variance (px²/s²), that rounding left at zero.
+_TINY = 1e-12
+# exp() of more comes near what a double can hold.
+_MOST_EXPONENT = 500.0
+
 
 @njit(cache=True)
 def existence_after_hit(existence: float, evidence: float) -> float:
@@ -21,10 +30,9 @@ def existence_after_hit(existence: float, evidence: float) -> float:
         existence: r before.
         evidence: ln Λ, the log likelihood ratio of the detection being the track's.
     """
-    # The log odds are bounded so that neither certainty nor overflow can be reached.
-    r = min(max(existence, 1e-9), 1.0 - 1e-9)
-    odds = math.log(r / (1.0 - r)) + min(max(evidence, -20.0), 20.0)
-    return 1.0 / (1.0 + math.exp(-min(max(odds, -20.0), 20.0)))
+    r = min(max(existence, _LEAST_DOUBT), 1.0 - _LEAST_DOUBT)
+    odds = math.log(r / (1.0 - r)) + min(max(evidence, -_MOST_LOG_ODDS), _MOST_LOG_ODDS)
+    return 1.0 / (1.0 + math.exp(-min(max(odds, -_MOST_LOG_ODDS), _MOST_LOG_ODDS)))
 
 
 @njit(cache=True)
@@ -39,7 +47,7 @@ def existence_after_miss(existence: float, p_detect: float, blind: float = 0.0) 
         p_detect: P_D of a sensor that sees.
         blind: b, the probability, after this scan, that the sensor is blind as a whole (`filters.blindness`).
     """
-    if_it_sees = existence * (1.0 - p_detect) / max(1.0 - existence * p_detect, 1e-12)
+    if_it_sees = existence * (1.0 - p_detect) / max(1.0 - existence * p_detect, _TINY)
     return blind * existence + (1.0 - blind) * if_it_sees
 
 
@@ -55,7 +63,7 @@ def hidden_after_miss(hidden: float, p_detect: float) -> float:
         hidden: h before.
         p_detect: P_D of this look if the vehicle is not hidden.
     """
-    return hidden / max(hidden + (1.0 - hidden) * (1.0 - p_detect), 1e-12)
+    return hidden / max(hidden + (1.0 - hidden) * (1.0 - p_detect), _TINY)
 
 
 @njit(cache=True)
@@ -93,11 +101,11 @@ def unsure_visibility(
         return 1.0
     log_odds, unseen, square = 0.0, 1.0, blind_speed * blind_speed
     for axis in range(2):
-        var = max(variance[axis], 1e-12)
+        var = max(variance[axis], _TINY)
         wide = square + 2.0 * var
         unseen *= math.sqrt(square / wide) * math.exp(-velocity[axis] * velocity[axis] / wide)
         log_odds += (
-            0.5 * math.log(max(prior_variance, 1e-12) / var) - 0.5 * velocity[axis] * velocity[axis] / var
+            0.5 * math.log(max(prior_variance, _TINY) / var) - 0.5 * velocity[axis] * velocity[axis] / var
         )
-    moves = 1.0 / (1.0 + math.exp(min(log_odds, 500.0)))
+    moves = 1.0 / (1.0 + math.exp(min(log_odds, _MOST_EXPONENT)))
     return moves * (1.0 - unseen)

@@ -118,6 +118,11 @@ CLAIMS = np.dtype(
 class SceneState(NamedTuple):
     """What is learnt of the scene as a whole.
 
+    Three questions are asked of a sensor, and each has its words here. Do the others bear it out (`claims`,
+    `agreed`, `trust`)? Does what it finds last (`lasting`, `worth`), or does it come again and still come to
+    nothing (`vain`, `fruitless`)? Can it see at the moment (`blind`), has it ever (`unproven`), and where
+    does it look (`field`)?
+
     Attributes:
         clutter: (S,) expected false boxes in a scan of each sensor.
         p_detect: (S,) each sensor's mean probability of detecting a confirmed track: light and darkness.

@@ -19,6 +19,8 @@ _GROSS = 10.0
 _LOOK_WEIGHT = 0.1
 # What is assumed of a sensor's P_D weighs as much as so many scans full of tracks.
 _PRIOR_SCANS = 10.0
+# However many misses, a vehicle is never certain to be hidden: then no later one could say that it is gone.
+_MOST_HIDDEN = 0.999
 
 
 @inner
@@ -61,8 +63,8 @@ def count_looks(
             sees = 1.0 - scene.blind[s]
             visible = p_detect[i, s] / own * sees
             if tracks.hidden[i, s] < 1.0:
-                awake = min(p_detect[i, s] / (1.0 - tracks.hidden[i, s]), 0.999)
-                hidden = min(hidden_after_miss(tracks.hidden[i, s], awake), 0.999)
+                awake = min(p_detect[i, s] / (1.0 - tracks.hidden[i, s]), _MOST_HIDDEN)
+                hidden = min(hidden_after_miss(tracks.hidden[i, s], awake), _MOST_HIDDEN)
                 tracks.hidden[i, s] += sees * (hidden - tracks.hidden[i, s])
             less = own - lifecycle.p_detect_weight * visible * own
             tracks.p_detect[i, s] = max(less, lifecycle.p_detect_min)
