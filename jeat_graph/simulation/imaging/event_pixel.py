@@ -176,6 +176,15 @@ def shot_share(luminance: float, model: PixelModel) -> float:
 
 
 @njit(cache=True, error_model="numpy")
+def _most_share(luminance: float, model: PixelModel) -> float:
+    """What `shot_share` is at most: beyond a half a power above 1 falls faster than the power 1."""
+    if model.shot_power < 1.0 or luminance <= model.shot_half:
+        return 1.0
+    out: float = model.shot_least + (1.0 - model.shot_least) * (model.shot_half / luminance)
+    return out
+
+
+@njit(cache=True, error_model="numpy")
 def advance(
     pixels: IntArray, luminance: FloatArray, since: FloatArray, end: float, settled: bool, model: PixelModel,
     state: PixelState, sink: EventSink,
@@ -255,6 +264,9 @@ def advance(
                 now = max(shot, now)
                 memory[i, NEXT_SHOT] = shot + exponential(random, i, shot_rate + hot_rate)
                 pick = uniform(random, i) * (shot_rate + hot_rate)
+                # In good light nearly all candidates fall, and a power for each is what noise costs.
+                if pick >= hot_rate + shot_rate * _most_share(luminance[n], model):
+                    continue
                 if pick >= hot_rate + shot_rate * shot_share(luminance[n], model):
                     continue
                 brighter = uniform(random, i) < (_HOT_ON if pick < hot_rate else model.shot_on)

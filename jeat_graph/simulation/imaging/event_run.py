@@ -163,6 +163,15 @@ def key_lights(
 
 
 @njit(cache=True, error_model="numpy")
+def between(keys: FloatArray, first: int, share: float, light: FloatArray) -> None:
+    """Fill the light (P, 3) that lies a share of the way from one of the keys (K, P, 3) to the next."""
+    for p in range(light.shape[0]):
+        for k in range(light.shape[1]):
+            before = keys[first, p, k]
+            light[p, k] = before + share * (keys[first + 1, p, k] - before)
+
+
+@njit(cache=True, error_model="numpy")
 def run_physical(
     work: Interval, stage: Stage, model: PixelModel, state: PixelState, sink: EventSink, room: int
 ) -> tuple[EventSink, int]:
@@ -229,7 +238,7 @@ def run_physical(
                             place = here * key_count / samples
                             low = min(int(place), key_count - 1)
                             share = place - low
-                            light[:] = keys[low] + share * (keys[low + 1] - keys[low])
+                            between(keys, low, share, light)
                         paint_tile(tile, here * stride - 1, who, counts, stage, light)
                         read_luminance(canvas.out, tile, seen[top])
                         rendered += 1

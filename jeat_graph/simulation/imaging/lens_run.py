@@ -13,7 +13,7 @@ from numba import njit
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.simulation.imaging.event_pixel import LUMINANCE as SEEN
 from jeat_graph.simulation.imaging.event_pixel import OUTPUT, SIGNAL, PixelModel, PixelState, advance
-from jeat_graph.simulation.imaging.event_run import COARSE, SETTLE_STEPS, UNNOTICED, any_touch
+from jeat_graph.simulation.imaging.event_run import COARSE, SETTLE_STEPS, UNNOTICED, any_touch, between
 from jeat_graph.simulation.imaging.event_sink import EventSink, with_room
 from jeat_graph.simulation.imaging.lens import place_on_canvas
 from jeat_graph.simulation.imaging.lens_interval import LensInterval, Pictures, Sight
@@ -163,7 +163,7 @@ def _paint(
         place = step * keys / (len(work.times_us) - 1)
         low = min(int(place), keys - 1)
         share, at = place - low, work.first[n] + low
-        light[:] = work.light[at] + share * (work.light[at + 1] - work.light[at])
+        between(work.light, at, share, light)
     tile = take_ground(row0, column0, stage.packed, canvas.ground)
     paint_tile(tile, step - 1, who, counts, stage, light)
     for r in range(tile.rows):

@@ -27,9 +27,12 @@ def take_ground(row0: int, column0: int, packed: FloatArray, ground: FloatArray)
     """Copy a tile's part of the static picture to where it is at hand; returns the tile."""
     height, width = packed.shape[:2]
     tile = Tile(row0, column0, min(TILE_H, height - row0), min(TILE_W, width - column0))
+    # Number by number: parts of arrays would count references, twice a pixel.
+    layers = packed.shape[2]
     for r in range(tile.rows):
         for c in range(tile.columns):
-            ground[r * TILE_W + c] = packed[row0 + r, column0 + c]
+            for k in range(layers):
+                ground[r * TILE_W + c, k] = packed[row0 + r, column0 + c, k]
     return tile
 
 
