@@ -176,7 +176,7 @@ def shot_share(luminance: float, model: PixelModel) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _most_share(luminance: float, model: PixelModel) -> float:
+def most_share(luminance: float, model: PixelModel) -> float:
     """What `shot_share` is at most: beyond a half a power above 1 falls faster than the power 1."""
     if model.shot_power < 1.0 or luminance <= model.shot_half:
         return 1.0
@@ -265,7 +265,7 @@ def advance(
                 memory[i, NEXT_SHOT] = shot + exponential(random, i, shot_rate + hot_rate)
                 pick = uniform(random, i) * (shot_rate + hot_rate)
                 # In good light nearly all candidates fall, and a power for each is what noise costs.
-                if pick >= hot_rate + shot_rate * _most_share(luminance[n], model):
+                if pick >= hot_rate + shot_rate * most_share(luminance[n], model):
                     continue
                 if pick >= hot_rate + shot_rate * shot_share(luminance[n], model):
                     continue

@@ -183,6 +183,12 @@ def beam_candela(forward: float, right: float, up: float, peak: float, stray: fl
     """
     if forward <= 0.05:
         return 0.0
+    return beam_ahead(forward, right, up, peak, stray)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def beam_ahead(forward: float, right: float, up: float, peak: float, stray: float) -> float:
+    """`beam_candela` of a place that is ahead of the lamps; without branches, for loops of it."""
     inverse = 1.0 / forward
     side, down = right * inverse, -up * inverse
     edge = clamp01((down - 0.0017) / 0.009)

@@ -9,9 +9,9 @@ from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.simulation.imaging.background import COVER, LUX, PLACE, WALL
+from jeat_graph.simulation.imaging.beam_blockers import BLOCKERS, before, let_through
 from jeat_graph.simulation.imaging.layers import ON_GROUND, ON_WALL
-from jeat_graph.simulation.imaging.lighting import LAMP_HEIGHT_M, beam_candela
-from jeat_graph.simulation.imaging.smooth import clamp01
+from jeat_graph.simulation.imaging.lighting import LAMP_HEIGHT_M, beam_ahead, beam_candela
 from jeat_graph.simulation.imaging.stage import BEAM_PEAK, BEAM_RANGE, BEAM_STRAY, Stage
 from jeat_graph.simulation.imaging.tiles import TILE, TILE_H, TILE_W, Tile
 
@@ -21,8 +21,6 @@ _FAR_TILES, _FARTHER_TILES, _FARTHEST_TILES = 1.5, 3.0, 6.0  # from the lamps, i
 _DARK_LUX = 0.15  # on the road, what a pixel's dark current is worth
 _OTHERS = 0.25  # share of all beams' light that must be there for one beam to go unnoticed
 _NODES = np.array([0, 2, 4, 6, 7])  # rows and columns of a tile at which far light is made
-_BLOCKED_M = 0.5  # way through a vehicle after which a beam is blocked
-_BLOCKERS = 4  # vehicles that may stand before one vehicle's beams
 _CORNER = 5  # where a vehicle's light at the four corners begins among what is kept of it
 
 
@@ -59,7 +57,11 @@ def _on_ground(
     limit, radius = scene[BEAM_RANGE], extent[2]
     limit2, peak, stray = limit * limit, scene[BEAM_PEAK], scene[BEAM_STRAY]
     lift2 = LAMP_HEIGHT_M * LAMP_HEIGHT_M
-    blockers = np.empty(_BLOCKERS, dtype=np.int64)
+    # Places on the ground: the tile's corners, its nodes, every other of them, all of its pixels.
+    corner, node, other, each = np.empty((2, 4)), np.empty((2, 25)), np.empty((2, 9)), np.empty((2, TILE))
+    have_nodes = have_pixels = False
+    shone = np.empty(TILE)
+    blockers = np.empty(BLOCKERS, dtype=np.int64)
     count = 0
     # Of each vehicle whose light may get here: which, where its lamps are, how near, its light at corners.
     kept, value = np.empty(len(who), dtype=np.int64), np.empty((len(who), 9))
@@ -71,6 +73,9 @@ def _on_ground(
     if whole:
         across = (ground[0, PLACE] - ground[TILE - 1, PLACE]) ** 2
         across += (ground[0, PLACE + 1] - ground[TILE - 1, PLACE + 1]) ** 2
+        for k in range(4):
+            p = (TILE_H - 1) * (k >> 1) * TILE_W + (TILE_W - 1) * (k & 1)
+            corner[0, k], corner[1, k] = ground[p, PLACE], ground[p, PLACE + 1]
     for v in who:
         sin, cos = pose[v, 2], pose[v, 3]
         x, y = pose[v, 0] + 0.5 * skin[v, 0] * sin, pose[v, 1] + 0.5 * skin[v, 0] * cos
@@ -81,12 +86,12 @@ def _on_ground(
         brightest = nearest = math.inf
         if whole:
             brightest = 0.0
+            beams_at(corner, (x, y, sin, cos), (fade[v], limit2, peak, stray), shone)
             for k in range(4):
-                p = (TILE_H - 1) * (k >> 1) * TILE_W + (TILE_W - 1) * (k & 1)
-                dx, dy = ground[p, PLACE] - x, ground[p, PLACE + 1] - y
+                dx, dy = corner[0, k] - x, corner[1, k] - y
                 nearest = min(nearest, dx * dx + dy * dy + lift2)
-                value[count, _CORNER + k] = fade[v] * _beam_at(dx, dy, sin, cos, limit2, peak, stray)
-                brightest = max(brightest, value[count, _CORNER + k])
+                value[count, _CORNER + k] = shone[k]
+                brightest = max(brightest, shone[k])
         kept[count] = v
         value[count, 0], value[count, 1], value[count, 2] = x, y, ahead
         value[count, 3], value[count, 4] = nearest, brightest
@@ -102,35 +107,52 @@ def _on_ground(
         # Whether beams matter on this tile is told by its corners, unless these are near the lamps.
         if not near and value[n, 4] < enough:
             continue
-        sin, cos = pose[v, 2], pose[v, 3]
-        blocked = _before(v, x, y, min(value[n, 2], limit), pose, fade, skin, blockers)
+        lamp, shine = (x, y, pose[v, 2], pose[v, 3]), (fade[v], limit2, peak, stray)
+        blocked = before(v, x, y, min(value[n, 2], limit), pose, fade, skin, blockers)
         if near:
+            if not have_pixels:
+                have_pixels = True
+                for p in range(TILE):
+                    each[0, p], each[1, p] = ground[p, PLACE], ground[p, PLACE + 1]
+            beams_at(each, lamp, shine, shone)
             for r in range(rows):
                 for c in range(columns):
                     p = r * TILE_W + c
                     if ground[p, LUX] > 0.0:
-                        dx, dy = ground[p, PLACE] - x, ground[p, PLACE + 1] - y
-                        lux = fade[v] * _beam_at(dx, dy, sin, cos, limit2, peak, stray)
-                        if blocked and lux > 0.0:
-                            lux *= _let_through(x, y, dx, dy, pose, skin, blockers, blocked)
-                        light[p, ON_GROUND] += lux
+                        level = shone[p]
+                        if blocked and level > 0.0:
+                            dx, dy = each[0, p] - x, each[1, p] - y
+                            level *= let_through(x, y, dx, dy, pose, skin, blockers, blocked)
+                        light[p, ON_GROUND] += level
             continue
         # Far from the lamps light changes little across a tile: it is made at nodes, the fewer the farther.
         smooth = True
         step = 1
         if not blocked:
             step = 4 if apart > _FARTHEST_TILES**2 else (2 if apart > _FARTHER_TILES**2 else 1)
+        if step < 4 and not have_nodes:
+            have_nodes = True
+            _take_nodes(ground, node, 1)
+            _take_nodes(ground, other, 2)
+        if step == 1:
+            beams_at(node, lamp, shine, shone)
+        elif step == 2:
+            beams_at(other, lamp, shine, shone)
+        at = 0
         for r in range(0, len(_NODES), step):
             for c in range(0, len(_NODES), step):
                 if step == 4:
-                    lux = value[n, _CORNER + (r >> 1) + (c >> 2)]
+                    _spread(nodes, r, c, step, value[n, _CORNER + (r >> 1) + (c >> 2)])
+                    continue
+                level = shone[at]
+                if step == 2:
+                    _spread(nodes, r, c, step, level)
                 else:
-                    p = _NODES[r] * TILE_W + _NODES[c]
-                    dx, dy = ground[p, PLACE] - x, ground[p, PLACE + 1] - y
-                    lux = fade[v] * _beam_at(dx, dy, sin, cos, limit2, peak, stray)
-                    if blocked and lux > 0.0:
-                        lux *= _let_through(x, y, dx, dy, pose, skin, blockers, blocked)
-                _spread(nodes, r, c, step, lux)
+                    if blocked and level > 0.0:
+                        dx, dy = node[0, at] - x, node[1, at] - y
+                        level *= let_through(x, y, dx, dy, pose, skin, blockers, blocked)
+                    nodes[r, c] += level
+                at += 1
     if smooth:
         for r in range(TILE_H):
             r0 = min(r >> 1, len(_NODES) - 2)
@@ -160,77 +182,46 @@ def _spread(nodes: FloatArray, row: int, column: int, step: int, lux: float) -> 
 
 
 @njit(cache=True, error_model="numpy")
-def _beam_at(dx: float, dy: float, sin: float, cos: float, limit2: float, peak: float, stray: float) -> float:
-    """Illuminance of the ground by headlamps that stand (dx, dy) m before it, and shine to (sin, cos)."""
-    lift = LAMP_HEIGHT_M
-    forward, r2 = dx * sin + dy * cos, dx * dx + dy * dy + lift * lift
-    if forward <= 0.05 or r2 >= limit2:
-        return 0.0
-    window = 1.0 - r2 / limit2
-    # A lamp is no point: the constant keeps its light finite beside it.
-    r2 += 0.3
-    candela = beam_candela(forward, dx * cos - dy * sin, -lift, peak, stray)
-    return candela * lift / (r2 * math.sqrt(r2)) * window * window
+def _take_nodes(ground: FloatArray, place: FloatArray, step: int) -> None:
+    """Fill the places (2, N) of every `step`-th node of a tile by rows and columns."""
+    at = 0
+    for r in range(0, len(_NODES), step):
+        for c in range(0, len(_NODES), step):
+            p = _NODES[r] * TILE_W + _NODES[c]
+            place[0, at], place[1, at] = ground[p, PLACE], ground[p, PLACE + 1]
+            at += 1
 
 
 @njit(cache=True, error_model="numpy")
-def _let_through(
-    x: float, y: float, dx: float, dy: float, pose: FloatArray, skin: FloatArray, blockers: IntArray, n: int
-) -> float:
-    """Part of the light that `n` vehicles let through on the way from (x, y) by (dx, dy) to the ground."""
-    left = 1.0
-    for k in range(n):
-        w = blockers[k]
-        outline = (pose[w, 0], pose[w, 1], pose[w, 2], pose[w, 3], 0.48 * skin[w, 0], 0.46 * skin[w, 1])
-        left *= 1.0 - clamp01(_way_within(x, y, dx, dy, outline) / _BLOCKED_M)
-    return left
+def beams_at(
+    place: FloatArray,
+    lamp: tuple[float, float, float, float],
+    shine: tuple[float, float, float, float],
+    out: FloatArray,
+) -> None:
+    """Illuminance of places on the ground by one vehicle's headlamps.
 
+    The loop has no branches, so that it is done for several places at once.
 
-@njit(cache=True, error_model="numpy")
-def _before(
-    v: int, x: float, y: float, reach: float, pose: FloatArray, fade: FloatArray, skin: FloatArray,
-    blockers: IntArray,
-) -> int:  # fmt: skip
-    """Find the vehicles that may stand in a vehicle's beams within `reach` m; returns how many."""
-    count = 0
-    sin, cos = pose[v, 2], pose[v, 3]
-    for w in range(len(pose)):
-        if w == v or fade[w] <= 0.0:
-            continue
-        dx, dy = pose[w, 0] - x, pose[w, 1] - y
-        forward, right = dx * sin + dy * cos, dx * cos - dy * sin
-        half = 0.5 * skin[w, 0]
-        if forward > 0.0 and forward - half < reach and abs(right) < 2.0 + 0.3 * forward:
-            blockers[count] = w
-            count += 1
-            if count == _BLOCKERS:
-                break
-    return count
-
-
-@njit(cache=True, error_model="numpy")
-def _way_within(
-    x: float, y: float, dx: float, dy: float, outline: tuple[float, float, float, float, float, float]
-) -> float:
-    """Length (m) of the way from (x, y) by (dx, dy) within a vehicle's outline on the road.
-
-    The outline is x, y, sine and cosine of the direction, half of the length and of the width.
+    Args:
+        place: (2, N) x and y (m).
+        lamp: where the lamps stand, x and y (m), and sine and cosine of the direction in which they shine.
+        shine: share of the light that counts, square of its range (m²), peak (cd) and stray share of a beam.
+        out: (N,) at least; filled (lux).
     """
-    sin, cos = outline[2], outline[3]
-    ox, oy = x - outline[0], y - outline[1]
-    low, high = 0.0, 1.0
-    for axis in range(2):
-        if axis == 0:
-            start, step, most = ox * sin + oy * cos, dx * sin + dy * cos, outline[4]
-        else:
-            start, step, most = ox * cos - oy * sin, dx * cos - dy * sin, outline[5]
-        if abs(step) < 1e-9:
-            if abs(start) > most:
-                return 0.0
-            continue
-        first, second = (-most - start) / step, (most - start) / step
-        low, high = max(low, min(first, second)), min(high, max(first, second))
-    return max(0.0, high - low) * math.sqrt(dx * dx + dy * dy)
+    x, y, sin, cos = lamp
+    fade, limit2, peak, stray = shine
+    lift = LAMP_HEIGHT_M
+    for n in range(place.shape[1]):
+        dx, dy = place[0, n] - x, place[1, n] - y
+        forward, r2 = dx * sin + dy * cos, dx * dx + dy * dy + lift * lift
+        window = 1.0 - r2 / limit2
+        there = (forward > 0.05) & (r2 < limit2)
+        # A lamp is no point: the constant keeps its light finite beside it.
+        r2 += 0.3
+        candela = beam_ahead(max(forward, 0.05), dx * cos - dy * sin, -lift, peak, stray)
+        lux = fade * (candela * lift / (r2 * math.sqrt(r2)) * window * window)
+        out[n] = lux if there else 0.0
 
 
 @njit(cache=True, error_model="numpy")
