@@ -43,6 +43,10 @@ demo: $(VENV)/.run
 clip: $(VENV)/.run
 	@$(BIN)/python -m jeat_graph.cli.demo_raw demo
 
+# Some images forbid Python to keep what it compiled: every process of the tests would compile its sources anew, and
+# pytest all of theirs (a tenth of the whole).
+test test-portable live fuzz: export PYTHONDONTWRITEBYTECODE :=
+
 test: $(VENV)/.test $(VENV)/.compiled
 	@echo "make: running the tests"
 	@$(BIN)/python -m pytest -p no:randomly -n 2 --dist worksteal
