@@ -92,6 +92,8 @@ def imports_within(node: ast.AST, runs: bool = True) -> list[tuple[str, bool]]:
     """All dotted names imported at or below a node, inside functions too, and whether each import runs."""
     found = [(name, runs) for name in names_imported(node)]
     for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.expr):
+            continue  # most of the tree, and no statement is in it
         found += imports_within(child, runs and not for_types_only(child))
     return found
 

@@ -34,11 +34,11 @@ def traffic(num):
 
 
 def live(preset):
-    """Memory of a tracker that is stepped for minutes (MiB, one reading per 50 s)."""
+    """Memory of a tracker that is stepped for minutes (MiB, one reading per 35 s)."""
     tracker, memory = Tracker(load_config(preset, ["smoother.engine=none"])), []
-    for k, scan in enumerate(traffic(25_000)):
+    for k, scan in enumerate(traffic(17_500)):
         tracker.step(scan)
-        if k % 5_000 == 4_999:
+        if k % 3_500 == 3_499:
             gc.collect()
             memory.append(resident_mib())
     return {"memory": memory, "born": tracker.num_born}
@@ -70,14 +70,14 @@ def long_track():
     And least processor time (s) of a piece of it, of one that came lately and of one of long ago, in turns.
     """
     old, memory = OneVehicle(), []
-    for _ in range(50):
+    for _ in range(38):
         old.drive()
         memory.append(resident_mib())
     young = OneVehicle()
     for _ in range(5):
         young.drive()
     early, late = (
-        min(spent) for spent in zip(*((young.drive(), old.drive()) for _ in range(15)), strict=True)
+        min(spent) for spent in zip(*((young.drive(), old.drive()) for _ in range(10)), strict=True)
     )
     born = old.tracker.num_born
     old.tracker.finish()

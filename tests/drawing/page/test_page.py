@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from itertools import pairwise
 
 import numpy as np
@@ -338,7 +339,7 @@ def test_many_long_tracks_stay_below_five_megabytes(tmp_path, report):
     run = tmp_path / "run"
     run.mkdir()
     write_trajectories(table, run / "causal.csv")
-    write_trajectories(table, run / "smoothed.csv")
+    shutil.copy(run / "causal.csv", run / "smoothed.csv")
     assert len(report(run).text) < 5e6
 
 

@@ -50,6 +50,10 @@ def test_the_worker_gives_the_bytes_of_smoothing_here(engine):
     assert same_bytes(whole, here.finish())
     assert there.smoother_counts == here.smoother_counts
     assert there.smoother_counts["tracks"] == 2
+    # After the end there is nothing more, and no error.
+    for call in (there.finish, there.smoothed, there.drain_smoothed):
+        assert len(call()) == 0
+    assert there.smoother_counts["tracks"] == 2
 
 
 def test_smoothed_in_between_is_that_of_smoothing_here():
@@ -147,15 +151,6 @@ def test_a_tracker_that_never_saw_a_scan_has_no_rows():
         assert len(table) == 0
         assert table.sensors == tracker.sensor_names
     assert tracker.smoother_counts == dict.fromkeys(tracker.smoother_counts, 0)
-
-
-def test_after_the_end_there_is_nothing_more_and_no_error():
-    tracker = make_tracker("smoother.worker=true")
-    run(tracker, DETECTIONS)
-    assert len(tracker.finish()) > 300
-    for call in (tracker.finish, tracker.smoothed, tracker.drain_smoothed):
-        assert len(call()) == 0
-    assert tracker.smoother_counts["tracks"] == 2
 
 
 def test_two_trackers_with_workers_do_not_meddle():
