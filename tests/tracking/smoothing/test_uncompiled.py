@@ -4,10 +4,10 @@ import os
 import subprocess
 import sys
 
+import numba
 import numpy as np
 
 SCRIPT = """
-import sys
 import numpy as np
 from jeat_graph import Tracker, load_config
 
@@ -20,18 +20,17 @@ for engine in ("fixed-lag", "fixed-lag-rts", "rts", "full"):
         tracker.step((0.05 * k, "rgb" if k % 2 else "evt", [[left[k], 100, 40, 30]], [0.9]))
     table = tracker.finish()
     columns[f"{engine} mean"], columns[f"{engine} var"] = table.mean, table.var
-np.savez(sys.argv[1], **columns)
 """
 
 
 def test_uncompiled_smoothers_agree_with_compiled_ones(tmp_path):
-    tables = []
-    for switch in ("0", "1"):
-        path = tmp_path / f"{switch}.npz"
-        environment = {**os.environ, "NUMBA_DISABLE_JIT": switch}
-        subprocess.run([sys.executable, "-c", SCRIPT, str(path)], env=environment, check=True)
-        tables.append(dict(np.load(path)))
-    compiled, plain = tables
+    environment, path = {**os.environ, "NUMBA_DISABLE_JIT": "1"}, tmp_path / "plain.npz"
+    script = f"{SCRIPT}\nnp.savez({str(path)!r}, **columns)"
+    subprocess.run([sys.executable, "-c", script], env=environment, check=True)
+    plain, here = dict(np.load(path)), {}
+    assert not numba.config.DISABLE_JIT
+    exec(SCRIPT, here)
+    compiled = here["columns"]
     assert compiled.keys() == plain.keys()
     for name, column in compiled.items():
         assert len(column) > 50
