@@ -44,6 +44,12 @@ def test_a_track_is_reported_until_the_longest_gap_has_passed():
         assert len(tracker.step((t + gap, "evt", [], []))) == rows
 
 
+def test_by_default_a_vehicle_that_one_scan_missed_is_reported_and_after_two_it_is_not():
+    tracker, table, t = follow(velocity=(60.0, 0.0), preset="default")
+    assert len(table) == 1
+    assert [len(tracker.step((t + k * STEP, "rgb", [], []))) for k in (1, 2)] == [1, 0]
+
+
 def test_until_the_slowest_sensors_next_scan_nothing_is_missed():
     """Of six vehicles the fast sensor sees five, the slow one all until its last two scans."""
     rates = {"slow": 20, "fast": 100}
