@@ -2,7 +2,12 @@
 
 Two explanations of a fragment's first state are weighed: it is the continuation of an earlier fragment,
 predicted over the gap by the motion model, or a vehicle that appears there for the first time. The pairs with
-the greatest total log likelihood ratio are joined, in one assignment over the whole recording.
+the greatest total log odds are joined, in one assignment over the whole recording.
+
+That two fragments agree says that they are of one *thing*. Whether it is a vehicle is another question, for
+what a detector wrongly takes for one it takes again and again, at the same place: a fragment whose hits and
+misses had it most likely for nothing when it was last seen is no vehicle that went on unseen, however well
+its return agrees.
 
 Source: the tracklet linking of Huang, Wu, Nevatia, Robust Object Tracking by Hierarchical Association of
 Detection Responses, ECCV 2008, with the motion model's own densities.
@@ -46,6 +51,7 @@ class FragmentEnds:
         seen_t: (K,) times at which the sensors saw anything at all (s), ascending, and
         seen_s: (K,) for how long they had been seeing by then (s). Where the sensors see others, a vehicle
             is not hidden for long; where they see nothing, its silence says nothing.
+        end_existence: (N,) probability, by all until then, that the fragment was a vehicle when last seen.
     """
 
     start_t: FloatArray
@@ -62,6 +68,7 @@ class FragmentEnds:
     birth_log_density: FloatArray
     seen_t: FloatArray
     seen_s: FloatArray
+    end_existence: FloatArray
 
 
 def seeing_time(t: FloatArray, longest_pause_s: float) -> tuple[FloatArray, FloatArray]:
@@ -140,10 +147,26 @@ def foreseeable(ends: FragmentEnds, first: IntArray, second: IntArray) -> BoolAr
     return np.asarray((spread <= (_FORESEEN_SIZES * size) ** 2).all(axis=0))
 
 
+def continuation_score(ratio: FloatArray, existence: FloatArray) -> FloatArray:
+    """Log odds (P,) that a vehicle went on unseen, against a new vehicle or a false box that comes again.
+
+    With r the probability that the first fragment was a vehicle and L the likelihood ratio of one thing
+    against a new one: r L : (1 - r) L + 1. False things are taken to come back as often as vehicles do, so
+    agreement alone never makes a vehicle of one.
+
+    Args:
+        ratio: (P,) ln L.
+        existence: (P,) r.
+    """
+    tiny = np.finfo(np.float64).tiny
+    doubt = np.log(np.maximum(1.0 - existence, tiny))
+    return np.log(np.maximum(existence, tiny)) + ratio - np.logaddexp(doubt + ratio, 0.0)
+
+
 def link(
     ends: FragmentEnds, *, max_gap_s: float, gate: float, size_density: float, hidden_s: float = np.inf
 ) -> IntArray:
-    """Choose which fragments continue which, by one assignment of greatest total likelihood.
+    """Choose which fragments continue which, by one assignment of greatest total log odds.
 
     Args:
         ends: N fragments.
@@ -167,8 +190,9 @@ def link(
     d2, ratio = pair_scores(ends, first, second, size_density)
     seen = np.interp(ends.start_t[second], ends.seen_t, ends.seen_s)
     ratio -= (seen - np.interp(ends.end_t[first], ends.seen_t, ends.seen_s)) / hidden_s
-    keep = (d2 <= gate) & (ratio > 0.0) & foreseeable(ends, first, second)
-    first, second, ratio = first[keep], second[keep], ratio[keep]
+    score = continuation_score(ratio, ends.end_existence[first])
+    keep = (d2 <= gate) & (score > 0.0) & foreseeable(ends, first, second)
+    first, second, score = first[keep], second[keep], score[keep]
     if not len(first):
         return before
     # Ends and starts are two sides of a graph, which falls into small independent parts.
@@ -179,7 +203,7 @@ def link(
         rows, row = np.unique(first[mine], return_inverse=True)
         cols, col = np.unique(second[mine], return_inverse=True)
         gain = np.zeros((len(rows), len(cols)))
-        gain[row, col] = ratio[mine]
+        gain[row, col] = score[mine]
         for a, b in zip(*linear_sum_assignment(gain, maximize=True), strict=True):
             if gain[a, b] > 0.0:
                 before[cols[b]] = rows[a]

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import itertools
+import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.stats import multivariate_normal
 
 from jeat_graph.smoothers.linking import (
     FragmentEnds,
     candidate_pairs,
+    continuation_score,
     foreseeable,
     link,
     pair_scores,
@@ -22,7 +26,7 @@ from .conftest import noise, transition
 DENSITY = 0.5
 
 
-def fragments(starts, ends, rng, spread=20.0):
+def fragments(starts, ends, rng, spread=20.0, existence=1.0):
     """Fragments with random states; `starts` and `ends` are their times (N,)."""
     n = len(starts)
 
@@ -48,6 +52,7 @@ def fragments(starts, ends, rng, spread=20.0):
         birth_log_density=np.full(n, -30.0),
         seen_t=np.array([0.0, 10.0]),
         seen_s=np.array([0.0, 10.0]),
+        end_existence=np.full(n, existence),
     )
 
 
@@ -128,6 +133,29 @@ def test_a_vehicle_is_not_hidden_for_long_while_others_are_seen():
         for hidden in (1.6 / ratio[0], 1.4 / ratio[0])
     }
     assert list(link_with.values()) == [0, -1]
+
+
+@given(st.floats(1e-6, 1.0 - 1e-6), st.floats(-30.0, 30.0))
+def test_the_score_is_the_sum_over_what_the_first_fragment_was_and_whether_it_came_again(existence, ratio):
+    """Vehicle or not, one thing or two: only a vehicle that is one thing with the next went on unseen."""
+    weights = {
+        (vehicle, again): (existence if vehicle else 1.0 - existence) * (math.exp(ratio) if again else 1.0)
+        for vehicle, again in itertools.product((True, False), repeat=2)
+    }
+    others = sum(weight for case, weight in weights.items() if case != (True, True))
+    found = continuation_score(np.array([ratio]), np.array([existence]))[0]
+    assert found == pytest.approx(math.log(weights[True, True] / others), rel=1e-9, abs=1e-9)
+
+
+def test_what_certainly_is_a_vehicle_is_judged_by_agreement_alone():
+    ratio = np.array([-5.0, 0.0, 3.0, 700.0])
+    assert continuation_score(ratio, np.ones(4)) == pytest.approx(ratio)
+
+
+def test_agreement_makes_no_vehicle_of_what_was_none():
+    for existence, joined in ((0.9, 0), (0.6, 0), (0.4, -1), (0.05, -1)):
+        ends = fragments([0.0, 2.0], [1.0, 3.0], np.random.default_rng(2), spread=1.0, existence=existence)
+        assert link(ends, max_gap_s=3.0, gate=1e9, size_density=DENSITY).tolist() == [-1, joined]
 
 
 def test_time_in_which_nothing_is_seen_does_not_count():

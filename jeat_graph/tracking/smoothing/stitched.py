@@ -83,7 +83,14 @@ def fragment_ends(histories: Sequence[TrackHistory], config: Config) -> Fragment
         birth_log_density=_birth_log_density(wholes, start_mean, config),
         seen_t=seen_t,
         seen_s=seen_s,
+        end_existence=np.array([_existence_when_last_seen(history.observed) for history in histories]),
     )
+
+
+def _existence_when_last_seen(observed: ObservationTimes) -> float:
+    """Causal existence at the last step in which a detection was taken; 1 where nothing is known of it."""
+    seen = np.flatnonzero((observed.used != 0) & np.isfinite(observed.existence))
+    return float(observed.existence[seen[-1]]) if len(seen) else 1.0
 
 
 def _typical_jerk(track: TrackData) -> float:
