@@ -78,10 +78,16 @@ def pack(background: Background, lights: Lights, view: View, channels: int) -> F
         view.eye[k] + depth * (X * view.rotation[0, k] + Y * view.rotation[1, k] + view.rotation[2, k])
         for k in range(2)
     ]
-    flat = [b.lux[..., None], b.place, b.front_cover[..., None], b.front_depth[..., None]]
     clear = np.exp(-lights.beta * ground_distance(b.place, b.lux, view))
-    through = np.stack([b.gain, clear], axis=2)
-    return np.concatenate([*flat, np.stack(wall, axis=2), through, *planes], axis=2)
+    layers = [b.lux, *np.moveaxis(b.place, 2, 0), b.front_cover, b.front_depth, *wall, b.gain, clear]
+    for plane in planes:
+        layers += [plane[..., k] for k in range(channels)]
+    out = np.empty((height, width, len(layers)))
+    # Rows at hand, and layer by layer: to lay side by side a number of each takes several times as long.
+    for row in range(height):
+        for k, layer in enumerate(layers):
+            out[row, :, k] = layer[row]
+    return out
 
 
 @njit(cache=True, error_model="numpy")

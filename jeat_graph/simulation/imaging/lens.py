@@ -219,10 +219,14 @@ def straighten(bent: FloatArray, config: LensConfig) -> FloatArray:
         ConfigError: there are none, for the distortion folds the picture over.
     """
     target = np.sqrt((bent**2).sum(axis=-1, keepdims=True))
-    r = target.copy()
+    r = before = target.copy()
     with np.errstate(all="ignore"):
-        for _ in range(_NEWTON):
-            r = r - (r * _gain(r, config) - target) / _slope(r, config)
+        for k in range(_NEWTON):
+            r, before, last = r - (r * _gain(r, config) - target) / _slope(r, config), r, before
+            # Once all radii are where they were two steps ago, rounding takes them to and fro for ever.
+            if np.array_equal(r, last):
+                r = before if (_NEWTON - 1 - k) % 2 else r
+                break
         worst = np.abs(r * _gain(r, config) - target).max()
         monotone = _slope(np.linspace(0.0, float(r.max()), 200), config).min() > 0.0
     if not (np.isfinite(worst) and worst < 1e-9 and monotone):
@@ -232,11 +236,13 @@ def straighten(bent: FloatArray, config: LensConfig) -> FloatArray:
 
 
 def _gain(r: Any, config: LensConfig) -> Any:
-    return 1.0 + config.k1 * r**2 + config.k2 * r**4
+    inner = 1.0 + config.k1 * r**2
+    return inner + config.k2 * r**4 if config.k2 else inner  # a fourth power is dear
 
 
 def _slope(r: Any, config: LensConfig) -> Any:
-    return 1.0 + 3.0 * config.k1 * r**2 + 5.0 * config.k2 * r**4
+    inner = 1.0 + 3.0 * config.k1 * r**2
+    return inner + 5.0 * config.k2 * r**4 if config.k2 else inner
 
 
 def _add_drops(rays: FloatArray, config: LensConfig, camera: Camera, rng: np.random.Generator) -> None:

@@ -129,7 +129,7 @@ def _contrast(static: FloatArray, dark: float) -> FloatArray:
 def _sight(lens: Lens, contrast: FloatArray) -> Sight:
     """Where the tiles of pixels look; `contrast` is of the canvas, by its rows and columns of tiles."""
     tiles = tile_raster(lens.rays.shape[1], lens.rays.shape[0])
-    reach = _reach(lens, tiles)
+    reach = _reach(lens)
     across, down = -(-lens.canvas.width // TILE_W), -(-lens.canvas.height // TILE_H)
     seen_by: list[list[int]] = [[] for _ in range(across * down)]
     for s, (top, low, left, right) in enumerate(reach.tolist()):
@@ -147,14 +147,21 @@ def _spread(lens: Lens, tiles: IntArray) -> tuple[FloatArray, FloatArray]:
     rest = np.array([[lens.canvas.fx, 0.0, lens.canvas.cx], [0.0, lens.canvas.fy, lens.canvas.cy]])
     place = lens.rays @ rest[:, :2].T + rest[:, 2]
     at = np.minimum(tiles + np.array([TILE_H // 2, TILE_W // 2]), np.array(place.shape[:2]) - 1)
-    middle, spread = lens.rays[at[:, 0], at[:, 1]], np.zeros((len(tiles), 4))
-    for n, (row, column) in enumerate(tiles.tolist()):
-        part = place[row : row + TILE_H, column : column + TILE_W].reshape(-1, 2) - place[at[n, 0], at[n, 1]]
-        spread[n] = part[:, 1].min(), part[:, 1].max(), part[:, 0].min(), part[:, 0].max()
-    return np.ascontiguousarray(middle), spread
+    own = place[at[:, 0], at[:, 1]]
+    low, high = _ranges(place)
+    spread = np.stack([low[:, 1], high[:, 1], low[:, 0], high[:, 0]], axis=1) - own[:, [1, 1, 0, 0]]
+    return np.ascontiguousarray(lens.rays[at[:, 0], at[:, 1]]), spread
 
 
-def _reach(lens: Lens, tiles: IntArray) -> IntArray:
+def _ranges(place: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Least and greatest place (T, 2) of the pixels in each tile, of places (H, W, 2)."""
+    rows, columns = np.arange(0, place.shape[0], TILE_H), np.arange(0, place.shape[1], TILE_W)
+    low = np.minimum.reduceat(np.minimum.reduceat(place, rows, axis=0), columns, axis=1)
+    high = np.maximum.reduceat(np.maximum.reduceat(place, rows, axis=0), columns, axis=1)
+    return low.reshape(-1, 2), high.reshape(-1, 2)
+
+
+def _reach(lens: Lens) -> IntArray:
     """First and last tile of the canvas, by row and column (T, 4), that each tile of pixels may look at."""
     height, width = lens.canvas.height, lens.canvas.width
     rest = np.array([[lens.canvas.fx, 0.0, lens.canvas.cx], [0.0, lens.canvas.fy, lens.canvas.cy]])
@@ -162,12 +169,11 @@ def _reach(lens: Lens, tiles: IntArray) -> IntArray:
     turns = lens.sway.most()
     far = 1.0 + float((lens.rays**2).sum(axis=-1).max())
     spare = lens.canvas.fx * (far * float(turns[:2].max()) + math.sqrt(far) * float(turns[2])) + 1.5
-    out = np.zeros((len(tiles), 4), dtype=np.int64)
-    for n, (row, column) in enumerate(tiles.tolist()):
-        part = place[row : row + TILE_H, column : column + TILE_W].reshape(-1, 2)
-        low = np.maximum(np.floor(part.min(axis=0) - spare), 0)
-        high = np.minimum(np.ceil(part.max(axis=0) + spare), (width - 1, height - 1))
-        low = np.minimum(low, (width - 1, height - 1))
-        high = np.maximum(high, low)
-        out[n] = low[1] // TILE_H, high[1] // TILE_H, low[0] // TILE_W, high[0] // TILE_W
+    last = np.array([width - 1, height - 1])
+    low, high = _ranges(place)
+    low = np.minimum(np.maximum(np.floor(low - spare), 0), last)
+    high = np.maximum(np.minimum(np.ceil(high + spare), last), low)
+    out: IntArray = np.stack(
+        [low[:, 1] // TILE_H, high[:, 1] // TILE_H, low[:, 0] // TILE_W, high[:, 0] // TILE_W], axis=1
+    ).astype(np.int64)
     return out
