@@ -43,8 +43,8 @@ demo: $(VENV)/.run
 clip: $(VENV)/.run
 	@$(BIN)/python -m jeat_graph.cli.demo_raw demo
 
-# Some images forbid Python to keep what it compiled: every process of the tests would compile its sources anew, and
-# pytest all of theirs (a tenth of the whole).
+# Some images forbid Python to keep what it compiled: pytest would rewrite all assertions anew in each of its
+# processes, which takes as long as all else before the first test.
 test test-portable live fuzz: export PYTHONDONTWRITEBYTECODE :=
 
 test: $(VENV)/.test $(VENV)/.compiled
