@@ -20,6 +20,8 @@ _SAME_RATE = 1.1
 # A box tells how far the picture reaches if so many boxes, itself among them, reach at least half as far.
 # Of few boxes none is taken for wild.
 _NEAR, _COMPANY, _COMPANY_SHARE, _FEW = 0.5, 3, 5e-4, 10
+# Left and width are each rounded where boxes are written, and their sum may lie that far outside the picture.
+_ROUNDING_PX = 0.05
 # Fewer scans do not tell a clock.
 LEAST_SCANS = 3
 
@@ -60,7 +62,7 @@ def fit_picture(config: Config, recordings: Sequence[Detections]) -> Config:
     reach = [d.boxes[:, :2] + d.boxes[:, 2:] for d in recordings if len(d)]
     if not reach:
         return config
-    width, height = (max(math.ceil(_farthest(v)), 1) for v in np.concatenate(reach).T)
+    width, height = (max(math.ceil(_farthest(v) - _ROUNDING_PX), 1) for v in np.concatenate(reach).T)
     return as_config(config, (width, height))
 
 

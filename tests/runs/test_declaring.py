@@ -38,6 +38,13 @@ def test_a_wild_box_does_not_say_how_far(wild):
     assert picture(np.vstack([[wild], drive(5000), [wild]])) == (1920.0, 1080.0)
 
 
+def test_numbers_rounded_in_a_file_make_the_picture_no_larger():
+    boxes = drive(40)
+    boxes[:, 2:] += 0.006
+    assert picture(boxes) == (1920.0, 1080.0)
+    assert picture(boxes + [0.0, 0.0, 0.5, 0.5]) == (1921.0, 1081.0)
+
+
 def test_boxes_left_of_the_picture_and_above_do_no_harm():
     assert picture(np.array([[-300.0, -200.0, 20.0, 20.0]] * 4)) == (1.0, 1.0)
 
