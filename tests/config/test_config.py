@@ -265,3 +265,8 @@ def test_what_is_said_of_the_picture_beside_its_size_leaves_the_size_to_be_seen(
     again = config_from_dict(config_to_dict(seen))
     assert (again.image.edge_px, again.input.picture) == (2.0, "seen")
     assert load_config("default", ["image.width=1920"]).input.picture == "given"
+
+
+def test_a_setting_of_a_sensor_that_is_not_declared_says_how_to_declare_it():
+    with pytest.raises(ConfigError, match="'cam' is not declared; declare it as a whole"):
+        load_config("default", ["sensors.cam.latency_s=0.1"])

@@ -42,7 +42,7 @@ def test_numbers_rounded_in_a_file_make_the_picture_no_larger():
     boxes = drive(40)
     boxes[:, 2:] += 0.006
     assert picture(boxes) == (1920.0, 1080.0)
-    assert picture(boxes + [0.0, 0.0, 0.5, 0.5]) == (1921.0, 1081.0)
+    assert picture(boxes + np.array([0.0, 0.0, 0.5, 0.5])) == (1921.0, 1081.0)
 
 
 def test_boxes_left_of_the_picture_and_above_do_no_harm():
