@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -129,7 +130,8 @@ def _contrast(static: FloatArray, dark: float) -> FloatArray:
 def _sight(lens: Lens, contrast: FloatArray) -> Sight:
     """Where the tiles of pixels look; `contrast` is of the canvas, by its rows and columns of tiles."""
     tiles = tile_raster(lens.rays.shape[1], lens.rays.shape[0])
-    reach = _reach(lens)
+    places = _places(lens)
+    reach = _reach(lens, places)
     across, down = -(-lens.canvas.width // TILE_W), -(-lens.canvas.height // TILE_H)
     seen_by: list[list[int]] = [[] for _ in range(across * down)]
     for s, (top, low, left, right) in enumerate(reach.tolist()):
@@ -138,17 +140,30 @@ def _sight(lens: Lens, contrast: FloatArray) -> Sight:
                 seen_by[row * across + column].append(s)
     first = np.cumsum([0, *(len(those) for those in seen_by)], dtype=np.int64)
     flat = np.array([s for those in seen_by for s in those], dtype=np.int64)
-    middle, spread = _spread(lens, tiles)
+    middle, spread = _spread(lens, tiles, places)
     return Sight(tiles, np.ascontiguousarray(lens.rays), reach, first, flat, middle, spread, contrast)
 
 
-def _spread(lens: Lens, tiles: IntArray) -> tuple[FloatArray, FloatArray]:
-    """`middle` and `spread` of a sight."""
+class _Places(NamedTuple):
+    """Places (H, W, 2) on the canvas of the pixels, the mount at rest; least and greatest (T, 2) of tiles."""
+
+    place: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+
+def _places(lens: Lens) -> _Places:
+    """Where pixels look on the canvas while the mount is at rest."""
     rest = np.array([[lens.canvas.fx, 0.0, lens.canvas.cx], [0.0, lens.canvas.fy, lens.canvas.cy]])
     place = lens.rays @ rest[:, :2].T + rest[:, 2]
+    return _Places(place, *_ranges(place))
+
+
+def _spread(lens: Lens, tiles: IntArray, places: _Places) -> tuple[FloatArray, FloatArray]:
+    """`middle` and `spread` of a sight."""
+    place, low, high = places
     at = np.minimum(tiles + np.array([TILE_H // 2, TILE_W // 2]), np.array(place.shape[:2]) - 1)
     own = place[at[:, 0], at[:, 1]]
-    low, high = _ranges(place)
     spread = np.stack([low[:, 1], high[:, 1], low[:, 0], high[:, 0]], axis=1) - own[:, [1, 1, 0, 0]]
     return np.ascontiguousarray(lens.rays[at[:, 0], at[:, 1]]), spread
 
@@ -161,18 +176,15 @@ def _ranges(place: FloatArray) -> tuple[FloatArray, FloatArray]:
     return low.reshape(-1, 2), high.reshape(-1, 2)
 
 
-def _reach(lens: Lens) -> IntArray:
+def _reach(lens: Lens, places: _Places) -> IntArray:
     """First and last tile of the canvas, by row and column (T, 4), that each tile of pixels may look at."""
     height, width = lens.canvas.height, lens.canvas.width
-    rest = np.array([[lens.canvas.fx, 0.0, lens.canvas.cx], [0.0, lens.canvas.fy, lens.canvas.cy]])
-    place = lens.rays @ rest[:, :2].T + rest[:, 2]
     turns = lens.sway.most()
     far = 1.0 + float((lens.rays**2).sum(axis=-1).max())
     spare = lens.canvas.fx * (far * float(turns[:2].max()) + math.sqrt(far) * float(turns[2])) + 1.5
     last = np.array([width - 1, height - 1])
-    low, high = _ranges(place)
-    low = np.minimum(np.maximum(np.floor(low - spare), 0), last)
-    high = np.maximum(np.minimum(np.ceil(high + spare), last), low)
+    low = np.minimum(np.maximum(np.floor(places.low - spare), 0), last)
+    high = np.maximum(np.minimum(np.ceil(places.high + spare), last), low)
     out: IntArray = np.stack(
         [low[:, 1] // TILE_H, high[:, 1] // TILE_H, low[:, 0] // TILE_W, high[:, 0] // TILE_W], axis=1
     ).astype(np.int64)

@@ -36,8 +36,9 @@ def test_what_tiles_look_at_is_what_their_pixels_do(width: int) -> None:
     camera = replace(source.camera, width=width, height=91)
     lens = Lens(LensConfig(k1=-0.15, sway_deg=0.05), camera, np.random.default_rng(3))
     tiles = tile_raster(camera.width, camera.height)
-    middle, spread = lens_events._spread(lens, tiles)
-    reach = lens_events._reach(lens)
+    places = lens_events._places(lens)
+    middle, spread = lens_events._spread(lens, tiles, places)
+    reach = lens_events._reach(lens, places)
     focal = np.array([lens.canvas.fx, lens.canvas.fy])
     place = lens.rays * focal + np.array([lens.canvas.cx, lens.canvas.cy])
     for n, (row, column) in enumerate(tiles.tolist()):
