@@ -1,7 +1,9 @@
 # Every target does its own set-up in .venv and needs only make and Python 3.11 or later.
 #
 #   make demo    from raw pictures and events to tracks on a film, and a longer simulation judged (in demo/)
-#   make test    run all tests, those of time by themselves
+#   make test    run the tests, those of time by themselves
+#   make test-slow   run those that make test leaves out: endurance, destruction, training
+#   make test-all    run both
 #   make test-portable   run the numerical tests with other kernels, in random order (SEED=... repeats one)
 #   make licences   list the licences of everything installed with the package
 #   make fuzz    the long form of the tests that damage files, streams and processes (an hour)
@@ -32,7 +34,7 @@ OTHER_KERNELS = OPENBLAS_CORETYPE=$(if $(filter x86_64 AMD64,$(shell uname -m)),
 	NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python .ci/kernels.py names)" \
 	NUMBA_CPU_NAME=generic NUMBA_CACHE_DIR=$(CURDIR)/$(VENV)/numba-generic
 
-.PHONY: demo clip test test-portable licences live fuzz lint types bounds build docs clean
+.PHONY: demo clip test test-slow test-all test-portable licences live fuzz lint types bounds build docs clean
 .DELETE_ON_ERROR:
 
 # The clip is rendered on one core while the tracker is compiled on the other.
@@ -45,12 +47,20 @@ clip: $(VENV)/.run
 
 # Some images forbid Python to keep what it compiled: pytest would rewrite all assertions anew in each of its
 # processes, which takes as long as all else before the first test.
-test test-portable live fuzz: export PYTHONDONTWRITEBYTECODE :=
+test test-slow test-portable live fuzz: export PYTHONDONTWRITEBYTECODE :=
 
 test: $(VENV)/.test $(VENV)/.compiled
 	@echo "make: running the tests"
-	@$(BIN)/python -m pytest -p no:randomly -n 2 --dist worksteal
-	@$(BIN)/python -m pytest -p no:randomly -n 0 tests/performance/test_time.py
+	@$(BIN)/python -m pytest -p no:randomly -n 2 --dist worksteal -m "not slow"
+	@$(BIN)/python -m pytest -p no:randomly -n 0 -m "not slow" tests/performance/test_time.py
+
+test-slow: $(VENV)/.test $(VENV)/.compiled
+	@echo "make: running the slow tests"
+	@$(BIN)/python -m pytest -p no:randomly -n 2 --dist worksteal -m slow
+
+# One after the other, also with make -j: both would wait for each other's processor time.
+test-all: test
+	@$(MAKE) --no-print-directory test-slow
 
 test-portable: $(VENV)/.test $(VENV)/.compiled
 	@rm -rf $(VENV)/numba-generic

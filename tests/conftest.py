@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -40,3 +42,60 @@ def dying():
         }
 
     return environment
+
+
+@pytest.fixture(scope="session")
+def loaded():
+    """The context of processes that begin with all loaded (`loaded/loaded_process.py`)."""
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        pytest.skip("processes cannot be forked here")
+    from multiprocessing import forkserver
+
+    folder = str(Path(__file__).parent / "loaded")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["loaded_process"])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", os.pathsep.join(filter(None, [folder, os.environ.get("PYTHONPATH", "")])))
+        patch.setenv("JEAT_GRAPH_LOAD", "1")
+        forkserver.ensure_running()
+    sys.path.append(folder)
+    yield context
+    sys.path.remove(folder)
+    # It counts the time of its processes as its own, and we count its time when it has ended.
+    forkserver._forkserver._stop()
+
+
+@pytest.fixture(scope="session")
+def start(loaded):
+    """Start `jeat-graph` in a process that begins with all loaded; `loaded/started.py` has what it gives."""
+    from started import Started
+
+    def begin(*arguments: object, env: dict[str, str] | None = None, stdin: Path | None = None) -> Started:
+        return Started(loaded, [str(argument) for argument in arguments], env, stdin)
+
+    return begin
+
+
+@pytest.fixture(scope="session")
+def call(start):
+    """Run `jeat-graph` to its end in a process that begins with all loaded."""
+    from started import completed
+
+    def run(
+        *arguments: object, given: bytes = b"", env: dict[str, str] | None = None, timeout: float = 600.0
+    ):
+        return completed(start(*arguments, env=env), given, timeout)
+
+    return run
+
+
+@pytest.fixture
+def forked_workers(loaded, monkeypatch):
+    """What the package does in workers begins with all loaded there too; for tests of what workers do."""
+    ours = multiprocessing.get_context
+
+    def context(method: str | None = None):
+        return loaded if method == "spawn" else ours(method)
+
+    monkeypatch.setattr("multiprocessing.get_context", context)
+    monkeypatch.setattr("jeat_graph.tracking.smoothing.worker.get_context", context)

@@ -63,6 +63,7 @@ def test_a_short_day_keeps_its_vehicles_its_memory_and_its_temper(tmp_path, caps
     assert periods[-1]["memory_mb"] < later[0]["memory_mb"] + 20.0
 
 
+@pytest.mark.slow
 def test_a_day_that_was_broken_off_goes_on_and_counts_what_an_unbroken_one_counts(tmp_path, monkeypatch):
     monkeypatch.setattr("jeat_graph.benchmark.endurance._CHECKPOINT_S", 3.0)
     load, file = Load(12.0 / 3600.0, 3), tmp_path / "state.npz"

@@ -24,14 +24,17 @@ COMMAND = [sys.executable, "-m", "jeat_graph.cli.main", "stream"]
 PATIENCE_S = 120.0  # the first run on a machine compiles
 
 
-@contextmanager
-def live(*arguments):
-    """The command as a process, its stdin and stdout in our hands; killed if it does not end by itself."""
+def begun(*arguments):
+    """The command as a user starts it."""
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     pipe = subprocess.PIPE
-    process = subprocess.Popen(
-        [*COMMAND, *map(str, arguments)], stdin=pipe, stdout=pipe, stderr=pipe, env=environment
-    )
+    command = [*COMMAND, *map(str, arguments)]
+    return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, env=environment)
+
+
+@contextmanager
+def live(process):
+    """Have its stdin and stdout in our hands; it is killed if it does not end by itself."""
     try:
         yield process
     finally:
@@ -94,7 +97,7 @@ def line(t, sensor="rgb", **other):
 
 
 def test_each_line_is_answered_while_the_input_is_open():
-    with live() as process:
+    with live(begun()) as process:
         for k in range(10):
             process.stdin.write(line(0.05 * k).encode())
             process.stdin.flush()
@@ -106,8 +109,8 @@ def test_each_line_is_answered_while_the_input_is_open():
         assert process.wait(PATIENCE_S) == 0
 
 
-def test_an_empty_line_of_csv_completes_a_scan_at_once():
-    with live("--format", "csv") as process:
+def test_an_empty_line_of_csv_completes_a_scan_at_once(start):
+    with live(start("stream", "--format", "csv")) as process:
         process.stdin.write(b"t,sensor,left,top,width,height,score\n")
         for k in range(6):
             process.stdin.write(f"{0.05 * k},rgb,100,100,40,30,0.99\n\n".encode())
@@ -346,9 +349,9 @@ def test_smoothed_without_a_smoother_is_refused(monkeypatch, capsys, tmp_path):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_it_cleanly_and_keeps_the_smoothed_trajectories(number, tmp_path):
+def test_a_signal_ends_it_cleanly_and_keeps_the_smoothed_trajectories(number, start, tmp_path):
     path = tmp_path / "s.csv"
-    with live("--smoothed", path) as process:
+    with live(start("stream", "--smoothed", path)) as process:
         for k in range(30):
             process.stdin.write(line(0.05 * k).encode())
             process.stdin.flush()
@@ -361,8 +364,8 @@ def test_a_signal_ends_it_cleanly_and_keeps_the_smoothed_trajectories(number, tm
     assert len(read_trajectories(path)) == 30
 
 
-def test_a_reader_that_goes_away_ends_it_cleanly():
-    with live() as process:
+def test_a_reader_that_goes_away_ends_it_cleanly(start):
+    with live(start("stream")) as process:
         process.stdin.write(line(0.0).encode())
         process.stdin.flush()
         answer(process)

@@ -76,6 +76,7 @@ def test_where_the_code_is_kept_as_ever_nothing_is_said():
         assert kernel_cache.notice == ""
 
 
+@pytest.mark.slow
 def test_two_processes_that_compile_into_one_empty_folder_both_get_there(tmp_path):
     (tmp_path / "cached.py").write_text(CACHED, encoding="utf-8")
     script = "import cached; print(cached.twice(21), sum(cached.twice.stats.cache_hits.values()))"

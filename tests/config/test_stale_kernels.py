@@ -61,7 +61,9 @@ def answers(house: Path, cache: Path | None) -> list[int]:
     return [int(word) for word in done.stdout.split()]
 
 
-@pytest.mark.parametrize("apart", [False, True], ids=["beside the sources", "in a cache"])
+@pytest.mark.parametrize(
+    "apart", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["beside the sources", "in a cache"]
+)
 def test_a_kernel_whose_callee_changed_is_compiled_anew_and_no_other(house, tmp_path, apart):
     cache = tmp_path / "cache" if apart else None
     product, gone, kept = answers(house, cache)

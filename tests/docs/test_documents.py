@@ -84,7 +84,7 @@ def test_the_tutorial_runs_from_beginning_to_end(tmp_path, monkeypatch):
     steps = commands(ROOT / "docs" / "tutorial.md", ("sh",))
     assert [words[0] for words in steps] == ["simulate", "track", "eval", "compare", "report", "render"]
     # As it stands there but for the length: most of the time would go into the film.
-    steps[0][steps[0].index("12")] = "2"
+    steps[0][steps[0].index("12")] = "1"
     for words in steps:
         assert main(words) == 0, " ".join(words)
     assert (tmp_path / "run.webm").stat().st_size > 0

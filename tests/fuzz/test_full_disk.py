@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -27,24 +26,18 @@ COMMANDS = {
 QUICK = ("track", "render", "stream")
 
 
-def command(*arguments: object) -> list[str]:
-    return [sys.executable, "-m", "jeat_graph.cli.main", *map(str, arguments)]
-
-
 @pytest.fixture(scope="module")
-def work(tmp_path_factory) -> dict[str, Path]:
+def work(tmp_path_factory, call) -> dict[str, Path]:
     """Detections with their truth, and the run of them; a few rows, or a simulated recording."""
     folder = tmp_path_factory.mktemp("work")
     sim, run = folder / "sim", folder / "run"
     if FULL:
-        simulate = command("simulate", "night", "--duration", "3", "--out", sim)
-        subprocess.run(simulate, check=True, capture_output=True)
+        assert call("simulate", "night", "--duration", "3", "--out", sim).returncode == 0
     else:
         sim.mkdir()
         rows = "".join(f"{k * 0.05:.2f},rgb,{100 + 2 * k},200,40,30,0.95\n" for k in range(60))
         (sim / "detections.csv").write_text("t,sensor,left,top,width,height,score\n" + rows)
-    track = command("track", sim / "detections.csv", "--out", run)
-    subprocess.run(track, check=True, capture_output=True)
+    assert call("track", sim / "detections.csv", "--out", run).returncode == 0
     return {"sim": sim, "run": run}
 
 
@@ -72,12 +65,12 @@ def small_disk(tmp_path):
 
 @pytest.mark.parametrize("name", COMMANDS if FULL else QUICK)
 @pytest.mark.parametrize("size_kib", SIZES_KIB)
-def test_a_full_disk_is_one_line_and_nothing_unfinished_is_there(work, small_disk, name, size_kib):
+def test_a_full_disk_is_one_line_and_nothing_unfinished_is_there(work, small_disk, call, name, size_kib):
     disk = small_disk(size_kib)
     arguments = [text.format(disk=disk, **work) for text in COMMANDS[name]]
     rows = (work["sim"] / "detections.csv").read_bytes()
-    done = subprocess.run(command(*arguments), input=rows, capture_output=True, timeout=600, check=False)
-    said = done.stderr.decode().splitlines()
+    done = call(*arguments, given=rows)
+    said = done.stderr.splitlines()
     assert not any("Traceback" in line for line in said)
     there = {path for path in disk.rglob("*") if path.is_file()}
     if FULL and done.returncode == 0:

@@ -47,30 +47,36 @@ class Command:
     Args:
         name: one of `COMMANDS`.
         places: what stands for the names in braces.
+        begin: what starts it, as `start` does.
         dying: the fixture of that name.
     """
 
-    def __init__(self, name: str, places: dict[str, Path], dying) -> None:
-        self._texts, self._places, self._dying = COMMANDS[name], places, dying
+    def __init__(self, name: str, places: dict[str, Path], begin, dying) -> None:
+        self._texts, self._places, self._begin, self._dying = COMMANDS[name], places, begin, dying
         self._rows = (places["recording"] / "detections.csv").read_bytes() if name == "stream" else b""
 
-    def start(self, out: Path, **fate: object) -> subprocess.Popen[bytes]:
+    def start(self, out: Path, **fate: object):
         """Start it, to die at a change to files if so wished."""
         out.mkdir(exist_ok=True)
         arguments = [text.format(out=out, **self._places) for text in self._texts]
         rows = out.parent / "rows"
         rows.write_bytes(self._rows)
-        with rows.open("rb") as stdin:
-            return subprocess.Popen(
-                [sys.executable, "-m", "jeat_graph.cli.main", *arguments],
-                **{"stdin": stdin, "stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE},
-                env=self._dying(out, **fate),
-                preexec_fn=heed_interrupts,
-            )
+        return self._begin(*arguments, stdin=rows, env=self._dying(out, **fate))
 
     def run(self, out: Path, **fate: object) -> Killed:
         """Run it to its end, whatever that is."""
         return ended(self.start(out, **fate), out)
+
+
+def as_a_user(*arguments: str, stdin: Path, env: dict[str, str]) -> subprocess.Popen[bytes]:
+    """Start it from nothing: what is killed at random moments may be killed while it is being loaded."""
+    with stdin.open("rb") as rows:
+        return subprocess.Popen(
+            [sys.executable, "-m", "jeat_graph.cli.main", *arguments],
+            **{"stdin": rows, "stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE},
+            env=env,
+            preexec_fn=heed_interrupts,
+        )
 
 
 def heed_interrupts() -> None:
@@ -78,7 +84,7 @@ def heed_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def ended(process: subprocess.Popen[bytes], out: Path) -> Killed:
+def ended(process, out: Path) -> Killed:
     said = process.communicate(timeout=PATIENCE_S)[1].decode()
     found = {str(p.relative_to(out)): p.read_bytes() for p in sorted(out.rglob("*")) if p.is_file()}
     hidden = [name for name in found if any(part.startswith(".") for part in Path(name).parts)]
@@ -156,8 +162,10 @@ def check(left: Killed, whole: dict[str, bytes], number: int, varying: set[str],
         assert not set(left.hidden) - set(before) or left.status < 0
 
 
-def test_a_run_killed_while_it_writes_leaves_the_earlier_one_and_can_be_repeated(places, tmp_path, dying):
-    command, log = Command("track-causal", places, dying), tmp_path / "log"
+def test_a_run_killed_while_it_writes_leaves_the_earlier_one_and_can_be_repeated(
+    places, tmp_path, start, dying
+):
+    command, log = Command("track-causal", places, start, dying), tmp_path / "log"
     whole = command.run(tmp_path / "out", log=log)
     assert whole.status == 0, whole.said
     changes = log.read_text().splitlines()
@@ -190,7 +198,7 @@ def test_any_command_killed_at_any_moment_leaves_whole_files_and_ends_the_same_w
 ):
     if any("{pictures}" in text for text in COMMANDS[name]):
         places = {**places, "pictures": request.getfixturevalue("pictures")}
-    command, log = Command(name, places, dying), tmp_path / "log"
+    command, log = Command(name, places, as_a_user, dying), tmp_path / "log"
     begin = time.monotonic()
     whole = command.run(tmp_path / "whole", log=log)
     takes_s = time.monotonic() - begin

@@ -13,6 +13,8 @@ from jeat_graph.live.engines import run_local
 from jeat_graph.live.manifest import read_manifest
 
 TABLES = ("causal.csv", "smoothed.csv")
+# But for the last, on Ray, whose workers are its own.
+pytestmark = pytest.mark.usefixtures("forked_workers")
 
 
 @pytest.fixture
@@ -190,6 +192,7 @@ def test_a_worker_that_dies_costs_no_other_job_and_a_deadly_job_only_itself(tmp_
     assert tries == {f"j{k}": 2 if k in (2, 4) else 1 for k in range(7)}
 
 
+@pytest.mark.slow
 def test_on_ray_a_killed_worker_costs_nothing_and_the_bytes_are_those_of_a_series(
     manifest, tmp_path, full, monkeypatch, dying
 ):

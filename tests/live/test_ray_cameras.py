@@ -15,6 +15,7 @@ from jeat_graph.live.late import LiveTracker
 PAGE = Path(__file__).parents[2] / "docs" / "guides" / "batch.md"
 
 
+@pytest.mark.slow
 def test_a_killed_camera_goes_on_where_it_was(simulated, tmp_path):
     ray = pytest.importorskip("ray", reason="Ray is not installed")
     (recipe,) = re.findall(r"```ray\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL)

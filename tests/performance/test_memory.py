@@ -6,6 +6,7 @@ import pytest
 GAIN_MIB = 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preset", ["default", "paper"])
 def test_minutes_of_100_hz_input_leave_nothing_behind(measure, preset):
     found = measure("live", preset)
@@ -13,6 +14,7 @@ def test_minutes_of_100_hz_input_leave_nothing_behind(measure, preset):
     assert found["memory"][-1] - found["memory"][0] < GAIN_MIB  # over 14,000 steps
 
 
+@pytest.mark.slow
 def test_many_vehicles_that_come_and_go_leave_nothing_behind(measure):
     found = measure("short_tracks")
     assert found["tracks"] == 150

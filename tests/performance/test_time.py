@@ -190,6 +190,7 @@ def test_boxes_are_read_about_as_fast_as_pandas_reads_their_columns(tmp_path, le
     assert coco < 1.2 * tree  # .45 measured; three times where entries are looked at one by one
 
 
+@pytest.mark.slow
 def test_a_vehicle_that_stays_for_minutes_costs_no_more_at_its_end(measure):
     found = measure("long_track")
     assert found["born"] == 1

@@ -181,6 +181,7 @@ def test_sequences_say_what_they_lack(small_set, lack):
     assert max(ages) <= 1.4 * 0.05 + 0.2 + 1e-6
 
 
+@pytest.mark.slow
 def test_a_network_learns_both_by_heart(small_set, tmp_path):
     settings = TrainSettings(
         crop_px=SIZE,
@@ -203,6 +204,7 @@ def test_a_network_learns_both_by_heart(small_set, tmp_path):
     assert judge(trainer.average, members, SIZE, settings, 99)["all"].ap50 > 90.0
 
 
+@pytest.mark.slow
 def test_a_training_can_start_from_its_own_result(small_set, tmp_path):
     settings = TrainSettings(
         crop_px=(32, 32), batch=2, epochs=0.1, judged=2, steps=2, back=1, learning_rate=1e-6

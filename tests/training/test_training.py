@@ -41,13 +41,19 @@ def test_a_network_learns_pictures_by_heart(small_set, tmp_path):
     assert judge(trainer.average, members, SIZE, settings, 99)["all"].ap50 > 90.0
 
 
+@pytest.mark.slow
 def test_a_network_learns_events_by_heart(small_set, tmp_path):
     settings = TrainSettings(**BASE, epochs=12.0, events=STILL, steps=4, back=2, most_step_bins=6)
     trainer, members = trained(small_set, tmp_path, "events", settings)
     assert judge(trainer.average, members, SIZE, settings, 99)["all"].ap50 > 90.0
 
 
-@pytest.mark.parametrize("kind", ["frames", "events", "fused"])
+slow = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    "kind", ["frames", pytest.param("events", marks=slow), pytest.param("fused", marks=slow)]
+)
 def test_a_training_that_was_killed_writes_the_same_bytes(small_set, tmp_path, kind):
     settings = TrainSettings(
         crop_px=(32, 32), batch=2, epochs=1.0, judge_every=0.2, judged=2, steps=2, back=1, seed=3

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import gc
 import os
+import signal
 import subprocess
 import sys
+import threading
 import time
 import warnings
 from dataclasses import fields
@@ -24,6 +26,9 @@ from jeat_graph.tracking.smoothing.worker import SmoothingWorker, _portable
 from jeat_graph.tracking.step_record import record_step
 
 from .conftest import make_tracker, recording, run
+
+# The programs below start their workers as a user's do, the commands' tests too.
+pytestmark = pytest.mark.usefixtures("forked_workers")
 
 CARS = ((0.0, 1.6, {}), (0.5, 9.0, {"start": (900.0, 500.0), "velocity": (-100.0, 0.0)}))
 DETECTIONS = recording(duration=3.0, cars=CARS, blind=((1.9, 2.2),))
@@ -68,6 +73,9 @@ def test_smoothed_in_between_is_that_of_smoothing_here():
 def test_with_a_queue_of_one_the_tracker_waits_and_nothing_is_lost():
     here, there = make_tracker("smoother.chunk=1"), make_tracker("smoother.chunk=1")
     there._smoothers = SmoothingWorker(there.config, most_waiting=1)
+    pid = there._smoothers._process.pid
+    os.kill(pid, signal.SIGSTOP)
+    threading.Timer(0.3, os.kill, (pid, signal.SIGCONT)).start()
     with pytest.warns(UserWarning, match="falls behind"):
         run(there, DETECTIONS)
     run(here, DETECTIONS)
@@ -224,7 +232,14 @@ if __name__ == "__main__":
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-@pytest.mark.parametrize(("started", "killed"), [(True, False), (False, False), (True, True)])
+@pytest.mark.parametrize(
+    ("started", "killed"),
+    [
+        pytest.param(True, False, marks=pytest.mark.slow),
+        pytest.param(False, False, marks=pytest.mark.slow),
+        (True, True),
+    ],
+)
 def test_a_program_that_ends_without_finish_ends_and_so_does_its_worker(tmp_path, started, killed):
     """Though all waits to be sent, as the worker has not begun yet; and though nobody can tell it."""
     script = tmp_path / "script.py"
