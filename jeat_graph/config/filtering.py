@@ -110,6 +110,13 @@ class BoxesConfig(Section):
     centre_px: float = number(
         20.0, "px", "std of a systematic error of the centre that all boxes have, next to sensors.*.bias_std"
     )
+    place_share: float = number(
+        0.03,
+        "1",
+        "std of how a systematic error of the centre grows with the place in the picture (px per px), next "
+        "to sensors.*.bias_std",
+    )
+    lag_s: float = number(0.3, "s", "std of how late a sensor's clock is, next to sensors.*.bias_std")
     pair_s: float = number(0.1, "s", "two sensors' boxes so close in time are compared")
     witness_s: float = number(
         1.0, "s", "boxes of one vehicle are one independent witness in so much time", open_low=True

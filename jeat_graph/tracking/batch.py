@@ -11,6 +11,7 @@ from numba import njit
 from jeat_graph.association.costs import log_score_ratio
 from jeat_graph.config.kernel_form import Model
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.filters.box_offsets import centre_offset
 from jeat_graph.filters.cut_boxes import LOW_CUT, cut_of
 from jeat_graph.filters.noise import score_weight
 from jeat_graph.filters.worth import score_odds
@@ -113,7 +114,7 @@ def prepare(arrivals: Arrivals, offsets: FloatArray, model: Model) -> Batch:
 
     Args:
         arrivals: the detections.
-        offsets: (S, 2, 3) what was learnt of the sensors' systematic errors beyond the configured ones.
+        offsets: (S, 2, 6) what was learnt of the sensors' systematic errors beyond the configured ones.
         model: sensors and settings.
     """
     sensors, noise, image = model.sensors, model.settings.noise, model.settings.image
@@ -131,6 +132,7 @@ def prepare(arrivals: Arrivals, offsets: FloatArray, model: Model) -> Batch:
     seen_side = np.zeros((num, 2))
     for j in range(num):
         s = sensor[j]
+        at_x, at_y = boxes[j, 0] + 0.5 * boxes[j, 2], boxes[j, 1] + 0.5 * boxes[j, 3]
         for axis in range(2):
             side = boxes[j, 2 + axis]
             low, high = boxes[j, axis], boxes[j, axis] + side
@@ -147,7 +149,7 @@ def prepare(arrivals: Arrivals, offsets: FloatArray, model: Model) -> Batch:
             plain[j, axis], plain[j, 2 + axis] = z[j, axis], log_size[j, axis]
             log_size[j, axis] -= offsets[s, axis, 2]
             true_side = math.exp(log_size[j, axis])
-            z[j, axis] -= offsets[s, axis, 0] * true_side + offsets[s, axis, 1]
+            z[j, axis] -= centre_offset(offsets[s, axis], true_side, at_x, at_y)
             corrected[j, 2 + axis] = true_side
             corrected[j, axis] = z[j, axis] - 0.5 * true_side
         calibrated = interpolate(scores[j], sensors.curve_score[s], sensors.curve_precision[s])

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import NamedTuple
 
+from jeat_graph.filters.box_offsets import lags_of, middle_of
 from jeat_graph.tracking.snapshot import Snapshot
 
 
@@ -17,8 +19,13 @@ class SensorState(NamedTuple):
         blind: probability that it is blind as a whole now: finds nothing, whatever is there.
         noise_scale: mean factor on its noise variance over the confirmed tracks (paper eq. 5), 1 without any.
         offset_centre_share: what its centres are off by beside those of others, as a share of the side;
-        offset_centre_px: and by so much whatever the size (px).
-        offset_log_size: what its ln width and ln height are off by. All of it is taken off its boxes.
+        offset_centre_px: and by so much whatever the size (px), in the middle of where vehicles have been.
+        offset_log_size: what its ln width and ln height are off by.
+        offset_place_x: what its centres are off by for each px to the right of that middle (px per px),
+        offset_place_y: and for each px below it. All of these are taken off its boxes.
+        lag_s: by how much its boxes are older than the youngest sensor's, as moving vehicles tell (s);
+        lag_std_s: the standard deviation of that, None before there is any. It is not taken off:
+            `sensors.*.latency_s` does that.
     """
 
     clutter: float
@@ -29,10 +36,18 @@ class SensorState(NamedTuple):
     offset_centre_share: tuple[float, float] = (0.0, 0.0)
     offset_centre_px: tuple[float, float] = (0.0, 0.0)
     offset_log_size: tuple[float, float] = (0.0, 0.0)
+    offset_place_x: tuple[float, float] = (0.0, 0.0)
+    offset_place_y: tuple[float, float] = (0.0, 0.0)
+    lag_s: float = 0.0
+    lag_std_s: float | None = None
 
 
 def sensor_states(now: Snapshot, sensors: tuple[str, ...]) -> dict[str, SensorState]:
     """Return the state of each sensor, by name."""
+    x, y = middle_of(now.scene.pair_sums)
+    offsets = now.scene.offsets.copy()
+    offsets[:, :, 1] += offsets[:, :, 3] * x + offsets[:, :, 4] * y
+    lag_s, lag_std_s = lags_of(now.scene.pair_sums, now.scene.pair_factors, now.scene.offsets)
     scale = now.tracks.scale[now.tracks.confirmed]
     return {
         name: SensorState(
@@ -41,7 +56,9 @@ def sensor_states(now: Snapshot, sensors: tuple[str, ...]) -> dict[str, SensorSt
             float(now.scene.trust[s]),
             float(now.scene.blind[s]),
             float(scale[:, s].mean()) if len(scale) else 1.0,
-            *[(float(x), float(y)) for x, y in now.scene.offsets[s].T],
+            *[(float(along_x), float(along_y)) for along_x, along_y in offsets[s, :, :5].T],
+            float(lag_s[s]),
+            float(lag_std_s[s]) if lag_std_s[s] < inf else None,
         )
         for s, name in enumerate(sensors)
     }

@@ -147,8 +147,9 @@ class SceneState(NamedTuple):
         vain_seen: (S,) what that share rests on, in seconds of a track.
         worth_mean: (S, 2) what its scores say of what lasts (`filters.worth`): a, b.
         worth_cov: (S, 2, 2) covariance of the two.
-        pair_sums: (S, S, 2, 10) what pairs of boxes of a sensor and a later one said (`filters.box_offsets`).
-        offsets: (S, 2, 3) what each sensor is off by along each axis: share of the side, px, ln side.
+        pair_sums: (S, S, 2, 35) what pairs of boxes of a sensor and a later one said (`filters.box_offsets`).
+        offsets: (S, 2, 6) what each sensor is off by along each axis: share of the side, px, ln side, px per
+            px of the place along x and y.
         pair_factors: (S, S, 2, 2) factors on the variances that are assumed of their differences.
         usual_jerk: (K,) recent mean weight of each density of jerk over the confirmed tracks.
         field: (S, 2) how far each sensor's boxes reach to the left and to the right (px), from +inf, -inf.
@@ -213,7 +214,7 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
         worth_mean=np.tile(assumed, (num_sensors, 1)),
         worth_cov=np.tile(config.lifecycle.worth_std**2 * np.eye(2), (num_sensors, 1, 1)),
         pair_sums=np.zeros((num_sensors, num_sensors, 2, NUM_SUMS)),
-        offsets=np.zeros((num_sensors, 2, 3)),
+        offsets=np.zeros((num_sensors, 2, 6)),
         pair_factors=np.ones((num_sensors, num_sensors, 2, 2)),
         usual_jerk=prior_weights(config.motion.manoeuvre_prior, config.motion.densities),
         field=np.tile([np.inf, -np.inf], (num_sensors, 1)),

@@ -12,7 +12,8 @@ from jeat_graph.cli.main import main
 from jeat_graph.data.detections import Detections
 from jeat_graph.io.detections_io import write_detections
 from jeat_graph.io.truth_io import write_truth
-from jeat_graph.runs.latency import at_measurement
+from jeat_graph.runs.latency import at_measurement, late_clocks
+from jeat_graph.tracking.sensor_state import SensorState
 
 LATENCY_S = 0.0625  # exact in binary, so that times come back to the last bit
 SETTING = f"sensors.rgb.latency_s={LATENCY_S}"
@@ -88,3 +89,24 @@ def test_the_commands_take_it_off(recorded, tmp_path):
         calibrated = load_config(out)
         found.append(((run / "causal.csv").read_bytes(), calibrated.sensors["rgb"].sigma_px))
     assert found[0] == found[1]
+
+
+def test_a_late_detector_is_named(recorded, tmp_path, capsys):
+    """Known and not set it is said, with how to set it; set, nothing is said."""
+    write_detections(delayed(recorded[0], 0.1), tmp_path / "late.csv")
+    for setting, said in ((), True), (("--set", "sensors.rgb.latency_s=0.1"), False):
+        run = tmp_path / f"run-{said}"
+        assert main(["track", str(tmp_path / "late.csv"), "--out", str(run), *setting]) == 0
+        warned = "\n".join(json.loads((run / "run.json").read_text())["warnings"])
+        for text in (capsys.readouterr().err, warned):
+            assert ("sensor rgb: its boxes are 0.0" in text) == said
+            assert ("sensors.rgb.latency_s=" in text) == said
+
+
+def test_a_lag_that_is_not_certain_is_not_spoken_of():
+    plain = SensorState(0.3, 0.9, 1.0, 0.0, 1.0)
+    sure, unsure = plain._replace(lag_s=0.06, lag_std_s=0.01), plain._replace(lag_s=0.06, lag_std_s=0.02)
+    short = plain._replace(lag_s=0.015, lag_std_s=1e-4)
+    assert late_clocks({"a": plain, "b": unsure, "c": short}) == []
+    (line,) = late_clocks({"a": plain, "b": sure})
+    assert line.startswith("sensor b: its boxes are 0.060 s older")

@@ -31,7 +31,7 @@ def drawn(boxes, rng, scale=(1.0, 1.0), shift=(0.0, 0.0)):
     return np.hstack([centre - 0.5 * size, size])
 
 
-def follow(*overrides, scale=(1.0, 1.0), shift=(0.0, 0.0), second=True, tracker=None, start=0.0):
+def follow(*overrides, scale=(1.0, 1.0), shift=(0.0, 0.0), late_s=0.0, second=True, tracker=None, start=0.0):
     """Track six cars; the second detector draws its boxes otherwise. Returns the tracker and the tables."""
     rng = np.random.default_rng(7)
     tracker = tracker or Tracker(load_config("default", [*DECLARED, *overrides]), image=(1280, 720))
@@ -72,6 +72,54 @@ def test_boxes_that_lie_some_px_off_are_found_and_put_right():
     moved = np.array(state.offset_centre_share) * size + state.offset_centre_px
     np.testing.assert_allclose(moved, (6.0, -4.0), atol=1.2)
     assert len(tables[-1]) == CARS
+
+
+def both_ways(t):
+    """Ten cars, every other one to the left, each at its own speed, all over the picture for ten seconds."""
+    speed = np.array([(60.0 + 5.0 * i) * (1.0 if i % 2 else -1.0) for i in range(10)])
+    left = np.where(speed > 0.0, 60.0, 1120.0) + speed * t
+    return np.column_stack([left, 20.0 + 65.0 * np.arange(10), np.full((10, 2), 50.0)])
+
+
+def watch(second, *overrides, seconds=9.0, alone_from=np.inf):
+    """Track them by a camera and by a second detector, `second` of the time; in the end by that one alone."""
+    rng = np.random.default_rng(5)
+    tracker = Tracker(load_config("default", [*DECLARED, *overrides]), image=(1280, 720))
+    for k in range(int(seconds * RATE_HZ)):
+        t = k / RATE_HZ
+        if t < alone_from:
+            tracker.step((t, "rgb", drawn(both_ways(t), rng), np.full(10, 0.9)))
+        table = tracker.step((t + 0.01, "evt", drawn(second(t + 0.01), rng), np.full(10, 0.9)))
+    return tracker, table
+
+
+def centre_error(table, t):
+    """Root mean square distance of what is reported from the nearest true centre (px)."""
+    true, found = (boxes[:, :2] + 0.5 * boxes[:, 2:] for boxes in (both_ways(t), table.boxes))
+    distance = np.linalg.norm(true[:, None] - found, axis=2).min(1)
+    return np.sqrt((distance**2).mean())
+
+
+def test_a_picture_with_another_focal_length_is_laid_over_the_first():
+    """2 % longer: 10 px aside near the edges, nothing in the middle, and no one shift mends that."""
+
+    def longer(t):
+        boxes = both_ways(t)
+        boxes[:, :2] += 0.02 * (boxes[:, :2] + 0.5 * boxes[:, 2:] - (640.0, 360.0))
+        return boxes
+
+    learnt, plain = (watch(longer, *how, alone_from=8.0)[1] for how in ((), ("boxes.place_share=0",)))
+    assert len(learnt) == 10
+    assert centre_error(learnt, 8.91) < 0.6 * centre_error(plain, 8.91)
+
+
+def test_a_detector_that_is_late_is_found_out():
+    states = watch(lambda t: both_ways(t - 0.1))[0].sensor_states()
+    assert states["rgb"].lag_s == 0.0
+    assert states["evt"].lag_s == pytest.approx(0.1, abs=0.02)
+    assert states["evt"].lag_std_s < 0.01
+    punctual = watch(both_ways)[0].sensor_states()
+    assert max(one.lag_s for one in punctual.values()) < 0.01
 
 
 def test_two_that_agree_stay_as_they_are():

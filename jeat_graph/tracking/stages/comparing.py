@@ -106,11 +106,13 @@ def settle_offsets(scene: SceneState, model: Model) -> None:
     """Draw the conclusions for the next step: how noisy the differences are, then what sensors are off by."""
     sensors, settings = model.sensors, model.settings.boxes
     S = len(sensors.bias_std)
-    std = np.empty((S, 3))
+    std = np.empty((S, 5))
     for s in range(S):
         std[s, 0] = settings.centre_share * sensors.bias_std[s]
         std[s, 1] = settings.centre_px * sensors.bias_std[s]
         std[s, 2] = sensors.bias_std[s]
+        std[s, 3] = settings.place_share * sensors.bias_std[s]
+        std[s, 4] = settings.lag_s * sensors.bias_std[s]
         for o in range(s + 1, S):
             for axis in range(2):
                 difference = scene.offsets[s, axis] - scene.offsets[o, axis]
