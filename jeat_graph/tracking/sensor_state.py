@@ -44,21 +44,26 @@ class SensorState(NamedTuple):
 
 def sensor_states(now: Snapshot, sensors: tuple[str, ...]) -> dict[str, SensorState]:
     """Return the state of each sensor, by name."""
-    x, y = middle_of(now.scene.pair_sums)
+    middle_x, middle_y = middle_of(now.scene.pair_sums)
     offsets = now.scene.offsets.copy()
-    offsets[:, :, 1] += offsets[:, :, 3] * x + offsets[:, :, 4] * y
+    offsets[:, :, 1] += offsets[:, :, 3] * middle_x + offsets[:, :, 4] * middle_y
     lag_s, lag_std_s = lags_of(now.scene.pair_sums, now.scene.pair_factors, now.scene.offsets)
     scale = now.tracks.scale[now.tracks.confirmed]
-    return {
-        name: SensorState(
-            float(now.scene.clutter[s]),
-            float(now.scene.p_detect[s]),
-            float(now.scene.trust[s]),
-            float(now.scene.blind[s]),
-            float(scale[:, s].mean()) if len(scale) else 1.0,
-            *[(float(along_x), float(along_y)) for along_x, along_y in offsets[s, :, :5].T],
-            float(lag_s[s]),
-            float(lag_std_s[s]) if lag_std_s[s] < inf else None,
+    states = {}
+    for s, name in enumerate(sensors):
+        share, px, log_size, place_x, place_y = [(float(x), float(y)) for x, y in offsets[s, :, :5].T]
+        states[name] = SensorState(
+            clutter=float(now.scene.clutter[s]),
+            p_detect=float(now.scene.p_detect[s]),
+            trust=float(now.scene.trust[s]),
+            blind=float(now.scene.blind[s]),
+            noise_scale=float(scale[:, s].mean()) if len(scale) else 1.0,
+            offset_centre_share=share,
+            offset_centre_px=px,
+            offset_log_size=log_size,
+            offset_place_x=place_x,
+            offset_place_y=place_y,
+            lag_s=float(lag_s[s]),
+            lag_std_s=float(lag_std_s[s]) if lag_std_s[s] < inf else None,
         )
-        for s, name in enumerate(sensors)
-    }
+    return states
