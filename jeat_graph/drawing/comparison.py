@@ -37,12 +37,15 @@ _STYLE: Any = {
 }
 
 
-def write_plots(comparison: Comparison, folder: str | Path) -> list[Path]:
-    """Draw all pictures that a comparison with truth allows, each as PNG and SVG.
+def write_plots(
+    comparison: Comparison, folder: str | Path, suffixes: tuple[str, ...] = (".png", ".svg")
+) -> list[Path]:
+    """Draw all pictures that a comparison with truth allows.
 
     Args:
         comparison: with samples, or with errors on the road; without them nothing is drawn.
         folder: where to write.
+        suffixes: the formats to write each in.
 
     Returns:
         The files written.
@@ -73,7 +76,7 @@ def write_plots(comparison: Comparison, folder: str | Path) -> list[Path]:
                 figures["road-errors"] = lambda: road_errors(plt, on_road)
             for name, draw in with_progress(figures.items()):
                 figure = draw()
-                for suffix in with_progress((".png", ".svg")):
+                for suffix in with_progress(suffixes):
                     path = Path(folder) / (name + suffix)
                     with atomic_path(path) as temporary:
                         figure.savefig(temporary, metadata={"Date": None} if suffix == ".svg" else None)

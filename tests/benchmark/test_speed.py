@@ -10,6 +10,8 @@ import pytest
 from jeat_graph.benchmark.speed import ENGINES
 from jeat_graph.benchmark.speed_subjects import installed_peers
 from jeat_graph.benchmark.speed_timing import summarise, time_side_by_side
+from jeat_graph.benchmark.speed_worker import _JOBS, ask
+from jeat_graph.cli.main import main
 
 
 def run_times(**seconds):
@@ -53,16 +55,22 @@ def test_peers_hold_most_objects_of_the_scene():
     assert all(run[name][1] > 0.75 * 30 for name in peers)
 
 
-def test_the_command_writes_table_json_and_plots(tmp_path):
+def test_a_job_is_done_in_a_process_of_its_own():
+    times = ask({"job": "start_up"})
+    assert 0.0 < times["import_s"] < times["import_tracker_s"]
+    assert times["first_step_s"] > 0.0
+    with pytest.raises(RuntimeError, match="process failed"):
+        ask({"job": "start"})
+
+
+def test_the_command_writes_table_json_and_plots(tmp_path, monkeypatch, capsys):
+    def here(job):
+        return json.loads(json.dumps(_JOBS[job["job"]](**{k: v for k, v in job.items() if k != "job"})))
+
+    monkeypatch.setattr("jeat_graph.benchmark.speed.ask", here)
     arguments = ["benchmark", "speed", "--quick", "--no-peers", "--objects", "5"]
-    done = subprocess.run(
-        [sys.executable, "-m", "jeat_graph.cli.main", *arguments, "--out", str(tmp_path)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    assert "times real time" in done.stdout.lower()
+    assert main([*arguments, "--out", str(tmp_path)]) == 0
+    assert "times real time" in capsys.readouterr().out.lower()
     result = json.loads((tmp_path / "speed.json").read_text())
     assert {(row["objects"], row["tracker"]) for row in result["steps"]} == {
         (5, name) for name in ("highway", "paper")

@@ -175,7 +175,7 @@ def write_boxes(folder: Path, n: int) -> tuple[Path, Path]:
 
 
 def test_boxes_are_read_about_as_fast_as_pandas_reads_their_columns(tmp_path, least):
-    path, results = write_boxes(tmp_path, 100_000)
+    path, results = write_boxes(tmp_path, 50_000)
     table, plain = least(
         lambda: read_detections(path),
         lambda: pd.read_csv(path),

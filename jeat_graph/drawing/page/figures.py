@@ -45,10 +45,9 @@ def compared_run(comparison: Comparison) -> ComparedRun:
 
     figures = []
     with tempfile.TemporaryDirectory() as folder:
-        for path in write_plots(comparison, folder):
-            if path.suffix == ".svg":
-                alt, caption = _TEXTS[path.stem]
-                figures.append(Figure(_address(path), alt + _figures_of(comparison, path.stem), caption))
+        for path in write_plots(comparison, folder, (".svg",)):
+            alt, caption = _TEXTS[path.stem]
+            figures.append(Figure(_address(path), alt + _figures_of(comparison, path.stem), caption))
     return ComparedRun(tuple(comparison.tables), tuple(figures))
 
 
