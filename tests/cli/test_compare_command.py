@@ -15,7 +15,7 @@ from jeat_graph.tracking import records
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("compare")
-    assert main(["simulate", "day-sparse", "--out", str(path / "sim"), "--duration", "3", "--seed", "1"]) == 0
+    assert main(["simulate", "day-sparse", "--out", str(path / "sim"), "--duration", "2", "--seed", "1"]) == 0
     detections = str(path / "sim" / "detections.csv")
     assert main(["track", detections, "--out", str(path / "run"), "--smoother", "rts"]) == 0
     return path
@@ -58,7 +58,7 @@ def test_the_same_run_gives_the_same_bytes(folder):
 
 def test_an_input_that_has_changed_is_refused(folder, tmp_path, capsys):
     moved = tmp_path / "detections.csv"
-    moved.write_bytes((folder / "sim" / "detections.csv").read_bytes() + b"2.9999,rgb,1,1,5,5,0.5\n")
+    moved.write_bytes((folder / "sim" / "detections.csv").read_bytes() + b"1.9999,rgb,1,1,5,5,0.5\n")
     out = str(tmp_path / "out")
     assert main(["compare", str(folder / "run"), "--detections", str(moved), "--out", out]) == 2
     error = capsys.readouterr().err

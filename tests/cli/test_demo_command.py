@@ -6,7 +6,7 @@ import pytest
 
 from jeat_graph.cli.main import main
 
-SHORT = ["--duration", "3"]
+SHORT = ["--duration", "2"]
 
 
 @pytest.fixture(scope="module")

@@ -26,7 +26,7 @@ MOST_LATE_S = 0.3
 
 @pytest.fixture(scope="module")
 def detections():
-    return record(load_scenario("night"), 5, 2.0).detections
+    return record(load_scenario("night"), 5, 1.5).detections
 
 
 @pytest.fixture(scope="module")

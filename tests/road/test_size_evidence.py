@@ -72,7 +72,7 @@ def test_sizes_alone_calibrate_a_camera_as_well_as_they_say(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Nearly all of what it leaves open is the focal length."""
-    t, ids, made = _drive(2, 20)
+    t, ids, made = _drive(2, 14)
     boxes, middle = tmp_path / "boxes.csv", (made[:, :2] + made[:, 2:]) / 2.0
     values = [t, ids, made[:, :2], made[:, 2:] - made[:, :2], np.ones(len(t)), middle, np.zeros((len(t), 10))]
     lines = [",".join(f"{value:.9g}" for value in row) + ",rgb\n" for row in np.column_stack(values)]
