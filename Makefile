@@ -34,7 +34,7 @@ OTHER_KERNELS = OPENBLAS_CORETYPE=$(if $(filter x86_64 AMD64,$(shell uname -m)),
 	NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python .ci/kernels.py names)" \
 	NUMBA_CPU_NAME=generic NUMBA_CACHE_DIR=$(CURDIR)/$(VENV)/numba-generic
 
-.PHONY: demo clip test test-slow test-all test-portable licences live fuzz lint types bounds build docs clean
+.PHONY: demo clip test test-slow test-all compiled-for-tests test-portable licences live fuzz lint types bounds build docs clean
 .DELETE_ON_ERROR:
 
 # The clip is rendered on one core while the tracker is compiled on the other.
@@ -49,14 +49,19 @@ clip: $(VENV)/.run
 # processes, which takes as long as all else before the first test.
 test test-slow test-portable live fuzz: export PYTHONDONTWRITEBYTECODE :=
 
-test: $(VENV)/.test $(VENV)/.compiled
+test: compiled-for-tests
 	@echo "make: running the tests"
 	@$(BIN)/python -m pytest -p no:randomly -n 2 --dist worksteal -m "not slow"
 	@$(BIN)/python -m pytest -p no:randomly -n 0 -m "not slow" tests/performance/test_time.py
 
-test-slow: $(VENV)/.test $(VENV)/.compiled
+test-slow: compiled-for-tests
 	@echo "make: running the slow tests"
 	@$(BIN)/python -m pytest -p no:randomly -n 2 --dist worksteal -m slow
+	@$(BIN)/python -m pytest -p no:randomly -n 0 -m slow tests/performance/test_time.py
+
+# The tracker on one core, what the tests call beside it on the other.
+compiled-for-tests: $(VENV)/.test
+	@$(MAKE) --no-print-directory -j 2 $(VENV)/.compiled $(VENV)/.compiled-beside
 
 # One after the other, also with make -j: both would wait for each other's processor time.
 test-all: test
@@ -135,6 +140,10 @@ $(VENV)/.lint: pyproject.toml | $(BIN)/python
 # Code that no longer fits its sources is thrown away at the first import (config/stale_kernels.py).
 $(VENV)/.compiled: $(SOURCES) $(VENV)/.run
 	@$(BIN)/python -m jeat_graph.tracking.warm_up
+	@touch $@
+
+$(VENV)/.compiled-beside: $(SOURCES) $(VENV)/.test
+	@$(BIN)/python tests/loaded/compile_beside.py
 	@touch $@
 
 build/.wheel: $(SOURCES) $(shell find eval configs -name '*.py' -o -name '*.yaml') pyproject.toml | $(BIN)/python

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import signal
+import subprocess
+import sys
 import time
 import uuid
 
@@ -13,6 +15,7 @@ from live_tests import brokers
 from jeat_graph.io.detections_io import read_detections
 from jeat_graph.live.transport.ends import open_sink, open_source
 
+COMMAND = [sys.executable, "-m", "jeat_graph.cli.main", "stream"]
 PATIENCE_S = 120.0
 
 
@@ -50,16 +53,16 @@ def answers_from(source, last: int, process) -> list[dict]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["mqtt", "nats"])
-def test_killed_in_between_it_answers_every_message_and_each_alike(scheme, messages, start, tmp_path):
+def test_killed_in_between_it_answers_every_message_and_each_alike(scheme, messages, tmp_path):
     pytest.importorskip({"mqtt": "paho.mqtt", "nats": "nats"}[scheme], reason="the client is not installed")
     server = {"mqtt": brokers.mosquitto, "nats": brokers.nats_server}[scheme](tmp_path)
     if server is None:
         pytest.skip(f"this machine has no server for {scheme}")
     topic = f"{scheme}://127.0.0.1:{server.port}/t{uuid.uuid4().hex}"
-    command = ["stream", "--source", topic + "in", "--sink", topic + "out"]
+    command = [*COMMAND, "--source", topic + "in", "--sink", topic + "out"]
     command += ["--checkpoint", str(tmp_path / "state.npz"), "--every", "0.3"]
     answers = open_source(topic + "out")
-    process = start(*command)
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
     try:
         sink = open_sink(topic + "in")
         half = len(messages) // 2
@@ -72,7 +75,7 @@ def test_killed_in_between_it_answers_every_message_and_each_alike(scheme, messa
         process.kill()
         process.wait()
         process.stderr.close()
-        process = start(*command)
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
         for message in messages[half:]:
             sink.send(message)
         said += answers_from(answers, json.loads(messages[-1])["seq"], process)
