@@ -22,7 +22,14 @@ from jeat_graph.simulation.imaging.event_pixel import (
     make_model,
     make_state,
 )
-from jeat_graph.simulation.imaging.event_run import Interval, fill, light_all, read_luminance, run_physical
+from jeat_graph.simulation.imaging.event_run import (
+    Interval,
+    coarse_steps,
+    fill,
+    light_all,
+    read_luminance,
+    run_physical,
+)
 from jeat_graph.simulation.imaging.event_sink import EventSink, make_sink, to_events, with_room
 from jeat_graph.simulation.imaging.lamp_flicker import LampFlicker
 from jeat_graph.simulation.imaging.layers import GLOW
@@ -118,7 +125,13 @@ class EventCamera:
         run = _run_carla if self._carla else run_physical
         work = Interval(
             *(r.tiles, plan.boxes, steps, plan.lit, times_us, self._static),
-            *(self._quiet, self._glowing, self._light, self._lamps.within(1e-6 * times_us)),
+            *(
+                self._quiet,
+                self._glowing,
+                self._light,
+                self._lamps.within(1e-6 * times_us),
+                coarse_steps(r.quick),
+            ),
         )
         sink = make_sink(max(1 << 18, 2 * self._room))
         stage = r.stage(moments, plan, channels=1)
@@ -132,7 +145,7 @@ def _run_carla(
     work: Interval, stage: Stage, model: CarlaModel, state: CarlaState, sink: EventSink, room: int
 ) -> tuple[EventSink, int]:
     """Take all pixels from tick to tick, tile by tile; as `run_physical`."""
-    tiles, boxes, steps, lit, times_us, static, _, _, _, _ = work
+    tiles, boxes, steps, lit, times_us, static, _, _, _, _, _ = work
     who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)
     counts = np.zeros(3, dtype=np.int64)
     pixels, luminance = np.zeros(TILE, dtype=np.int64), np.zeros(TILE)

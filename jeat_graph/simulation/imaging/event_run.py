@@ -12,9 +12,8 @@ from jeat_graph.simulation.imaging.background import PACKED
 from jeat_graph.simulation.imaging.event_pixel import LUMINANCE as SEEN
 from jeat_graph.simulation.imaging.event_pixel import PixelModel, PixelState, advance, unsettled
 from jeat_graph.simulation.imaging.event_sink import EventSink, with_room
-from jeat_graph.simulation.imaging.insects import insect_meets
-from jeat_graph.simulation.imaging.layers import GLOW, ON_GROUND, ON_WALL, meets
-from jeat_graph.simulation.imaging.painter import light_tile, paint_tile, take_ground
+from jeat_graph.simulation.imaging.layers import GLOW, ON_GROUND, ON_WALL
+from jeat_graph.simulation.imaging.painter import any_touch, light_tile, paint_light, paint_tile, take_ground
 from jeat_graph.simulation.imaging.plan import who_touches
 from jeat_graph.simulation.imaging.stage import Stage
 from jeat_graph.simulation.imaging.tiles import TILE, TILE_H, TILE_W, Tile
@@ -22,8 +21,9 @@ from jeat_graph.simulation.imaging.tiles import TILE, TILE_H, TILE_W, Tile
 SETTLE_STEPS = 8  # of pixels that see nothing move, while their photoreceptors still follow
 _FOLLOWING, _SETTLED = 0.01, 1e-6  # ln
 MAX_KEYS = 32
-COARSE = 4  # steps that are tried as one
-UNNOTICED = 0.02  # relative change that needs no samples between
+COARSE = 8  # steps that are tried as one
+COARSE_LIT = 2  # where lamps' light is
+UNNOTICED = 0.08  # relative change that needs no samples between
 _BEND = 0.02  # relative distance of beams' and glow's light from a straight line in time
 _FAINT_CD_M2 = 0.005
 
@@ -56,6 +56,7 @@ class Interval(NamedTuple):
         glowing: (T,) true where beams or glow were on a tile at the interval's beginning; changed.
         light: (T, P, 3) that light; changed.
         flicker: street lamps that flicker.
+        coarse: steps of a tile that are tried as one, a power of two.
     """
 
     tiles: IntArray
@@ -68,6 +69,7 @@ class Interval(NamedTuple):
     glowing: BoolArray
     light: FloatArray
     flicker: Flicker
+    coarse: int
 
 
 @njit(cache=True, error_model="numpy")
@@ -111,7 +113,13 @@ def read_luminance(patch: FloatArray, tile: Tile, luminance: FloatArray) -> None
 
 @njit(cache=True, error_model="numpy")
 def key_lights(
-    tile: Tile, most: int, who: IntArray, counts: IntArray, stage: Stage, now: FloatArray, keys: FloatArray
+    tile: Tile,
+    most: int,
+    who: IntArray,
+    counts: IntArray,
+    stage: Stage,
+    now: FloatArray,
+    keys: FloatArray,
 ) -> int:
     """Fill the light of beams and glow at key times, between which it is linear.
 
@@ -171,12 +179,21 @@ def between(keys: FloatArray, first: int, share: float, light: FloatArray) -> No
             light[p, k] = before + share * (keys[first + 1, p, k] - before)
 
 
+def coarse_steps(quick: bool) -> int:
+    """Steps of a tile that are tried as one, a power of two; fewer where there is anything `quick`.
+
+    No vehicle passes a tile unseen in them, for it is longer than its way between two frames. Insects would,
+    and the pulse of a lamp.
+    """
+    return COARSE_LIT if quick else COARSE
+
+
 @njit(cache=True, error_model="numpy")
 def run_physical(
     work: Interval, stage: Stage, model: PixelModel, state: PixelState, sink: EventSink, room: int
 ) -> tuple[EventSink, int]:
     """Take all pixels through an interval, tile by tile; returns the sink and how many tiles were painted."""
-    tiles, boxes, steps, lit, times_us, static, quiet, glowing, light_now, flicker = work
+    tiles, boxes, steps, lit, times_us, static, quiet, glowing, light_now, flicker, most = work
     who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)
     counts = np.zeros(3, dtype=np.int64)
     pixels, luminance = np.zeros(TILE, dtype=np.int64), np.zeros(TILE)
@@ -222,16 +239,16 @@ def run_physical(
             constant = True
         samples = max(steps[n], key_count, flicker.steps)
         stride = available // samples
-        # Samples are taken coarsely first, and where they differ, those between them too. Nothing as wide as
-        # a vehicle passes a tile unseen within four steps; its lamps might, and so might light.
-        coarse = min(samples, COARSE if constant else COARSE // 2) if flicker.steps == 1 else 1
+        # Samples are taken coarsely first, and where they differ, those between them too.
+        coarse = min(samples, most if constant else COARSE_LIT) if flicker.steps == 1 else 1
         for k in range(0, samples, coarse):
             top, stack[0] = 0, k + coarse
             done = k
             while top >= 0:
                 here = stack[top]
                 if not painted[top]:
-                    if constant and not any_touch(here * stride - 1, who, counts, stage, row0, column0):
+                    touched = any_touch(here * stride - 1, who, counts, stage, row0, column0)
+                    if constant and not touched:
                         seen[top, :count] = still[:count]
                     else:
                         if not constant:
@@ -239,7 +256,10 @@ def run_physical(
                             low = min(int(place), key_count - 1)
                             share = place - low
                             between(keys, low, share, light)
-                        paint_tile(tile, here * stride - 1, who, counts, stage, light)
+                        if touched:
+                            paint_tile(tile, here * stride - 1, who, counts, stage, light)
+                        else:
+                            paint_light(tile, light, canvas.ground, canvas.out)
                         read_luminance(canvas.out, tile, seen[top])
                         rendered += 1
                     if flicker.steps > 1:
@@ -265,23 +285,6 @@ def _flicker(luminance: FloatArray, pixels: IntArray, flicker: Flicker, at: int)
     """Change the luminance of pixels as lamps do at one of the interval's times."""
     for n in range(len(luminance)):
         luminance[n] *= 1.0 + flicker.share[pixels[n]] * flicker.change[at]
-
-
-@njit(cache=True, error_model="numpy")
-def any_touch(j: int, who: IntArray, counts: IntArray, stage: Stage, row0: int, column0: int) -> bool:
-    """Say whether any body, shadow or insect may be on the tile at (row0, column0) at time `j`."""
-    touch = stage.moments.touch
-    vehicles = touch.shape[1]
-    for n in range(counts[0]):
-        v = who[0, n]
-        if v >= vehicles:
-            if insect_meets(stage.insects[j, v - vehicles], row0, column0):
-                return True
-            continue
-        box = (touch[j, v, 0, 0], touch[j, v, 0, 1], touch[j, v, 0, 2], touch[j, v, 0, 3])
-        if meets(box[0], box[1], box[2], box[3], row0, column0):
-            return True
-    return False
 
 
 @njit(cache=True, error_model="numpy")

@@ -12,7 +12,7 @@ from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.events import EventArray
 from jeat_graph.simulation.imaging.config import ImagingConfig
 from jeat_graph.simulation.imaging.event_pixel import make_model, make_state
-from jeat_graph.simulation.imaging.event_run import SETTLE_STEPS, light_all
+from jeat_graph.simulation.imaging.event_run import SETTLE_STEPS, coarse_steps, light_all
 from jeat_graph.simulation.imaging.event_sink import make_sink, to_events
 from jeat_graph.simulation.imaging.lamp_flicker import LampFlicker
 from jeat_graph.simulation.imaging.layers import GLOW
@@ -88,6 +88,7 @@ class LensEventCamera:
             self._busy,
             *self._seen,
             self._lamps.within(1e-6 * times),
+            coarse_steps(r.quick),
         )
         sink = make_sink(max(1 << 18, 2 * self._room))
         sink = run_lens(work, self._pictures, self._sight, stage, self._model, self._state, sink, self._room)

@@ -68,6 +68,7 @@ class LensInterval(NamedTuple):
         since: (N,) from when on each pixel is still to be taken (µs); changed.
         before: (N,) luminance that each saw when its tile looked last (cd/m²); changed.
         flicker: street lamps that flicker.
+        coarse: steps of a tile that are tried as one, a power of two.
     """
 
     tiles: IntArray
@@ -82,6 +83,7 @@ class LensInterval(NamedTuple):
     since: FloatArray
     before: FloatArray
     flicker: Flicker
+    coarse: int
 
 
 @njit(cache=True, error_model="numpy")

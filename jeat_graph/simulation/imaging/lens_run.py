@@ -13,11 +13,11 @@ from numba import njit
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.simulation.imaging.event_pixel import LUMINANCE as SEEN
 from jeat_graph.simulation.imaging.event_pixel import OUTPUT, SIGNAL, PixelModel, PixelState, advance
-from jeat_graph.simulation.imaging.event_run import COARSE, SETTLE_STEPS, UNNOTICED, any_touch, between
+from jeat_graph.simulation.imaging.event_run import COARSE_LIT, SETTLE_STEPS, UNNOTICED, between
 from jeat_graph.simulation.imaging.event_sink import EventSink, with_room
 from jeat_graph.simulation.imaging.lens import place_on_canvas
 from jeat_graph.simulation.imaging.lens_interval import LensInterval, Pictures, Sight
-from jeat_graph.simulation.imaging.painter import paint_tile, take_ground
+from jeat_graph.simulation.imaging.painter import any_touch, paint_light, paint_tile, take_ground
 from jeat_graph.simulation.imaging.plan import who_touches
 from jeat_graph.simulation.imaging.stage import Stage
 from jeat_graph.simulation.imaging.tiles import TILE, TILE_H, TILE_W
@@ -127,7 +127,7 @@ def _next_painting(
     keys = max(0, int(work.first[n + 1] - work.first[n]) - 1)
     samples = max(int(work.steps[n]), keys, 1)
     stride = count // samples
-    most = min(samples, COARSE if keys == 0 else COARSE // 2)
+    most = min(samples, work.coarse if keys == 0 else COARSE_LIT)
     copy_tile(row0, column0, pictures.after, pictures.before)
     # Light alone goes in straight lines between its keys.
     if most > 1 and work.steps[n] > 0 and start % (most * stride) == 0:
@@ -154,8 +154,9 @@ def _paint(
     counts = np.empty(3, dtype=np.int64)
     who_touches(row0, column0, work.boxes, who, counts)
     light, canvas = stage.canvas.light, stage.canvas
+    touched = any_touch(step - 1, who, counts, stage, row0, column0)
     if keys == 0:
-        if not any_touch(step - 1, who, counts, stage, row0, column0):
+        if not touched:
             copy_tile(row0, column0, static, picture)
             return
         light[:] = 0.0
@@ -165,7 +166,10 @@ def _paint(
         share, at = place - low, work.first[n] + low
         between(work.light, at, share, light)
     tile = take_ground(row0, column0, stage.packed, canvas.ground)
-    paint_tile(tile, step - 1, who, counts, stage, light)
+    if touched:
+        paint_tile(tile, step - 1, who, counts, stage, light)
+    else:
+        paint_light(tile, light, canvas.ground, canvas.out)
     for r in range(tile.rows):
         for c in range(tile.columns):
             picture[row0 + r, column0 + c] = canvas.out[r * TILE_W + c, 0]

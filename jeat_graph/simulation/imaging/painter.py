@@ -57,6 +57,50 @@ def light_tile(tile: Tile, j: int, who: IntArray, counts: IntArray, stage: Stage
 
 
 @njit(cache=True, error_model="numpy")
+def any_touch(j: int, who: IntArray, counts: IntArray, stage: Stage, row0: int, column0: int) -> bool:
+    """Say whether any body, shadow or insect may be on the tile at (row0, column0) at time `j`."""
+    touch = stage.moments.touch
+    vehicles = touch.shape[1]
+    for n in range(counts[0]):
+        v = who[0, n]
+        if v >= vehicles:
+            if insect_meets(stage.insects[j, v - vehicles], row0, column0):
+                return True
+            continue
+        box = (touch[j, v, 0, 0], touch[j, v, 0, 1], touch[j, v, 0, 2], touch[j, v, 0, 3])
+        if meets(box[0], box[1], box[2], box[3], row0, column0):
+            return True
+    return False
+
+
+@njit(cache=True, error_model="numpy")
+def paint_light(tile: Tile, light: FloatArray, ground: FloatArray, out: FloatArray) -> None:
+    """Paint a tile that no body, shadow or insect touches: as `paint_tile` does, to the bit, in less time.
+
+    Args:
+        tile: where.
+        light: (P, 2 + C) of beams and glow.
+        ground: (P, …) of the canvas, with the tile's ground on it.
+        out: (P, C) filled.
+    """
+    channels = out.shape[1]
+    back, albedo = PACKED, PACKED + channels
+    front, front_albedo, glow = PACKED + 2 * channels, PACKED + 3 * channels, PACKED + 4 * channels
+    for r in range(tile.rows):
+        for c in range(tile.columns):
+            p = r * TILE_W + c
+            lit, wall, cover = light[p, ON_GROUND], light[p, ON_WALL], ground[p, COVER]
+            hidden = cover > 0.0 and ground[p, DEPTH] > 0.0
+            for k in range(channels):
+                level = ground[p, back + k]
+                level += ground[p, albedo + k] * lit
+                if hidden:
+                    level = level * (1.0 - cover) + ground[p, front + k]
+                    level += ground[p, front_albedo + k] * wall
+                out[p, k] = (level + ground[p, glow + k] + light[p, GLOW + k]) * ground[p, GAIN]
+
+
+@njit(cache=True, error_model="numpy")
 def paint_tile(tile: Tile, j: int, who: IntArray, counts: IntArray, stage: Stage, light: FloatArray) -> bool:
     """Render a tile at time `j` onto the canvas; says whether anything touched it.
 

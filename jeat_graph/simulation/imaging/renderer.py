@@ -39,19 +39,42 @@ class Renderer:
         tiles: (T, 2) first row and column of each tile.
     """
 
-    def __init__(self, scene: Scene, config: RenderConfig, seed: int, varied: bool = False) -> None:
-        """Render the static picture, and give each vehicle its looks by `seed`, `varied` or one a kind."""
+    def __init__(
+        self,
+        scene: Scene,
+        config: RenderConfig,
+        seed: int,
+        varied: bool = False,
+        like: Renderer | None = None,
+    ) -> None:
+        """Render the static picture, and give each vehicle its looks.
+
+        Args:
+            scene: what to render.
+            config: how.
+            seed: of the looks.
+            varied: looks of their own, instead of one a kind.
+            like: of the same place with other traffic; its static picture is this one's, too.
+        """
         self.scene = scene
         self.config = config
         self.lights = lights_of(scene, config)
         self.optics = optics_of(scene.camera, config)
         self.view = view_of(scene.camera)
-        self.background: Background = make_background(scene, self.lights, self.optics, config)
+        self._settings: dict[int, Setting] = {}
+        if like is None:
+            self.background: Background = make_background(scene, self.lights, self.optics, config)
+        else:
+            self.background, self._settings = like.background, like._settings
         self.tiles = tile_raster(scene.camera.width, scene.camera.height)
         self._insects = draw_insects(stream(seed, "insects"), config.insects_hz, self.view, self.lights)
-        self._settings: dict[int, Setting] = {}
         self._varied = varied
         self._appearance = appearance_of(scene, stream(seed, "paint"), varied)
+
+    @property
+    def quick(self) -> bool:
+        """Whether anything comes and goes quicker than vehicles pass: insects, pulsed lamps."""
+        return self.config.insects_hz > 0.0 or self.config.led_pulse_hz > 0.0
 
     def plan(
         self,
@@ -92,9 +115,12 @@ class Renderer:
         insects, pace = self._insects.during(start_s, end_s), Pace(step, duration)
         return make_plan(moments, motion, look, insects, self.tiles, self.view, pace, self.lights.on)
 
-    def look(self, time_s: float) -> Look:
-        """Say which vehicles there are at a time (s), and what they look like."""
-        return self._look(self.scene.states_at(np.array([time_s]), self.config.far_m, _NEAR_M))[0]
+    def seen_at(self, time_s: float) -> tuple[Look, Moments]:
+        """Say which vehicles there are at a time (s), what they look like, and where they are seen."""
+        times = np.array([time_s])
+        states = self.scene.states_at(times, self.config.far_m, _NEAR_M)
+        look, _ = self._look(states)
+        return look, self._project(states, times, look, np.ones(len(look.number), dtype=np.int64))
 
     def moments(
         self, times: FloatArray, look: Look, every: IntArray | None = None, for_events: bool = False

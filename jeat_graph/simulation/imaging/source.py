@@ -90,6 +90,7 @@ class RenderedSource:
         render = self.imaging.render
         self.camera_config = scaled_camera(scenario.camera, render.width, render.height)
         self.camera = Camera.mounted(self.camera_config)
+        self._same: Renderer | None = None  # of any segment, where all have one place in common
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -159,7 +160,10 @@ class RenderedSource:
         if config.lens != LensConfig():
             lens = Lens(config.lens, camera, stream(seed, "lens"))
             scene = replace(scene, camera=lens.canvas)
-        renderer = Renderer(scene, config.render, seed, varied=self.world == "varied")
+        varied = self.world == "varied"
+        renderer = Renderer(scene, config.render, seed, varied, like=self._same)
+        if lens is None and not varied:
+            self._same = renderer
         exposure = choose_exposure(config.rgb, renderer.background.whole)
         eye: EventCamera | LensEventCamera | None = None
         if self.sensors != "rgb":
@@ -179,8 +183,7 @@ class RenderedSource:
                 radiance, seen = photograph(renderer, lens, float(time[0]), exposure, config.rgb)
                 charge = electrons(seen, exposure.time_s, config.rgb, noise)
                 rgb = develop(charge, exposure.gain, config.rgb)
-            look = renderer.look(float(time[0]))
-            moments = renderer.moments(time, look)
+            look, moments = renderer.seen_at(float(time[0]))
             _, instance, visible = buffers(moments, look, blocked.depth, blocked.cover)
             tight = tight_boxes(moments, (scene.camera.width, scene.camera.height))
             contrast = np.full(len(look.number), np.nan)

@@ -89,7 +89,7 @@ def simulated(colour: tuple[float, float, float]) -> float:
     boxes, count = [], 0
     for k in range(1, 15):
         events = eye.advance(round(1e6 * period_s * k))
-        look = renderer.look(period_s * k)
+        look = renderer.seen_at(period_s * k)[0]
         box = tight_boxes(renderer.moments(np.array([period_s * k]), look), (width, height))[0]
         boxes.append(np.concatenate([box[:2], box[:2] + box[2:]]))
         if k > 1:

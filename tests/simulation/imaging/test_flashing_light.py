@@ -56,10 +56,10 @@ def test_led_lamps_in_pulses_make_events_at_their_rate():
     brighter = np.concatenate([one.t_us[one.polarity == 1] for one in t_us])
     assert spectrum_peak_hz(brighter, 0.15) == 200.0
     times = np.arange(0.0, 0.1, 1e-4)
-    moments = renderer.moments(times, renderer.look(0.0), for_events=True)
+    moments = renderer.moments(times, renderer.seen_at(0.0)[0], for_events=True)
     # Pulses have the mean of steady light.
     assert moments.lamp[:, 0, 2, LAMP_PULSE].mean() == pytest.approx(1.0, abs=0.02)
-    assert (renderer.moments(times, renderer.look(0.0)).lamp[:, 0, 2, LAMP_PULSE] == 1.0).all()
+    assert (renderer.moments(times, renderer.seen_at(0.0)[0]).lamp[:, 0, 2, LAMP_PULSE] == 1.0).all()
 
 
 @pytest.mark.parametrize("light", ["day", "night-nolight"])
@@ -70,7 +70,7 @@ def test_indicators_of_varied_worlds_flash_in_amber(light):
     for index in range(6):
         scene, imaging, _ = source._build(index)
         renderer = Renderer(scene, imaging.render, 1, varied=True)
-        look = renderer.look(0.0)
+        look = renderer.seen_at(0.0)[0]
         moments = renderer.moments(times, look)
         for v in np.flatnonzero(look.hazard & look.parked):
             for k in np.flatnonzero(look.lamps[v, :, 2] == INDICATOR):
@@ -87,5 +87,5 @@ def test_indicators_of_varied_worlds_flash_in_amber(light):
 def test_the_fixed_world_has_no_indicators():
     source = RenderedSource(load_scenario("night"), small(), seed=3, frames=1)
     scene, imaging, _ = source._build(0)
-    look = Renderer(scene, imaging.render, 1).look(0.0)
+    look = Renderer(scene, imaging.render, 1).seen_at(0.0)[0]
     assert not (look.lamps[..., 2] == INDICATOR).any()

@@ -22,6 +22,19 @@ def test_mean_and_variance_follow_the_photon_transfer_curve(mean: float) -> None
     assert charge.var() == pytest.approx(variance, rel=6.0 * math.sqrt(2.0 / charge.size))
 
 
+def test_noise_of_few_photoelectrons_has_their_skewness_beside_read_noise() -> None:
+    config = RGBConfig(read_noise_e=3.0)
+    for mean in (1.0, 6.0, 15.0):
+        radiance = np.full((400, 400, 3), mean / (config.responsivity * 0.01))
+        charge = electrons(radiance, 0.01, config, np.random.default_rng(1)).ravel()
+        z = (charge - charge.mean()) / charge.std()
+        # Cumulants of a sum add up, and all of a Poisson's are its mean. Sample skewness spreads by √(6 / n).
+        assert (z**3).mean() == pytest.approx(
+            mean / (mean + 9.0) ** 1.5, abs=5.0 * math.sqrt(6.0 / z.size) + 0.005
+        )
+        assert (z**4).mean() - 3.0 == pytest.approx(mean / (mean + 9.0) ** 2, abs=0.04)
+
+
 def test_a_full_well_holds_no_more() -> None:
     config = RGBConfig(read_noise_e=0.0)
     charge = electrons(np.full((10, 10, 3), 1e9), 0.01, config, np.random.default_rng(0))
