@@ -25,7 +25,15 @@ def numbers(text: str) -> list[float]:
     return [float(found) for found in re.findall(r"-?\d+(?:\.\d+)?", text)]
 
 
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+#: The shortest is run each time, the others with the slow tests.
+QUICK = "first-steps"
+
+
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(path, marks=() if path.stem == QUICK else pytest.mark.slow) for path in NOTEBOOKS],
+    ids=lambda path: path.stem,
+)
 def test_every_cell_runs_and_prints_what_is_kept(path, tmp_path, monkeypatch, capsys):
     """What is kept in the notebook is about what it prints now: the tracker may have become better."""
     pytest.importorskip("supervision")

@@ -116,6 +116,7 @@ def test_any_stream_gives_sound_estimates_and_the_same_ones_without_its_refused_
     assert_same(tables, again)
 
 
+@pytest.mark.usefixtures("forked_workers")
 @pytest.mark.parametrize("seed", range(200, 210) if FULL else range(200, 201))
 def test_a_smoother_in_a_process_of_its_own_gives_the_same_rows(seed):
     sensors = tuple(sorted(load_config("default").sensors))

@@ -21,6 +21,7 @@ from jeat_graph.simulation.dataset.recording import record_dataset
 from jeat_graph.simulation.dataset.verify import verify
 
 Usage = namedtuple("Usage", "total used free")
+pytestmark = pytest.mark.usefixtures("forked_workers")
 
 
 def test_two_processes_give_the_bytes_of_one(tmp_path: Path, make, fingerprints) -> None:
