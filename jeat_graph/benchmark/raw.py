@@ -20,7 +20,8 @@ from jeat_graph.benchmark.steps import start
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError
-from jeat_graph.detection.detecting import FUSED_SENSOR
+from jeat_graph.detection.declared import declared_settings
+from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR, FUSED_SENSOR, DetectRequest
 
 if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
@@ -60,6 +61,18 @@ class Row:
     def key(self) -> tuple[str, str]:
         """Whose recordings they are."""
         return (FUSED_SENSOR, self.detectors[0]) if self.sensors == (FUSED_SENSOR,) else self.detectors
+
+    def request(self) -> DetectRequest:
+        """What has detected, wherever that was."""
+        frames, events = self.detectors
+        if self.sensors == (FUSED_SENSOR,):
+            return DetectRequest(frames="frames", events="events", detector_fused=frames)
+        return DetectRequest(
+            frames="frames" if FRAMES_SENSOR in self.sensors else None,
+            events="events" if EVENTS_SENSOR in self.sensors else None,
+            detector_frames=frames,
+            detector_events=events,
+        )
 
     def __str__(self) -> str:
         by_sensor = {**dict(zip(SENSORS, self.detectors, strict=True)), FUSED_SENSOR: self.detectors[0]}
@@ -194,21 +207,26 @@ def _tracked(row: Row, recording: SizedRecording) -> dict[str, Any]:
     if row.tracker == BYTETRACK:
         return {CAUSAL: run_baseline("bytetrack", recording.detections, row.sensors)}
     seen = recording.only(row.sensors)
-    config = _config(row.tracker, seen, recording.size_px)
+    config = _config(row, seen, recording.size_px)
     seen = at_measurement(seen, config)
     if row.tracker == PAPER:
         return {CAUSAL: track(config, seen)}
     return dict(zip((CAUSAL, SMOOTHED), both_tables(config, seen), strict=True))
 
 
-def _config(name: str, seen: Detections, size_px: tuple[int, int]) -> Config:
-    """Return a preset for what is seen: the rates of the sensors, and their picture."""
+def _config(row: Row, seen: Detections, size_px: tuple[int, int]) -> Config:
+    """Return a preset for what is seen: what is known of the networks, their rates, and their picture.
+
+    As in `track`, files beside the networks count with `default` alone.
+    """
     from jeat_graph.runs.declaring import fit_input
 
     width, height = size_px
-    picture = [f"image.width={width}", f"image.height={height}"]
-    fitted, _ = fit_input(load_config("default" if name == PAPER else name, picture), seen)
-    return start(load_config(PAPER), fitted) if name == PAPER else fitted
+    changes = [f"image.width={width}", f"image.height={height}"]
+    if row.tracker == "default":
+        changes += declared_settings(row.request())
+    fitted, _ = fit_input(load_config("default" if row.tracker == PAPER else row.tracker, changes), seen)
+    return start(load_config(PAPER), fitted) if row.tracker == PAPER else fitted
 
 
 def _scores(group: Sequence[JudgedRecording], found: Sequence[Any], row: Row, kind: Any) -> dict[str, Any]:

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 HELP = "track the vehicles in files of detections, or in raw frames and events, and write a run directory"
 #: Within the run directory, where raw recordings were tracked.
 DETECTIONS = "detections.csv"
+#: The preset of who names none.
+DEFAULT = "default"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -85,12 +87,15 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.runs.run_options import RunOptions
     from jeat_graph.runs.track_files import TrackRequest, track_files
 
-    detections = tuple(str(item) for item in args.detections) or _detected(args)
+    detections = tuple(str(item) for item in args.detections)
+    declared: tuple[str, ...] = ()
+    if not detections:
+        detections, declared = _detected(args)
     request = TrackRequest(
         detections=detections,
         out=args.out,
         config=args.config,
-        overrides=tuple(overrides(args)),
+        overrides=(*declared, *overrides(args)),
         rate_hz=args.rate,
         input_format=args.input_format,
         score_scale=args.score_scale,
@@ -113,9 +118,14 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _detected(args: argparse.Namespace) -> tuple[str, ...]:
-    """Detect in raw recordings; returns the file of detections, which lies in the run directory."""
+def _detected(args: argparse.Namespace) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Detect in raw recordings.
+
+    Returns:
+        The file of detections, which lies in the run directory, and what `default` is told of the networks.
+    """
     from jeat_graph.cli.detect_command import detect_with_bar
+    from jeat_graph.detection.declared import declared_settings
     from jeat_graph.detection.detecting import picture_of
     from jeat_graph.io.atomic import check_writable
     from jeat_graph.io.detections_io import write_detections
@@ -131,9 +141,11 @@ def _detected(args: argparse.Namespace) -> tuple[str, ...]:
     found = out / DETECTIONS
     check_writable(found)
     request = detect_request(args)
+    # Another configuration, a preset or the user's own, says itself what its sensors are.
+    declared = declared_settings(request, _say) if args.config == DEFAULT else []
     args.image = args.image or picture_of(request)
     write_detections(detect_with_bar(request, "track"), found)
-    return (str(found),)
+    return (str(found),), tuple(declared)
 
 
 def _road_tables(camera_file: str) -> Callable[[Path, Config], None]:

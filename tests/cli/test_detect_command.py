@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pandas as pd
 import pytest
 
 from jeat_graph.cli.main import main
+from jeat_graph.config.reading import load_config
 from jeat_graph.io.detections_io import read_detections
 from jeat_graph.io.events.evt3_writer import Evt3Writer
 
@@ -130,3 +132,28 @@ def test_a_real_street_from_one_file(tmp_path):
     assert (long["max"] > 2.3).all()
     # The parked van does not move, so nobody sees it.
     assert not ((table.x - 170).abs() + (table.y - 171).abs() < 10).any()
+
+
+def test_track_takes_a_networks_boxes_for_what_is_known_of_them(tmp_path, raw, monkeypatch, capsys):
+    """Without --config; --set counts over it, and another configuration instead of it."""
+    from jeat_graph.data.detections import Detections
+    from jeat_graph.data.scan import Scan
+
+    boxes, scores = np.array([[10.0, 60.0, 40.0, 20.0]]), np.array([0.9])
+    found = Detections.from_scans(Scan(k / 20, "rgb", boxes + 0.5 * k, scores) for k in range(20))
+    monkeypatch.setattr("jeat_graph.cli.detect_command.detect_with_bar", lambda *_: found)
+    frames = ["track", "--frames", str(raw / "frames"), "--detector-frames", "sehn"]
+    used = {}
+    for name, more in {
+        "plain": [],
+        "set": ["--set", "sensors.rgb.p_detect=0.7"],
+        "highway": ["--config", "highway"],
+    }.items():
+        assert main([*frames, "--out", str(tmp_path / name), *more]) == 0
+        used[name] = json.loads((tmp_path / name / "run.json").read_text())["config"]["sensors"]["rgb"]
+        assert ("sehn-frames.tracking.yaml" in capsys.readouterr().err) == (name != "highway")
+    known = load_config("sehn").sensors["rgb"]
+    assert used["plain"]["p_detect"] == known.p_detect
+    assert used["set"]["p_detect"] == 0.7
+    assert used["set"]["rho_x"] == used["plain"]["rho_x"] == known.rho_x
+    assert used["highway"]["rho_x"] == load_config("highway").sensors["rgb"].rho_x

@@ -1,0 +1,87 @@
+"""What the tracker is told of a network: a file beside it, which holds what was measured of its boxes.
+
+Beside `NAME.onnx` it is `NAME.tracking.yaml`, with the section `sensor` (keys as of `sensors.NAME` in a
+configuration) and, if wanted, `birth: {max_overlap: …}` and `beside: SENSOR`,
+without which it does not count.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from jeat_graph.config.fields import number
+from jeat_graph.config.section_tree import build, read_tree
+from jeat_graph.config.sensors import SensorConfig
+from jeat_graph.data.errors import ConfigError
+from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR, FUSED_SENSOR, DetectRequest
+from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION, network_file
+
+_SUFFIX = ".tracking.yaml"
+
+
+@dataclass(frozen=True)
+class _Birth:
+    max_overlap: float = number(1.0, "1", "a box that overlaps a track by more begins none", 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class _Declared:
+    beside: str = ""
+    sensor: SensorConfig = field(default_factory=SensorConfig)
+    birth: _Birth = field(default_factory=_Birth)
+
+
+def declared_settings(request: DetectRequest, say: Callable[[str], object] = lambda _: None) -> list[str]:
+    """Return what files beside the networks say of them, as `key=value` settings of the tracker.
+
+    Of several `birth.max_overlap` the smallest counts. A network without such a file, and the detectors
+    without weights, say nothing.
+
+    Args:
+        request: what detects.
+        say: called with a line for each file that was found.
+
+    Raises:
+        ConfigError: a detector that is not known, or a file that cannot be read or holds something else.
+    """
+    found: list[str] = []
+    overlaps: list[float] = []
+    seen = [
+        name
+        for name, what in ((FRAMES_SENSOR, request.frames), (EVENTS_SENSOR, request.events))
+        if what is not None
+    ]
+    for sensor, detector, kind in _networks(request):
+        network = network_file(detector, kind)
+        path = network.with_name(network.name.removesuffix(network.suffix) + _SUFFIX)
+        if not path.is_file():
+            continue
+        tree = read_tree(str(path), (), str, "file of what a network's boxes are like")
+        try:
+            declared = build(_Declared, tree, "")
+        except ConfigError as error:
+            raise ConfigError(f"{path}: {error}") from None
+        assert isinstance(declared, _Declared)
+        if declared.beside and declared.beside not in seen:
+            continue
+        facts = tree.get("sensor", {})
+        found += [f"sensors.{sensor}.{key}={json.dumps(value)}" for key, value in facts.items()]
+        overlaps.append(declared.birth.max_overlap)
+        say(f"sensor {sensor!r}: its boxes are taken for what {path.name} says (any other --config: not)")
+    if overlaps and min(overlaps) < 1.0:
+        found.append(f"birth.max_overlap={min(overlaps)}")
+    return found
+
+
+def _networks(request: DetectRequest) -> list[tuple[str, str, str]]:
+    """Sensor, detector and kind of each network that looks at something."""
+    if request.detector_fused is not None:
+        return [(FUSED_SENSOR, request.detector_fused, FUSED)]
+    looking: list[tuple[str, str, str, str | Path | None]] = [
+        (FRAMES_SENSOR, request.detector_frames, FRAMES, request.frames),
+        (EVENTS_SENSOR, request.detector_events, EVENTS, request.events),
+    ]
+    return [(sensor, by, kind) for sensor, by, kind, what in looking if what is not None and by != MOTION]

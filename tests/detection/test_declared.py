@@ -1,0 +1,43 @@
+"""What files beside the networks tell the tracker of them."""
+
+from __future__ import annotations
+
+import pytest
+
+from jeat_graph.config.reading import load_config
+from jeat_graph.data.errors import ConfigError
+from jeat_graph.detection.declared import declared_settings
+from jeat_graph.detection.detecting import DetectRequest
+
+
+@pytest.mark.parametrize("network", ["sehn", "sehn-int8"])
+def test_networks_of_the_package_are_declared_as_their_preset_declares_them(network):
+    said: list[str] = []
+    asked = DetectRequest(frames="a", events="b", detector_frames=network, detector_events=network)
+    found, preset = load_config("default", declared_settings(asked, said.append)), load_config("sehn")
+    assert found.sensors == preset.sensors
+    assert found.birth.max_overlap == preset.birth.max_overlap
+    assert found.motion == load_config("default").motion
+    assert [line.split(":")[0] for line in said] == ["sensor 'rgb'", "sensor 'evt'"]
+
+
+def test_who_looks_at_nothing_or_has_no_weights_says_nothing():
+    assert declared_settings(DetectRequest(frames="a", events="b")) == []
+    only = declared_settings(DetectRequest(frames="a", events="b", detector_events="sehn"))
+    assert {line.split(".")[1] for line in only if line.startswith("sensors")} == {"evt"}
+    # What is known of the events' boxes was found, and pays, beside pictures.
+    assert declared_settings(DetectRequest(events="b", detector_events="sehn")) == []
+
+
+def test_a_network_of_ones_own(tmp_path):
+    network = tmp_path / "mine.onnx"
+    request = DetectRequest(frames="a", detector_frames=str(network))
+    assert declared_settings(request) == []
+    beside = tmp_path / "mine.tracking.yaml"
+    beside.write_text("sensor: {p_detect: 0.7}\n", encoding="utf-8")
+    assert declared_settings(request) == ["sensors.rgb.p_detect=0.7"]
+    for wrong in ("sensor: {p_detekt: 0.7}", "sensors: {}", "sensor: 3", "sensor: {p_detect: 7}", "- 1"):
+        beside.write_text(wrong + "\n", encoding="utf-8")
+        with pytest.raises(ConfigError) as error:
+            declared_settings(request)
+        assert "mine.tracking.yaml" in str(error.value), wrong
