@@ -20,6 +20,8 @@ _LEAST_SPREAD = 0.1
 _LEAST_LONELY = 0.1
 # How often false things score high, next to true ones, in a detector whose scores tell them apart badly.
 _FALSE_HIGH = 2.0 / 3.0
+# Hits bring a vehicle at least so many times what its misses take.
+_LEAST_GAIN = 2.0
 
 
 @njit(cache=True)
@@ -98,6 +100,21 @@ def trust_alone(repeated: float, usual: float, least: float) -> float:
         least: factor on that one.
     """
     return math.pow(least, min(repeated / usual, 1.0))
+
+
+@njit(cache=True)
+def trust_on_balance(trust: float, gained: float, lost: float) -> float:
+    """Factor on the evidence of hits, but no less than what lets a vehicle live that is found as usual.
+
+    Misses count in full. Where hits are weighed down and a detector finds every other vehicle, misses take
+    more than hits bring: all vehicles end, whatever is known of false things.
+
+    Args:
+        trust: that factor by what is known of false things, in (0, 1].
+        gained: what hits say for the vehicles that are tracked, a scan, at a factor of 1.
+        lost: what misses say against them.
+    """
+    return max(trust, min(_LEAST_GAIN * lost / gained, 1.0)) if gained > 0.0 else trust
 
 
 @njit(cache=True)

@@ -145,6 +145,8 @@ class SceneState(NamedTuple):
         lasting_seen: (S,) what that mean rests on, in seconds of a track.
         vain: (S,) share of each sensor's detections that came again on tracks that did not last.
         vain_seen: (S,) what that share rests on, in seconds of a track.
+        gained: (S,) recent evidence of the hits on each sensor's confirmed tracks, a scan, before its trust.
+        lost: (S,) that of the misses of them, which speaks against them.
         worth_mean: (S, 2) what its scores say of what lasts (`filters.worth`): a, b.
         worth_cov: (S, 2, 2) covariance of the two.
         pair_sums: (S, S, 2, 35) what pairs of boxes of a sensor and a later one said (`filters.box_offsets`).
@@ -174,6 +176,8 @@ class SceneState(NamedTuple):
     lasting_seen: FloatArray
     vain: FloatArray
     vain_seen: FloatArray
+    gained: FloatArray
+    lost: FloatArray
     worth_mean: FloatArray
     worth_cov: FloatArray
     pair_sums: FloatArray
@@ -211,6 +215,8 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
         lasting_seen=np.full(num_sensors, _USUAL_WEIGHT),
         vain=np.full(num_sensors, config.lifecycle.usual_vain),
         vain_seen=np.full(num_sensors, _USUAL_VAIN_WEIGHT),
+        gained=np.zeros(num_sensors),
+        lost=np.zeros(num_sensors),
         worth_mean=np.tile(assumed, (num_sensors, 1)),
         worth_cov=np.tile(config.lifecycle.worth_std**2 * np.eye(2), (num_sensors, 1, 1)),
         pair_sums=np.zeros((num_sensors, num_sensors, 2, NUM_SUMS)),

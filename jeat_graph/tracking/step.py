@@ -64,7 +64,7 @@ def step(
     learn_boxes(tracks, n, batch, association, scene, model)
     learn_lasting(tracks, n, batch, association, scene, model)
     count_witnesses(tracks, n, association.match, scene)
-    learn_trust(tracks, n, batch, association, scene, model)
+    learn_trust(tracks, n, batch, association, p_detect, scene, model)
     learn_scene(tracks, n, dt, batch, association, p_detect, scene, model)
     count_looks(tracks, n, batch, association, p_detect, scene, settings)
     judge_worth(tracks, n, scene, model)

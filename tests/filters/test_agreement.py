@@ -12,6 +12,7 @@ from jeat_graph.filters.agreement import (
     share_of_kind,
     trust_alone,
     trust_in,
+    trust_on_balance,
 )
 
 SHARE = st.floats(0.0, 1.0)
@@ -76,3 +77,16 @@ def test_a_sensor_alone_is_believed_between_not_at_all_better_and_in_full():
     assert trust_alone(0.0, 0.02, 0.3) == 1.0
     assert trust_alone(0.01, 0.02, 0.3) == pytest.approx(np.sqrt(0.3))
     assert trust_alone(0.02, 0.02, 0.3) == trust_alone(0.9, 0.02, 0.3) == 0.3
+
+
+@given(st.floats(0.01, 1.0), st.floats(0.1, 100.0), st.floats(0.0, 1.0))
+def test_hits_bring_a_vehicle_twice_what_misses_take_unless_they_are_believed_in_full(trust, gained, share):
+    factor = trust_on_balance(trust, gained, share * gained)
+    assert trust <= factor <= 1.0
+    assert factor == 1.0 or factor * gained >= 2.0 * share * gained * (1.0 - 1e-12)
+    # Where that is so anyhow, nothing changes.
+    assert factor == trust or factor <= 2.0 * share * (1.0 + 1e-12)
+
+
+def test_before_the_first_hit_nothing_is_known_of_misses():
+    assert trust_on_balance(0.3, 0.0, 0.0) == trust_on_balance(0.3, 0.0, 2.0) == 0.3

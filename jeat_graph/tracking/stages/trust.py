@@ -16,12 +16,14 @@ from jeat_graph.filters.agreement import (
     share_of_kind,
     trust_alone,
     trust_in,
+    trust_on_balance,
 )
 from jeat_graph.filters.existence import motion_visibility
 from jeat_graph.filters.worth import worth_of
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.inner import inner
+from jeat_graph.tracking.stages.learning import scan_weight
 from jeat_graph.tracking.stages.looking import known_fields, learns_fields, looks_at, place_of, write_looks
 from jeat_graph.tracking.stages.predicting import has_looked
 from jeat_graph.tracking.stages.worth import has_moved
@@ -41,7 +43,13 @@ def looks_too(other: int, s: int, t: float, scene: SceneState, model: Model) -> 
 
 @inner
 def learn_trust(
-    tracks: TrackArrays, n: int, batch: Batch, association: Association, scene: SceneState, model: Model
+    tracks: TrackArrays,
+    n: int,
+    batch: Batch,
+    association: Association,
+    p_detect: FloatArray,
+    scene: SceneState,
+    model: Model,
 ) -> None:
     """Follow how far each present sensor is borne out by the others, in place.
 
@@ -71,7 +79,9 @@ def learn_trust(
                 sight[other] = scene.p_detect[other] * (1.0 - scene.blind[other])
         if np.max(sight) == 0.0:
             if lifecycle.judges_worth and _is_alone(s, scene):
-                scene.trust[s] = trust_alone(scene.vain[s], lifecycle.usual_vain, sensors.prior_trust[s])
+                trust = trust_alone(scene.vain[s], lifecycle.usual_vain, sensors.prior_trust[s])
+                _weigh_looks(tracks, n, association, p_detect, s, scene, model)
+                scene.trust[s] = trust_on_balance(trust, scene.gained[s], scene.lost[s])
             continue
         _forget(s, math.exp(-sensors.period_s[s] / lifecycle.disagreement_memory_s), scene)
         for i in range(n):
@@ -103,6 +113,30 @@ def learn_trust(
             _PRIOR_CLAIMS,
             sensors.disagreement[s],
         )
+
+
+@inner
+def _weigh_looks(
+    tracks: TrackArrays,
+    n: int,
+    association: Association,
+    p_detect: FloatArray,
+    s: int,
+    scene: SceneState,
+    model: Model,
+) -> None:
+    """Follow what hits and misses of sensor `s` say for and against its confirmed tracks, in place."""
+    gained, lost = 0.0, 0.0
+    for i in range(n):
+        if not tracks.confirmed[i]:
+            continue
+        if association.match[i, s] >= 0:
+            gained += tracks.existence[i] * max(association.evidence[i, s], 0.0)
+        else:
+            lost -= tracks.existence[i] * math.log(1.0 - p_detect[i, s])
+    weight = scan_weight(s, model)
+    scene.gained[s] += weight * (model.sensors.tempering[s] * gained - scene.gained[s])
+    scene.lost[s] += weight * (lost - scene.lost[s])
 
 
 @inner
