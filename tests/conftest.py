@@ -61,6 +61,10 @@ def loaded():
     sys.path.append(folder)
     yield context
     sys.path.remove(folder)
+    # It ends when its processes have: those that a failed test's traceback still holds would be waited for.
+    for child in multiprocessing.active_children():
+        child.kill()
+        child.join()
     # It counts the time of its processes as its own, and we count its time when it has ended.
     forkserver._forkserver._stop()
 
