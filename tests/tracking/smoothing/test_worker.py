@@ -70,14 +70,24 @@ def test_smoothed_in_between_is_that_of_smoothing_here():
     assert same_bytes(there.finish(), here.finish())
 
 
-def test_with_a_queue_of_one_the_tracker_waits_and_nothing_is_lost():
+def test_with_a_queue_of_one_the_tracker_waits_and_nothing_is_lost(monkeypatch):
+    """The worker stands still until the warning comes, or for 20 s, after which the test fails."""
     here, there = make_tracker("smoother.chunk=1"), make_tracker("smoother.chunk=1")
     there._smoothers = SmoothingWorker(there.config, most_waiting=1)
-    pid = there._smoothers._process.pid
+    pid, warn = there._smoothers._process.pid, warnings.warn
     os.kill(pid, signal.SIGSTOP)
-    threading.Timer(0.3, os.kill, (pid, signal.SIGCONT)).start()
+    at_last = threading.Timer(20.0, os.kill, (pid, signal.SIGCONT))
+    at_last.start()
+
+    def warn_and_go_on(*arguments, **options):
+        os.kill(pid, signal.SIGCONT)
+        warn(*arguments, **options)
+
+    monkeypatch.setattr(warnings, "warn", warn_and_go_on)
     with pytest.warns(UserWarning, match="falls behind"):
         run(there, DETECTIONS)
+    monkeypatch.undo()
+    at_last.cancel()
     run(here, DETECTIONS)
     assert same_bytes(there.finish(), here.finish())
 
