@@ -1,14 +1,18 @@
-"""Options of the commands that detect in raw pictures and events: `detect` and `track`."""
+"""Options of the commands that detect in raw pictures and events, or that are told what did."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from jeat_graph.config.argument_types import picture_size, positive
 
 if TYPE_CHECKING:
     from jeat_graph.detection.detecting import DetectRequest
+
+#: The preset of who names none.
+DEFAULT = "default"
 
 
 def add_detecting(parser: argparse._ActionsContainer) -> None:
@@ -65,6 +69,39 @@ def add_detecting(parser: argparse._ActionsContainer) -> None:
         metavar="S",
         help="what to add to the events' times for the clock of the frames (default: 0)",
     )
+
+
+def add_made_by(parser: argparse.ArgumentParser) -> None:
+    """Declare which networks made the boxes that come in (`made_by`)."""
+    for name, sensor in (("frames", "rgb"), ("events", "evt"), ("fused", "fused")):
+        parser.add_argument(
+            f"--detector-{name}",
+            metavar="NAME|FILE.onnx",
+            help=f"the network that makes the boxes of {sensor}; `default` is told what is known of them",
+        )
+
+
+def made_by(args: argparse.Namespace, say: Callable[[str], object]) -> list[str]:
+    """Return what the configuration `default` is told of networks whose boxes come from elsewhere.
+
+    Raises:
+        ConfigError: a network that is not known, one of which nothing is known, or another configuration.
+    """
+    options = {"rgb": "frames", "evt": "events", "fused": "fused"}
+    given = {sensor: getattr(args, f"detector_{option}") for sensor, option in options.items()}
+    networks = {sensor: network for sensor, network in given.items() if network not in (None, "motion")}
+    if not networks:
+        return []
+    from jeat_graph.data.errors import ConfigError
+    from jeat_graph.detection.declared import declared_of
+
+    named = ", ".join(f"--detector-{options[sensor]}" for sensor in networks)
+    if args.config != DEFAULT:
+        raise ConfigError(f"{named} tells the configuration `default` of boxes; {args.config} says it itself")
+    settings = declared_of(networks, say)
+    if not settings:
+        raise ConfigError(f"{named}: nothing beside the network tells what its boxes are like")
+    return settings
 
 
 def detect_request(args: argparse.Namespace) -> DetectRequest:

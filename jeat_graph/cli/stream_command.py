@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from jeat_graph.cli.detect_options import add_made_by, made_by
 from jeat_graph.cli.options import add_config, add_image, add_time_unit, overrides
 from jeat_graph.config.argument_types import positive
 
@@ -41,6 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add_config(parser)
     add_image(parser)
+    add_made_by(parser)
     add(
         "--format",
         choices=("json", "csv"),
@@ -132,7 +134,7 @@ def _config(args: argparse.Namespace) -> Config:
     from jeat_graph.config.reading import load_config
     from jeat_graph.data.errors import ConfigError
 
-    config = load_config(args.config, overrides(args))
+    config = load_config(args.config, [*made_by(args, _warn), *overrides(args)])
     if args.checkpoint is not None and config.smoother.worker:
         raise ConfigError("--checkpoint does not go with smoother.worker: its state is in another process")
     if args.sink is not None and args.format == "csv":

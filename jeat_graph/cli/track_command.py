@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jeat_graph.cli.detect_options import add_detecting, detect_request
+from jeat_graph.cli.detect_options import DEFAULT, add_detecting, detect_request, made_by
 from jeat_graph.cli.options import (
     add_config,
     add_formats,
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 HELP = "track the vehicles in files of detections, or in raw frames and events, and write a run directory"
 #: Within the run directory, where raw recordings were tracked.
 DETECTIONS = "detections.csv"
-#: The preset of who names none.
-DEFAULT = "default"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -74,7 +72,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     raw = parser.add_argument_group(
         "raw recordings",
         "Without DETECTIONS vehicles are found in --frames, --events or both, and tracked; detections.csv "
-        "in the run directory holds what was found.",
+        "in the run directory holds what was found. With DETECTIONS, --detector-frames, --detector-events "
+        "and --detector-fused say which networks made the boxes of the sensors rgb, evt and fused.",
     )
     raw.add_argument("--events", metavar="FILE", help="events to detect in: RAW, DAT, AEDAT, HDF5, ROS bag")
     add_detecting(raw)
@@ -88,8 +87,9 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.runs.track_files import TrackRequest, track_files
 
     detections = tuple(str(item) for item in args.detections)
-    declared: tuple[str, ...] = ()
-    if not detections:
+    if detections:
+        declared = tuple(made_by(args, _say))
+    else:
         detections, declared = _detected(args)
     request = TrackRequest(
         detections=detections,

@@ -8,9 +8,8 @@ without which it does not count.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from jeat_graph.config.fields import number
 from jeat_graph.config.section_tree import build, read_tree
@@ -20,6 +19,7 @@ from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR, FUSED_S
 from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION, network_file
 
 _SUFFIX = ".tracking.yaml"
+_KINDS = {FRAMES_SENSOR: FRAMES, EVENTS_SENSOR: EVENTS, FUSED_SENSOR: FUSED}
 
 
 @dataclass(frozen=True)
@@ -47,15 +47,31 @@ def declared_settings(request: DetectRequest, say: Callable[[str], object] = lam
     Raises:
         ConfigError: a detector that is not known, or a file that cannot be read or holds something else.
     """
+    looking = {
+        FRAMES_SENSOR: request.detector_frames if request.frames is not None else None,
+        EVENTS_SENSOR: request.detector_events if request.events is not None else None,
+    }
+    if request.detector_fused is not None:
+        looking = {FUSED_SENSOR: request.detector_fused}
+    return declared_of({sensor: by for sensor, by in looking.items() if by is not None}, say)
+
+
+def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lambda _: None) -> list[str]:
+    """Return the same of detectors whose boxes come from elsewhere, from a file or a pipe.
+
+    Args:
+        detectors: by sensor (`rgb`, `evt` or `fused`) what makes its boxes, `motion` or a network.
+        say: called with a line for each file that was found.
+
+    Raises:
+        ConfigError: a detector that is not known, or a file that cannot be read or holds something else.
+    """
     found: list[str] = []
     overlaps: list[float] = []
-    seen = [
-        name
-        for name, what in ((FRAMES_SENSOR, request.frames), (EVENTS_SENSOR, request.events))
-        if what is not None
-    ]
-    for sensor, detector, kind in _networks(request):
-        network = network_file(detector, kind)
+    for sensor, detector in detectors.items():
+        if detector == MOTION:
+            continue
+        network = network_file(detector, _KINDS[sensor])
         path = network.with_name(network.name.removesuffix(network.suffix) + _SUFFIX)
         if not path.is_file():
             continue
@@ -65,7 +81,7 @@ def declared_settings(request: DetectRequest, say: Callable[[str], object] = lam
         except ConfigError as error:
             raise ConfigError(f"{path}: {error}") from None
         assert isinstance(declared, _Declared)
-        if declared.beside and declared.beside not in seen:
+        if declared.beside and declared.beside not in detectors:
             continue
         facts = tree.get("sensor", {})
         found += [f"sensors.{sensor}.{key}={json.dumps(value)}" for key, value in facts.items()]
@@ -74,14 +90,3 @@ def declared_settings(request: DetectRequest, say: Callable[[str], object] = lam
     if overlaps and min(overlaps) < 1.0:
         found.append(f"birth.max_overlap={min(overlaps)}")
     return found
-
-
-def _networks(request: DetectRequest) -> list[tuple[str, str, str]]:
-    """Sensor, detector and kind of each network that looks at something."""
-    if request.detector_fused is not None:
-        return [(FUSED_SENSOR, request.detector_fused, FUSED)]
-    looking: list[tuple[str, str, str, str | Path | None]] = [
-        (FRAMES_SENSOR, request.detector_frames, FRAMES, request.frames),
-        (EVENTS_SENSOR, request.detector_events, EVENTS, request.events),
-    ]
-    return [(sensor, by, kind) for sensor, by, kind, what in looking if what is not None and by != MOTION]

@@ -1,0 +1,62 @@
+"""`--detector-frames` and its like where boxes come from a file or a pipe: what made them is told."""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+
+import pytest
+
+from jeat_graph.cli.main import main
+from jeat_graph.config.reading import load_config
+from jeat_graph.detection.declared import declared_of
+
+BOTH = ("--detector-frames", "sehn", "--detector-events", "sehn")
+LINES = [f"{k * 0.05:.2f},{name},{100 + 2 * k},200,40,30,0.95" for k in range(30) for name in ("rgb", "evt")]
+
+
+@pytest.fixture
+def boxes(write):
+    return write(*LINES)
+
+
+def of_run(folder):
+    return json.loads((folder / "run.json").read_text())["config"]
+
+
+def test_a_file_of_boxes_is_tracked_as_what_is_known_of_its_networks_says(boxes, tmp_path, capsys):
+    out = str(tmp_path / "run")
+    assert main(["track", boxes, "--out", out, *BOTH, "--set", "sensors.evt.p_detect=0.6"]) == 0
+    assert "sehn-frames.tracking.yaml" in capsys.readouterr().err
+    found, preset = of_run(tmp_path / "run"), load_config("sehn")
+    assert found["sensors"]["rgb"]["p_detect"] == preset.sensors["rgb"].p_detect
+    assert found["sensors"]["evt"]["memory_s"] == preset.sensors["evt"].memory_s
+    assert found["sensors"]["evt"]["p_detect"] == 0.6, "what the user sets counts over it"
+    assert found["birth"]["max_overlap"] == preset.birth.max_overlap
+
+
+def test_boxes_from_a_pipe_are_taken_for_what_the_same_settings_say(boxes, monkeypatch, capsys):
+    networks = {"rgb": "sehn", "evt": "sehn"}
+    by_hand = [word for setting in declared_of(networks) for word in ("--set", setting)]
+    answers = []
+    for told in (BOTH, by_hand, ()):
+        with open(boxes, "rb") as file:
+            monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(file.read())))
+        assert main(["stream", "--format", "csv", "--image", "640x384", *told]) == 0
+        streamed = capsys.readouterr()
+        assert ("sehn-events.tracking.yaml" in streamed.err) == (told is BOTH)
+        answers.append(streamed.out)
+    assert answers[0] == answers[1] != answers[2]
+
+
+@pytest.mark.parametrize("command", ["track", "stream"])
+def test_what_cannot_be_told_is_one_line(command, boxes, tmp_path, fails):
+    begin = ["track", boxes, "--out", str(tmp_path / "run")] if command == "track" else ["stream"]
+    assert "sehn says it itself" in fails(*begin, *BOTH, "--config", "sehn")
+    assert "nonsense" in fails(*begin, "--detector-frames", "nonsense")
+    bare = str(tmp_path / "bare.onnx")
+    assert "--detector-frames: nothing beside the network" in fails(*begin, "--detector-frames", bare)
+    # Events' boxes are known beside those of pictures only.
+    assert "--detector-events: nothing" in fails(*begin, "--detector-events", "sehn")
+    assert not (tmp_path / "run").exists()
