@@ -83,6 +83,7 @@ class SensorArrays(NamedTuple):
         curve_precision: (S, K) its values.
         tempering: (S,) exponent on evidence.
         blind_speed: (S,) px/s.
+        least_overlap: (S,) least IoU with a track that another sensor has seen; 0: any.
         disagreement: (S,) power of the share of its lasting tracks that others see; 0: always believed.
         prior_trust: (S,) trust in the sensor before anything is known of it.
     """
@@ -104,6 +105,7 @@ class SensorArrays(NamedTuple):
     curve_precision: FloatArray
     tempering: FloatArray
     blind_speed: FloatArray
+    least_overlap: FloatArray
     disagreement: FloatArray
     prior_trust: FloatArray
 

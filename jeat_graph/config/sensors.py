@@ -57,6 +57,14 @@ class SensorConfig(Section):
     disagreement: float | None = number(
         None, "1", "`lifecycle.disagreement` for this sensor, if another than for all", 0.0
     )
+    least_overlap: float = number(
+        0.0,
+        "1",
+        "least IoU of its box with that of a track which another sensor has seen; one that fits less is not "
+        "taken for the track's",
+        0.0,
+        1.0,
+    )
     latency_s: float = number(
         0.0,
         "s",

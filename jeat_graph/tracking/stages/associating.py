@@ -7,11 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jeat_graph.association.boxes import clip_boxes, track_boxes
 from jeat_graph.association.costs import likelihood_cost, log_evidence
 from jeat_graph.association.densities import Likelihood
 from jeat_graph.association.gates import Expected, Found, Pairs, gated_pairs
 from jeat_graph.association.joint import associate_joint, associate_sequential, associate_slots
 from jeat_graph.association.methods import JOINT, SLOTS
+from jeat_graph.association.overlap import overlap
 from jeat_graph.config.kernel_form import Model
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.tracking.batch import Batch
@@ -61,10 +63,34 @@ def judge_pairs(
         settings.gate_bound,
         settings.size_gate_bound,
     )
+    if np.max(sensors.least_overlap) > 0.0:
+        pairs = _fitting(pairs, tracks, n, batch, model)
     log_clutter = np.empty(len(sensors.sigma_px))
     for s in range(len(log_clutter)):
         log_clutter[s] = math.log(scene.clutter[s]) - model.settings.log_clutter_volume
     return pairs, log_evidence(pairs, p_detect, batch.log_score, log_clutter, batch.sensor)
+
+
+@inner
+def _fitting(pairs: Pairs, tracks: TrackArrays, n: int, batch: Batch, model: Model) -> Pairs:
+    """Leave out the pairs whose boxes fit less than the sensor's do that are right (`least_overlap`).
+
+    A sensor whose boxes are mostly right where another's are like them, and mostly wrong elsewhere, says
+    little where it disagrees; its noise, the same for all of its boxes, would let it draw the track off. What
+    it alone has seen is left to it.
+    """
+    boxes, image = track_boxes(tracks.mean[:n], tracks.size_mean[:n]), model.settings.image
+    if image.edge_px > 0.0:
+        boxes = clip_boxes(boxes, image.width, image.height)
+    fit = np.ones(len(pairs.rows), dtype=np.bool_)
+    for p in range(len(fit)):
+        i, j = pairs.rows[p], pairs.cols[p]
+        least = model.sensors.least_overlap[batch.sensor[j]]
+        if least > 0.0 and tracks.seen_by[i] & ~(1 << batch.sensor[j]):
+            fit[p] = overlap(batch.boxes[j], boxes[i]) >= least
+    return Pairs(
+        pairs.rows[fit], pairs.cols[fit], pairs.d2[fit], pairs.log_density[fit], pairs.log_size_density[fit]
+    )
 
 
 @inner
