@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 import sys
@@ -19,6 +20,16 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # counts over its examples still differs a little with what ran before it, and its bound must allow for that.
 settings.register_profile("jeat-graph", deadline=None, derandomize=True)
 settings.load_profile("jeat-graph")
+
+# What is imported and collected stays to the end: the collector need not look through half a million objects
+# again and again, neither while they are made nor after.
+gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    """From here on garbage is collected as ever."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session")

@@ -57,6 +57,8 @@ def test_motion_is_estimated_for_the_size_noise_that_stays(measured, base):
 
 
 def test_a_part_that_does_worse_on_the_other_half_goes_back_to_the_base(recordings, base, monkeypatch):
+    """And the gain of each part is told, in their order, as soon as it is known."""
+
     def spoilt(measured, parts):
         config = with_parts(measured, parts)
         if "births" not in parts:
@@ -65,14 +67,10 @@ def test_a_part_that_does_worse_on_the_other_half_goes_back_to_the_base(recordin
         return replace(config, birth=replace(config.birth, arrival_rate_hz=1e-12, initial=1e-12))
 
     monkeypatch.setattr(module, "with_parts", spoilt)
-    config, choices = choose_parts(recordings, base)
+    told = []
+    config, choices = choose_parts(recordings, base, max_scans=200, progress=told.append)
+    assert [choice.part for choice in choices] == list(PARTS) == told
     assert config.birth == base.birth
     births = next(choice for choice in choices if choice.part == "births")
     assert not births.kept
     assert births.gain < -10.0
-
-
-def test_the_gain_of_each_part_is_told(recordings, base):
-    told = []
-    _, choices = choose_parts(recordings, base, max_scans=200, progress=told.append)
-    assert [choice.part for choice in choices] == list(PARTS) == told

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import shutil
 
 import pytest
 
@@ -28,6 +29,14 @@ def shown(folder):
     with contextlib.redirect_stdout(io.StringIO()) as printed:
         assert main(["compare", str(folder / "run"), "--gt", truth, "--out", str(folder / "out")]) == 0
     return printed.getvalue()
+
+
+@pytest.fixture(scope="module")
+def kept(folder):
+    """A run that kept its measurements."""
+    detections = str(folder / "sim" / "detections.csv")
+    assert main(["track", detections, "--out", str(folder / "kept"), "--diagnostics"]) == 0
+    return folder / "kept"
 
 
 def test_it_prints_tables_and_writes_json_and_pictures(folder, shown):
@@ -80,27 +89,25 @@ def test_a_folder_that_holds_no_run_is_refused(tmp_path, capsys):
 
 
 def test_a_run_that_kept_its_measurements_is_not_tracked_again_and_compares_the_same(
-    folder, tmp_path, monkeypatch
+    folder, kept, tmp_path, monkeypatch
 ):
     detections, truth = str(folder / "sim" / "detections.csv"), str(folder / "sim" / "gt.csv")
-    kept, out, again = (str(tmp_path / name) for name in ("kept", "out", "again"))
-    assert main(["track", detections, "--out", kept, "--diagnostics"]) == 0
-    tracked = ["compare", kept, "--gt", truth, "--no-plots", "--out", again, "--detections", detections]
+    out, again = (str(tmp_path / name) for name in ("out", "again"))
+    tracked = ["compare", str(kept), "--gt", truth, "--no-plots", "--out", again, "--detections", detections]
     assert main(tracked) == 0
     monkeypatch.setattr(records, "record_tracks", None)
-    assert main(["compare", kept, "--gt", truth, "--no-plots", "--out", out]) == 0
+    assert main(["compare", str(kept), "--gt", truth, "--no-plots", "--out", out]) == 0
     assert (tmp_path / "out" / "compare.json").read_bytes() == (
         tmp_path / "again" / "compare.json"
     ).read_bytes()
 
 
 @pytest.mark.parametrize("name", ["measurements.parquet", "causal.csv"])
-def test_a_file_of_the_run_that_has_changed_is_refused(folder, tmp_path, capsys, name):
-    kept = tmp_path / "kept"
-    assert main(["track", str(folder / "sim" / "detections.csv"), "--out", str(kept), "--diagnostics"]) == 0
-    (kept / name).write_bytes((kept / name).read_bytes()[:-1])
-    assert main(["compare", str(kept)]) == 2
+def test_a_file_of_the_run_that_has_changed_is_refused(kept, tmp_path, capsys, name):
+    run = shutil.copytree(kept, tmp_path / "run")
+    (run / name).write_bytes((run / name).read_bytes()[:-1])
+    assert main(["compare", str(run)]) == 2
     assert f"{name}: has changed since the run" in capsys.readouterr().err
-    (kept / name).unlink()
-    assert main(["compare", str(kept)]) == 2
+    (run / name).unlink()
+    assert main(["compare", str(run)]) == 2
     assert f"{name}: is missing from the run" in capsys.readouterr().err

@@ -20,7 +20,7 @@ class Pair(NamedTuple):
     counts: np.ndarray
 
 
-@njit
+@njit(cache=True)  # as all kernels are
 def scaled(pair, factor):
     """Multiply in place and return the sum."""
     pair.values[:] *= factor

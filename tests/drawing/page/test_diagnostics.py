@@ -27,6 +27,15 @@ def recording():
     return record(load_scenario("night"), 5, 2.0).detections
 
 
+@pytest.fixture(scope="module")
+def tracked(tmp_path_factory, recording):
+    """A folder with the recording, as `d.csv`, and the run of it with the option, `run`."""
+    folder = tmp_path_factory.mktemp("tracked")
+    write_detections(recording, folder / "d.csv")
+    assert main(["track", str(folder / "d.csv"), "--out", str(folder / "run"), "--diagnostics"]) == 0
+    return folder
+
+
 def collect(config, detections):
     tracker = Tracker(config, diagnostics=True)
     parts = []
@@ -72,12 +81,9 @@ def test_noise_scale_is_the_one_before_the_detection_adapted_it_by_equation_5(re
     assert checked > 1000
 
 
-def test_each_update_of_a_reported_track_stands_in_the_column_sensors(tmp_path, recording):
-    source = tmp_path / "d.csv"
-    write_detections(recording, source)
-    assert main(["track", str(source), "--out", str(tmp_path / "run"), "--diagnostics"]) == 0
-    causal = read_trajectories(tmp_path / "run" / "causal.csv")
-    table = read_diagnostics(tmp_path / "run" / "diagnostics.csv")
+def test_each_update_of_a_reported_track_stands_in_the_column_sensors(tracked):
+    causal = read_trajectories(tracked / "run" / "causal.csv")
+    table = read_diagnostics(tracked / "run" / "diagnostics.csv")
     told = {
         (t, i, name)
         for t, i, text in zip(causal.t, causal.track_id, causal.sensor_text(), strict=True)
@@ -90,25 +96,14 @@ def test_each_update_of_a_reported_track_stands_in_the_column_sensors(tmp_path, 
     assert {one for one in logged if one[:2] in confirmed} == told
 
 
-def test_the_option_changes_no_byte_of_the_other_tables(tmp_path, recording):
-    source = tmp_path / "d.csv"
-    write_detections(recording, source)
-    for name, more in (("a", []), ("b", ["--diagnostics"]), ("c", ["--diagnostics"])):
-        assert main(["track", str(source), "--out", str(tmp_path / name), *more]) == 0
-    for file in ("causal.csv", "smoothed.csv"):
-        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
-    assert not (tmp_path / "a" / "diagnostics.csv").exists()
-    assert (tmp_path / "b" / "diagnostics.csv").read_bytes() == (
-        tmp_path / "c" / "diagnostics.csv"
-    ).read_bytes()
-
-
-def test_a_run_without_the_option_removes_the_table_of_an_earlier_one(tmp_path, recording):
-    source, out = tmp_path / "d.csv", tmp_path / "run"
-    write_detections(recording, source)
+def test_the_option_changes_no_byte_of_the_other_tables_and_without_it_its_table_goes(tmp_path, tracked):
+    source, out = tracked / "d.csv", tmp_path / "run"
     assert main(["track", str(source), "--out", str(out), "--diagnostics"]) == 0
+    assert (out / "diagnostics.csv").read_bytes() == (tracked / "run" / "diagnostics.csv").read_bytes()
     assert main(["track", str(source), "--out", str(out)]) == 0
     assert not (out / "diagnostics.csv").exists()
+    for file in ("causal.csv", "smoothed.csv"):
+        assert (out / file).read_bytes() == (tracked / "run" / file).read_bytes()
 
 
 def test_it_works_without_a_smoother_too(recording):

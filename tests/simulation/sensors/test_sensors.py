@@ -1,12 +1,13 @@
 """The detectors: who is found, with what noise, scores, clutter and timing."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
 from jeat_graph.data.detections import Detections
-from jeat_graph.simulation.scenario import Scenario, load_scenario
+from jeat_graph.simulation.scenario import load_scenario
 from jeat_graph.simulation.sensors.clutter import ClutterConfig, draw_clutter
 from jeat_graph.simulation.sensors.detectability import judge
 from jeat_graph.simulation.sensors.detector import SensorModel, detect
@@ -22,20 +23,20 @@ from .ap import iou_matrix
 PICTURE = (1280.0, 720.0)
 
 
-def views_of(name: str, seed: int = 3, rate_hz: float = 20.0) -> tuple[Scenario, Views]:
+@cache
+def views(name: str) -> Views:
     s = load_scenario(name)
-    scene = Scene.build(seed, 15.0, s.road, s.fleet, s.traffic, s.light, s.camera)
-    return s, look(scene, np.arange(0.0, 15.0, 1.0 / rate_hz), s.truth)
+    scene = Scene.build(3, 15.0, s.road, s.fleet, s.traffic, s.light, s.camera)
+    return look(scene, np.arange(0.0, 15.0, 0.05), s.truth)
 
 
-DARK, DARK_VIEWS = views_of("night-nolight")
-DAY, DAY_VIEWS = views_of("day")
+DARK, DAY = load_scenario("night-nolight"), load_scenario("day")
 
 
 def test_the_event_camera_never_sees_what_is_parked() -> None:
-    p = judge(DAY_VIEWS, DAY.sensors["evt"].detect).p_detect
-    assert DAY_VIEWS.parked.any()
-    assert (p[DAY_VIEWS.parked] == 0.0).all()
+    p = judge(views("day"), DAY.sensors["evt"].detect).p_detect
+    assert views("day").parked.any()
+    assert (p[views("day").parked] == 0.0).all()
 
 
 def test_in_a_recording_no_event_box_but_clutter_lies_on_a_parked_vehicle() -> None:
@@ -48,44 +49,51 @@ def test_in_a_recording_no_event_box_but_clutter_lies_on_a_parked_vehicle() -> N
 
 def test_blindness_follows_the_image_speed() -> None:
     model = replace(DAY.sensors["evt"].detect, p_max=1.0, half_size_px=0, half_visible=0, half_lux=0)
-    speed = np.hypot(*DAY_VIEWS.motion[:, 2:4].T)
+    speed = np.hypot(*views("day").motion[:, 2:4].T)
     expected = 1.0 - np.exp(-((speed / model.blind_speed) ** 2))
-    assert judge(DAY_VIEWS, model).p_detect == pytest.approx(expected)
+    assert judge(views("day"), model).p_detect == pytest.approx(expected)
 
 
 def test_in_the_dark_the_rgb_camera_sees_mostly_what_is_near() -> None:
-    p = judge(DARK_VIEWS, DARK.sensors["rgb"].detect).p_detect
-    moving = ~DARK_VIEWS.parked & ~DARK_VIEWS.ignore
-    near, far = moving & (DARK_VIEWS.distance < 40), moving & (DARK_VIEWS.distance > 110)
+    p = judge(views("night-nolight"), DARK.sensors["rgb"].detect).p_detect
+    moving = ~views("night-nolight").parked & ~views("night-nolight").ignore
+    near, far = (
+        moving & (views("night-nolight").distance < 40),
+        moving & (views("night-nolight").distance > 110),
+    )
     assert p[near].mean() > 0.7
     assert p[far].mean() < 0.45
-    assert 0.15 < p[DARK_VIEWS.parked & ~DARK_VIEWS.ignore].mean() < 0.6
+    assert 0.15 < p[views("night-nolight").parked & ~views("night-nolight").ignore].mean() < 0.6
 
 
 def test_by_day_nearly_every_free_vehicle_is_seen_by_the_rgb_camera() -> None:
-    p = judge(DAY_VIEWS, DAY.sensors["rgb"].detect).p_detect
-    free = ~DAY_VIEWS.ignore & (DAY_VIEWS.visible > 0.9)
+    p = judge(views("day"), DAY.sensors["rgb"].detect).p_detect
+    free = ~views("day").ignore & (views("day").visible > 0.9)
     assert p[free].mean() > 0.97
 
 
 @pytest.mark.parametrize("cause", ["visible", "lux"])
 def test_occlusion_and_darkness_lower_the_probability(cause: str) -> None:
     model = DARK.sensors["rgb"].detect
-    low = judge(replace(DARK_VIEWS, **{cause: getattr(DARK_VIEWS, cause) * 0.5}), model).p_detect
-    before = judge(DARK_VIEWS, model).p_detect
+    low = judge(
+        replace(views("night-nolight"), **{cause: getattr(views("night-nolight"), cause) * 0.5}), model
+    ).p_detect
+    before = judge(views("night-nolight"), model).p_detect
     assert (low <= before).all()
     assert (low < before).mean() > 0.95
 
 
 def test_blur_in_the_dark_lowers_the_probability_and_raises_the_noise() -> None:
     model = DARK.sensors["rgb"].detect
-    sharp = judge(DARK_VIEWS, replace(model, exposure_s=0.0))
-    blurred = judge(DARK_VIEWS, replace(model, exposure_s=0.1))
-    moving = (np.hypot(*DARK_VIEWS.motion[:, 2:4].T) > 50.0) & (DARK_VIEWS.visible > 0.1)
+    sharp = judge(views("night-nolight"), replace(model, exposure_s=0.0))
+    blurred = judge(views("night-nolight"), replace(model, exposure_s=0.1))
+    moving = (np.hypot(*views("night-nolight").motion[:, 2:4].T) > 50.0) & (
+        views("night-nolight").visible > 0.1
+    )
     assert (blurred.p_detect[moving] < sharp.p_detect[moving]).all()
-    noise, zero = NoiseModel(outlier_probability=0.0), np.zeros((len(DARK_VIEWS), 4))
+    noise, zero = NoiseModel(outlier_probability=0.0), np.zeros((len(views("night-nolight")), 4))
     error = [
-        perturb(np.random.default_rng(0), DARK_VIEWS.boxes, zero, c, noise)[1][moving].mean()
+        perturb(np.random.default_rng(0), views("night-nolight").boxes, zero, c, noise)[1][moving].mean()
         for c in (sharp, blurred)
     ]
     assert error[1] > 1.2 * error[0]
@@ -93,10 +101,10 @@ def test_blur_in_the_dark_lowers_the_probability_and_raises_the_noise() -> None:
 
 def test_noise_of_the_centre_has_the_configured_size() -> None:
     model = NoiseModel(sigma_px=0.7, rho=0.03, outlier_probability=0.0, dark_factor=0.0, blur_factor=0.0)
-    conditions = judge(DAY_VIEWS, DAY.sensors["rgb"].detect)
+    conditions = judge(views("day"), DAY.sensors["rgb"].detect)
     rng = np.random.default_rng(1)
-    boxes, _ = perturb(rng, DAY_VIEWS.boxes, persistent_noise(rng, DAY_VIEWS, model), conditions, model)
-    true = DAY_VIEWS.boxes
+    boxes, _ = perturb(rng, views("day").boxes, persistent_noise(rng, views("day"), model), conditions, model)
+    true = views("day").boxes
     shift = (boxes[:, :2] + boxes[:, 2:] / 2) - (true[:, :2] + true[:, 2:] / 2)
     unit = shift / np.hypot(0.7, 0.03 * true[:, 2:])
     assert unit.std() == pytest.approx(1.0, abs=0.05)
@@ -175,8 +183,8 @@ def test_blank_scans_come_in_bursts_of_the_configured_share() -> None:
 def test_blank_scans_arrive_without_boxes_and_dropped_ones_do_not_arrive() -> None:
     model = SensorModel(timing=TimingConfig(drop_probability=0.2, blank_rate_hz=0.5, blank_duration_s=0.3))
     clock = run_clock(np.random.default_rng(9), model.timing, 15.0)
-    clock = replace(clock, times=DAY_VIEWS.times)
-    found = detect(1, "rgb", clock, DAY_VIEWS, PICTURE, model)
+    clock = replace(clock, times=views("day").times)
+    found = detect(1, "rgb", clock, views("day"), PICTURE, model)
     assert np.array_equal(found.scan_t, clock.times[~clock.dropped])
     empty = np.diff(found.scan_start) == 0
     assert np.array_equal(empty, clock.blank[~clock.dropped])
@@ -196,8 +204,12 @@ def matched_scores(detections: Detections, recording_truth: Views) -> tuple[np.n
 def test_scores_of_true_boxes_are_higher_than_those_of_false_ones_but_overlap_them() -> None:
     model = DARK.sensors["rgb"]
     model = replace(model, timing=replace(model.timing, drop_probability=0.0))
-    clock = replace(run_clock(np.random.default_rng(0), model.timing, 15.0), times=DARK_VIEWS.times)
-    true, false = matched_scores(detect(2, "rgb", clock, DARK_VIEWS, PICTURE, model), DARK_VIEWS)
+    clock = replace(
+        run_clock(np.random.default_rng(0), model.timing, 15.0), times=views("night-nolight").times
+    )
+    true, false = matched_scores(
+        detect(2, "rgb", clock, views("night-nolight"), PICTURE, model), views("night-nolight")
+    )
     assert len(false) > 50
     assert np.median(true) > np.median(false) + 0.1
     assert np.percentile(false, 80) > np.percentile(true, 20)
