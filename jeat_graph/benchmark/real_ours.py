@@ -12,7 +12,7 @@ from jeat_graph.config.reading import load_config
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.runs.declaring import fit_input
+from jeat_graph.runs.declaring import fit_input, own_picture
 from jeat_graph.runs.latency import at_measurement
 from jeat_graph.tracking.whole import both_tables
 
@@ -60,7 +60,7 @@ def configs_for(row: OursOnSet, one: RealSet) -> list[Config]:
         return [_without_memory(config) for config in fitted] if row.white else fitted
     whole = fit_input(base, *seen)[0]
     halves = [_calibrated(row, one, half, seen, whole) for half in range(2)]
-    return [halves[k % 2] for k in range(len(seen))]
+    return [own_picture(halves[k % 2], detections) for k, detections in enumerate(seen)]
 
 
 def _without_memory(config: Config) -> Config:

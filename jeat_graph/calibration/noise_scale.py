@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from jeat_graph.calibration.supervised import Recording
-from jeat_graph.calibration.verdict import CHANCE, Verdict, judge_both
+from jeat_graph.calibration.verdict import CHANCE, Verdict, judge
 from jeat_graph.config.schema import Config
 
 #: Factors on the standard deviation of the centre's noise that are tried.
@@ -38,7 +38,7 @@ def scale_noise(config: Config, folds: Sequence[Sequence[Recording]]) -> tuple[C
     """
     # Of two as good the one nearer to what was measured.
     tried = sorted(FACTORS, key=lambda factor: abs(math.log(factor)))
-    verdicts = [judge_both(with_noise(config, factor), folds) for factor in tried]
+    verdicts = [judge([with_noise(config, factor)] * len(folds), folds) for factor in tried]
     free = [k for k, one in enumerate(verdicts) if one.mean >= verdicts[0].mean - CHANCE]
     best = max(free, key=lambda k: (verdicts[k].objective, -k))
     return with_noise(config, tried[best]), tried[best], verdicts[best]

@@ -1,9 +1,10 @@
 """Which parts of a calibration are kept: those that win on recordings they were not estimated from.
 
 Matched detections give noise, reliability, motion and births that describe the recordings; whether a tracker
-does better with them is another question. Each half of the recordings is tracked with what the other half
-gives, and a part (say, the births) for which the base configuration's own values do better there goes back to
-them.
+does better with them is another question, and a tracker that learns its sensors while it runs often does not.
+Each half of the recordings is tracked with what the other half gives, and with the base. Where all parts
+together do better than the base they are kept, but for those (say, the births) without which it goes better
+still; else the base stays, but for those with which it does better.
 """
 
 from __future__ import annotations
@@ -11,9 +12,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from jeat_graph.calibration.cuts import folds, shorten
 from jeat_graph.calibration.supervised import MatchedSensors, Recording, measure_sensors, with_sensors
-from jeat_graph.calibration.tune import folds, shorten
-from jeat_graph.calibration.verdict import better, judge
+from jeat_graph.calibration.verdict import Verdict, better, judge
 from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import DataError
 
@@ -35,8 +36,11 @@ SENSOR_PARTS = {
 }
 #: The parts, in the order in which they are tried.
 PARTS = (*SENSOR_PARTS, _BIRTHS)
-# A part goes only where the base does better by more than this (per cent): less is chance.
+# What a change must gain (per cent) to be made: less is chance.
 _LEAST_GAIN = 0.2
+# As many standard errors, too: of two halves of a set of real recordings one gained two of them and the other
+# lost as much.
+_ERRORS = 2.0
 
 
 @dataclass(frozen=True)
@@ -112,22 +116,34 @@ def choose_parts(
     """
     whole = measure_sensors(recordings, base)
     parts = folds(shorten(recordings, max_scans))
-    try:
-        halves = [measure_sensors(other, base) for other in reversed(parts)] if len(parts) == 2 else []
-        now = judge([with_parts(half, PARTS) for half in halves], parts) if halves else None
-    except DataError:
-        now = None
-    if now is None:
+    if len(parts) < 2:
         return with_parts(whole, PARTS), ()
-    kept = list(PARTS)
+    try:
+        halves = [measure_sensors(other, base) for other in reversed(parts)]
+        kept, choices = _choose(
+            lambda some: judge([with_parts(half, some) for half in halves], parts),
+            progress or (lambda _: None),
+        )
+    except DataError:
+        return with_parts(whole, PARTS), ()
+    return with_parts(whole, kept), choices
+
+
+def _choose(
+    verdict: Callable[[Sequence[str]], Verdict], progress: Callable[[str], None]
+) -> tuple[list[str], tuple[PartChoice, ...]]:
+    """Choose parts: leave some out of all where all together beat the base, else add some to none."""
+    now, every = verdict(()), verdict(PARTS)
+    kept: list[str] = []
+    if better(every, now, _LEAST_GAIN, _ERRORS):
+        kept, now = list(PARTS), every
     choices = []
     for part in PARTS:
-        without = [one for one in kept if one != part]
-        other = judge([with_parts(half, without) for half in halves], parts)
-        gain = now.objective - other.objective
-        if better(other, now, _LEAST_GAIN):
-            kept, now = without, other
+        turned = [one for one in PARTS if (one in kept) != (one == part)]
+        other = verdict(turned)
+        gain = (other.objective - now.objective) * (1.0 if part in turned else -1.0)
+        if better(other, now, _LEAST_GAIN, _ERRORS):
+            kept, now = turned, other
         choices.append(PartChoice(part, part in kept, gain))
-        if progress is not None:
-            progress(part)
-    return with_parts(whole, kept), tuple(choices)
+        progress(part)
+    return kept, tuple(choices)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from jeat_graph.calibration.cuts import folds, shorten
 from jeat_graph.calibration.matches import SensorMatches, match_sensor
 from jeat_graph.calibration.noise_scale import scale_noise
 from jeat_graph.calibration.offset import (
@@ -19,12 +20,12 @@ from jeat_graph.calibration.offset import (
 from jeat_graph.calibration.parts import PARTS, PartChoice, choose_parts
 from jeat_graph.calibration.supervised import Recording, calibrate
 from jeat_graph.calibration.tracked import follow
-from jeat_graph.calibration.tune import Choice, folds, shorten, tune, tuned_settings
+from jeat_graph.calibration.tune import Choice, tune, tuned_settings
 from jeat_graph.config.schema import Config, InputConfig
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.progress import with_progress
-from jeat_graph.runs.declaring import fit_input
+from jeat_graph.runs.declaring import fit_input, own_picture
 from jeat_graph.runs.latency import taken_off
 
 # How often lags are looked for, each time in what those found before leave.
@@ -122,7 +123,7 @@ def calibrate_without_truth(recordings: Sequence[Detections], base: Config) -> C
 
     lags = settled(find, with_progress(range(_ROUNDS)))
     association = replace(base.association, priority=())
-    config = replace(base, association=association, input=InputConfig())
+    config = replace(base, association=association, input=InputConfig(picture=base.input.picture))
     if found_lags(lags):
         config = earliest_on_time(with_lags(config, lags))
     return Calibration(config, tuple(lags))
@@ -136,10 +137,10 @@ def _lags_with_truth(recordings: Sequence[Recording], base: Config) -> list[Lag]
     matches = {}
     for name in base.sensor_names:
         found = [
-            match_sensor(detections, truth, name, k)
+            match_sensor(detections, truth, name, k).only_whole(own_picture(base, detections).image)
             for k, (detections, truth) in enumerate(recordings)
             if name in detections.sensors
         ]
         if found:
-            matches[name] = SensorMatches.pool(found).only_whole(base.image)
+            matches[name] = SensorMatches.pool(found)
     return lags_from_truth(matches, {name: 1.0 / base.sensors[name].rate_hz for name in matches})

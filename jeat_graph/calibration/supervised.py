@@ -16,7 +16,7 @@ from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.progress import with_progress
 from jeat_graph.data.trajectories import GroundTruth
-from jeat_graph.runs.declaring import scan_rate_hz, undeclared_sensor
+from jeat_graph.runs.declaring import own_picture, scan_rate_hz, undeclared_sensor
 
 Recording = tuple[Detections, GroundTruth]
 
@@ -47,11 +47,11 @@ def measure_sensors(recordings: Sequence[Recording], base: Config | None = None)
     sensors: dict[str, SensorConfig] = {}
     for name in with_progress(names):
         parts = [
-            match_sensor(detections, truth, name, sequence)
+            match_sensor(detections, truth, name, sequence).only_whole(_image_of(base, detections))
             for sequence, (detections, truth) in enumerate(recordings)
             if name in detections.sensors
         ]
-        matches[name] = SensorMatches.pool(parts).only_whole(ImageConfig() if base is None else base.image)
+        matches[name] = SensorMatches.pool(parts)
         known = _known(base, name)
         rate = scan_rate_hz([detections for detections, _ in recordings], name)
         sensors[name] = calibrate_sensor(matches[name], replace(known, rate_hz=rate or known.rate_hz))
@@ -82,7 +82,7 @@ def with_sensors(measured: MatchedSensors, sensors: Mapping[str, SensorConfig]) 
         motion=replace(fit_motion(tracks, size), unseen_memory_s=config.motion.unseen_memory_s),
         size=size,
         birth=fit_births(config, measured.matches, measured.recordings),
-        input=InputConfig(),
+        input=InputConfig(picture=config.input.picture),
     )
 
 
@@ -129,6 +129,10 @@ def fit_births(
     initial = boxes / sum(len(f) for f in frames)
     arrivals = max(births - initial * len(recordings), 1.0)
     return replace(config.birth, arrival_rate_hz=arrivals / max(duration, 1.0), initial=initial)
+
+
+def _image_of(base: Config | None, detections: Detections) -> ImageConfig:
+    return ImageConfig() if base is None else own_picture(base, detections).image
 
 
 def _known(base: Config | None, name: str) -> SensorConfig:

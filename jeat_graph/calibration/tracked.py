@@ -12,6 +12,7 @@ from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.progress import progress_span, with_progress
+from jeat_graph.runs.declaring import own_picture
 from jeat_graph.tracking.whole import track
 
 _MIN_ROWS = 50
@@ -54,7 +55,7 @@ def follow(recordings: Sequence[Detections], config: Config) -> TrackedDetection
     first_track = 0
     for detections in with_progress(recordings):
         with progress_span(0.0, 0.6):
-            table = track(eager, detections)
+            table = track(own_picture(eager, detections), detections)
         sure = table.existence >= config.lifecycle.confirm_existence
         kept = np.isin(table.track_id, np.unique(table.track_id[sure]))
         table = table.take(kept)

@@ -2,32 +2,37 @@
 
 A handful of recordings tells little: between two configurations that are as good as each other, scores
 differ by half a point and more. So a change counts as better only if it wins by more than its standard error
-over the recordings, wins on each half of them, and costs no accuracy for the sake of variances.
+over the recordings (over parts of their time, where they are few), wins on each half of them, and costs no
+accuracy for the sake of variances.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from jeat_graph.calibration.consistency_penalty import consistency_penalty
+from jeat_graph.calibration.cuts import in_parts
 from jeat_graph.calibration.supervised import Recording
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.frames import Kind
 from jeat_graph.eval.metrics import evaluate
 from jeat_graph.eval.position_nees import position_nees
-from jeat_graph.tracking.whole import both_tables, track
+from jeat_graph.runs.declaring import own_picture
+from jeat_graph.tracking.whole import both_tables
 
 #: What a change may lose, in the mean or on one half (per cent), and still count as no worse.
 CHANCE = 0.05
-# Below three recordings their spread says nothing of its own accuracy.
+# Below three values their spread says nothing.
 _LEAST_FOR_SPREAD = 3
+# Fewer recordings are cut into about so many parts of their time, which tell how far scores spread.
+_LEAST_FOR_CHANCE = 6
+_KINDS: tuple[Kind, ...] = ("causal", "smoothed")
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +44,9 @@ class Verdict:
         weight: (N,) number of true boxes of each.
         fold: (N,) the half of the recordings to which it belongs.
         penalty: for untrue variances (per cent).
+        part_accuracy: (M,) the same of parts by whose spread chance is judged: the recordings, or where they
+            are few, parts of their time.
+        part_weight: (M,) number of true boxes of each.
 
     Raises:
         DataError: nothing to be judged by.
@@ -48,6 +56,8 @@ class Verdict:
     weight: FloatArray
     fold: IntArray
     penalty: float
+    part_accuracy: FloatArray
+    part_weight: FloatArray
 
     def __post_init__(self) -> None:
         if not len(self.accuracy):
@@ -64,7 +74,7 @@ class Verdict:
         return self.mean - self.penalty
 
 
-def better(one: Verdict, other: Verdict, least: float) -> bool:
+def better(one: Verdict, other: Verdict, least: float, errors: float = 1.0) -> bool:
     """Whether a configuration does better than another, by more than chance and on each half.
 
     Accuracy comes first; truer variances count between configurations that are as accurate as each other.
@@ -73,13 +83,15 @@ def better(one: Verdict, other: Verdict, least: float) -> bool:
         one: of the configuration in question.
         other: of the present one, on the same recordings.
         least: what it must gain (per cent).
+        errors: how many of its standard errors it must gain.
     """
     gain = one.accuracy - other.accuracy
     for k in np.unique(one.fold):
         mine = one.fold == k
         if np.average(gain[mine], weights=one.weight[mine]) < -CHANCE:
             return False
-    sure = max(least, standard_error(gain, one.weight))
+    spread = one.part_accuracy - other.part_accuracy
+    sure = max(least, errors * standard_error(spread, one.part_weight))
     more = one.mean - other.mean
     return more >= sure or (more >= -CHANCE and one.objective - other.objective >= sure)
 
@@ -100,49 +112,57 @@ def standard_error(gain: FloatArray, weight: FloatArray) -> float:
 
 
 def judge(configs: Sequence[Config], folds: Sequence[Sequence[Recording]]) -> Verdict:
-    """Track each fold with a configuration of its own and judge the causal table.
+    """Track each fold with a configuration of its own; the causal and the smoothed table count the same.
 
     Args:
         configs: one for each fold.
         folds: recordings with truth.
     """
-    return _judged(configs, folds, lambda config, detections: (track(config, detections),), ("causal",))
-
-
-def judge_both(config: Config, folds: Sequence[Sequence[Recording]]) -> Verdict:
-    """Track with one configuration and judge the causal and the smoothed table, which count the same.
-
-    Args:
-        config: of all folds.
-        folds: recordings with truth.
-    """
-    return _judged([config] * len(folds), folds, both_tables, ("causal", "smoothed"))
-
-
-def _judged(
-    configs: Sequence[Config],
-    folds: Sequence[Sequence[Recording]],
-    tables_of: Callable[[Config, Detections], tuple[Trajectories, ...]],
-    kinds: Sequence[Kind],
-) -> Verdict:
     accuracy, weight, fold, penalty = [], [], [], []
+    part_accuracy: list[float] = []
+    part_weight: list[float] = []
+    count = sum(len(recordings) for recordings in folds)
+    cuts = -(-_LEAST_FOR_CHANCE // count) if count else 1
     for k, (config, recordings) in enumerate(zip(configs, folds, strict=True)):
-        tables = [tables_of(config, detections) for detections, _ in recordings]
+        tables = [both_tables(own_picture(config, detections), detections) for detections, _ in recordings]
         for group in _with_truth(recordings):
-            scores = []
-            for c, kind in enumerate(kinds):
-                pairs = [(recordings[i][1], tables[i][c]) for i in group]
-                instants = [np.unique(recordings[i][0].scan_t) for i in group]
-                scores.append(evaluate(pairs, kind=kind, instants=instants if kind == "causal" else None))
-            if not scores[0].truth_boxes:
+            judged = [(recordings[i][1], tables[i], np.unique(recordings[i][0].scan_t)) for i in group]
+            mean, boxes = _accuracy(judged)
+            if not boxes:
                 continue
-            accuracy.append(float(np.mean([s.MOTA + s.IDF1 + s.HOTA for s in scores])) / 3.0)
-            weight.append(float(scores[0].truth_boxes))
+            accuracy.append(mean)
+            weight.append(float(boxes))
             fold.append(k)
-        for c, kind in enumerate(kinds):
+            parts = [(mean, boxes)]
+            if cuts > 1:
+                parts = [
+                    _accuracy([(truth, part, at)])
+                    for whole, pair, at in judged
+                    for truth, part in in_parts(whole, pair, cuts)
+                ]
+            part_accuracy += [mean for mean, boxes in parts]
+            part_weight += [float(boxes) for _, boxes in parts]
+        for c, kind in enumerate(_KINDS):
             pairs = [(truth, one[c]) for (_, truth), one in zip(recordings, tables, strict=True)]
             penalty.append(consistency_penalty(position_nees(pairs, kind).anees))
-    return Verdict(np.array(accuracy), np.array(weight), np.array(fold), float(np.mean(penalty)))
+    return Verdict(
+        np.array(accuracy),
+        np.array(weight),
+        np.array(fold),
+        float(np.mean(penalty)),
+        np.array(part_accuracy),
+        np.array(part_weight),
+    )
+
+
+def _accuracy(judged: Sequence[tuple[GroundTruth, Sequence[Trajectories], FloatArray]]) -> tuple[float, int]:
+    """Mean of the scores of both tables (per cent), and how many boxes there are to find."""
+    scores = []
+    for c, kind in enumerate(_KINDS):
+        pairs = [(truth, tables[c]) for truth, tables, _ in judged]
+        instants = [at for _, _, at in judged] if kind == "causal" else None
+        scores.append(evaluate(pairs, kind=kind, instants=instants))
+    return float(np.mean([s.MOTA + s.IDF1 + s.HOTA for s in scores])) / 3.0, scores[0].truth_boxes
 
 
 def _with_truth(recordings: Sequence[Recording]) -> list[list[int]]:

@@ -22,6 +22,11 @@ _SAME_RATE = 1.1
 _NEAR, _COMPANY, _COMPANY_SHARE, _FEW = 0.5, 3, 5e-4, 10
 # Left and width are each rounded where boxes are written, and their sum may lie that far outside the picture.
 _ROUNDING_PX = 0.05
+# So many boxes that end within so little of each other (px), and begin at places that differ by more, are cut
+# by the picture's edge, and no parked vehicle.
+_PILE, _PILE_PX, _BEGIN_PX = 5, 0.5, 10.0
+# Edges of two recordings that are as near to each other (px) are those of pictures of one size.
+_SAME_EDGE_PX = 2.0
 # Fewer scans do not tell a clock.
 LEAST_SCANS = 3
 
@@ -58,12 +63,32 @@ def fit_input(config: Config, *recordings: Detections) -> tuple[Config, list[str
 
 
 def fit_picture(config: Config, recordings: Sequence[Detections]) -> Config:
-    """Let the picture reach as far as the boxes of some recordings do (whole px)."""
-    reach = [d.boxes[:, :2] + d.boxes[:, 2:] for d in recordings if len(d)]
-    if not reach:
+    """Let the picture reach as far as the boxes of some recordings do (whole px).
+
+    Where several have pictures of different sizes it stays to be seen of each (`input.picture`); until then
+    it is the largest.
+    """
+    filled = [d.boxes for d in recordings if len(d)]
+    if not filled:
         return config
-    width, height = (max(math.ceil(_farthest(v) - _ROUNDING_PX), 1) for v in np.concatenate(reach).T)
-    return as_config(config, (width, height))
+    reach = np.concatenate([boxes[:, :2] + boxes[:, 2:] for boxes in filled])
+    sides = [max(math.ceil(_farthest(v) - _ROUNDING_PX), 1) for v in reach.T]
+    fitted = as_config(config, (sides[0], sides[1]))
+    differ = any(_ends_before(boxes[:, k], boxes[:, 2 + k], sides[k]) for boxes in filled for k in range(2))
+    return replace(fitted, input=replace(fitted.input, picture="seen")) if differ else fitted
+
+
+def own_picture(config: Config, recording: Detections) -> Config:
+    """Fit the picture to one recording, if its size is still to be seen (`input.picture`)."""
+    return fit_picture(config, [recording]) if config.input.picture == "seen" else config
+
+
+def _ends_before(begin: FloatArray, side: FloatArray, size: float) -> bool:
+    """Whether boxes (N,) pile up at an edge that lies before the end of a picture of some size."""
+    reach = begin + side
+    edge = _farthest(reach)
+    piled = begin[np.abs(reach - edge) <= _PILE_PX]
+    return edge < size - _SAME_EDGE_PX and len(piled) >= _PILE and bool(np.ptp(piled) > _BEGIN_PX)
 
 
 def _farthest(reach: FloatArray) -> float:

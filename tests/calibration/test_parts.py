@@ -2,11 +2,13 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from jeat_graph.calibration import parts as module
 from jeat_graph.calibration.parts import PARTS, choose_parts, with_parts
 from jeat_graph.calibration.supervised import calibrate, measure_sensors, with_sensors
+from jeat_graph.calibration.verdict import Verdict
 from jeat_graph.config.reading import load_config
 from jeat_graph.runs.declaring import fit_input
 
@@ -74,3 +76,24 @@ def test_a_part_that_does_worse_on_the_other_half_goes_back_to_the_base(recordin
     births = next(choice for choice in choices if choice.part == "births")
     assert not births.kept
     assert births.gain < -10.0
+
+
+@pytest.mark.parametrize(
+    ("scores", "kept", "gains"),
+    [
+        # All of them win over the base, and win more without the births.
+        ({"": 50.0, "nsrb": 60.0, "srb": 40.0, "nrb": 55.0, "nsb": 52.0, "nsr": 63.0}, "nsr", (20, 5, 8, -3)),
+        # Together they lose; the reliability alone wins.
+        ({"": 50.0, "nsrb": 40.0, "n": 45.0, "s": 49.0, "r": 53.0, "rb": 52.0}, "r", (-5, -1, 3, -1)),
+    ],
+)
+def test_the_base_stays_but_for_what_wins(scores, kept, gains):
+    def verdict(some):
+        score = scores["".join("nsrb"[k] for k, part in enumerate(PARTS) if part in some)]
+        each = np.full(6, score)
+        return Verdict(each, np.ones(6), np.arange(6) % 2, 0.0, each, np.ones(6))
+
+    found, choices = module._choose(verdict, lambda _: None)
+    assert found == [part for k, part in enumerate(PARTS) if "nsrb"[k] in kept]
+    assert [choice.gain for choice in choices] == pytest.approx(list(gains))
+    assert [choice.kept for choice in choices] == [part in found for part in PARTS]

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from jeat_graph.calibration.cuts import cut_truth, folds, shorten
 from jeat_graph.calibration.supervised import calibrate
-from jeat_graph.calibration.tune import cut_truth, folds, plateau, shorten, tune, tuned_settings
+from jeat_graph.calibration.tune import plateau, tune, tuned_settings
 from jeat_graph.calibration.verdict import Verdict, judge
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Detections
@@ -131,7 +132,7 @@ def test_a_setting_that_wins_on_one_half_only_is_not_chosen(recordings, monkeypa
         calls["parts"] += 1
         gain = configs[0].output.max_gap_scans - 0.5
         accuracy = np.array([50.0 + 10.0 * gain, 50.0 - gain])
-        return Verdict(accuracy, np.ones(2), np.arange(2), 0.0)
+        return Verdict(accuracy, np.ones(2), np.arange(2), 0.0, accuracy, np.ones(2))
 
     monkeypatch.setattr(module, "judge", judged)
     chosen, _ = tune(start, recordings[:1], passes=1)
@@ -143,8 +144,9 @@ def test_a_value_that_the_base_brings_along_stays_where_no_other_does_better(rec
     from jeat_graph.calibration import tune as module
 
     start = load_config("default")
+    same = np.full(2, 50.0)
     monkeypatch.setattr(
-        module, "judge", lambda configs, parts: Verdict(np.full(2, 50.0), np.ones(2), np.arange(2), 0.0)
+        module, "judge", lambda configs, parts: Verdict(same, np.ones(2), np.arange(2), 0.0, same, np.ones(2))
     )
     assert tune(start, recordings[:1], passes=1) == (start, tune(start, recordings[:1], passes=1)[1])
 

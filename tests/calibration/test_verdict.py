@@ -6,13 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph import load_config
-from jeat_graph.calibration.tune import folds, shorten
-from jeat_graph.calibration.verdict import Verdict, better, judge, judge_both, standard_error
+from jeat_graph.calibration.cuts import folds, shorten
+from jeat_graph.calibration.verdict import Verdict, better, judge, standard_error
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.eval.metrics import evaluate
-from jeat_graph.tracking.whole import track
+from jeat_graph.runs.declaring import own_picture
+from jeat_graph.tracking.whole import both_tables
 
 LEAST = 0.1
 
@@ -20,7 +21,8 @@ LEAST = 0.1
 def verdict(accuracy, penalty=0.0, weight=None):
     count = len(accuracy)
     weights = np.ones(count) if weight is None else np.asarray(weight, dtype=float)
-    return Verdict(np.asarray(accuracy, dtype=float), weights, np.arange(count) % 2, penalty)
+    accuracies = np.asarray(accuracy, dtype=float)
+    return Verdict(accuracies, weights, np.arange(count) % 2, penalty, accuracies, weights)
 
 
 def test_a_gain_on_every_recording_is_better():
@@ -70,13 +72,38 @@ def test_two_are_never_better_than_each_other(one, other, penalty, other_penalty
     assert not (better(a, b, LEAST) and better(b, a, LEAST))
 
 
-def test_accuracy_is_the_mean_of_three_scores_of_each_recording(recordings):
+def test_accuracy_is_the_mean_of_three_scores_of_both_tables_of_each_recording(recordings):
     config, parts = load_config("default"), folds(shorten(recordings, 300))
     found = judge([config] * len(parts), parts)
     for k, (detections, truth) in enumerate([one for part in parts for one in part]):
-        s = evaluate([(truth, track(config, detections))], instants=[np.unique(detections.scan_t)])
-        assert found.accuracy[k] == pytest.approx((s.MOTA + s.IDF1 + s.HOTA) / 3.0)
+        causal, smoothed = both_tables(own_picture(config, detections), detections)
+        s = evaluate([(truth, causal)], instants=[np.unique(detections.scan_t)])
+        later = evaluate([(truth, smoothed)], kind="smoothed")
+        total = s.MOTA + s.IDF1 + s.HOTA + later.MOTA + later.IDF1 + later.HOTA
+        assert found.accuracy[k] == pytest.approx(total / 6.0)
         assert found.weight[k] == s.truth_boxes
+
+
+def test_few_recordings_are_judged_by_the_spread_over_parts_of_their_time(recordings):
+    config, parts = load_config("default"), folds(shorten(recordings[:1], 300))
+    found = judge([config] * len(parts), parts)
+    assert len(found.accuracy) == 2
+    assert len(found.part_accuracy) == 6
+    assert found.part_weight.sum() == found.weight.sum(), "each true box is in one part"
+    assert found.part_weight.max() < 2.0 * found.part_weight.min()
+    many = [(detections, truth) for detections, truth in shorten(recordings[:1], 60)] * 6
+    of_many = judge([config, config], [many[:3], many[3:]])
+    np.testing.assert_array_equal(of_many.part_accuracy, of_many.accuracy)
+
+
+def test_a_gain_that_the_parts_of_the_time_disagree_about_is_chance():
+    def one_recording(parts):
+        both = np.array([np.mean(parts[:3]), np.mean(parts[3:])])
+        return Verdict(both, np.ones(2), np.arange(2), 0.0, np.asarray(parts, dtype=float), np.ones(6))
+
+    now = one_recording([80.0] * 6)
+    assert better(one_recording([81.0] * 6), now, LEAST)
+    assert not better(one_recording([85.0, 72.0, 88.0, 73.0, 84.0, 87.0]), now, LEAST)
 
 
 def test_nothing_to_find_is_no_verdict():
@@ -98,7 +125,7 @@ def test_a_recording_without_a_vehicle_is_judged_with_the_one_before(recordings)
         ignore=np.zeros(0, dtype=bool),
         frames=np.unique(t),
     )
-    alone = judge_both(config, [[busy]])
-    both = judge_both(config, [[busy, (false, nothing)]])
+    alone = judge([config], [[busy]])
+    both = judge([config], [[busy, (false, nothing)]])
     assert len(both.accuracy) == len(alone.accuracy) == 1
     assert both.mean < alone.mean

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from jeat_graph.calibration.procedure import calibrate_without_truth
-from jeat_graph.config.reading import as_config, load_config
+from jeat_graph.config.reading import as_config, config_to_dict, load_config
 from jeat_graph.data.detections import Detections
-from jeat_graph.runs.declaring import fit_input
+from jeat_graph.runs.declaring import fit_input, own_picture
 
 
 def recording(boxes: np.ndarray) -> Detections:
@@ -66,6 +68,37 @@ def test_blind_calibration_finds_the_rate_of_one_camera_in_two_recordings():
     base = as_config(load_config("default"), (1280, 720))
     found = calibrate_without_truth([camera(0.0), camera(0.02)], base).config
     assert found.sensors["cam"].rate_hz == pytest.approx(20.0)
+
+
+def leaving(width):
+    """Vehicles that leave a picture of some width on the right, cut where it ends."""
+    left = np.linspace(100.0, width - 5.0, 60)
+    boxes = np.column_stack([left, np.full(60, 200.0), np.minimum(200.0, width - left), np.full(60, 40.0)])
+    return Detections.from_rows(np.arange(60) / 20.0, np.full(60, "cam"), boxes, np.full(60, 0.9))
+
+
+def test_pictures_of_several_sizes_stay_to_be_seen():
+    base, small, large = load_config("default"), leaving(1224.0), leaving(1242.0)
+    both = fit_input(base, small, large)[0]
+    assert (both.input.picture, both.image.width) == ("seen", 1242.0)
+    assert own_picture(both, small).image.width == 1224.0
+    assert own_picture(both, large).image.width == 1242.0
+    assert fit_input(base, large, large)[0].input.picture == "given"
+    # One in which nothing comes to the edge says nothing of the size, nor does a vehicle parked there.
+    assert fit_input(base, camera(0.0), large)[0].input.picture == "given"
+    parked = camera(0.0)
+    parked = replace(parked, boxes=np.tile([200.0, 200.0, 40.0, 30.0], (40, 1)))
+    assert fit_input(base, parked, large)[0].input.picture == "given"
+
+
+def test_calibration_keeps_to_what_each_recording_shows_of_its_picture():
+    found = calibrate_without_truth([leaving(1224.0), leaving(1242.0)], load_config("default")).config
+    assert found.input.picture == "seen"
+    assert "width" not in config_to_dict(found)["image"]
+    given = calibrate_without_truth(
+        [leaving(1224.0), leaving(1242.0)], as_config(load_config("default"), (1242, 375))
+    )
+    assert (given.config.input.picture, given.config.image.width) == ("given", 1242.0)
 
 
 def test_sensors_of_any_of_the_recordings_are_declared():
