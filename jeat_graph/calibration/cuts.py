@@ -110,6 +110,12 @@ def in_parts(
     ends = np.append(ends[:-1], np.inf)
     out = []
     for start, end in zip(starts, ends, strict=True):
-        kept = [one.take((one.t > start - _BEFORE_S) & (one.t <= end + _BEFORE_S)) for one in tables]
-        out.append((cut_truth(truth, float(start), float(end)), kept))
+        part = cut_truth(truth, float(start), float(end))
+        frames = part.frame_times()
+        kept = []
+        for one in tables:
+            near = (one.t > start - _BEFORE_S) & (one.t <= end + _BEFORE_S)
+            # Rows before or after all of its frames say nothing in this part.
+            kept.append(one.take(near & np.any((one.t >= frames[0]) & (one.t <= frames[-1]))))
+        out.append((part, kept))
     return out

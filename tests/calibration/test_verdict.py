@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph import load_config
-from jeat_graph.calibration.cuts import folds, shorten
+from jeat_graph.calibration.cuts import cut_scans, folds, shorten
 from jeat_graph.calibration.verdict import Verdict, better, judge, standard_error
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
@@ -94,6 +94,15 @@ def test_few_recordings_are_judged_by_the_spread_over_parts_of_their_time(record
     many = [(detections, truth) for detections, truth in shorten(recordings[:1], 60)] * 6
     of_many = judge([config, config], [many[:3], many[3:]])
     np.testing.assert_array_equal(of_many.part_accuracy, of_many.accuracy)
+
+
+def test_a_part_of_the_time_in_which_nothing_was_tracked_counts_as_missed(recordings):
+    config, (detections, truth) = load_config("default"), shorten(recordings[:1], 300)[0]
+    late = 0.5 * (detections.scan_t[0] + detections.scan_t[-1])
+    boxes = [np.flatnonzero(detections.scan_t > late)[0], detections.num_scans]
+    found = judge([config], [[(cut_scans(detections, *boxes), truth)]])
+    assert len(found.part_accuracy) == 6
+    assert found.part_accuracy[0] == 0.0 < found.part_accuracy[-1]
 
 
 def test_a_gain_that_the_parts_of_the_time_disagree_about_is_chance():
