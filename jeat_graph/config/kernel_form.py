@@ -21,7 +21,7 @@ _SCALARS = (bool, int, float)
 
 
 def _members(section: type[Any]) -> dict[str, type[Any]]:
-    """Names and types of the numbers and flags of a section, declared or derived, in their order."""
+    """Names and types of a section's numbers and flags, declared or derived, in their order."""
     hints = typing.get_type_hints(section)
     declared = {f.name: hints[f.name] for f in fields(section)}
     derived = {
@@ -50,8 +50,10 @@ def _tuple_class(name: str, members: dict[str, type[Any]]) -> type[Any]:
     return made
 
 
+# Types are written as texts in the schema; to resolve them anew for every tracker took most of its setup.
+_MEMBERS = {section: _members(section) for section in (Config, SensorConfig, *_sections().values())}
 _SECTION_TUPLES = {
-    name: _tuple_class(section.__name__.replace("Config", "Settings"), _members(section))
+    name: _tuple_class(section.__name__.replace("Config", "Settings"), _MEMBERS[section])
     for name, section in _sections().items()
 }
 
@@ -59,7 +61,7 @@ if TYPE_CHECKING:
     # The tuples have the names and types of the schema, so a kernel's use of a setting is checked against it.
     Settings = NewType("Settings", Config)
 else:
-    Settings = _tuple_class("Settings", {**_SECTION_TUPLES, **_members(Config)})
+    Settings = _tuple_class("Settings", {**_SECTION_TUPLES, **_MEMBERS[Config]})
 
 
 class SensorArrays(NamedTuple):
@@ -157,7 +159,7 @@ def sensor_arrays(config: Config) -> SensorArrays:
     error, correlation_time_s = error_states(sensors)
     same = {
         name: np.array([getattr(s, name) for s in sensors], dtype=np.float64)
-        for name in _members(SensorConfig)
+        for name in _MEMBERS[SensorConfig]
         if name in SensorArrays._fields
     }
     lifecycle = config.lifecycle
@@ -184,7 +186,7 @@ def kernel_settings(config: Config) -> Settings:
     """
 
     def values(source: Any) -> dict[str, Any]:
-        return {name: kind(getattr(source, name)) for name, kind in _members(type(source)).items()}
+        return {name: kind(getattr(source, name)) for name, kind in _MEMBERS[type(source)].items()}
 
     sections = {name: made(**values(getattr(config, name))) for name, made in _SECTION_TUPLES.items()}
     make: Any = Settings

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import difflib
+import functools
 import re
 import types
 import typing
@@ -15,6 +17,9 @@ import yaml
 
 from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.data.errors import ConfigError
+
+# Types of the fields of each kind of section, as `_types_of` has found them.
+_TYPES: dict[type[Any], dict[str, Any]] = {}
 
 
 def read_tree(
@@ -49,7 +54,7 @@ def read_tree(
         except (OSError, UnicodeDecodeError) as error:
             raise ConfigError(f"{source}: cannot be read: {error}") from None
     try:
-        tree = load_yaml(text)
+        tree = copy.deepcopy(_named_tree(text)) if source in names else load_yaml(text)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         place = f"{source}:{mark.line + 1}" if mark is not None else source
@@ -62,6 +67,12 @@ def read_tree(
     if not isinstance(base, str):
         raise ConfigError(f"{source}: `base` must be the name of a {kind} or file")
     return merge(read_tree(base, names, text_of, kind, (*seen, source)), tree)
+
+
+@functools.cache
+def _named_tree(text: str) -> Any:
+    """The tree of what comes with the package: a few texts, each read once (only to copy)."""
+    return load_yaml(text)
 
 
 def merge(low: Mapping[str, Any], high: Mapping[str, Any]) -> dict[str, Any]:
@@ -131,7 +142,7 @@ def build(kind: type[Any], tree: Any, where: str) -> Any:
         tree = {}
     if not isinstance(tree, Mapping):
         raise ConfigError(f"{where[:-1]}: must hold `key: value` lines, not {_short(tree)}")
-    hints = typing.get_type_hints(kind)
+    hints = _types_of(kind)
     check_keys(tree, list(hints), where)
     values = {key: convert(hints[key], value, where + str(key)) for key, value in tree.items()}
     try:
@@ -139,6 +150,13 @@ def build(kind: type[Any], tree: Any, where: str) -> Any:
     except ConfigError as error:
         # A section names its fields without knowing where it stands (`fields.check`).
         raise ConfigError(f"{where}{error}") from None
+
+
+def _types_of(kind: type[Any]) -> dict[str, Any]:
+    """Types of a dataclass's fields, made from their texts once (only to read)."""
+    if kind not in _TYPES:
+        _TYPES[kind] = typing.get_type_hints(kind)
+    return _TYPES[kind]
 
 
 def convert(hint: Any, value: Any, where: str) -> Any:
