@@ -155,14 +155,10 @@ def _truth_between(
     """Truth at `t` between two frames: boxes (G, 4), ids (G,), ignored (G,) and image speed (G,)."""
     a = order[start[left] : stop[left]]
     b = order[start[right] : stop[right]]
-    ids, ia, ib = np.intersect1d(truth.object_id[a], truth.object_id[b], return_indices=True)
-    # Ids of ignored regions need not be unique in a frame; those without a partner are held still.
     if left == right:
-        a, ids = order[start[left] : stop[left]], truth.object_id[order[start[left] : stop[left]]]
-        boxes = truth.boxes[a]
-        ignored = truth.ignore[a]
-        centre_speed = _speed(truth, a)
-        return boxes, ids, ignored, centre_speed
+        return truth.boxes[a], truth.object_id[a], truth.ignore[a], _speed(truth, a)
+    # Ids of ignored regions need not be unique in a frame; those without a partner are held still.
+    ids, ia, ib = np.intersect1d(truth.object_id[a], truth.object_id[b], return_indices=True)
     span = frames[right] - frames[left]
     f = (t - frames[left]) / span
     boxes = (1.0 - f) * truth.boxes[a[ia]] + f * truth.boxes[b[ib]]

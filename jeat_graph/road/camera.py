@@ -136,13 +136,15 @@ class RoadCamera:
 
     def rays(self, pixels: FloatArray) -> FloatArray:
         """Directions (..., 3) in the road's axes of what pixels (..., 2) show; not of unit length."""
-        d = (pixels - [self.cx, self.cy]) / [self.fx, self.fy]
-        n = d.copy()
+        n = (pixels - [self.cx, self.cy]) / [self.fx, self.fy]
         if self.k1 or self.k2:
+            seen2 = n[..., 0] ** 2 + n[..., 1] ** 2
+            inward = np.ones_like(seen2)  # distortion is radial: all that is sought is one factor a pixel
             for _ in range(_UNDISTORT_STEPS):
-                r2 = (n**2).sum(axis=-1, keepdims=True)
-                n = d / (1.0 + self.k1 * r2 + self.k2 * r2**2)
-        return np.concatenate([n, np.ones((*n.shape[:-1], 1))], axis=-1) @ self.rotation
+                r2 = seen2 * inward**2
+                inward = 1.0 / (1.0 + r2 * (self.k1 + self.k2 * r2))
+            n = n * inward[..., None]
+        return np.asarray(n @ self.rotation[:2] + self.rotation[2], dtype=np.float64)
 
     def to_road(self, pixels: FloatArray, height_m: float | FloatArray = 0.0) -> FloatArray:
         """Places (..., 2) in m that pixels (..., 2) show, if what they show is `height_m` above the road.

@@ -49,6 +49,7 @@ def test_good_evidence_gives_the_camera_back() -> None:
     assert found.fx == pytest.approx(2600.0, rel=0.03)
 
 
+@pytest.mark.slow
 def test_scale_error_is_within_its_spread() -> None:
     """Monte Carlo: the error of a distance over its stated standard deviation is of size one."""
     ratios = []

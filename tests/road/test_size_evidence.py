@@ -68,6 +68,7 @@ def test_a_box_cut_by_the_edge_does_not_count() -> None:
     assert (tracks.sides[whole][:, 2] < WIDTH).all()
 
 
+@pytest.mark.slow
 def test_sizes_alone_calibrate_a_camera_as_well_as_they_say(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -53,6 +53,7 @@ def test_truth_does_not_depend_on_the_light() -> None:
     assert np.array_equal(day.boxes, dark.boxes)
 
 
+@pytest.mark.slow
 def test_average_precision_matches_the_detector_table_of_the_paper() -> None:
     pairs: dict[tuple[str, str], list[tuple[Detections, GroundTruth]]] = {}
     for name in ("day", "night", "night-nolight"):

@@ -321,6 +321,7 @@ def test_hostile_names_of_sensors_and_files_stay_text(tmp_path, report):
     assert "run<b>&amp; 1 tracks" in html.said
 
 
+@pytest.mark.slow
 def test_many_long_tracks_stay_below_five_megabytes(tmp_path, report):
     tracks, steps = 50, 3000
     rng = np.random.default_rng(1)
