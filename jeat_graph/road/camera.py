@@ -19,8 +19,6 @@ from jeat_graph.data.errors import DataError
 # What the covariance is about, in this order: logarithm of the focal length, logarithm of fy / fx, principal
 # point (px), radial distortion, a small turn of the camera about its own axes X, Y, Z (rad), its place (m).
 PARAMETERS = ("log_f", "log_aspect", "cx", "cy", "k1", "k2", "turn_x", "turn_y", "turn_z", "x", "y", "z")
-# Steps of the numerical derivatives, about the square root of the precision times each parameter's size.
-_STEP = np.array([1e-5, 1e-5, 1e-2, 1e-2, 1e-5, 1e-5, 1e-6, 1e-6, 1e-6, 1e-4, 1e-4, 1e-4])
 _UNDISTORT_STEPS = 6
 
 
@@ -199,15 +197,29 @@ class RoadCamera:
         )
 
     def calibration_jacobian(self, pixels: FloatArray, height_m: float | FloatArray = 0.0) -> FloatArray:
-        """Derivative (..., 2, 12) of `to_road` with respect to `PARAMETERS`, by central differences."""
-        columns = []
-        for k, step in enumerate(_STEP):
-            change = np.zeros(len(PARAMETERS))
-            change[k] = step
-            ahead = self.moved(change).to_road(pixels, height_m)
-            change[k] = -step
-            columns.append((ahead - self.moved(change).to_road(pixels, height_m)) / (2.0 * step))
-        return np.stack(columns, axis=-1)
+        """Derivative (..., 2, 12) of `to_road` with respect to `PARAMETERS`; NaN in the sky.
+
+        Of the implicit function: the place moves so that its pixel stays where it is.
+        """
+        xy = self.to_road(pixels, height_m)
+        z = np.broadcast_to(np.asarray(height_m, dtype=np.float64), xy.shape[:-1])
+        points = np.concatenate([xy, z[..., None]], axis=-1)
+        local = (points - self.position) @ self.rotation.T
+        n = local[..., :2] / local[..., 2:]
+        r2 = (n**2).sum(axis=-1, keepdims=True)
+        straight = n * [self.fx, self.fy]
+        by_point = self.jacobian(points)
+        by_turn = np.cross(np.eye(3), local[..., None, :])  # rows: about x, y, z
+
+        by_change = np.zeros((*xy.shape, len(PARAMETERS)))
+        by_change[..., 0] = straight * (1.0 + self.k1 * r2 + self.k2 * r2**2)
+        by_change[..., 1, 1] = by_change[..., 1, 0]
+        by_change[..., 0, 2] = by_change[..., 1, 3] = 1.0
+        by_change[..., 4] = straight * r2
+        by_change[..., 5] = straight * r2**2
+        by_change[..., 6:9] = by_point @ self.rotation.T @ np.swapaxes(by_turn, -1, -2)
+        by_change[..., 9:] = -by_point
+        return np.asarray(-np.linalg.solve(by_point[..., :2], by_change), dtype=np.float64)
 
     def angles(self) -> tuple[float, float, float]:
         """Pitch (downward), yaw (to the right) and roll (clockwise) of the camera against the road, rad."""

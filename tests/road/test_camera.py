@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -62,15 +63,27 @@ def test_jacobians_are_finite_differences() -> None:
         np.testing.assert_allclose(J[:, axis], want, rtol=1e-4, atol=1e-8)
 
 
-def test_calibration_jacobian_predicts_a_moved_camera() -> None:
-    cam = camera()
-    pixel = see(cam, np.array([[2.0, 35.0]]))
-    J = cam.calibration_jacobian(pixel)[0]
-    for k, size in enumerate([1e-4, 1e-4, 0.1, 0.1, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-3, 1e-3, 1e-3]):
+def test_calibration_jacobian_is_central_differences_of_moved_cameras() -> None:
+    # About the cube root of the precision times the size of each parameter.
+    steps = [1e-5, 1e-5, 1e-2, 1e-2, 1e-5, 1e-5, 1e-6, 1e-6, 1e-6, 1e-4, 1e-4, 1e-4]
+    cam = replace(camera(), k1=-0.08, k2=0.02)
+    pixels, height = see(cam, np.array([[[2.0, 35.0], [-3.0, 20.0]], [[8.0, 60.0], [0.5, 90.0]]])), 0.4
+    J = cam.calibration_jacobian(pixels, height)
+    assert J.shape == (2, 2, 2, len(PARAMETERS))
+    for k, step in enumerate(steps):
         change = np.zeros(len(PARAMETERS))
-        change[k] = size
-        moved = cam.moved(change).to_road(pixel)[0] - cam.to_road(pixel)[0]
-        np.testing.assert_allclose(moved, J[:, k] * size, rtol=2e-2, atol=1e-7)
+        change[k] = step
+        ahead, behind = (cam.moved(sign * change).to_road(pixels, height) for sign in (1.0, -1.0))
+        want = (ahead - behind) / (2.0 * step)
+        np.testing.assert_allclose(J[..., k], want, rtol=1e-4, atol=1e-5 * np.abs(want).max())
+
+
+def test_calibration_jacobian_of_the_sky_is_nan() -> None:
+    cam = camera()
+    pixels = np.array([see(cam, np.array([[2.0, 35.0]]))[0], [cam.cx, -1e4]])
+    J = cam.calibration_jacobian(pixels)
+    assert np.isfinite(J[0]).all()
+    assert np.isnan(J[1]).all()
 
 
 def test_turn_is_opencvs_rodrigues() -> None:
