@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.frames import Kind, build_frames
 from jeat_graph.eval.matching import matched_entries
@@ -30,8 +31,24 @@ class PositionNees(NamedTuple):
     matched: int
 
 
-def position_nees(pairs: Sequence[tuple[GroundTruth, Trajectories]], kind: Kind = "causal") -> PositionNees:
-    """Judge the position's variances of tables against truth, pooled.
+class PositionErrors(NamedTuple):
+    """Matched boxes and how far they are off.
+
+    Attributes:
+        error: (K, 2) of the centre (px).
+        var: (K, 2) what the table says of it (px²).
+        area: (K,) of the true box (px²).
+    """
+
+    error: FloatArray
+    var: FloatArray
+    area: FloatArray
+
+
+def position_errors(
+    pairs: Sequence[tuple[GroundTruth, Trajectories]], kind: Kind = "causal"
+) -> PositionErrors:
+    """Match tables with truth, pooled, and compare the centres.
 
     Only matched boxes that keep off the edges of the picture count: the truth of a box that is cut is the
     part that shows. The picture is taken to reach as far as the truth does.
@@ -40,7 +57,7 @@ def position_nees(pairs: Sequence[tuple[GroundTruth, Trajectories]], kind: Kind 
         pairs: truth and table of each recording.
         kind: how the tables are put beside the truth (`frames.build_frames`).
     """
-    squares = [np.zeros((0, 2))]
+    columns = [(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0))]
     for truth, table in pairs:
         frames = build_frames(truth, table, kind=kind)
         there, track = matched_entries(frames.iou, _MATCH_IOU)
@@ -50,8 +67,19 @@ def position_nees(pairs: Sequence[tuple[GroundTruth, Trajectories]], kind: Kind 
         inside = (box[:, :2] > _EDGE_PX).all(axis=1) & (far[:, 0] < width - _EDGE_PX)
         inside &= far[:, 1] < height - _EDGE_PX
         error = frames.tracks.mean[track, :2] - (box[:, :2] + 0.5 * box[:, 2:])
-        squares.append((error**2 / frames.tracks.var[track, :2])[inside])
-    total = np.concatenate(squares).sum(axis=1)
+        columns.append((error[inside], frames.tracks.var[track, :2][inside], box[inside, 2:].prod(axis=1)))
+    return PositionErrors(*(np.concatenate(parts) for parts in zip(*columns, strict=True)))
+
+
+def position_nees(pairs: Sequence[tuple[GroundTruth, Trajectories]], kind: Kind = "causal") -> PositionNees:
+    """Judge the position's variances of tables against truth, pooled.
+
+    Args:
+        pairs: truth and table of each recording.
+        kind: how the tables are put beside the truth (`frames.build_frames`).
+    """
+    found = position_errors(pairs, kind)
+    total = np.sum(found.error**2 / found.var, axis=1)
     if not len(total):
         return PositionNees(np.nan, np.nan, 0)
     return PositionNees(float(total.mean() / 2.0), float(np.mean(total < _ELLIPSE_95)), len(total))

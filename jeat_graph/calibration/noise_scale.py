@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from jeat_graph.calibration.supervised import Recording
-from jeat_graph.calibration.verdict import CHANCE, Verdict, judge
+from jeat_graph.calibration.verdict import CHANCE, Verdict, better, judge
 from jeat_graph.config.schema import Config
 
 #: Factors on the standard deviation of the centre's noise that are tried.
@@ -26,8 +26,8 @@ def with_noise(config: Config, factor: float) -> Config:
 def scale_noise(config: Config, folds: Sequence[Sequence[Recording]]) -> tuple[Config, float, Verdict]:
     """Choose the factor on the noise of the centre with which both tables are best and consistent.
 
-    Of the factors that cost no accuracy beyond chance it is the one with the greatest objective: accuracy
-    less the penalty for variances that are not true.
+    It stays at 1 unless another does better by more than chance (`verdict.better`); of those the one with the
+    greatest objective is taken: accuracy less the penalty for variances that are not true.
 
     Args:
         config: calibrated.
@@ -39,6 +39,6 @@ def scale_noise(config: Config, folds: Sequence[Sequence[Recording]]) -> tuple[C
     # Of two as good the one nearer to what was measured.
     tried = sorted(FACTORS, key=lambda factor: abs(math.log(factor)))
     verdicts = [judge([with_noise(config, factor)] * len(folds), folds) for factor in tried]
-    free = [k for k, one in enumerate(verdicts) if one.mean >= verdicts[0].mean - CHANCE]
-    best = max(free, key=lambda k: (verdicts[k].objective, -k))
+    surer = [k for k, one in enumerate(verdicts) if better(one, verdicts[0], CHANCE, 2.0)]
+    best = max([0, *surer], key=lambda k: (verdicts[k].objective, -k))
     return with_noise(config, tried[best]), tried[best], verdicts[best]

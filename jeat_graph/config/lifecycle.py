@@ -282,3 +282,11 @@ class OutputConfig(Section):
     min_visible: float = number(
         0.3, "1", "reported only if this fraction of the box lies in the picture", 0.0, 1.0
     )
+    lasting_error: float = number(
+        0.0,
+        "1",
+        "standard deviation of what a vehicle's boxes are off by as long as it is seen, as a share of "
+        "sqrt(width height); it adds to the variances of positions in the tables, and to nothing else",
+        0.0,
+        1.0,
+    )

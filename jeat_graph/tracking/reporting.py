@@ -196,6 +196,7 @@ def columns_of(
             for d in range(3):
                 mean[r, 2 * d + axis] = tracks.mean[i, axis, d]
                 var[r, 2 * d + axis] = tracks.cov[i, axis, d, d]
+            var[r, axis] += output.lasting_error * output.lasting_error * boxes[r, 2] * boxes[r, 3]
     return (
         np.full(len(rows), t),
         tracks.track_id[rows],

@@ -48,14 +48,15 @@ def rows_of(
         shown = observed.used != 0 if config.image.edge_px > 0.0 else np.zeros(len(t), dtype=bool)
         inside: BoolArray = (visible > 0.0) & ((visible >= config.output.min_visible) | shown)
         keep = slice(None) if inside.all() else inside
-    var = np.diagonal(cov, axis1=2, axis2=3)
+    var = np.diagonal(cov, axis1=2, axis2=3).transpose(0, 2, 1).reshape(-1, 6).copy()
+    var[:, :2] += config.output.lasting_error**2 * np.prod(size, axis=1)[:, None]
     return Trajectories(
         t=observed.t[keep],
         track_id=np.full(len(t), track_id, dtype=np.int64)[keep],
         boxes=boxes[keep],
         existence=existence[keep],
         mean=mean.transpose(0, 2, 1).reshape(-1, 6)[keep],
-        var=var.transpose(0, 2, 1).reshape(-1, 6)[keep],
+        var=var[keep],
         used=observed.used[keep],
         sensors=config.sensor_names,
         size_var=(size * size * log_var)[keep],
