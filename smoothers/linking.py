@@ -7,7 +7,8 @@ the greatest total log odds are joined, in one assignment over the whole recordi
 That two fragments agree says that they are of one *thing*. Whether it is a vehicle is another question, for
 what a detector wrongly takes for one it takes again and again, at the same place: a fragment whose hits and
 misses had it most likely for nothing when it was last seen is no vehicle that went on unseen, however well
-its return agrees.
+its return agrees. What has not left its place is told from nothing by hits and misses, and from such a false
+thing by what its detections look like alone; and a false thing needs nobody to hide it.
 
 Source: the tracklet linking of Huang, Wu, Nevatia, Robust Object Tracking by Hierarchical Association of
 Detection Responses, ECCV 2008, with the motion model's own densities.
@@ -29,6 +30,9 @@ FREEDOM = 8
 
 # Standard deviation, in sizes of the vehicle, up to which a fragment's place over the gap counts as known.
 _FORESEEN_SIZES = 1.25
+
+# So far from where it began, in sizes, a fragment has left the place: five times a usual error.
+_MOVED_SIZES = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +56,7 @@ class FragmentEnds:
         seen_s: (K,) for how long they had been seeing by then (s). Where the sensors see others, a vehicle
             is not hidden for long; where they see nothing, its silence says nothing.
         end_existence: (N,) probability, by all until then, that the fragment was a vehicle when last seen.
+        end_worth: (N,) the same by nothing but what its detections look like.
     """
 
     start_t: FloatArray
@@ -69,6 +74,7 @@ class FragmentEnds:
     seen_t: FloatArray
     seen_s: FloatArray
     end_existence: FloatArray
+    end_worth: FloatArray
 
 
 def seeing_time(t: FloatArray, longest_pause_s: float) -> tuple[FloatArray, FloatArray]:
@@ -147,20 +153,35 @@ def foreseeable(ends: FragmentEnds, first: IntArray, second: IntArray) -> BoolAr
     return np.asarray((spread <= (_FORESEEN_SIZES * size) ** 2).all(axis=0))
 
 
-def continuation_score(ratio: FloatArray, existence: FloatArray) -> FloatArray:
+def stay_in_place(ends: FragmentEnds, first: IntArray, second: IntArray) -> BoolArray:
+    """Mark the pairs (P,) of which no end is far from where the first fragment began."""
+    size = np.exp(0.5 * ends.end_size[first, :, 0].sum(axis=1))
+    began = ends.start_mean[first, :, 0]
+    others = ends.end_mean[first, :, 0], ends.start_mean[second, :, 0], ends.end_mean[second, :, 0]
+    way = np.stack([np.hypot(*(other - began).T) for other in others]).max(axis=0)
+    return np.asarray(way <= _MOVED_SIZES * size)
+
+
+def continuation_score(
+    ratio: FloatArray, existence: FloatArray, hidden: FloatArray, silent: FloatArray
+) -> FloatArray:
     """Log odds (P,) that a vehicle went on unseen, against a new vehicle or a false box that comes again.
 
-    With r the probability that the first fragment was a vehicle and L the likelihood ratio of one thing
-    against a new one: r L : (1 - r) L + 1. False things are taken to come back as often as vehicles do, so
-    agreement alone never makes a vehicle of one.
+    With r the probability that the first fragment was a vehicle, L the likelihood ratio of one thing against
+    a new one, and h and f the probabilities that a vehicle and a false thing are not seen in between:
+    r h L : (1 - r) f L + 1. False things come back as vehicles do, so agreement alone never makes a vehicle
+    of one.
 
     Args:
         ratio: (P,) ln L.
         existence: (P,) r.
+        hidden: (P,) ln h.
+        silent: (P,) ln f.
     """
     tiny = np.finfo(np.float64).tiny
     doubt = np.log(np.maximum(1.0 - existence, tiny))
-    return np.log(np.maximum(existence, tiny)) + ratio - np.logaddexp(doubt + ratio, 0.0)
+    vehicle = np.log(np.maximum(existence, tiny)) + hidden + ratio
+    return np.asarray(vehicle - np.logaddexp(doubt + silent + ratio, 0.0))
 
 
 def link(
@@ -189,8 +210,10 @@ def link(
         return before
     d2, ratio = pair_scores(ends, first, second, size_density)
     seen = np.interp(ends.start_t[second], ends.seen_t, ends.seen_s)
-    ratio -= (seen - np.interp(ends.end_t[first], ends.seen_t, ends.seen_s)) / hidden_s
-    score = continuation_score(ratio, ends.end_existence[first])
+    hidden = (np.interp(ends.end_t[first], ends.seen_t, ends.seen_s) - seen) / hidden_s
+    in_place = stay_in_place(ends, first, second)
+    existence = ends.end_existence[first] * np.where(in_place, ends.end_worth[first], 1.0)
+    score = continuation_score(ratio, existence, hidden, np.where(in_place, 0.0, hidden))
     keep = (d2 <= gate) & (score > 0.0) & foreseeable(ends, first, second)
     first, second, score = first[keep], second[keep], score[keep]
     if not len(first):

@@ -59,6 +59,7 @@ class TrackArrays(NamedTuple):
         lasting: (C,) whether it has lasted (`filters.worth`).
         last_box: (C, S, 5) each sensor's last whole box, as it saw it: time (s), centre (px), ln width and ln
             height.
+        worth: (C,) probability that what has such scores lasts, where one sensor alone has seen it; else 1.
         worthy: (C,) whether things of such scores last often enough to be believed of one sensor alone.
     """
 
@@ -91,6 +92,7 @@ class TrackArrays(NamedTuple):
     jerk_factor: FloatArray
     lasting: npt.NDArray[np.bool_]
     last_box: FloatArray
+    worth: FloatArray
     worthy: npt.NDArray[np.bool_]
 
 
@@ -261,6 +263,7 @@ def allocate(capacity: int, num_sensors: int, num_errors: int = 0, densities: in
         jerk_factor=np.ones(capacity),
         lasting=np.zeros(capacity, dtype=np.bool_),
         last_box=np.full((capacity, num_sensors, 5), -np.inf),
+        worth=np.ones(capacity),
         worthy=np.ones(capacity, dtype=np.bool_),
     )
 

@@ -24,6 +24,7 @@ class StepRecord(NamedTuple):
         births: how many of the tracks were born in it; they are the last ones.
         ids: (N,) identities, ascending.
         existence: (N,) probability of existence.
+        worth: (N,) probability that what one sensor alone sees with such scores is a vehicle; 1 elsewhere.
         used: (N,) bit k is set where a detection of sensor k was taken.
         confirmed: (N,) whether the track is confirmed.
         held: (N,) whether it is reported as standing still.
@@ -35,6 +36,7 @@ class StepRecord(NamedTuple):
     births: int
     ids: IntArray
     existence: FloatArray
+    worth: FloatArray
     used: IntArray
     confirmed: BoolArray
     held: BoolArray
@@ -72,6 +74,7 @@ def record_step(
         births,
         ids,
         np.where(tracks.worthy[:n], 1.0, _UNWORTHY) * tracks.existence[:n],
+        tracks.worth[:n].copy(),
         tracks.used[:n].copy(),
         tracks.confirmed[:n].copy(),
         held,

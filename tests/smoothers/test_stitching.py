@@ -19,6 +19,7 @@ from jeat_graph.smoothers.linking import (
     link,
     pair_scores,
     seeing_time,
+    stay_in_place,
 )
 
 from .conftest import noise, transition
@@ -26,7 +27,7 @@ from .conftest import noise, transition
 DENSITY = 0.5
 
 
-def fragments(starts, ends, rng, spread=20.0, existence=1.0):
+def fragments(starts, ends, rng, spread=20.0, existence=1.0, worth=1.0):
     """Fragments with random states; `starts` and `ends` are their times (N,)."""
     n = len(starts)
 
@@ -53,6 +54,7 @@ def fragments(starts, ends, rng, spread=20.0, existence=1.0):
         seen_t=np.array([0.0, 10.0]),
         seen_s=np.array([0.0, 10.0]),
         end_existence=np.full(n, existence),
+        end_worth=np.full(n, worth),
     )
 
 
@@ -135,27 +137,64 @@ def test_a_vehicle_is_not_hidden_for_long_while_others_are_seen():
     assert list(link_with.values()) == [0, -1]
 
 
-@given(st.floats(1e-6, 1.0 - 1e-6), st.floats(-30.0, 30.0))
-def test_the_score_is_the_sum_over_what_the_first_fragment_was_and_whether_it_came_again(existence, ratio):
+@given(st.floats(1e-6, 1.0 - 1e-6), st.floats(-30.0, 30.0), st.floats(-6.0, 0.0), st.floats(-6.0, 0.0))
+def test_the_score_is_the_sum_over_what_the_first_fragment_was_and_whether_it_came_again(
+    existence, ratio, hidden, silent
+):
     """Vehicle or not, one thing or two: only a vehicle that is one thing with the next went on unseen."""
+    unseen = {True: math.exp(hidden), False: math.exp(silent)}
     weights = {
-        (vehicle, again): (existence if vehicle else 1.0 - existence) * (math.exp(ratio) if again else 1.0)
+        (vehicle, again): (existence if vehicle else 1.0 - existence)
+        * (unseen[vehicle] * math.exp(ratio) if again else 1.0)
         for vehicle, again in itertools.product((True, False), repeat=2)
     }
     others = sum(weight for case, weight in weights.items() if case != (True, True))
-    found = continuation_score(np.array([ratio]), np.array([existence]))[0]
+    each = (np.array([value]) for value in (ratio, existence, hidden, silent))
+    found = continuation_score(*each)[0]
     assert found == pytest.approx(math.log(weights[True, True] / others), rel=1e-9, abs=1e-9)
 
 
 def test_what_certainly_is_a_vehicle_is_judged_by_agreement_alone():
     ratio = np.array([-5.0, 0.0, 3.0, 700.0])
-    assert continuation_score(ratio, np.ones(4)) == pytest.approx(ratio)
+    seen = np.zeros(4)
+    assert continuation_score(ratio, np.ones(4), seen, seen) == pytest.approx(ratio)
 
 
 def test_agreement_makes_no_vehicle_of_what_was_none():
     for existence, joined in ((0.9, 0), (0.6, 0), (0.4, -1), (0.05, -1)):
         ends = fragments([0.0, 2.0], [1.0, 3.0], np.random.default_rng(2), spread=1.0, existence=existence)
         assert link(ends, max_gap_s=3.0, gate=1e9, size_density=DENSITY).tolist() == [-1, joined]
+
+
+def standing(gap, worth, existence=0.999, way=0.0):
+    """Two fragments at one place, of a size of e⁴ = 54.6 px, the second `way` px further on at its end."""
+    ends = fragments([0.0, 1.0 + gap], [1.0, 2.0 + gap], np.random.default_rng(7), 0.0, existence, worth)
+    ends.end_size[..., 0], ends.end_size[..., 1] = 4.0, 0.0
+    ends.start_size[:] = 4.0
+    ends.start_cov[:] = ends.end_cov[:] = np.diag([1.0, 4.0, 4.0])
+    ends.end_mean[1, 0, 0] = way
+    return ends
+
+
+def joined(ends):
+    return link(ends, max_gap_s=3.0, gate=30.0, size_density=DENSITY, hidden_s=0.5)[1] == 0
+
+
+@pytest.mark.parametrize("worth", [0.6, 0.8, 0.95])
+def test_what_comes_again_at_its_place_was_hidden_or_is_no_vehicle(worth):
+    """A vehicle is hidden for so long with e^(-gap / 0.5 s); a false thing comes and goes."""
+    p = 0.999 * worth
+    longest = 0.5 * math.log(p / (1.0 - p))
+    assert joined(standing(0.98 * longest, worth))
+    assert not joined(standing(1.02 * longest, worth))
+
+
+def test_what_leaves_its_place_is_no_false_thing_that_comes_again():
+    far = 0.25 * math.exp(4.0)
+    for way, stays in ((0.99 * far, True), (1.01 * far, False)):
+        ends = standing(1.4, worth=0.6, way=way)
+        assert stay_in_place(ends, np.array([0]), np.array([1])).tolist() == [stays]
+        assert joined(ends) is not stays
 
 
 def test_time_in_which_nothing_is_seen_does_not_count():

@@ -26,12 +26,14 @@ class ObservationTimes:
     Attributes:
         t: (K,) times of the steps (s), ascending.
         existence: (K,) causal probability that the track is a vehicle; NaN where it had no state.
+        worth: (K,) probability, by their scores, that what one sensor alone sees is a vehicle; 1 elsewhere.
         used: (K,) bit k is set where a detection of sensor k was taken.
         held: (K,) whether it was reported as standing still, if need be without any detection.
     """
 
     t: FloatArray
     existence: FloatArray
+    worth: FloatArray
     used: IntArray
     held: BoolArray
 
@@ -40,20 +42,26 @@ class ObservationTimes:
 
     def select(self, rows: slice | npt.NDArray[np.intp] | BoolArray) -> ObservationTimes:
         """Return some of the steps."""
-        return ObservationTimes(self.t[rows], self.existence[rows], self.used[rows], self.held[rows])
+        return ObservationTimes(
+            self.t[rows], self.existence[rows], self.worth[rows], self.used[rows], self.held[rows]
+        )
 
     @staticmethod
     def empty() -> ObservationTimes:
         """Return none."""
         none = np.zeros(0)
-        return ObservationTimes(none, none, np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.bool_))
+        return ObservationTimes(none, none, none, np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.bool_))
 
     @staticmethod
     def unseen(t: FloatArray) -> ObservationTimes:
         """Return times `t` (K,) between two fragments of one vehicle."""
         count = len(t)
         return ObservationTimes(
-            t, np.full(count, np.nan), np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.bool_)
+            t,
+            np.full(count, np.nan),
+            np.ones(count),
+            np.zeros(count, dtype=np.int64),
+            np.zeros(count, dtype=np.bool_),
         )
 
     @staticmethod
@@ -66,6 +74,7 @@ class ObservationTimes:
         return ObservationTimes(
             np.concatenate([part.t for part in parts]),
             np.concatenate([part.existence for part in parts]),
+            np.concatenate([part.worth for part in parts]),
             np.concatenate([part.used for part in parts]),
             np.concatenate([part.held for part in parts]),
         )

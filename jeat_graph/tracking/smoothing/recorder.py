@@ -22,6 +22,7 @@ class Packet(NamedTuple):
         counts: (K,) living tracks after each step; their L = Σ counts rows follow one another below.
         ids: (L,) identities.
         existence: (L,) probability of existence.
+        worth: (L,) probability that what one sensor alone sees with such scores is a vehicle; 1 elsewhere.
         used: (L,) bit k is set where a detection of sensor k was taken.
         confirmed: (L,) whether the track is confirmed.
         held: (L,) whether it is reported as standing still.
@@ -35,6 +36,7 @@ class Packet(NamedTuple):
     counts: IntArray
     ids: IntArray
     existence: FloatArray
+    worth: FloatArray
     used: IntArray
     confirmed: BoolArray
     held: BoolArray
@@ -84,6 +86,7 @@ class StepRecorder:
             np.array([len(step.ids) for step in steps], dtype=np.int64),
             np.concatenate([step.ids for step in steps]),
             np.concatenate([step.existence for step in steps]),
+            np.concatenate([step.worth for step in steps]),
             np.concatenate([step.used for step in steps]),
             np.concatenate([step.confirmed for step in steps]),
             np.concatenate([step.held for step in steps]),

@@ -119,6 +119,7 @@ def split(packet: Packet, rate_hz: float) -> Iterator[tuple[int, Share]]:
     observed = ObservationTimes(
         np.repeat(packet.t, packet.counts)[rows],
         packet.existence[rows],
+        packet.worth[rows],
         packet.used[rows],
         packet.held[rows],
     )

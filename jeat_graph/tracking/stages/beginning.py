@@ -205,6 +205,7 @@ def start_track(
     tracks.hits[i] = 1
     tracks.score_odds[i] = batch.score_odds[j]
     tracks.lasting[i] = False
+    tracks.worth[i] = 1.0
     tracks.worthy[i] = True
     tracks.t_birth[i] = t
     tracks.born_at[i] = view.z

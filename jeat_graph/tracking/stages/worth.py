@@ -136,7 +136,7 @@ def doubt_scores(batch: Batch, scene: SceneState, model: Model) -> None:
 
 @njit(cache=True)
 def judge_worth(tracks: TrackArrays, n: int, scene: SceneState, model: Model) -> None:
-    """Say of each of the first `n` tracks, in place, whether it is worth something: always if two see it.
+    """Say of each of the first `n` tracks, in place, what it is worth: always enough if two see it.
 
     What is worth nearly as much as the usual box of what lasts is as good as this sensor's scores can tell.
     """
@@ -151,4 +151,5 @@ def judge_worth(tracks: TrackArrays, n: int, scene: SceneState, model: Model) ->
         s = only_sensor(tracks.seen_by[i], len(scene.first_look))
         # No branch that writes a flag, as in `confirm`.
         worth = worth_of(scene.worth_mean[s], tracks.score_odds[i])
+        tracks.worth[i] = 1.0 if s < 0 else worth
         tracks.worthy[i] = s < 0 or worth >= least[s]

@@ -21,7 +21,11 @@ def looks_of(existence, t=None):
     n = len(existence)
     times = np.arange(n) * 0.3 if t is None else np.array(t)
     return ObservationTimes(
-        times, np.array(existence, dtype=float), np.zeros(n, dtype=np.int64), np.zeros(n, dtype=bool)
+        times,
+        np.array(existence, dtype=float),
+        np.ones(n),
+        np.zeros(n, dtype=np.int64),
+        np.zeros(n, dtype=bool),
     )
 
 

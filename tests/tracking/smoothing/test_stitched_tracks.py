@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from jeat_graph import Tracker, load_config
+
 from .conftest import make_tracker, recording, run
 
 TWO_CARS = (
@@ -77,3 +79,28 @@ def test_stitching_leaves_the_causal_table_alone():
     plain = run(make_tracker("smoother.engine=none"), VANISHED)
     assert np.array_equal(stitched.mean, plain.mean)
     assert np.array_equal(stitched.track_id, plain.track_id)
+
+
+def test_a_thing_that_comes_and_goes_at_its_place_is_not_filled_in_while_a_car_behind_something_is():
+    """One detector whose scores say nothing; a sign is taken for a vehicle one second out of 2.4."""
+    rng = np.random.default_rng(1)
+    detector = "sensors.one={rate_hz: 15}"
+    tracker = Tracker(load_config("default", [detector, "smoother.engine=rts"]), image=(1280, 720))
+    sign, on_s, period_s = np.array([600.0, 500.0, 60.0, 60.0]), 1.0, 2.4
+    for k in range(15 * 20):
+        t = k / 15
+        x = (150.0 * t + 320.0 * np.arange(4)) % 1280.0
+        cars = np.column_stack([x, 100.0 + 90.0 * np.arange(4), np.full(4, 80.0), np.full(4, 50.0)])
+        # Behind a pillar in the middle of the picture nothing is found of a car: for .6 s.
+        seen = (np.abs(x - 640.0) > 45.0) & (x < 1190.0)
+        boxes = np.vstack([cars[seen], sign[None][: int(t % period_s < on_s)]])
+        tracker.step((t, "one", boxes + rng.normal(0.0, 1.0, boxes.shape), np.ones(len(boxes))))
+    table = tracker.finish()
+    place = table.boxes[:, :2] + 0.5 * table.boxes[:, 2:]
+    # At first a score of one is believed; what it is worth is learnt within seconds.
+    away = (table.t > 6.0) & (table.t % period_s > on_s + 0.4)
+    on_sign = np.hypot(*(place - sign[:2] - 30.0).T) < 20.0
+    assert not (on_sign & away).any()
+    behind = (np.abs(place[:, 0] - 680.0) < 40.0) & ~on_sign
+    passes = 4 * 15.0 * 150.0 / 1280.0
+    assert behind.sum() > 0.8 * passes * (80.0 / 150.0) * 15.0
