@@ -52,4 +52,5 @@ def predict_reported(now: Snapshot, t: float, model: Model, sensors: tuple[str, 
     cov = np.zeros((len(table), 6, 6))
     for axis in range(2):
         cov[:, axis::2, axis::2] = tracks.cov[rows, axis, :_MOTION, :_MOTION]
+        cov[:, axis, axis] = table.var[:, axis]  # with the error that lasts, which is the position's alone
     return Prediction(**vars(table), cov=cov)

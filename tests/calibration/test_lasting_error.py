@@ -108,3 +108,24 @@ def test_it_adds_to_the_variances_of_positions_and_changes_nothing_else(recordin
         same = replace(wide, var=plain.var)
         for name in ("t", "track_id", "existence", "mean", "used"):
             np.testing.assert_array_equal(getattr(plain, name), getattr(same, name))
+
+
+def test_a_prediction_says_it_too_and_its_covariance_has_its_variances(recording):
+    detections, _ = recording
+    found = []
+    for share in (0.0, SHARE):
+        tracker = Tracker(
+            load_config("default", (*CONFIG, "smoother.engine=none", f"output.lasting_error={share}"))
+        )
+        for k in range(20):
+            tracker.step(detections.scan(k))
+        found.append(tracker.predict(1.0))
+    plain, wide = found
+    assert len(plain)
+    for one in found:
+        np.testing.assert_array_equal(np.diagonal(one.cov, axis1=1, axis2=2), one.var)
+        np.linalg.cholesky(one.cov)  # raises where one is not positive definite
+    added = SHARE**2 * wide.boxes[:, 2:].prod(axis=1)
+    np.testing.assert_allclose(
+        wide.cov[:, :2, :2] - plain.cov[:, :2, :2], added[:, None, None] * np.eye(2), rtol=1e-9
+    )
