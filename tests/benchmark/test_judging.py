@@ -77,6 +77,7 @@ def test_a_missing_package_is_said_and_its_trackers_are_left_out(monkeypatch, ca
     assert "Norfair left out (pip install rich filterpy && pip install --no-deps norfair)" in said
 
 
+@pytest.mark.slow
 def test_a_search_says_what_it_gained_on_each_stream(monkeypatch):
     pytest.importorskip("trackers", reason="needs the package trackers (extra baselines)")
     monkeypatch.setitem(SEARCH_GRIDS, "sort", {"minimum_consecutive_frames": (1, 20)})

@@ -15,6 +15,10 @@ from jeat_graph.live.transport.ends import open_sink, open_source
 
 SCHEMES = {"mqtt": "paho.mqtt", "nats": "nats", "kafka": "confluent_kafka"}
 PATIENCE_S = 120.0
+#: Groups of Kafka take seconds to come together: that they do is tried by the messages in their order.
+PATIENT = pytest.mark.parametrize(
+    "broker", ["mqtt", "nats", pytest.param("kafka", marks=pytest.mark.slow)], indirect=True, scope="module"
+)
 
 
 @pytest.fixture(scope="module", params=SCHEMES)
@@ -70,6 +74,7 @@ def test_messages_come_in_order_each_once(url):
     source.close()
 
 
+@PATIENT
 def test_what_was_not_committed_comes_again_in_order_and_what_was_does_not(url):
     source = open_source(url)
     send(url, numbered(30))
@@ -106,6 +111,7 @@ def test_what_is_sent_once_a_source_is_open_is_never_lost(url):
         source.close()
 
 
+@PATIENT
 def test_a_first_message_is_not_kept_waiting_for_more(url):
     source = open_source(url)
     send(url, [b"warm"])
