@@ -31,8 +31,8 @@ FREEDOM = 8
 # Standard deviation, in sizes of the vehicle, up to which a fragment's place over the gap counts as known.
 _FORESEEN_SIZES = 1.25
 
-# So far from where it began, in sizes, a fragment has left the place: five times a usual error.
-_MOVED_SIZES = 0.25
+#: So far from where it began, in sizes, a fragment has left the place: five times a usual error.
+MOVED_SIZES = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +159,7 @@ def stay_in_place(ends: FragmentEnds, first: IntArray, second: IntArray) -> Bool
     began = ends.start_mean[first, :, 0]
     others = ends.end_mean[first, :, 0], ends.start_mean[second, :, 0], ends.end_mean[second, :, 0]
     way = np.stack([np.hypot(*(other - began).T) for other in others]).max(axis=0)
-    return np.asarray(way <= _MOVED_SIZES * size)
+    return np.asarray(way <= MOVED_SIZES * size)
 
 
 def continuation_score(

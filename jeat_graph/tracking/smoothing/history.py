@@ -11,6 +11,7 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import RecordArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.smoothers.engine import TrackSmoother, make_smoother
+from jeat_graph.smoothers.linking import MOVED_SIZES
 from jeat_graph.smoothers.measurements import concatenate_measurements
 from jeat_graph.smoothers.track_data import COINCIDENT_S, SmoothedTrack
 from jeat_graph.tracking.classes import Votes
@@ -196,12 +197,21 @@ class TrackHistory:
         # Of two steps at one time the later one counts.
         chosen[:-1] &= observed.t[1:] > observed.t[:-1]
         existence = observed.hindsight(self._config.lifecycle.lifetime_s, self._known)
+        if self._whole and self._stays(piece):
+            existence = observed.in_place(existence)
         chosen &= existence >= self._config.smoother.min_existence
         if not chosen.any():
             return []
         kept = observed.select(chosen)
         rows = rows_of(self.track_id, piece, self._sizes.smooth(), kept, existence[chosen], self._config)
         return [self._classified(rows)]
+
+    def _stays(self, piece: SmoothedTrack) -> bool:
+        """Whether it has never left the place where it began."""
+        assert self._sizes is not None
+        size = np.exp(0.5 * self._sizes.smooth().mean[-1, :, 0].sum())
+        way = np.hypot(*(piece.mean[:, :, 0] - piece.mean[0, :, 0]).T)
+        return bool(way.max() <= MOVED_SIZES * size)
 
     def _classified(self, rows: Trajectories) -> Trajectories:
         """The rows with the class of all that has been taken in by now, if anything was said of it."""

@@ -79,6 +79,22 @@ class ObservationTimes:
             np.concatenate([part.held for part in parts]),
         )
 
+    def when_last_seen(self) -> tuple[float, float]:
+        """Causal existence and worth at the last step with a detection; 1 where nothing is known of them."""
+        seen = np.flatnonzero((self.used != 0) & np.isfinite(self.existence))
+        return (float(self.existence[seen[-1]]), float(self.worth[seen[-1]])) if len(seen) else (1.0, 1.0)
+
+    def in_place(self, existence: FloatArray) -> FloatArray:
+        """Probability (K,) that what has never left its place is a vehicle at each step.
+
+        That a thing comes again where it was makes no vehicle of what was none before; its looks may.
+
+        Args:
+            existence: (K,) what `hindsight` says of it.
+        """
+        by_looks = existence * self.when_last_seen()[1]
+        return np.asarray(np.fmax(by_looks, np.fmin(existence, self.existence)))
+
     def hindsight(self, lifetime_s: float, known: bool = False) -> FloatArray:
         """Probability (K,) that the track is a vehicle at each step, given its whole life.
 

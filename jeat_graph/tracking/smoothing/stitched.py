@@ -68,7 +68,7 @@ def fragment_ends(histories: Sequence[TrackHistory], config: Config) -> Fragment
     seen_t, seen_s = seeing_time(np.concatenate([rows["t"] for rows in wholes]), _LONGEST_PAUSE_S)
     start_mean = states.start_mean[..., :MOTION]
     start_size = np.stack([size.mean[0, :, 0] for size in sizes])
-    existence, worth = zip(*[_when_last_seen(history.observed) for history in histories], strict=True)
+    existence, worth = zip(*[history.observed.when_last_seen() for history in histories], strict=True)
     return FragmentEnds(
         start_t=np.array([track.t[0] for track in tracks]),
         start_mean=start_mean,
@@ -87,12 +87,6 @@ def fragment_ends(histories: Sequence[TrackHistory], config: Config) -> Fragment
         end_existence=np.array(existence),
         end_worth=np.array(worth),
     )
-
-
-def _when_last_seen(observed: ObservationTimes) -> tuple[float, float]:
-    """Causal existence and worth at the last step with a detection; 1 where nothing is known of them."""
-    seen = np.flatnonzero((observed.used != 0) & np.isfinite(observed.existence))
-    return (float(observed.existence[seen[-1]]), float(observed.worth[seen[-1]])) if len(seen) else (1.0, 1.0)
 
 
 def _typical_jerk(track: TrackData) -> float:

@@ -10,7 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from jeat_graph.config.reading import load_config
+from jeat_graph.smoothers.measurements import measurements
+from jeat_graph.tracking.smoothing.history import TrackHistory
 from jeat_graph.tracking.smoothing.observation_times import BELIEVED, RETURNS, ObservationTimes
+from jeat_graph.tracking.smoothing.priors import ErrorStates
 
 LIFETIME_S = 5.0
 
@@ -88,3 +92,40 @@ def test_the_end_of_a_track_that_fades_is_no_vehicle():
 def test_between_two_fragments_it_is_there_as_at_their_ends():
     values = looks_of([0.9, np.nan, np.nan, 0.6]).hindsight(LIFETIME_S)
     assert values[1] == values[2] == min(values[0], values[3])
+
+
+@pytest.mark.parametrize(("worth", "expected"), [(0.5, [0.45, 0.8, 0.9]), (1.0, [0.9, 0.9, 0.9])])
+def test_what_stays_in_place_is_believed_for_its_looks_or_for_what_had_been_seen_by_then(worth, expected):
+    """The worth of the last detection counts: after it there are only misses."""
+    looks = ObservationTimes(
+        np.arange(3) * 0.1,
+        np.array([0.2, 0.8, 0.95]),
+        np.array([0.1, worth, 0.3]),
+        np.array([1, 1, 0]),
+        np.zeros(3, dtype=bool),
+    )
+    assert looks.when_last_seen() == (0.8, worth)
+    assert looks.in_place(np.full(3, 0.9)) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("velocity", "first"), [(0.0, 0.6), (200.0, 0.1)])
+def test_only_what_moves_has_rows_from_before_it_was_believed_in(velocity, first):
+    """Causal log odds rise by .9 a step from -4 on: .62 after .5 s, .80 after .6 s."""
+    t = np.arange(20) * 0.1
+    rows = measurements(
+        t,
+        np.column_stack([300.0 + velocity * t, np.full(20, 200.0)]),
+        np.full((20, 2), 4.0),
+        np.full(20, 9.0),
+    )
+    rows["velocity_var"], rows["acceleration_var"], rows["rate_var"] = 100.0**2, 100.0**2, 0.1
+    rows["log_size"], rows["size_var"] = 4.0, 0.01
+    config = load_config("default", ["sensors.one={rate_hz: 10}", "smoother.engine=rts"])
+    history = TrackHistory(1, config, ErrorStates.of(config), keep=True)
+    history.add_measurements(rows)
+    seen = np.ones(20, dtype=np.int64)
+    rising = 1.0 / (1.0 + np.exp(4.0 - 0.9 * np.arange(20)))
+    history.add_steps(ObservationTimes(t, rising, np.full(20, 0.6), seen, np.zeros(20, dtype=bool)), True)
+    history.feed()
+    (table,) = history.finish()
+    assert table.t[0] == pytest.approx(first, abs=1e-9)
