@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.frames import Kind, build_frames
 from jeat_graph.eval.matching import matched_entries
@@ -37,12 +37,14 @@ class PositionErrors(NamedTuple):
     Attributes:
         error: (K, 2) of the centre (px).
         var: (K, 2) what the table says of it (px²).
-        area: (K,) of the true box (px²).
+        height: (K,) of the table's box (px).
+        object_id: (K,) whose it is; no two recordings share one.
     """
 
     error: FloatArray
     var: FloatArray
-    area: FloatArray
+    height: FloatArray
+    object_id: IntArray
 
 
 def position_errors(
@@ -57,7 +59,8 @@ def position_errors(
         pairs: truth and table of each recording.
         kind: how the tables are put beside the truth (`frames.build_frames`).
     """
-    columns = [(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0))]
+    columns = [(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0, dtype=np.int64))]
+    objects = 0
     for truth, table in pairs:
         frames = build_frames(truth, table, kind=kind)
         there, track = matched_entries(frames.iou, _MATCH_IOU)
@@ -67,7 +70,10 @@ def position_errors(
         inside = (box[:, :2] > _EDGE_PX).all(axis=1) & (far[:, 0] < width - _EDGE_PX)
         inside &= far[:, 1] < height - _EDGE_PX
         error = frames.tracks.mean[track, :2] - (box[:, :2] + 0.5 * box[:, 2:])
-        columns.append((error[inside], frames.tracks.var[track, :2][inside], box[inside, 2:].prod(axis=1)))
+        names, number = np.unique(frames.truth_id[there], return_inverse=True)
+        found = (error, frames.tracks.var[track, :2], frames.tracks.boxes[track, 3], objects + number)
+        columns.append(tuple(column[inside] for column in found))
+        objects += len(names)
     return PositionErrors(*(np.concatenate(parts) for parts in zip(*columns, strict=True)))
 
 

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from jeat_graph.calibration.cuts import folds, shorten
-from jeat_graph.calibration.lasting_error import measure_lasting_error, with_lasting_error
 from jeat_graph.calibration.matches import SensorMatches, match_sensor
 from jeat_graph.calibration.noise_scale import scale_noise
 from jeat_graph.calibration.offset import (
@@ -22,6 +21,7 @@ from jeat_graph.calibration.parts import PARTS, PartChoice, choose_parts
 from jeat_graph.calibration.supervised import Recording, calibrate
 from jeat_graph.calibration.tracked import follow
 from jeat_graph.calibration.tune import Choice, tune, tuned_settings
+from jeat_graph.calibration.written_variances import measure_written_variances
 from jeat_graph.config.schema import Config, InputConfig
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
@@ -35,7 +35,7 @@ _PASSES = 2
 # About so many scans are tracked for each factor on the noise.
 _SCANS = 6000
 NOISE_FACTOR = "noise of the centre, factor"
-LASTING_ERROR = "output.lasting_error"
+POSITION_SCALE, LASTING_ERROR = "output.position_scale", "output.lasting_error"
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def calibrate_with_truth(
     Raises:
         DataError: too little that matches.
     """
-    base = fit_input(with_lasting_error(base, 0.0), *(detections for detections, _ in recordings))[0]
+    base = fit_input(base, *(detections for detections, _ in recordings))[0]
     lags = settled(
         lambda known: _lags_with_truth(_on_time(recordings, known), base),
         with_progress(range(_ROUNDS), 2 * _ROUNDS),
@@ -90,13 +90,14 @@ def calibrate_with_truth(
     config, parts = choose_parts(pairs, base, progress=progress)
     config, choices = tune(config, pairs, passes=_PASSES, progress=progress)
     short = shorten(pairs, _SCANS)
-    config = with_lasting_error(config, measure_lasting_error(config, short))
+    config = measure_written_variances(config, short, base.output)
     config, factor, verdict = scale_noise(config, folds(short))
     if factor != 1.0:
-        config = with_lasting_error(config, measure_lasting_error(config, short))
+        config = measure_written_variances(config, short, base.output)
     choices = (
         *choices,
         Choice(NOISE_FACTOR, factor, verdict.objective),
+        Choice(POSITION_SCALE, config.output.position_scale, verdict.objective),
         Choice(LASTING_ERROR, config.output.lasting_error, verdict.objective),
     )
     if progress is not None:

@@ -269,7 +269,7 @@ class MergeConfig(Section):
 
 @dataclass(frozen=True)
 class OutputConfig(Section):
-    """Which tracks the causal table reports."""
+    """Which tracks the causal table reports, and how sure the tables say they are of positions."""
 
     min_existence: float = number(0.5, "1", "reported only above this probability of existence", 0.0, 1.0)
     max_gap_s: float = number(
@@ -282,11 +282,9 @@ class OutputConfig(Section):
     min_visible: float = number(
         0.3, "1", "reported only if this fraction of the box lies in the picture", 0.0, 1.0
     )
+    position_scale: float = number(
+        1.0, "1", "factor on the variances of positions as they are written, and on nothing else", 1e-3, 1e3
+    )
     lasting_error: float = number(
-        0.0,
-        "1",
-        "standard deviation of what a vehicle's boxes are off by as long as it is seen, as a share of "
-        "sqrt(width height); it adds to the variances of positions in the tables, and to nothing else",
-        0.0,
-        1.0,
+        0.0, "1", "std of what boxes are off by as long as they are seen, per height; written, too", 0.0, 1.0
     )

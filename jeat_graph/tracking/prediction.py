@@ -10,7 +10,14 @@ from jeat_graph.association.boxes import track_boxes
 from jeat_graph.config.kernel_form import Model
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.tracking.reporting import as_table, columns_of, longest_gap_s, remain, reported_rows
+from jeat_graph.tracking.reporting import (
+    as_table,
+    columns_of,
+    longest_gap_s,
+    remain,
+    reported_rows,
+    written_scale,
+)
 from jeat_graph.tracking.snapshot import Snapshot
 from jeat_graph.tracking.stages.predicting import predict_all
 
@@ -51,6 +58,9 @@ def predict_reported(now: Snapshot, t: float, model: Model, sensors: tuple[str, 
     table = as_table(columns_of(tracks, rows, boxes, t, *sections), sensors, now.classes)
     cov = np.zeros((len(table), 6, 6))
     for axis in range(2):
-        cov[:, axis::2, axis::2] = tracks.cov[rows, axis, :_MOTION, :_MOTION]
-        cov[:, axis, axis] = table.var[:, axis]  # with the error that lasts, which is the position's alone
+        # D P D with a diagonal D stays positive definite, and so does what errors that last are added to.
+        D = np.ones((len(table), _MOTION))
+        D[:, 0] = np.sqrt([written_scale(cut, settings.output) for cut in tracks.cut[rows, axis]])
+        cov[:, axis::2, axis::2] = D[:, :, None] * tracks.cov[rows, axis, :_MOTION, :_MOTION] * D[:, None]
+        cov[:, axis, axis] = table.var[:, axis]
     return Prediction(**vars(table), cov=cov)

@@ -10,6 +10,7 @@ from jeat_graph.config.kernel_form import Model
 from jeat_graph.config.schema import ImageConfig, OutputConfig
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.filters.cut_boxes import WHOLE
 from jeat_graph.tracking.classes import ClassTally
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
@@ -154,6 +155,12 @@ def remain(boxes: FloatArray, image: ImageConfig, output: OutputConfig) -> BoolA
 
 
 @njit(cache=True)
+def written_scale(cut: int, output: OutputConfig) -> float:
+    """Return the factor on a position's variance; a size that the edge hides is not noise to be narrowed."""
+    return output.position_scale if cut == WHOLE else max(output.position_scale, 1.0)
+
+
+@njit(cache=True)
 def columns_of(
     tracks: TrackArrays,
     rows: IntArray,
@@ -196,7 +203,8 @@ def columns_of(
             for d in range(3):
                 mean[r, 2 * d + axis] = tracks.mean[i, axis, d]
                 var[r, 2 * d + axis] = tracks.cov[i, axis, d, d]
-            var[r, axis] += output.lasting_error * output.lasting_error * boxes[r, 2] * boxes[r, 3]
+            lasting = output.lasting_error * boxes[r, 3]
+            var[r, axis] = written_scale(tracks.cut[i, axis], output) * var[r, axis] + lasting * lasting
     return (
         np.full(len(rows), t),
         tracks.track_id[rows],

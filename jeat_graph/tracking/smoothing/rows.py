@@ -49,7 +49,7 @@ def rows_of(
         inside: BoolArray = (visible > 0.0) & ((visible >= config.output.min_visible) | shown)
         keep = slice(None) if inside.all() else inside
     var = np.diagonal(cov, axis1=2, axis2=3).transpose(0, 2, 1).reshape(-1, 6).copy()
-    var[:, :2] += config.output.lasting_error**2 * np.prod(size, axis=1)[:, None]
+    var[:, :2] = _scale(boxes, config) * var[:, :2] + (config.output.lasting_error * size[:, 1:]) ** 2
     return Trajectories(
         t=observed.t[keep],
         track_id=np.full(len(t), track_id, dtype=np.int64)[keep],
@@ -61,6 +61,16 @@ def rows_of(
         sensors=config.sensor_names,
         size_var=(size * size * log_var)[keep],
     )
+
+
+def _scale(boxes: FloatArray, config: Config) -> FloatArray:
+    """Factors (K, 2) on the position's variances of boxes (K, 4), as `reporting.written_scale` has them."""
+    scale, edge = config.output.position_scale, config.image.edge_px
+    if scale >= 1.0 or edge <= 0.0:
+        return np.full((len(boxes), 2), scale)
+    low, high = boxes[:, :2], boxes[:, :2] + boxes[:, 2:]
+    far = np.array([config.image.width, config.image.height]) - edge
+    return np.where((low <= edge) | (high >= far), 1.0, scale)
 
 
 @njit(cache=True)
