@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 SCENARIO, SEED, FRAMES, SIZE = "night-nolight", 7, 40, "640x384"
-NETWORK = PRESET = "sehn"
+NETWORK = "sehn"
 #: Moments of the strip of pictures.
 MOMENTS = 4
 
@@ -27,7 +27,7 @@ def commands(out: Path) -> list[list[str]]:
     segment = out / "clip" / "segments" / "000000"
     tracked = str(out / "raw")
     raw = ["--frames", str(segment), "--events", str(segment / "events.h5")]
-    network = ["--detector-frames", NETWORK, "--detector-events", NETWORK, "--config", PRESET]
+    network = ["--detector-frames", NETWORK, "--detector-events", NETWORK]
     return [
         clip_command(out),
         ["track", *raw, *network, "--out", tracked],
