@@ -85,11 +85,12 @@ def calibrate_with_truth(
     )
     # Each sensor by its own lag, early ones too: the truth stays where it is.
     pairs = _on_time(recordings, found_lags(lags))
+    short = shorten(pairs, _SCANS)
     if not tuned:
-        return Calibration(with_lags(calibrate(pairs, base), lags), tuple(lags))
+        config = measure_written_variances(calibrate(pairs, base), short, base.output)
+        return Calibration(with_lags(config, lags), tuple(lags))
     config, parts = choose_parts(pairs, base, progress=progress)
     config, choices = tune(config, pairs, passes=_PASSES, progress=progress)
-    short = shorten(pairs, _SCANS)
     config = measure_written_variances(config, short, base.output)
     config, factor, verdict = scale_noise(config, folds(short))
     if factor != 1.0:
