@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jeat_graph.data.boxes import LARGEST_PX, SMALLEST_PX
+from jeat_graph.detection.declared import declared_of
 
 REFUSED_SHARE = 0.15
 #: Boxes of a burst, and how many in a hundred scans are one.
@@ -44,6 +45,24 @@ def stream(seed: int, sensors: tuple[str, ...], length: int, burst: int = BURST)
         scores = rng.choice([0.0, 1.0, 0.5, rng.random()], len(boxes))
         steps.append(Step((t, sensor, *laid_out(rng, boxes, scores)), bad=False))
     return steps[:length]
+
+
+def settings(seed: int, sensors: tuple[str, ...]) -> list[str]:
+    """Settings that a user may add to any preset: of how boxes fit, of trust, of what networks declare."""
+    rng = np.random.default_rng(seed)
+    drawn: list[str] = []
+    if {"rgb", "evt"} <= set(sensors) and rng.random() < 0.5:
+        network = str(rng.choice(["sehn", "sehn-int8"]))
+        drawn += declared_of({"rgb": network, "evt": network})
+    for name in sensors:
+        drawn.append(f"sensors.{name}.least_overlap={rng.choice([1e-3, 0.3, 0.6, 0.999, 1.0])}")
+        drawn.append(f"sensors.{name}.bias_std={rng.choice([0.0, 0.02, 0.2])}")
+    drawn.append(f"birth.max_overlap={rng.choice([0.0, 0.1, 0.3, 1.0])}")
+    drawn.append(f"association.method={rng.choice(['slots', 'joint', 'sequential'])}")
+    drawn.append(f"lifecycle.field_doubt={rng.choice([0.0, 0.5, 6.0])}")
+    drawn.append(f"lifecycle.disagreement={rng.choice([0.0, 0.5, 3.0])}")
+    drawn.append(f"output.lasting_error={rng.choice([0.0, 0.01, 1.0])}")
+    return drawn
 
 
 def later(rng: np.random.Generator, t: float) -> float:

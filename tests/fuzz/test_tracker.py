@@ -12,7 +12,7 @@ from jeat_graph.data.errors import DataError, TimeOrderError, UnknownSensorError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.tracker import Tracker
 
-from .grammar import BURST, LARGE_BURST, Step, stream
+from .grammar import BURST, LARGE_BURST, Step, settings, stream
 
 pytestmark = pytest.mark.filterwarnings("ignore::jeat_graph.data.errors.InputWarning")
 FULL = bool(os.environ.get("JEAT_GRAPH_FULL"))
@@ -144,3 +144,16 @@ def test_smoothed_estimates_are_sound_and_causal_ones_do_not_depend_on_them(seed
     causal, smoothed = run(preset, "none", steps, *as_one)[0], run(preset, engine, steps, *as_one)[1]
     image = load_config(preset).image
     check_later_knows_more(Trajectories.concatenate(causal), smoothed, (image.width, image.height))
+
+
+@pytest.mark.parametrize("seed", range(300, 350) if FULL else range(300, 302))
+def test_with_any_settings_estimates_are_sound_and_the_same_ones_with_a_smoother(seed):
+    preset, engine = PRESETS[seed % len(PRESETS)], ("fixed-lag", "rts", "full")[seed % 3]
+    sensors = tuple(sorted(load_config(preset).sensors))
+    more = settings(seed, sensors)
+    steps = stream(seed, sensors, LENGTH // 2)
+    causal, _ = run(preset, "none", steps, *more)
+    with_smoother, smoothed = run(preset, engine, steps, *more)
+    assert_same(causal, with_smoother)
+    for table in (*causal, smoothed):
+        check_table(table)
