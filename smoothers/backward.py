@@ -11,8 +11,10 @@ from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.smoothers.adjoint import (
+    cov_from_next,
     cov_over_measurement,
     cov_over_step,
+    is_lost,
     mean_over_measurement,
     mean_over_step,
     write_cov,
@@ -86,7 +88,26 @@ def smooth_covs(
         filtered: what `filter_rows` has made of these.
         out: becomes the covariances of the first K keys, and the gains from each to the next.
     """
+    if not _cov_pass(dims, span, steps, observations, filtered, out):
+        # The last of the wanted keys needs its neighbour, and that may need its own.
+        n, keys = len(dims), span.end - span.first
+        more = Covariances(np.empty((keys, 2, n, n)), np.empty((keys, 2, n, n)))
+        _cov_pass(dims, span, steps, observations, filtered, more)
+        out.cov[:] = more.cov[: len(out.cov)]
+
+
+@njit(cache=True)
+def _cov_pass(
+    dims: tuple[int, ...],
+    span: Span,
+    steps: Steps,
+    observations: Observations,
+    filtered: Filtered,
+    out: Covariances,
+) -> bool:
+    """Smooth covariances as `smooth_covs` says; False if the last of them has lost its digits."""
     n = len(dims)
+    whole = True
     phi, var = np.empty(n - 3), np.empty(n - 3)
     Lam = np.zeros((2, n, n))
     u, d = np.empty(n), np.empty(n)
@@ -105,6 +126,12 @@ def smooth_covs(
                     write_cov(dims, P, Lam[a], part, u, out.cov[o, a])
                     step_cov(dims, dt, steps.jerk[k + 1], phi, var, P, part, predicted)
                     write_gain(dims, predicted, part, L, d, out.gain[o, a])
+                    if is_lost(dims, P, filtered.cov[k + 1, a], out.cov[o, a]):
+                        if o + 1 < len(out.cov):
+                            jerk, gain, after = steps.jerk[k + 1], out.gain[o, a], out.cov[o + 1, a]
+                            out.cov[o, a] = cov_from_next(dims, dt, jerk, phi, var, P, gain, after)
+                        else:
+                            whole = False
                 else:
                     out.cov[o, a] = P
                     out.gain[o, a] = 0.0
@@ -117,6 +144,7 @@ def smooth_covs(
         if k > span.first:
             dt = steps.t[k] - steps.t[k - 1]
             error_steps(dt, steps.correlation_time, phi, var)
+    return whole
 
 
 @njit(cache=True)
@@ -149,7 +177,8 @@ def smooth_until(
     for o in range(len(at)):
         lam[:] = 0.0
         Lam[:] = 0.0
-        i = np.searchsorted(observations.key, until[o], side="right") - 1
+        end = np.searchsorted(observations.key, until[o], side="right")
+        i = end - 1
         for k in range(until[o], at[o], -1):
             while i >= 0 and observations.key[i] == k:
                 e = observations.error[i] + 3
@@ -164,8 +193,15 @@ def smooth_until(
             for a in range(2):
                 mean_over_step(dims, dt, phi, lam[a])
                 cov_over_step(dims, dt, phi, Lam[a])
-        k = at[o]
+        k, lost = at[o], False
         for a in range(2):
             write_mean(dims, filtered.mean[k, a], filtered.cov[k, a], lam[a], out_mean[o, a])
             write_cov(dims, filtered.cov[k, a], Lam[a], part, u, out_cov[o, a])
+            if k < until[o] and is_lost(dims, filtered.cov[k, a], filtered.cov[k + 1, a], out_cov[o, a]):
+                lost = True
+        if lost:
+            span, keys = Span(k, until[o] + 1, end), until[o] + 1 - k
+            more = Covariances(np.empty((keys, 2, n, n)), np.empty((keys, 2, n, n)))
+            _cov_pass(dims, span, steps, observations, filtered, more)
+            out_cov[o] = more.cov[0]
     return out_mean, out_cov

@@ -11,7 +11,7 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, TextArray
 from jeat_graph.data.errors import DataError
 
 #: Smallest side, and farthest place or largest side, of a box (px): beyond what any picture can hold.
-SMALLEST_PX, LARGEST_PX = 1e-9, 1e9
+SMALLEST_PX, LARGEST_PX = 1e-9, 1e6
 
 
 def check_boxes(boxes: npt.ArrayLike, scores: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
