@@ -65,8 +65,8 @@ def from_numpy(values: npt.NDArray[Any]) -> Any:
     missing = None
     if isinstance(values, np.ma.MaskedArray):
         missing, values = np.ma.getmaskarray(values), values.data
-    elif values.dtype.kind == "f":
-        missing = np.isnan(values)
+    if values.dtype.kind == "f":
+        missing = np.isnan(values) if missing is None else missing | np.isnan(values)
     kind = pa.from_numpy_dtype(values.dtype)
     data = _bits(values) if values.dtype.kind == "b" else pa.py_buffer(np.ascontiguousarray(values))
     there = None if missing is None or not missing.any() else _bits(~missing)

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pyarrow as pa
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
@@ -26,9 +26,11 @@ def test_numbers_are_what_arrow_makes_of_them(values):
 
 
 @given(values=SOME, seed=st.integers(0, 2**32 - 1))
+@example(values=np.array([np.nan, 1.0]), seed=0)
 def test_masked_entries_are_missing(values, seed):
     mask = np.random.default_rng(seed).random(len(values)) < 0.3
-    assert from_numpy(np.ma.array(values, mask=mask)).equals(pa.array(values, mask=mask))
+    missing = mask | (values != values)
+    assert from_numpy(np.ma.array(values, mask=mask)).equals(pa.array(values, mask=missing))
 
 
 @given(texts=TEXTS)
