@@ -80,6 +80,8 @@ def write_plots(
                     path = Path(folder) / (name + suffix)
                     with atomic_path(path) as temporary:
                         figure.savefig(temporary, metadata={"Date": None} if suffix == ".svg" else None)
+                    # Laid out once: to do so for each format takes as long as to draw it.
+                    figure.set_layout_engine("none")
                     written.append(path)
                 plt.close(figure)
     finally:
