@@ -85,7 +85,7 @@ def module_of(dotted: str) -> str | None:
 
 def for_types_only(node: ast.AST) -> bool:
     """Whether a statement is `if TYPE_CHECKING:`."""
-    return isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+    return isinstance(node, ast.If) and getattr(node.test, "id", None) == "TYPE_CHECKING"
 
 
 def imports_within(node: ast.AST, runs: bool = True) -> list[tuple[str, bool]]:
@@ -149,6 +149,8 @@ def functions(node: ast.AST, prefix: str) -> list[tuple[str, ast.FunctionDef | a
     """Every function below a node with its full name."""
     found = []
     for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.expr):
+            continue  # most of the tree, and no definition is in it
         name = f"{prefix}.{child.name}" if hasattr(child, "name") else prefix
         if isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef):
             found.append((name, child))

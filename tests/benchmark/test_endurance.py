@@ -50,15 +50,15 @@ def test_durations_are_counted_to_one_per_cent():
 
 def test_a_short_day_keeps_its_vehicles_its_memory_and_its_temper(tmp_path, capsys):
     out = tmp_path / "periods.json"
-    code = main(["benchmark", "endurance", "--hours", "0.005", "--vehicles", "3", "--out", str(out)])
+    code = main(["benchmark", "endurance", "--hours", "0.003", "--vehicles", "3", "--out", str(out)])
     assert code == 0
     assert "0 warnings" in capsys.readouterr().out
     periods = json.loads(out.read_text())
     assert len(periods) == PERIODS
-    assert sum(one["scans"] for one in periods) > 2000
+    assert sum(one["scans"] for one in periods) > 1200
     later = periods[6:]
     assert {one["reported"] for one in later} == {3}
-    assert periods[-1]["rows"] > 3000
+    assert periods[-1]["rows"] > 1800
     # No more is kept at the end than after a quarter, but for what an allocator does.
     assert periods[-1]["memory_mb"] < later[0]["memory_mb"] + 20.0
 

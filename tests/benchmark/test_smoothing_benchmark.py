@@ -57,8 +57,8 @@ def test_real_paths_keep_their_places_and_too_short_ones_are_left_out(tmp_path):
 
 
 def test_the_command_writes_what_it_prints(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("jeat_graph.benchmark.smoothing._DRAWN_SEEDS", 8)
-    arguments = ["--scenarios", "night", "--duration", "2", "--seeds", "0", "1", "--jobs", "1"]
+    monkeypatch.setattr("jeat_graph.benchmark.smoothing._DRAWN_SEEDS", 4)
+    arguments = ["--scenarios", "night", "--duration", "1", "--seeds", "0", "1", "--jobs", "1"]
     missing = ["--data", str(tmp_path / "none")]
     assert main(["benchmark", "smoothing", *arguments, *missing, "--out", str(tmp_path)]) in (0, None)
     printed = capsys.readouterr()

@@ -14,6 +14,12 @@ from jeat_graph.benchmark.speed_worker import _JOBS, ask
 from jeat_graph.cli.main import main
 
 
+@pytest.fixture(autouse=True)
+def no_collection(monkeypatch):
+    """Collecting garbage before each turn is for the figures, which these tests do not judge."""
+    monkeypatch.setattr("jeat_graph.benchmark.speed_timing.gc.collect", lambda: 0)
+
+
 def run_times(**seconds):
     return {name: (np.array(values), 5.0) for name, values in seconds.items()}
 

@@ -83,7 +83,7 @@ def objective(config, training):
 
 @pytest.fixture(scope="module")
 def tuned(recordings):
-    training = shorten(recordings, 300)
+    training = shorten(recordings, 200)
     start = calibrate(training, load_config("default"))
     start = replace(start, output=replace(start.output, max_gap_scans=0.0, max_gap_s=5.0))
     return training, start, tune(start, training, passes=1)

@@ -15,9 +15,9 @@ HEADER = "t,sensor,left,top,width,height,score\n"
 
 @pytest.fixture(scope="session")
 def recording(tmp_path_factory) -> Path:
-    """A folder with `detections.csv` and `gt.csv` of two simulated seconds."""
+    """A folder with `detections.csv` and `gt.csv` of a simulated second."""
     folder = tmp_path_factory.mktemp("recording")
-    assert main(["simulate", "night", "--out", str(folder), "--duration", "2", "--seed", "5"]) == 0
+    assert main(["simulate", "night", "--out", str(folder), "--duration", "1.2", "--seed", "5"]) == 0
     return folder
 
 

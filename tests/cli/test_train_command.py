@@ -59,6 +59,7 @@ def test_what_cannot_be_is_said_in_one_line(tmp_path, capsys, words, said):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_training_from_the_command_line(tmp_path, capsys):
     pytest.importorskip("torch", reason="training needs PyTorch, the extra `train`")
     from ..training.small_sets import write_segment

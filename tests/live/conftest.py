@@ -21,7 +21,7 @@ def simulated(tmp_path_factory):
     """Make `detections.csv` and `gt.csv` of some simulated seconds, once a seed and duration; the folder."""
     made: dict[tuple[int, float], Path] = {}
 
-    def make(seed: int, duration_s: float = 1.5) -> Path:
+    def make(seed: int, duration_s: float = 1.0) -> Path:
         key = (seed, duration_s)
         if key not in made:
             folder = tmp_path_factory.mktemp("simulated")

@@ -23,7 +23,7 @@ ENGINES = ("fixed-lag", "fixed-lag-rts", "rts", "none")
 
 @pytest.fixture(scope="module")
 def batches():
-    return list(record(load_scenario("night"), 5, 1.5).detections.batches())
+    return list(record(load_scenario("night"), 5, 1.25).detections.batches())
 
 
 def assert_equal(one, other):

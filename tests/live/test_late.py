@@ -66,7 +66,7 @@ def test_random_delays_change_nothing_in_the_end(detections, in_order, tmp_path_
     state, smoothed = in_order
     expected = smoothed_bytes(smoothed, folder)
 
-    @settings(max_examples=200 if full else 4, deadline=None)
+    @settings(max_examples=200 if full else 3, deadline=None)
     @given(st.integers(0, 2**32 - 1), st.sampled_from(("each scan", "each sensor")))
     def holds(seed, kind):
         rng = np.random.default_rng(seed)

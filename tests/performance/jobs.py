@@ -108,7 +108,7 @@ def short_windows():
     """Memory (MiB) while windows of half a second are filled and finished, one reading per 50 lives."""
     rng, memory = np.random.default_rng(0), []
     t = np.arange(0.01, 0.5, 0.008)
-    for life in range(400):
+    for life in range(250):
         z = 600.0 + rng.normal(0.0, 2.0, (len(t), 2))
         mean, cov = z[0][:, None] * [1, 0, 0], np.tile(np.diag([9.0, 2500, 900]), (2, 1, 1))
         smoother = FixedLagSmoother(Prior(0.0, mean, cov))

@@ -24,4 +24,4 @@ def test_many_vehicles_that_come_and_go_leave_nothing_behind(measure):
 
 def test_many_short_windows_leave_nothing_behind(measure):
     found = measure("short_windows")
-    assert found["memory"][-1] - found["memory"][1] < GAIN_MIB  # over 300 lives
+    assert found["memory"][-1] - found["memory"][1] < GAIN_MIB  # over 150 lives

@@ -209,7 +209,7 @@ def test_calibration_share_is_that_of_the_place() -> None:
 
 def test_track_with_a_camera_writes_the_tables_of_the_road(tmp_path: Path) -> None:
     sim, run = tmp_path / "sim", tmp_path / "run"
-    assert main(["simulate", "day-sparse", "--out", str(sim), "--duration", "4", "--seed", "2"]) == 0
+    assert main(["simulate", "day-sparse", "--out", str(sim), "--duration", "2.5", "--seed", "2"]) == 0
     track = ["track", str(sim / "detections.csv"), "--config", "highway", "--out", str(run)]
     assert main([*track, "--camera", str(sim / "camera.yaml")]) == 0
     tables = {}

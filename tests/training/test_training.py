@@ -35,6 +35,7 @@ def trained(root, tmp_path, kind, settings):
     return trainer, members
 
 
+@pytest.mark.slow
 def test_a_network_learns_pictures_by_heart(small_set, tmp_path):
     settings = TrainSettings(**BASE, epochs=10.0, pictures=UNCHANGED)
     trainer, members = trained(small_set, tmp_path, "frames", settings)

@@ -96,7 +96,7 @@ class Page(HTMLParser):
 @pytest.fixture(scope="session")
 def recording(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("recording")
-    assert main(["simulate", "night", "--out", str(folder), "--duration", "2", "--seed", "5"]) == 0
+    assert main(["simulate", "night", "--out", str(folder), "--duration", "1.2", "--seed", "5"]) == 0
     return folder
 
 

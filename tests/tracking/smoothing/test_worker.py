@@ -230,12 +230,12 @@ sys.path.insert(0, {folder!r})
 from conftest import make_tracker, recording, run
 
 if __name__ == "__main__":
-    cars = tuple((0.0, 9.0, {{"start": (100.0 + 90.0 * k, 100.0 + 40.0 * k)}}) for k in range(10))
+    cars = tuple((0.0, 9.0, {{"start": (100.0 + 90.0 * k, 100.0 + 40.0 * k)}}) for k in range(6))
     tracker = make_tracker("smoother.worker=true")
     print(tracker._smoothers._process.pid, flush=True)
     if {started}:
         tracker.smoothed()
-    run(tracker, recording(duration=4.0, cars=cars))
+    run(tracker, recording(duration=2.0, cars=cars))
     if {killed}:
         os.kill(os.getpid(), signal.SIGKILL)
 """
