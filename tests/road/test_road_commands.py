@@ -156,6 +156,7 @@ def test_the_size_of_the_picture_comes_from_the_run_or_has_to_be_given(
     assert (camera.width, camera.height) == (WIDTH, HEIGHT)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not BRNO.is_dir(), reason="needs ../shared/data/brno beside the checkout")
 def test_real_vehicles_within_their_intervals(tmp_path: Path) -> None:
     """Two minutes of a real highway against laser gates: error, and how many intervals hold the truth."""
@@ -193,7 +194,7 @@ def test_real_vehicles_within_their_intervals(tmp_path: Path) -> None:
 def test_a_simulated_run_in_metres(tmp_path: Path) -> None:
     """From detections to speeds with the scenario's exact camera, against the truth on the road."""
     sim, run, out = tmp_path / "sim", tmp_path / "run", tmp_path / "road"
-    assert main(["simulate", "day-sparse", "--out", str(sim), "--duration", "6", "--seed", "2"]) == 0
+    assert main(["simulate", "day-sparse", "--out", str(sim), "--duration", "4", "--seed", "2"]) == 0
     assert main(["track", str(sim / "detections.csv"), "--out", str(run)]) == 0
     assert main(["road", str(run), "--camera", str(sim / "camera.yaml"), "--out", str(out)]) == 0
     truth: dict[float, list[dict[str, str]]] = {}

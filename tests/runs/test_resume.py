@@ -27,7 +27,7 @@ class BrokenOffError(Exception):
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
     folder = tmp_path_factory.mktemp("recording")
-    assert main(["simulate", "night", "--out", str(folder), "--duration", "2", "--seed", "3"]) == 0
+    assert main(["simulate", "night-sparse", "--out", str(folder), "--duration", "2", "--seed", "3"]) == 0
     return folder / "detections.csv"
 
 
@@ -130,7 +130,7 @@ def test_killed_at_random_moments_it_goes_on(tmp_path, full):
     """The command itself, killed again and again until it is through."""
     if not full:
         pytest.skip("the long form only: a recording long enough to be saved on the way")
-    assert main(["simulate", "night", "--out", str(tmp_path), "--duration", "200", "--seed", "3"]) == 0
+    assert main(["simulate", "night-sparse", "--out", str(tmp_path), "--duration", "200", "--seed", "3"]) == 0
     command = [sys.executable, "-m", "jeat_graph.cli.main", "track", str(tmp_path / "detections.csv")]
     subprocess.run([*command, "--out", str(tmp_path / "whole")], check=True, env=os.environ)
     rng, kills = random.Random(1), 0
