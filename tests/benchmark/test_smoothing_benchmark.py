@@ -33,7 +33,7 @@ def test_drawn_noise_has_the_variance_and_the_memory_of_its_model(sensor, model)
     assert np.concatenate(product).mean() == pytest.approx(expected.mean(), rel=0.12)
 
 
-@pytest.mark.parametrize("memory", [False, True])
+@pytest.mark.parametrize("memory", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_on_drawn_tracks_all_estimates_are_consistent_and_smoothing_pays(memory):
     rows = {row["row"]: row for row in drawn([from_model(seed, memory) for seed in range(40)])}
     for row in rows.values():

@@ -140,7 +140,7 @@ def test_a_run_without_tracks_has_a_table_without_rows(tmp_path, name):
 def test_the_bytes_do_not_depend_on_the_pieces(tmp_path, name):
     whole = table(67_000)
     write_trajectories(whole, tmp_path / f"whole-{name}")
-    for cuts in ([1], [65_536], [65_530, 65_541], list(range(0, 67_000, 997))):
+    for cuts in ([1], [65_530, 65_541], list(range(0, 67_000, 4_999))):
         path = tmp_path / f"{len(cuts)}-{cuts[0]}-{name}"
         with TrajectoryWriter(path) as writer:
             for start, end in itertools.pairwise([0, *cuts, len(whole)]):

@@ -84,7 +84,7 @@ def test_same_tracks_as_the_paper_in_a_crowd_where_gates_overlap(oracle, state, 
 
 
 def test_same_tracks_as_the_paper_where_tracks_end_after_gaps(oracle, state, scene):
-    batches = [(t, scans) for t, scans in scene(7, duration=3.0) if (t % 1.0) < 0.65 or t > 2.0]
+    batches = [(t, scans) for t, scans in scene(7, duration=2.5) if (t % 1.0) < 0.65 or t > 2.0]
     _, compared = run_both(oracle, state, batches)
     assert compared > 500
 
@@ -92,7 +92,7 @@ def test_same_tracks_as_the_paper_where_tracks_end_after_gaps(oracle, state, sce
 def test_same_tracks_as_the_paper_with_one_sensor_only(oracle, state, scene):
     batches = [
         (t, [scan for scan in scans if scan[0] == "rgb"])
-        for t, scans in scene(9, duration=3.0)
+        for t, scans in scene(9, duration=2.0)
         if any(scan[0] == "rgb" for scan in scans)
     ]
     run_both(oracle, state, batches)

@@ -57,7 +57,7 @@ slow = pytest.mark.slow
 )
 def test_a_training_that_was_killed_writes_the_same_bytes(small_set, tmp_path, kind):
     settings = TrainSettings(
-        crop_px=(32, 32), batch=2, epochs=1.0, judge_every=0.2, judged=2, steps=2, back=1, seed=3
+        crop_px=(32, 32), batch=2, epochs=1.0, judge_every=0.4, judged=2, steps=2, back=1, seed=3
     )
 
     def request(out):

@@ -6,6 +6,7 @@ import sys
 
 import numba
 import numpy as np
+import pytest
 
 SCRIPT = """
 import numpy as np
@@ -23,6 +24,7 @@ for engine in ("fixed-lag", "fixed-lag-rts", "rts", "full"):
 """
 
 
+@pytest.mark.slow
 def test_uncompiled_smoothers_agree_with_compiled_ones(tmp_path):
     environment, path = {**os.environ, "NUMBA_DISABLE_JIT": "1"}, tmp_path / "plain.npz"
     script = f"{SCRIPT}\nnp.savez({str(path)!r}, **columns)"

@@ -242,14 +242,8 @@ if __name__ == "__main__":
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-@pytest.mark.parametrize(
-    ("started", "killed"),
-    [
-        pytest.param(True, False, marks=pytest.mark.slow),
-        pytest.param(False, False, marks=pytest.mark.slow),
-        (True, True),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("started", "killed"), [(True, False), (False, False), (True, True)])
 def test_a_program_that_ends_without_finish_ends_and_so_does_its_worker(tmp_path, started, killed):
     """Though all waits to be sent, as the worker has not begun yet; and though nobody can tell it."""
     script = tmp_path / "script.py"
