@@ -82,6 +82,7 @@ def tables(result: Mapping[str, Any]) -> dict[str, Table]:
     }
     if "kitti" in result:
         out["ablation-kitti"] = common.pooled_table(
-            result["kitti"], "From paper to default, calibrated, on real data: five sequences, leave-one-out, pooled"
+            result["kitti"],
+            "From paper to default, calibrated, on real data: five sequences, leave-one-out, pooled",
         )
     return out
