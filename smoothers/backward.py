@@ -90,10 +90,18 @@ def smooth_covs(
     """
     if not _cov_pass(dims, span, steps, observations, filtered, out):
         # The last of the wanted keys needs its neighbour, and that may need its own.
-        n, keys = len(dims), span.end - span.first
-        more = Covariances(np.empty((keys, 2, n, n)), np.empty((keys, 2, n, n)))
-        _cov_pass(dims, span, steps, observations, filtered, more)
-        out.cov[:] = more.cov[: len(out.cov)]
+        out.cov[:] = _all_covs(dims, span, steps, observations, filtered).cov[: len(out.cov)]
+
+
+@njit(cache=True)
+def _all_covs(
+    dims: tuple[int, ...], span: Span, steps: Steps, observations: Observations, filtered: Filtered
+) -> Covariances:
+    """Smooth the covariances of all keys of a span, each of which then has the neighbour that it may need."""
+    n, keys = len(dims), span.end - span.first
+    out = Covariances(np.empty((keys, 2, n, n)), np.empty((keys, 2, n, n)))
+    _cov_pass(dims, span, steps, observations, filtered, out)
+    return out
 
 
 @njit(cache=True)
@@ -200,8 +208,6 @@ def smooth_until(
             if k < until[o] and is_lost(dims, filtered.cov[k, a], filtered.cov[k + 1, a], out_cov[o, a]):
                 lost = True
         if lost:
-            span, keys = Span(k, until[o] + 1, end), until[o] + 1 - k
-            more = Covariances(np.empty((keys, 2, n, n)), np.empty((keys, 2, n, n)))
-            _cov_pass(dims, span, steps, observations, filtered, more)
-            out_cov[o] = more.cov[0]
+            span = Span(k, until[o] + 1, end)
+            out_cov[o] = _all_covs(dims, span, steps, observations, filtered).cov[0]
     return out_mean, out_cov
