@@ -89,7 +89,7 @@ def _sizes_at(
 
 
 @njit(cache=True)
-def _smooth(
+def _filter(
     prior_t: float,
     prior_mean: FloatArray,
     prior_cov: FloatArray,
@@ -99,7 +99,7 @@ def _smooth(
     drift: FloatArray,
     prior_drift: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Filter and smooth [ln size, rate]; see `smooth_size`, whose measurements are in order of time here."""
+    """Filter [ln size, rate]; see `smooth_size`, whose measurements are in order of time here."""
     t, rate_density = np.empty(len(times) + 1), np.empty(len(times) + 1)
     key = np.empty(len(times), dtype=np.int64)
     t[0], rate_density[0], keys = prior_t, prior_drift, 1
@@ -109,7 +109,6 @@ def _smooth(
             keys += 1
         key[i] = keys - 1
     mean, cov = np.empty((keys, 2, 2)), np.empty((keys, 2, 2, 2))
-    cross = np.zeros((keys, 2, 2, 2))
     ahead = np.empty((keys, 2, 3))  # predicted covariances: of the size, with the rate, of the rate
     for axis in range(2):
         i = 0
@@ -136,6 +135,15 @@ def _smooth(
                 i += 1
             mean[k, axis, 0], mean[k, axis, 1] = m, v
             cov[k, axis, 0, 0], cov[k, axis, 0, 1], cov[k, axis, 1, 0], cov[k, axis, 1, 1] = a, b, b, c
+    return t[:keys], rate_density[:keys], mean, cov, ahead
+
+
+@njit(cache=True)
+def _smooth_back(t: FloatArray, mean: FloatArray, cov: FloatArray, ahead: FloatArray) -> FloatArray:
+    """Smooth what `_filter` gave, in place; return the covariances of each key with the next (K, 2, 2, 2)."""
+    keys = len(t)
+    cross = np.zeros((keys, 2, 2, 2))
+    for axis in range(2):
         for k in range(keys - 2, -1, -1):
             d = t[k + 1] - t[k]
             P, A = cov[k, axis], ahead[k + 1, axis]
@@ -160,7 +168,7 @@ def _smooth(
             P[0, 1] += g10 * (g00 * D0 + g01 * D1) + g11 * (g00 * D1 + g01 * D2)
             P[1, 0] = P[0, 1]
             P[1, 1] += g10 * (g10 * D0 + g11 * D1) + g11 * (g10 * D1 + g11 * D2)
-    return t[:keys], rate_density[:keys], mean, cov, cross
+    return cross
 
 
 def smooth_size(
@@ -200,4 +208,33 @@ def smooth_size(
     if len(times) and times[0] < prior_t - COINCIDENT_S:
         raise DataError(f"a size at {times[0]} s is older than the track's prior at {prior_t} s")
     prior = float(prior_t), prior_mean, prior_cov
-    return SmoothedSize(*_smooth(*prior, times, z, var, drift, float(prior_density)))
+    keys, density, mean, cov, ahead = _filter(*prior, times, z, var, drift, float(prior_density))
+    cross = _smooth_back(keys, mean, cov, ahead)
+    return SmoothedSize(keys, density, mean, cov, cross)
+
+
+def filter_size(
+    prior_mean: FloatArray,
+    prior_cov: FloatArray,
+    t: FloatArray,
+    log_size: FloatArray,
+    r: FloatArray,
+    density: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Filter the sizes of one track, whose first measurement is its prior.
+
+    Args:
+        prior_mean: (2, 2) for width and height [ln size, rate] at the first measurement.
+        prior_cov: (2, 2, 2) its covariance.
+        t: (M,) times of the measurements (s), ascending.
+        log_size: (M, 2) measured ln w and ln h (ln px).
+        r: (M, 2) their variances.
+        density: root spectral density of the rate (1/s^1.5).
+
+    Returns:
+        (K, 2, 2) means and (K, 2, 2, 2) covariances by all until each key; keys are as `TrackData` has them.
+    """
+    drift = np.full(len(t) - 1, density)
+    later = t[1:], log_size[1:], r[1:]
+    _, _, mean, cov, _ = _filter(float(t[0]), prior_mean, prior_cov, *later, drift, density)
+    return mean, cov

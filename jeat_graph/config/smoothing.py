@@ -40,6 +40,14 @@ class SmootherConfig(Section):
     )
     output_rate_hz: float = number(0.0, "Hz", "rows per second of the smoothed table; 0: one at each scan")
     worker: bool = flag(False, "smooth in a process of its own, so that no step of the tracker waits for it")
+    exchange_share: float = number(
+        0.02,
+        "1",
+        "full and rts: in so many of the encounters of two vehicles the tracker mixes them up; when the "
+        "recording ends they are exchanged where, by all that is known then, that is likelier; 0: never",
+        0.0,
+        0.5,
+    )
     stitch: bool = flag(True, "full and rts: join the fragments of one vehicle when the recording ends")
     stitch_max_gap_s: float = number(3.0, "s", "longest time between two fragments of one vehicle")
     stitch_hidden_s: float = number(

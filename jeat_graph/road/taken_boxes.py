@@ -9,13 +9,14 @@ from __future__ import annotations
 import numpy as np
 
 from jeat_graph.config.schema import Config
-from jeat_graph.data.arrays import RecordArray
+from jeat_graph.data.arrays import BoolArray, RecordArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.road.box_rows import BoxConfig, SensorErrors, rows_of_log
 from jeat_graph.road.boxes_road import TrackBoxes, each_track
 from jeat_graph.road.camera import RoadCamera
 
 _SAME_TRACK = 0.5  # share of a fragment's detections that lie on a track for it to be a part of it
+_FEW = 3  # fewer detections in a row that lie beside their track's boxes are errors, not another's
 
 
 def sensor_errors(config: Config) -> SensorErrors:
@@ -31,27 +32,44 @@ def boxes_of_log(
 ) -> list[TrackBoxes]:
     """Give each track of a table the detections that it took in.
 
-    Where fragments were stitched the table has one identity for several of the log's: a fragment belongs to
-    the track on whose boxes its detections lie, at times at which the track has none of its own.
+    Where fragments were stitched the table has one identity for several of the log's, and where two vehicles
+    were exchanged in hindsight each has what the other took in from then on. So detections of another
+    identity belong to the track on whose boxes they lie, at times at which the track has none of its own.
     """
     log = log[np.argsort(log["track_id"], kind="stable")]
     pieces = np.split(log, np.flatnonzero(np.diff(log["track_id"])) + 1) if len(log) else []
-    own = {int(rows["track_id"][0]): rows for rows in pieces}
-    tracks = each_track(table)
-    known = {int(one.track_id[0]) for one in tracks}
-    strays = [rows for k, rows in own.items() if k not in known]
+    tracks = {int(one.track_id[0]): one for one in each_track(table)}
+    own: dict[int, list[RecordArray]] = {k: [] for k in tracks}
+    strays: list[RecordArray] = []
+    for rows in pieces:
+        k = int(rows["track_id"][0])
+        near, away = _split(rows, tracks[k]) if k in tracks else ([], [rows])
+        own.get(k, []).extend(near)
+        strays += away
+    for rows in strays:
+        k = int(rows["track_id"][0])
+        takers = [other for other, one in tracks.items() if other != k and _belongs(rows, one, own[other])]
+        # What lies on no other track is the track's own: a vehicle may stray from its smoothed boxes.
+        for taker in takers or [k]:
+            own.get(taker, []).append(rows)
     found = []
-    for one in tracks:
-        k = int(one.track_id[0])
-        parts = [own[k]] if k in own else []
-        parts += [rows for rows in strays if _belongs(rows, one, parts)]
-        if not parts:
-            continue
-        taken = np.concatenate(parts)
-        taken = taken[np.argsort(taken["t"], kind="stable")]
-        rows = rows_of_log(taken, errors, (camera.width, camera.height), config)
-        found.append(TrackBoxes(k, one.t, rows))
+    for k, one in tracks.items():
+        if own[k]:
+            taken = np.concatenate(own[k])
+            taken = taken[np.argsort(taken["t"], kind="stable")]
+            boxes = rows_of_log(taken, errors, (camera.width, camera.height), config)
+            found.append(TrackBoxes(k, one.t, boxes))
     return found
+
+
+def _split(rows: RecordArray, track: Trajectories) -> tuple[list[RecordArray], list[RecordArray]]:
+    """Parts of a track's detections that lie on its boxes, and longer ones that do not."""
+    on = _inside(rows, track)
+    changes = np.flatnonzero(np.diff(on)) + 1
+    parts = list(zip(np.split(rows, changes), np.split(on, changes), strict=True))
+    away = [part for part, lies in parts if not lies[0] and len(part) >= _FEW]
+    near = [part for part, lies in parts if lies[0] or len(part) < _FEW]
+    return near, away
 
 
 def _belongs(rows: RecordArray, track: Trajectories, parts: list[RecordArray]) -> bool:
@@ -59,6 +77,11 @@ def _belongs(rows: RecordArray, track: Trajectories, parts: list[RecordArray]) -
         return False
     if any(rows["t"][0] <= part["t"][-1] and part["t"][0] <= rows["t"][-1] for part in parts):
         return False
+    return bool(_inside(rows, track).mean() >= _SAME_TRACK)
+
+
+def _inside(rows: RecordArray, track: Trajectories) -> BoolArray:
+    """Whether the middles of detections (M,) lie within a track's boxes at their times."""
     at = np.stack([np.interp(rows["t"], track.t, track.boxes[:, k]) for k in range(4)], axis=1)
     inside = np.abs(rows["z"] - at[:, :2] - at[:, 2:] / 2.0) < at[:, 2:] / 2.0
-    return bool(inside.all(axis=1).mean() >= _SAME_TRACK)
+    return np.asarray(inside.all(axis=1))

@@ -12,7 +12,7 @@ from jeat_graph.tracking.smoothing.shares import packet_cost
 from jeat_graph.tracking.step_record import StepRecord
 
 #: What is counted of the smoothers (attributes of `TrackSmoothers`).
-COUNTS = ("tracks", "rebuilds", "fallbacks", "too_late", "stitched")
+COUNTS = ("tracks", "rebuilds", "fallbacks", "too_late", "exchanged", "stitched")
 
 
 class Smoothing(Protocol):

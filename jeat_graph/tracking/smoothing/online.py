@@ -13,6 +13,7 @@ from jeat_graph.data.progress import progress_span, with_progress
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.smoothers.engine import load_engine
 from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
+from jeat_graph.tracking.smoothing.exchanged import exchange_histories
 from jeat_graph.tracking.smoothing.history import WHOLE, TrackHistory
 from jeat_graph.tracking.smoothing.priors import ErrorStates
 from jeat_graph.tracking.smoothing.recorder import Packet
@@ -48,12 +49,13 @@ class TrackSmoothers:
         rebuilds: how often GTSAM failed and a window was built anew.
         fallbacks: how often our own pass had to stand in for GTSAM.
         too_late: measurements that came too late for a window.
+        exchanged: encounters after which two vehicles changed places in hindsight.
         stitched: joints between fragments of one vehicle.
         tracks: confirmed tracks that have ended.
     """
 
     def __init__(self, config: Config) -> None:
-        self.rebuilds = self.fallbacks = self.too_late = self.stitched = self.tracks = 0
+        self.rebuilds = self.fallbacks = self.too_late = self.exchanged = self.stitched = self.tracks = 0
         self._config = config
         self._errors = ErrorStates.of(config)
         settings = config.smoother
@@ -170,17 +172,20 @@ class TrackSmoothers:
         return self._gathered(now)
 
     def finish(self) -> Trajectories:
-        """End all tracks, stitch fragments if that is wanted, and return all rows not drained yet."""
+        """End all tracks, put identities right in hindsight, and return all rows not drained yet."""
         self.work()
         self._done.extend(self._histories.values())
         self._histories = {}
         histories, self._done = sorted(self._done, key=lambda h: h.track_id), []
         if self._stitch:
             histories = [history for history in histories if history.confirmed]
-            with progress_span(0.0, _STITCHED):
+            with progress_span(0.0, 0.5 * _STITCHED):
+                histories, exchanges = exchange_histories(histories, self._config)
+            with progress_span(0.5 * _STITCHED, _STITCHED):
                 histories, joints = stitch_histories(
                     histories, np.concatenate([np.zeros(0), *self._scan_t]), self._config
                 )
+            self.exchanged += exchanges
             self.stitched += joints
         with progress_span(_STITCHED if self._stitch else 0.0, 1.0):
             for history in with_progress(histories):
