@@ -43,8 +43,9 @@ class SmootherConfig(Section):
     exchange_share: float = number(
         0.02,
         "1",
-        "full and rts, with stitch: in so many of the encounters of two vehicles the tracker mixes them up; "
-        "when the recording ends they change places where, by all that is known then, that is likelier; 0: never",
+        "full and rts, with stitch: in so many of the encounters of two vehicles the tracker mixes them up. "
+        "When the recording ends they change places where, by all that is known then, that is likelier; 0: "
+        "never",
         0.0,
         0.5,
     )
