@@ -77,23 +77,42 @@ class Batch(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """One detection as one track takes it in: what it measures, and how exactly.
+    """K detections as K tracks take them in, no track more than one: what they measure, and how exactly.
 
     Attributes:
-        z: (2,) box centre (px).
-        log_size: (2,) ln width and ln height (ln px).
-        white: (2,) variances of the white part of the centre's noise (px²).
-        coloured_std: (2,) standard deviations of the part that is correlated in time (px), 0 for none.
-        log_size_var: (2,) variances of ln width and ln height.
-        noise: (2,) what of `white` is the noise of boxes, and not what an unknown size adds (px²).
+        track: (K,) row of the track.
+        detection: (K,) the detection that it takes.
+        z: (K, 2) box centre (px).
+        log_size: (K, 2) ln width and ln height (ln px).
+        white: (K, 2) variances of the white part of the centre's noise (px²).
+        coloured_std: (K, 2) standard deviations of the part that is correlated in time (px), 0 for none.
+        log_size_var: (K, 2) variances of ln width and ln height.
+        noise: (K, 2) what of `white` is the noise of boxes, and not what an unknown size adds (px²).
     """
 
+    track: IntArray
+    detection: IntArray
     z: FloatArray
     log_size: FloatArray
     white: FloatArray
     coloured_std: FloatArray
     log_size_var: FloatArray
     noise: FloatArray
+
+
+@njit(cache=True)
+def no_measurements(num: int) -> Measured:
+    """Allocate `num` measurements, all to be filled in."""
+    return Measured(
+        np.empty(num, dtype=np.int64),
+        np.empty(num, dtype=np.int64),
+        np.empty((num, 2)),
+        np.empty((num, 2)),
+        np.empty((num, 2)),
+        np.empty((num, 2)),
+        np.empty((num, 2)),
+        np.empty((num, 2)),
+    )
 
 
 @njit(cache=True)

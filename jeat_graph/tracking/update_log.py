@@ -42,68 +42,69 @@ def allocate_log(capacity: int) -> UpdateLog:
 
 
 @njit(cache=True)
-def log_update(
+def log_updates(
     log: UpdateLog,
-    track_id: int,
-    j: int,
+    track_id: IntArray,
+    jerk: FloatArray,
     batch: Batch,
     measured: Measured,
-    jerk: float,
     sensors: SensorArrays,
 ) -> None:
-    """Append one measurement, if there is room.
+    """Append K measurements, as far as there is room.
 
     Args:
         log: the log.
-        track_id: the track that took it.
-        j: the detection.
+        track_id: (C,) identities of all tracks.
+        jerk: (K,) root spectral density of each taking track's jerk (px/s^2.5).
         batch: all detections of the step.
-        measured: what it measures of the track.
-        jerk: root spectral density of the track's jerk (px/s^2.5).
+        measured: what the taken ones measure of their tracks.
         sensors: parameters of the sensors.
     """
-    k = log.count[0]
-    if k >= len(log.rows):
-        return
-    row, s = log.rows[k], batch.sensor[j]
-    log.detection[k] = j
-    row["t"] = batch.t
-    row["track_id"] = track_id
-    row["sensor"] = s
-    row["birth"] = 0
-    row["error"] = sensors.error[s]
-    row["jerk"] = max(jerk, _LEAST_JERK)
-    row["rate_var"] = 0.0
-    row["nis"] = math.nan
-    row["scale"] = 1.0
-    for axis in range(2):
-        row["z"][axis] = measured.z[axis]
-        row["r"][axis] = measured.white[axis]
-        row["noise"][axis] = measured.noise[axis]
-        row["coloured_std"][axis] = measured.coloured_std[axis]
-        row["log_size"][axis] = measured.log_size[axis]
-        row["size_var"][axis] = measured.log_size_var[axis]
-        row["cut"][axis] = batch.cut[j, axis]
-        row["side"][axis] = batch.side[j, axis]
-        row["velocity_var"][axis] = 0.0
-        row["acceleration_var"][axis] = 0.0
-    log.count[0] = k + 1
+    first = log.count[0]
+    num = min(len(measured.track), len(log.rows) - first)
+    rows, taken, z, white, noise = log.rows, measured.detection, measured.z, measured.white, measured.noise
+    coloured_std, log_size, size_var = measured.coloured_std, measured.log_size, measured.log_size_var
+    for k in range(num):
+        row, j = rows[first + k], taken[k]
+        log.detection[first + k] = j
+        row["t"] = batch.t
+        row["track_id"] = track_id[measured.track[k]]
+        row["sensor"] = batch.sensor[j]
+        row["birth"] = 0
+        row["error"] = sensors.error[batch.sensor[j]]
+        row["jerk"] = max(jerk[k], _LEAST_JERK)
+        row["rate_var"] = 0.0
+        row["nis"] = math.nan
+        row["scale"] = 1.0
+        for axis in range(2):
+            row["z"][axis] = z[k, axis]
+            row["r"][axis] = white[k, axis]
+            row["noise"][axis] = noise[k, axis]
+            row["coloured_std"][axis] = coloured_std[k, axis]
+            row["log_size"][axis] = log_size[k, axis]
+            row["size_var"][axis] = size_var[k, axis]
+            row["cut"][axis] = batch.cut[j, axis]
+            row["side"][axis] = batch.side[j, axis]
+            row["velocity_var"][axis] = 0.0
+            row["acceleration_var"][axis] = 0.0
+    log.count[0] = first + num
 
 
 @njit(cache=True)
-def log_innovation(log: UpdateLog, nis: float, scale: float) -> None:
-    """Note in the last row how well the measurement fitted the prediction.
+def log_innovations(log: UpdateLog, nis: FloatArray, scale: FloatArray) -> None:
+    """Note in the last K rows how well the measurements fitted the predictions.
 
     Args:
-        log: the log, of capacity 0 or with a row just appended.
-        nis: normalised innovation squared (χ² with 2 degrees of freedom).
-        scale: the noise scale s with which the measurement was weighed.
+        log: the log, of capacity 0 or with K rows just appended.
+        nis: (K,) normalised innovation squared (χ² with 2 degrees of freedom).
+        scale: (K,) the noise scale s with which each measurement was weighed.
     """
-    k = log.count[0] - 1
-    if k < 0:
+    if len(log.rows) == 0:
         return
-    log.rows[k]["nis"] = nis
-    log.rows[k]["scale"] = scale
+    first = log.count[0] - len(nis)
+    for k in range(len(nis)):
+        log.rows[first + k]["nis"] = nis[k]
+        log.rows[first + k]["scale"] = scale[k]
 
 
 @njit(cache=True)

@@ -22,7 +22,7 @@ from jeat_graph.filters.cut_boxes import (
 )
 from jeat_graph.filters.noise import base_variance
 from jeat_graph.filters.prior import write_prior, write_size_prior
-from jeat_graph.tracking.batch import Batch, Measured
+from jeat_graph.tracking.batch import Batch, Measured, no_measurements
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.comparing import remember_box
 from jeat_graph.tracking.stages.ending import confirm, has_left
@@ -30,10 +30,10 @@ from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.stages.learning import scan_weight
 from jeat_graph.tracking.stages.manoeuvring import start_jerk
 from jeat_graph.tracking.stages.predicting import jerk_of, new_velocity_var, split_noise
-from jeat_graph.tracking.stages.updating import update_track
+from jeat_graph.tracking.stages.updating import take_in
 from jeat_graph.tracking.stages.worth import judge_worth
 from jeat_graph.tracking.state import SceneState, TrackArrays
-from jeat_graph.tracking.update_log import UpdateLog, log_birth, log_update
+from jeat_graph.tracking.update_log import UpdateLog, log_birth, log_updates
 
 
 @inner
@@ -74,7 +74,8 @@ def give_birth(
     for j in range(len(partner)):
         if partner[j] >= 0:
             i = n + partner[j]
-            update_track(tracks, i, batch, j, second_view(tracks, i, batch, j, model.sensors), model, log)
+            view = second_view(tracks, i, batch, j, model.sensors)
+            take_in(tracks, view, batch.sensor[j], batch, model, log)
             remember_box(tracks, i, batch, j)
             tracks.hidden[i, batch.sensor[j]] = 0.0
             # Two sensors' false boxes seldom coincide: each view's chance to be false remains.
@@ -85,45 +86,51 @@ def give_birth(
 
 
 @inner
-def first_view(batch: Batch, j: int, sensors: SensorArrays) -> Measured:
-    """Say what detection `j` measures where no track's size is known; one that is cut may be much larger."""
-    s = batch.sensor[j]
-    white, coloured_std, noise = np.empty(2), np.empty(2), np.empty(2)
-    z, log_size, log_size_var = batch.z[j].copy(), batch.log_size[j].copy(), sensors.size_var[s].copy()
+def first_view(batch: Batch, i: int, j: int, sensors: SensorArrays) -> Measured:
+    """Say what detection `j` measures for row `i`, of unknown size; one that is cut may be much larger."""
+    s, own = batch.sensor[j], no_measurements(1)
+    own.track[0], own.detection[0] = i, j
     size = math.sqrt(batch.boxes[j, 2] * batch.boxes[j, 3])
     for axis in range(2):
         side = batch.boxes[j, 2 + axis]
         base = base_variance(sensors.sigma_px[s], sensors.rho[s, axis], side, sensors.rho_size[s], size)
         r, h = split_noise(base, s, sensors)
-        noise[axis], coloured_std[axis] = r * batch.weight[j], h
-        white[axis] = noise[axis]
+        noise = r * batch.weight[j]
+        z, white, log_size, log_size_var = (
+            batch.z[j, axis],
+            noise,
+            batch.log_size[j, axis],
+            sensors.size_var[s, axis],
+        )
         cut = batch.cut[j, axis]
         if cut != WHOLE:
-            log_size[axis] += FIRST_LOG_GROWTH
-            log_size_var[axis] += FIRST_LOG_GROWTH_STD * FIRST_LOG_GROWTH_STD
-            half_var = centre_from_side(HIGH_CUT, 0.0, log_size[axis], log_size_var[axis])[1]
+            log_size += FIRST_LOG_GROWTH
+            log_size_var += FIRST_LOG_GROWTH_STD * FIRST_LOG_GROWTH_STD
+            half_var = centre_from_side(HIGH_CUT, 0.0, log_size, log_size_var)[1]
             if cut != BOTH_CUT:
-                z[axis], _ = centre_from_side(cut, batch.side[j, axis], log_size[axis], 0.0)
-            white[axis] += half_var
-    return Measured(z, log_size, white, coloured_std, log_size_var, noise)
+                z, _ = centre_from_side(cut, batch.side[j, axis], log_size, 0.0)
+            white += half_var
+        own.z[0, axis], own.log_size[0, axis], own.log_size_var[0, axis] = z, log_size, log_size_var
+        own.white[0, axis], own.coloured_std[0, axis], own.noise[0, axis] = white, h, noise
+    return own
 
 
 @inner
 def second_view(tracks: TrackArrays, i: int, batch: Batch, j: int, sensors: SensorArrays) -> Measured:
     """Say what detection `j` measures of track `i`, which another sensor's detection has just begun."""
-    own = first_view(batch, j, sensors)
+    own = first_view(batch, i, j, sensors)
     for axis in range(2):
         cut = batch.cut[j, axis]
         if cut == WHOLE:
             continue
         known = tracks.size_mean[i, axis, 0]
         if cut == BOTH_CUT:
-            own.z[axis] = tracks.mean[i, axis, 0]
+            own.z[0, axis] = tracks.mean[i, axis, 0]
         else:
             shown = batch.log_size[j, axis]
-            own.z[axis], _ = centre_from_part(cut, batch.side[j, axis], shown, known, 0.0)
+            own.z[0, axis], _ = centre_from_part(cut, batch.side[j, axis], shown, known, 0.0)
         # Both views guess the part that does not show in the same way.
-        own.log_size[axis], own.log_size_var[axis] = known, UNKNOWN
+        own.log_size[0, axis], own.log_size_var[0, axis] = known, UNKNOWN
     return own
 
 
@@ -186,15 +193,15 @@ def start_track(
     velocity_var = np.full(2, new_velocity_var(side, model.settings))
     acceleration_var = np.full(2, acceleration_std * acceleration_std)
     rate_var = model.settings.size.rate_std * model.settings.size.rate_std
-    view = first_view(batch, j, sensors)
-    white, coloured_std, error = view.white, view.coloured_std, sensors.error[s]
+    view = first_view(batch, i, j, sensors)
+    z, white, coloured_std, error = view.z[0], view.white[0], view.coloured_std[0], sensors.error[s]
     mean, cov = tracks.mean[i], tracks.cov[i]
-    write_prior(view.z, white, coloured_std, error, velocity_var, acceleration_var, mean, cov)
+    write_prior(z, white, coloured_std, error, velocity_var, acceleration_var, mean, cov)
     size_mean, size_cov = tracks.size_mean[i], tracks.size_cov[i]
-    write_size_prior(view.log_size, view.log_size_var, rate_var, size_mean, size_cov)
+    write_size_prior(view.log_size[0], view.log_size_var[0], rate_var, size_mean, size_cov)
     for axis in range(2):
         tracks.cut[i, axis] = batch.cut[j, axis]
-        tracks.rest_point[i, axis] = view.z[axis]
+        tracks.rest_point[i, axis] = z[axis]
         tracks.rest_var[i, axis] = white[axis] + coloured_std[axis] * coloured_std[axis]
     tracks.rest_since[i] = t
     tracks.standing_log_odds[i] = 0.0
@@ -208,13 +215,13 @@ def start_track(
     tracks.worth[i] = 1.0
     tracks.worthy[i] = True
     tracks.t_birth[i] = t
-    tracks.born_at[i] = view.z
+    tracks.born_at[i] = z
     tracks.last_box[i] = -np.inf
     remember_box(tracks, i, batch, j)
     tracks.t_update[i] = t
     tracks.used[i] = 1 << s
     tracks.seen_by[i] = 1 << s
     if len(log.rows) > 0:
-        jerk = jerk_of(tracks, i, model.settings)
-        log_update(log, track_id, j, batch, view, jerk, sensors)
+        jerk = jerk_of(tracks, view.track, model.settings)
+        log_updates(log, tracks.track_id, jerk, batch, view, sensors)
         log_birth(log, velocity_var, acceleration_var, rate_var)

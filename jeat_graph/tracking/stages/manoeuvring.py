@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from jeat_graph.config.kernel_form import Model
-from jeat_graph.data.arrays import BoolArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.filters.cut_boxes import WHOLE, floor_of_centre
 from jeat_graph.filters.jerk import track_jerk
 from jeat_graph.filters.manoeuvre import mean_factor, predict_manoeuvres, relax_weights, weigh_manoeuvres
-from jeat_graph.tracking.batch import Batch, Measured
+from jeat_graph.tracking.batch import Measured
 from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.state import USUAL_JERK_S, SceneState, TrackArrays
 
@@ -58,29 +58,31 @@ def predict_manoeuvring(
 
 
 @inner
-def weigh_jerk(tracks: TrackArrays, i: int, batch: Batch, j: int, measured: Measured, error: int) -> float:
-    """Weigh the densities by detection `j`, which track `i` has just taken, in place.
+def weigh_jerk(tracks: TrackArrays, measured: Measured, cut: IntArray, error: int, nis: FloatArray) -> None:
+    """Weigh the densities of K tracks by the detections that they have just taken, in place.
 
-    Returns:
-        What of the normalised innovation squared no manoeuvre explains.
+    Args:
+        tracks: state of all tracks.
+        measured: what these detections measure.
+        cut: (M, 2) which sides of all detections the edges of the picture cut.
+        error: the sensor's error state, counted from 0, or -1.
+        nis: (K,) normalised innovation squared; lowered to what of it no manoeuvre explains.
     """
-    mean, cov, cut = tracks.jerk_mean[i], tracks.jerk_cov[i], batch.cut[j]
-    nis = weigh_manoeuvres(
-        mean,
-        cov,
-        tracks.jerk_weight[i],
-        measured.z,
-        measured.white,
-        measured.coloured_std,
-        error,
-        cut == WHOLE,
-    )
-    for axis in range(2):
-        if cut[axis] != WHOLE:
-            size, size_var = tracks.size_mean[i, axis, 0], tracks.size_cov[i, axis, 0, 0]
-            for k in range(len(mean)):
-                floor_of_centre(cut[axis], size, size_var, cov[k, axis])
-    return float(nis)
+    track, detection, z = measured.track, measured.detection, measured.z
+    white, coloured_std = measured.white, measured.coloured_std
+    mean, cov, weight = tracks.jerk_mean, tracks.jerk_cov, tracks.jerk_weight
+    size_mean, size_cov, whole = tracks.size_mean, tracks.size_cov, np.empty(2, dtype=np.bool_)
+    for m in range(len(track)):
+        i, j = track[m], detection[m]
+        whole[0], whole[1] = cut[j, 0] == WHOLE, cut[j, 1] == WHOLE
+        left = weigh_manoeuvres(mean[i], cov[i], weight[i], z[m], white[m], coloured_std[m], error, whole)
+        nis[m] = min(nis[m], left)
+        for axis in range(2):
+            if not whole[axis]:
+                for k in range(weight.shape[1]):
+                    floor_of_centre(
+                        cut[j, axis], size_mean[i, axis, 0], size_cov[i, axis, 0, 0], cov[i, k, axis]
+                    )
 
 
 @inner

@@ -10,7 +10,7 @@ from numba import njit
 
 from jeat_graph.association.boxes import occluded_fraction, track_boxes, visible_fraction
 from jeat_graph.config.kernel_form import Model, SensorArrays, Settings
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.filters.coasting import forget
 from jeat_graph.filters.coloured_noise import expected, predict_errors
 from jeat_graph.filters.existence import motion_visibility, unsure_visibility
@@ -32,19 +32,26 @@ _SURELY = 0.99
 _LATE_PERIODS = 3.0
 
 
-@inlined
-def jerk_of(tracks: TrackArrays, i: int, settings: Settings) -> float:
-    """Root spectral density of the jerk of track `i` now (px/s^2.5)."""
-    factor = tracks.jerk_factor[i]
-    if tracks.standing[i]:
-        factor *= settings.standing.jerk_factor
-    return track_jerk(
-        tracks.size_mean[i],
-        settings.motion.jerk_px,
-        settings.motion.jerk_per_size,
-        settings.motion.jerk_per_growth,
-        factor,
+@inner
+def jerk_of(tracks: TrackArrays, track: IntArray, settings: Settings) -> FloatArray:
+    """Root spectral density (K,) of the jerk of the tracks in rows `track` (K,) now (px/s^2.5)."""
+    motion, still = settings.motion, settings.standing.jerk_factor
+    size_mean, factor, standing, out = (
+        tracks.size_mean,
+        tracks.jerk_factor,
+        tracks.standing,
+        np.empty(len(track)),
     )
+    for k in range(len(track)):
+        i = track[k]
+        out[k] = track_jerk(
+            size_mean[i],
+            motion.jerk_px,
+            motion.jerk_per_size,
+            motion.jerk_per_growth,
+            factor[i] * still if standing[i] else factor[i],
+        )
+    return out
 
 
 @inner
@@ -92,10 +99,9 @@ def predict_all(tracks: TrackArrays, n: int, dt: float, scene: SceneState, model
     manoeuvring = tracks.jerk_weight.shape[1] > 0
     if manoeuvring:
         choose_jerk(tracks, n, dt, scene, model)
-    jerk = np.empty(n)
+    jerk = jerk_of(tracks, np.arange(n), settings)
     for i in range(n):
         side = mean_side(tracks.size_mean[i])
-        jerk[i] = jerk_of(tracks, i, settings)
         drift = settings.standing.drift_per_size * side
         tracks.rest_var[i] += drift * drift * dt
     predict(tracks.mean[:n], tracks.cov[:n], jerk, dt)

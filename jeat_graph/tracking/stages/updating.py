@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from jeat_graph.config.kernel_form import Model, SensorArrays, Settings
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.filters.coloured_noise import update_centre
 from jeat_graph.filters.cut_boxes import (
     BOTH_CUT,
@@ -27,155 +27,192 @@ from jeat_graph.filters.standing import (
     update_odds,
     update_rest_point,
 )
-from jeat_graph.tracking.batch import Batch, Measured
+from jeat_graph.tracking.batch import Batch, Measured, no_measurements
 from jeat_graph.tracking.stages.associating import Association, judge_pairs
-from jeat_graph.tracking.stages.inner import inlined, inner
+from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.stages.manoeuvring import weigh_jerk
 from jeat_graph.tracking.stages.predicting import Expectation, expect_detections, jerk_of, occlusion
 from jeat_graph.tracking.state import SceneState, TrackArrays
-from jeat_graph.tracking.update_log import UpdateLog, log_innovation, log_update
+from jeat_graph.tracking.update_log import UpdateLog, log_innovations, log_updates
+
+# Loops stand inside: a function that takes the state of all tracks for each of them counts references to some
+# hundred arrays each time, which takes longer than an update.
 
 
 @inner
-def measured_by(
-    tracks: TrackArrays, i: int, batch: Batch, j: int, expectation: Expectation, sensors: SensorArrays
-) -> Measured:
-    """Say what detection `j` measures of track `i`; a box that is cut only what its visible sides tell."""
-    s = batch.sensor[j]
-    noise = expectation.white[i, s] * batch.weight[j]
-    coloured_std, log_size_var = expectation.coloured_std[i, s], sensors.size_var[s]
-    if batch.cut[j, 0] == WHOLE and batch.cut[j, 1] == WHOLE:
-        return Measured(batch.z[j], batch.log_size[j], noise, coloured_std, log_size_var, noise)
-    white = noise.copy()
-    z, log_size, log_size_var = batch.z[j].copy(), batch.log_size[j].copy(), log_size_var.copy()
-    for axis in range(2):
-        cut = batch.cut[j, axis]
-        if cut == WHOLE:
-            continue
-        known, known_var = tracks.size_mean[i, axis, 0], tracks.size_cov[i, axis, 0, 0]
-        if cut == BOTH_CUT:
-            z[axis], white[axis] = tracks.mean[i, axis, 0], UNKNOWN
-        else:
-            z[axis], var = centre_from_part(cut, batch.side[j, axis], log_size[axis], known, known_var)
-            white[axis] += var
-        log_size[axis], log_size_var[axis] = max(known, log_size[axis]), UNKNOWN
-    return Measured(z, log_size, white, coloured_std, log_size_var, noise)
-
-
-@inlined
-def judge_standing(
-    tracks: TrackArrays, i: int, t: float, z: FloatArray, R: FloatArray, settings: Settings
-) -> None:
-    """Weigh a measurement z (2,), R (2,) of track `i` under "stands" and "moves", before it is taken in."""
-    standing = settings.standing
-    still = still_evidence(tracks.rest_point[i], tracks.rest_var[i], z, R)
-    moving = moving_evidence(tracks.mean[i], tracks.cov[i], z, R)
-    odds = update_odds(tracks.standing_log_odds[i], still, moving, standing.memory)
-    tracks.standing_log_odds[i] = odds
-    if odds < standing.leave_odds:
-        # It moves: look for a place to stand from here on.
-        tracks.standing[i] = False
-        tracks.standing_log_odds[i] = standing.leave_odds
-        tracks.rest_point[i] = z
-        tracks.rest_var[i] = R
-        tracks.rest_since[i] = t
-        return
-    old = t - tracks.rest_since[i] >= standing.min_age_s
-    tracks.standing[i] = tracks.standing[i] or (old and odds > standing.enter_odds)
-    update_rest_point(tracks.rest_point[i], tracks.rest_var[i], z, R)
-
-
-@inlined
-def update_track(
+def measure(
     tracks: TrackArrays,
-    i: int,
+    pairs: IntArray,
     batch: Batch,
-    j: int,
-    measured: Measured,
-    model: Model,
-    log: UpdateLog,
+    expectation: Expectation,
+    s: int,
+    sensors: SensorArrays,
+) -> Measured:
+    """Say what detections of sensor `s` measure of tracks; one that is cut, only what its visible sides tell.
+
+    Args:
+        tracks: state of all tracks.
+        pairs: (2, K) rows of the tracks, and the detection of each.
+        batch: all detections of the step.
+        expectation: of the same tracks.
+        s: the sensor.
+        sensors: parameters of the sensors.
+    """
+    out = no_measurements(pairs.shape[1])
+    size_var = sensors.size_var
+    mean, size_mean, size_cov = tracks.mean, tracks.size_mean, tracks.size_cov
+    for k in range(pairs.shape[1]):
+        i, j = pairs[0, k], pairs[1, k]
+        out.track[k], out.detection[k] = i, j
+        for axis in range(2):
+            cut, noise = batch.cut[j, axis], expectation.white[i, s, axis] * batch.weight[j]
+            z, white, log_size = batch.z[j, axis], noise, batch.log_size[j, axis]
+            log_size_var = size_var[s, axis]
+            if cut != WHOLE:
+                known, known_var = size_mean[i, axis, 0], size_cov[i, axis, 0, 0]
+                if cut == BOTH_CUT:
+                    z, white = mean[i, axis, 0], UNKNOWN
+                else:
+                    z, var = centre_from_part(cut, batch.side[j, axis], log_size, known, known_var)
+                    white += var
+                log_size, log_size_var = max(known, log_size), UNKNOWN
+            out.z[k, axis], out.log_size[k, axis] = z, log_size
+            out.white[k, axis], out.noise[k, axis] = white, noise
+            out.coloured_std[k, axis] = expectation.coloured_std[i, s, axis]
+            out.log_size_var[k, axis] = log_size_var
+    return out
+
+
+@inner
+def judge_standing(tracks: TrackArrays, measured: Measured, t: float, settings: Settings) -> None:
+    """Weigh measurements under "stands" and "moves", before they are taken in."""
+    standing, mean, cov = settings.standing, tracks.mean, tracks.cov
+    stands, log_odds, since = tracks.standing, tracks.standing_log_odds, tracks.rest_since
+    point, var, track, z = tracks.rest_point, tracks.rest_var, measured.track, measured.z
+    # Both models take the coloured noise for white, so that they are compared on equal terms.
+    R = measured.white + measured.coloured_std * measured.coloured_std
+    for k in range(len(track)):
+        i = track[k]
+        still = still_evidence(point[i], var[i], z[k], R[k])
+        odds = update_odds(log_odds[i], still, moving_evidence(mean[i], cov[i], z[k], R[k]), standing.memory)
+        log_odds[i] = odds
+        if odds < standing.leave_odds:
+            # It moves: look for a place to stand from here on.
+            stands[i], log_odds[i], since[i] = False, standing.leave_odds, t
+            for axis in range(2):
+                point[i, axis], var[i, axis] = z[k, axis], R[k, axis]
+            continue
+        old = t - since[i] >= standing.min_age_s
+        stands[i] = stands[i] or (old and odds > standing.enter_odds)
+        update_rest_point(point[i], var[i], z[k], R[k])
+
+
+@inner
+def take_centres(tracks: TrackArrays, measured: Measured, error: int) -> FloatArray:
+    """Take measured centres in; returns their normalised innovations squared (K,)."""
+    mean, cov, track, z = tracks.mean, tracks.cov, measured.track, measured.z
+    white, coloured_std, nis = measured.white, measured.coloured_std, np.empty(len(measured.track))
+    for k in range(len(track)):
+        nis[k] = update_centre(mean[track[k]], cov[track[k]], z[k], white[k], coloured_std[k], error)
+    return nis
+
+
+@inner
+def take_sizes(tracks: TrackArrays, measured: Measured, batch: Batch) -> None:
+    """Take measured sizes in, and what a cut leaves open of size and centre."""
+    track, detection = measured.track, measured.detection
+    log_size, log_size_var = measured.log_size, measured.log_size_var
+    mean, var, cov, cuts = tracks.size_mean, tracks.size_cov, tracks.cov, tracks.cut
+    for k in range(len(track)):
+        i, j = track[k], detection[k]
+        for side in range(2):
+            cut = batch.cut[j, side]
+            update_block(mean[i, side], var[i, side], log_size[k, side], log_size_var[k, side])
+            cuts[i, side] = cut
+            if cut != WHOLE:
+                bound_unmeasured(var[i, side])
+                if batch.log_size[j, side] > mean[i, side, 0]:
+                    # The whole is no smaller than the part, and does not shrink either: between one sensor's
+                    # bound and another's slightly shorter boxes the rate would run away.
+                    mean[i, side, 0] = batch.log_size[j, side]
+                    mean[i, side, 1] = max(mean[i, side, 1], 0.0)
+                floor_of_centre(cut, mean[i, side, 0], var[i, side, 0, 0], cov[i, side])
+
+
+@inner
+def hold_still(tracks: TrackArrays, track: IntArray, std_per_size: float) -> None:
+    """Take in that of the tracks in rows `track` (K,) those which stand neither move nor grow."""
+    standing, mean, cov = tracks.standing, tracks.mean, tracks.cov
+    size_mean, size_cov = tracks.size_mean, tracks.size_cov
+    for i in track:
+        if standing[i]:
+            size = math.exp(0.5 * (size_mean[i, 0, 0] + size_mean[i, 1, 0]))
+            stand_still(mean[i], cov[i], size_mean[i], size_cov[i], std_per_size, size)
+
+
+@inner
+def take_in(
+    tracks: TrackArrays, measured: Measured, s: int, batch: Batch, model: Model, log: UpdateLog
 ) -> None:
-    """Update track `i` with detection `j`: filter, size, noise scale, standing."""
-    sensors, settings = model.sensors, model.settings
-    z, R, coloured_std = measured.z, measured.white, measured.coloured_std
-    s = batch.sensor[j]
-    if len(log.rows) > 0:
-        jerk = jerk_of(tracks, i, settings)
-        log_update(log, tracks.track_id[i], j, batch, measured, jerk, sensors)
+    """Update tracks with the detections of sensor `s` that they take: filter, size, noise scale, standing."""
+    settings, error, track = model.settings, model.sensors.error[s], measured.track
+    logs = len(log.rows) > 0
+    if logs:
+        jerk = jerk_of(tracks, track, settings)
+        log_updates(log, tracks.track_id, jerk, batch, measured, model.sensors)
     if settings.standing.enabled:
-        # Both models take the coloured noise for white, so that they are compared on equal terms.
-        judge_standing(tracks, i, batch.t, z, R + coloured_std * coloured_std, settings)
-    nis = update_centre(tracks.mean[i], tracks.cov[i], z, R, coloured_std, sensors.error[s])
-    log_innovation(log, nis, tracks.scale[i, s])
+        judge_standing(tracks, measured, batch.t, settings)
+    nis = take_centres(tracks, measured, error)
+    if logs:
+        log_innovations(log, nis, tracks.scale[track, s])
     if tracks.jerk_weight.shape[1]:
         # A lag behind what turns is no noise of the boxes.
-        nis = min(nis, weigh_jerk(tracks, i, batch, j, measured, sensors.error[s]))
-    tracks.scale[i, s] = adapt_scale(
-        tracks.scale[i, s],
-        nis,
-        settings.noise.adaptation_rate,
-        settings.noise.scale_min,
-        settings.noise.scale_max,
-    )
-    for side in range(2):
-        update_block(
-            tracks.size_mean[i, side],
-            tracks.size_cov[i, side],
-            measured.log_size[side],
-            measured.log_size_var[side],
+        weigh_jerk(tracks, measured, batch.cut, error, nis)
+    take_sizes(tracks, measured, batch)
+    hold_still(tracks, track, settings.standing.speed_std_per_size)
+    noise, scale, hits, score_odds = settings.noise, tracks.scale, tracks.hits, tracks.score_odds
+    t_update, used, seen_by = tracks.t_update, tracks.used, tracks.seen_by
+    for k in range(len(track)):
+        i, j = track[k], measured.detection[k]
+        scale[i, s] = adapt_scale(
+            scale[i, s], nis[k], noise.adaptation_rate, noise.scale_min, noise.scale_max
         )
-        tracks.cut[i, side] = batch.cut[j, side]
-        if batch.cut[j, side] != WHOLE:
-            bound_unmeasured(tracks.size_cov[i, side])
-            if batch.log_size[j, side] > tracks.size_mean[i, side, 0]:
-                # The whole is no smaller than the part, and does not shrink either: between one sensor's
-                # bound and another's slightly shorter boxes the rate would run away.
-                tracks.size_mean[i, side, 0] = batch.log_size[j, side]
-                tracks.size_mean[i, side, 1] = max(tracks.size_mean[i, side, 1], 0.0)
-        floor_of_centre(
-            batch.cut[j, side],
-            tracks.size_mean[i, side, 0],
-            tracks.size_cov[i, side, 0, 0],
-            tracks.cov[i, side],
-        )
-    if tracks.standing[i]:
-        size = math.exp(0.5 * (tracks.size_mean[i, 0, 0] + tracks.size_mean[i, 1, 0]))
-        stand_still(
-            tracks.mean[i],
-            tracks.cov[i],
-            tracks.size_mean[i],
-            tracks.size_cov[i],
-            settings.standing.speed_std_per_size,
-            size,
-        )
-    tracks.hits[i] += 1
-    tracks.score_odds[i] += (batch.score_odds[j] - tracks.score_odds[i]) / tracks.hits[i]
-    tracks.t_update[i] = batch.t
-    tracks.used[i] |= 1 << s
-    tracks.seen_by[i] |= 1 << s
+        hits[i] += 1
+        score_odds[i] += (batch.score_odds[j] - score_odds[i]) / hits[i]
+        t_update[i] = batch.t
+        used[i] |= 1 << s
+        seen_by[i] |= 1 << s
 
 
 @inner
-def take_detection(
+def take_pairs(
     tracks: TrackArrays,
-    i: int,
+    pairs: IntArray,
+    s: int,
     batch: Batch,
-    j: int,
-    measured: Measured,
-    evidence: float,
+    expectation: Expectation,
+    evidence: FloatArray,
     model: Model,
     log: UpdateLog,
 ) -> None:
-    """Let track `i` take detection `j`, of tempered `evidence`: update its state and its existence."""
-    update_track(tracks, i, batch, j, measured, model, log)
+    """Let tracks take detections of sensor `s`, and update state and existence.
+
+    Args:
+        tracks: state of all tracks.
+        pairs: (2, K) rows of the tracks, none of them twice, and the detection of each.
+        s: the sensor.
+        batch: all detections of the step.
+        expectation: of all tracks.
+        evidence: (K,) tempered ln Λ of each pair.
+        model: sensors and settings.
+        log: takes down what the tracks take in.
+    """
+    measured = measure(tracks, pairs, batch, expectation, s, model.sensors)
+    take_in(tracks, measured, s, batch, model, log)
     if model.settings.lifecycle.by_existence:
-        tracks.existence[i] = existence_after_hit(tracks.existence[i], evidence)
-
-
-@inner
-def tempered(association: Association, i: int, s: int, scene: SceneState, model: Model) -> float:
-    """Return the evidence of sensor `s` for track `i` as far as it is believed."""
-    return float(model.sensors.tempering[s] * scene.trust[s] * association.evidence[i, s])
+        existence = tracks.existence
+        for k in range(pairs.shape[1]):
+            existence[pairs[0, k]] = existence_after_hit(existence[pairs[0, k]], evidence[k])
 
 
 @inner
@@ -194,16 +231,19 @@ def update_matched(
     That is a stacked update where all is linear: where no box is cut, the track does not stand, and the
     sensors have no error states, which are measured in the order of the sensors.
     """
-    match = association.match
-    for i in range(n):
-        for s in range(match.shape[1]):
-            j = match[i, s]
-            if j < 0:
-                continue
-            association.taken[j] = 1
-            measured = measured_by(tracks, i, batch, j, expectation, model.sensors)
-            evidence = tempered(association, i, s, scene, model)
-            take_detection(tracks, i, batch, j, measured, evidence, model, log)
+    match, taken = association.match, association.taken
+    for s in range(match.shape[1]):
+        track = np.flatnonzero(match[:, s] >= 0)
+        if len(track) == 0:
+            continue
+        pairs, evidence = np.empty((2, len(track)), dtype=np.int64), np.empty(len(track))
+        believed = model.sensors.tempering[s] * scene.trust[s]
+        for k in range(len(track)):
+            i = track[k]
+            pairs[0, k], pairs[1, k] = i, match[i, s]
+            evidence[k] = believed * association.evidence[i, s]
+            taken[match[i, s]] = 1
+        take_pairs(tracks, pairs, s, batch, expectation, evidence, model, log)
 
 
 @inner
@@ -226,28 +266,30 @@ def take_second_views(
     if np.all(taken != 0):
         return
     expectation = expect_detections(tracks, n, occlusion(tracks, n), model)
-    pairs, evidence = judge_pairs(tracks, n, batch, expectation, p_detect, scene, model)
-    first_pair = np.searchsorted(pairs.rows, np.arange(n + 1))
+    listed, evidence = judge_pairs(tracks, n, batch, expectation, p_detect, scene, model)
+    first_pair, sensor = np.searchsorted(listed.rows, np.arange(n + 1)), batch.sensor
+    first = np.full(n, -1)
     for i in range(n):
-        first = -1
         for s in range(match.shape[1]):
             if match[i, s] >= 0:
-                first = s
-        if first < 0:
-            continue
-        for s in range(match.shape[1]):
-            if s == first:
+                first[i] = s
+    for s in range(match.shape[1]):
+        pairs, tempered, count = np.empty((2, n), dtype=np.int64), np.empty(n), 0
+        believed = model.sensors.tempering[s] * scene.trust[s]
+        for i in range(n):
+            if first[i] < 0 or first[i] == s:
                 continue
-            best = np.inf
             # Not the literal -1, for which all that follows would be compiled a second time.
-            chosen = np.int64(-1)
+            best, chosen = np.inf, np.int64(-1)
             for p in range(first_pair[i], first_pair[i + 1]):
-                j = pairs.cols[p]
-                if not taken[j] and batch.sensor[j] == s and pairs.d2[p] <= best:
-                    best, chosen = pairs.d2[p], np.int64(p)
+                j = listed.cols[p]
+                if not taken[j] and sensor[j] == s and listed.d2[p] <= best:
+                    best, chosen = listed.d2[p], np.int64(p)
             if chosen >= 0:
-                j = pairs.cols[chosen]
+                j = listed.cols[chosen]
                 match[i, s], association.evidence[i, s], taken[j] = j, evidence[chosen], 1
-                measured = measured_by(tracks, i, batch, j, expectation, model.sensors)
-                believed = tempered(association, i, s, scene, model)
-                take_detection(tracks, i, batch, j, measured, believed, model, log)
+                pairs[0, count], pairs[1, count] = i, j
+                tempered[count] = believed * evidence[chosen]
+                count += 1
+        if count:
+            take_pairs(tracks, pairs[:, :count].copy(), s, batch, expectation, tempered, model, log)
