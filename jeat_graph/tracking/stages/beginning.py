@@ -9,7 +9,7 @@ import numpy as np
 from jeat_graph.association.births import choose_births
 from jeat_graph.association.boxes import clip_boxes, track_boxes
 from jeat_graph.config.kernel_form import Model, SensorArrays, Settings
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.filters.cut_boxes import (
     BOTH_CUT,
     FIRST_LOG_GROWTH,
@@ -49,7 +49,7 @@ def give_birth(
 ) -> tuple[int, int]:
     """Start tracks from leftovers; returns the number of tracks and the next identity."""
     settings = model.settings
-    existence = birth_existence(batch, scene, model)
+    existence = birth_existence(batch, association.taken, scene, model)
     parents, partner, double = choose_births(
         batch.boxes,
         existence,
@@ -143,35 +143,46 @@ def shown_boxes(tracks: TrackArrays, n: int, settings: Settings) -> FloatArray:
 
 
 @inner
-def birth_existence(batch: Batch, scene: SceneState, model: Model) -> FloatArray:
+def birth_existence(batch: Batch, taken: IntArray, scene: SceneState, model: Model) -> FloatArray:
     """Probability (M,) that a detection which no track took is of a vehicle not tracked before.
 
     u P_D LR(score) / (u P_D LR(score) + λ): u vehicles in the scene are expected to have no track yet, and
     most leftovers are clutter however high their score (Williams 2015, the Poisson part of the mixture).
     A box of nearly the whole picture says nothing of where a vehicle is: dazzled detectors of change give it.
+
+    Args:
+        batch: the M detections.
+        taken: (M,) not 0 where a track takes the detection, of which nothing is said (-1).
+        scene: running estimates.
+        model: sensors and settings.
     """
-    image, lifecycle = model.settings.image, model.settings.lifecycle
-    out = np.empty(len(batch.precision))
+    image, leaves = model.settings.image, model.settings.lifecycle.leave_picture
+    most = model.settings.birth.max_picture_share * image.width * image.height
+    z, boxes, cut, sensor, log_score = batch.z, batch.boxes, batch.cut, batch.sensor, batch.log_score
+    out, p_detect, clutter, undetected = (
+        np.full(len(taken), -1.0),
+        scene.p_detect,
+        scene.clutter,
+        scene.undetected[0],
+    )
     for j in range(len(out)):
-        s = batch.sensor[j]
-        x, y = batch.z[j]
-        if lifecycle.leave_picture and has_left(x, y, batch.boxes[j], image):
-            out[j] = -1.0  # it would end in the same step
+        if taken[j]:
             continue
-        if covers_picture(batch, j, image.width * image.height, model.settings.birth.max_picture_share):
-            out[j] = -1.0
+        if leaves and has_left(z[j, 0], z[j, 1], boxes[j], image):
+            continue  # it would end in the same step
+        if covers_picture(boxes[j], cut[j], most):
             continue
-        true = scene.undetected[0] * scene.p_detect[s] * math.exp(batch.log_score[j])
-        out[j] = true / (true + scene.clutter[s])
+        true = undetected * p_detect[sensor[j]] * math.exp(log_score[j])
+        out[j] = true / (true + clutter[sensor[j]])
     return out
 
 
 @inner
-def covers_picture(batch: Batch, j: int, area: float, most: float) -> bool:
-    """Whether detection `j` reaches three edges of the picture and covers more than `most` of its `area`."""
-    first, second = batch.cut[j]
+def covers_picture(box: FloatArray, cut: IntArray, most: float) -> bool:
+    """Whether a box (4,) with cuts (2,) reaches three edges of the picture and covers over `most` px²."""
+    first, second = cut
     reaches = first != WHOLE and second != WHOLE and (first == BOTH_CUT or second == BOTH_CUT)
-    return bool(reaches and batch.boxes[j, 2] * batch.boxes[j, 3] > most * area)
+    return bool(reaches and box[2] * box[3] > most)
 
 
 @inner

@@ -50,24 +50,26 @@ def judge_sight(
     lifecycle = model.settings.lifecycle
     if not lifecycle.judges_sight:
         return
-    newcomer = birth_existence(batch, scene, model)
-    leftover = np.ones(len(newcomer), dtype=np.bool_)
+    match, existence, seen_by = association.match, tracks.existence, tracks.seen_by
+    taken = np.zeros(len(batch.precision), dtype=np.int64)
+    for i in range(n):
+        for s in range(match.shape[1]):
+            if match[i, s] >= 0:
+                taken[match[i, s]] = 1
+    newcomer = birth_existence(batch, taken, scene, model)
     for s in range(len(batch.present)):
         if not batch.present[s]:
             continue
         others = others_look(s, batch.t, scene, model)
         missed, found = 0.0, 0.0
         for i in range(n):
-            j = association.match[i, s]
-            if j < 0:
-                # What it alone has ever seen may as well have been nothing.
-                if tracks.seen_by[i] & ~(1 << s):
-                    missed += ratio_of_miss(tracks.existence[i], p_detect[i, s])
-            else:
-                leftover[j] = False
-                found += ratio_of_hit(tracks.existence[i], p_detect[i, s], association.evidence[i, s])
-        for j in range(len(leftover)):
-            if leftover[j] and batch.sensor[j] == s and newcomer[j] > 0.0:
+            if match[i, s] >= 0:
+                found += ratio_of_hit(existence[i], p_detect[i, s], association.evidence[i, s])
+            # What it alone has ever seen may as well have been nothing.
+            elif seen_by[i] & ~(1 << s):
+                missed += ratio_of_miss(existence[i], p_detect[i, s])
+        for j in range(len(newcomer)):
+            if batch.sensor[j] == s and newcomer[j] > 0.0:
                 found += ratio_of_leftover(newcomer[j])
         if not others:
             scene.blind[s] = 0.0
