@@ -8,28 +8,22 @@ import numpy as np
 
 from jeat_graph.association.births import choose_births
 from jeat_graph.association.boxes import clip_boxes, track_boxes
-from jeat_graph.config.kernel_form import Model, SensorArrays, Settings
+from jeat_graph.config.kernel_form import Model, Settings
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.filters.cut_boxes import (
     BOTH_CUT,
-    FIRST_LOG_GROWTH,
-    FIRST_LOG_GROWTH_STD,
-    HIGH_CUT,
-    UNKNOWN,
     WHOLE,
-    centre_from_part,
-    centre_from_side,
 )
-from jeat_graph.filters.noise import base_variance
 from jeat_graph.filters.prior import write_prior, write_size_prior
-from jeat_graph.tracking.batch import Batch, Measured, no_measurements
+from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.comparing import remember_box
 from jeat_graph.tracking.stages.ending import confirm, has_left
 from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.stages.learning import scan_weight
 from jeat_graph.tracking.stages.manoeuvring import start_jerk
-from jeat_graph.tracking.stages.predicting import jerk_of, new_velocity_var, split_noise
+from jeat_graph.tracking.stages.measuring import first_view, second_view
+from jeat_graph.tracking.stages.predicting import jerk_of, new_velocity_var
 from jeat_graph.tracking.stages.updating import take_in
 from jeat_graph.tracking.stages.worth import judge_worth
 from jeat_graph.tracking.state import SceneState, TrackArrays
@@ -83,55 +77,6 @@ def give_birth(
     judge_worth(tracks, n + len(parents), scene, model)
     confirm(tracks, n + len(parents), batch.t, settings)
     return n + len(parents), next_id + len(parents)
-
-
-@inner
-def first_view(batch: Batch, i: int, j: int, sensors: SensorArrays) -> Measured:
-    """Say what detection `j` measures for row `i`, of unknown size; one that is cut may be much larger."""
-    s, own = batch.sensor[j], no_measurements(1)
-    own.track[0], own.detection[0] = i, j
-    size = math.sqrt(batch.boxes[j, 2] * batch.boxes[j, 3])
-    for axis in range(2):
-        side = batch.boxes[j, 2 + axis]
-        base = base_variance(sensors.sigma_px[s], sensors.rho[s, axis], side, sensors.rho_size[s], size)
-        r, h = split_noise(base, s, sensors)
-        noise = r * batch.weight[j]
-        z, white, log_size, log_size_var = (
-            batch.z[j, axis],
-            noise,
-            batch.log_size[j, axis],
-            sensors.size_var[s, axis],
-        )
-        cut = batch.cut[j, axis]
-        if cut != WHOLE:
-            log_size += FIRST_LOG_GROWTH
-            log_size_var += FIRST_LOG_GROWTH_STD * FIRST_LOG_GROWTH_STD
-            half_var = centre_from_side(HIGH_CUT, 0.0, log_size, log_size_var)[1]
-            if cut != BOTH_CUT:
-                z, _ = centre_from_side(cut, batch.side[j, axis], log_size, 0.0)
-            white += half_var
-        own.z[0, axis], own.log_size[0, axis], own.log_size_var[0, axis] = z, log_size, log_size_var
-        own.white[0, axis], own.coloured_std[0, axis], own.noise[0, axis] = white, h, noise
-    return own
-
-
-@inner
-def second_view(tracks: TrackArrays, i: int, batch: Batch, j: int, sensors: SensorArrays) -> Measured:
-    """Say what detection `j` measures of track `i`, which another sensor's detection has just begun."""
-    own = first_view(batch, i, j, sensors)
-    for axis in range(2):
-        cut = batch.cut[j, axis]
-        if cut == WHOLE:
-            continue
-        known = tracks.size_mean[i, axis, 0]
-        if cut == BOTH_CUT:
-            own.z[0, axis] = tracks.mean[i, axis, 0]
-        else:
-            shown = batch.log_size[j, axis]
-            own.z[0, axis], _ = centre_from_part(cut, batch.side[j, axis], shown, known, 0.0)
-        # Both views guess the part that does not show in the same way.
-        own.log_size[0, axis], own.log_size_var[0, axis] = known, UNKNOWN
-    return own
 
 
 @inner

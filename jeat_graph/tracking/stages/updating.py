@@ -6,15 +6,12 @@ import math
 
 import numpy as np
 
-from jeat_graph.config.kernel_form import Model, SensorArrays, Settings
+from jeat_graph.config.kernel_form import Model, Settings
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.filters.coloured_noise import update_centre
 from jeat_graph.filters.cut_boxes import (
-    BOTH_CUT,
-    UNKNOWN,
     WHOLE,
     bound_unmeasured,
-    centre_from_part,
     floor_of_centre,
 )
 from jeat_graph.filters.existence import existence_after_hit
@@ -27,60 +24,17 @@ from jeat_graph.filters.standing import (
     update_odds,
     update_rest_point,
 )
-from jeat_graph.tracking.batch import Batch, Measured, no_measurements
+from jeat_graph.tracking.batch import Batch, Measured
 from jeat_graph.tracking.stages.associating import Association, judge_pairs
 from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.stages.manoeuvring import weigh_jerk
+from jeat_graph.tracking.stages.measuring import measure
 from jeat_graph.tracking.stages.predicting import Expectation, expect_detections, jerk_of, occlusion
 from jeat_graph.tracking.state import SceneState, TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog, log_innovations, log_updates
 
 # Loops stand inside: a function that takes the state of all tracks for each of them counts references to some
 # hundred arrays each time, which takes longer than an update.
-
-
-@inner
-def measure(
-    tracks: TrackArrays,
-    pairs: IntArray,
-    batch: Batch,
-    expectation: Expectation,
-    s: int,
-    sensors: SensorArrays,
-) -> Measured:
-    """Say what detections of sensor `s` measure of tracks; one that is cut, only what its visible sides tell.
-
-    Args:
-        tracks: state of all tracks.
-        pairs: (2, K) rows of the tracks, and the detection of each.
-        batch: all detections of the step.
-        expectation: of the same tracks.
-        s: the sensor.
-        sensors: parameters of the sensors.
-    """
-    out = no_measurements(pairs.shape[1])
-    size_var = sensors.size_var
-    mean, size_mean, size_cov = tracks.mean, tracks.size_mean, tracks.size_cov
-    for k in range(pairs.shape[1]):
-        i, j = pairs[0, k], pairs[1, k]
-        out.track[k], out.detection[k] = i, j
-        for axis in range(2):
-            cut, noise = batch.cut[j, axis], expectation.white[i, s, axis] * batch.weight[j]
-            z, white, log_size = batch.z[j, axis], noise, batch.log_size[j, axis]
-            log_size_var = size_var[s, axis]
-            if cut != WHOLE:
-                known, known_var = size_mean[i, axis, 0], size_cov[i, axis, 0, 0]
-                if cut == BOTH_CUT:
-                    z, white = mean[i, axis, 0], UNKNOWN
-                else:
-                    z, var = centre_from_part(cut, batch.side[j, axis], log_size, known, known_var)
-                    white += var
-                log_size, log_size_var = max(known, log_size), UNKNOWN
-            out.z[k, axis], out.log_size[k, axis] = z, log_size
-            out.white[k, axis], out.noise[k, axis] = white, noise
-            out.coloured_std[k, axis] = expectation.coloured_std[i, s, axis]
-            out.log_size_var[k, axis] = log_size_var
-    return out
 
 
 @inner
