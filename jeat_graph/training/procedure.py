@@ -180,7 +180,7 @@ def _read(request: TrainRequest, paths: Sequence[Path]) -> Any:
             found += read_coco_pictures(path, request.pictures)
         else:
             found += read_pictures(path)
-    names = Counter(path.stem for path in paths)
+    names = Counter(path.stem if path.suffix.lower() == _JSON else path.name for path in paths)
     name, times = names.most_common(1)[0]
     if times > 1:
         raise DataError(f"{times} data sets are called {name}; their results could not be told apart", name)

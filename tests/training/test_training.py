@@ -9,7 +9,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs PyTorch, the extra `train`")
 
-from jeat_graph.data.errors import OtherRunError  # noqa: E402
+from jeat_graph.data.errors import DataError, OtherRunError  # noqa: E402
 from jeat_graph.detection.models.onnx_head import read_onnx_head  # noqa: E402
 from jeat_graph.training.data_sets import Split, read_event_segments, read_pictures  # noqa: E402
 from jeat_graph.training.judging import judge  # noqa: E402
@@ -104,3 +104,16 @@ def test_the_file_says_what_it_was_trained_on_and_how_good_it_is(small_set, tmp_
     assert card["judged"]["all"]["boxes"] == 2 * FRAMES  # of one of the two segments
     assert np.isfinite(card["judged"]["all"]["AP50"])
     assert notes["names"] == "{0: 'vehicle'}"
+
+
+def test_data_sets_are_told_apart_by_their_whole_names(small_set, tmp_path):
+    lights = [tmp_path / "lux-0.5", tmp_path / "lux-0.7"]
+    for link in lights:
+        link.symlink_to(small_set)
+    settings = TrainSettings(crop_px=(32, 32), batch=2, epochs=0.1, judged=1)
+    done = train(TrainRequest(tuple(lights), tmp_path / "n.onnx", NetSettings(width=2), settings))
+    assert [one["name"] for one in done.card["data"]] == ["lux-0.5", "lux-0.7"]
+    twice = TrainRequest((small_set, small_set), tmp_path / "m.onnx", NetSettings(width=2), settings)
+    with pytest.raises(DataError, match="2 data sets are called small"):
+        train(twice)
+    assert not (tmp_path / "m.onnx").exists()
