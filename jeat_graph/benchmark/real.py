@@ -2,7 +2,8 @@
 
 Every set of real recordings is tracked as it comes, after blind calibration and after calibration with truth,
 each half of a set with what the other half gives; both tables are judged, and so are the peers, with their
-defaults and tuned on the judged recordings themselves.
+defaults and tuned on the judged recordings themselves. Copies of the recordings, altered a little, say how
+much of the scores is luck.
 """
 
 from __future__ import annotations
@@ -19,15 +20,16 @@ from jeat_graph.benchmark.judging import in_processes, summarise
 from jeat_graph.benchmark.peer_cache import PeerCache, cache_key
 from jeat_graph.benchmark.peer_search import peers_here
 from jeat_graph.benchmark.provenance import provenance
-from jeat_graph.benchmark.real_ours import OursOnSet, judge_row, rows_of
+from jeat_graph.benchmark.real_copies import CopyJob, copies_table, judge_copy
+from jeat_graph.benchmark.real_ours import METRICS, OursOnSet, judge_row, rows_of
 from jeat_graph.benchmark.real_sets import RealSet, real_sets
 from jeat_graph.benchmark.robustness import PRESETS, judge_variation, variations
+from jeat_graph.config.argument_types import natural
 from jeat_graph.config.reading import load_config
 
 if TYPE_CHECKING:
     from jeat_graph.eval.tables import Cell, Table
 
-METRICS = ("MOTA", "IDF1", "HOTA")
 _QUICK_RECORDINGS = 2
 _ROBUSTNESS_DURATION_S = 20.0
 _QUICK_DURATION_S = 6.0
@@ -43,6 +45,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     }
     common.declare(parser, "real", texts)
     add = parser.add_argument
+    add(
+        "--copies",
+        type=natural,
+        default=0,
+        metavar="N",
+        help="judge N copies of each set, too, altered a little: how much of the scores is luck (0)",
+    )
     add("--peers", metavar="JSON", help="keep the other trackers' scores in this file from run to run")
     add("--no-peers", action="store_true", help="leave the other trackers out")
     add("--tuned", action="store_true", help="search the others' parameters too, on what is judged (slow)")
@@ -70,11 +79,15 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
         cache = PeerCache(Path(args.peers) if args.peers else None)
         names, tuned = peers_here(), args.tuned and not args.quick
         peers = [one for found in sets for one in judge_peers(found, names, cache, tuned)]
+    others = () if args.no_peers else tuple(peers_here())
+    drawn = [CopyJob(data, most, one.name, seed, others) for one in sets for seed in range(args.copies)]
+    copies = in_processes(judge_copy, drawn, args.jobs, "altered copies") if drawn else []
     setup: dict[str, Any] = {
         "data": {one.name: [r.name for r in one.recordings] for one in sets},
         "seeds": list(args.seeds or ((0,) if args.quick else (0, 1))),
         "duration_s": args.duration or (_QUICK_DURATION_S if args.quick else _ROBUSTNESS_DURATION_S),
         "tuned": bool(args.tuned),
+        "copies": args.copies,
     }
     robustness: list[dict[str, Any]] = []
     if not args.no_robustness:
@@ -90,6 +103,7 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
         **provenance(setup, {name: load_config(name) for name in PRESETS}),
         "ours": ours,
         "peers": peers,
+        "copies": [record for found in copies for record in found],
         "robustness": robustness,
         "robustness_summary": summarise(robustness),
     }
@@ -129,7 +143,11 @@ def tables(result: Mapping[str, Any]) -> dict[str, Table]:
     for name in names:
         ours = [e for e in result["ours"] if e["set"] == name]
         peers = [e for e in result["peers"] if e["set"] == name]
-        out[f"real-{name.lower().replace(' ', '-')}"] = set_table(name, ours, peers)
+        marker = name.lower().replace(" ", "-")
+        out[f"real-{marker}"] = set_table(name, ours, peers)
+        copies = [e for e in result.get("copies", ()) if e["set"] == name]
+        if copies:
+            out[f"copies-{marker}"] = copies_table(name, copies, result["settings"]["copies"])
     if result["robustness_summary"]:
         seeds = common.over_seeds(len(result["settings"]["seeds"]))
         out["robustness"] = common.scenario_table(

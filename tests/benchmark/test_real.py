@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from jeat_graph.benchmark.peer_cache import PeerCache, cache_key
+from jeat_graph.benchmark.real_copies import LEFT_OUT, MOVED, altered
 from jeat_graph.benchmark.recordings import JudgedRecording, simulated
 from jeat_graph.benchmark.robustness import judge_variation, variations, varied
 from jeat_graph.cli.main import main
@@ -45,6 +46,37 @@ def test_every_stream_is_judged_and_the_tables_come_back_from_the_file(data, tmp
         assert set(one["by_recording"]) == {"0005", "0006"}
     assert main(["benchmark", "real", "--from", str(out / "real.json")]) == 0
     assert capsys.readouterr().out == shown
+
+
+def test_copies_are_altered_a_little_and_judged_with_their_spread(data, tmp_path, capsys):
+    few = ["--no-peers", "--no-calibrate", "--no-robustness", "--quick", "--copies", "2", "--jobs", "1"]
+    assert main(["benchmark", "real", "--data", str(data), "--out", str(tmp_path), *few]) == 0
+    assert "mean of 2 altered copies" in capsys.readouterr().out
+    found = json.loads((tmp_path / "real.json").read_text())["copies"]
+    assert len(found) == 2 * 3 * 2  # copies, streams, tables
+    mine = [e for e in found if e["row"] == "default, rgb + lidar" and e["kind"] == "causal"]
+    mota = [e["scores"]["MOTA"] for e in mine]
+    assert len(mota) == 2
+    assert mota[0] != mota[1]
+    lines = (tmp_path / "real.md").read_text().splitlines()
+    cells = [line.split("|") for line in lines if line.startswith("| default, rgb + lidar") and "±" in line]
+    assert cells[0][2].startswith(f" {np.mean(mota):.1f}±{np.std(mota, ddof=1):.1f} /")
+
+
+def test_an_altered_copy_has_the_scans_of_the_original_and_boxes_near_its():
+    original = simulated("day", 5, 4.0).detections
+    copy = altered(original, np.random.default_rng(0))
+    np.testing.assert_array_equal(copy.scan_t, original.scan_t)
+    left = 1.0 - len(copy.scores) / len(original.scores)
+    assert abs(left - LEFT_OUT) < 4.0 * np.sqrt(LEFT_OUT / len(original.scores))
+    for k in range(len(original.scan_t)):
+        before = slice(*original.scan_start[k : k + 2])
+        after = slice(*copy.scan_start[k : k + 2])
+        kept = np.isin(original.scores[before], copy.scores[after])
+        assert kept.sum() == len(copy.scores[after])
+        was, now = original.boxes[before][kept], copy.boxes[after]
+        assert np.all(np.abs(now - was) < 6.0 * MOVED * was[:, [2, 3, 2, 3]])
+        assert np.any(now != was) or len(now) == 0
 
 
 def test_a_folder_without_recordings_is_said(tmp_path, capsys):

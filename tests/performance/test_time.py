@@ -50,7 +50,7 @@ def frames(num, objects=50):
 
 
 def test_our_step_takes_less_than_a_sixth_of_bytetracks():
-    """Undisturbed it is an eighth or less, by processor; with others at work small arrays lose by cold caches."""
+    """Undisturbed it is an eighth or less, by processor; with others at work cold caches cost us more."""
     if not installed_peers():
         pytest.skip("the package trackers is not installed")
     names, faster = ["highway", "bytetrack"], []
