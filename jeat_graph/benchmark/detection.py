@@ -14,8 +14,9 @@ import numpy as np
 from jeat_graph.benchmark import common
 from jeat_graph.benchmark.judging import in_processes
 from jeat_graph.benchmark.provenance import provenance
-from jeat_graph.benchmark.raw_options import add_raw, detectors_of, findings
+from jeat_graph.benchmark.raw_options import NONE, add_raw, detectors_of, findings
 from jeat_graph.benchmark.raw_segments import SENSORS, RawFound, described, find_in, segments_in
+from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.detection.detecting import FUSED_SENSOR
 
@@ -41,7 +42,7 @@ _KEYS = ("AP50", "AP")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the benchmark's arguments."""
-    add_raw(parser, "detection")
+    add_raw(parser, "detection", one_is_enough=True)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -50,7 +51,14 @@ def run(args: argparse.Namespace) -> int:
 
 
 def measure(args: argparse.Namespace) -> dict[str, Any]:
-    """Let every detector look at every segment, and judge what it finds."""
+    """Let every detector look at every segment, and judge what it finds.
+
+    Raises:
+        ConfigError: no detectors, or what `findings` raises.
+    """
+    args.frames, args.events = ([one for one in names if one != NONE] for names in (args.frames, args.events))
+    if not (args.frames or args.events or args.fused):
+        raise ConfigError("no detectors: give --frames, --events or --fused")
     folders = [Path(one) for one in args.folders]
     segments = segments_in(folders)
     asked = findings(args, segments, _EVERY_SCORE)

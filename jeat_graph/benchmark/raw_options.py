@@ -14,14 +14,17 @@ from jeat_graph.detection.detecting import FUSED_SENSOR
 from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION
 
 KINDS = (FRAMES, EVENTS)
+#: In place of detectors: nobody looks at these.
+NONE = "none"
 
 
-def add_raw(parser: argparse.ArgumentParser, name: str) -> None:
+def add_raw(parser: argparse.ArgumentParser, name: str, one_is_enough: bool = False) -> None:
     """Declare data sets and detectors.
 
     Args:
         parser: of the benchmark.
         name: of the files that it writes.
+        one_is_enough: whether one of pictures and events may be left out.
     """
     add = parser.add_argument
     add(
@@ -31,6 +34,7 @@ def add_raw(parser: argparse.ArgumentParser, name: str) -> None:
         help="folders that `simulate --sensors pictures` wrote, one a light; no detector may have seen them",
     )
     texts = "detectors of {}: motion, the name of a network that comes with the package, or FILE.onnx"
+    texts += f"; {NONE}: nobody looks at them" if one_is_enough else ""
     for kind, seen in zip(KINDS, ("pictures", "events"), strict=True):
         help_text = texts.format(f"{seen} (default: {MOTION})")
         add(f"--{kind}", nargs="+", default=[MOTION], metavar="NAME|FILE", help=help_text)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -71,6 +72,23 @@ def test_only_segments_for_tests_are_judged(small):
     assert [s.name for s in segments_in([small])] == ["000001"]
     with pytest.raises(DataError, match="2 data sets are called small"):
         segments_in([small, small])
+
+
+def test_one_sensor_may_be_left_out_where_a_set_lacks_it(small, tmp_path, capsys):
+    """Sets of `simulate --sensors rgb` have a file of events with none in it."""
+    blind = tmp_path / "blind"
+    shutil.copytree(small, blind)
+    for segment in (blind / "segments").iterdir():
+        with EventWriter(segment / "events.h5", SIZE, "none"):
+            pass
+    judge = ["benchmark", "detection", str(blind), "--jobs", "1"]
+    assert main([*judge, "--events", "none", "--out", str(tmp_path)]) == 0
+    found = json.loads((tmp_path / "detection.json").read_text())
+    assert [one["sensor"] for one in found["records"]] == ["rgb"]
+    assert found["settings"]["detectors"] == {"rgb": [{"name": "motion"}], "evt": []}
+    capsys.readouterr()
+    assert main([*judge, "--events", "none", "--frames", "none"]) == 2
+    assert "no detectors" in capsys.readouterr().err
 
 
 def test_detectors_are_judged_by_light_motion_and_size(small, tmp_path, capsys):
