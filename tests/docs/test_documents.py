@@ -100,6 +100,22 @@ def test_links_lead_to_files(page):
     assert missing == []
 
 
+def anchors(page):
+    """What headings of a page are called in links: small letters, no punctuation, hyphens for spaces."""
+    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    headings = (re.sub(r"[^\w\- ]", "", one.lower()) for one in re.findall(r"^#+ (.+)$", text, re.MULTILINE))
+    return {one.replace(" ", "-") for one in headings}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_links_lead_to_headings(page):
+    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    links = re.findall(r"\]\((?!http)([^)#]*)#([^)]+)\)", text)
+    pages = [(page.parent / target if target else page, anchor) for target, anchor in links]
+    read = [(target, anchor) for target, anchor in pages if target.suffix == ".md"]
+    assert [f"{t.name}#{a}" for t, a in read if a not in anchors(t)] == []
+
+
 def test_the_readme_is_short():
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 150
 
