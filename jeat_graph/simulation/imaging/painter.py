@@ -17,9 +17,12 @@ from jeat_graph.simulation.imaging.moments import BOX, SIDES
 from jeat_graph.simulation.imaging.road_light import cast_beams
 from jeat_graph.simulation.imaging.shadows import cast_shadow
 from jeat_graph.simulation.imaging.shapes import PARTS
-from jeat_graph.simulation.imaging.stage import AIR, BETA, LIGHTS_ON, SUN_LUX, WET, Stage
+from jeat_graph.simulation.imaging.stage import AIR, BETA, LIGHTS_ON, SKY_LUX, SUN_LUX, WET, Stage
 from jeat_graph.simulation.imaging.streaks import add_streaks
 from jeat_graph.simulation.imaging.tiles import TILE_H, TILE_W, Tile
+
+# Sums of the same lights differ by no more than this.
+_ROUNDING = 1e-9
 
 
 @njit(cache=True, error_model="numpy")
@@ -180,7 +183,8 @@ def compose(tile: Tile, shaded: bool, scene: FloatArray, light: FloatArray, canv
     """
     ground, filled, value, shade, out = canvas.ground, canvas.filled, canvas.value, canvas.shade, canvas.out
     channels = out.shape[1]
-    sun, foggy = scene[SUN_LUX], shaded and scene[BETA] > 0.0
+    sun, sky, foggy = scene[SUN_LUX], scene[SKY_LUX], shaded and scene[BETA] > 0.0
+    open_lux = (1.0 - _ROUNDING) * (sun + sky)
     back, albedo = PACKED, PACKED + channels
     front, front_albedo, glow = PACKED + 2 * channels, PACKED + 3 * channels, PACKED + 4 * channels
     for r in range(tile.rows):
@@ -189,7 +193,9 @@ def compose(tile: Tile, shaded: bool, scene: FloatArray, light: FloatArray, canv
             lux = ground[p, LUX]
             left = 1.0
             if shaded and lux > 0.0:
-                left = ((lux - sun) * shade[p, 0] + sun * shade[p, 1]) / lux
+                # In a bridge's shadow, and where there is but little ground, a vehicle has less sun to take.
+                direct = sun if lux >= open_lux else max(lux - sky, 0.0)
+                left = ((lux - direct) * shade[p, 0] + direct * shade[p, 1]) / lux
             lit, wall = light[p, ON_GROUND], light[p, ON_WALL]
             cover = ground[p, COVER]
             depth = ground[p, DEPTH] if cover > 0.0 else -1.0

@@ -58,14 +58,19 @@ class FewVehicles:
 
 
 def renderer_of(
-    rows: Any, light: LightConfig = DAY, width: int = 192, height: int = 112, **render: Any
+    rows: Any,
+    light: LightConfig = DAY,
+    width: int = 192,
+    height: int = 112,
+    around: Surroundings = FIXED,
+    **render: Any,
 ) -> Renderer:
     """Renderer of a few vehicles."""
     camera = Camera.mounted(scaled_camera(load_scenario("day").camera, width, height))
     nobody = Fleet(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
     table = np.asarray(rows, dtype=np.float64).reshape(-1, 7)
     fleet = Fleet(table[:, 0].astype(np.int64), table[:, 4:])
-    scene: Any = FewVehicles(rows, Light(light), camera, Road.build(RoadConfig()), fleet, nobody)
+    scene: Any = FewVehicles(rows, Light(light), camera, Road.build(RoadConfig()), fleet, nobody, around)
     return Renderer(scene, RenderConfig(width=width, height=height, **render), seed=0)
 
 

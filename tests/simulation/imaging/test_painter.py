@@ -7,7 +7,9 @@ from jeat_graph.simulation.imaging.air import airlight
 from jeat_graph.simulation.imaging.lighting import LUMINANCE
 from jeat_graph.simulation.imaging.moments import BOX, HULL, SIDES
 from jeat_graph.simulation.imaging.smooth import clamp01
+from jeat_graph.simulation.imaging.visibility import buffers
 from jeat_graph.simulation.world.light import LightConfig
+from jeat_graph.simulation.world.surroundings import FIXED
 
 from .scenes import CAR, DARK, DAY, LAMPS, renderer_of
 
@@ -30,6 +32,24 @@ def test_radiance_is_finite_and_not_negative(light: LightConfig) -> None:
     picture = renderer_of(OTHERS, light).picture(0.3)
     assert np.isfinite(picture).all()
     assert (picture >= 0.0).all()
+
+
+@pytest.mark.parametrize("bridge_m", [18.0, 30.0, 45.0])
+def test_in_a_bridge_s_shadow_a_vehicle_takes_no_more_light_than_there_is(bridge_m: float) -> None:
+    """There is no sun to take: what is left beside the vehicle is a quarter of the sky's light and more."""
+    around = FIXED._replace(bridges_m=(bridge_m,), bridge_wide_m=12.0)
+    alone = renderer_of([], DAY, around=around)
+    ground = alone.background
+    dim = (ground.lux > 0.0) & (ground.lux < 0.5 * ground.lux.max()) & (ground.front_cover == 0.0)
+    lane = dim & (np.abs(ground.place[..., 0] - 4.0) < 1.0)
+    row = (0, 4.0, float(np.median(ground.place[lane][:, 1])), 0.0, 4.4, 1.8, 1.46)
+    shaded = renderer_of([row], DAY, around=around)
+    look, moments = shaded.seen_at(0.0)
+    _, instance, _ = buffers(moments, look, ground.front_depth, ground.front_cover)
+    dim &= instance == 0
+    before, after = (one.picture(0.0)[dim] @ LUMINANCE for one in (alone, shaded))
+    assert (after < 0.9 * before).any()
+    assert (after >= 0.24 * before).all()
 
 
 def test_what_is_dark_is_dark() -> None:
