@@ -20,7 +20,7 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.filters.motion import size_process_noise
+from jeat_graph.filters.kalman import predict_size
 from jeat_graph.smoothers.transitions import step_cov, step_mean
 
 # A tuple of three elements, which tells the compiler that there are no error states (`transitions.py`).
@@ -91,19 +91,15 @@ def _joint(past: TwoSided, i: int, jerk: float, future: TwoSided, j: int, size_d
     """
     dt = future.t[j] - past.t[i]
     mean, cov, moved, none = np.empty(3), np.empty((3, 3)), np.empty((3, 3)), np.empty(0)
-    size, spread = np.empty(2), size_process_noise(dt, size_density)
+    size, size_cov = past.past_size[i : i + 1].copy(), past.past_size_cov[i : i + 1].copy()
+    predict_size(size, size_cov, size_density, dt)
     total = 0.0
     for axis in range(2):
         step_mean(_MOTION, dt, none, past.past_mean[i, axis], mean)
         step_cov(_MOTION, dt, jerk, none, none, past.past_cov[i, axis], moved, cov)
         total += _log_density(future.future_mean[j, axis] - mean, cov + future.future_cov[j, axis])
-        s, P = past.past_size[i, axis], past.past_size_cov[i, axis]
-        size[0], size[1] = s[0] + dt * s[1], s[1]
-        moved[0, 0] = P[0, 0] + dt * (2.0 * P[0, 1] + dt * P[1, 1])
-        moved[0, 1] = moved[1, 0] = P[0, 1] + dt * P[1, 1]
-        moved[1, 1] = P[1, 1]
         total += _log_density(
-            future.future_size[j, axis] - size, spread + moved[:2, :2] + future.future_size_cov[j, axis]
+            future.future_size[j, axis] - size[0, axis], size_cov[0, axis] + future.future_size_cov[j, axis]
         )
     return total
 

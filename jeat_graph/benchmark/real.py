@@ -22,7 +22,7 @@ from jeat_graph.benchmark.peer_search import peers_here
 from jeat_graph.benchmark.provenance import provenance
 from jeat_graph.benchmark.real_copies import CopyJob, copies_table, judge_copy
 from jeat_graph.benchmark.real_ours import METRICS, OursOnSet, judge_row, rows_of
-from jeat_graph.benchmark.real_sets import RealSet, real_sets
+from jeat_graph.benchmark.real_sets import RealSet, real_set, real_sets
 from jeat_graph.benchmark.robustness import PRESETS, judge_variation, variations
 from jeat_graph.config.argument_types import natural
 from jeat_graph.config.reading import load_config
@@ -75,12 +75,12 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
     jobs = [(row, data, most, one.name) for one in sets for row in rows_of(one, calibrate)]
     ours = in_processes(_judge_ours, jobs, args.jobs, "real, ours")
     peers: list[dict[str, Any]] = []
+    names: list[str] = []
     if sets and not args.no_peers:
         cache = PeerCache(Path(args.peers) if args.peers else None)
         names, tuned = peers_here(), args.tuned and not args.quick
         peers = [one for found in sets for one in judge_peers(found, names, cache, tuned)]
-    others = () if args.no_peers else tuple(peers_here())
-    drawn = [CopyJob(data, most, one.name, seed, others) for one in sets for seed in range(args.copies)]
+    drawn = [CopyJob(data, most, one.name, seed, tuple(names)) for one in sets for seed in range(args.copies)]
     copies = in_processes(judge_copy, drawn, args.jobs, "altered copies") if drawn else []
     setup: dict[str, Any] = {
         "data": {one.name: [r.name for r in one.recordings] for one in sets},
@@ -111,7 +111,7 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
 
 def _judge_ours(job: tuple[OursOnSet, Path, int | None, str]) -> dict[str, Any]:
     row, data, most, name = job
-    return judge_row(row, next(one for one in real_sets(data, most) if one.name == name))
+    return judge_row(row, real_set(data, most, name))
 
 
 def judge_peers(one: RealSet, names: Sequence[str], cache: PeerCache, tuned: bool) -> list[dict[str, Any]]:

@@ -18,7 +18,7 @@ import numpy as np
 from jeat_graph.benchmark.contenders import NAMES
 from jeat_graph.benchmark.judging import spread
 from jeat_graph.benchmark.real_ours import METRICS, OursOnSet, judge_row
-from jeat_graph.benchmark.real_sets import RealSet, real_sets
+from jeat_graph.benchmark.real_sets import RealSet, real_set
 from jeat_graph.data.detections import Detections
 
 if TYPE_CHECKING:
@@ -51,15 +51,7 @@ def altered(detections: Detections, rng: np.random.Generator) -> Detections:
     kept = rng.random(len(detections.scores)) >= LEFT_OUT
     sides = detections.boxes[:, [2, 3, 2, 3]]
     boxes = detections.boxes + MOVED * sides * rng.normal(size=detections.boxes.shape)
-    before = np.concatenate([[0], np.cumsum(kept)])
-    return replace(
-        detections,
-        scan_start=before[detections.scan_start],
-        boxes=boxes[kept],
-        scores=detections.scores[kept],
-        classes=None if detections.classes is None else detections.classes[kept],
-        embeddings=None if detections.embeddings is None else detections.embeddings[kept],
-    )
+    return replace(detections, boxes=boxes).where(kept)
 
 
 def copy_of(one: RealSet, seed: int) -> RealSet:
@@ -73,7 +65,7 @@ def judge_copy(job: CopyJob) -> list[dict[str, Any]]:
     """Judge `default` and the peers, with their defaults, on every stream of an altered copy."""
     from jeat_graph.eval.baselines import judge_baseline
 
-    one = copy_of(next(s for s in real_sets(job.data, job.most) if s.name == job.name), job.seed)
+    one = copy_of(real_set(job.data, job.most, job.name), job.seed)
     pairs = [(r.truth, r.detections) for r in one.recordings]
     found: list[dict[str, Any]] = []
     for stream in reversed(one.streams):

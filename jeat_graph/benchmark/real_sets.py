@@ -55,6 +55,11 @@ def real_sets(data: Path, most: int | None = None) -> tuple[RealSet, ...]:
     return tuple(found)
 
 
+def real_set(data: Path, most: int | None, name: str) -> RealSet:
+    """The set of that name; arguments otherwise as in `real_sets`."""
+    return next(one for one in real_sets(data, most) if one.name == name)
+
+
 def _columns(path: Path) -> JudgedRecording:
     from jeat_graph.io.detections_io import read_detections
     from jeat_graph.io.truth_io import read_truth

@@ -233,7 +233,10 @@ class Detections(DetectionViews):
         Raises:
             DataError: no detection has a class, or none is of one of these.
         """
-        keep = rows_of_class(self.classes, names, unknown=True)
+        return self.where(rows_of_class(self.classes, names, unknown=True))
+
+    def where(self, keep: BoolArray) -> Detections:
+        """Keep the detections (N,) that a mask says; all scans stay."""
         before = np.concatenate(([0], np.cumsum(keep)))
         return replace(
             self,

@@ -58,7 +58,7 @@ def step(
     expectation = expect_detections(tracks, n, occluded, model)
     association = associate(tracks, n, batch, expectation, p_found, scene, model)
     judge_sight(tracks, n, batch, association, p_detect, scene, model)
-    update_matched(tracks, n, batch, expectation, association, scene, model, log)
+    update_matched(tracks, batch, expectation, association, scene, model, log)
     if settings.association.second_views:
         take_second_views(tracks, n, batch, association, p_found, scene, model, log)
     learn_boxes(tracks, n, batch, association, scene, model)

@@ -28,7 +28,7 @@ class Association(NamedTuple):
     Attributes:
         match: (n, S) detection that each track takes of each sensor, or -1.
         evidence: (n, S) its ln Λ.
-        taken: (M,) 1 where a track has taken the detection, else 0; filled while they are taken in.
+        taken: (M,) 1 where a track has taken the detection, else 0; second views and births add to it.
     """
 
     match: IntArray
@@ -103,7 +103,7 @@ def associate(
     scene: SceneState,
     model: Model,
 ) -> Association:
-    """Associate a batch with the first `n` tracks, predicted to its time; nothing counts as taken yet."""
+    """Associate a batch with the first `n` tracks, predicted to its time."""
     settings, num_sensors = model.settings.association, len(model.sensors.sigma_px)
     pairs, pair_evidence = judge_pairs(tracks, n, batch, expectation, p_detect, scene, model)
     rows, cols = pairs.rows, pairs.cols
@@ -124,9 +124,10 @@ def associate(
         match = associate_sequential(
             n, num_sensors, rows, cols, costs, batch.sensor, unassigned, model.priority
         )
-    evidence = np.zeros((n, num_sensors))
+    evidence, taken = np.zeros((n, num_sensors)), np.zeros(len(batch.sensor), dtype=np.int64)
     for p in range(len(rows)):
         s = batch.sensor[cols[p]]
         if match[rows[p], s] == cols[p]:
             evidence[rows[p], s] = pair_evidence[p]
-    return Association(match, evidence, np.zeros(len(batch.sensor), dtype=np.int64))
+            taken[cols[p]] = 1
+    return Association(match, evidence, taken)

@@ -10,10 +10,7 @@ from jeat_graph.association.births import choose_births
 from jeat_graph.association.boxes import clip_boxes, track_boxes
 from jeat_graph.config.kernel_form import Model, Settings
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.filters.cut_boxes import (
-    BOTH_CUT,
-    WHOLE,
-)
+from jeat_graph.filters.cut_boxes import BOTH_CUT, WHOLE
 from jeat_graph.filters.prior import write_prior, write_size_prior
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.associating import Association
@@ -104,12 +101,8 @@ def birth_existence(batch: Batch, taken: IntArray, scene: SceneState, model: Mod
     image, leaves = model.settings.image, model.settings.lifecycle.leave_picture
     most = model.settings.birth.max_picture_share * image.width * image.height
     z, boxes, cut, sensor, log_score = batch.z, batch.boxes, batch.cut, batch.sensor, batch.log_score
-    out, p_detect, clutter, undetected = (
-        np.full(len(taken), -1.0),
-        scene.p_detect,
-        scene.clutter,
-        scene.undetected[0],
-    )
+    p_detect, clutter, undetected = scene.p_detect, scene.clutter, scene.undetected[0]
+    out = np.full(len(taken), -1.0)
     for j in range(len(out)):
         if taken[j]:
             continue

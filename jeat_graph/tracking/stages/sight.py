@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from jeat_graph.config.kernel_form import Model
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.filters.blindness import (
@@ -51,12 +49,7 @@ def judge_sight(
     if not lifecycle.judges_sight:
         return
     match, existence, seen_by = association.match, tracks.existence, tracks.seen_by
-    taken = np.zeros(len(batch.precision), dtype=np.int64)
-    for i in range(n):
-        for s in range(match.shape[1]):
-            if match[i, s] >= 0:
-                taken[match[i, s]] = 1
-    newcomer = birth_existence(batch, taken, scene, model)
+    newcomer = birth_existence(batch, association.taken, scene, model)
     for s in range(len(batch.present)):
         if not batch.present[s]:
             continue

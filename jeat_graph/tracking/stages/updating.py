@@ -9,11 +9,7 @@ import numpy as np
 from jeat_graph.config.kernel_form import Model, Settings
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.filters.coloured_noise import update_centre
-from jeat_graph.filters.cut_boxes import (
-    WHOLE,
-    bound_unmeasured,
-    floor_of_centre,
-)
+from jeat_graph.filters.cut_boxes import WHOLE, bound_unmeasured, floor_of_centre
 from jeat_graph.filters.existence import existence_after_hit
 from jeat_graph.filters.kalman import update_block
 from jeat_graph.filters.noise import adapt_scale
@@ -172,7 +168,6 @@ def take_pairs(
 @inner
 def update_matched(
     tracks: TrackArrays,
-    n: int,
     batch: Batch,
     expectation: Expectation,
     association: Association,
@@ -185,7 +180,7 @@ def update_matched(
     That is a stacked update where all is linear: where no box is cut, the track does not stand, and the
     sensors have no error states, which are measured in the order of the sensors.
     """
-    match, taken = association.match, association.taken
+    match = association.match
     for s in range(match.shape[1]):
         track = np.flatnonzero(match[:, s] >= 0)
         if len(track) == 0:
@@ -196,7 +191,6 @@ def update_matched(
             i = track[k]
             pairs[0, k], pairs[1, k] = i, match[i, s]
             evidence[k] = believed * association.evidence[i, s]
-            taken[match[i, s]] = 1
         take_pairs(tracks, pairs, s, batch, expectation, evidence, model, log)
 
 
