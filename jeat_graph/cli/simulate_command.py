@@ -161,7 +161,7 @@ def _pictures(args: argparse.Namespace, scenario: Scenario) -> int:
     from jeat_graph.simulation.dataset.protocol import Protocol
     from jeat_graph.simulation.dataset.recording import record_dataset
     from jeat_graph.simulation.dataset.workers import available_cores
-    from jeat_graph.simulation.imaging.renderer import paint_all
+    from jeat_graph.simulation.imaging.painter import paint_tile
     from jeat_graph.simulation.scenario import scenario_to_yaml
     from jeat_graph.tracking.notice import notice_if_cold
 
@@ -183,7 +183,8 @@ def _pictures(args: argparse.Namespace, scenario: Scenario) -> int:
     total = protocol.segments * frames
     quiet = not sys.stderr.isatty()
     if not carla:
-        notice_if_cold(paint_all, "the renderer")
+        # Whatever is rendered, pictures or events, is painted tile by tile.
+        notice_if_cold(paint_tile, "the renderer")
     with (
         tqdm(total=total, desc="simulate", unit=" frames", disable=quiet, leave=False) as bar,
         refreshing(bar),

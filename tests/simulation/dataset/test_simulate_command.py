@@ -45,6 +45,17 @@ def test_who_waits_for_the_renderer_to_be_compiled_is_told(tmp_path: Path, capsy
     assert "jeat-graph: compiling the renderer for this machine, once" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("sensors", ["rgb", "events", "pictures"])
+def test_who_rendered_before_is_not_told_to_wait_again(tmp_path: Path, capsys, monkeypatch, sensors) -> None:
+    arguments = ["--segments", "1", "--seed", "3", *SMALL]
+    arguments[arguments.index("--sensors") + 1] = sensors
+    for again in ("first", "second"):
+        monkeypatch.setattr(notice, "_said", set())
+        assert main(["simulate", "night", "--out", str(tmp_path / again), *arguments]) == 0
+        told = capsys.readouterr().err
+    assert "compiling the renderer" not in told
+
+
 def test_the_scenario_beside_it_can_be_simulated_again(pictures: Path) -> None:
     assert load_scenario(pictures / "scenario.yaml") == load_scenario("night")
 
