@@ -69,8 +69,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         default=[],
         metavar="NAME|FILE",
-        help="networks that `train` made, whose weights are the first ones: of the same kind and size, "
-        "and for fused one of frames and one of events; a NAME comes with the package",
+        help="networks that `train` made, whose weights are the first ones: of the same kind and as wide, or "
+        "a half or another whole part of it; for fused one of frames and one of events; a NAME comes with the "
+        "package",
     )
     add(
         "--int8",

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,6 +21,7 @@ from jeat_graph.detection.models.onnx_head import CARD, read_onnx_head
 from jeat_graph.training.fused_network import FusedNet, GatedSum
 from jeat_graph.training.network import DetectionNet, VehicleNet
 from jeat_graph.training.settings import COARSEST, EVENTS, FRAMES, FUSED, NetSettings
+from jeat_graph.training.widening import widen
 
 _SIDE = (COARSEST, COARSEST)
 _TINY = 1e-12
@@ -37,22 +39,24 @@ def new_network(settings: NetSettings, start: Sequence[Path] = ()) -> VehicleNet
 
     Args:
         settings: what it looks like.
-        start: networks that `train` made; of both sensors one of each kind may be given, or one of both.
+        start: networks that `train` made, as wide as this one or a whole part of it; of both sensors one of
+            each kind may be given, or one of both.
 
     Raises:
         DataError: a file that `train` did not make, or of a network that looks otherwise.
     """
-    net = FusedNet(settings) if settings.kind == FUSED else DetectionNet(settings)
-    given: dict[str, tuple[Path, VehicleNet]] = {}
+    net = _of_kind(settings)
+    given: dict[str, VehicleNet] = {}
     for path in start:
         found = read_network(path)
-        if not _fits(found.settings, settings) or found.settings.kind in given:
+        kind = found.settings.kind
+        if not _fits(found.settings, settings) or kind in given:
             raise DataError(_unfit(found.settings, settings), path)
-        given[found.settings.kind] = (path, found)
+        given[kind] = _as_wide(found, settings.width)
     if settings.kind in given:
-        net.load_state_dict(given[settings.kind][1].state_dict())
+        net.load_state_dict(given[settings.kind].state_dict())
     elif isinstance(net, FusedNet):
-        _start_fused(net, {kind: one for kind, (_, one) in given.items()})
+        _start_fused(net, given)
     return net
 
 
@@ -76,7 +80,7 @@ def read_network(path: Path) -> VehicleNet:
         DataError: not a file that `train` made.
     """
     settings = settings_of(path)
-    net = FusedNet(settings) if settings.kind == FUSED else DetectionNet(settings)
+    net = _of_kind(settings)
     calls = _calls(net)
     layers = list(_layers(path))
     if len(layers) != len(calls):
@@ -105,6 +109,19 @@ def read_network(path: Path) -> VehicleNet:
     return net
 
 
+def _of_kind(settings: NetSettings) -> VehicleNet:
+    return FusedNet(settings) if settings.kind == FUSED else DetectionNet(settings)
+
+
+def _as_wide(net: VehicleNet, width: int) -> VehicleNet:
+    """Return a network that says the same and has a whole multiple of channels."""
+    if net.settings.width == width:
+        return net
+    wide = _of_kind(replace(net.settings, width=width))
+    widen(net, wide)
+    return wide
+
+
 def _start_fused(net: FusedNet, given: dict[str, VehicleNet]) -> None:
     """Take backbones from networks of one sensor, and the head from that of pictures if there is one."""
     frames, events = (given.get(kind) for kind in (FRAMES, EVENTS))
@@ -124,14 +141,15 @@ def _start_fused(net: FusedNet, given: dict[str, VehicleNet]) -> None:
 
 def _fits(found: NetSettings, wanted: NetSettings) -> bool:
     kinds = (FRAMES, EVENTS, FUSED) if wanted.kind == FUSED else (wanted.kind,)
-    same = found.width == wanted.width and (found.kind == FRAMES or found.bins == wanted.bins)
+    same = wanted.width % found.width == 0 and (found.kind == FRAMES or found.bins == wanted.bins)
     return found.kind in kinds and same
 
 
 def _unfit(found: NetSettings, wanted: NetSettings) -> str:
     return (
         f"is of {found.kind} with {found.width} channels and {found.bins} bins; to train is one of "
-        f"{wanted.kind} with {wanted.width} and {wanted.bins}, and of each kind one file can be its start"
+        f"{wanted.kind} with {wanted.width} and {wanted.bins}: its start has as many channels, a half or "
+        "another whole part, and is one file of each kind"
     )
 
 
