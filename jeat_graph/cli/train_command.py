@@ -70,8 +70,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="NAME|FILE",
         help="networks that `train` made, whose weights are the first ones: of the same kind and as wide, or "
-        "a half or another whole part of it; for fused one of frames and one of events; a NAME comes with the "
-        "package",
+        "a half or another whole part of it; for fused one of frames and one of events; a NAME comes with "
+        "the package",
     )
     add(
         "--int8",

@@ -13,6 +13,7 @@ import torch
 from torch import Tensor
 
 from jeat_graph.data.arrays import BoolArray, FloatArray
+from jeat_graph.detection.models.feeding import letterbox_scale
 from jeat_graph.io.decoders import RgbImage
 from jeat_graph.training.data_sets import EventSegment, FusedSegment, Picture
 from jeat_graph.training.event_samples import Sequence, draw_sequence
@@ -58,6 +59,7 @@ class Batches:
         members: pictures, or recordings of events.
         net: what the network takes.
         settings: of the training.
+        side: width and height that whole pictures are brought to in use (px); None: as they are.
     """
 
     def __init__(
@@ -65,8 +67,9 @@ class Batches:
         members: AnySequence[Picture | EventSegment],
         net: NetSettings,
         settings: TrainSettings,
+        side: tuple[int, int] | None = None,
     ) -> None:
-        self._members, self._net, self._settings = members, net, settings
+        self._members, self._net, self._settings, self._side = members, net, settings, side
         by_group: dict[str | int, list[int]] = {}
         for k, member in enumerate(members):
             by_group.setdefault(member.group if settings.by_segment else k, []).append(k)
@@ -123,19 +126,20 @@ class Batches:
         def picture(frame: int) -> RgbImage:
             return self._picture((index, frame), lambda: member.picture(frame))
 
-        return draw_fused(member, rng, self._net, self._settings, picture)
+        return draw_fused(member, rng, self._net, self._settings, picture, self._side)
 
     def _one(self, number: int) -> tuple[list[npt.NDArray[np.generic]], list[Target]]:
         index, rng = self._drawn(number)
         member = self._members[index]
         if isinstance(member, EventSegment):
-            drawn = draw_sequence(member, rng, self._net, self._settings)
+            drawn = draw_sequence(member, rng, self._net, self._settings, self._side)
             return list(drawn.windows), _targets(drawn)
         changes = self._settings.pictures
         frame = self._picture((index, 0), member.load)
         shares = (changes.zoom, changes.mirror_share, changes.on_box_share)
         size_px = (frame.shape[1], frame.shape[0])
-        window = draw_window(rng, size_px, self._settings.crop_px, member.truth, shares)
+        served = letterbox_scale(size_px, self._side or size_px)
+        window = draw_window(rng, size_px, self._settings.crop_px, member.truth, shares, served)
         shown = cut_out(frame, window, rng, draw_light(rng, changes))
         return [shown], [_target(*window.boxes(member.truth))]
 

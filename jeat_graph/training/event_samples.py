@@ -11,6 +11,7 @@ import numpy.typing as npt
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
+from jeat_graph.detection.models.event_places import event_scale
 from jeat_graph.detection.windows import EventBins
 from jeat_graph.io.events_dsec import EventFile
 from jeat_graph.training.data_sets import EventSegment
@@ -59,9 +60,20 @@ class SequencePlan(NamedTuple):
 
 
 def draw_sequence(
-    segment: EventSegment, rng: np.random.Generator, net: NetSettings, settings: TrainSettings
+    segment: EventSegment,
+    rng: np.random.Generator,
+    net: NetSettings,
+    settings: TrainSettings,
+    side: tuple[int, int] | None = None,
 ) -> Sequence:
     """Draw a sequence of a segment.
+
+    Args:
+        segment: the recording.
+        rng: random numbers.
+        net: what the network takes.
+        settings: of the training.
+        side: width and height of the network's input in use (px); None: those of the recording.
 
     Raises:
         DataError: the recording is too short, or cannot be read.
@@ -71,7 +83,8 @@ def draw_sequence(
     truth = [asked_for(segment, plan.file_s(0.0), plan.file_s(end), settings.least_way_px) for end in ends]
     changes = settings.events
     shares = (changes.zoom, changes.mirror_share, changes.on_box_share)
-    window = draw_window(rng, size_px, settings.crop_px, truth[-1], shares)
+    served = event_scale(size_px, side or size_px)
+    window = draw_window(rng, size_px, settings.crop_px, truth[-1], shares, served)
     return cut_sequence(events, truth, plan, window, (rng, net, settings))
 
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from jeat_graph.detection.models.event_places import event_scale
 from jeat_graph.io.decoders import RgbImage
 from jeat_graph.training.data_sets import FusedSegment
 from jeat_graph.training.event_samples import Sequence, asked_for, cut_sequence, drawn_events
@@ -47,6 +48,7 @@ def draw_fused(
     net: NetSettings,
     settings: TrainSettings,
     picture: Callable[[int], RgbImage],
+    side: tuple[int, int] | None = None,
 ) -> FusedSequence:
     """Draw a sequence of a segment.
 
@@ -56,6 +58,7 @@ def draw_fused(
         net: what the network takes.
         settings: of the training.
         picture: reads a picture by its index, or has kept it.
+        side: width and height of the network's input in use (px); None: those of the recording.
 
     Raises:
         DataError: the recording is too short, or cannot be read.
@@ -71,7 +74,8 @@ def draw_fused(
     ]
     changes = settings.pictures
     shares = (settings.events.zoom, changes.mirror_share, changes.on_box_share)
-    window = draw_window(rng, size_px, settings.crop_px, truth[-1], shares)
+    served = event_scale(size_px, side or size_px)
+    window = draw_window(rng, size_px, settings.crop_px, truth[-1], shares, served)
     windows = cut_sequence(events, truth, plan, window, (rng, net, settings))
     if lack.no_events:
         windows = windows._replace(windows=np.zeros_like(windows.windows))

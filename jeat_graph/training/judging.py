@@ -12,6 +12,7 @@ from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.events import EventArray
 from jeat_graph.data.interop import from_xyxy
 from jeat_graph.detection.models.choosing import choose
+from jeat_graph.detection.models.event_places import EventPlaces, event_scale
 from jeat_graph.detection.models.feeding import picture_input, place, usual_feed
 from jeat_graph.detection.models.layouts import decode
 from jeat_graph.detection.models.model_settings import OWN_OVERLAPS, ModelSettings
@@ -21,7 +22,7 @@ from jeat_graph.training.data_sets import EventSegment, FusedSegment, Picture
 from jeat_graph.training.event_samples import asked_for, windows_of
 from jeat_graph.training.fused_network import FusedNet, SeenPictures
 from jeat_graph.training.network import PICTURE_INPUT, VehicleNet, cell_places, served_boxes
-from jeat_graph.training.settings import TrainSettings, padded
+from jeat_graph.training.settings import TrainSettings
 from jeat_graph.training.truth_at import TrueBoxes
 
 #: How the outputs are laid out, one of those in `detection.models.layouts`.
@@ -73,7 +74,7 @@ def judge(
     Args:
         net: left in the mode for use.
         members: pictures, or recordings of events.
-        side: width and height that pictures are brought to (px).
+        side: width and height of the network's input (px).
         settings: of the training.
         most: at most so many pictures or windows, evenly chosen.
 
@@ -86,7 +87,7 @@ def judge(
     looks = (
         list(_pictures(net, _evenly(pictures, most), side))
         if pictures
-        else list(_windows(net, segments, settings, max(most // max(len(segments), 1), 1)))
+        else list(_windows(net, segments, side, settings, max(most // max(len(segments), 1), 1)))
     )
     found = {"all": precision_of(looks)}
     for source in dict.fromkeys(look.source for look in looks):
@@ -139,7 +140,11 @@ def _pictures(net: VehicleNet, pictures: Sequence[Picture], side: tuple[int, int
 
 @torch.no_grad()
 def _windows(
-    net: VehicleNet, segments: Sequence[EventSegment], settings: TrainSettings, most: int
+    net: VehicleNet,
+    segments: Sequence[EventSegment],
+    side: tuple[int, int],
+    settings: TrainSettings,
+    most: int,
 ) -> Iterator[Looked]:
     shape = net.settings
     bin_us = round(shape.bin_s * _US)
@@ -153,14 +158,14 @@ def _windows(
                 continue
             events = file.between(first_us, first_us + ends[-1])
             size_px = file.size_px or settings.crop_px
-        own = EventArray.trusted(events.t_us - first_us, events.x, events.y, events.polarity)
-        side = padded(size_px)
+        places = EventPlaces(size_px, event_scale(size_px, side))
+        own = places.moved(EventArray.trusted(events.t_us - first_us, events.x, events.y, events.polarity))
         reader = _Reader(net, side)
         state = tuple(one.to(reader.device) for one in net.empty_state(1, side))
         for end, window in zip(ends, windows_of(own, side, shape, ends), strict=True):
             now = (first_us + end) / _US
             shown = torch.from_numpy(window[None]).float().to(reader.device)
-            rows, state = net(shown, state, 1, *_seen(net, segment, now, side))
+            rows, state = net(shown, state, 1, *_seen(net, segment, now, (side, places.shown_px)))
             corners, scores = reader.read(rows)
             begin = max(first_us / _US, now - _SEEN_S)
             truth = (
@@ -168,21 +173,28 @@ def _windows(
                 if isinstance(net, FusedNet)
                 else asked_for(segment, begin, now, settings.least_way_px)
             )
-            yield Looked(segment.source, corners, scores, truth)
+            yield Looked(segment.source, places.back(corners), scores, truth)
 
 
 def _seen(
-    net: VehicleNet, segment: EventSegment, now: float, side: tuple[int, int]
+    net: VehicleNet, segment: EventSegment, now: float, sides: tuple[tuple[int, int], tuple[int, int]]
 ) -> tuple[SeenPictures, ...]:
-    """Return the newest picture up to a time (s) for a network of both sensors; () for another."""
+    """Return the newest picture up to a time (s) for a network of both sensors; () for another.
+
+    Args:
+        net: the network.
+        segment: the recording.
+        now: the time.
+        sides: width and height (px) of the input, and of the picture in it.
+    """
     if not isinstance(net, FusedNet) or not isinstance(segment, FusedSegment):
         return ()
     device = next(net.parameters()).device
     index = segment.newest(now)
     if index is None:
-        shown, given = net.inputs(side)[PICTURE_INPUT], [0.0, 0.0, 1.0]
+        shown, given = net.inputs(sides[0])[PICTURE_INPUT], [0.0, 0.0, 1.0]
     else:
-        shown = torch.from_numpy(picture_input(segment.picture(index), side))
+        shown = torch.from_numpy(picture_input(segment.picture(index), *sides))
         given = [1.0, max(now - float(segment.times_s[index]), 0.0), 1.0]
     none = torch.zeros(0, dtype=torch.long)
     return (SeenPictures(shown.to(device), none, torch.tensor([given]).to(device)),)

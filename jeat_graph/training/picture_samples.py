@@ -56,6 +56,7 @@ def draw_window(
     side: tuple[int, int],
     truth: TrueBoxes,
     changes: tuple[float, float, float],
+    served: float = 1.0,
 ) -> CutOut:
     """Draw a cut-out.
 
@@ -65,9 +66,10 @@ def draw_window(
         side: of the cut-out.
         truth: what is in the picture.
         changes: `zoom`, `mirror_share` and `on_box_share` of the settings.
+        served: scale of lengths at which the network looks at whole pictures in use.
     """
     zoom, mirror_share, on_box_share = changes
-    scale = float(np.exp(rng.uniform(-1.0, 1.0) * np.log(zoom)))
+    scale = served * float(np.exp(rng.uniform(-1.0, 1.0) * np.log(zoom)))
     mirrored = bool(rng.random() < mirror_share)
     on_box, place, which = rng.random() < on_box_share, rng.random(2), rng.random()
     wanted = np.flatnonzero(~truth.ignored)

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.events import EventArray
+from jeat_graph.detection.models.event_places import EventPlaces, event_scale
 from jeat_graph.detection.models.feeding import place, usual_feed
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.models.onnx_head import CARD, OnnxHead, read_onnx_head
@@ -143,7 +144,9 @@ def _windows(
     with EventFile(recording.path) as file:
         first_us = int(recording.truth.times[0] * _US) // length_us * length_us
         events = file.between(first_us, first_us + _WINDOWS * length_us)
-    own = EventArray.trusted(events.t_us - first_us, events.x, events.y, events.polarity)
+        size_px = file.size_px or side
+    places = EventPlaces(size_px, event_scale(size_px, side))
+    own = places.moved(EventArray.trusted(events.t_us - first_us, events.x, events.y, events.polarity))
     ends = [(k + 1) * length_us for k in range(_WINDOWS)]
     for k, window in enumerate(windows_of(own, side, settings, ends)):
         feed = {EVENTS_INPUT: window[None].astype(np.float32), **state}

@@ -119,7 +119,7 @@ class Trainer:
         Raises:
             DataError: data that cannot be read, or a loss that is no number any more.
         """
-        batches = Batches(self._job.split.learned, self._job.net, self._job.settings)
+        batches = Batches(self._job.split.learned, self._job.net, self._job.settings, self._job.side)
         total = max(math.ceil(self._job.settings.epochs * batches.per_epoch), 1)
         begun = time.monotonic() - self._spent_s
         saved = time.monotonic()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,11 @@ import pytest
 torch = pytest.importorskip("torch", reason="training needs PyTorch, the extra `train`")
 
 from jeat_graph.data.errors import DataError  # noqa: E402
+from jeat_graph.data.events import EventArray  # noqa: E402
 from jeat_graph.data.trajectories import GroundTruth  # noqa: E402
+from jeat_graph.detection.models.event_places import EventPlaces, event_scale  # noqa: E402
+from jeat_graph.detection.models.feeding import letterbox_scale, place, usual_feed  # noqa: E402
+from jeat_graph.detection.models.model_settings import ModelSettings  # noqa: E402
 from jeat_graph.training.batches import Batches  # noqa: E402
 from jeat_graph.training.coco_pictures import read_coco_pictures  # noqa: E402
 from jeat_graph.training.data_sets import (  # noqa: E402
@@ -20,8 +25,8 @@ from jeat_graph.training.data_sets import (  # noqa: E402
     read_pictures,
     split_by_segment,
 )
-from jeat_graph.training.event_samples import draw_sequence  # noqa: E402
-from jeat_graph.training.judging import Looked, precision_of  # noqa: E402
+from jeat_graph.training.event_samples import draw_sequence, drawn_events, windows_of  # noqa: E402
+from jeat_graph.training.judging import LAYOUT, Looked, precision_of  # noqa: E402
 from jeat_graph.training.picture_samples import CutOut, cut_out, draw_light, draw_window  # noqa: E402
 from jeat_graph.training.settings import (  # noqa: E402
     EventChanges,
@@ -217,3 +222,39 @@ def test_precision_by_size_leaves_out_what_is_of_other_sizes():
     assert precision_of(looks, 0.0, 12.0).ap50 == pytest.approx(50.0)
     assert precision_of(looks).boxes == 2
     assert np.isnan(precision_of(looks, 12.0, 32.0).ap50)
+
+
+@pytest.mark.parametrize("times", [0.5, 1.0, 1.5])
+def test_pictures_are_learned_from_at_the_size_at_which_they_are_looked_at(times):
+    """Unchanged but for its size, what is learned from is what the network is fed with in use."""
+    rng = np.random.default_rng(4)
+    frame = np.kron(rng.integers(0, 256, (12, 16, 3)), np.ones((8, 8, 1))).astype(np.uint8)
+    side = (round(128 * times), round(96 * times))
+    fed, at = place(frame, side, usual_feed(LAYOUT, ModelSettings()))
+    served = letterbox_scale((128, 96), side)
+    truth = one_box(40.0, 30.0, 100.0, 70.0)
+    window = draw_window(rng, (128, 96), side, truth, (1.0, 0.0, 0.0), served)
+    shown = cut_out(frame, window, rng, draw_light(rng, replace(NO_CHANGE, grey_share=0.0)))
+    np.testing.assert_allclose(at.back(window.boxes(truth)[0]), truth.corners, atol=1e-9)
+    inner = (slice(None), slice(2, -2), slice(2, -2))
+    # Both interpolate between neighbours, with weights in steps of 1/32 or finer.
+    assert np.abs(fed[0][inner] - shown[inner]).max() < 1 / 32 + 2 / 255
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_events_are_learned_from_at_the_size_at_which_they_are_looked_at(small_set, times):
+    side = (SIZE[0] * times, SIZE[1] * times)
+    changes = EventChanges(mirror_share=0.0, zoom=1.0, drop_share=0.0, time_scale=1.0, noise_hz_px=0.0)
+    settings = TrainSettings(crop_px=side, steps=2, least_step_bins=2, most_step_bins=2, events=changes)
+    net = NetSettings(kind="events")
+    segment = read_event_segments(small_set)[0]
+    drawn = draw_sequence(segment, np.random.default_rng(5), net, settings, side)
+    plan, events, size_px = drawn_events(segment, np.random.default_rng(5), net, settings)
+    own_us = (events.t_us - plan.start_us).astype(np.int64)
+    kept = (own_us >= 0) & (own_us < plan.ends_us(net, settings)[-1])
+    own = EventArray(own_us[kept], events.x[kept], events.y[kept], events.polarity[kept])
+    moved = EventPlaces(size_px, event_scale(size_px, side)).moved(own)
+    served = windows_of(moved, side, net, plan.ends_us(net, settings))
+    np.testing.assert_array_equal(drawn.windows, np.stack(served))
+    for corners, end in zip(drawn.corners, plan.ends_us(net, settings), strict=True):
+        np.testing.assert_allclose(corners, times * segment.truth.at(plan.file_s(end)).corners, atol=1e-9)

@@ -11,8 +11,10 @@ import numpy.typing as npt
 
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError
-from jeat_graph.detection.binned import BinnedDetector
+from jeat_graph.data.events import EventArray
+from jeat_graph.detection.binned import BinnedDetector, Signal
 from jeat_graph.detection.models.engine import open_engine
+from jeat_graph.detection.models.event_places import EventPlaces, event_scale
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.models.onnx_head import CARD, OnnxHead, Port, read_onnx_head
 from jeat_graph.detection.models.output_reader import OutputReader, scan_within
@@ -26,8 +28,9 @@ _US_PER_S = 1e6
 class ModelEventDetector(BinnedDetector):
     """Turns events, given piece by piece, into scans by a network from an ONNX file.
 
-    Its first input is the stacked histogram (1, 2 x bins, height, width) of `windows.EventBins`; a picture
-    that is smaller is filled up with zeros at the right and below. Further inputs are its memory: each has an
+    Its first input is the stacked histogram (1, 2 x bins, height, width) of `windows.EventBins`. A network
+    that `train` made is shown the camera's picture as large as its input allows; of others a picture that is
+    smaller is filled up with zeros at the right and below. Further inputs are its memory: each has an
     output of the same shape, in the same order, which is given back with the next window; it begins with
     zeros.
 
@@ -67,15 +70,17 @@ class ModelEventDetector(BinnedDetector):
         head = read_onnx_head(path)
         self._input = _window_input(head, self._path)
         bins = (self._input.shape[1] or 0) // 2
-        ring, rate_hz = EventBins(size_px, bins, times.bin_s), times.rate(self._usual_hz)
-        super().__init__(size_px, sensor, rate_hz, ring, bins, times)
         width, height = size_px
         self._side = (self._input.shape[3] or width, self._input.shape[2] or height)
-        if width > self._side[0] or height > self._side[1]:
+        scale = event_scale(size_px, self._side) if CARD in head.notes else 1.0
+        self._places = EventPlaces(size_px, scale)
+        if any(shown > side for shown, side in zip(self._places.shown_px, self._side, strict=True)):
             raise DataError(
                 f"takes windows of {self._side[0]} x {self._side[1]} px; the camera has {width} x {height}",
                 path,
             )
+        ring, rate_hz = EventBins(self._places.shown_px, bins, times.bin_s), times.rate(self._usual_hz)
+        super().__init__(size_px, sensor, rate_hz, ring, bins, times)
         self._by_polarity = _by_polarity(self._settings.channels, head)
         self._memory, outputs = _memory(head, self._path, self._beside)
         self._outputs = OutputReader(outputs, self._side, head.notes, self._settings, self._path, coco=False)
@@ -86,9 +91,14 @@ class ModelEventDetector(BinnedDetector):
         order = "polarity" if self._by_polarity else "time"
         self.description = (
             f"{self._path.name}: layout {self._outputs.layout}, windows of {bins} bins of {times.bin_s:g} s "
-            f"by {order} in {self._side[0]} x {self._side[1]} px{kept}, {self._outputs.words}, "
-            f"run by {self._engine.name}"
+            f"by {order} in {self._side[0]} x {self._side[1]} px{_scaled(scale)}{kept}, "
+            f"{self._outputs.words}, run by {self._engine.name}"
         )
+
+    def without_noise(self, events: EventArray) -> Signal | None:
+        """Do the first half of `push`; the events that are left lie where the network sees them."""
+        signal = super().without_noise(events)
+        return None if signal is None else signal._replace(events=self._places.moved(signal.events))
 
     def _emptied(self) -> None:
         self._state = {}
@@ -99,7 +109,7 @@ class ModelEventDetector(BinnedDetector):
     def _window(self) -> npt.NDArray[Any]:
         """Return the histogram as the network takes it; one of bytes is taken as it is, without a copy."""
         stacked = self._bins.stack(self._by_polarity)[None]
-        width, height = self.size_px
+        width, height = self._places.shown_px
         if (width, height) == self._side:
             return stacked.astype(self._input.kind, copy=False)
         window = self._empty_window()
@@ -119,7 +129,11 @@ class ModelEventDetector(BinnedDetector):
         outputs = self._engine.run(inputs)
         self._state = {given.name: outputs[returned] for given, returned in self._memory}
         corners, scores = self._outputs.read({name: outputs[name] for name in self._read})
-        return scan_within(t, self.sensor, corners, scores, self.size_px)
+        return scan_within(t, self.sensor, self._places.back(corners), scores, self.size_px)
+
+
+def _scaled(scale: float) -> str:
+    return "" if scale == 1.0 else f" at {scale:.3g} times the camera's"
 
 
 def _window_input(head: OnnxHead, path: Path) -> Port:

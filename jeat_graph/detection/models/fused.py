@@ -118,7 +118,7 @@ class FusedDetector(ModelEventDetector):
                 f"a picture has {width} x {height} px, the events {self.size_px[0]} x {self.size_px[1]}: a "
                 "network of both needs pictures and events of the same pixels"
             )
-        return picture_input(frame, self._side)
+        return picture_input(frame, self._side, self._places.shown_px)
 
 
 def _given(*, picture: bool, age_s: float, events: bool) -> npt.NDArray[np.float32]:

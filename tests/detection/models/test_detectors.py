@@ -130,7 +130,7 @@ def test_channels_are_in_the_order_that_the_network_has_learned(tmp_path, channe
     for seen in range(20):
         path = counting_net(tmp_path / f"{seen}.onnx", SIDE, 20, ROWS[:1], 1.0, seen, notes)
         settings = ModelSettings(channels=channels)
-        detector = ModelEventDetector(path, (100, 80), times=EventSettings(rate_hz=50.0), settings=settings)
+        detector = ModelEventDetector(path, (120, 92), times=EventSettings(rate_hz=50.0), settings=settings)
         # Three that became darker, in the newest bin of the first window, which is that from 30 to 80 ms.
         times = np.array([21_000, 76_000, 77_000, 78_000, 90_000])
         at = 10 * np.arange(1, 6, dtype="u2")
