@@ -95,6 +95,16 @@ def test_pictures_are_read_no_further_than_the_events_have_come(net):
     assert len(read) <= 5
 
 
+def test_pictures_and_events_of_a_small_camera_fill_the_input(tmp_path):
+    """Half as wide and high as the input: a white picture is white all over it, and boxes come back halved."""
+    path = telling_net(tmp_path / "own.onnx", SIDE, 20, ROWS, notes={"card": "{}"})
+    camera = (SIDE[0] // 2, SIDE[1] // 2)
+    detector = FusedDetector(path, camera, times=FAST)
+    white = np.full((camera[1], camera[0], 3), 255, dtype=np.uint8)
+    box = detector.look_at(white, 0.1).boxes[0]
+    np.testing.assert_allclose(box, [(LEFT + OF_PICTURE) / 2, (TOP + 1.0) / 2, 5.0, 5.0], atol=1e-3)
+
+
 def test_what_is_seen_live_counts_from_its_time_on(net):
     detector = FusedDetector(net, SIDE, times=FAST)
     events = few_events()

@@ -66,7 +66,7 @@ def counting_net(path, side, channels, rows, per_event=0.0, seen=slice(None), no
     return _save(path, helper.make_graph(nodes, "counting", inputs, outputs, values), notes)
 
 
-def telling_net(path, side, channels, rows):
+def telling_net(path, side, channels, rows, notes=None):
     """A network of both sensors that tells what it is given by where its boxes (K, 6) are.
 
     Boxes lie 8 px to the right with a picture, 16 px with events, and down by 100 px a second of age and by
@@ -98,7 +98,7 @@ def telling_net(path, side, channels, rows):
     shapes = {"events": [1, channels, height, width], "picture": [1, 3, height, width], "given": [1, 3]}
     inputs = [helper.make_tensor_value_info(k, TensorProto.FLOAT, shape) for k, shape in shapes.items()]
     outputs = [helper.make_tensor_value_info("found", TensorProto.FLOAT, [1, *rows.shape])]
-    return _save(path, helper.make_graph(nodes, "telling", inputs, outputs, values), None)
+    return _save(path, helper.make_graph(nodes, "telling", inputs, outputs, values), notes)
 
 
 def _save(path, graph, notes):
