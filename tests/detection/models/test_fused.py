@@ -96,7 +96,7 @@ def test_pictures_are_read_no_further_than_the_events_have_come(net):
 
 
 def test_pictures_and_events_of_a_small_camera_fill_the_input(tmp_path):
-    """Half as wide and high as the input: a white picture is white all over it, and boxes come back halved."""
+    """Half as wide and high as the input: a white picture is white all over it, boxes come back halved."""
     path = telling_net(tmp_path / "own.onnx", SIDE, 20, ROWS, notes={"card": "{}"})
     camera = (SIDE[0] // 2, SIDE[1] // 2)
     detector = FusedDetector(path, camera, times=FAST)
