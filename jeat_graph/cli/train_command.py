@@ -77,7 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--int8",
         metavar="NAME|FILE",
         help="instead of training bring this network of `train` to 8-bit numbers, by what it sees of DATA: "
-        "half of the time with ONNX Runtime",
+        "half of the time with ONNX Runtime; --size gives it another input",
     )
     add("--batch", type=counting, metavar="N", help="cut-outs, or sequences of events, a step (default 8)")
     length = parser.add_mutually_exclusive_group()

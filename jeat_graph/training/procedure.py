@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tempfile
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
@@ -28,6 +29,7 @@ from jeat_graph.training.judging import Precision, judge
 from jeat_graph.training.log_files import draw_log, write_log
 from jeat_graph.training.making import settings_of
 from jeat_graph.training.quantising import write_int8
+from jeat_graph.training.resizing import resized
 from jeat_graph.training.settings import FRAMES, FUSED, NetSettings, TrainSettings, padded
 from jeat_graph.training.trainer import Trainer, TrainingJob
 from jeat_graph.version import __version__
@@ -148,7 +150,7 @@ def bring_to_int8(source: Path, request: TrainRequest) -> int:
 
     Args:
         source: a network that `train` made.
-        request: data and the file to write; nothing is learned.
+        request: data and the file to write, and the input's size if it shall be another; nothing is learned.
 
     Returns:
         How many pictures or windows it has looked at.
@@ -160,8 +162,13 @@ def bring_to_int8(source: Path, request: TrainRequest) -> int:
     kind = settings_of(source).kind
     if kind != request.net.kind:
         raise ConfigError(f"--int8: the network is of {kind}, not of {request.net.kind}")
+    if request.side is not None and request.side != padded(request.side):
+        raise ConfigError(f"--size: {request.side[0]}x{request.side[1]} must be whole multiples of 16 px")
     split = split_by_segment(_read(request, request.data), request.data)
-    return write_int8(source, split.learned, [_described(path) for path in request.data], request.out)
+    about = [_described(path) for path in request.data]
+    with tempfile.TemporaryDirectory() as folder:
+        sized = source if request.side is None else resized(source, request.side, Path(folder) / source.name)
+        return write_int8(sized, split.learned, about, request.out)
 
 
 def _read(request: TrainRequest, paths: Sequence[Path]) -> Any:

@@ -72,6 +72,19 @@ def test_it_says_nearly_what_the_network_said(kind, small_set, tmp_path, capsys)
     assert card["int8"]["data"][0]["name"] == small_set.name
 
 
+@pytest.mark.parametrize("kind", ["frames", "events"])
+def test_the_input_can_get_another_size(kind, small_set, tmp_path, capsys):
+    source, out = network(kind, tmp_path / "net.onnx"), tmp_path / "small.onnx"
+    command = ["train", kind, str(small_set), "--int8", str(source), "--out", str(out), "--size"]
+    assert main([*command, "96x64"]) == 0
+    head = read_onnx_head(out)
+    assert head.inputs[0].shape[2:] == (64, 96)
+    card = json.loads(head.notes["card"])
+    assert (card["side"], card["judged_at"]) == ([96, 64], list(SIDE))
+    assert main([*command, "90x64"]) == 2
+    assert "--size: 90x64 must be whole multiples of 16 px" in capsys.readouterr().err
+
+
 def test_what_does_not_fit_is_refused(small_set, tmp_path, capsys):
     source, out = network("frames", tmp_path / "net.onnx"), tmp_path / "small.onnx"
     assert main(["train", "events", str(small_set), "--int8", str(source), "--out", str(out)]) == 2
