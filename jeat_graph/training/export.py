@@ -17,12 +17,13 @@ from typing import Any, cast
 
 import numpy as np
 import torch
-from torch import Tensor, nn
 
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.detection.models.onnx_head import CARD
 from jeat_graph.io.atomic import atomic_path
-from jeat_graph.training.network import VehicleNet, cell_places, served_boxes
+from jeat_graph.training.making import SECOND_LOOK
+from jeat_graph.training.network import VehicleNet
+from jeat_graph.training.serving import ServedNet
 
 _OPSET = 17
 #: Smaller tensors are not worth a cast.
@@ -32,35 +33,17 @@ _CLASS = "vehicle"
 NAMES = "names"
 
 
-class ServedNet(nn.Module):
-    """A trained network for pictures of one size, its rows turned into boxes.
-
-    Args:
-        net: trained.
-        side: width and height of the input (px), whole multiples of 16.
-    """
-
-    def __init__(self, net: VehicleNet, side: tuple[int, int]) -> None:
-        super().__init__()
-        self.net = net
-        places, strides = cell_places(side)
-        self.register_buffer("places", places)
-        self.register_buffer("strides", strides)
-
-    def forward(self, *values: Tensor) -> tuple[Tensor, ...]:
-        """Return boxes and scores (1, 5, N), and the next states, of inputs and states."""
-        rows, kept = self.net.serve(values)
-        return (served_boxes(rows, self.get_buffer("places"), self.get_buffer("strides")), *kept)
-
-
-def write_onnx(net: VehicleNet, side: tuple[int, int], card: Mapping[str, Any], path: Path) -> None:
+def write_onnx(
+    net: VehicleNet, side: tuple[int, int], card: Mapping[str, Any], path: Path, *, second_look: bool = False
+) -> None:
     """Write a network with its card.
 
     Args:
         net: trained.
-        side: width and height of its input (px), whole multiples of 16.
+        side: width and height of its input (px), whole multiples of 16; of 32 with a second look.
         card: what is to be known of it: data, settings, how good it is.
         path: the file.
+        second_look: whether it looks at half the size, too (`serving`).
 
     Raises:
         ConfigError: the package `onnx` is not installed.
@@ -69,8 +52,8 @@ def write_onnx(net: VehicleNet, side: tuple[int, int], card: Mapping[str, Any], 
         import onnx
     except ImportError:
         raise ConfigError("writing ONNX needs pip install 'jeat-graph[train]'") from None
-    served = ServedNet(net, side).to("cpu").eval()
-    inputs, state = net.to("cpu").inputs(side), net.empty_state(1, side)
+    served = ServedNet(net, side, second_look).to("cpu").eval()
+    inputs, state = net.to("cpu").inputs(side), served.empty_state()
     states = range(len(state))
     buffer = io.BytesIO()
     with warnings.catch_warnings():
@@ -86,10 +69,30 @@ def write_onnx(net: VehicleNet, side: tuple[int, int], card: Mapping[str, Any], 
             output_names=["boxes", *(f"next_state_{k}" for k in states)],
         )
     model = onnx.load_from_string(buffer.getvalue())
+    _share(model)
     _halve(model)
+    card = {key: value for key, value in card.items() if key != SECOND_LOOK}
+    card |= {SECOND_LOOK: True} if second_look else {}
     onnx.helper.set_model_props(model, {NAMES: str({0: _CLASS}), CARD: json.dumps(card, sort_keys=True)})
     with atomic_path(path) as temporary:
         temporary.write_bytes(model.SerializeToString(deterministic=True))
+
+
+def _share(model: Any) -> None:
+    """Keep equal weights once: a second look takes those of the first."""
+    graph, kept, same = model.graph, dict[bytes, Any](), dict[str, str]()
+    for tensor in graph.initializer:
+        name = tensor.name
+        tensor.name = ""
+        first = kept.setdefault(tensor.SerializeToString(deterministic=True), tensor)
+        tensor.name = name
+        same[name] = first.name
+    for node in graph.node:
+        for k, name in enumerate(node.input):
+            node.input[k] = same.get(name, name)
+    used = [tensor for tensor in graph.initializer if same[tensor.name] == tensor.name]
+    del graph.initializer[:]
+    graph.initializer.extend(used)
 
 
 def _halve(model: Any) -> None:

@@ -20,8 +20,9 @@ from jeat_graph.eval.detection_ap import average_precision, match_greedily
 from jeat_graph.io.events_dsec import EventFile
 from jeat_graph.training.data_sets import EventSegment, FusedSegment, Picture
 from jeat_graph.training.event_samples import asked_for, windows_of
-from jeat_graph.training.fused_network import FusedNet, SeenPictures
-from jeat_graph.training.network import PICTURE_INPUT, VehicleNet, cell_places, served_boxes
+from jeat_graph.training.fused_network import FusedNet
+from jeat_graph.training.network import PICTURE_INPUT, VehicleNet
+from jeat_graph.training.serving import ServedNet
 from jeat_graph.training.settings import TrainSettings
 from jeat_graph.training.truth_at import TrueBoxes
 
@@ -85,7 +86,7 @@ def judge(
     pictures = [m for m in members if isinstance(m, Picture)]
     segments = [m for m in members if isinstance(m, EventSegment)]
     looks = (
-        list(_pictures(net, _evenly(pictures, most), side))
+        list(_pictures(net, _evenly(pictures, most), side, settings.second_look))
         if pictures
         else list(_windows(net, segments, side, settings, max(most // max(len(segments), 1), 1)))
     )
@@ -128,13 +129,14 @@ def _evenly(members: Sequence[Picture], most: int) -> list[Picture]:
 
 
 @torch.no_grad()
-def _pictures(net: VehicleNet, pictures: Sequence[Picture], side: tuple[int, int]) -> Iterator[Looked]:
-    reader = _Reader(net, side)
+def _pictures(
+    net: VehicleNet, pictures: Sequence[Picture], side: tuple[int, int], second_look: bool
+) -> Iterator[Looked]:
+    reader = _Reader(net, side, second_look)
     feed = usual_feed(LAYOUT, ModelSettings())
     for picture in pictures:
         values, at = place(picture.load(), side, feed)
-        rows, _ = net(torch.from_numpy(values).to(reader.device))
-        corners, scores = reader.read(rows)
+        corners, scores = reader.look((torch.from_numpy(values),))
         yield Looked(picture.source, at.back(corners), scores, picture.truth)
 
 
@@ -160,13 +162,11 @@ def _windows(
             size_px = file.size_px or settings.crop_px
         places = EventPlaces(size_px, event_scale(size_px, side))
         own = places.moved(EventArray.trusted(events.t_us - first_us, events.x, events.y, events.polarity))
-        reader = _Reader(net, side)
-        state = tuple(one.to(reader.device) for one in net.empty_state(1, side))
+        reader = _Reader(net, side, settings.second_look)
         for end, window in zip(ends, windows_of(own, side, shape, ends), strict=True):
             now = (first_us + end) / _US
-            shown = torch.from_numpy(window[None]).float().to(reader.device)
-            rows, state = net(shown, state, 1, *_seen(net, segment, now, (side, places.shown_px)))
-            corners, scores = reader.read(rows)
+            shown = torch.from_numpy(window[None]).float()
+            corners, scores = reader.look((shown, *_seen(net, segment, now, (side, places.shown_px))))
             begin = max(first_us / _US, now - _SEEN_S)
             truth = (
                 segment.truth.at(now)  # pictures show who stands, too
@@ -178,8 +178,8 @@ def _windows(
 
 def _seen(
     net: VehicleNet, segment: EventSegment, now: float, sides: tuple[tuple[int, int], tuple[int, int]]
-) -> tuple[SeenPictures, ...]:
-    """Return the newest picture up to a time (s) for a network of both sensors; () for another.
+) -> tuple[torch.Tensor, ...]:
+    """Return the newest picture up to a time (s) and what there is, for a network of both; () for another.
 
     Args:
         net: the network.
@@ -189,29 +189,27 @@ def _seen(
     """
     if not isinstance(net, FusedNet) or not isinstance(segment, FusedSegment):
         return ()
-    device = next(net.parameters()).device
     index = segment.newest(now)
     if index is None:
         shown, given = net.inputs(sides[0])[PICTURE_INPUT], [0.0, 0.0, 1.0]
     else:
         shown = torch.from_numpy(picture_input(segment.picture(index), *sides))
         given = [1.0, max(now - float(segment.times_s[index]), 0.0), 1.0]
-    none = torch.zeros(0, dtype=torch.long)
-    return (SeenPictures(shown.to(device), none, torch.tensor([given]).to(device)),)
+    return (shown, torch.tensor([given]))
 
 
 class _Reader:
-    """Turns the network's rows into boxes just as its ONNX file is read."""
+    """Looks at one thing after the other, and turns what is said into boxes just as its ONNX file is read."""
 
-    def __init__(self, net: VehicleNet, side: tuple[int, int]) -> None:
-        self.device = next(net.parameters()).device
+    def __init__(self, net: VehicleNet, side: tuple[int, int], second_look: bool) -> None:
         self._side = side
-        self._places, self._strides = (part.to(self.device) for part in cell_places(side))
+        self._device = next(net.parameters()).device
+        self._served = ServedNet(net, side, second_look).to(self._device)
+        self._state = self._served.empty_state()
 
-    def read(self, rows: torch.Tensor) -> tuple[FloatArray, FloatArray]:
-        """Return corners (M, 4) and scores (M,)."""
-        table = served_boxes(rows, self._places, self._strides).cpu().numpy()
-        corners, scores, _ = choose(
-            decode(LAYOUT, {"boxes": table}, self._side), None, _LEAST_SCORE, *OWN_OVERLAPS
-        )
+    def look(self, shown: tuple[torch.Tensor, ...]) -> tuple[FloatArray, FloatArray]:
+        """Return corners (M, 4) and scores (M,); what the network remembers goes on."""
+        boxes, *self._state = self._served(*(one.to(self._device) for one in shown), *self._state)
+        found = decode(LAYOUT, {"boxes": boxes.cpu().numpy()}, self._side)
+        corners, scores, _ = choose(found, None, _LEAST_SCORE, *OWN_OVERLAPS)
         return corners, scores

@@ -23,6 +23,8 @@ from jeat_graph.training.network import DetectionNet, VehicleNet
 from jeat_graph.training.settings import COARSEST, EVENTS, FRAMES, FUSED, NetSettings
 from jeat_graph.training.widening import widen
 
+#: The card's word for a second look.
+SECOND_LOOK = "second_look"
 _SIDE = (COARSEST, COARSEST)
 _TINY = 1e-12
 
@@ -72,6 +74,11 @@ def settings_of(path: Path) -> NetSettings:
         raise DataError("is no network that `train` made", path) from None
 
 
+def looks_twice(path: Path) -> bool:
+    """Return whether a file that `train` made takes a second look at half the size."""
+    return bool(json.loads(read_onnx_head(path).notes[CARD]).get(SECOND_LOOK, False))
+
+
 def read_network(path: Path) -> VehicleNet:
     """Read a network that `train` wrote; it says what the file says, but for rounding.
 
@@ -83,6 +90,8 @@ def read_network(path: Path) -> VehicleNet:
     net = _of_kind(settings)
     calls = _calls(net)
     layers = list(_layers(path))
+    if looks_twice(path):
+        layers = layers[: len(layers) // 2]  # the other half are the same, looking again
     if len(layers) != len(calls):
         raise DataError(f"has {len(layers)} convolutions, and its card says {len(calls)}", path)
     first: dict[int, Tensor] = {}
@@ -192,7 +201,7 @@ def _read_told(path: Path, net: VehicleNet) -> None:
         return
     graph, values = _graph(path)
     products = [node for node in graph.node if node.op_type in ("MatMul", "Gemm")]
-    for join, node in zip(net.join, products, strict=True):
+    for join, node in zip(net.join, products[: len(net.join)], strict=True):
         assert isinstance(join, GatedSum)
         weight = values[node.input[1]]
         join.told.weight.copy_(weight.reshape(join.told.weight.shape) if node.op_type == "Gemm" else weight.T)

@@ -199,22 +199,28 @@ def _behind_rows(model: Any) -> list[str]:
     return names
 
 
-def _cut_off(model: Any) -> Any:
-    """Return the layer that cuts off high counts, the first."""
-    return next(node for node in model.graph.node if EVENTS_INPUT in node.input)
+def _cut_offs(model: Any) -> list[Any]:
+    """Return the layers that cut off high counts, that of the first look first."""
+    from_counts, found = {EVENTS_INPUT}, []
+    for node in model.graph.node:
+        if node.op_type != "Conv" and node.input and node.input[0] in from_counts:
+            from_counts.update(node.output)
+            if node.op_type == "Clip":
+                found.append(node)
+    return found
 
 
 def _counts_as_they_are(model: Any) -> dict[str, Any]:
     """Ask for counts as 8-bit numbers of scale 1: they are whole and few."""
     unscaled = {"scale": np.array(1.0, dtype=np.float32), "zero_point": np.array(0, dtype=np.uint8)}
-    return {"TensorQuantOverrides": {_cut_off(model).output[0]: [unscaled]}}
+    return {"TensorQuantOverrides": {limit.output[0]: [dict(unscaled)] for limit in _cut_offs(model)}}
 
 
 def _take_counts(model: Any) -> None:
-    """Let the network take counts of events as they are, bytes: nothing is converted."""
-    from onnx import TensorProto, numpy_helper
+    """Let the network take counts of events as they are, bytes: those of the first look are not converted."""
+    from onnx import TensorProto, helper, numpy_helper
 
-    graph, limit = model.graph, _cut_off(model)
+    graph, limit = model.graph, _cut_offs(model)[0]
     scaled = next(n for n in graph.node if n.op_type == "QuantizeLinear" and n.input[0] == limit.output[0])
     most = next(numpy_helper.to_array(one) for one in graph.initializer if one.name == limit.input[2])
     graph.initializer.append(numpy_helper.from_array(most.astype(np.uint8), "most_count"))
@@ -223,5 +229,11 @@ def _take_counts(model: Any) -> None:
         if node.op_type == "DequantizeLinear" and node.input[0] == scaled.output[0]:
             node.input[0] = limit.output[0]
     graph.node.remove(scaled)
+    others = [node for node in graph.node if node is not limit and EVENTS_INPUT in node.input]
+    for node in others:  # a second look takes means of counts
+        for k, name in enumerate(node.input):
+            node.input[k] = "counts" if name == EVENTS_INPUT else name
+    if others:
+        graph.node.insert(0, helper.make_node("Cast", [EVENTS_INPUT], ["counts"], to=TensorProto.FLOAT))
     del graph.value_info[:]
     graph.input[0].type.tensor_type.elem_type = TensorProto.UINT8

@@ -122,6 +122,11 @@ class TrainSettings(Section):
         "whether each segment of pictures is shown alike often, not each picture: worlds of many pictures, "
         "which are much alike, do not outweigh those of few",
     )
+    second_look: bool = flag(
+        False,
+        "whether the finished network looks twice, the second time at half the size, for vehicles that are "
+        "large in its input",
+    )
     clip: float = number(10.0, "1", "longest gradient", open_low=True)
     average_steps: float = number(500.0, "1", "steps that the averaged weights go back", 1.0)
     kept_mb: float = number(2000.0, "MB", "so much of the pictures is kept in memory once it was read")

@@ -14,39 +14,41 @@ from jeat_graph.detection.models.model_settings import ModelSettings  # noqa: E4
 from jeat_graph.detection.models.onnx_head import read_onnx_head  # noqa: E402
 from jeat_graph.detection.models.pictures import ModelPictureDetector  # noqa: E402
 from jeat_graph.detection.settings import EventSettings  # noqa: E402
-from jeat_graph.training.export import ServedNet, write_onnx  # noqa: E402
+from jeat_graph.training.export import write_onnx  # noqa: E402
 from jeat_graph.training.network import DetectionNet  # noqa: E402
+from jeat_graph.training.serving import ServedNet  # noqa: E402
 from jeat_graph.training.settings import NetSettings  # noqa: E402
 
-SIDE = (64, 48)
+SIDE = (64, 32)
 ENGINES = ["opencv", "onnxruntime"]
 #: Weights in half precision: each of some twenty layers adds at most 2^-11 of what it says.
 RELATIVE, ABSOLUTE = 20 * 2.0**-11, 20 * 2.0**-11
 
 
-@pytest.fixture(scope="module", params=["frames", "events"])
+@pytest.fixture(scope="module", params=["frames", "events", "frames twice", "events twice"])
 def pair(request, tmp_path_factory):
     """A network whose normalisations are not those of a fresh one, and its file."""
     torch.manual_seed(4)
-    net = DetectionNet(NetSettings(kind=request.param, width=6))
+    kind, twice = request.param.split()[0], request.param.endswith("twice")
+    net = DetectionNet(NetSettings(kind=kind, width=6))
     state = net.empty_state(2, SIDE)
     for _ in range(3):
         _, state = net(3.0 * torch.rand(2, net.settings.channels, SIDE[1], SIDE[0]), state)
         state = tuple(one.detach() for one in state)
     net.eval()
     path = tmp_path_factory.mktemp("onnx") / "net.onnx"
-    write_onnx(net, SIDE, {"seed": 4}, path)
-    return net, path
+    write_onnx(net, SIDE, {"seed": 4}, path, second_look=twice)
+    return ServedNet(net, SIDE, twice), path
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_both_engines_say_what_the_network_says(pair, engine):
-    net, path = pair
+    served, path = pair
     if engine == "onnxruntime":
         pytest.importorskip("onnxruntime", reason="the extra `onnxruntime` is not installed")
     head = read_onnx_head(path)
     run = open_engine(path, head, engine, 1)
-    served, state = ServedNet(net, SIDE), net.empty_state(1, SIDE)
+    net, state = served.net, served.empty_state()
     generator = torch.Generator().manual_seed(5)
     for _ in range(3):  # the memory comes back and counts
         shown = 3.0 * torch.rand(1, net.settings.channels, SIDE[1], SIDE[0], generator=generator)
@@ -72,12 +74,12 @@ def test_the_memory_matters():
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_file_is_recognised_and_runs(pair, engine):
-    net, path = pair
+    served, path = pair
     if engine == "onnxruntime":
         pytest.importorskip("onnxruntime", reason="the extra `onnxruntime` is not installed")
     settings = ModelSettings(backend=engine, score=0.0)
     rng = np.random.default_rng(0)
-    if net.settings.kind == "frames":
+    if served.net.settings.kind == "frames":
         detector = ModelPictureDetector(path, settings=settings)
         scan = detector(rng.integers(0, 255, (SIDE[1], SIDE[0], 3)).astype(np.uint8), 1.0)
         assert "layout yolov8" in detector.description
@@ -87,8 +89,8 @@ def test_the_file_is_recognised_and_runs(pair, engine):
         x, y = (rng.integers(0, side, 500).astype(np.uint16) for side in SIDE)
         scan = detector.push(EventArray(t, x, y, rng.integers(0, 2, 500).astype(np.uint8)))[0]
         assert (
-            "layout yolov8, windows of 10 bins of 0.005 s by time in 64 x 48 px, 2 states kept"
-            in detector.description
+            "layout yolov8, windows of 10 bins of 0.005 s by time in 64 x 32 px, "
+            f"{2 * len(served.looks)} states kept" in detector.description
         )
     assert "classes vehicle" in detector.description
     assert len(scan.boxes) > 0

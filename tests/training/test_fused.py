@@ -12,12 +12,13 @@ from jeat_graph.detection.models.engine import open_engine  # noqa: E402
 from jeat_graph.detection.models.onnx_head import read_onnx_head  # noqa: E402
 from jeat_graph.training.batches import Batches  # noqa: E402
 from jeat_graph.training.data_sets import Split, read_fused_segments  # noqa: E402
-from jeat_graph.training.export import ServedNet, write_onnx  # noqa: E402
+from jeat_graph.training.export import write_onnx  # noqa: E402
 from jeat_graph.training.fused_network import FusedNet, SeenPictures  # noqa: E402
 from jeat_graph.training.judging import judge  # noqa: E402
 from jeat_graph.training.making import new_network, read_network  # noqa: E402
 from jeat_graph.training.network import DetectionNet  # noqa: E402
 from jeat_graph.training.procedure import TrainRequest, train  # noqa: E402
+from jeat_graph.training.serving import ServedNet  # noqa: E402
 from jeat_graph.training.settings import (  # noqa: E402
     EventChanges,
     FusedChanges,

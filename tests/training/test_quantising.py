@@ -20,10 +20,10 @@ from jeat_graph.training.network import DetectionNet  # noqa: E402
 from jeat_graph.training.quantising import write_int8  # noqa: E402
 from jeat_graph.training.settings import NetSettings  # noqa: E402
 
-from .small_sets import SIZE as SIDE  # noqa: E402
+SIDE = (64, 32)
 
 
-def network(kind, path):
+def network(kind, path, twice=False):
     """A network that has seen something: its layers are not of one scale."""
     torch.manual_seed(4)
     settings = NetSettings(kind=kind, width=6)
@@ -33,13 +33,14 @@ def network(kind, path):
         _, state = net(torch.rand(2, settings.channels, SIDE[1], SIDE[0]), state)
         state = tuple(one.detach() for one in state)
     card = {"net": {"kind": kind, "width": 6}, "side": list(SIDE), "tested": {}}
-    write_onnx(net.eval(), SIDE, card, path)
+    write_onnx(net.eval(), SIDE, card, path, second_look=twice)
     return path
 
 
+@pytest.mark.parametrize("twice", [False, True])
 @pytest.mark.parametrize("kind", ["frames", "events"])
-def test_it_says_nearly_what_the_network_said(kind, small_set, tmp_path, capsys):
-    source, out = network(kind, tmp_path / "net.onnx"), tmp_path / "small.onnx"
+def test_it_says_nearly_what_the_network_said(kind, twice, small_set, tmp_path, capsys):
+    source, out = network(kind, tmp_path / "net.onnx", twice), tmp_path / "small.onnx"
     assert main(["train", kind, str(small_set), "--int8", str(source), "--out", str(out)]) == 0
     assert "wrote" in capsys.readouterr().out
     heads = [read_onnx_head(path) for path in (source, out)]
@@ -60,11 +61,11 @@ def test_it_says_nearly_what_the_network_said(kind, small_set, tmp_path, capsys)
     # 8 bits a layer leave a few per cent of what a layer's features spread over.
     assert np.abs(whole[:, :4] - small[:, :4]).mean() < 0.1 * whole[:, :4].std()
     assert np.abs(whole[:, 4] - small[:, 4]).max() < 0.05
-    # The last layers, one for each of three strides, stay as they are: boxes are told to fractions of px.
+    # The last layers, one for each of three strides and look, stay as they are: boxes to fractions of px.
     graph = onnx.load(str(out)).graph
     scaled = {name for node in graph.node if node.op_type == "DequantizeLinear" for name in node.output}
     layers = [node for node in graph.node if node.op_type == "Conv"]
-    assert sum(node.input[1] not in scaled for node in layers) == 3 < len(layers)
+    assert sum(node.input[1] not in scaled for node in layers) == 3 * (1 + twice) < len(layers)
     assert all(node.input[1] not in scaled for node in layers[-1:])
     card = json.loads(heads[1].notes["card"])
     assert card["net"] == {"kind": kind, "width": 6}
