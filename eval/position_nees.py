@@ -38,13 +38,15 @@ class PositionErrors(NamedTuple):
         error: (K, 2) of the centre (px).
         var: (K, 2) what the table says of it (px²).
         height: (K,) of the table's box (px).
-        object_id: (K,) whose it is; no two recordings share one.
+        object_id: (K,) whose it is; no two recordings share one, and tables of both kinds have the same.
+        recording: (K,) number of the recording.
     """
 
     error: FloatArray
     var: FloatArray
     height: FloatArray
     object_id: IntArray
+    recording: IntArray
 
 
 def position_errors(
@@ -59,9 +61,10 @@ def position_errors(
         pairs: truth and table of each recording.
         kind: how the tables are put beside the truth (`frames.build_frames`).
     """
-    columns = [(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0, dtype=np.int64))]
+    none = np.zeros(0, dtype=np.int64)
+    columns = [(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), none, none)]
     objects = 0
-    for truth, table in pairs:
+    for number, (truth, table) in enumerate(pairs):
         frames = build_frames(truth, table, kind=kind)
         there, track = matched_entries(frames.iou, _MATCH_IOU)
         box = frames.truth_boxes[there]
@@ -70,8 +73,10 @@ def position_errors(
         inside = (box[:, :2] > _EDGE_PX).all(axis=1) & (far[:, 0] < width - _EDGE_PX)
         inside &= far[:, 1] < height - _EDGE_PX
         error = frames.tracks.mean[track, :2] - (box[:, :2] + 0.5 * box[:, 2:])
-        names, number = np.unique(frames.truth_id[there], return_inverse=True)
-        found = (error, frames.tracks.var[track, :2], frames.tracks.boxes[track, 3], objects + number)
+        names = np.unique(truth.object_id)
+        whose = objects + np.searchsorted(names, frames.truth_id[there])
+        of = np.full(len(whose), number)
+        found = (error, frames.tracks.var[track, :2], frames.tracks.boxes[track, 3], whose, of)
         columns.append(tuple(column[inside] for column in found))
         objects += len(names)
     return PositionErrors(*(np.concatenate(parts) for parts in zip(*columns, strict=True)))

@@ -27,6 +27,14 @@ _KINDS: tuple[Kind, ...] = ("causal", "smoothed")
 _SPREAD = np.array([1.0, 0.05])
 _BOUNDS = ((np.log(0.05), np.log(50.0)), (0.0, 0.2))
 _DIGITS = 4
+# Recordings of one kind of scene differ by so much in ln of the error squared over the variance.
+_BETWEEN_RECORDINGS = 0.5
+# What is held of objects before they are seen weighs as much as so many of them: each has one error (of two
+# axes, which varies by 1 around 1), nearly the same in both tables.
+_PRIOR_OBJECTS = 4.0
+_ALIKE = 0.9
+# How well errors are known depends on what is sought: first as held beforehand, then as found.
+_ROUNDS = 2
 
 
 def with_written_variances(config: Config, scale: float, lasting: float) -> Config:
@@ -48,17 +56,20 @@ def measure_written_variances(config: Config, recordings: Sequence[Recording], b
         position_errors([(truth, pair[k]) for (_, truth), pair in zip(recordings, tables, strict=True)], kind)
         for k, kind in enumerate(_KINDS)
     ]
-    return with_written_variances(config, *likeliest(errors, base.position_scale, base.lasting_error))
+    return with_written_variances(config, *truest(errors, base.position_scale, base.lasting_error))
 
 
-def likeliest(tables: Sequence[PositionErrors], scale: float, lasting: float) -> tuple[float, float]:
-    """Factor s and share b under which errors with the variances s P + (b height)² are likeliest.
+def truest(tables: Sequence[PositionErrors], scale: float, lasting: float) -> tuple[float, float]:
+    """Factor s and share b with which the variances s P + (b height)² of all tables are true.
 
-    Errors of one object are nearly one error, so each object counts once, however many boxes it has: a few of
-    them leave what was held beforehand nearly as it was.
+    True means that the mean A of error² / variance is 1, in each table: ln A is the residual. The likeliest
+    values would not do: errors have long tails and go with P, and a normal likelihood pays for that by one
+    table that says too much and one that says too little. How well ln A is known follows from how much the
+    objects differ, each of which is nearly one error however many boxes it has, and the recordings, which
+    differ more than their objects tell. A few of either leave what was held beforehand nearly as it was.
 
     Args:
-        tables: errors of each table, with the variances P.
+        tables: errors of each table on the same recordings, with the variances P.
         scale: s as it is held to be beforehand, to within a factor of e.
         lasting: b, to within .05.
 
@@ -66,16 +77,44 @@ def likeliest(tables: Sequence[PositionErrors], scale: float, lasting: float) ->
         s and b.
     """
     before = np.array([np.log(scale), lasting])
-
-    def cost(x: FloatArray) -> float:
-        total = 0.5 * float(np.sum(((x - before) / _SPREAD) ** 2))
-        for one in tables:
-            if len(one.error):
-                var = np.exp(x[0]) * one.var + (x[1] * one.height[:, None]) ** 2
-                terms = np.log(var) + one.error**2 / var
-                total += 0.5 * len(np.unique(one.object_id)) * float(terms.sum(axis=1).mean())
-        return total
-
+    known = [one for one in tables if len(one.error)]
+    if not known:
+        return scale, lasting
     low, high = np.array(_BOUNDS).T
-    found = minimize(cost, np.clip(before, low, high), bounds=_BOUNDS, method="L-BFGS-B").x
+    found = np.clip(before, low, high)
+    for _ in range(_ROUNDS):
+        weight = np.linalg.inv(_covariance(known, [_squares(one, found) for one in known]))
+
+        def cost(x: FloatArray, weight: FloatArray = weight) -> float:
+            residual = np.log([_squares(one, x).mean() for one in known])
+            return 0.5 * float(residual @ weight @ residual + np.sum(((x - before) / _SPREAD) ** 2))
+
+        found = minimize(cost, found, bounds=_BOUNDS, method="L-BFGS-B").x
     return round(float(np.exp(found[0])), _DIGITS), round(float(found[1]), _DIGITS)
+
+
+def _squares(one: PositionErrors, x: FloatArray) -> FloatArray:
+    """Error² / variance (K,) of each box, mean of both axes, with ln s and b in `x` (2,)."""
+    var = np.exp(x[0]) * one.var + (x[1] * one.height[:, None]) ** 2
+    return np.asarray(np.mean(one.error**2 / var, axis=1))
+
+
+def _covariance(tables: Sequence[PositionErrors], squares: Sequence[FloatArray]) -> FloatArray:
+    """Covariance (T, T) of ln of the mean of each table's `squares`, by objects and by recordings.
+
+    Args:
+        tables: T tables.
+        squares: (K,) of each table's boxes.
+    """
+    objects = np.unique(np.concatenate([one.object_id for one in tables]))
+    recordings = np.unique(np.concatenate([one.recording for one in tables]))
+    count = len(objects)
+    influence, share = np.zeros((count, len(tables))), np.zeros((len(recordings), len(tables)))
+    for k, (one, square) in enumerate(zip(tables, squares, strict=True)):
+        off = count * (square / square.mean() - 1.0) / len(square)
+        np.add.at(influence[:, k], np.searchsorted(objects, one.object_id), off)
+        np.add.at(share[:, k], np.searchsorted(recordings, one.recording), 1.0 / len(square))
+    alike = np.full((len(tables), len(tables)), _ALIKE)
+    np.fill_diagonal(alike, 1.0)
+    of_object = (influence.T @ influence + _PRIOR_OBJECTS * alike) / (count - 1.0 + _PRIOR_OBJECTS)
+    return np.asarray(of_object / count + _BETWEEN_RECORDINGS**2 * alike * (share.T @ share))
