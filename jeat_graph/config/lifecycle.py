@@ -129,6 +129,9 @@ class LifecycleConfig(Section):
     worth_memory_s: float = number(
         1000.0, "s", "time after which what was learnt of them is as uncertain as at first", open_low=True
     )
+    least_move: float = number(
+        0.0, "1", "what none saw but sensors blind to what stands must move by this share of its size; 0: not"
+    )
     delete_existence: float = number(0.001, "1", "deleted below this probability of existence", 0.0, 1.0)
     lifetime_s: float = number(
         20.0, "s", "mean time a vehicle stays in the picture (decay of existence)", open_low=True
@@ -277,6 +280,10 @@ class OutputConfig(Section):
     )
     max_gap_scans: float = number(
         0.0, "scans", "the same in scans of the slowest sensor, over P_D⁴; the less counts; 0: no bound"
+    )
+    scans_of_several: bool = flag(
+        False,
+        "scans count only while several sensors look; one alone is given `max_gap_s`: nobody fills its gaps",
     )
     clip: bool = flag(True, "clip boxes to the picture; drop those outside it")
     min_visible: float = number(

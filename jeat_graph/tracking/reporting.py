@@ -18,6 +18,8 @@ from jeat_graph.tracking.state import SceneState, TrackArrays
 _TRUSTED = 0.5
 # A scan that is so many periods after the last has not come.
 _OVERDUE = 1.5
+# A sensor without a scan for so long does not look (s).
+_LOOKS_S = 1.0
 
 
 def longest_gap_s(scene: SceneState, model: Model, t: float) -> float:
@@ -28,19 +30,27 @@ def longest_gap_s(scene: SceneState, model: Model, t: float) -> float:
     than that of vehicles). Sensors that the others do not bear out, or that are blind, are not waited for.
     Until that sensor's next scan is due nothing has been missed, so the time counts from its last.
 
+    What two sensors see has vanished soon after neither finds it; the gaps of one alone nobody fills. So with
+    `output.scans_of_several` one alone is given the longest time there is.
+
     Args:
         scene: what is learnt of the sensors.
         model: sensors and settings.
         t: now (s).
     """
     output = model.settings.output
-    if output.max_gap_scans == 0.0:
-        return float(output.max_gap_s)
+    scans, most = output.max_gap_scans, float(output.max_gap_s)
+    if scans == 0.0:
+        return most
     believed = scene.trust * (1.0 - scene.blind)
-    scans, most = output.max_gap_scans, output.max_gap_s
-    return float(
+    if output.scans_of_several:
+        sees = (scene.last_look >= t - _LOOKS_S) & (believed >= _TRUSTED * believed.max())
+        if np.count_nonzero(sees) < 2:
+            return most
+    wait = float(
         _longest_wait(scene.p_detect, believed, model.sensors.period_s, t - scene.last_look, scans, most)
     )
+    return min(wait, most) if output.scans_of_several else wait
 
 
 @njit(cache=True)

@@ -122,3 +122,19 @@ def test_a_track_whose_centre_leaves_the_picture_ends():
             steps=10,
         )
         assert tracker.num_tracks == alive
+
+
+@pytest.mark.parametrize(("sensors", "left"), [(("slow", "fast"), 0), (("slow",), 1)])
+def test_a_scan_that_missed_a_vehicle_counts_where_another_sensor_looked_too(sensors, left):
+    """Of two sensors neither finds it any more; one that looks alone may just have missed it."""
+    declared = [f"sensors.{name}={{rate_hz: 20, disagreement: 0}}" for name in ("slow", "fast")]
+    by_scans = ["output.max_gap_scans=0.7", "output.max_gap_s=0.14", "output.scans_of_several=true"]
+    tracker = Tracker(load_config("default", ["smoother.engine=none", *by_scans, *declared]))
+    reported = []
+    for k in range(40):
+        seen = np.array([[100.0 + 3.0 * k, 60.0, 40.0, 30.0]])[: 1 if k < 38 else 0]
+        reported.append(
+            len(tracker.step([(STEP * k, name, seen, np.full(len(seen), 0.95)) for name in sensors]))
+        )
+    assert reported[37] == 1
+    assert reported[38:] == [left, left]

@@ -115,3 +115,41 @@ def test_a_saved_tracker_goes_on_with_what_it_learnt(tmp_path):
         np.testing.assert_array_equal(
             getattr(again.snapshot().scene, name), getattr(tracker.snapshot().scene, name)
         )
+
+
+def flickering(least_move, speed=0.0, seen_by=("evt",), light=True):
+    """Rows a scan in the last second of what an event camera finds all the time, and those in hindsight.
+
+    Eight cars pass, which a camera sees too if there is light.
+    """
+    rng = np.random.default_rng(7)
+    tracker = Tracker(load_config("highway", [f"lifecycle.least_move={least_move}", "smoother.engine=full"]))
+    rows = []
+    for k in range(300):
+        t = 0.01 * k
+        thing = [300.0 + speed * t, 200.0, 40.0, 30.0]
+        cars = [[100.0 + 100.0 * i + 60.0 * t, 400.0 + 30.0 * i, 60.0, 25.0] for i in range(8)]
+        for name in ("evt", "rgb"):
+            boxes = [thing] * (name in seen_by) + (cars if light or name == "evt" else [])
+            found = np.array(boxes).reshape(-1, 4) + rng.normal(0.0, 1.0, (len(boxes), 4))
+            if name == "evt" or k % 5 == 0:
+                table = tracker.step((t, name, found, np.full(len(found), 0.9)))
+        rows.append((table.boxes[:, 1] < 300.0).sum())
+    return np.mean(rows[-100:]), (tracker.finish().boxes[:, 1] < 300.0).sum()
+
+
+def test_what_an_event_camera_alone_finds_at_one_place_all_the_time_is_no_vehicle():
+    """It sees nothing that stands still, and the camera, which sees that, does not find it."""
+    assert flickering(0.0)[0] > 0.9
+    assert flickering(0.2) == (0.0, 0)
+
+
+@pytest.mark.parametrize(
+    "how",
+    [{"speed": 30.0}, {"seen_by": ("evt", "rgb")}, {"light": False}],
+    ids=lambda how: str(next(iter(how))),
+)
+def test_unless_it_moves_or_the_camera_sees_it_too_or_would_not(how):
+    shown, smoothed = flickering(0.2, **how)
+    assert shown > 0.9
+    assert smoothed > 0

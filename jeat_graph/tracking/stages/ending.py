@@ -26,7 +26,8 @@ def confirm(tracks: TrackArrays, n: int, t: float, settings: Settings) -> None:
     for i in range(n):
         if lifecycle.by_existence:
             believed = tracks.existence[i] >= lifecycle.confirm_existence
-            earned = believed and tracks.worthy[i]
+            # What does not move yet is held back from the table alone: it is no less followed.
+            earned = believed and (tracks.worthy[i] or not lifecycle.judges_worth)
         else:
             old = t - tracks.t_birth[i] >= lifecycle.confirm_age_s
             earned = old and tracks.hits[i] >= lifecycle.confirm_hits

@@ -22,6 +22,8 @@ _ROUNDING_S = 1e-9
 # A track so far from its first detection, as a share of its size, has left the place: five times the error
 # of a usual detector.
 _MOVED = 0.25
+# A sensor that finds so many of the vehicles finds what stands, too.
+_MOST = 0.8
 _LEAST_ODDS = math.log(LEAST_PRECISION / (1.0 - LEAST_PRECISION))
 
 
@@ -31,6 +33,32 @@ def has_moved(tracks: TrackArrays, i: int) -> bool:
     size = mean_side(tracks.size_mean[i])
     x, y = tracks.mean[i, 0, 0] - tracks.born_at[i, 0], tracks.mean[i, 1, 0] - tracks.born_at[i, 1]
     return bool(x * x + y * y > _MOVED * _MOVED * size * size)
+
+
+@inner
+def asks_for_motion(scene: SceneState, model: Model) -> bool:
+    """Whether a sensor looks that finds what stands, so that others need not be believed of it."""
+    sharpest = 0.0
+    for s in range(len(scene.first_look)):
+        if model.sensors.blind_speed[s] <= 0.0 and scene.first_look[s] < np.inf:
+            sharpest = max(sharpest, scene.p_detect[s] * scene.trust[s] * (1.0 - scene.blind[s]))
+    return bool(model.settings.lifecycle.least_move > 0.0 and sharpest >= _MOST)
+
+
+@inlined
+def shows_motion(tracks: TrackArrays, i: int, model: Model) -> bool:
+    """Whether track `i` may be a vehicle by how it moves, for those who saw it.
+
+    A sensor that is blind to what stands still cannot have found a vehicle at one place again and again:
+    what it alone finds there is a lamp that flickers, or leaves. So what only such sensors have seen has to
+    leave the place where it began, by `lifecycle.least_move` of its size.
+    """
+    for s in range(len(model.sensors.blind_speed)):
+        if tracks.seen_by[i] >> s & 1 and model.sensors.blind_speed[s] <= 0.0:
+            return True
+    size = model.settings.lifecycle.least_move * mean_side(tracks.size_mean[i])
+    x, y = tracks.mean[i, 0, 0] - tracks.born_at[i, 0], tracks.mean[i, 1, 0] - tracks.born_at[i, 1]
+    return bool(x * x + y * y > size * size)
 
 
 @inner
@@ -140,8 +168,10 @@ def judge_worth(tracks: TrackArrays, n: int, scene: SceneState, model: Model) ->
 
     What is worth nearly as much as the usual box of what lasts is as good as this sensor's scores can tell.
     """
-    lifecycle = model.settings.lifecycle
+    lifecycle, asks = model.settings.lifecycle, asks_for_motion(scene, model)
     if not lifecycle.judges_worth:
+        for i in range(n):
+            tracks.worthy[i] = not asks or shows_motion(tracks, i, model)
         return
     least = np.empty(len(scene.first_look))
     for s in range(len(least)):
@@ -152,4 +182,4 @@ def judge_worth(tracks: TrackArrays, n: int, scene: SceneState, model: Model) ->
         # No branch that writes a flag, as in `confirm`.
         worth = worth_of(scene.worth_mean[s], tracks.score_odds[i])
         tracks.worth[i] = 1.0 if s < 0 else worth
-        tracks.worthy[i] = s < 0 or worth >= least[s]
+        tracks.worthy[i] = (s < 0 or worth >= least[s]) and (not asks or shows_motion(tracks, i, model))
