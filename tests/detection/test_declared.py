@@ -10,7 +10,7 @@ from jeat_graph.detection.declared import declared_settings
 from jeat_graph.detection.detecting import DetectRequest
 
 
-@pytest.mark.parametrize("network", ["sehn", "sehn-int8"])
+@pytest.mark.parametrize("network", ["sehn", "sehn-int8", "sehn-fast"])
 def test_networks_of_the_package_are_declared_as_their_preset_declares_them(network):
     said: list[str] = []
     asked = DetectRequest(frames="a", events="b", detector_frames=network, detector_events=network)

@@ -52,7 +52,7 @@ def settings(seed: int, sensors: tuple[str, ...]) -> list[str]:
     rng = np.random.default_rng(seed)
     drawn: list[str] = []
     if {"rgb", "evt"} <= set(sensors) and rng.random() < 0.5:
-        network = str(rng.choice(["sehn", "sehn-int8"]))
+        network = str(rng.choice(["sehn", "sehn-int8", "sehn-fast"]))
         drawn += declared_of({"rgb": network, "evt": network})
     for name in sensors:
         drawn.append(f"sensors.{name}.least_overlap={rng.choice([1e-3, 0.3, 0.6, 0.999, 1.0])}")
