@@ -69,8 +69,8 @@ def write_onnx(
             output_names=["boxes", *(f"next_state_{k}" for k in states)],
         )
     model = onnx.load_from_string(buffer.getvalue())
-    _share(model)
-    _halve(model)
+    share_weights(model)
+    halve_weights(model)
     card = {key: value for key, value in card.items() if key != SECOND_LOOK}
     card |= {SECOND_LOOK: True} if second_look else {}
     onnx.helper.set_model_props(model, {NAMES: str({0: _CLASS}), CARD: json.dumps(card, sort_keys=True)})
@@ -78,8 +78,8 @@ def write_onnx(
         temporary.write_bytes(model.SerializeToString(deterministic=True))
 
 
-def _share(model: Any) -> None:
-    """Keep equal weights once: a second look takes those of the first."""
+def share_weights(model: Any) -> None:
+    """Keep equal weights once, and none that nobody takes: a second look takes those of the first."""
     graph, kept, same = model.graph, dict[bytes, Any](), dict[str, str]()
     for tensor in graph.initializer:
         name = tensor.name
@@ -90,15 +90,20 @@ def _share(model: Any) -> None:
     for node in graph.node:
         for k, name in enumerate(node.input):
             node.input[k] = same.get(name, name)
-    used = [tensor for tensor in graph.initializer if same[tensor.name] == tensor.name]
+    taken = {name for node in graph.node for name in node.input}
+    used = [tensor for tensor in graph.initializer if tensor.name in taken]
     del graph.initializer[:]
     graph.initializer.extend(used)
 
 
-def _halve(model: Any) -> None:
+def halve_weights(model: Any, *, only_exact: bool = False) -> None:
     """Store weights in half precision, each with a cast before its first use: half the file.
 
     Whoever runs the network casts them once, when it is loaded; it calculates in single precision.
+
+    Args:
+        model: as ONNX has it; changed.
+        only_exact: leave those as they are that half precision would change.
     """
     from onnx import TensorProto, helper, numpy_helper
 
@@ -107,8 +112,13 @@ def _halve(model: Any) -> None:
         if tensor.data_type != TensorProto.FLOAT or np.prod(tensor.dims) < _LEAST_HALVED:
             kept.append(tensor)
             continue
+        values = numpy_helper.to_array(tensor)
+        halved = values.astype(np.float16)
+        if only_exact and not np.array_equal(halved.astype(np.float32), values):
+            kept.append(tensor)
+            continue
         name = f"{tensor.name}_half"
-        kept.append(numpy_helper.from_array(numpy_helper.to_array(tensor).astype(np.float16), name))
+        kept.append(numpy_helper.from_array(halved, name))
         casts.append(helper.make_node("Cast", [name], [tensor.name], to=TensorProto.FLOAT))
     nodes = list(graph.node)
     del graph.initializer[:], graph.node[:]

@@ -26,6 +26,7 @@ from jeat_graph.io.atomic import atomic_path
 from jeat_graph.io.events_dsec import EventFile
 from jeat_graph.training.data_sets import EventSegment, Picture
 from jeat_graph.training.event_samples import windows_of
+from jeat_graph.training.export import halve_weights, share_weights
 from jeat_graph.training.judging import LAYOUT
 from jeat_graph.training.making import settings_of
 from jeat_graph.training.network import EVENTS_INPUT, PICTURE_INPUT
@@ -104,6 +105,8 @@ def write_int8(source: Path, members: Sequence[Picture | EventSegment], about: o
         model = onnx.load(str(small))
     if settings.kind == EVENTS:
         _take_counts(model)
+    share_weights(model)
+    halve_weights(model, only_exact=True)  # the places of cells
     card = json.loads(head.notes[CARD])
     note = "judged and tested are of the network before it was brought to 8 bits"
     card["int8"] = {"data": about, "looks": looks, "note": note}
