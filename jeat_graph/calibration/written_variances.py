@@ -83,7 +83,8 @@ def truest(tables: Sequence[PositionErrors], scale: float, lasting: float) -> tu
     low, high = np.array(_BOUNDS).T
     found = np.clip(before, low, high)
     for _ in range(_ROUNDS):
-        weight = np.linalg.inv(_covariance(known, [_squares(one, found) for one in known]))
+        covariance = _covariance(known, [_squares(one, found) for one in known])
+        weight: FloatArray = np.asarray(np.linalg.inv(covariance), dtype=np.float64)
 
         def cost(x: FloatArray, weight: FloatArray = weight) -> float:
             residual = np.log([_squares(one, x).mean() for one in known])
