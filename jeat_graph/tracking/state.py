@@ -60,7 +60,8 @@ class TrackArrays(NamedTuple):
         last_box: (C, S, 5) each sensor's last whole box, as it saw it: time (s), centre (px), ln width and ln
             height.
         worth: (C,) probability that what has such scores lasts, where one sensor alone has seen it; else 1.
-        worthy: (C,) whether things of such scores last often enough to be believed of one sensor alone.
+        worthy: (C,) whether it may be reported: things of such scores last often enough to be believed of one
+            sensor alone, and it has moved where only sensors that see nothing stand have seen it.
     """
 
     mean: FloatArray

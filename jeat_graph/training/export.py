@@ -71,8 +71,8 @@ def write_onnx(
     model = onnx.load_from_string(buffer.getvalue())
     share_weights(model)
     halve_weights(model)
-    card = {key: value for key, value in card.items() if key != SECOND_LOOK}
-    card |= {SECOND_LOOK: True} if second_look else {}
+    if second_look:
+        card = {**card, SECOND_LOOK: True}
     onnx.helper.set_model_props(model, {NAMES: str({0: _CLASS}), CARD: json.dumps(card, sort_keys=True)})
     with atomic_path(path) as temporary:
         temporary.write_bytes(model.SerializeToString(deterministic=True))

@@ -25,6 +25,7 @@ from jeat_graph.training.widening import widen
 
 #: The card's word for a second look.
 SECOND_LOOK = "second_look"
+_NOT_OURS = "is no network that `train` made"
 _SIDE = (COARSEST, COARSEST)
 _TINY = 1e-12
 
@@ -69,14 +70,30 @@ def settings_of(path: Path) -> NetSettings:
         DataError: not a file that `train` made.
     """
     try:
-        return NetSettings(**json.loads(read_onnx_head(path).notes[CARD])["net"])
+        return NetSettings(**card_of(path)["net"])
     except (KeyError, TypeError, ValueError, ConfigError):
-        raise DataError("is no network that `train` made", path) from None
+        raise DataError(_NOT_OURS, path) from None
+
+
+def card_of(path: Path) -> dict[str, Any]:
+    """Return what `train` has written into a file.
+
+    Raises:
+        DataError: not a file that `train` made.
+    """
+    try:
+        return dict(json.loads(read_onnx_head(path).notes[CARD]))
+    except (KeyError, TypeError, ValueError):
+        raise DataError(_NOT_OURS, path) from None
 
 
 def looks_twice(path: Path) -> bool:
-    """Return whether a file that `train` made takes a second look at half the size."""
-    return bool(json.loads(read_onnx_head(path).notes[CARD]).get(SECOND_LOOK, False))
+    """Return whether a file that `train` made takes a second look at half the size.
+
+    Raises:
+        DataError: not a file that `train` made.
+    """
+    return bool(card_of(path).get(SECOND_LOOK, False))
 
 
 def read_network(path: Path) -> VehicleNet:

@@ -14,7 +14,6 @@ import torch
 import yaml
 
 from jeat_graph.data.errors import ConfigError, DataError
-from jeat_graph.detection.models.onnx_head import read_onnx_head
 from jeat_graph.io.hashing import sha256_of
 from jeat_graph.training.coco_pictures import read_coco_pictures
 from jeat_graph.training.data_sets import (
@@ -30,7 +29,7 @@ from jeat_graph.training.judging import Precision, judge
 from jeat_graph.training.log_files import draw_log, write_log
 from jeat_graph.training.making import looks_twice, settings_of
 from jeat_graph.training.quantising import write_int8
-from jeat_graph.training.resizing import resized
+from jeat_graph.training.resizing import input_side, resized
 from jeat_graph.training.settings import COARSEST, FRAMES, FUSED, NetSettings, TrainSettings, padded
 from jeat_graph.training.trainer import Trainer, TrainingJob
 from jeat_graph.version import __version__
@@ -105,7 +104,7 @@ def train(
     members = _read(request, request.data)
     split = split_by_segment(members, request.data)
     side = request.side or _side(members[0])
-    _check_side(side, request.settings)
+    _check_side(side, request.settings.second_look)
     unit = "pictures" if request.net.kind == FRAMES else "recordings"
     say(f"{len(split.learned)} {unit} to learn from, {len(split.judged)} to judge by; {split.note}")
     tests = _read(request, request.tested) if request.tested else []
@@ -162,21 +161,19 @@ def bring_to_int8(source: Path, request: TrainRequest) -> int:
     kind = settings_of(source).kind
     if kind != request.net.kind:
         raise ConfigError(f"--int8: the network is of {kind}, not of {request.net.kind}")
-    if request.side is not None:
-        _check_side(request.side, request.settings)
+    side = request.side or input_side(source)
+    twice = request.settings.second_look or (request.side is None and looks_twice(source))
+    _check_side(side, twice)
     split = split_by_segment(_read(request, request.data), request.data)
     about = [_described(path) for path in request.data]
     with tempfile.TemporaryDirectory() as folder:
-        shape = read_onnx_head(source).inputs[0].shape
-        side = request.side or (shape[3] or 0, shape[2] or 0)
-        twice = request.settings.second_look or (request.side is None and looks_twice(source))
         sized = resized(source, side, Path(folder) / source.name, twice)
         return write_int8(sized, split.learned, about, request.out)
 
 
-def _check_side(side: tuple[int, int], settings: TrainSettings) -> None:
+def _check_side(side: tuple[int, int], second_look: bool) -> None:
     """Refuse an input that cannot be divided as the network does."""
-    least = COARSEST * (2 if settings.second_look else 1)
+    least = COARSEST * (2 if second_look else 1)
     if any(one % least for one in side):
         raise ConfigError(f"--size: {side[0]}x{side[1]} must be whole multiples of {least} px")
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
-from jeat_graph.detection.models.onnx_head import CARD, read_onnx_head
+from jeat_graph.detection.models.onnx_head import read_onnx_head
 from jeat_graph.training.export import write_onnx
-from jeat_graph.training.making import looks_twice, read_network
+from jeat_graph.training.making import SECOND_LOOK, card_of, read_network
 
 
 def resized(source: Path, side: tuple[int, int], out: Path, second_look: bool = False) -> Path:
@@ -23,10 +22,16 @@ def resized(source: Path, side: tuple[int, int], out: Path, second_look: bool = 
         ConfigError: the package `onnx` is not installed.
         DataError: no file that `train` made.
     """
-    head = read_onnx_head(source)
-    net, card = read_network(source).eval(), json.loads(head.notes[CARD])
-    if head.inputs[0].shape[2:] == (side[1], side[0]) and looks_twice(source) == second_look:
+    card = card_of(source)
+    twice = bool(card.pop(SECOND_LOOK, False))
+    if input_side(source) == side and twice == second_look:
         return source
     card["judged_at"], card["side"] = card.get("side"), list(side)
-    write_onnx(net, side, card, out, second_look=second_look)
+    write_onnx(read_network(source).eval(), side, card, out, second_look=second_look)
     return out
+
+
+def input_side(source: Path) -> tuple[int, int]:
+    """Return the width and height (px) of a network's first input."""
+    height, width = read_onnx_head(source).inputs[0].shape[2:]
+    return width or 0, height or 0

@@ -18,6 +18,7 @@ from jeat_graph.detection.models.onnx_head import read_onnx_head  # noqa: E402
 from jeat_graph.training.export import write_onnx  # noqa: E402
 from jeat_graph.training.network import DetectionNet  # noqa: E402
 from jeat_graph.training.quantising import write_int8  # noqa: E402
+from jeat_graph.training.resizing import resized  # noqa: E402
 from jeat_graph.training.settings import NetSettings  # noqa: E402
 
 SIDE = (64, 32)
@@ -84,6 +85,18 @@ def test_the_input_can_get_another_size(kind, small_set, tmp_path, capsys):
     assert (card["side"], card["judged_at"]) == ([96, 64], list(SIDE))
     assert main([*command, "90x64"]) == 2
     assert "--size: 90x64 must be whole multiples of 16 px" in capsys.readouterr().err
+
+
+def test_a_second_look_is_refused_where_half_the_input_does_not_fit(small_set, tmp_path, capsys):
+    """Said in one line, whether the size is asked for or is the network's own."""
+    source, out = network("frames", tmp_path / "net.onnx"), tmp_path / "small.onnx"
+    command = ["train", "frames", str(small_set), "--int8", str(source), "--out", str(out)]
+    sized = tmp_path / "sized.onnx"
+    resized(source, (64, 48), sized)
+    for more in (["--size", "64x48"], ["--int8", str(sized)]):
+        assert main([*command, *more, "--set", "second_look=true"]) == 2
+        assert "--size: 64x48 must be whole multiples of 32 px" in capsys.readouterr().err
+    assert not out.exists()
 
 
 def test_what_does_not_fit_is_refused(small_set, tmp_path, capsys):

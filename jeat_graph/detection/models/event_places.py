@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.events import EventArray
+from jeat_graph.detection.models.feeding import letterbox_scale, scaled_px
 
 # From here on an enlarged picture is worth the gaps between its events.
 _WORTH_SCALING = 1.1
@@ -27,7 +28,7 @@ def event_scale(size_px: tuple[int, int], side: tuple[int, int]) -> float:
         size_px: width and height of the camera's picture.
         side: those of the network's input.
     """
-    scale = min(side[0] / size_px[0], side[1] / size_px[1])
+    scale = letterbox_scale(size_px, side)
     return 1.0 if 1.0 <= scale < _WORTH_SCALING else scale
 
 
@@ -45,8 +46,7 @@ class EventPlaces:
 
     def __init__(self, size_px: tuple[int, int], scale: float) -> None:
         self.scale = scale
-        width, height = (max(round(side * scale), 1) for side in size_px)
-        self.shown_px = (width, height)
+        self.shown_px = scaled_px(size_px, scale)
         self._x, self._y = (_table(side, scale) for side in size_px)
 
     def moved(self, events: EventArray) -> EventArray:

@@ -89,6 +89,12 @@ def letterbox_scale(size_px: tuple[int, int], side: tuple[int, int]) -> float:
     return min(side[0] / size_px[0], side[1] / size_px[1])
 
 
+def scaled_px(size_px: tuple[int, int], scale: float) -> tuple[int, int]:
+    """Return a width and height (px) times a scale, in whole pixels and never 0."""
+    width, height = (max(round(side * scale), 1) for side in size_px)
+    return width, height
+
+
 def place(frame: RgbImage, side: tuple[int, int], feed: Feed) -> tuple[npt.NDArray[np.float32], Letterbox]:
     """Turn a picture (H, W, 3) into input (1, 3, height, width) of the given side (width, height, px)."""
     import cv2
@@ -98,8 +104,7 @@ def place(frame: RgbImage, side: tuple[int, int], feed: Feed) -> tuple[npt.NDArr
         at = Letterbox(side[0] / width, side[1] / height, 0.0, 0.0)
         canvas: Any = cv2.resize(frame, side)
     else:
-        scale = letterbox_scale((width, height), side)
-        inner = max(round(width * scale), 1), max(round(height * scale), 1)
+        inner = scaled_px((width, height), letterbox_scale((width, height), side))
         spare = (side[0] - inner[0], side[1] - inner[1]) if feed.fit == "letterbox-centre" else (0, 0)
         left, top = spare[0] // 2, spare[1] // 2
         at = Letterbox(inner[0] / width, inner[1] / height, float(left), float(top))
@@ -115,20 +120,20 @@ def place(frame: RgbImage, side: tuple[int, int], feed: Feed) -> tuple[npt.NDArr
 
 
 def picture_input(
-    frame: RgbImage, side: tuple[int, int], shown_px: tuple[int, int] | None = None
+    frame: RgbImage, side: tuple[int, int], shown_px: tuple[int, int]
 ) -> npt.NDArray[np.float32]:
     """Return a picture (H, W, 3) as (1, 3, height, width) of 0 to 1, filled up at the right and below.
 
     Args:
-        frame: no larger than `side`, unless it is brought to another size.
+        frame: the picture.
         side: width and height of the input (px).
-        shown_px: width and height that the picture is brought to; None: as it is.
+        shown_px: width and height that the picture is brought to, no larger than `side`.
     """
     import cv2
 
-    if shown_px is not None and shown_px != (frame.shape[1], frame.shape[0]):
+    width, height = shown_px
+    if frame.shape[:2] != (height, width):
         frame = np.asarray(cv2.resize(frame, shown_px))
-    height, width = frame.shape[:2]
     values = np.full((1, 3, side[1], side[0]), _FILL / _WHITE, dtype=np.float32)
     values[0, :, :height, :width] = frame.transpose(2, 0, 1)
     values[0, :, :height, :width] /= _WHITE

@@ -28,11 +28,17 @@ _LEAST_ODDS = math.log(LEAST_PRECISION / (1.0 - LEAST_PRECISION))
 
 
 @inlined
-def has_moved(tracks: TrackArrays, i: int) -> bool:
+def has_gone(tracks: TrackArrays, i: int, share: float) -> bool:
     """Whether track `i` is further from where it began than a share of its size."""
-    size = mean_side(tracks.size_mean[i])
+    least = share * mean_side(tracks.size_mean[i])
     x, y = tracks.mean[i, 0, 0] - tracks.born_at[i, 0], tracks.mean[i, 1, 0] - tracks.born_at[i, 1]
-    return bool(x * x + y * y > _MOVED * _MOVED * size * size)
+    return bool(x * x + y * y > least * least)
+
+
+@inlined
+def has_moved(tracks: TrackArrays, i: int) -> bool:
+    """Whether track `i` has left the place where it began."""
+    return has_gone(tracks, i, _MOVED)
 
 
 @inner
@@ -56,9 +62,7 @@ def shows_motion(tracks: TrackArrays, i: int, model: Model) -> bool:
     for s in range(len(model.sensors.blind_speed)):
         if tracks.seen_by[i] >> s & 1 and model.sensors.blind_speed[s] <= 0.0:
             return True
-    size = model.settings.lifecycle.least_move * mean_side(tracks.size_mean[i])
-    x, y = tracks.mean[i, 0, 0] - tracks.born_at[i, 0], tracks.mean[i, 1, 0] - tracks.born_at[i, 1]
-    return bool(x * x + y * y > size * size)
+    return has_gone(tracks, i, model.settings.lifecycle.least_move)
 
 
 @inner
