@@ -140,7 +140,10 @@ class Batches:
         size_px = (frame.shape[1], frame.shape[0])
         served = letterbox_scale(size_px, self._side or size_px)
         window = draw_window(rng, size_px, self._settings.crop_px, member.truth, shares, served)
-        shown = cut_out(frame, window, rng, draw_light(rng, changes))
+        light = draw_light(rng, changes)
+        # Nothing is drawn where no share is asked for: the same settings then show the same as ever.
+        cluttered = changes.clutter_share > 0.0 and rng.random() < changes.clutter_share
+        shown = cut_out(frame, window, rng, light, member.truth if cluttered else None)
         return [shown], [_target(*window.boxes(member.truth))]
 
     def _picture(self, key: tuple[int, int], load: Callable[[], RgbImage]) -> RgbImage:

@@ -17,6 +17,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.io.decoders import RgbImage
 from jeat_graph.io.truth_io import read_truth
 from jeat_graph.io.video import VIDEO_FILES, open_frames
+from jeat_graph.training.far_truth import asking_for_far
 from jeat_graph.training.truth_at import TrueBoxes, TruthByTime
 
 _SEGMENTS, _TRUTH, _EVENTS, _SPLIT = "segments", "gt.csv", "events.h5", "val.txt"
@@ -117,8 +118,12 @@ def segments_of(root: Path) -> list[Path]:
     return found
 
 
-def read_pictures(root: Path) -> list[Picture]:
+def read_pictures(root: Path, far_px: float | None = None) -> list[Picture]:
     """Return the pictures of a folder that have truth.
+
+    Args:
+        root: as `simulate` writes it.
+        far_px: ask also for far vehicles whose boxes are so wide and high (px); None: as the truth does.
 
     Raises:
         DataError: there are none.
@@ -128,7 +133,7 @@ def read_pictures(root: Path) -> list[Picture]:
         place = next((folder / name for name in VIDEO_FILES.values() if (folder / name).exists()), None)
         if place is None:
             continue
-        truth = TruthByTime(read_truth(folder / _TRUTH))
+        truth = _truth(folder, far_px)
         with open_frames(place) as frames:
             times = frames.times_s
         for index, t in enumerate(truth.times.tolist()):
@@ -140,14 +145,14 @@ def read_pictures(root: Path) -> list[Picture]:
     return found
 
 
-def read_event_segments(root: Path) -> list[EventSegment]:
-    """Return the recordings of events of a folder.
+def read_event_segments(root: Path, far_px: float | None = None) -> list[EventSegment]:
+    """Return the recordings of events of a folder; arguments as `read_pictures`.
 
     Raises:
         DataError: there are none.
     """
     found = [
-        EventSegment(str(folder), root.name, folder / _EVENTS, TruthByTime(read_truth(folder / _TRUTH)))
+        EventSegment(str(folder), root.name, folder / _EVENTS, _truth(folder, far_px))
         for folder in segments_of(root)
         if (folder / _EVENTS).is_file()
     ]
@@ -156,14 +161,14 @@ def read_event_segments(root: Path) -> list[EventSegment]:
     return found
 
 
-def read_fused_segments(root: Path) -> list[FusedSegment]:
-    """Return the recordings of a folder that have pictures and events.
+def read_fused_segments(root: Path, far_px: float | None = None) -> list[FusedSegment]:
+    """Return the recordings of a folder that have pictures and events; arguments as `read_pictures`.
 
     Raises:
         DataError: there are none.
     """
     found = []
-    for segment in read_event_segments(root):
+    for segment in read_event_segments(root, far_px):
         folder = Path(segment.group)
         place = next((folder / name for name in VIDEO_FILES.values() if (folder / name).exists()), None)
         if place is not None:
@@ -175,6 +180,11 @@ def read_fused_segments(root: Path) -> list[FusedSegment]:
     if not found:
         raise DataError("holds no pictures beside its events; make it with --sensors pictures", root)
     return found
+
+
+def _truth(folder: Path, far_px: float | None) -> TruthByTime:
+    truth = read_truth(folder / _TRUTH)
+    return TruthByTime(truth if far_px is None else asking_for_far(truth, folder, far_px))
 
 
 class _Loader:

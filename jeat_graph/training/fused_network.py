@@ -89,6 +89,11 @@ class FusedNet(VehicleNet):
         self.join = nn.ModuleList(GatedSum(channels) for channels in level_channels(settings.width))
         self.head = Head(settings.width)
 
+    def hold_pictures(self) -> None:
+        """Keep what looks at pictures and says where vehicles are as it is; the rest learns."""
+        for part in (self.pictures, self.head):
+            part.requires_grad_(False)
+
     def forward(
         self, x: Tensor, state: Sequence[Tensor], length: int, seen: SeenPictures
     ) -> tuple[Tensor, tuple[Tensor, ...]]:

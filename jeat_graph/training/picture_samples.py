@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.io.decoders import RgbImage
+from jeat_graph.training.clutter import draw_clutter
 from jeat_graph.training.settings import PictureChanges
 from jeat_graph.training.truth_at import TrueBoxes
 
@@ -109,16 +110,32 @@ def draw_light(rng: np.random.Generator, changes: PictureChanges) -> LightChange
 
 
 def cut_out(
-    frame: RgbImage, window: CutOut, rng: np.random.Generator, light: LightChange
+    frame: RgbImage,
+    window: CutOut,
+    rng: np.random.Generator,
+    light: LightChange,
+    beside: TrueBoxes | None = None,
 ) -> npt.NDArray[np.float32]:
-    """Return the cut-out (3, H, W) of a picture (H, W, 3), lit and grained anew, red first, 0 to 1."""
+    """Return the cut-out (3, H, W) of a picture (H, W, 3), lit and grained anew, red first, 0 to 1.
+
+    Args:
+        frame: the picture.
+        window: what is cut out.
+        rng: random numbers.
+        light: how it is lit and grained.
+        beside: what is in the picture; given, shapes that are no vehicles are drawn beside it.
+    """
     import cv2
 
     # OpenCV counts from the middle of the first pixel, boxes from its edge.
     half = 0.5 * (window.scale - 1.0)
     matrix = np.array([[window.scale, 0.0, window.left + half], [0.0, window.scale, window.top + half]])
     warped = cv2.warpAffine(frame, matrix, window.side, flags=cv2.INTER_LINEAR, borderValue=(_GREY,) * 3)
-    values = light.levels[np.asarray(warped)]
+    shown = np.asarray(warped)
+    if beside is not None:
+        vehicles, _ = window._replace(mirrored=False).boxes(beside)
+        shown = draw_clutter(shown, vehicles, rng)
+    values = light.levels[shown]
     if window.mirrored:
         values = values[:, ::-1]
     if light.grey:

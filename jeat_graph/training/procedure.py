@@ -6,7 +6,7 @@ import json
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from jeat_graph.training.coco_pictures import read_coco_pictures
 from jeat_graph.training.data_sets import (
     EventSegment,
     Picture,
+    Split,
     read_event_segments,
     read_fused_segments,
     read_pictures,
@@ -101,8 +102,9 @@ def train(
     log, plot = request.out.with_suffix(".csv"), request.out.with_suffix(".png")
     checkpoint = request.out.with_suffix(".checkpoint")
     device = _device(request.device)
+    _check_held(request)
     members = _read(request, request.data)
-    split = split_by_segment(members, request.data)
+    split = _asking_far(request, split_by_segment(members, request.data))
     side = request.side or _side(members[0])
     _check_side(side, request.settings.second_look)
     unit = "pictures" if request.net.kind == FRAMES else "recordings"
@@ -171,6 +173,15 @@ def bring_to_int8(source: Path, request: TrainRequest) -> int:
         return write_int8(sized, split.learned, about, request.out)
 
 
+def _check_held(request: TrainRequest) -> None:
+    """Refuse to hold what nothing was put into."""
+    kinds = {settings_of(path).kind for path in request.start}
+    if request.net.kind == FUSED and request.settings.fused.hold_pictures and not kinds & {FRAMES, FUSED}:
+        raise ConfigError(
+            "fused.hold_pictures: give the network of pictures, or of both, that it shall stay (--start)"
+        )
+
+
 def _check_side(side: tuple[int, int], second_look: bool) -> None:
     """Refuse an input that cannot be divided as the network does."""
     least = COARSEST * (2 if second_look else 1)
@@ -178,7 +189,17 @@ def _check_side(side: tuple[int, int], second_look: bool) -> None:
         raise ConfigError(f"--size: {side[0]}x{side[1]} must be whole multiples of {least} px")
 
 
-def _read(request: TrainRequest, paths: Sequence[Path]) -> Any:
+def _asking_far(request: TrainRequest, split: Split[Any]) -> Split[Any]:
+    """Let what is learned ask for far vehicles, if it shall; what is judged stays as the truth has it."""
+    far_px = request.settings.far_px
+    if far_px is None:
+        return split
+    groups = {member.group for member in split.learned}
+    asking = [member for member in _read(request, request.data, far_px) if member.group in groups]
+    return replace(split, learned=asking)
+
+
+def _read(request: TrainRequest, paths: Sequence[Path], far_px: float | None = None) -> Any:
     """Return pictures or recordings of all data sets.
 
     Raises:
@@ -187,13 +208,13 @@ def _read(request: TrainRequest, paths: Sequence[Path]) -> Any:
     found: list[Any] = []
     for path in paths:
         if request.net.kind == FUSED:
-            found += read_fused_segments(path)
+            found += read_fused_segments(path, far_px)
         elif request.net.kind != FRAMES:
-            found += read_event_segments(path)
+            found += read_event_segments(path, far_px)
         elif path.suffix.lower() == _JSON:
             found += read_coco_pictures(path, request.pictures)
         else:
-            found += read_pictures(path)
+            found += read_pictures(path, far_px)
     names = Counter(path.stem if path.suffix.lower() == _JSON else path.name for path in paths)
     name, times = names.most_common(1)[0]
     if times > 1:

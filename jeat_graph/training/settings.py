@@ -60,6 +60,13 @@ class PictureChanges(Section):
         0.2, "1", "so many lose their colours, as a camera without them sees", 0.0, 1.0
     )
     noise: float = number(8.0, "grey levels", "noise of up to this deviation is added", 0.0, 128.0)
+    clutter_share: float = number(
+        0.0,
+        "1",
+        "in so many shapes that are no vehicles are drawn beside the vehicles, where data show little else",
+        0.0,
+        1.0,
+    )
 
 
 @dataclass(frozen=True)
@@ -84,6 +91,11 @@ class FusedChanges(Section):
     no_events_share: float = number(0.1, "1", "so many, of the others, have no events", 0.0, 1.0)
     stale_share: float = number(0.3, "1", "in so many the pictures come late", 0.0, 1.0)
     stale_s: float = number(0.15, "s", "by up to so much", 0.0, 10.0)
+    hold_pictures: bool = flag(
+        False,
+        "whether what was taken from a network of pictures stays as it is: only events, and how both are "
+        "summed, are learned, and little data of both do not spoil what much data of pictures have taught",
+    )
 
 
 @dataclass(frozen=True)
@@ -136,6 +148,13 @@ class TrainSettings(Section):
     most_step_bins: int = number(10, "bins", "longest (50 ms)", 1, 1000)
     least_way_px: float = number(
         1.0, "px", "who has gone less since a sequence began left hardly an event and is not asked for"
+    )
+    far_px: float | None = number(
+        None,
+        "px",
+        "learn also those vehicles that the truth leaves out, as far ones are, where a third of them is seen "
+        "and width and height have so much; judged is by the truth",
+        open_low=True,
     )
     judge_every: float = number(
         0.1, "1", "share of the training between two looks at what it has learned", 0.001, 1.0

@@ -16,6 +16,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.training.batches import Batches, ShownBatch
 from jeat_graph.training.checkpoint import read_checkpoint, write_checkpoint
 from jeat_graph.training.data_sets import Split
+from jeat_graph.training.fused_network import FusedNet
 from jeat_graph.training.judging import judge
 from jeat_graph.training.learning import cost_of
 from jeat_graph.training.making import new_network
@@ -97,6 +98,8 @@ class Trainer:
         torch.manual_seed(settings.seed)
         # Channels last: convolutions of few channels are a fifth quicker so on processors.
         net = new_network(job.net, job.start)
+        if isinstance(net, FusedNet) and settings.fused.hold_pictures:
+            net.hold_pictures()
         self.net = net.to(job.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
         self.average = copy.deepcopy(self.net).requires_grad_(False)
         self._optimiser = torch.optim.AdamW(
@@ -236,6 +239,7 @@ class Trainer:
 
 def _groups(net: VehicleNet, decay: float) -> Sequence[dict[str, Any]]:
     """Weights of convolutions are held small; biases and normalisations are free."""
-    held = [p for p in net.parameters() if p.ndim > 1]
-    free = [p for p in net.parameters() if p.ndim <= 1]
+    learned = [p for p in net.parameters() if p.requires_grad]
+    held = [p for p in learned if p.ndim > 1]
+    free = [p for p in learned if p.ndim <= 1]
     return [{"params": held, "weight_decay": decay}, {"params": free, "weight_decay": 0.0}]

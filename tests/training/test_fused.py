@@ -7,7 +7,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs PyTorch, the extra `train`")
 
-from jeat_graph.data.errors import DataError  # noqa: E402
+from jeat_graph.data.errors import ConfigError, DataError  # noqa: E402
 from jeat_graph.detection.models.engine import open_engine  # noqa: E402
 from jeat_graph.detection.models.onnx_head import read_onnx_head  # noqa: E402
 from jeat_graph.training.batches import Batches  # noqa: E402
@@ -217,3 +217,33 @@ def test_a_training_can_start_from_its_own_result(small_set, tmp_path):
     values = moment(13, (1.0, 0.0, 1.0))
     one, other = (said(read_network(done.files[0]).eval(), values) for done in (done, again))
     torch.testing.assert_close(one, other, rtol=RELATIVE, atol=ABSOLUTE)
+
+
+def test_what_pictures_taught_can_be_held(small_set, tmp_path):
+    """Backbone and head of the pictures stay to the bit; what events add is learned."""
+    frames = used(14, NetSettings(kind="frames", width=4))
+    path = tmp_path / "frames.onnx"
+    write_onnx(frames, SIDE, {"net": vars(frames.settings)}, path)
+    settings = TrainSettings(
+        crop_px=(32, 32),
+        batch=2,
+        epochs=0.5,
+        judged=2,
+        steps=2,
+        back=2,
+        learning_rate=1e-2,
+        fused=FusedChanges(hold_pictures=True),
+    )
+    members = read_fused_segments(small_set)
+    job = TrainingJob(NET, settings, Split(members, members, ""), SIZE, "cpu", tmp_path / "c", "x", (path,))
+    trainer = Trainer(job)
+    first = {name: value.clone() for name, value in trainer.net.state_dict().items()}
+    trainer.run()
+    now = trainer.net.state_dict().items()
+    changed = {name for name, value in now if not torch.equal(value, first[name])}
+    assert not [name for name in changed if name.startswith(("pictures.", "head."))]
+    for part in ("events.", "join."):
+        assert any(name.startswith(part) for name in changed)
+    request = TrainRequest((small_set,), tmp_path / "f.onnx", NET, settings)
+    with pytest.raises(ConfigError, match="hold_pictures"):
+        train(request)
