@@ -147,9 +147,7 @@ def _ellipse(cover: npt.NDArray[np.uint8], _: npt.NDArray[np.float32], rng: np.r
     cv2.ellipse(cover, (width // 2, height // 2), axes, turned, 0.0, 360.0, _WHITE, -1, cv2.LINE_AA)
 
 
-def _front(
-    cover: npt.NDArray[np.uint8], colours: npt.NDArray[np.float32], rng: np.random.Generator
-) -> None:
+def _front(cover: npt.NDArray[np.uint8], colours: npt.NDArray[np.float32], rng: np.random.Generator) -> None:
     """Draw a wall with rows of windows, lit or dark."""
     cover[:] = _WHITE
     height, width = cover.shape
