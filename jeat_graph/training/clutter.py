@@ -22,11 +22,13 @@ _LEAST_PX, _MOST_PX = 4.0, 160.0
 _MOST_SHAPES, _LEAST_CORNERS, _MOST_CORNERS = 40, 3, 8
 #: Vehicles keep so much around them (px): what touches them would tell where they are, or hide them.
 _MARGIN_PX = 3.0
-#: Shares of the kinds: a shape with corners, a round one, a front with windows, a post or a wire.
-_KINDS = (0.4, 0.2, 0.25, 0.15)
+#: Shares of the kinds: a shape with corners, a round one, a front with windows, a post or a wire, specks.
+_KINDS = (0.35, 0.15, 0.2, 0.15, 0.15)
 #: A window, and what is left between two, as shares of a front.
 _MOST_WINDOWS, _WINDOW_SHARE = 6, (0.3, 0.8)
 _WHITE = 255.0
+#: Specks, as far roofs and leaves in the light are: how wide and high each is, and how far apart (px).
+_SPECK_PX, _BETWEEN_PX = (1.0, 8.0), (5.0, 20.0)
 #: Cells of a shape's grain (px), and how strong it is at most (grey levels).
 _GRAIN_PX, _GRAIN = (1.0, 8.0), 70.0
 #: How far edges are smeared (px).
@@ -95,7 +97,7 @@ def _shape(half: FloatArray, rng: np.random.Generator) -> _Shape:
 
     width, height = (int(np.ceil(2.0 * one)) for one in half)
     kind = int(np.searchsorted(np.cumsum(_KINDS), rng.random(), side="right"))
-    outline = (_polygon, _ellipse, _front, _post)[min(kind, len(_KINDS) - 1)]
+    outline = (_polygon, _ellipse, _front, _post, _specks)[min(kind, len(_KINDS) - 1)]
     cover = np.zeros((height, width), dtype=np.uint8)
     colours = _colours(width, height, rng)
     outline(cover, colours, rng)
@@ -166,3 +168,19 @@ def _post(cover: npt.NDArray[np.uint8], _: npt.NDArray[np.float32], rng: np.rand
     ends = np.rint(rng.random((2, 2)) * (width, height)).astype(int).tolist()
     thick = int(rng.integers(1, 4))
     cv2.line(cover, ends[0], ends[1], _WHITE, thick, cv2.LINE_AA)
+
+
+def _specks(cover: npt.NDArray[np.uint8], colours: npt.NDArray[np.float32], rng: np.random.Generator) -> None:
+    """Draw small patches, each with a shade of its own, with what was there before between them."""
+    import cv2
+
+    height, width = cover.shape
+    count = 1 + int(width * height / rng.uniform(*_BETWEEN_PX) ** 2)
+    middle = rng.random((count, 2)) * (width, height)
+    half = 0.5 * np.exp(rng.uniform(*np.log(_SPECK_PX), (count, 2)))
+    shade = np.clip(rng.uniform(0.0, _WHITE, (count, 1)) + 0.3 * (_colour(rng) - 0.5 * _WHITE), 0.0, _WHITE)
+    ends = np.rint(np.concatenate([middle - half, middle + half - 1.0], axis=1)).astype(int).tolist()
+    for (left, top, right, bottom), colour in zip(ends, shade.tolist(), strict=True):
+        corners = ((left, top), (max(right, left), max(bottom, top)))
+        cv2.rectangle(cover, *corners, _WHITE, -1)
+        cv2.rectangle(colours, *corners, colour, -1)
