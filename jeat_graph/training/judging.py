@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import torch
@@ -34,9 +34,12 @@ _LEAST_SCORE = 0.01
 SIZES = {"below 12 px": (0.0, 12.0), "12 to 32 px": (12.0, 32.0), "above 32 px": (32.0, np.inf)}
 #: Windows are judged every 20 ms.
 _STEP_BINS = 4
+#: Of a recording at least so many are.
+_LEAST_WINDOWS = 8
 #: Who has hardly moved for so long is not asked for: nothing shows it, though a memory may know of it (s).
 _SEEN_S = 0.2
 _US = 1e6
+Judged = TypeVar("Judged", Picture, EventSegment)
 
 
 class Precision(NamedTuple):
@@ -88,7 +91,7 @@ def judge(
     looks = (
         list(_pictures(net, _evenly(pictures, most), side, settings.second_look))
         if pictures
-        else list(_windows(net, segments, side, settings, max(most // max(len(segments), 1), 1)))
+        else list(_windows(net, *_shared_out(segments, most), side, settings))
     )
     found = {"all": precision_of(looks)}
     for source in dict.fromkeys(look.source for look in looks):
@@ -123,7 +126,13 @@ def _between(corners: FloatArray, low: float, high: float) -> BoolArray:
     return np.asarray((side >= low) & (side < high))
 
 
-def _evenly(members: Sequence[Picture], most: int) -> list[Picture]:
+def _shared_out(segments: Sequence[EventSegment], most: int) -> tuple[list[EventSegment], int]:
+    """Return whose windows are judged, and how many of each: in a recording's first one nothing has moved."""
+    each = max(most // max(len(segments), 1), min(most, _LEAST_WINDOWS))
+    return _evenly(segments, max(most // each, 1)), each
+
+
+def _evenly(members: Sequence[Judged], most: int) -> list[Judged]:
     chosen = np.unique(np.linspace(0, len(members) - 1, min(most, len(members))).round().astype(int))
     return [members[k] for k in chosen.tolist()]
 
@@ -144,9 +153,9 @@ def _pictures(
 def _windows(
     net: VehicleNet,
     segments: Sequence[EventSegment],
+    most: int,
     side: tuple[int, int],
     settings: TrainSettings,
-    most: int,
 ) -> Iterator[Looked]:
     shape = net.settings
     bin_us = round(shape.bin_s * _US)

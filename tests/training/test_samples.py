@@ -26,7 +26,7 @@ from jeat_graph.training.data_sets import (  # noqa: E402
     split_by_segment,
 )
 from jeat_graph.training.event_samples import draw_sequence, drawn_events, windows_of  # noqa: E402
-from jeat_graph.training.judging import LAYOUT, Looked, precision_of  # noqa: E402
+from jeat_graph.training.judging import LAYOUT, Looked, _shared_out, precision_of  # noqa: E402
 from jeat_graph.training.picture_samples import CutOut, cut_out, draw_light, draw_window  # noqa: E402
 from jeat_graph.training.settings import (  # noqa: E402
     EventChanges,
@@ -258,3 +258,13 @@ def test_events_are_learned_from_at_the_size_at_which_they_are_looked_at(small_s
     np.testing.assert_array_equal(drawn.windows, np.stack(served))
     for corners, end in zip(drawn.corners, plan.ends_us(net, settings), strict=True):
         np.testing.assert_allclose(corners, times * segment.truth.at(plan.file_s(end)).corners, atol=1e-9)
+
+
+def test_recordings_are_judged_for_long_enough_that_something_has_moved(small_set):
+    """Of many recordings few are, rather than the first window of each, in which nothing has."""
+    segments = read_event_segments(small_set) * 6
+    chosen, each = _shared_out(segments, 16)
+    assert (len(chosen), each) == (2, 8)
+    assert _shared_out(segments, 5) == ([segments[0]], 5)
+    chosen, each = _shared_out(segments, 240)
+    assert (len(chosen), each) == (12, 20)
