@@ -47,30 +47,6 @@ class Marked(NamedTuple):
     group: Whole
     weight: Whole
 
-    def renumbered(self, number: IntArray) -> Marked:
-        """Return the pixels of groups g with `number[g]` > 0, which is their new number."""
-        return Marked(*_renumbered(self, number))
-
-
-def linked(marks: npt.NDArray[Any], link_px: int) -> tuple[int, Marked]:
-    """Number the groups of marked pixels: two belong together across a gap of less than `link_px`.
-
-    Args:
-        marks: (H, W), marked where positive.
-        link_px: the gap (px), along rows and columns.
-
-    Returns:
-        The number of groups, and the marked pixels.
-    """
-    import cv2
-
-    marked = np.asarray(marks > 0)
-    mask: Any = marked.view(np.uint8)
-    if link_px > 1:
-        mask = cv2.dilate(mask, np.ones((link_px, link_px), dtype=np.uint8))
-    count, labels = cv2.connectedComponents(mask, connectivity=8, ltype=cv2.CV_32S)
-    return count - 1, Marked(*_gathered(np.flatnonzero(marked), labels, marks))
-
 
 def measured(count: int, marked: Marked, trim_share: float = 0.0, *, keep_empty: bool = False) -> Components:
     """Measure groups by their marked pixels.
@@ -82,9 +58,7 @@ def measured(count: int, marked: Marked, trim_share: float = 0.0, *, keep_empty:
             its fullest column are not of its box, and so for rows: thin shadows, and noise.
         keep_empty: also return groups without a marked pixel, with boxes of no size, so that rows are groups.
     """
-    corners, weight, pixels = _measure(count, marked)
-    if trim_share > 0.0:
-        _trim(marked, corners, trim_share)
+    corners, weight, pixels = _measure(count, marked, trim_share)
     found = (pixels > 0) | keep_empty
     corners[pixels == 0] = 0
     corners = corners[found].astype(np.float64)
@@ -133,96 +107,75 @@ def _weights(count: int, marked: Marked) -> Any:
 
 
 @numba.njit(cache=True, nogil=True)
-def _renumbered(marked: Marked, number: IntArray) -> tuple[Any, Any, Any, Any]:
-    """Column, row, new group and mark of the pixels whose group has a new number above 0."""
-    found = np.empty((4, len(marked.group)), dtype=np.int32)
-    k = 0
-    for p in range(len(marked.group)):
-        new = number[marked.group[p]]
-        if new > 0:
-            found[0, k], found[1, k] = marked.x[p], marked.y[p]
-            found[2, k], found[3, k] = new, marked.weight[p]
-            k += 1
-    return found[0, :k], found[1, :k], found[2, :k], found[3, :k]
+def _measure(count: int, marked: Marked, share: float) -> tuple[Any, Any, Any]:
+    """Corners (M, 4) left, top, right, bottom, sums and numbers of the marked pixels of each group.
 
-
-@numba.njit(cache=True, nogil=True)
-def _gathered(places: IntArray, labels: Any, marks: Any) -> tuple[Any, Any, Any, Any]:
-    """Column, row, group and mark (P,) of pixels by their number, row by row."""
-    width = marks.shape[1]
-    found = np.empty((4, len(places)), dtype=np.int32)
-    row, begin = 0, 0
-    for k in range(len(places)):
-        while places[k] >= begin + width:
-            row, begin = row + 1, begin + width
-        column = places[k] - begin
-        found[0, k], found[1, k] = column, row
-        found[2, k], found[3, k] = labels[row, column], marks[row, column]
-    return found[0], found[1], found[2], found[3]
-
-
-@numba.njit(cache=True, nogil=True)
-def _measure(count: int, marked: Marked) -> tuple[Any, Any, Any]:
-    """Corners (M, 4) left, top, right, bottom, sums and numbers of the marked pixels of each group."""
-    corners = np.empty((count, 4), dtype=np.int64)
-    corners[:, :2] = np.iinfo(np.int64).max
-    corners[:, 2:] = 0
+    How many marked pixels each column and row of a group has says where its box begins and ends, with thin
+    ends (`share` = 0) and without.
+    """
+    extents = _extents(count, marked)
+    start = np.zeros((count + 1, 2), dtype=np.int64)
+    for k in range(count):
+        start[k + 1, 0] = start[k, 0] + extents[k, 2] - extents[k, 0]
+        start[k + 1, 1] = start[k, 1] + extents[k, 3] - extents[k, 1]
+    columns = np.zeros(start[count, 0], dtype=np.int32)
+    rows = np.zeros(start[count, 1], dtype=np.int32)
     weight = np.zeros(count)
     pixels = np.zeros(count, dtype=np.int64)
     p, end = 0, len(marked.x)
     while p < end:
-        k, row = marked.group[p] - 1, marked.y[p]
-        first, last, total, number = -1, -1, np.int64(0), 0
-        while p < end and marked.group[p] - 1 == k and marked.y[p] == row:
-            if marked.weight[p] > 0:
-                if first < 0:
-                    first = marked.x[p]
-                last = marked.x[p]
+        group, row = marked.group[p], marked.y[p]
+        k = np.int64(group) - 1
+        left = start[k, 0] - extents[k, 0] if k >= 0 else 0
+        total, number = np.int64(0), np.int64(0)
+        while p < end and marked.group[p] == group and marked.y[p] == row:
+            if k >= 0:
+                on = np.int32(marked.weight[p] > 0)
+                columns[left + marked.x[p]] += on
+                number += on
                 total += marked.weight[p]
-                number += 1
             p += 1
-        if number and k >= 0:
-            corners[k, 0] = min(corners[k, 0], first)
-            corners[k, 1] = min(corners[k, 1], row)
-            corners[k, 2] = max(corners[k, 2], last + 1)
-            corners[k, 3] = max(corners[k, 3], row + 1)
+        if k >= 0:
+            rows[start[k, 1] + row - extents[k, 1]] += number
             weight[k] += total
             pixels[k] += number
+    corners = np.zeros((count, 4), dtype=np.int64)
+    for k in range(count):
+        if pixels[k]:
+            for axis, filled in ((0, columns), (1, rows)):
+                first, last = _full_enough(filled[start[k, axis] : start[k + 1, axis]], share)
+                corners[k, axis] = extents[k, axis] + first
+                corners[k, axis + 2] = extents[k, axis] + last + 1
     return corners, weight, pixels
 
 
 @numba.njit(cache=True, nogil=True)
-def _trim(marked: Marked, corners: Any, share: float) -> None:
-    """Take thin ends off the corners (M, 4), from each side up to the first full enough column or row."""
-    count = len(corners)
-    start = np.zeros((count + 1, 2), dtype=np.int64)
-    for k in range(count):
-        start[k + 1, 0] = start[k, 0] + max(corners[k, 2] - corners[k, 0], 0)
-        start[k + 1, 1] = start[k, 1] + max(corners[k, 3] - corners[k, 1], 0)
-    columns = np.zeros(start[count, 0], dtype=np.int64)
-    rows = np.zeros(start[count, 1], dtype=np.int64)
+def _extents(count: int, marked: Marked) -> Any:
+    """Left, top, right, bottom (M, 4) of all pixels of each group (px), those with no weight too; else 0."""
+    extents = np.zeros((count, 4), dtype=np.int64)
     p, end = 0, len(marked.x)
     while p < end:
-        k, row = marked.group[p] - 1, marked.y[p]
-        left = start[k, 0] - corners[k, 0] if k >= 0 else 0
-        number = 0
-        while p < end and marked.group[p] - 1 == k and marked.y[p] == row:
-            if marked.weight[p] > 0 and k >= 0:
-                columns[left + marked.x[p]] += 1
-                number += 1
+        # What lies together in a row is mostly of one group, and rows ascend.
+        group, row, first = marked.group[p], marked.y[p], p
+        while p < end and marked.group[p] == group and marked.y[p] == row:
             p += 1
-        if number:
-            rows[start[k, 1] + row - corners[k, 1]] += number
-    for k in range(count):
-        for axis, filled in ((0, columns), (1, rows)):
-            low, high = start[k, axis], start[k + 1, axis]
-            if high <= low:
-                continue
-            least = share * filled[low:high].max()
-            first, last = low, high - 1
-            while filled[first] < least:
-                first += 1
-            while filled[last] < least:
-                last -= 1
-            corners[k, axis + 2] = corners[k, axis] + last - low + 1
-            corners[k, axis] += first - low
+        if group > 0:
+            k = group - 1
+            if extents[k, 3] == 0:
+                extents[k, 0], extents[k, 1] = marked.x[first], row
+            extents[k, 0] = min(extents[k, 0], marked.x[first])
+            extents[k, 2] = max(extents[k, 2], marked.x[p - 1] + 1)
+            extents[k, 3] = row + 1
+    return extents
+
+
+@numba.njit(cache=True, nogil=True)
+def _full_enough(filled: npt.NDArray[np.int32], share: float) -> tuple[int, int]:
+    """First and last of some columns or rows that hold this share of what the fullest holds, and anything."""
+    least = max(share * filled.max(), 1.0)
+    first, last = 0, len(filled) - 1
+    while filled[first] < least:
+        first += 1
+    while filled[last] < least:
+        last -= 1
+    return first, last

@@ -15,12 +15,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Scan
 from jeat_graph.detection.binned import BinnedDetector
-from jeat_graph.detection.components import Components, linked, measured, weights, without_inner
+from jeat_graph.detection.components import Components, measured, weights, without_inner
+from jeat_graph.detection.linking import MarkedPixels, linked, marked_pixels
 from jeat_graph.detection.memory import CloudMemory
 from jeat_graph.detection.settings import USUAL_RATE_HZ, EventSettings
 from jeat_graph.detection.windows import EventBins
@@ -67,24 +67,18 @@ class EventDetector(BinnedDetector):
         side = np.maximum(boxes[:, 2:] - smear, np.minimum(boxes[:, 2:], settings.least_side_px))
         return np.column_stack([boxes[:, :2] + (boxes[:, 2:] - side) / 2.0, side])
 
-    def _link_px(self, total: npt.NDArray[np.uint16]) -> int:
+    def _link_px(self, pixels: MarkedPixels) -> int:
         """Return the gap across which pixels belong together (px): narrow where the events are dense."""
-        hit = int(np.count_nonzero(total))
-        per_pixel = float(total.sum()) / hit if hit else 1.0
+        hit = len(pixels.x)
+        per_pixel = pixels.total / hit if hit else 1.0
         return int(np.clip(round(self.settings.link_events / per_pixel), 2, self._near_px))
 
     def _clouds(self) -> Components:
         """Link the window's events; boxes from the newest part, weights from all."""
         settings = self.settings
-        total = self._bins.total
-        count, marked = linked(total, self._link_px(total))
-        enough = weights(count, marked) >= settings.least_events
-        if not enough.any():
-            nothing = Components(np.zeros((0, 4)), np.zeros(0), np.zeros(0, dtype=np.int64))
-            self._memory.remember(nothing.boxes)
-            return nothing
-        heavy = np.append(False, enough)  # no group comes first
-        count, marked = self._memory.relabel(marked.renumbered(np.cumsum(heavy) * heavy))
+        pixels = marked_pixels(self._bins.total)
+        count, marked = linked(pixels, self._link_px(pixels), settings.least_events)
+        count, marked = self._memory.relabel(count, marked)
         whole = weights(count, marked)
         newest = self._bins.recent(settings.bins(settings.extent_s), marked.y, marked.x)
         recent = measured(count, marked._replace(weight=newest), settings.trim_share, keep_empty=True)

@@ -11,7 +11,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.detection.components import Marked, Whole
 
 # A box is found again where it overlaps its place by this (intersection over union).
@@ -51,57 +51,75 @@ class CloudMemory:
         moved[:, :2] += self.velocity
         return moved
 
-    def relabel(self, marked: Marked) -> tuple[int, Marked]:
+    def relabel(self, count: int, marked: Marked) -> tuple[int, Marked]:
         """Put pieces together, and take clouds apart.
 
         Args:
+            count: number of clouds.
             marked: pixels, each of a cloud.
 
         Returns:
             The number of clouds, and the pixels with the clouds numbered anew.
         """
-        expected = self.expected()
-        cloud = marked.group
-        if len(expected) and len(cloud):
-            cloud = self._assign(marked, expected)
-        there = np.bincount(cloud) > 0
-        return int(there.sum()), marked._replace(group=np.cumsum(there, dtype=np.int32)[cloud])
+        old = np.flatnonzero(self._age >= self._apart_steps)
+        if not len(old) or not len(marked.group):
+            return count, marked
+        expected = self.expected()[old]
+        base = count + 1
+        share, near = _shares(marked, expected, self._link_px, base)
+        new, pieces = self._pieces(marked, share, near, old, expected)
+        if all(len(names) < 2 for names in pieces) and new is marked.group:
+            return count, marked  # as they were
+        extents, sizes = _extents(marked._replace(group=new), base + len(old))
+        table = np.arange(base + len(old))
+        for k, names in enumerate(pieces):
+            # A dark body fires at its ends only: pieces may be far apart, but within what it was.
+            most_px = expected[k, 2:] + 2.0 * self._link_px
+            _join(table, list(dict.fromkeys(names)), extents, sizes, most_px)
+        there = np.zeros(len(table), dtype=bool)
+        there[table[sizes > 0]] = True
+        number = np.cumsum(there, dtype=np.int32)
+        return int(there.sum()), marked._replace(group=number[table][new])
 
-    def _assign(self, marked: Marked, expected: FloatArray) -> Whole:
-        """Name the cloud of each marked pixel (P,): as before, or a new name for each remembered box.
+    def _pieces(
+        self, marked: Marked, share: FloatArray, near: FloatArray, old: IntArray, expected: FloatArray
+    ) -> tuple[Whole, list[list[int]]]:
+        """Find the pieces of remembered boxes, and divide clouds that are several of them.
 
         Args:
-            marked: pixels; their clouds have the names so far.
-            expected: (K, 4) where the remembered boxes should be.
+            marked: pixels; their M clouds have the names so far.
+            share: (M + 1, K) of each cloud's pixels that lie in the box.
+            near: (M + 1, K) that lie in it or no farther from it than the gap.
+            old: (K,) rows of the boxes.
+            expected: (K, 4) where they should be.
+
+        Returns:
+            The cloud of each pixel (P,), with the new name M + 1 + k where it is a part of box k; and the
+            names of the pieces of each box, that of its part first.
         """
-        old = self._age >= self._apart_steps
         cloud = marked.group
-        base = int(cloud.max()) + 1
-        both = np.concatenate([expected, _grown(expected, self._link_px)])
-        share, near = np.split(_shares(marked, both, base), 2, axis=1)
-        touch = old & (share >= _TOUCHED)
-        pieces: dict[int, list[int]] = {}
-        new = cloud.copy()
+        base = len(share)
+        new = cloud
+        touch = share >= _TOUCHED
         divided = np.zeros(base, dtype=bool)
+        pieces: list[list[int]] = [[] for _ in old]
         for m in np.flatnonzero(touch.sum(axis=1) > 1).tolist():
-            touched = self._apart(np.flatnonzero(touch[m]))
+            which = np.flatnonzero(touch[m])
+            touched = which[self._apart(old[which])]
             if len(touched) > 1:
+                new = cloud.copy() if new is cloud else new
                 rows = np.flatnonzero(cloud == m)
                 places = np.column_stack([marked.x[rows], marked.y[rows]]).astype(np.float64) + 0.5
                 new[rows] = base + touched[_nearest(places, expected[touched])]
                 divided[m] = True
                 for k in touched.tolist():
-                    pieces.setdefault(k, []).insert(0, base + k)
-        fit = np.where(old & (near >= _INSIDE), share + near, -1.0)
-        for m in np.flatnonzero(~divided & (fit.max(axis=1) > 0.0)).tolist():
-            pieces.setdefault(int(fit[m].argmax()), []).append(m)
-        extents, sizes = _extents(marked._replace(group=new), base + len(expected))
-        table = np.arange(base + len(expected))
-        for k, names in pieces.items():
-            # A dark body fires at its ends only: pieces may be far apart, but within what it was.
-            most_px = expected[k, 2:] + 2.0 * self._link_px
-            _join(table, list(dict.fromkeys(names)), extents, sizes, most_px)
-        return np.asarray(table[new], dtype=np.int32)
+                    pieces[k].insert(0, base + k)
+        fit = np.where(near >= _INSIDE, share + near, -1.0)
+        fit[divided] = -1.0
+        best = fit.argmax(axis=1)
+        for m in np.flatnonzero(fit.max(axis=1) > 0.0).tolist():
+            pieces[best[m]].append(m)
+        return new, pieces
 
     def remember(self, boxes: FloatArray) -> None:
         """Keep the boxes (M, 4) of this step for the next."""
@@ -121,14 +139,12 @@ class CloudMemory:
             age[again] = self._age[before] + 1
         self.boxes, self.velocity, self._age = boxes.copy(), velocity, age
 
-    def _apart(self, which: IntArray) -> IntArray:
-        """Keep those of some remembered boxes that move differently from the first of them, and it."""
-        if len(which) < 2:
-            return which
+    def _apart(self, which: IntArray) -> BoolArray:
+        """Return which of some remembered boxes move differently from the first of them, and it."""
         velocity = self.velocity[which]
         apart = np.abs(velocity[:, None] - velocity[None]).max(axis=2) * self._apart_steps > self._link_px
         first = int(apart.sum(axis=1).argmax())
-        return np.asarray(which[apart[first] | (np.arange(len(which)) == first)])
+        return np.asarray(apart[first] | (np.arange(len(which)) == first))
 
 
 def _centres(boxes: FloatArray) -> FloatArray:
@@ -191,38 +207,53 @@ def _extents(marked: Marked, names: int) -> tuple[Any, Any]:
     return extents, sizes
 
 
-def _shares(marked: Marked, boxes: FloatArray, names: int) -> FloatArray:
-    """Share of each cloud's pixels whose middles lie in each box (K, 4): rows by the name of the cloud."""
-    inside, count = _count_inside(marked, boxes, names)
-    return np.asarray(inside / np.maximum(count, 1)[:, None])
+def _shares(marked: Marked, boxes: FloatArray, by: float, names: int) -> tuple[FloatArray, FloatArray]:
+    """Share of each cloud's pixels with middles in each box (names, K), and in it grown `by` to all sides."""
+    inside, near, count = _count_inside(marked, boxes, _grown(boxes, by), names)
+    most = np.maximum(count, 1)[:, None]
+    return inside / most, near / most
 
 
 @numba.njit(cache=True, nogil=True)
-def _count_inside(marked: Marked, boxes: FloatArray, names: int) -> tuple[Any, Any]:
-    """Pixels of each cloud in each box (names, K), and of each cloud (names,); pixels come row by row."""
+def _count_inside(marked: Marked, boxes: FloatArray, grown: FloatArray, names: int) -> tuple[Any, Any, Any]:
+    """Pixels of each cloud in each box and in the one around it (names, K), and of each cloud (names,)."""
     x, y, cloud = marked.x, marked.y, marked.group
     inside = np.zeros((names, len(boxes)), dtype=np.int64)
+    near = np.zeros((names, len(boxes)), dtype=np.int64)
     count = np.zeros(names, dtype=np.int64)
     # Where each row begins: a box asks but few pixels of its own rows.
     start = np.zeros(y[len(y) - 1] + 2, dtype=np.int64)
-    for p in range(len(cloud)):
-        count[cloud[p]] += 1
-        start[y[p] + 1] = p + 1
+    p = 0
+    while p < len(cloud):
+        name, row, first = cloud[p], y[p], p
+        while p < len(cloud) and cloud[p] == name and y[p] == row:
+            p += 1
+        count[name] += p - first
+        start[row + 1] = p
     for row in range(1, len(start)):
         start[row] = max(start[row], start[row - 1])
     for j in range(len(boxes)):
         left, top, width, height = boxes[j]
-        row = max(int(np.floor(top - 0.5)), 0)
-        while row < len(start) - 1 and row + 0.5 - top <= height:
-            if row + 0.5 >= top:
+        out_left, out_top, out_width, out_height = grown[j]
+        row = max(int(np.floor(out_top - 0.5)), 0)
+        while row < len(start) - 1 and row + 0.5 - out_top <= out_height:
+            if row + 0.5 >= out_top:
+                in_rows = row + 0.5 >= top and row + 0.5 - top <= height
                 k, end = start[row], start[row + 1]
-                k += np.searchsorted(x[k:end], left - 1.0)
-                while k < end and x[k] + 0.5 - left <= width:
-                    if x[k] + 0.5 - left >= 0.0:
-                        inside[cloud[k], j] += 1
-                    k += 1
+                k += np.searchsorted(x[k:end], out_left - 1.0)
+                while k < end and x[k] + 0.5 - out_left <= out_width:
+                    name = cloud[k]
+                    one, other = 0, 0
+                    while k < end and cloud[k] == name and x[k] + 0.5 - out_left <= out_width:
+                        from_left = x[k] + 0.5 - left
+                        one += (from_left >= 0.0) & (from_left <= width)
+                        other += x[k] + 0.5 - out_left >= 0.0
+                        k += 1
+                    near[name, j] += other
+                    if in_rows:
+                        inside[name, j] += one
             row += 1
-    return inside, count
+    return inside, near, count
 
 
 @numba.njit(cache=True, nogil=True)

@@ -19,10 +19,11 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError
-from jeat_graph.detection.components import Components, linked, measured, without_inner
+from jeat_graph.detection.components import Components, measured, without_inner
+from jeat_graph.detection.linking import linked, marked_pixels
 from jeat_graph.detection.memory import CloudMemory
 from jeat_graph.detection.settings import PictureSettings
 from jeat_graph.io.decoders import RgbImage
@@ -32,6 +33,9 @@ _SIGMA_PER_MAD = 1.4826
 # The brightness of a picture is judged by every so manieth pixel along rows and columns.
 _STRIDE = 4
 _BLUR_PX = 3
+_GREY = 255
+# Two pictures differ by less, a change of brightness included.
+_BEYOND = 3 * _GREY
 # A picture may be so many times as noisy as those that the background was made of (and one grey level).
 _MOST_NOISE = 3.0
 
@@ -49,7 +53,7 @@ class PictureDetector:
         self.settings = settings or PictureSettings()
         self._waiting: list[tuple[float, npt.NDArray[np.uint8]]] = []
         self._background: npt.NDArray[np.uint8] | None = None
-        self._noise: FloatArray = np.zeros((0, 0))
+        self._limit: npt.NDArray[np.int16] = np.zeros((0, 0), dtype=np.int16)
         self._most_noise = math.inf
         self._adapted_s = -math.inf
         self._last_s = -math.inf
@@ -76,8 +80,10 @@ class PictureDetector:
         stack = np.stack(greys)
         middle, mad = _middle_and_spread(stack)
         self._background = np.rint(middle).astype(np.uint8)
-        self._noise = _SIGMA_PER_MAD * mad
-        self._most_noise = _MOST_NOISE * float(np.median(self._noise)) + 1.0
+        noise = _SIGMA_PER_MAD * mad
+        # Differences are whole numbers: larger than a limit is larger than the whole number below it.
+        self._limit = np.minimum(self.settings.sigmas * noise, _BEYOND).astype(np.int16)
+        self._most_noise = _MOST_NOISE * float(np.median(noise)) + 1.0
         height, width = self._background.shape
         diagonal = math.hypot(width, height)
         self._link_px = max(2, round(self.settings.link_share * diagonal))
@@ -130,31 +136,27 @@ class PictureDetector:
 
     def _foreground(self, grey: npt.NDArray[np.uint8], t: float) -> npt.NDArray[np.uint8] | None:
         """Mark the pixels (H, W) that are foreground; None where the whole picture has changed."""
-        import cv2
-
         assert self._background is not None
         settings = self.settings
-        difference = cv2.subtract(grey, self._background, dtype=cv2.CV_16S)
-        brighter = int(np.median(difference[::_STRIDE, ::_STRIDE]))
-        difference = np.abs(difference - np.int16(brighter))
-        common = _SIGMA_PER_MAD * float(np.median(difference[::_STRIDE, ::_STRIDE]))
-        common = min(common, self._most_noise)  # another scene is no noise
-        level = max(settings.least_contrast, settings.sigmas * common)
-        marks: Any = (difference > np.maximum(level, settings.sigmas * self._noise)).astype(np.uint8)
+        brighter, deviation = _usual(grey, self._background)
+        common = min(_SIGMA_PER_MAD * deviation, self._most_noise)  # another scene is no noise
+        level = np.float32(max(settings.least_contrast, settings.sigmas * common))
+        limit = int(min(level, _BEYOND))
+        marks, number = _different(grey, self._background, brighter, limit, self._limit)
         if t - self._adapted_s >= settings.adapt_s:
             self._adapted_s = t
             self._background += (grey > self._background).astype(np.uint8)
             self._background -= (grey < self._background).astype(np.uint8)
-        if marks.mean() > settings.most_share:
+        if number / marks.size > settings.most_share:
             self._background, self._memory = None, None
             return None
         return np.asarray(marks, dtype=np.uint8)
 
     def _groups(self, marks: npt.NDArray[np.uint8]) -> Components:
         settings = self.settings
-        count, marked = linked(marks, self._link_px)
+        count, marked = linked(marked_pixels(marks), self._link_px)
         if self._memory is not None:
-            count, marked = self._memory.relabel(marked)
+            count, marked = self._memory.relabel(count, marked)
         found = measured(count, marked, settings.trim_share)
         large = (found.boxes[:, 2:] >= settings.least_side_px).all(axis=1)
         found = found.take(large & (found.pixels >= settings.least_pixels))
@@ -195,6 +197,57 @@ def _middle_and_spread(stack: npt.NDArray[np.uint8]) -> tuple[Any, Any]:
             middle[row, column] = twice / 2.0
             spread[row, column] = (one + other) / 4.0 if count % 2 == 0 else other / 2.0
     return middle, spread
+
+
+@numba.njit(cache=True, nogil=True)
+def _usual(grey: npt.NDArray[np.uint8], background: npt.NDArray[np.uint8]) -> tuple[int, float]:
+    """Median difference of a picture (H, W) from the background, without its fraction, and that from it."""
+    height, width = grey.shape
+    number = np.zeros(2 * _GREY + 1, dtype=np.int64)
+    for row in range(0, height, _STRIDE):
+        for column in range(0, width, _STRIDE):
+            number[_GREY + np.int64(grey[row, column]) - np.int64(background[row, column])] += 1
+    brighter = int(_median(number) - _GREY)
+    apart = np.zeros(2 * _GREY + 1, dtype=np.int64)
+    for k in range(len(number)):
+        apart[abs(k - _GREY - brighter)] += number[k]
+    return brighter, _median(apart)
+
+
+@numba.njit(cache=True, nogil=True)
+def _median(number: IntArray) -> float:
+    """Median of whole numbers from 0, of which there are so many each."""
+    count = number.sum()
+    k, low, passed = 0, -1, number[0]
+    while True:
+        if low < 0 and passed > (count - 1) // 2:
+            low = k
+        if passed > count // 2:
+            return (low + k) / 2.0
+        k += 1
+        passed += number[k]
+
+
+@numba.njit(cache=True, nogil=True)
+def _different(
+    grey: npt.NDArray[np.uint8],
+    background: npt.NDArray[np.uint8],
+    brighter: int,
+    limit: int,
+    limits: npt.NDArray[np.int16],
+) -> tuple[Any, int]:
+    """Mark the pixels (H, W) that differ by more than both limits; also return how many do."""
+    height, width = grey.shape
+    marks = np.empty((height, width), dtype=np.uint8)
+    number = 0
+    for row in range(height):
+        for column in range(width):
+            difference = abs(
+                np.int32(grey[row, column]) - np.int32(background[row, column]) - np.int32(brighter)
+            )
+            marks[row, column] = difference > max(np.int32(limits[row, column]), np.int32(limit))
+            number += marks[row, column]
+    return marks, number
 
 
 def _grey(frame: RgbImage) -> npt.NDArray[np.uint8]:

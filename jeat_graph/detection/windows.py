@@ -24,6 +24,8 @@ _US_PER_S = 1e6
 _MOST = 255
 #: A bin with fewer events than this share of its cells is emptied event by event, a fuller one as a whole.
 _SPARSE_SHARE = 0.01
+#: Where more than this share of the pixels is asked for, all are summed: neighbours in memory at once.
+_DENSE_SHARE = 0.02
 # Of a bin: how many events, and where.
 _NOTHING = (0, EventArray.empty().x, EventArray.empty().y)
 
@@ -107,6 +109,8 @@ class EventBins:
             x: (P,) columns (px).
         """
         slots = (self._newest - np.arange(bins)) % len(self._ring)
+        if len(x) > _DENSE_SHARE * self._total.size:
+            return np.asarray(_picked(_planes(self._ring, slots), y, x))
         return np.asarray(_summed(self._ring, slots, y, x))
 
 
@@ -163,4 +167,26 @@ def _summed(ring: npt.NDArray[np.uint8], slots: IntArray, y: Whole, x: Whole) ->
         for slot in slots:
             total += np.int32(ring[slot, 0, y[p], x[p]]) + np.int32(ring[slot, 1, y[p], x[p]])
         out[p] = total
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _planes(ring: npt.NDArray[np.uint8], slots: IntArray) -> Any:
+    """Events (H, W) of all pixels in some bins."""
+    _, _, height, width = ring.shape
+    out = np.zeros((height, width), dtype=np.uint16)
+    for row in range(height):
+        for slot in slots:
+            for column in range(width):
+                out[row, column] += np.uint16(ring[slot, 0, row, column]) + np.uint16(
+                    ring[slot, 1, row, column]
+                )
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _picked(plane: npt.NDArray[np.uint16], y: Whole, x: Whole) -> Any:
+    out = np.empty(len(x), dtype=np.int32)
+    for p in range(len(x)):
+        out[p] = plane[y[p], x[p]]
     return out

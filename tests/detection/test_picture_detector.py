@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.detection.picture_detector import PictureDetector, _middle_and_spread
+from jeat_graph.detection.picture_detector import PictureDetector, _different, _middle_and_spread, _usual
 from jeat_graph.detection.settings import PictureSettings
 
 from .moving import SIZE, box_at, iou, picture_of
@@ -102,3 +102,19 @@ def test_middle_and_spread_are_the_medians(count):
     middle, spread = _middle_and_spread(stack)
     np.testing.assert_array_equal(middle, np.median(stack, axis=0))
     np.testing.assert_array_equal(spread, np.median(np.abs(stack - np.median(stack, axis=0)), axis=0))
+
+
+def test_what_is_usual_and_what_differs_are_those_of_the_definition():
+    rng = np.random.default_rng(6)
+    for spread in (0, 3, 300):
+        background = rng.integers(0, 256, (37, 50)).astype(np.uint8)
+        grey = np.clip(background + rng.integers(-spread, spread + 1, (37, 50)) + 7, 0, 255).astype(np.uint8)
+        difference = grey.astype(np.int64) - background
+        brighter, deviation = _usual(grey, background)
+        assert brighter == int(np.median(difference[::4, ::4]))
+        apart = abs(difference - brighter)
+        assert deviation == np.median(apart[::4, ::4])
+        limits = rng.integers(0, 60, (37, 50)).astype(np.int16)
+        marks, number = _different(grey, background, brighter, 12, limits)
+        np.testing.assert_array_equal(marks, apart > np.maximum(limits, 12))
+        assert number == marks.sum()
