@@ -9,6 +9,7 @@ Source of the first: Delbruck, "Frame-free dynamic digital vision" (2008).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numba
 import numpy as np
@@ -81,10 +82,10 @@ class NoiseFilter:
 
     def keep(self, events: EventArray) -> EventArray:
         """Return the events that are not noise."""
-        rows = np.flatnonzero(self.signal(events))
+        good = self.signal(events)
         if events.by_motion is not None:
-            return events.take(rows)
-        return EventArray.trusted(events.t_us[rows], events.x[rows], events.y[rows], events.polarity[rows])
+            return events.take(np.flatnonzero(good))
+        return EventArray.trusted(*_taken(events.t_us, events.x, events.y, events.polarity, good))
 
     def signal(self, events: EventArray) -> BoolArray:
         """Return which events (N,) are not noise."""
@@ -100,12 +101,13 @@ class NoiseFilter:
             last_us = min(self._period_end, self._begin_us + 2 * _MOST_LATER_US)
             end = int(np.searchsorted(events.t_us, last_us))
             rows = slice(start, max(end, start + 1))
+            if settings.hot_pixels:
+                _add(events.x[rows], events.y[rows], self._counts)
             alone = _judge(
                 events.t_us[rows],
                 events.x[rows],
                 events.y[rows],
                 self._last,
-                self._counts,
                 self.hot,
                 (self._begin_us, round(settings.support_s * _US_PER_S), settings.background),
                 good[rows],
@@ -137,42 +139,71 @@ class NoiseFilter:
 
 
 @numba.njit(cache=True, nogil=True)
+def _add(x: npt.NDArray[np.uint16], y: npt.NDArray[np.uint16], counts: npt.NDArray[np.int32]) -> None:
+    """Count the events of each pixel (H, W)."""
+    height, width = counts.shape
+    for k in range(len(x)):
+        column, row = np.int64(x[k]), np.int64(y[k])
+        if column < width and row < height:
+            counts[row, column] += np.int32(1)
+
+
+@numba.njit(cache=True, nogil=True)
 def _judge(
     t: IntArray,
     x: npt.NDArray[np.uint16],
     y: npt.NDArray[np.uint16],
     last: npt.NDArray[np.int32],
-    counts: npt.NDArray[np.int32],
     hot: BoolArray,
     settings: tuple[int, int, bool],
     good: BoolArray,
 ) -> int:
     """Mark the events that are no noise in `good`, keep the last times; return how many stood alone."""
     begin_us, support_us, background = settings
-    height, width = counts.shape
+    height, width = np.uint64(hot.shape[0]), np.uint64(hot.shape[1])
+    one, two = np.uint64(1), np.uint64(2)
+    flat, line = last.reshape(-1), np.uint64(last.shape[1])
+    any_hot, all_good = hot.any(), not background
     alone = 0
     for k in range(len(t)):
-        column, row = np.int64(x[k]), np.int64(y[k])
-        if column >= width or row >= height:
-            continue
-        counts[row, column] += np.int32(1)
-        if hot[row, column]:
+        column, row = np.uint64(x[k]), np.uint64(y[k])
+        if column >= width or row >= height or (any_hot and hot[row, column]):
             continue
         now = t[k] - begin_us
         since = np.int32(max(now - support_us, _NEVER + 1))
-        # Most events have company; the first that is found will do.
-        near = (
-            last[row + 1, column] >= since
-            or last[row + 1, column + 2] >= since
-            or last[row, column + 1] >= since
-            or last[row + 2, column + 1] >= since
-            or last[row, column] >= since
-            or last[row, column + 2] >= since
-            or last[row + 2, column] >= since
-            or last[row + 2, column + 2] >= since
+        # All eight around are asked, though the first that fired will do: which one that is cannot be
+        # guessed, and a wrong guess takes the processor longer.
+        above = row * line + column
+        here = above + line
+        below = here + line
+        newest = max(
+            max(max(flat[above], flat[above + one]), max(flat[above + two], flat[here])),
+            max(max(flat[here + two], flat[below]), max(flat[below + one], flat[below + two])),
         )
-        last[row + 1, column + 1] = now
-        if not near:
-            alone += 1
-        good[k] = near or not background
+        near = newest >= since
+        flat[here + one] = now
+        alone += not near
+        good[k] = near | all_good
     return alone
+
+
+@numba.njit(cache=True, nogil=True)
+def _taken(
+    t: IntArray,
+    x: npt.NDArray[np.uint16],
+    y: npt.NDArray[np.uint16],
+    polarity: npt.NDArray[np.uint8],
+    good: BoolArray,
+) -> tuple[Any, Any, Any, Any]:
+    """Times, columns, rows and polarities of the events that are marked in `good` (N,)."""
+    number = 0
+    for k in range(len(good)):
+        number += good[k]
+    # One more, for an event is written before it is known whether it stays.
+    out_t, out_x = np.empty(number + 1, t.dtype), np.empty(number + 1, x.dtype)
+    out_y, out_p = np.empty(number + 1, y.dtype), np.empty(number + 1, polarity.dtype)
+    n = 0
+    for k in range(len(good)):
+        out_t[n], out_x[n], out_y[n], out_p[n] = t[k], x[k], y[k], polarity[k]
+        n += good[k]
+    return out_t[:n], out_x[:n], out_y[:n], out_p[:n]
