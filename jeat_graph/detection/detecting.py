@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Generator, Iterator
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -152,10 +152,28 @@ def _picture_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str]
         model = ModelPictureDetector(network, FRAMES_SENSOR, request.settings.model_frames)
         say(model.description)
         return (model(frame, t) for t, frame in with_progress(source, len(source)))
+    stack.enter_context(_one_thread())
     detector = PictureDetector(FRAMES_SENSOR, request.settings.frames)
     _prime(detector, source, request)
     found = (detector(frame, t) for t, frame in with_progress(source, len(source)))
     return (scan for scan in found if scan is not None)
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Let OpenCV work in the thread that calls it.
+
+    Its work on a picture is short, and threads of its own wait busily for the next: twice the processor's
+    time, of which the other camera has a use.
+    """
+    import cv2
+
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(before)
 
 
 def _prime(detector: PictureDetector, source: Any, request: DetectRequest) -> None:
@@ -203,6 +221,7 @@ def _events(
 
     assert request.events is not None
     reader = stack.enter_context(open_events(request.events, request.event_size_px))
+    reader.labels = False
     if reader.size_px is None:
         raise DataError("does not say the size of its picture; give it with --event-size WxH", request.events)
     width, height = reader.size_px

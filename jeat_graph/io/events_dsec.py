@@ -110,33 +110,43 @@ class EventFile:
             raise DataError(f"ms_to_idx is wrong at {ms} ms: that event is earlier", self.path)
         return part.between(start_us, end_us)
 
-    def rows(self, first: int, end: int) -> EventArray:
+    def rows(self, first: int, end: int, labels: bool = True) -> EventArray:
         """Read events by number, from `first` to before `end`.
+
+        Args:
+            first: number of the first.
+            end: number behind the last.
+            labels: whether to read what caused them, too, where it is known.
 
         Raises:
             DataError: times run backwards, or the data are damaged.
         """
-        read = {name: self._read(data, slice(first, end)) for name, data in self._events.items()}
+        labels = labels and self.labelled
+        names = [name for name in self._events if labels or name != LABEL]
+        read = {name: self._read(self._events[name], slice(first, end)) for name in names}
         for name in ("x", "y"):
-            if len(read[name]) and not 0 <= int(read[name].min()) <= int(read[name].max()) < 2**16:
+            if (
+                read[name].dtype != np.uint16
+                and len(read[name])
+                and not 0 <= int(read[name].min()) <= int(read[name].max()) < 2**16
+            ):
                 raise DataError(f"events/{name}: negative or too large for 16 bits", self.path)
-        labels = read[LABEL] != 0 if self.labelled else None
         try:
             return EventArray(
                 read["t"].astype(np.int64),
-                read["x"].astype(np.uint16),
-                read["y"].astype(np.uint16),
-                (read["p"] > 0).astype(np.uint8),
-                labels,
+                read["x"].astype(np.uint16, copy=False),
+                read["y"].astype(np.uint16, copy=False),
+                (read["p"] > 0).view(np.uint8),
+                read[LABEL] != 0 if labels else None,
             )
         except DataError:
             row = first + 1 + int(np.argmax(np.diff(read["t"].astype(np.int64)) < 0))
             raise DataError(f"times run backwards at event {row}", self.path) from None
 
-    def pieces(self, rows: int = _PIECE_ROWS) -> Iterator[EventArray]:
-        """Yield all events, at most `rows` at a time."""
+    def pieces(self, rows: int = _PIECE_ROWS, labels: bool = True) -> Iterator[EventArray]:
+        """Yield all events, at most `rows` at a time, with what caused them or without."""
         for first in range(0, len(self), rows):
-            yield self.rows(first, min(first + rows, len(self)))
+            yield self.rows(first, min(first + rows, len(self)), labels)
 
     def ms_to_idx(self) -> IntArray:
         """Return the index by millisecond as it is in the file (M,)."""

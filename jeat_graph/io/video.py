@@ -64,7 +64,10 @@ class FrameSource:
 
     def __iter__(self) -> Iterator[tuple[float, RgbImage]]:
         for i in range(len(self)):
-            yield float(self.times_s[i]), self.frame(i)
+            frame = self.frame(i)
+            # Passed: the kept ones are those that were asked for before, and still come.
+            self._kept.pop(i)
+            yield float(self.times_s[i]), frame
 
     def close(self) -> None:
         """Close the file."""

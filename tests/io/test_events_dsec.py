@@ -111,6 +111,9 @@ def test_the_bytes_do_not_depend_on_how_the_events_are_cut(tmp_path: Path, monke
     assert write(tmp_path / "b.h5", *pieces).read_bytes() == whole
     with EventFile(tmp_path / "b.h5") as file:
         assert_same(EventArray.concatenate(list(file.pieces(500))), events)
+        bare = EventArray.concatenate(list(file.pieces(500, labels=False)))
+        assert bare.by_motion is None
+        np.testing.assert_array_equal(bare.t_us, events.t_us)
 
 
 def test_a_file_without_events_says_how_long_it_is(tmp_path: Path) -> None:

@@ -61,6 +61,20 @@ def test_frames_can_be_asked_for_in_any_order(tmp_path: Path) -> None:
             source.frame(40)
 
 
+def test_frames_that_were_asked_for_are_decoded_once_and_let_go_when_they_are_passed(tmp_path: Path) -> None:
+    frames = pictures(40)
+    with open_frames(write(tmp_path, "png", frames)) as source:
+        decoded: list[int] = []
+        decode = source._decode.bgr
+        source._decode.bgr = lambda index: decoded.append(index) or decode(index)  # type: ignore[method-assign]
+        for k in range(0, 40, 4):
+            source.frame(k)
+        for k, (_, frame) in enumerate(source):
+            assert np.array_equal(frame, frames[k])
+        assert sorted(decoded) == list(range(40))
+        assert not source._kept
+
+
 def test_times_come_from_the_table_beside_the_video(tmp_path: Path) -> None:
     write(tmp_path, "lossless", pictures(3), [25_000, 76_000, 124_000])
     with open_frames(tmp_path / "frames.avi") as source:

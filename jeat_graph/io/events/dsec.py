@@ -44,7 +44,7 @@ class DsecReader(EventReader):
         """
         assert self.size_px is not None
         width, height = self.size_px
-        for piece in self._events.pieces(PIECE_ROWS):
+        for piece in self._events.pieces(PIECE_ROWS, self.labels):
             inside = (piece.x < width) & (piece.y < height)
             self.damage.outside += int((~inside).sum())
             yield piece if inside.all() else piece.take(inside)

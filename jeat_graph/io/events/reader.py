@@ -81,6 +81,7 @@ class EventReader:
         size_px: width and height of the picture; None if neither the file nor the caller says.
         t_offset_us: what to add to the events' times for the clock of frames that belong to them (µs).
         origin_us: time 0 on the clock that the file gives times by (µs).
+        labels: whether pieces say what caused the events, where the file does.
         triggers: edges of external signals that came with the last piece.
         damage: what was passed over so far.
     """
@@ -92,6 +93,7 @@ class EventReader:
         self.size_px = size_px
         self.t_offset_us = 0
         self.origin_us = 0
+        self.labels = True
         self.triggers = Triggers.none()
         self.damage = Damage()
 
