@@ -125,20 +125,20 @@ def _measure(count: int, marked: Marked, share: float) -> tuple[Any, Any, Any]:
     p, end = 0, len(marked.x)
     while p < end:
         group, row = marked.group[p], marked.y[p]
-        k = np.int64(group) - 1
-        left = start[k, 0] - extents[k, 0] if k >= 0 else 0
+        own = np.int64(group) - 1
+        left = start[own, 0] - extents[own, 0] if own >= 0 else 0
         total, number = np.int64(0), np.int64(0)
         while p < end and marked.group[p] == group and marked.y[p] == row:
-            if k >= 0:
+            if own >= 0:
                 on = np.int32(marked.weight[p] > 0)
                 columns[left + marked.x[p]] += on
                 number += on
                 total += marked.weight[p]
             p += 1
-        if k >= 0:
-            rows[start[k, 1] + row - extents[k, 1]] += number
-            weight[k] += total
-            pixels[k] += number
+        if own >= 0:
+            rows[start[own, 1] + row - extents[own, 1]] += number
+            weight[own] += total
+            pixels[own] += number
     corners = np.zeros((count, 4), dtype=np.int64)
     for k in range(count):
         if pixels[k]:

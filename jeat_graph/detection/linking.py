@@ -73,18 +73,19 @@ def linked(pixels: MarkedPixels, link_px: int, least_weight: float = 0.0) -> tup
     return count, Marked(*columns)
 
 
-@intrinsic
-def _lowest_bit(context: Any, word: Any) -> Any:
-    """Return the number of the lowest bit of a word that is set; 64 where none is."""
-
+def _count_trailing_zeros(context: Any, word: Any) -> Any:
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.cttz(arguments[0], ir.Constant(ir.IntType(1), 0))
 
     return types.int64(types.uint64), code
 
 
+#: Number of the lowest bit of a word that is set; 64 where none is.
+_lowest_bit: Any = intrinsic(_count_trailing_zeros)
+
+
 @numba.njit(cache=True, nogil=True)
-def _collected(bits: _Bits, marks: Any) -> tuple[Any, Any, Any, int]:
+def _collected(bits: _Bits, marks: Any) -> Any:
     """Columns and marks (P,) of the marked pixels, where rows begin (H + 1,), and the sum of the marks."""
     height, words = bits.shape
     start = np.empty(height + 1, dtype=np.int64)
