@@ -26,6 +26,7 @@ import numpy.typing as npt
 from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
+from jeat_graph.io.hdf5_chunks import read_chunks
 from jeat_graph.io.hdf5_items import check_storage, find_item, single_item
 
 US_PER_MS = 1000
@@ -198,6 +199,10 @@ class EventFile:
 
     def _read(self, data: Any, rows: slice) -> npt.NDArray[Any]:
         try:
+            if rows.start is not None and rows.stop is not None:
+                read = read_chunks(data, rows.start, rows.stop)
+                if read is not None:
+                    return read
             return np.asarray(data[rows])
         except (OSError, RuntimeError, ValueError, MemoryError) as error:
             reason = " ".join(str(error).split())[:200]
