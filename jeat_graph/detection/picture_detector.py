@@ -140,8 +140,9 @@ class PictureDetector:
         settings = self.settings
         brighter, deviation = _usual(grey, self._background)
         common = min(_SIGMA_PER_MAD * deviation, self._most_noise)  # another scene is no noise
-        level = np.float32(max(settings.least_contrast, settings.sigmas * common))
-        limit = int(min(level, _BEYOND))
+        # As precise as the limits, which are rounded down, too.
+        level = float(np.float32(max(settings.least_contrast, settings.sigmas * common)))
+        limit = int(min(level, float(_BEYOND)))
         marks, number = _different(grey, self._background, brighter, limit, self._limit)
         if t - self._adapted_s >= settings.adapt_s:
             self._adapted_s = t
