@@ -20,14 +20,17 @@ from jeat_graph.data.trajectories import GroundTruth
 
 #: What simulated segments say of each vehicle beside their truth, and the columns that are used of it.
 VEHICLES = "vehicles.csv"
-_COLUMNS = ("t", "object_id", "visible")
-#: So much of a vehicle must be uncovered.
-_LEAST_VISIBLE = 0.3
+_COLUMNS = ("t", "object_id", "visible", "contrast")
+#: So much of a vehicle must be uncovered, and its contrast to what is around it so many times the noise (Rose,
+#: "Vision: Human and Electronic", 1973): who is asked for a vehicle that fog hides learns to see fog as vehicles.
+_LEAST_VISIBLE, _LEAST_CONTRAST = 0.3, 5.0
 _US_PER_S = 1e6
 
 
 def asking_for_far(truth: GroundTruth, folder: Path, least_px: float) -> GroundTruth:
     """Return truth that asks for ignored vehicles too, if they can be seen and are large enough.
+
+    They can where a third of them is uncovered and stands out from what is around it.
 
     Args:
         truth: of a simulated segment.
@@ -40,7 +43,9 @@ def asking_for_far(truth: GroundTruth, folder: Path, least_px: float) -> GroundT
     path = folder / VEHICLES
     try:
         table = pd.read_csv(path, usecols=list(_COLUMNS))
-        visible = table["visible"].to_numpy(float)
+        visible = table["visible"].to_numpy(float) >= _LEAST_VISIBLE
+        # Where no picture was drawn nobody knows the contrast.
+        clear = ~(table["contrast"].to_numpy(float) < _LEAST_CONTRAST)
         keys = _keys(table["t"].to_numpy(float), table["object_id"].to_numpy(np.int64))
     except FileNotFoundError:
         raise DataError("is missing: without it nobody knows which far vehicles can be seen", path) from None
@@ -51,7 +56,7 @@ def asking_for_far(truth: GroundTruth, folder: Path, least_px: float) -> GroundT
     place = np.minimum(np.searchsorted(keys[order], wanted), max(len(keys) - 1, 0))
     if len(wanted) and not (len(keys) and np.array_equal(keys[order][place], wanted)):
         raise DataError("does not tell of the same vehicles as the truth beside it", path)
-    seen = visible[order][place] >= _LEAST_VISIBLE if len(wanted) else np.zeros(0, dtype=bool)
+    seen = (visible & clear)[order][place] if len(wanted) else np.zeros(0, dtype=bool)
     large = (truth.boxes[:, 2:] >= least_px).all(axis=1)
     return replace(truth, ignore=truth.ignore & ~(seen & large))
 

@@ -16,16 +16,19 @@ from jeat_graph.training.settings import NetSettings, TrainSettings  # noqa: E40
 
 from .small_sets import FRAMES, write_segment  # noqa: E402
 
-SIZES = {1: (8.0, 8.0), 2: (8.0, 3.0), 3: (8.0, 8.0), 4: (8.0, 8.0)}
-SEEN = {1: 1.0, 2: 1.0, 3: 0.1, 4: 1.0}
-IGNORED = {1: True, 2: True, 3: True, 4: False}
+SIZES = {1: (8.0, 8.0), 2: (8.0, 3.0), 3: (8.0, 8.0), 4: (8.0, 8.0), 5: (8.0, 8.0), 6: (8.0, 8.0)}
+SEEN = {1: 1.0, 2: 1.0, 3: 0.1, 4: 1.0, 5: 1.0, 6: 1.0}
+CONTRAST = {1: 20.0, 2: 20.0, 3: 20.0, 4: 20.0, 5: 4.0, 6: ""}
+IGNORED = {1: True, 2: True, 3: True, 4: False, 5: True, 6: True}
+COUNT = len(SIZES)
+HEAD = "t,object_id,visible,contrast\n"
 
 
 def truth():
-    """Two times of a far, a far and low, a hidden, and a near vehicle."""
-    ids = np.array([1, 2, 3, 4] * 2)
+    """Two times of a far, a far and low, a hidden, a near, a far one in fog, and one of unknown contrast."""
+    ids = np.array(list(SIZES) * 2)
     return GroundTruth(
-        t=np.repeat([0.1, 0.15], 4),
+        t=np.repeat([0.1, 0.15], COUNT),
         object_id=ids,
         boxes=np.array([[10.0 * k, 5.0, *SIZES[k]] for k in ids.tolist()]),
         motion=None,
@@ -34,17 +37,19 @@ def truth():
 
 
 def write_vehicles(folder, rows):
-    lines = "".join(f"{t:.6f},{k},{SEEN[k]}\n" for t, k in rows)
-    (folder / VEHICLES).write_text("t,object_id,visible\n" + lines, encoding="utf-8")
+    lines = "".join(f"{t:.6f},{k},{SEEN[k]},{CONTRAST[k]}\n" for t, k in rows)
+    (folder / VEHICLES).write_text(HEAD + lines, encoding="utf-8")
 
 
 def test_what_is_large_and_seen_is_asked_for(tmp_path):
     """Whatever the order of the rows."""
-    write_vehicles(tmp_path, [(t, k) for k in (3, 1, 4, 2) for t in (0.15, 0.1)])
+    write_vehicles(tmp_path, [(t, k) for k in (3, 6, 1, 5, 4, 2) for t in (0.15, 0.1)])
     found = asking_for_far(truth(), tmp_path, 5.0)
-    assert found.ignore.tolist() == [False, True, True, False] * 2
+    assert found.ignore.tolist() == [False, True, True, False, True, False] * 2
     np.testing.assert_array_equal(found.boxes, truth().boxes)
-    assert asking_for_far(truth(), tmp_path, 2.0).ignore.tolist() == [False, False, True, False] * 2
+    assert (
+        asking_for_far(truth(), tmp_path, 2.0).ignore.tolist() == [False, False, True, False, True, False] * 2
+    )
 
 
 def test_an_empty_truth_stays_empty(tmp_path):
@@ -58,9 +63,9 @@ def test_an_empty_truth_stays_empty(tmp_path):
     [
         (None, "is missing"),
         ("t,object_id\n0.1,1\n", "has no columns"),
-        ("t,object_id,visible\n0.1,1,much\n", "has no columns"),
-        ("t,object_id,visible\n0.1,1,1\n", "the same vehicles"),
-        ("t,object_id,visible\n", "the same vehicles"),
+        (HEAD + "0.1,1,much,9\n", "has no columns"),
+        (HEAD + "0.1,1,1,9\n", "the same vehicles"),
+        (HEAD, "the same vehicles"),
     ],
 )
 def test_what_does_not_fit_is_refused(tmp_path, text, words):
@@ -83,8 +88,8 @@ def test_what_is_judged_stays_as_the_truth_has_it(tmp_path):
             GroundTruth(given.t, given.object_id, given.boxes, None, far, frames=given.frame_times()),
             folder / "gt.csv",
         )
-        rows = "".join(f"{t:.6f},{k},1\n" for t, k in zip(given.t, given.object_id, strict=True))
-        (folder / VEHICLES).write_text("t,object_id,visible\n" + rows, encoding="utf-8")
+        rows = "".join(f"{t:.6f},{k},1,9\n" for t, k in zip(given.t, given.object_id, strict=True))
+        (folder / VEHICLES).write_text(HEAD + rows, encoding="utf-8")
     assert sum(one.truth.ignored.sum() for one in read_pictures(root)) == 2 * FRAMES
     assert sum(one.truth.ignored.sum() for one in read_pictures(root, 5.0)) == 0
     settings = TrainSettings(crop_px=(32, 32), batch=2, epochs=0.2, judged=2, far_px=5.0)
