@@ -118,6 +118,27 @@ def trust_on_balance(trust: float, gained: float, lost: float) -> float:
 
 
 @njit(cache=True)
+def trust_of_best(trust: float, best: float, unknown: float, gained: float, lost: float) -> float:
+    """`trust_on_balance` among several sensors: for the one that is borne out best, for others in proportion.
+
+    Of two poor sensors neither bears the other out, and both would be believed so little that nothing lives.
+    That says nothing against the vehicles: the better of them is believed as one that looks alone, but no
+    more than one of which nothing is known. Beside a good sensor a poor one gains nothing by that.
+
+    Args:
+        trust: factor on the evidence of hits by how far others bear the sensor out, in [0, 1].
+        best: the greatest such factor of the sensors that look.
+        unknown: that of a sensor of which nothing is known.
+        gained: what hits say for this sensor's vehicles, as there.
+        lost: what misses say against them.
+    """
+    # High powers of small shares may underflow.
+    if best <= 0.0:
+        return trust
+    return max(trust, min(trust_on_balance(trust, gained, lost), unknown) * trust / best)
+
+
+@njit(cache=True)
 def trust_in(borne_out: float, claims: float, prior: float, prior_weight: float, power: float) -> float:
     """Factor on the weight of a sensor's evidence: the share that is borne out, to some power; in (0, 1].
 

@@ -61,6 +61,7 @@ def variations() -> list[Variation]:
         Variation(f"events {_LATE_S * 1e3:g} ms late", change=_late),
         Variation("gantry swaying", change=_sway),
         Variation("with a third, poor detector", change=_third),
+        Variation("two poor detectors alone", change=_two_poor),
         Variation("no light", world=DARK),
         Variation("no light, half of the vehicles found", {"detect": {"p_max": 0.5}}, world=DARK),
     ]
@@ -138,9 +139,20 @@ def _sway(one: JudgedRecording) -> JudgedRecording:
 
 
 def _third(one: JudgedRecording) -> JudgedRecording:
-    """Add a detector at 10 Hz that finds half of the vehicles and takes a dozen fixed things for one."""
-    rng = np.random.default_rng(1)
-    truth = one.truth
+    """Add a poor detector."""
+    third = _poor_detector(one.truth, _POOR, 1)
+    return replace(one, detections=Detections.concatenate([one.detections, third]))
+
+
+def _two_poor(one: JudgedRecording) -> JudgedRecording:
+    """Leave nothing but two poor detectors."""
+    poor = [_poor_detector(one.truth, name, seed) for seed, name in enumerate(("first", "second"), 11)]
+    return replace(one, detections=Detections.concatenate(poor))
+
+
+def _poor_detector(truth: GroundTruth, name: str, seed: int) -> Detections:
+    """Simulate a detector at 10 Hz that finds half of the vehicles and takes a dozen fixed things for one."""
+    rng = np.random.default_rng(seed)
     frames = np.unique(truth.t)[::2]
     low, high = np.array([0.0, 100.0, 30.0, 30.0]), np.array([1200.0, 650.0, 90.0, 70.0])
     places = rng.uniform(low, high, (12, 4))
@@ -155,7 +167,6 @@ def _third(one: JudgedRecording) -> JudgedRecording:
         t.append(np.full(len(found), moment))
         boxes.append(found)
         scores.append(rng.uniform(0.4, 0.95, len(found)))
-    third = Detections.from_rows(
-        np.concatenate(t), np.full(sum(map(len, t)), _POOR), np.concatenate(boxes), np.concatenate(scores)
+    return Detections.from_rows(
+        np.concatenate(t), np.full(sum(map(len, t)), name), np.concatenate(boxes), np.concatenate(scores)
     )
-    return replace(one, detections=Detections.concatenate([one.detections, third]))

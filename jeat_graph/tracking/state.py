@@ -136,6 +136,7 @@ class SceneState(NamedTuple):
         agreed_seen: (S,) how much of them another sensor bears out, over all strips (s).
         agreed_odds: (S,) mean log odds of the scores of these.
         agreed_without: (S, S) detections of the first on tracks that a sensor besides the two has seen (s).
+        borne_out: (S,) the share of its claims that is, to the power that counts, in (0, 1].
         trust: (S,) what all that says of the sensor: factor on its evidence, in (0, 1].
         fruitless: (S,) recent mean number, a scan, of each sensor's detections on tracks that ended without
             having been confirmed, and of those that no track took where there was such a track; all on tracks
@@ -169,6 +170,7 @@ class SceneState(NamedTuple):
     agreed_seen: FloatArray
     agreed_odds: FloatArray
     agreed_without: FloatArray
+    borne_out: FloatArray
     trust: FloatArray
     fruitless: FloatArray
     looked: FloatArray
@@ -208,6 +210,7 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
         agreed_seen=np.zeros(num_sensors),
         agreed_odds=np.zeros(num_sensors),
         agreed_without=np.zeros((num_sensors, num_sensors)),
+        borne_out=sensors.prior_trust.copy(),
         trust=sensors.prior_trust.copy(),
         fruitless=np.zeros(num_sensors),
         looked=np.zeros(num_sensors),

@@ -12,6 +12,7 @@ from jeat_graph.filters.agreement import (
     share_of_kind,
     trust_alone,
     trust_in,
+    trust_of_best,
     trust_on_balance,
 )
 
@@ -90,3 +91,20 @@ def test_hits_bring_a_vehicle_twice_what_misses_take_unless_they_are_believed_in
 
 def test_before_the_first_hit_nothing_is_known_of_misses():
     assert trust_on_balance(0.3, 0.0, 0.0) == trust_on_balance(0.3, 0.0, 2.0) == 0.3
+
+
+@given(st.floats(1e-6, 1.0), st.floats(0.01, 1.0), st.floats(0.1, 100.0), st.floats(0.0, 1.0))
+def test_the_best_is_believed_as_if_alone_but_no_more_than_an_unknown_one(trust, unknown, gained, share):
+    alone = trust_on_balance(trust, gained, share * gained)
+    expected = max(trust, min(alone, unknown))
+    assert trust_of_best(trust, trust, unknown, gained, share * gained) == pytest.approx(expected)
+
+
+@given(st.floats(1e-6, 1.0), SHARE, st.floats(0.1, 100.0), st.floats(0.0, 1.0))
+def test_another_is_lifted_by_no_more_than_its_part_of_the_best(best, part, gained, share):
+    factor = trust_of_best(part * best, best, 0.3, gained, share * gained)
+    assert part * best <= factor <= max(0.3 * part, part * best) * (1.0 + 1e-12)
+
+
+def test_where_nothing_is_left_of_any_trust_there_is_none():
+    assert trust_of_best(0.0, 0.0, 0.3, 1.0, 1.0) == 0.0

@@ -71,6 +71,27 @@ def test_two_good_sensors_are_not_disturbed_by_a_third():
     assert false_rows(reported) < 0.05 * len(GHOSTS) * STEPS / 2
 
 
+def test_of_two_poor_sensors_each_is_believed_so_far_that_cars_live():
+    """Each sees things that are none, at places of its own, and misses half of the cars."""
+    rng = np.random.default_rng(7)
+    declared = [f"sensors.{name}={{rate_hz: {RATE_HZ}}}" for name in ("one", "other")]
+    tracker = Tracker(load_config("default", [*declared, "smoother.engine=none"]))
+    places = {name: rng.uniform((0, 420, 40, 30), (1150, 640, 80, 60), (6, 4)) for name in ("one", "other")}
+    cars_shown = 0
+    for k in range(2 * STEPS):
+        t = k / RATE_HZ
+        cars = np.array([[100.0 + 30.0 * (t % 30.0), y, 60.0, 40.0] for y in (60.0, 150.0, 240.0, 330.0)])
+        scans = []
+        for name, ghosts in places.items():
+            seen = np.concatenate([cars[rng.random(4) < 0.5], ghosts[rng.random(6) < 0.6]])
+            scores = rng.uniform(0.4, 0.95, len(seen))
+            scans.append((t, name, seen + rng.normal(0.0, 1.0, seen.shape), scores))
+        table = tracker.step(scans)
+        if k >= STEPS:
+            cars_shown += int((table.boxes[:, 1] < 400.0).sum())
+    assert cars_shown / STEPS > 2.5
+
+
 def alone_with_two_of_three(score_of, seconds=60.0):
     """Track three cars that one sensor sees, of which another sees but one, always the same.
 

@@ -16,6 +16,7 @@ from jeat_graph.filters.agreement import (
     share_of_kind,
     trust_alone,
     trust_in,
+    trust_of_best,
     trust_on_balance,
 )
 from jeat_graph.filters.existence import motion_visibility
@@ -59,7 +60,8 @@ def learn_trust(
     a moment when the others are blind (their P_D is low), or at what is too slow for them or outside the part
     of the picture that they look at, counts little;
     while a sensor is the only one that looks, nothing is learnt of it; where no other ever has, what came
-    of its tracks tells (`trust_alone`).
+    of its tracks tells (`trust_alone`). Where none is borne out, the best is believed so far that vehicles
+    live (`trust_of_best`).
     """
     lifecycle, sensors = model.settings.lifecycle, model.sensors
     for s in range(len(batch.present)):
@@ -81,6 +83,7 @@ def learn_trust(
             if lifecycle.judges_worth and _is_alone(s, scene):
                 trust = trust_alone(scene.vain[s], lifecycle.usual_vain, sensors.prior_trust[s])
                 _weigh_looks(tracks, n, association, p_detect, s, scene, model)
+                scene.borne_out[s] = trust
                 scene.trust[s] = trust_on_balance(trust, scene.gained[s], scene.lost[s])
             continue
         _forget(s, math.exp(-sensors.period_s[s] / lifecycle.disagreement_memory_s), scene)
@@ -106,13 +109,20 @@ def learn_trust(
             score_variety(known.score_square, known.all),
             worth_of(scene.worth_mean[s], scene.agreed_odds[s]),
         )
-        scene.trust[s] = trust_in(
+        scene.borne_out[s] = trust_in(
             known.agreed + lonely * kind * (1.0 - _others_agreement(s, scene)),
             known.all,
             lifecycle.agreement_prior,
             _PRIOR_CLAIMS,
             sensors.disagreement[s],
         )
+        _weigh_looks(tracks, n, association, p_detect, s, scene, model)
+        best = scene.borne_out[s]
+        for other in range(len(sight)):
+            if looks_too(other, s, batch.t, scene, model):
+                best = max(best, scene.borne_out[other])
+        unknown, borne_out = sensors.prior_trust[s], scene.borne_out[s]
+        scene.trust[s] = trust_of_best(borne_out, best, unknown, scene.gained[s], scene.lost[s])
 
 
 @inner
