@@ -17,7 +17,7 @@ import numpy as np
 
 from jeat_graph.calibration.cuts import folds, shorten
 from jeat_graph.calibration.supervised import Recording
-from jeat_graph.calibration.verdict import Verdict, better, judge
+from jeat_graph.calibration.verdict import Verdict, better, judge, scene_error
 from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import DataError
 
@@ -86,12 +86,13 @@ def tune(
     if not recordings:
         raise DataError("tuning needs at least one recording with truth")
     parts = folds(shorten(recordings, max_scans))
+    scatter = scene_error(recordings)
     known: dict[str, Verdict] = {}
 
     def verdict(candidate: Config) -> Verdict:
         key = repr(candidate)
         if key not in known:
-            known[key] = judge([candidate] * len(parts), parts)
+            known[key] = replace(judge([candidate] * len(parts), parts), scene_error=scatter)
         return known[key]
 
     chosen: dict[str, Choice] = {}

@@ -1,5 +1,7 @@
 """Between two configurations the more accurate one wins, if it wins by more than chance."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,7 +9,7 @@ from hypothesis import strategies as st
 
 from jeat_graph import load_config
 from jeat_graph.calibration.cuts import cut_scans, folds, shorten
-from jeat_graph.calibration.verdict import Verdict, better, judge, standard_error
+from jeat_graph.calibration.verdict import Verdict, better, judge, scene_error, standard_error
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
@@ -113,6 +115,25 @@ def test_a_gain_that_the_parts_of_the_time_disagree_about_is_chance():
     now = one_recording([80.0] * 6)
     assert better(one_recording([81.0] * 6), now, LEAST)
     assert not better(one_recording([85.0, 72.0, 88.0, 73.0, 84.0, 87.0]), now, LEAST)
+
+
+def test_what_a_single_scene_gains_has_to_be_more_than_scenes_scatter():
+    now = [80.0, 80.0]
+    for gain, decided in ((1.0, False), (2.0, True)):
+        one = replace(verdict([80.0 + gain] * 2), scene_error=1.5)
+        assert better(one, verdict(now), LEAST) == decided
+    # Of what it says of the variances nothing is taken away, and what it loses counts.
+    assert better(replace(verdict([81.0] * 2), scene_error=1.5), verdict(now, penalty=0.2), LEAST)
+    assert not better(replace(verdict([79.0] * 2), scene_error=1.5), verdict(now, penalty=5.0), LEAST)
+
+
+def test_scenes_scatter_by_the_root_of_their_objects_and_several_tell_it_themselves(recordings):
+    detections, truth = recordings[0]
+    people = np.unique(truth.object_id[~truth.ignore])
+    few = replace(truth, ignore=truth.ignore | ~np.isin(truth.object_id, people[:3]))
+    whole, part = (scene_error([(detections, one)]) for one in (truth, few))
+    assert part == pytest.approx(whole * np.sqrt(len(people) / 3.0))
+    assert scene_error(list(recordings[:1]) * 2) == 0.0
 
 
 def test_nothing_to_find_is_no_verdict():
