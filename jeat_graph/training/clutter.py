@@ -104,8 +104,10 @@ def _shape(half: FloatArray, rng: np.random.Generator) -> _Shape:
     # A picture is not sharp; what is drawn into it would be told by its edges.
     blur = float(rng.uniform(*_BLUR_PX))
     soft = cv2.GaussianBlur(cover, (0, 0), blur, borderType=cv2.BORDER_CONSTANT)
-    colours = cv2.GaussianBlur(colours, (0, 0), blur, borderType=cv2.BORDER_REPLICATE)
-    return _Shape(np.asarray(colours), (soft.astype(np.float32) / np.float32(_WHITE))[..., None])
+    smeared = cv2.GaussianBlur(colours, (0, 0), blur, borderType=cv2.BORDER_REPLICATE)
+    return _Shape(
+        np.asarray(smeared, dtype=np.float32), (soft.astype(np.float32) / np.float32(_WHITE))[..., None]
+    )
 
 
 def _colours(width: int, height: int, rng: np.random.Generator) -> npt.NDArray[np.float32]:
@@ -177,7 +179,7 @@ def _specks(cover: npt.NDArray[np.uint8], colours: npt.NDArray[np.float32], rng:
     height, width = cover.shape
     count = 1 + int(width * height / rng.uniform(*_BETWEEN_PX) ** 2)
     middle = rng.random((count, 2)) * (width, height)
-    half = 0.5 * np.exp(rng.uniform(*np.log(_SPECK_PX), (count, 2)))
+    half = 0.5 * np.exp(rng.uniform(np.log(_SPECK_PX[0]), np.log(_SPECK_PX[1]), (count, 2)))
     shade = np.clip(rng.uniform(0.0, _WHITE, (count, 1)) + 0.3 * (_colour(rng) - 0.5 * _WHITE), 0.0, _WHITE)
     ends = np.rint(np.concatenate([middle - half, middle + half - 1.0], axis=1)).astype(int).tolist()
     for (left, top, right, bottom), colour in zip(ends, shade.tolist(), strict=True):

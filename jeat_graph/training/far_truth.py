@@ -21,8 +21,9 @@ from jeat_graph.data.trajectories import GroundTruth
 #: What simulated segments say of each vehicle beside their truth, and the columns that are used of it.
 VEHICLES = "vehicles.csv"
 _COLUMNS = ("t", "object_id", "visible", "contrast")
-#: So much of a vehicle must be uncovered, and its contrast to what is around it so many times the noise (Rose,
-#: "Vision: Human and Electronic", 1973): asked for vehicles that fog hides, a network sees vehicles in the fog.
+#: So much of a vehicle must be uncovered, and its contrast to what is around it so many times the noise
+#: (Rose, "Vision: Human and Electronic", 1973): asked for vehicles that fog hides, a network sees vehicles
+#: in the fog.
 _LEAST_VISIBLE, _LEAST_CONTRAST = 0.3, 5.0
 _US_PER_S = 1e6
 

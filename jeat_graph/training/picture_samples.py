@@ -131,7 +131,7 @@ def cut_out(
     half = 0.5 * (window.scale - 1.0)
     matrix = np.array([[window.scale, 0.0, window.left + half], [0.0, window.scale, window.top + half]])
     warped = cv2.warpAffine(frame, matrix, window.side, flags=cv2.INTER_LINEAR, borderValue=(_GREY,) * 3)
-    shown = np.asarray(warped)
+    shown: RgbImage = np.asarray(warped, dtype=np.uint8)
     if beside is not None:
         vehicles, _ = window._replace(mirrored=False).boxes(beside)
         shown = draw_clutter(shown, vehicles, rng)
