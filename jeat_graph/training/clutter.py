@@ -10,6 +10,8 @@ Source: Baradad et al., "Learning to See by Looking at Noise" (2021), whose dead
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
@@ -64,11 +66,11 @@ def draw_clutter(frame: RgbImage, vehicles: FloatArray, rng: np.random.Generator
     return shown
 
 
-class _Shape:
+class _Shape(NamedTuple):
     """A patch with colours (h, w, 3), and how much of each pixel it covers (h, w, 1), 0 to 1."""
 
-    def __init__(self, colours: npt.NDArray[np.float32], cover: npt.NDArray[np.float32]) -> None:
-        self.colours, self.cover = colours, cover
+    colours: npt.NDArray[np.float32]
+    cover: npt.NDArray[np.float32]
 
 
 def _touches(corners: FloatArray, vehicles: FloatArray) -> bool:
@@ -84,10 +86,7 @@ def _lay(shown: RgbImage, shape: _Shape, place: npt.NDArray[np.int_]) -> None:
     if right <= left or bottom <= top:
         return
     inner = (slice(top, bottom), slice(left, right))
-    part = shown[
-        place[1] + top : place[1] + bottom,
-        place[0] + left : place[0] + right,
-    ]
+    part = shown[place[1] + top : place[1] + bottom, place[0] + left : place[0] + right]
     cover = shape.cover[inner]
     part[:] = np.clip(part * (1.0 - cover) + shape.colours[inner] * cover, 0.0, _WHITE).astype(np.uint8)
 

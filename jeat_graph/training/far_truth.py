@@ -52,12 +52,11 @@ def asking_for_far(truth: GroundTruth, folder: Path, least_px: float) -> GroundT
         raise DataError("is missing: without it nobody knows which far vehicles can be seen", path) from None
     except (ValueError, UnicodeDecodeError, pd.errors.ParserError):
         raise DataError(f"has no columns {', '.join(_COLUMNS)} of numbers", path) from None
-    order = np.argsort(keys)
     wanted = _keys(truth.t, truth.object_id)
-    place = np.minimum(np.searchsorted(keys[order], wanted), max(len(keys) - 1, 0))
-    if len(wanted) and not (len(keys) and np.array_equal(keys[order][place], wanted)):
+    if not np.isin(wanted, keys).all():
         raise DataError("does not tell of the same vehicles as the truth beside it", path)
-    seen = (visible & clear)[order][place] if len(wanted) else np.zeros(0, dtype=bool)
+    order = np.argsort(keys)
+    seen = (visible & clear)[order][np.searchsorted(keys[order], wanted)]
     large = (truth.boxes[:, 2:] >= least_px).all(axis=1)
     return replace(truth, ignore=truth.ignore & ~(seen & large))
 

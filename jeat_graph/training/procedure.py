@@ -175,8 +175,9 @@ def bring_to_int8(source: Path, request: TrainRequest) -> int:
 
 def _check_held(request: TrainRequest) -> None:
     """Refuse to hold what nothing was put into."""
-    kinds = {settings_of(path).kind for path in request.start}
-    if request.net.kind == FUSED and request.settings.fused.hold_pictures and not kinds & {FRAMES, FUSED}:
+    if request.net.kind != FUSED or not request.settings.fused.hold_pictures:
+        return
+    if not any(settings_of(path).kind in (FRAMES, FUSED) for path in request.start):
         raise ConfigError(
             "fused.hold_pictures: give the network of pictures, or of both, that it shall stay (--start)"
         )

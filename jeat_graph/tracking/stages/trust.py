@@ -75,10 +75,11 @@ def learn_trust(
         # What bears others out is counted of sensors too that are always believed.
         if not batch.present[s]:
             continue
-        sight = np.zeros(len(batch.present))
+        sight, best = np.zeros(len(batch.present)), 0.0
         for other in range(len(sight)):
             if looks_too(other, s, batch.t, scene, model):
                 sight[other] = scene.p_detect[other] * (1.0 - scene.blind[other])
+                best = max(best, scene.borne_out[other])
         if np.max(sight) == 0.0:
             if lifecycle.judges_worth and _is_alone(s, scene):
                 trust = trust_alone(scene.vain[s], lifecycle.usual_vain, sensors.prior_trust[s])
@@ -117,11 +118,8 @@ def learn_trust(
             sensors.disagreement[s],
         )
         _weigh_looks(tracks, n, association, p_detect, s, scene, model)
-        best = scene.borne_out[s]
-        for other in range(len(sight)):
-            if looks_too(other, s, batch.t, scene, model):
-                best = max(best, scene.borne_out[other])
         unknown, borne_out = sensors.prior_trust[s], scene.borne_out[s]
+        best = max(best, borne_out)
         scene.trust[s] = trust_of_best(borne_out, best, unknown, scene.gained[s], scene.lost[s])
 
 
