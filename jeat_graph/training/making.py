@@ -43,7 +43,8 @@ def new_network(settings: NetSettings, start: Sequence[Path] = ()) -> VehicleNet
     Args:
         settings: what it looks like.
         start: networks that `train` made, as wide as this one or a whole part of it; of both sensors one of
-            each kind may be given, or one of both.
+            each kind may be given, or one of both, or that and one of a sensor, from which its part is then
+            taken.
 
     Raises:
         DataError: a file that `train` did not make, or of a network that looks otherwise.
@@ -58,8 +59,8 @@ def new_network(settings: NetSettings, start: Sequence[Path] = ()) -> VehicleNet
         given[kind] = _as_wide(found, settings.width)
     if settings.kind in given:
         net.load_state_dict(given[settings.kind].state_dict())
-    elif isinstance(net, FusedNet):
-        _start_fused(net, given)
+    if isinstance(net, FusedNet):
+        _take_parts(net, given)
     return net
 
 
@@ -148,15 +149,18 @@ def _as_wide(net: VehicleNet, width: int) -> VehicleNet:
     return wide
 
 
-def _start_fused(net: FusedNet, given: dict[str, VehicleNet]) -> None:
+def _take_parts(net: FusedNet, given: dict[str, VehicleNet]) -> None:
     """Take backbones from networks of one sensor, and the head from that of pictures if there is one."""
     frames, events = (given.get(kind) for kind in (FRAMES, EVENTS))
     if isinstance(events, DetectionNet):
         net.events.load_state_dict(events.backbone.state_dict())
-        net.head.load_state_dict(events.head.state_dict())
     if isinstance(frames, DetectionNet):
         net.pictures.load_state_dict(frames.backbone.state_dict())
-        net.head.load_state_dict(frames.head.state_dict())
+    begins = FUSED not in given
+    head = frames or (events if begins else None)
+    if isinstance(head, DetectionNet):
+        net.head.load_state_dict(head.head.state_dict())
+    if begins and frames is not None:
         for join in net.join:
             assert isinstance(join, GatedSum)
             # It begins as good as the pictures are; what events add is learned.

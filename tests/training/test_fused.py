@@ -152,6 +152,20 @@ def test_it_begins_as_good_as_the_network_of_pictures(tmp_path):
         new_network(NetSettings(kind="fused", width=6), (paths["frames"],))
 
 
+def test_the_pictures_part_of_a_network_of_both_can_be_a_better_one(tmp_path):
+    both, frames = used(15), used(16, NetSettings(kind="frames", width=4))
+    paths = [tmp_path / "both.onnx", tmp_path / "frames.onnx"]
+    for net, path in zip((both, frames), paths, strict=True):
+        write_onnx(net, SIDE, {"net": vars(net.settings)}, path)
+    net = new_network(NET, tuple(paths)).eval()
+    first, second = (read_network(path) for path in paths)
+    expected = first.state_dict() | {
+        name.replace("backbone", "pictures"): value for name, value in second.state_dict().items()
+    }
+    for name, value in net.state_dict().items():
+        assert torch.equal(value, expected[name]), name
+
+
 @pytest.mark.parametrize("lack", ["nothing", "pictures", "events"])
 def test_sequences_say_what_they_lack(small_set, lack):
     lacks = FusedChanges(
