@@ -63,7 +63,7 @@ STEPS = (
         ("lifecycle", "birth", "sensors.*.tempering", "input"),
         {"lifecycle.hidden_prior": 0.0, "lifecycle.p_detect_weight": 0.0, "lifecycle.leave_picture": False},
     ),
-    Change("+ output rules", ("output", "smoother", "lifecycle.leave_picture")),
+    Change("+ output rules", ("output", "smoother", "lifecycle.leave_picture", "sensors.*.score_fit")),
     Change("+ blindness of the event camera", ("sensors.*.blind_speed",)),
     Change("+ P_D of each track, hidden vehicles", ("lifecycle.hidden_prior", "lifecycle.p_detect_weight")),
     Change("+ standing tracks", ("standing",)),

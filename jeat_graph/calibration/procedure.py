@@ -18,6 +18,7 @@ from jeat_graph.calibration.offset import (
     with_lags,
 )
 from jeat_graph.calibration.parts import PARTS, PartChoice, choose_parts
+from jeat_graph.calibration.score_fit import SCORE_FIT, choose_score_fit, measure_score_fit
 from jeat_graph.calibration.supervised import Recording, calibrate
 from jeat_graph.calibration.tracked import follow
 from jeat_graph.calibration.tune import Choice, tune, tuned_settings
@@ -57,7 +58,7 @@ class Calibration:
 
 def steps_with_truth(config: Config) -> int:
     """How often `calibrate_with_truth` calls its `progress` at most."""
-    return len(PARTS) + _PASSES * len(tuned_settings(config)) + 1
+    return len(PARTS) + _PASSES * len(tuned_settings(config)) + 2
 
 
 def calibrate_with_truth(
@@ -87,10 +88,16 @@ def calibrate_with_truth(
     pairs = _on_time(recordings, found_lags(lags))
     short = shorten(pairs, _SCANS)
     if not tuned:
-        config = measure_written_variances(calibrate(pairs, base), short, base.output)
+        config = measure_score_fit(calibrate(pairs, base), short)
+        config = measure_written_variances(config, short, base.output)
         return Calibration(with_lags(config, lags), tuple(lags))
     config, parts = choose_parts(pairs, base, progress=progress)
     config, choices = tune(config, pairs, passes=_PASSES, progress=progress)
+    config, fits = choose_score_fit(config, short)
+    if fits is not None:
+        parts = (*parts, fits)
+    if progress is not None:
+        progress(SCORE_FIT)
     config = measure_written_variances(config, short, base.output)
     config, factor, verdict = scale_noise(config, folds(short))
     if factor != 1.0:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.data.detections import Detections
+from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.progress import progress_span, with_progress
+from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.runs.declaring import own_picture
 from jeat_graph.tracking.whole import track
 
@@ -61,22 +62,11 @@ def follow(recordings: Sequence[Detections], config: Config) -> TrackedDetection
         table = table.take(kept)
         _, number = np.unique(table.track_id, return_inverse=True)
         for s, name in enumerate(names):
-            if name not in detections.sensors:
-                continue
-            own = np.flatnonzero(detections.scan_sensor == detections.sensors.index(name))
-            first = np.searchsorted(table.t, detections.scan_t[own])
-            last = np.searchsorted(table.t, detections.scan_t[own], side="right")
-            bit = (table.used >> s & 1).astype(bool)
-            for k, lo, hi in zip(own, first, last, strict=True):
-                scan = detections.scan(int(k))
-                rows = np.arange(lo, hi)
-                rows = rows[bit[rows]]
-                if len(rows) and len(scan):
-                    j = _nearest(table.mean[rows, :2], table.boxes[rows, 2:], scan.boxes)
-                    cols["t"].append(np.full(len(rows), scan.t))
-                    cols["track"].append(first_track + number[rows])
-                    cols["sensor"].append(np.full(len(rows), s))
-                    cols["box"].append(scan.boxes[j])
+            for rows, scan, j in taken_in_scan(table, detections, name, s):
+                cols["t"].append(np.full(len(rows), scan.t))
+                cols["track"].append(first_track + number[rows])
+                cols["sensor"].append(np.full(len(rows), s))
+                cols["box"].append(scan.boxes[j])
         first_track += int(number.max(initial=-1)) + 1
     if sum(len(c) for c in cols["t"]) < _MIN_ROWS:
         raise DataError("the tracker could follow almost nothing")
@@ -88,6 +78,34 @@ def follow(recordings: Sequence[Detections], config: Config) -> TrackedDetection
         sensor=flat["sensor"][order].astype(np.int64),
         box=flat["box"][order],
     )
+
+
+def taken_in_scan(
+    table: Trajectories, detections: Detections, name: str, s: int
+) -> Iterator[tuple[IntArray, Scan, IntArray]]:
+    """Yield of each scan of a sensor what tracks took of it.
+
+    Args:
+        table: causal tracks, with rows at the times of the scans.
+        detections: of the recording.
+        name: of the sensor.
+        s: its bit in the table's `used`.
+
+    Yields:
+        Rows (R,) of the table whose tracks took a detection, the scan, and which (R,) each took.
+    """
+    if name not in detections.sensors:
+        return
+    own = np.flatnonzero(detections.scan_sensor == detections.sensors.index(name))
+    first = np.searchsorted(table.t, detections.scan_t[own])
+    last = np.searchsorted(table.t, detections.scan_t[own], side="right")
+    bit = (table.used >> s & 1).astype(bool)
+    for k, lo, hi in zip(own, first, last, strict=True):
+        scan = detections.scan(int(k))
+        rows = np.arange(lo, hi)
+        rows = rows[bit[rows]]
+        if len(rows) and len(scan):
+            yield rows, scan, _nearest(table.mean[rows, :2], table.boxes[rows, 2:], scan.boxes)
 
 
 def _nearest(centre: FloatArray, side: FloatArray, boxes: FloatArray) -> IntArray:

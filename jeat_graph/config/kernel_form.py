@@ -18,6 +18,8 @@ from jeat_graph.config.schema import Config, SensorConfig
 from jeat_graph.data.arrays import FloatArray, IntArray
 
 _SCALARS = (bool, int, float)
+# Of a sensor whose scores say nothing of how boxes fit.
+_ALWAYS_FITS = ((0.0, 1.0),)
 
 
 def _members(section: type[Any]) -> dict[str, type[Any]]:
@@ -83,6 +85,8 @@ class SensorArrays(NamedTuple):
         precision: (S,) overall.
         curve_score: (S, K) knots of the calibrated precision, padded with the last.
         curve_precision: (S, K) its values.
+        fit_score: (S, K) knots of the probability that the box of a track with such a detection fits.
+        fit_share: (S, K) its values; 1 where scores say nothing of it.
         tempering: (S,) exponent on evidence.
         blind_speed: (S,) px/s.
         least_overlap: (S,) least IoU with a track that another sensor has seen; 0: any.
@@ -105,6 +109,8 @@ class SensorArrays(NamedTuple):
     precision: FloatArray
     curve_score: FloatArray
     curve_precision: FloatArray
+    fit_score: FloatArray
+    fit_share: FloatArray
     tempering: FloatArray
     blind_speed: FloatArray
     least_overlap: FloatArray
@@ -147,15 +153,8 @@ def error_states(sensors: Sequence[SensorConfig]) -> tuple[IntArray, FloatArray]
 def sensor_arrays(config: Config) -> SensorArrays:
     """Collect the parameters of the sensors into arrays, in the order of `config.sensor_names`."""
     sensors = [config.sensors[name] for name in config.sensor_names]
-    knots = max(len(s.score_precision) for s in sensors)
-    curves = [s.score_precision + s.score_precision[-1:] * (knots - len(s.score_precision)) for s in sensors]
-    # Knots at one place would make the interpolation ambiguous; the padding lies beyond every score.
-    score = np.array(
-        [
-            [p[0] if k < len(s.score_precision) else 2.0 + k for k, p in enumerate(c)]
-            for s, c in zip(sensors, curves, strict=True)
-        ]
-    )
+    score, precision = _padded([s.score_precision for s in sensors])
+    fit_score, fit_share = _padded([s.score_fit or _ALWAYS_FITS for s in sensors])
     error, correlation_time_s = error_states(sensors)
     same = {
         name: np.array([getattr(s, name) for s in sensors], dtype=np.float64)
@@ -173,10 +172,26 @@ def sensor_arrays(config: Config) -> SensorArrays:
         bias=np.array([s.bias for s in sensors]),
         period_s=np.array([1.0 / s.rate_hz for s in sensors]),
         curve_score=score,
-        curve_precision=np.array([[p[1] for p in c] for c in curves]),
+        curve_precision=precision,
+        fit_score=fit_score,
+        fit_share=fit_share,
         disagreement=power,
         prior_trust=lifecycle.agreement_prior**power,
     )
+
+
+def _padded(curves: Sequence[Sequence[tuple[float, float]]]) -> tuple[FloatArray, FloatArray]:
+    """Knots (S, K) and values (S, K) of curves, each padded with its last value.
+
+    Knots at one place would make the interpolation ambiguous; the padding lies beyond every score.
+    """
+    knots = max(len(curve) for curve in curves)
+    score, value = np.empty((2, len(curves), knots))
+    for s, curve in enumerate(curves):
+        for k in range(knots):
+            score[s, k] = curve[k][0] if k < len(curve) else 2.0 + k
+            value[s, k] = curve[min(k, len(curve) - 1)][1]
+    return score, value
 
 
 def kernel_settings(config: Config) -> Settings:

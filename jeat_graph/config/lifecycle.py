@@ -285,6 +285,17 @@ class OutputConfig(Section):
         False,
         "scans count only while several sensors look; one alone is given `max_gap_s`: nobody fills its gaps",
     )
+    min_fit: float = number(
+        0.5,
+        "1",
+        "reported only while boxes fit with this probability by the scores of its detections (`score_fit` of "
+        "the sensors)",
+        0.0,
+        1.0,
+    )
+    fit_memory_s: float = number(
+        0.5, "s", "the scores count for so long, in hindsight both ways", open_low=True
+    )
     clip: bool = flag(True, "clip boxes to the picture; drop those outside it")
     min_visible: float = number(
         0.3, "1", "reported only if this fraction of the box lies in the picture", 0.0, 1.0

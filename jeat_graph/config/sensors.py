@@ -48,6 +48,13 @@ class SensorConfig(Section):
             "doc": "calibrated precision of a box of this score: (score, precision) knots, both rising"
         },
     )
+    score_fit: tuple[tuple[float, float], ...] = field(
+        default=(),
+        metadata={
+            "doc": "probability that a track's box fits if its detection has this score and no other sensor "
+            "sees it: (score, probability) knots, both rising; none: its scores say nothing of that"
+        },
+    )
     tempering: float = number(
         0.4, "1", "exponent on evidence, below 1 where false boxes repeat in time", 0.01, 1.0
     )
@@ -78,11 +85,14 @@ class SensorConfig(Section):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        knots = self.score_precision
-        ok = len(knots) >= 1 and all(0 <= s <= 1 and 0 <= p <= 1 for s, p in knots)
-        rising = all(b[0] > a[0] and b[1] >= a[1] for a, b in itertools.pairwise(knots))
-        if not (ok and rising):
-            raise ConfigError("score_precision: scores must rise, precisions must not fall, all in [0, 1]")
+        if not self.score_precision:
+            raise ConfigError("score_precision: needs at least one knot")
+        for name, what in (("score_precision", "precisions"), ("score_fit", "probabilities")):
+            knots = getattr(self, name)
+            inside = all(0 <= s <= 1 and 0 <= p <= 1 for s, p in knots)
+            rising = all(b[0] > a[0] and b[1] >= a[1] for a, b in itertools.pairwise(knots))
+            if not (inside and rising):
+                raise ConfigError(f"{name}: scores must rise, {what} must not fall, all in [0, 1]")
 
 
 @dataclass(frozen=True)

@@ -50,6 +50,7 @@ class Batch(NamedTuple):
         plain: (M, 4) centre (px) and ln width, ln height before what was learnt of the sensor was removed.
         boxes: (M, 4) the corresponding left, top, width, height (px).
         precision: (M,) calibrated precision.
+        fit: (M,) probability that the box of a track that takes it fits, by its score.
         log_score: (M,) ln of the score's likelihood ratio.
         score_odds: (M,) log odds of the score itself.
         weight: (M,) factor on the measurement variance (g of the paper).
@@ -66,6 +67,7 @@ class Batch(NamedTuple):
     plain: FloatArray
     boxes: FloatArray
     precision: FloatArray
+    fit: FloatArray
     log_score: FloatArray
     score_odds: FloatArray
     weight: FloatArray
@@ -144,6 +146,7 @@ def prepare(arrivals: Arrivals, offsets: FloatArray, model: Model) -> Batch:
     plain = np.empty((num, 4))
     corrected = np.empty((num, 4))
     precision = np.empty(num)
+    fit = np.empty(num)
     log_score = np.empty(num)
     odds = np.empty(num)
     weight = np.empty(num)
@@ -173,8 +176,9 @@ def prepare(arrivals: Arrivals, offsets: FloatArray, model: Model) -> Batch:
             corrected[j, axis] = z[j, axis] - 0.5 * true_side
         calibrated = interpolate(scores[j], sensors.curve_score[s], sensors.curve_precision[s])
         precision[j] = min(max(calibrated, LEAST_PRECISION), _MOST_PRECISION)
+        fit[j] = interpolate(scores[j], sensors.fit_score[s], sensors.fit_share[s])
         log_score[j] = log_score_ratio(precision[j], sensors.precision[s])
         odds[j] = score_odds(scores[j])
         weight[j] = score_weight(scores[j], noise.score_floor) if noise.score_weighting else 1.0
-    found = z, log_size, plain, corrected, precision, log_score, odds, weight
+    found = z, log_size, plain, corrected, precision, fit, log_score, odds, weight
     return Batch(arrivals.t, *found, sensor, arrivals.present, cut, seen_side, arrivals.alike)

@@ -59,6 +59,7 @@ def keep_rows(tracks: TrackArrays, rows: IntArray) -> None:
     _shift(tracks.last_box, rows, first)
     _shift(tracks.worth, rows, first)
     _shift(tracks.worthy, rows, first)
+    _shift(tracks.fit, rows, first)
 
 
 @njit(cache=True)

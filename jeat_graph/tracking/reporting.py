@@ -11,6 +11,7 @@ from jeat_graph.config.schema import ImageConfig, OutputConfig
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.filters.cut_boxes import WHOLE
+from jeat_graph.filters.fit import MEAN
 from jeat_graph.tracking.classes import ClassTally
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
@@ -142,6 +143,8 @@ def reported_rows(
         if gap > max_gap_s and not tracks.standing[i]:
             continue
         if by_existence and tracks.existence[i] < output.min_existence:
+            continue
+        if tracks.fit[i, MEAN] < output.min_fit:
             continue
         if output.clip:
             visible = visible_fraction(boxes[i], image.width, image.height)

@@ -62,6 +62,7 @@ class TrackArrays(NamedTuple):
         worth: (C,) probability that what has such scores lasts, where one sensor alone has seen it; else 1.
         worthy: (C,) whether it may be reported: things of such scores last often enough to be believed of one
             sensor alone, and it has moved where only sensors that see nothing stand have seen it.
+        fit: (C, 2) how likely its box fits, by the scores of its detections (`filters.fit`).
     """
 
     mean: FloatArray
@@ -95,6 +96,7 @@ class TrackArrays(NamedTuple):
     last_box: FloatArray
     worth: FloatArray
     worthy: npt.NDArray[np.bool_]
+    fit: FloatArray
 
 
 #: What is counted of a sensor's recent detections on lasting tracks while another sensor looked too, in
@@ -269,6 +271,7 @@ def allocate(capacity: int, num_sensors: int, num_errors: int = 0, densities: in
         last_box=np.full((capacity, num_sensors, 5), -np.inf),
         worth=np.ones(capacity),
         worthy=np.ones(capacity, dtype=np.bool_),
+        fit=np.zeros((capacity, 2)),
     )
 
 

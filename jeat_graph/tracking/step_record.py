@@ -28,6 +28,7 @@ class StepRecord(NamedTuple):
         used: (N,) bit k is set where a detection of sensor k was taken.
         confirmed: (N,) whether the track is confirmed.
         held: (N,) whether it is reported as standing still.
+        fit: (N, 2) how likely its box fits, by the scores of its detections (`filters.fit`).
         updates: (M,) records of the update log.
         votes: what these detections say of classes, or None.
     """
@@ -40,6 +41,7 @@ class StepRecord(NamedTuple):
     used: IntArray
     confirmed: BoolArray
     held: BoolArray
+    fit: FloatArray
     updates: RecordArray
     votes: Votes | None = None
 
@@ -78,6 +80,7 @@ def record_step(
         tracks.used[:n].copy(),
         tracks.confirmed[:n].copy(),
         held,
+        tracks.fit[:n].copy(),
         log.rows[: int(log.count[0])].copy(),
         votes,
     )

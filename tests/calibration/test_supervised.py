@@ -78,6 +78,8 @@ def test_all_else_is_the_base_configuration(found):
 def test_each_field_of_a_sensor_is_estimated_or_else_the_bases(recordings):
     """From two bases that agree in nothing: what comes out alike is estimated, all else is carried over."""
     kept = {"tempering": 0.35, "disagreement": 3.0, "latency_s": 0.01, "late_s": 0.2, "least_overlap": 0.4}
+    tracked = {"score_fit": ((0.0, 0.1), (1.0, 0.9))}  # found by tracking, not of detections
+    kept |= tracked
     estimated = {
         "rate_hz": 17.0,
         "sigma_px": 4.0,

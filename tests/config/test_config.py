@@ -114,6 +114,9 @@ def test_an_unknown_preset_names_the_nearest_one():
         ("association.priority=rgb", ["association.priority", "list"]),
         ("sensors.rgb.bias=[0, 0]", ["sensors.rgb.bias", "4 entries"]),
         ("sensors.rgb.score_precision=[[0.5, 0.9], [0.4, 0.95]]", ["sensors.rgb.score_precision", "rise"]),
+        ("sensors.rgb.score_precision=[]", ["sensors.rgb.score_precision", "at least one"]),
+        ("sensors.rgb.score_fit=[[0.5, 0.9], [0.6, 0.8]]", ["sensors.rgb.score_fit", "fall"]),
+        ("sensors.rgb.score_fit=[[0.5, 1.1]]", ["sensors.rgb.score_fit", "[0, 1]"]),
         ("motion=3", ["motion", "key: value"]),
     ],
 )

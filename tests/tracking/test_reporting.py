@@ -138,3 +138,45 @@ def test_a_scan_that_missed_a_vehicle_counts_where_another_sensor_looked_too(sen
         )
     assert reported[37] == 1
     assert reported[38:] == [left, left]
+
+
+FIT = ["sensors.rgb.score_fit=[[0.2, 0.1], [0.8, 0.9]]", "output.fit_memory_s=0.5"]
+
+
+def scores_over_time(scores, smoothed, overrides=()):
+    """Times at which a vehicle that drives by has a row when its detections have these scores."""
+    engine = "rts" if smoothed else "none"
+    tracker = Tracker(load_config("highway", [*FIT, *overrides, f"smoother.engine={engine}"]))
+    times = []
+    for k, score in enumerate(scores):
+        t = STEP * k
+        table = tracker.step((t, "rgb", np.array([[100.0 + 60.0 * t, 100.0, 40.0, 30.0]]), [score]))
+        times += table.t.tolist()
+    if smoothed:
+        times = tracker.finish().t.tolist()
+    return np.array(times)
+
+
+@pytest.mark.parametrize("smoothed", [False, True])
+def test_a_track_has_rows_only_while_its_scores_say_that_its_box_fits(smoothed):
+    """From 2 s on the scores say .1 where they said .9: the mean over .5 s is .5 after .5 ln 2 = .35 s.
+
+    It counts the detection of 2 s. In hindsight it is .5 just at 2 s.
+    """
+    scores = np.where(np.arange(80) < 40, 0.8, 0.2)
+    until = 2.0 if smoothed else 2.0 - STEP + 0.5 * np.log(2.0)
+    times = scores_over_time(scores, smoothed)
+    assert times.max() == pytest.approx(until, abs=1.5 * STEP)
+    assert np.diff(times).max() == pytest.approx(STEP)
+    always = scores_over_time(scores, smoothed, ["output.min_fit=0"])
+    assert always.max() == pytest.approx(79 * STEP)
+    nothing_said = scores_over_time(scores, smoothed, ["sensors.rgb.score_fit=[]"])
+    assert nothing_said.max() == pytest.approx(79 * STEP)
+
+
+def test_in_hindsight_a_vehicle_has_rows_as_soon_as_its_box_fits():
+    scores = np.where(np.arange(80) < 40, 0.2, 0.8)
+    assert scores_over_time(scores, False).min() == pytest.approx(
+        2.0 - STEP + 0.5 * np.log(2.0), abs=1.5 * STEP
+    )
+    assert scores_over_time(scores, True).min() == pytest.approx(2.0, abs=1.5 * STEP)

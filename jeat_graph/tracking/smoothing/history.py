@@ -10,6 +10,7 @@ import numpy as np
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import RecordArray
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.filters.fit import fit_in_hindsight
 from jeat_graph.smoothers.engine import TrackSmoother, make_smoother
 from jeat_graph.smoothers.linking import MOVED_SIZES
 from jeat_graph.smoothers.measurements import concatenate_measurements
@@ -200,6 +201,9 @@ class TrackHistory:
         if self._whole and self._stays(piece):
             existence = observed.in_place(existence)
         chosen &= existence >= self._config.smoother.min_existence
+        output = self._config.output
+        if output.min_fit > 0.0:
+            chosen &= fit_in_hindsight(observed.t, observed.fit, output.fit_memory_s) >= output.min_fit
         if not chosen.any():
             return []
         kept = observed.select(chosen)

@@ -29,6 +29,8 @@ class ObservationTimes:
         worth: (K,) probability, by their scores, that what one sensor alone sees is a vehicle; 1 elsewhere.
         used: (K,) bit k is set where a detection of sensor k was taken.
         held: (K,) whether it was reported as standing still, if need be without any detection.
+        fit: (K, 2) how likely its box fits, by the scores of its detections (`filters.fit`); NaN where it
+            had no state.
     """
 
     t: FloatArray
@@ -36,6 +38,7 @@ class ObservationTimes:
     worth: FloatArray
     used: IntArray
     held: BoolArray
+    fit: FloatArray
 
     def __len__(self) -> int:
         return len(self.t)
@@ -43,14 +46,20 @@ class ObservationTimes:
     def select(self, rows: slice | npt.NDArray[np.intp] | BoolArray) -> ObservationTimes:
         """Return some of the steps."""
         return ObservationTimes(
-            self.t[rows], self.existence[rows], self.worth[rows], self.used[rows], self.held[rows]
+            self.t[rows],
+            self.existence[rows],
+            self.worth[rows],
+            self.used[rows],
+            self.held[rows],
+            self.fit[rows],
         )
 
     @staticmethod
     def empty() -> ObservationTimes:
         """Return none."""
         none = np.zeros(0)
-        return ObservationTimes(none, none, none, np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.bool_))
+        flags = np.zeros(0, dtype=np.bool_)
+        return ObservationTimes(none, none, none, np.zeros(0, dtype=np.int64), flags, np.zeros((0, 2)))
 
     @staticmethod
     def unseen(t: FloatArray) -> ObservationTimes:
@@ -62,6 +71,7 @@ class ObservationTimes:
             np.ones(count),
             np.zeros(count, dtype=np.int64),
             np.zeros(count, dtype=np.bool_),
+            np.full((count, 2), np.nan),
         )
 
     @staticmethod
@@ -77,6 +87,7 @@ class ObservationTimes:
             np.concatenate([part.worth for part in parts]),
             np.concatenate([part.used for part in parts]),
             np.concatenate([part.held for part in parts]),
+            np.concatenate([part.fit for part in parts]),
         )
 
     def when_last_seen(self) -> tuple[float, float]:

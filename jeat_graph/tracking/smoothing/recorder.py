@@ -26,6 +26,7 @@ class Packet(NamedTuple):
         used: (L,) bit k is set where a detection of sensor k was taken.
         confirmed: (L,) whether the track is confirmed.
         held: (L,) whether it is reported as standing still.
+        fit: (L, 2) how likely its box fits, by the scores of its detections (`filters.fit`).
         updates: (M,) records of the update log.
         ended: identities of the tracks that ended.
         votes: what the M detections say of classes, or None.
@@ -40,6 +41,7 @@ class Packet(NamedTuple):
     used: IntArray
     confirmed: BoolArray
     held: BoolArray
+    fit: FloatArray
     updates: RecordArray
     ended: list[int]
     votes: Votes | None = None
@@ -90,6 +92,7 @@ class StepRecorder:
             np.concatenate([step.used for step in steps]),
             np.concatenate([step.confirmed for step in steps]),
             np.concatenate([step.held for step in steps]),
+            np.concatenate([step.fit for step in steps]),
             concatenate_measurements([step.updates for step in steps if len(step.updates)]),
             self._ended,
             Votes.join([step.votes for step in steps], [len(step.updates) for step in steps]),

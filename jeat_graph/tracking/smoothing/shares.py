@@ -122,6 +122,7 @@ def split(packet: Packet, rate_hz: float) -> Iterator[tuple[int, Share]]:
         packet.worth[rows],
         packet.used[rows],
         packet.held[rows],
+        packet.fit[rows],
     )
     by_track = np.argsort(packet.updates["track_id"], kind="stable")
     updates = packet.updates[by_track]

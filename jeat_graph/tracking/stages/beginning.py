@@ -11,6 +11,7 @@ from jeat_graph.association.boxes import clip_boxes, track_boxes
 from jeat_graph.config.kernel_form import Model, Settings
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.filters.cut_boxes import BOTH_CUT, WHOLE
+from jeat_graph.filters.fit import exactness, take
 from jeat_graph.filters.prior import write_prior, write_size_prior
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.associating import Association
@@ -163,6 +164,8 @@ def start_track(
     tracks.lasting[i] = False
     tracks.worth[i] = 1.0
     tracks.worthy[i] = True
+    tracks.fit[i] = 0.0
+    take(tracks.fit[i], batch.fit[j], exactness(view.log_size[0], view.noise[0], view.coloured_std[0]))
     tracks.t_birth[i] = t
     tracks.born_at[i] = z
     tracks.last_box[i] = -np.inf

@@ -14,6 +14,7 @@ from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.filters.coasting import forget
 from jeat_graph.filters.coloured_noise import expected, predict_errors
 from jeat_graph.filters.existence import motion_visibility, unsure_visibility
+from jeat_graph.filters.fit import fade
 from jeat_graph.filters.jerk import track_jerk
 from jeat_graph.filters.kalman import predict, predict_size
 from jeat_graph.filters.noise import base_variance, hidden_excess
@@ -116,6 +117,7 @@ def predict_all(tracks: TrackArrays, n: int, dt: float, scene: SceneState, model
         forget(
             tracks.mean[:n], tracks.cov[:n], tracks.size_mean[:n], tracks.size_cov[:n], unseen, dt, memory_s
         )
+    fade(tracks.fit[:n], dt, settings.output.fit_memory_s)
     lifecycle = settings.lifecycle
     if lifecycle.by_existence:
         survival = math.exp(-dt / lifecycle.lifetime_s)

@@ -11,6 +11,7 @@ from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.filters.coloured_noise import update_centre
 from jeat_graph.filters.cut_boxes import WHOLE, bound_unmeasured, floor_of_centre
 from jeat_graph.filters.existence import existence_after_hit
+from jeat_graph.filters.fit import exactness, take
 from jeat_graph.filters.kalman import update_block
 from jeat_graph.filters.noise import adapt_scale
 from jeat_graph.filters.standing import (
@@ -121,7 +122,7 @@ def take_in(
     take_sizes(tracks, measured, batch)
     hold_still(tracks, track, settings.standing.speed_std_per_size)
     noise, scale, hits, score_odds = settings.noise, tracks.scale, tracks.hits, tracks.score_odds
-    t_update, used, seen_by = tracks.t_update, tracks.used, tracks.seen_by
+    t_update, used, seen_by, fit = tracks.t_update, tracks.used, tracks.seen_by, tracks.fit
     for k in range(len(track)):
         i, j = track[k], measured.detection[k]
         scale[i, s] = adapt_scale(
@@ -129,6 +130,8 @@ def take_in(
         )
         hits[i] += 1
         score_odds[i] += (batch.score_odds[j] - score_odds[i]) / hits[i]
+        w = exactness(measured.log_size[k], measured.noise[k], measured.coloured_std[k])
+        take(fit[i], batch.fit[j], w)
         t_update[i] = batch.t
         used[i] |= 1 << s
         seen_by[i] |= 1 << s

@@ -166,7 +166,12 @@ def history_of(rows, votes=None):
     history.add_measurements(rows)
     count = len(rows)
     steps = ObservationTimes(
-        rows["t"].copy(), np.full(count, 0.9), np.ones(count), np.ones(count, int), np.zeros(count, bool)
+        rows["t"].copy(),
+        np.full(count, 0.9),
+        np.ones(count),
+        np.ones(count, int),
+        np.zeros(count, bool),
+        np.ones((count, 2)),
     )
     history.add_steps(steps, True)
     history.votes = votes or {}

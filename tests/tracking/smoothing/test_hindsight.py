@@ -30,6 +30,7 @@ def looks_of(existence, t=None):
         np.ones(n),
         np.zeros(n, dtype=np.int64),
         np.zeros(n, dtype=bool),
+        np.ones((n, 2)),
     )
 
 
@@ -103,6 +104,7 @@ def test_what_stays_in_place_is_believed_for_its_looks_or_for_what_had_been_seen
         np.array([0.1, worth, 0.3]),
         np.array([1, 1, 0]),
         np.zeros(3, dtype=bool),
+        np.ones((3, 2)),
     )
     assert looks.when_last_seen() == (0.8, worth)
     assert looks.in_place(np.full(3, 0.9)) == pytest.approx(expected)
@@ -125,7 +127,8 @@ def test_only_what_moves_has_rows_from_before_it_was_believed_in(velocity, first
     history.add_measurements(rows)
     seen = np.ones(20, dtype=np.int64)
     rising = 1.0 / (1.0 + np.exp(4.0 - 0.9 * np.arange(20)))
-    history.add_steps(ObservationTimes(t, rising, np.full(20, 0.6), seen, np.zeros(20, dtype=bool)), True)
+    looks = ObservationTimes(t, rising, np.full(20, 0.6), seen, np.zeros(20, dtype=bool), np.ones((20, 2)))
+    history.add_steps(looks, True)
     history.feed()
     (table,) = history.finish()
     assert table.t[0] == pytest.approx(first, abs=1e-9)
