@@ -3,7 +3,7 @@
 Every set of real recordings is tracked as it comes, after blind calibration and after calibration with truth,
 each half of a set with what the other half gives; both tables are judged, and so are the peers, with their
 defaults and tuned on the judged recordings themselves. Copies of the recordings, altered a little, say how
-much of the scores is luck.
+much of the scores is luck. Simulated worlds that nothing was made for stand beside the odd detectors.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from jeat_graph.benchmark import common
 from jeat_graph.benchmark.contenders import NAMES
+from jeat_graph.benchmark.foreign import WorldJob, judge_world, worlds, worlds_table
 from jeat_graph.benchmark.judging import in_processes, summarise
 from jeat_graph.benchmark.peer_cache import PeerCache, cache_key
 from jeat_graph.benchmark.peer_search import peers_here
@@ -56,6 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--no-peers", action="store_true", help="leave the other trackers out")
     add("--tuned", action="store_true", help="search the others' parameters too, on what is judged (slow)")
     add("--no-calibrate", action="store_true", help="leave the calibrated rows out (they take minutes)")
+    add("--no-worlds", action="store_true", help="leave the simulated worlds beside the highway out")
     add("--no-robustness", action="store_true", help="leave the simulated detectors out")
 
 
@@ -76,7 +78,7 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
     ours = in_processes(_judge_ours, jobs, args.jobs, "real, ours")
     peers: list[dict[str, Any]] = []
     names: list[str] = []
-    if sets and not args.no_peers:
+    if not args.no_peers:
         cache = PeerCache(Path(args.peers) if args.peers else None)
         names, tuned = peers_here(), args.tuned and not args.quick
         peers = [one for found in sets for one in judge_peers(found, names, cache, tuned)]
@@ -89,6 +91,14 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
         "tuned": bool(args.tuned),
         "copies": args.copies,
     }
+    foreign: list[list[dict[str, Any]]] = []
+    if not args.no_worlds:
+        seen = [
+            WorldJob(one.name, seed, setup["duration_s"], tuple(names))
+            for one in worlds()
+            for seed in setup["seeds"]
+        ]
+        foreign = in_processes(judge_world, seen, args.jobs, "other worlds")
     robustness: list[dict[str, Any]] = []
     if not args.no_robustness:
         odd = [
@@ -104,6 +114,7 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
         "ours": ours,
         "peers": peers,
         "copies": [record for found in copies for record in found],
+        "worlds": [record for found in foreign for record in found],
         "robustness": robustness,
         "robustness_summary": summarise(robustness),
     }
@@ -148,6 +159,8 @@ def tables(result: Mapping[str, Any]) -> dict[str, Table]:
         copies = [e for e in result.get("copies", ()) if e["set"] == name]
         if copies:
             out[f"copies-{marker}"] = copies_table(name, copies, result["settings"]["copies"])
+    if result.get("worlds"):
+        out["worlds"] = worlds_table(result["worlds"], len(result["settings"]["seeds"]))
     if result["robustness_summary"]:
         seeds = common.over_seeds(len(result["settings"]["seeds"]))
         out["robustness"] = common.scenario_table(

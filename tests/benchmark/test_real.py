@@ -34,7 +34,7 @@ def data(tmp_path_factory):
 
 def test_every_stream_is_judged_and_the_tables_come_back_from_the_file(data, tmp_path, capsys):
     out = tmp_path / "out"
-    small = ["--no-peers", "--no-calibrate", "--no-robustness", "--jobs", "1"]
+    small = ["--no-peers", "--no-calibrate", "--no-worlds", "--no-robustness", "--jobs", "1"]
     assert main(["benchmark", "real", "--data", str(data), "--out", str(out), *small]) == 0
     shown = capsys.readouterr().out
     result = json.loads((out / "real.json").read_text())
@@ -49,7 +49,17 @@ def test_every_stream_is_judged_and_the_tables_come_back_from_the_file(data, tmp
 
 
 def test_copies_are_altered_a_little_and_judged_with_their_spread(data, tmp_path, capsys):
-    few = ["--no-peers", "--no-calibrate", "--no-robustness", "--quick", "--copies", "2", "--jobs", "1"]
+    few = [
+        "--no-peers",
+        "--no-calibrate",
+        "--no-worlds",
+        "--no-robustness",
+        "--quick",
+        "--copies",
+        "2",
+        "--jobs",
+        "1",
+    ]
     assert main(["benchmark", "real", "--data", str(data), "--out", str(tmp_path), *few]) == 0
     assert "mean of 2 altered copies" in capsys.readouterr().out
     found = json.loads((tmp_path / "real.json").read_text())["copies"]
@@ -80,7 +90,7 @@ def test_an_altered_copy_has_the_scans_of_the_original_and_boxes_near_its():
 
 
 def test_a_folder_without_recordings_is_said(tmp_path, capsys):
-    small = ["--no-peers", "--no-robustness"]
+    small = ["--no-peers", "--no-worlds", "--no-robustness"]
     assert main(["benchmark", "real", "--data", str(tmp_path), *small]) == 0
     assert "no real recordings" in capsys.readouterr().err
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -13,8 +13,10 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.simulation.world.boxes import project_boxes
+from jeat_graph.simulation.world.camera import Camera
+from jeat_graph.simulation.world.light import Light
 from jeat_graph.simulation.world.occlusion import visible_fraction
-from jeat_graph.simulation.world.scene import Scene
+from jeat_graph.simulation.world.scene import VehicleStates
 from jeat_graph.simulation.world.vehicles import KIND_NAMES
 
 _CHUNK = 400  # times looked at together; bounds the memory
@@ -38,6 +40,24 @@ class TruthConfig:
         check(self)
         if self.horizon_m < self.range_m:
             raise ConfigError("horizon_m: must not be less than range_m (m)")
+
+
+class Looked(Protocol):
+    """What can be looked at: the highway's `Scene`, or another."""
+
+    @property
+    def camera(self) -> Camera:
+        """The one picture that all sensors' boxes refer to."""
+        ...
+
+    @property
+    def light(self) -> Light:
+        """Illumination."""
+        ...
+
+    def states_at(self, times: FloatArray, far_m: float) -> VehicleStates:
+        """State of everything up to `far_m` (m) ahead at times (T,) (s)."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +109,7 @@ class Views:
         )
 
 
-def look(scene: Scene, times: FloatArray, config: TruthConfig) -> Views:
+def look(scene: Looked, times: FloatArray, config: TruthConfig) -> Views:
     """Look at the scene at given times.
 
     Args:
@@ -104,7 +124,7 @@ def look(scene: Scene, times: FloatArray, config: TruthConfig) -> Views:
     return Views(times, *columns)
 
 
-def _look(scene: Scene, times: FloatArray, start: int, config: TruthConfig) -> tuple[npt.NDArray[Any], ...]:
+def _look(scene: Looked, times: FloatArray, start: int, config: TruthConfig) -> tuple[npt.NDArray[Any], ...]:
     states = scene.states_at(times[start : start + _CHUNK], far_m=config.horizon_m)
     projected = project_boxes(states, scene.camera)
     centre = np.concatenate([states.pose[:, :2], states.size[:, 2:] / 2.0], axis=1)
