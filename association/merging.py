@@ -1,4 +1,8 @@
-"""Merging: two tracks on one vehicle become one; the older confirmed identity survives."""
+"""Merging: two tracks on one vehicle become one; the older confirmed identity survives.
+
+Two people who walk behind each other have one box and one velocity, too. But they were seen apart before: one
+sensor found each of them where no other track was. What has never been seen apart may be one.
+"""
 
 from __future__ import annotations
 
@@ -7,41 +11,28 @@ import numpy.typing as npt
 from numba import njit
 
 from jeat_graph.association.overlap import overlap
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 
 
 @njit(cache=True)
-def find_duplicates(
-    boxes: FloatArray,
-    velocity: FloatArray,
-    velocity_var: FloatArray,
-    confirmed: npt.NDArray[np.bool_],
-    min_overlap: float,
-    velocity_gate: float,
-) -> npt.NDArray[np.bool_]:
-    """Mark the tracks that duplicate another one.
-
-    Two tracks are one vehicle if their boxes overlap and their velocities agree within their covariances. Of
-    the two, a confirmed one survives a tentative one; among equals the one that stands first, the older.
+def overlapping_pairs(boxes: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Pairs of boxes that overlap at all.
 
     Args:
-        boxes: (N, 4) left, top, width, height (px), tracks in order of age, the oldest first.
-        velocity: (N, 2) px/s.
-        velocity_var: (N, 2) variances (px²/s²).
-        confirmed: (N,) whether a track is confirmed.
-        min_overlap: least IoU of duplicates.
-        velocity_gate: χ² bound on the difference of the velocities (2 degrees of freedom).
+        boxes: (N, 4) left, top, width, height (px).
 
     Returns:
-        (N,) true where the track is to be removed.
+        (P, 2) rows of each pair, and (P,) its IoU; from left to right.
     """
     num = boxes.shape[0]
-    remove = np.zeros(num, dtype=np.bool_)
     order = np.argsort(boxes[:, 0], kind="mergesort")
     # In the order of the sweep, so that its inner loop runs through memory and mostly stops early.
     left = boxes[order, 0]
     top = boxes[order, 1]
     bottom = top + boxes[order, 3]
+    pairs = np.empty((max(2 * num, 16), 2), dtype=np.int64)
+    iou = np.empty(len(pairs))
+    count = 0
     for a in range(num):
         i = order[a]
         right = boxes[i, 0] + boxes[i, 2]
@@ -50,18 +41,91 @@ def find_duplicates(
                 break
             if top[b] >= bottom[a] or bottom[b] <= top[a]:
                 continue
-            k = order[b]
-            if remove[i] or remove[k] or overlap(boxes[i], boxes[k]) < min_overlap:
-                continue
-            d2 = 0.0
-            for axis in range(2):
-                e = velocity[i, axis] - velocity[k, axis]
-                d2 += e * e / (velocity_var[i, axis] + velocity_var[k, axis])
-            if d2 > velocity_gate:
-                continue
-            older, younger = min(i, k), max(i, k)
-            if confirmed[younger] and not confirmed[older]:
-                remove[older] = True
-            else:
-                remove[younger] = True
+            if count == len(pairs):
+                pairs = np.concatenate((pairs, np.empty_like(pairs)))
+                iou = np.concatenate((iou, np.empty_like(iou)))
+            pairs[count, 0], pairs[count, 1] = i, order[b]
+            iou[count] = overlap(boxes[i], boxes[order[b]])
+            count += 1
+    return pairs[:count], iou[:count]
+
+
+@njit(cache=True)
+def stands_apart(num: int, pairs: IntArray, iou: FloatArray, most_overlap: float) -> BoolArray:
+    """Say of each of `num` tracks (N,) whether none overlaps it by more than an IoU of `most_overlap`.
+
+    Args:
+        num: N.
+        pairs: (P, 2) of `overlapping_pairs`.
+        iou: (P,) of the same.
+        most_overlap: IoU.
+    """
+    apart = np.ones(num, dtype=np.bool_)
+    for p in range(len(pairs)):
+        if iou[p] > most_overlap:
+            apart[pairs[p, 0]] = False
+            apart[pairs[p, 1]] = False
+    return apart
+
+
+@njit(cache=True)
+def known_to_be_two(first: FloatArray, second: FloatArray, both_since: float) -> bool:
+    """Whether one sensor has seen each of two tracks apart from all others since there are both of them.
+
+    Args:
+        first: (S,) when each sensor last saw the one apart from all others (s).
+        second: (S,) the same of the other.
+        both_since: when the younger one began (s).
+    """
+    return bool(np.any((first > both_since) & (second > both_since)))
+
+
+@njit(cache=True)
+def find_duplicates(
+    pairs: IntArray,
+    iou: FloatArray,
+    velocity: FloatArray,
+    velocity_var: FloatArray,
+    confirmed: npt.NDArray[np.bool_],
+    born: FloatArray,
+    seen_apart: FloatArray,
+    min_overlap: float,
+    velocity_gate: float,
+) -> npt.NDArray[np.bool_]:
+    """Mark the tracks that duplicate another one.
+
+    Two tracks are one vehicle if their boxes overlap and their velocities agree within their covariances,
+    and they are not known to be two. Of the two, a confirmed one survives a tentative one; among equals the
+    one that stands first, the older.
+
+    Args:
+        pairs: (P, 2) of `overlapping_pairs`, of tracks in order of age, the oldest first.
+        iou: (P,) of the same.
+        velocity: (N, 2) px/s.
+        velocity_var: (N, 2) variances (px²/s²).
+        confirmed: (N,) whether a track is confirmed.
+        born: (N,) when each began (s).
+        seen_apart: (N, S) when each sensor last saw it apart from all others (s).
+        min_overlap: least IoU of duplicates.
+        velocity_gate: χ² bound on the difference of the velocities (2 degrees of freedom).
+
+    Returns:
+        (N,) true where the track is to be removed.
+    """
+    remove = np.zeros(len(confirmed), dtype=np.bool_)
+    for p in range(len(pairs)):
+        i, k = pairs[p, 0], pairs[p, 1]
+        if remove[i] or remove[k] or iou[p] < min_overlap:
+            continue
+        d2 = 0.0
+        for axis in range(2):
+            e = velocity[i, axis] - velocity[k, axis]
+            d2 += e * e / (velocity_var[i, axis] + velocity_var[k, axis])
+        if d2 > velocity_gate or known_to_be_two(seen_apart[i], seen_apart[k], max(born[i], born[k])):
+            continue
+        older, younger = min(i, k), max(i, k)
+        if confirmed[younger] and not confirmed[older]:
+            remove[older] = True
+        else:
+            remove[younger] = True
     return remove

@@ -263,6 +263,14 @@ class MergeConfig(Section):
     gate_probability: float = number(
         0.99, "1", "χ² mass within which their velocities agree", 0.5, 1.0 - 1e-12
     )
+    apart_overlap: float = number(
+        0.0,
+        "1",
+        "what one sensor has seen apart since there are both, neither overlapped by any track by more than "
+        "this IoU, is two vehicles and stays two; 0: not asked",
+        0.0,
+        1.0,
+    )
 
     @property
     def gate_bound(self) -> float:

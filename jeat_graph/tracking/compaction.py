@@ -57,6 +57,7 @@ def keep_rows(tracks: TrackArrays, rows: IntArray) -> None:
         _shift(tracks.jerk_factor, rows, first)
     _shift(tracks.lasting, rows, first)
     _shift(tracks.last_box, rows, first)
+    _shift(tracks.seen_apart, rows, first)
     _shift(tracks.worth, rows, first)
     _shift(tracks.worthy, rows, first)
     _shift(tracks.fit, rows, first)

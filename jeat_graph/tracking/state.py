@@ -59,6 +59,7 @@ class TrackArrays(NamedTuple):
         lasting: (C,) whether it has lasted (`filters.worth`).
         last_box: (C, S, 5) each sensor's last whole box, as it saw it: time (s), centre (px), ln width and ln
             height.
+        seen_apart: (C, S) when each sensor last gave it a box while no other track overlapped it (s).
         worth: (C,) probability that what has such scores lasts, where one sensor alone has seen it; else 1.
         worthy: (C,) whether it may be reported: things of such scores last often enough to be believed of one
             sensor alone, and it has moved where only sensors that see nothing stand have seen it.
@@ -94,6 +95,7 @@ class TrackArrays(NamedTuple):
     jerk_factor: FloatArray
     lasting: npt.NDArray[np.bool_]
     last_box: FloatArray
+    seen_apart: FloatArray
     worth: FloatArray
     worthy: npt.NDArray[np.bool_]
     fit: FloatArray
@@ -269,6 +271,7 @@ def allocate(capacity: int, num_sensors: int, num_errors: int = 0, densities: in
         jerk_factor=np.ones(capacity),
         lasting=np.zeros(capacity, dtype=np.bool_),
         last_box=np.full((capacity, num_sensors, 5), -np.inf),
+        seen_apart=np.full((capacity, num_sensors), -np.inf),
         worth=np.ones(capacity),
         worthy=np.ones(capacity, dtype=np.bool_),
         fit=np.zeros((capacity, 2)),

@@ -4,17 +4,23 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jeat_graph.association.merging import find_duplicates
+from jeat_graph.association.merging import find_duplicates, overlapping_pairs, stands_apart
+from jeat_graph.association.overlap import overlap
 
 GATE = 9.21
 
 
-def duplicates(boxes, velocity=None, confirmed=None, var=1.0):
+def duplicates(boxes, velocity=None, confirmed=None, var=1.0, born=None, seen_apart=None):
     n = len(boxes)
     velocity = np.zeros((n, 2)) if velocity is None else np.array(velocity, dtype=float)
     confirmed = np.ones(n, dtype=bool) if confirmed is None else np.array(confirmed)
     boxes = np.array(boxes, dtype=float).reshape(n, 4)
-    return find_duplicates(boxes, velocity, np.full((n, 2), var), confirmed, 0.7, GATE).tolist()
+    born = np.zeros(n) if born is None else np.array(born, dtype=float)
+    seen_apart = np.full((n, 1), -np.inf) if seen_apart is None else np.array(seen_apart, dtype=float)
+    found = overlapping_pairs(boxes)
+    return find_duplicates(
+        *found, velocity, np.full((n, 2), var), confirmed, born, seen_apart, 0.7, GATE
+    ).tolist()
 
 
 def test_of_two_confirmed_tracks_the_older_survives():
@@ -41,6 +47,38 @@ def test_vehicles_that_pass_each_other_are_two():
     assert duplicates([[0, 0, 10, 10]] * 2, velocity=[[0, 0], [10, 0]]) == [False, False]
     # The same difference is within the covariance of velocities that are known badly.
     assert duplicates([[0, 0, 10, 10]] * 2, velocity=[[0, 0], [10, 0]], var=100.0) == [False, True]
+
+
+def test_what_one_sensor_has_seen_apart_stays_two():
+    one_place, born = [[0, 0, 10, 10]] * 2, [0.0, 1.0]
+    assert duplicates(one_place, born=born, seen_apart=[[2.0], [3.0]]) == [False, False]
+    # One of them alone, or before there was the other, proves nothing.
+    assert duplicates(one_place, born=born, seen_apart=[[-np.inf], [3.0]]) == [False, True]
+    assert duplicates(one_place, born=born, seen_apart=[[0.5], [3.0]]) == [False, True]
+    # Nor does it if each has seen one: the two may draw one vehicle's box apart.
+    apart = [[2.0, -np.inf], [-np.inf, 3.0]]
+    assert duplicates(one_place, born=born, seen_apart=apart) == [False, True]
+
+
+def test_apart_is_what_no_other_overlaps_by_more():
+    boxes = np.array([[0, 0, 10, 10], [5, 0, 10, 10], [14, 0, 10, 10], [40, 0, 10, 10]], dtype=float)
+    pairs, iou = overlapping_pairs(boxes)
+    assert stands_apart(4, pairs, iou, 0.2).tolist() == [False, False, True, True]
+    assert stands_apart(4, pairs, iou, 0.01).tolist() == [False, False, False, True]
+
+
+@given(seed=st.integers(0, 10**6), n=st.integers(0, 40))
+@settings(max_examples=100, deadline=None)
+def test_every_pair_that_overlaps_is_listed_once(seed, n):
+    rng = np.random.default_rng(seed)
+    boxes = np.column_stack([rng.uniform(0, 30, (n, 2)), rng.uniform(1, 20, (n, 2))])
+    pairs, iou = overlapping_pairs(boxes)
+    listed = {(min(p), max(p)): o for p, o in zip(pairs.tolist(), iou, strict=True)}
+    assert len(listed) == len(pairs)
+    for i in range(n):
+        for k in range(i + 1, n):
+            expected = overlap(boxes[i], boxes[k])
+            assert listed.get((i, k), 0.0) == expected
 
 
 def test_nothing_to_merge():

@@ -169,6 +169,7 @@ def start_track(
     tracks.t_birth[i] = t
     tracks.born_at[i] = z
     tracks.last_box[i] = -np.inf
+    tracks.seen_apart[i] = -np.inf
     remember_box(tracks, i, batch, j)
     tracks.t_update[i] = t
     tracks.used[i] = 1 << s

@@ -8,10 +8,10 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.association.boxes import clip_boxes, track_boxes, visible_fraction
-from jeat_graph.association.merging import find_duplicates
+from jeat_graph.association.merging import find_duplicates, overlapping_pairs, stands_apart
 from jeat_graph.config.kernel_form import Model, Settings
 from jeat_graph.config.schema import ImageConfig
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.tracking.compaction import keep_rows
 from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.stages.learning import scan_weight
@@ -67,11 +67,19 @@ def remove_ended(tracks: TrackArrays, n: int, t: float, scene: SceneState, model
             for axis in range(2):
                 velocity[i, axis] = tracks.mean[i, axis, 1]
                 velocity_var[i, axis] = tracks.cov[i, axis, 1, 1]
+        pairs, iou = overlapping_pairs(
+            clip_boxes(boxes, image.width, image.height) if image.edge_px > 0.0 else boxes
+        )
+        if merge.apart_overlap > 0.0:
+            _note_apart(tracks, t, stands_apart(n, pairs, iou, merge.apart_overlap))
         remove = find_duplicates(
-            clip_boxes(boxes, image.width, image.height) if image.edge_px > 0.0 else boxes,
+            pairs,
+            iou,
             velocity,
             velocity_var,
             tracks.confirmed[:n],
+            tracks.t_birth[:n],
+            tracks.seen_apart[:n],
             merge.min_overlap,
             merge.gate_bound,
         )
@@ -97,6 +105,20 @@ def remove_ended(tracks: TrackArrays, n: int, t: float, scene: SceneState, model
         kept += 1
     keep_rows(tracks, rows[:kept])
     return kept
+
+
+@inner
+def _note_apart(tracks: TrackArrays, t: float, apart: BoolArray) -> None:
+    """Note down which sensors have just seen which of the N tracks apart (N,) from all others, in place.
+
+    Of what is not believed yet nothing is noted: a false box beside a vehicle is no second vehicle.
+    """
+    seen_apart, used = tracks.seen_apart, tracks.used
+    for i in range(len(apart)):
+        if apart[i] and tracks.confirmed[i] and tracks.worthy[i]:
+            for s in range(seen_apart.shape[1]):
+                if used[i] >> s & 1:
+                    seen_apart[i, s] = t
 
 
 @inner
