@@ -69,44 +69,41 @@ def stands_apart(num: int, pairs: IntArray, iou: FloatArray, most_overlap: float
 
 
 @njit(cache=True)
-def known_to_be_two(first: FloatArray, second: FloatArray, both_since: float) -> bool:
-    """Whether one sensor has seen each of two tracks apart from all others since there are both of them.
+def known_to_be_two(pairs: IntArray, born: FloatArray, seen_apart: FloatArray) -> BoolArray:
+    """Say of each pair (P,) whether one sensor has seen both apart from all others since there are both.
 
     Args:
-        first: (S,) when each sensor last saw the one apart from all others (s).
-        second: (S,) the same of the other.
-        both_since: when the younger one began (s).
+        pairs: (P, 2) rows of tracks.
+        born: (N,) when each track began (s).
+        seen_apart: (N, S) when each sensor last saw it apart from all others (s).
     """
-    return bool(np.any((first > both_since) & (second > both_since)))
+    two = np.zeros(len(pairs), dtype=np.bool_)
+    for p in range(len(pairs)):
+        i, k = pairs[p, 0], pairs[p, 1]
+        both_since = max(born[i], born[k])
+        for s in range(seen_apart.shape[1]):
+            two[p] = two[p] or (seen_apart[i, s] > both_since and seen_apart[k, s] > both_since)
+    return two
 
 
 @njit(cache=True)
 def find_duplicates(
     pairs: IntArray,
-    iou: FloatArray,
     velocity: FloatArray,
     velocity_var: FloatArray,
     confirmed: npt.NDArray[np.bool_],
-    born: FloatArray,
-    seen_apart: FloatArray,
-    min_overlap: float,
     velocity_gate: float,
 ) -> npt.NDArray[np.bool_]:
     """Mark the tracks that duplicate another one.
 
-    Two tracks are one vehicle if their boxes overlap and their velocities agree within their covariances,
-    and they are not known to be two. Of the two, a confirmed one survives a tentative one; among equals the
-    one that stands first, the older.
+    Two tracks whose boxes nearly coincide are one vehicle if their velocities agree within their covariances.
+    Of the two, a confirmed one survives a tentative one; among equals the one that stands first, the older.
 
     Args:
-        pairs: (P, 2) of `overlapping_pairs`, of tracks in order of age, the oldest first.
-        iou: (P,) of the same.
+        pairs: (P, 2) rows of tracks whose boxes nearly coincide, not known to be two; the oldest track first.
         velocity: (N, 2) px/s.
         velocity_var: (N, 2) variances (px²/s²).
         confirmed: (N,) whether a track is confirmed.
-        born: (N,) when each began (s).
-        seen_apart: (N, S) when each sensor last saw it apart from all others (s).
-        min_overlap: least IoU of duplicates.
         velocity_gate: χ² bound on the difference of the velocities (2 degrees of freedom).
 
     Returns:
@@ -115,13 +112,13 @@ def find_duplicates(
     remove = np.zeros(len(confirmed), dtype=np.bool_)
     for p in range(len(pairs)):
         i, k = pairs[p, 0], pairs[p, 1]
-        if remove[i] or remove[k] or iou[p] < min_overlap:
+        if remove[i] or remove[k]:
             continue
         d2 = 0.0
         for axis in range(2):
             e = velocity[i, axis] - velocity[k, axis]
             d2 += e * e / (velocity_var[i, axis] + velocity_var[k, axis])
-        if d2 > velocity_gate or known_to_be_two(seen_apart[i], seen_apart[k], max(born[i], born[k])):
+        if d2 > velocity_gate:
             continue
         older, younger = min(i, k), max(i, k)
         if confirmed[younger] and not confirmed[older]:

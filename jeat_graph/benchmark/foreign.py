@@ -15,7 +15,8 @@ import numpy as np
 
 from jeat_graph.benchmark.common import over_seeds
 from jeat_graph.benchmark.contenders import NAMES
-from jeat_graph.benchmark.foreign_scenes import Route, crossing, populate, roundabout, square, street
+from jeat_graph.benchmark.foreign_routes import Route, crossing, roundabout, square, street
+from jeat_graph.benchmark.foreign_scenes import populate
 from jeat_graph.benchmark.judging import spread
 from jeat_graph.benchmark.real_ours import METRICS, OursOnSet, judge_row
 from jeat_graph.benchmark.real_sets import RealSet

@@ -256,21 +256,14 @@ class BirthConfig(Section):
 
 @dataclass(frozen=True)
 class MergeConfig(Section):
-    """When two tracks are one vehicle; the older confirmed identity survives."""
+    """When two tracks are one vehicle, the older one; what one sensor has seen apart stays two."""
 
     enabled: bool = flag(True, "merge duplicates")
     min_overlap: float = number(0.7, "1", "IoU above which two tracks may be one", 0.0, 1.0)
     gate_probability: float = number(
         0.99, "1", "χ² mass within which their velocities agree", 0.5, 1.0 - 1e-12
     )
-    apart_overlap: float = number(
-        0.0,
-        "1",
-        "what one sensor has seen apart since there are both, neither overlapped by any track by more than "
-        "this IoU, is two vehicles and stays two; 0: not asked",
-        0.0,
-        1.0,
-    )
+    apart_overlap: float = number(0.0, "1", "IoU up to which tracks are seen apart; 0: not asked", 0.0, 1.0)
 
     @property
     def gate_bound(self) -> float:

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jeat_graph.association.merging import find_duplicates, overlapping_pairs, stands_apart
+from jeat_graph.association.merging import find_duplicates, known_to_be_two, overlapping_pairs, stands_apart
 from jeat_graph.association.overlap import overlap
 
 GATE = 9.21
@@ -17,10 +17,10 @@ def duplicates(boxes, velocity=None, confirmed=None, var=1.0, born=None, seen_ap
     boxes = np.array(boxes, dtype=float).reshape(n, 4)
     born = np.zeros(n) if born is None else np.array(born, dtype=float)
     seen_apart = np.full((n, 1), -np.inf) if seen_apart is None else np.array(seen_apart, dtype=float)
-    found = overlapping_pairs(boxes)
-    return find_duplicates(
-        *found, velocity, np.full((n, 2), var), confirmed, born, seen_apart, 0.7, GATE
-    ).tolist()
+    pairs, iou = overlapping_pairs(boxes)
+    pairs = pairs[iou >= 0.7]
+    pairs = pairs[~known_to_be_two(pairs, born, seen_apart)]
+    return find_duplicates(pairs, velocity, np.full((n, 2), var), confirmed, GATE).tolist()
 
 
 def test_of_two_confirmed_tracks_the_older_survives():

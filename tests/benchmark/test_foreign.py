@@ -9,16 +9,8 @@ import numpy as np
 import pytest
 
 from jeat_graph.benchmark.foreign import WorldJob, judge_world, recorded, worlds, worlds_table
-from jeat_graph.benchmark.foreign_scenes import (
-    CAR,
-    Route,
-    crossing,
-    is_red,
-    populate,
-    roundabout,
-    square,
-    street,
-)
+from jeat_graph.benchmark.foreign_routes import CAR, Route, crossing, roundabout, square, street
+from jeat_graph.benchmark.foreign_scenes import is_red, populate
 from jeat_graph.simulation.world.camera import CameraConfig
 from jeat_graph.simulation.world.truth import TruthConfig, look
 

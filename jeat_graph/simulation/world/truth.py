@@ -42,7 +42,7 @@ class TruthConfig:
             raise ConfigError("horizon_m: must not be less than range_m (m)")
 
 
-class Looked(Protocol):
+class Scenery(Protocol):
     """What can be looked at: the highway's `Scene`, or another."""
 
     @property
@@ -109,7 +109,7 @@ class Views:
         )
 
 
-def look(scene: Looked, times: FloatArray, config: TruthConfig) -> Views:
+def look(scene: Scenery, times: FloatArray, config: TruthConfig) -> Views:
     """Look at the scene at given times.
 
     Args:
@@ -124,7 +124,7 @@ def look(scene: Looked, times: FloatArray, config: TruthConfig) -> Views:
     return Views(times, *columns)
 
 
-def _look(scene: Looked, times: FloatArray, start: int, config: TruthConfig) -> tuple[npt.NDArray[Any], ...]:
+def _look(scene: Scenery, times: FloatArray, start: int, config: TruthConfig) -> tuple[npt.NDArray[Any], ...]:
     states = scene.states_at(times[start : start + _CHUNK], far_m=config.horizon_m)
     projected = project_boxes(states, scene.camera)
     centre = np.concatenate([states.pose[:, :2], states.size[:, 2:] / 2.0], axis=1)

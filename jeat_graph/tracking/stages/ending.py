@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.association.boxes import clip_boxes, track_boxes, visible_fraction
-from jeat_graph.association.merging import find_duplicates, overlapping_pairs, stands_apart
+from jeat_graph.association.merging import find_duplicates, known_to_be_two, overlapping_pairs, stands_apart
 from jeat_graph.config.kernel_form import Model, Settings
 from jeat_graph.config.schema import ImageConfig
 from jeat_graph.data.arrays import BoolArray, FloatArray
@@ -72,17 +72,11 @@ def remove_ended(tracks: TrackArrays, n: int, t: float, scene: SceneState, model
         )
         if merge.apart_overlap > 0.0:
             _note_apart(tracks, t, stands_apart(n, pairs, iou, merge.apart_overlap))
-        remove = find_duplicates(
-            pairs,
-            iou,
-            velocity,
-            velocity_var,
-            tracks.confirmed[:n],
-            tracks.t_birth[:n],
-            tracks.seen_apart[:n],
-            merge.min_overlap,
-            merge.gate_bound,
-        )
+        pairs = pairs[np.flatnonzero(iou >= merge.min_overlap)]
+        if len(pairs) > 0:
+            two = known_to_be_two(pairs, tracks.t_birth[:n], tracks.seen_apart[:n])
+            pairs = pairs[np.flatnonzero(~two)]
+            remove = find_duplicates(pairs, velocity, velocity_var, tracks.confirmed[:n], merge.gate_bound)
     rows = np.empty(n, dtype=np.int64)
     kept = 0
     for i in range(n):
