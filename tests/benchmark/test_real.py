@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from jeat_graph.benchmark import real
 from jeat_graph.benchmark.peer_cache import PeerCache, cache_key
 from jeat_graph.benchmark.real_copies import LEFT_OUT, MOVED, altered
 from jeat_graph.benchmark.recordings import JudgedRecording, simulated
@@ -138,3 +139,19 @@ def test_a_variation_is_judged_with_sensors_that_the_preset_does_not_know():
     record = judge_variation(("default", "with a third, poor detector", 0, 2.0))
     assert record["scores"]["truth_boxes"] > 0
     assert record["scenario"] == "with a third, poor detector"
+
+
+def test_other_worlds_are_judged_without_any_recording(tmp_path, capsys, monkeypatch):
+    few = [one for one in real.worlds() if one.name in ("roundabout", "square")]
+    monkeypatch.setattr(real, "worlds", lambda: few)
+    small = ["--no-peers", "--no-robustness", "--seeds", "3", "4", "--duration", "2", "--jobs", "1"]
+    assert main(["benchmark", "real", "--data", str(tmp_path), "--out", str(tmp_path), *small]) == 0
+    shown = capsys.readouterr().out
+    found = json.loads((tmp_path / "real.json").read_text())["worlds"]
+    assert {(r["world"], r["seed"], r["kind"]) for r in found} == {
+        (w.name, s, k) for w in few for s in (3, 4) for k in ("causal", "smoothed")
+    }
+    mota = [r["scores"]["MOTA"] for r in found if r["world"] == "square" and r["kind"] == "causal"]
+    assert f"{np.mean(mota):.1f}±{np.std(mota, ddof=1):.1f} /" in shown
+    assert main(["benchmark", "real", "--from", str(tmp_path / "real.json")]) == 0
+    assert capsys.readouterr().out == shown
