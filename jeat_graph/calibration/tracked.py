@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray
@@ -52,7 +54,7 @@ def follow(recordings: Sequence[Detections], config: Config) -> TrackedDetection
         output=replace(config.output, min_existence=0.0, max_gap_s=_REPORT_GAP_S, max_gap_scans=0.0),
     )
     names = config.sensor_names
-    cols: dict[str, list[FloatArray]] = {name: [] for name in ("t", "track", "sensor", "box")}
+    cols: dict[str, list[npt.NDArray[Any]]] = {name: [] for name in ("t", "track", "sensor", "box")}
     first_track = 0
     for detections in with_progress(recordings):
         with progress_span(0.0, 0.6):

@@ -1,8 +1,8 @@
 """What the tracker is told of a network: a file beside it, which holds what was measured of its boxes.
 
 Beside `NAME.onnx` it is `NAME.tracking.yaml`, with the section `sensor` (keys as of `sensors.NAME` in a
-configuration) and, if wanted, `birth: {max_overlap: …}` and `beside: SENSOR`,
-without which it does not count.
+configuration) and, if wanted, `birth: {max_overlap: …}`, `merge: {apart_overlap: …}` and `beside: SENSOR`:
+without that sensor only what its scores say of tracks counts.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR, FUSED_S
 from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION, network_file
 
 _SUFFIX = ".tracking.yaml"
+# What scores say of how tracks fit was measured of each sensor alone.
+_ALWAYS = "score_fit"
 _KINDS = {FRAMES_SENSOR: FRAMES, EVENTS_SENSOR: EVENTS, FUSED_SENSOR: FUSED}
 
 
@@ -28,17 +30,25 @@ class _Birth:
 
 
 @dataclass(frozen=True)
+class _Merge:
+    apart_overlap: float = number(
+        1.0, "1", "what was seen with an IoU of no more stays two; 0: its boxes may be two of one", 0.0, 1.0
+    )
+
+
+@dataclass(frozen=True)
 class _Declared:
     beside: str = ""
     sensor: SensorConfig = field(default_factory=SensorConfig)
     birth: _Birth = field(default_factory=_Birth)
+    merge: _Merge = field(default_factory=_Merge)
 
 
 def declared_settings(request: DetectRequest, say: Callable[[str], object] = lambda _: None) -> list[str]:
     """Return what files beside the networks say of them, as `key=value` settings of the tracker.
 
-    Of several `birth.max_overlap` the smallest counts. A network without such a file, and the detectors
-    without weights, say nothing.
+    Of several `birth.max_overlap` and `merge.apart_overlap` the smallest counts. A network without such a
+    file, and the detectors without weights, say nothing.
 
     Args:
         request: what detects.
@@ -68,6 +78,7 @@ def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lam
     """
     found: list[str] = []
     overlaps: list[float] = []
+    apart: list[float] = []
     for sensor, detector in detectors.items():
         if detector == MOTION:
             continue
@@ -81,12 +92,18 @@ def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lam
         except ConfigError as error:
             raise ConfigError(f"{path}: {error}") from None
         assert isinstance(declared, _Declared)
-        if declared.beside and declared.beside not in detectors:
-            continue
         facts = tree.get("sensor", {})
+        if declared.beside and declared.beside not in detectors:
+            facts = {key: value for key, value in facts.items() if key == _ALWAYS}
+            if not facts:
+                continue
+        else:
+            overlaps.append(declared.birth.max_overlap)
+        apart.append(declared.merge.apart_overlap)
         found += [f"sensors.{sensor}.{key}={json.dumps(value)}" for key, value in facts.items()]
-        overlaps.append(declared.birth.max_overlap)
         say(f"sensor {sensor!r}: its boxes are taken for what {path.name} says (any other --config: not)")
     if overlaps and min(overlaps) < 1.0:
         found.append(f"birth.max_overlap={min(overlaps)}")
+    if apart and min(apart) < 1.0:
+        found.append(f"merge.apart_overlap={min(apart)}")
     return found

@@ -17,6 +17,7 @@ def test_networks_of_the_package_are_declared_as_their_preset_declares_them(netw
     found, preset = load_config("default", declared_settings(asked, said.append)), load_config("sehn")
     assert found.sensors == preset.sensors
     assert found.birth.max_overlap == preset.birth.max_overlap
+    assert found.merge == preset.merge
     assert found.motion == load_config("default").motion
     assert [line.split(":")[0] for line in said] == ["sensor 'rgb'", "sensor 'evt'"]
 
@@ -26,7 +27,9 @@ def test_who_looks_at_nothing_or_has_no_weights_says_nothing():
     only = declared_settings(DetectRequest(frames="a", events="b", detector_events="sehn"))
     assert {line.split(".")[1] for line in only if line.startswith("sensors")} == {"evt"}
     # What is known of the events' boxes was found, and pays, beside pictures.
-    assert declared_settings(DetectRequest(events="b", detector_events="sehn")) == []
+    alone = declared_settings(DetectRequest(events="b", detector_events="sehn"))
+    # But for what their scores say of tracks, which was measured of each sensor alone.
+    assert [line.split("=")[0] for line in alone] == ["sensors.evt.score_fit", "merge.apart_overlap"]
 
 
 def test_a_network_of_ones_own(tmp_path):
@@ -36,7 +39,18 @@ def test_a_network_of_ones_own(tmp_path):
     beside = tmp_path / "mine.tracking.yaml"
     beside.write_text("sensor: {p_detect: 0.7}\n", encoding="utf-8")
     assert declared_settings(request) == ["sensors.rgb.p_detect=0.7"]
-    for wrong in ("sensor: {p_detekt: 0.7}", "sensors: {}", "sensor: 3", "sensor: {p_detect: 7}", "- 1"):
+    beside.write_text("sensor: {p_detect: 0.7, score_fit: [[0.1, 0.2], [0.9, 1]]}\nbeside: evt\n")
+    assert declared_settings(request) == ["sensors.rgb.score_fit=[[0.1, 0.2], [0.9, 1]]"]
+    beside.write_text("sensor: {p_detect: 0.7}\nbeside: evt\n")
+    assert declared_settings(request) == []
+    for wrong in (
+        "merge: {apart_overlap: 2}",
+        "sensor: {p_detekt: 0.7}",
+        "sensors: {}",
+        "sensor: 3",
+        "sensor: {p_detect: 7}",
+        "- 1",
+    ):
         beside.write_text(wrong + "\n", encoding="utf-8")
         with pytest.raises(ConfigError) as error:
             declared_settings(request)
