@@ -11,7 +11,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from jeat_graph.config.fields import number
+from jeat_graph.config.fields import Section, number
 from jeat_graph.config.section_tree import build, read_tree
 from jeat_graph.config.sensors import SensorConfig
 from jeat_graph.data.errors import ConfigError
@@ -25,12 +25,12 @@ _KINDS = {FRAMES_SENSOR: FRAMES, EVENTS_SENSOR: EVENTS, FUSED_SENSOR: FUSED}
 
 
 @dataclass(frozen=True)
-class _Birth:
+class _Birth(Section):
     max_overlap: float = number(1.0, "1", "a box that overlaps a track by more begins none", 0.0, 1.0)
 
 
 @dataclass(frozen=True)
-class _Merge:
+class _Merge(Section):
     apart_overlap: float = number(
         1.0, "1", "what was seen with an IoU of no more stays two; 0: its boxes may be two of one", 0.0, 1.0
     )
