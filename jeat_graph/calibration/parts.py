@@ -36,11 +36,11 @@ SENSOR_PARTS = {
 }
 #: The parts, in the order in which they are tried.
 PARTS = (*SENSOR_PARTS, _BIRTHS)
-#: What a change must gain (per cent) to be made: less is chance.
-LEAST_GAIN = 0.2
-#: As many standard errors, too: of two halves of a set of real recordings one gained two of them and the
-#: other lost as much.
-LEAST_ERRORS = 2.0
+# What a change must gain (per cent) to be made: less is chance.
+_LEAST_GAIN = 0.2
+# As many standard errors, too: of two halves of a set of real recordings one gained two of them and the
+# other lost as much.
+_LEAST_ERRORS = 2.0
 
 
 @dataclass(frozen=True)
@@ -135,14 +135,14 @@ def _choose(
     """Choose parts: leave some out of all where all together beat the base, else add some to none."""
     now, every = verdict(()), verdict(PARTS)
     kept: list[str] = []
-    if better(every, now, LEAST_GAIN, LEAST_ERRORS):
+    if better(every, now, _LEAST_GAIN, _LEAST_ERRORS):
         kept, now = list(PARTS), every
     choices = []
     for part in PARTS:
         turned = [one for one in PARTS if (one in kept) != (one == part)]
         other = verdict(turned)
         gain = (other.objective - now.objective) * (1.0 if part in turned else -1.0)
-        if better(other, now, LEAST_GAIN, LEAST_ERRORS):
+        if better(other, now, _LEAST_GAIN, _LEAST_ERRORS):
             kept, now = turned, other
         choices.append(PartChoice(part, part in kept, gain))
         progress(part)

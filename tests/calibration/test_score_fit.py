@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from jeat_graph.calibration import score_fit as module
 from jeat_graph.calibration.score_fit import SCORE_FIT, choose_score_fit, measure_score_fit
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Detections
 from jeat_graph.runs.declaring import fit_input
+from jeat_graph.tracking.whole import track
 
 GOOD, BAD = 0.8, 0.4
 
@@ -51,12 +53,25 @@ def test_scores_of_what_does_not_fit_are_found_and_rows_with_them_left_out(recor
     assert config.sensors["rgb"] == replace(base.sensors["rgb"], score_fit=config.sensors["rgb"].score_fit)
 
 
-def test_scores_that_say_nothing_change_nothing(recordings, base):
-    """Ghosts and vehicles have the same score: whatever is measured of it hides no row."""
+def test_scores_that_say_nothing_hide_nothing(recordings, base):
+    """Ghosts and vehicles have the same score."""
     seen = with_ghosts(recordings, 2, low=GOOD)
     config, choice = choose_score_fit(base, seen)
     assert choice is not None
+    assert choice.gain == pytest.approx(0.0, abs=1e-9)
+    for detections, _ in seen:
+        assert len(track(config, detections)) == len(track(base, detections))
+
+
+def test_what_loses_on_other_recordings_is_not_kept(recordings, base, monkeypatch):
+    """Measured from recordings whose scores mean the opposite."""
+    knots = ((BAD, 0.1), (GOOD, 0.2))
+    wrong = replace(base, sensors={"rgb": replace(base.sensors["rgb"], score_fit=knots)})
+    monkeypatch.setattr(module, "measure_score_fit", lambda config, recordings: wrong)
+    config, choice = choose_score_fit(base, with_ghosts(recordings, 4))
+    assert choice is not None
     assert not choice.kept
+    assert choice.gain < -1.0
     assert config == base
 
 
