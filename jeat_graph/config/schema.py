@@ -23,9 +23,9 @@ from jeat_graph.config.lifecycle import (
     BirthConfig,
     LifecycleConfig,
     MergeConfig,
-    OutputConfig,
 )
 from jeat_graph.config.live import LiveConfig
+from jeat_graph.config.output import OutputConfig
 from jeat_graph.config.sensors import InputConfig, SensorConfig
 from jeat_graph.config.smoothing import SmootherConfig
 from jeat_graph.data.errors import ConfigError

@@ -57,6 +57,4 @@ def test_what_cannot_be_told_is_one_line(command, boxes, tmp_path, fails):
     assert "nonsense" in fails(*begin, "--detector-frames", "nonsense")
     bare = str(tmp_path / "bare.onnx")
     assert "--detector-frames: nothing beside the network" in fails(*begin, "--detector-frames", bare)
-    # Events' boxes are known beside those of pictures only.
-    assert "--detector-events: nothing" in fails(*begin, "--detector-events", "sehn")
     assert not (tmp_path / "run").exists()
