@@ -104,10 +104,14 @@ def worlds() -> list[World]:
     ]
 
 
+def _world(name: str) -> World:
+    return next(one for one in worlds() if one.name == name)
+
+
 @lru_cache(maxsize=4)
 def recorded(name: str, seed: int, duration_s: float) -> JudgedRecording:
     """Record a world; the same arguments give the same bytes."""
-    world = next(one for one in worlds() if one.name == name)
+    world = _world(name)
     scene = populate(seed, duration_s, world.routes(), world.camera)
     picture = (float(world.camera.width), float(world.camera.height))
     parts: list[Detections] = []
@@ -150,7 +154,7 @@ def judge_world(job: WorldJob) -> list[dict[str, Any]]:
     from jeat_graph.eval.baselines import judge_baseline
 
     recording = recorded(job.name, job.seed, job.duration_s)
-    sensors = tuple(next(one for one in worlds() if one.name == job.name).sensors)
+    sensors = tuple(_world(job.name).sensors)
     one = RealSet(job.name, sensors, (recording,))
     row = judge_row(OursOnSet(DEFAULT, sensors), one)
     found = [_record(job, DEFAULT, kind, row[kind]) for kind in ("causal", "smoothed")]

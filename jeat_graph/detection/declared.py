@@ -77,8 +77,7 @@ def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lam
         ConfigError: a detector that is not known, or a file that cannot be read or holds something else.
     """
     found: list[str] = []
-    overlaps: list[float] = []
-    apart: list[float] = []
+    least = {"birth.max_overlap": 1.0, "merge.apart_overlap": 1.0}
     for sensor, detector in detectors.items():
         if detector == MOTION:
             continue
@@ -98,12 +97,8 @@ def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lam
             if not facts:
                 continue
         else:
-            overlaps.append(declared.birth.max_overlap)
-        apart.append(declared.merge.apart_overlap)
+            least["birth.max_overlap"] = min(least["birth.max_overlap"], declared.birth.max_overlap)
+        least["merge.apart_overlap"] = min(least["merge.apart_overlap"], declared.merge.apart_overlap)
         found += [f"sensors.{sensor}.{key}={json.dumps(value)}" for key, value in facts.items()]
         say(f"sensor {sensor!r}: its boxes are taken for what {path.name} says (any other --config: not)")
-    if overlaps and min(overlaps) < 1.0:
-        found.append(f"birth.max_overlap={min(overlaps)}")
-    if apart and min(apart) < 1.0:
-        found.append(f"merge.apart_overlap={min(apart)}")
-    return found
+    return found + [f"{key}={value}" for key, value in least.items() if value < 1.0]

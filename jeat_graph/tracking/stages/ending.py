@@ -61,12 +61,6 @@ def remove_ended(tracks: TrackArrays, n: int, t: float, scene: SceneState, model
     image, lifecycle, merge = settings.image, settings.lifecycle, settings.merge
     remove = np.zeros(n, dtype=np.bool_)
     if merge.enabled and n > 1:
-        velocity = np.empty((n, 2))
-        velocity_var = np.empty((n, 2))
-        for i in range(n):
-            for axis in range(2):
-                velocity[i, axis] = tracks.mean[i, axis, 1]
-                velocity_var[i, axis] = tracks.cov[i, axis, 1, 1]
         pairs, iou = overlapping_pairs(
             clip_boxes(boxes, image.width, image.height) if image.edge_px > 0.0 else boxes
         )
@@ -76,6 +70,12 @@ def remove_ended(tracks: TrackArrays, n: int, t: float, scene: SceneState, model
         if len(pairs) > 0:
             two = known_to_be_two(pairs, tracks.t_birth[:n], tracks.seen_apart[:n])
             pairs = pairs[np.flatnonzero(~two)]
+            velocity = np.empty((n, 2))
+            velocity_var = np.empty((n, 2))
+            for i in range(n):
+                for axis in range(2):
+                    velocity[i, axis] = tracks.mean[i, axis, 1]
+                    velocity_var[i, axis] = tracks.cov[i, axis, 1, 1]
             remove = find_duplicates(pairs, velocity, velocity_var, tracks.confirmed[:n], merge.gate_bound)
     rows = np.empty(n, dtype=np.int64)
     kept = 0
