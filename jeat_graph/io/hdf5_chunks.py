@@ -13,6 +13,11 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+try:
+    from zlib_ng import zlib_ng
+except ImportError:  # an extra
+    zlib_ng = None
+
 _DEFLATE, _SHUFFLE = 1, 2  # H5Z_FILTER_DEFLATE, H5Z_FILTER_SHUFFLE
 
 
@@ -25,11 +30,7 @@ def read_chunks(data: Any, first: int, end: int) -> npt.NDArray[Any] | None:
     Raises:
         OSError: a chunk is damaged; as the library.
     """
-    try:
-        from zlib_ng import zlib_ng
-    except ImportError:
-        return None
-    if not _whole_chunks(data, first, end):
+    if zlib_ng is None or not _whole_chunks(data, first, end):
         return None
     rows, shuffled = data.chunks[0], bool(data.shuffle)
     out = np.empty(end - first, dtype=data.dtype)

@@ -102,7 +102,7 @@ def train(
     log, plot = request.out.with_suffix(".csv"), request.out.with_suffix(".png")
     checkpoint = request.out.with_suffix(".checkpoint")
     device = _device(request.device)
-    _check_held(request)
+    _check_fused(request)
     members = _read(request, request.data)
     split = _asking_far(request, split_by_segment(members, request.data))
     side = request.side or _side(members[0])
@@ -173,9 +173,15 @@ def bring_to_int8(source: Path, request: TrainRequest) -> int:
         return write_int8(sized, split.learned, about, request.out)
 
 
-def _check_held(request: TrainRequest) -> None:
-    """Refuse to hold what nothing was put into."""
-    if request.net.kind != FUSED or not request.settings.fused.hold_pictures:
+def _check_fused(request: TrainRequest) -> None:
+    """Refuse to hold what nothing was put into, and what has no meaning for a network of both sensors."""
+    if request.net.kind != FUSED:
+        return
+    if request.settings.pictures.clutter_share > 0.0:
+        raise ConfigError(
+            "pictures.clutter_share: shapes are drawn for networks of pictures alone; events would not show them"
+        )
+    if not request.settings.fused.hold_pictures:
         return
     if not any(settings_of(path).kind in (FRAMES, FUSED) for path in request.start):
         raise ConfigError(

@@ -261,3 +261,9 @@ def test_what_pictures_taught_can_be_held(small_set, tmp_path):
     request = TrainRequest((small_set,), tmp_path / "f.onnx", NET, settings)
     with pytest.raises(ConfigError, match="hold_pictures"):
         train(request)
+
+
+def test_shapes_that_no_event_would_show_are_refused(small_set, tmp_path):
+    settings = TrainSettings(pictures=PictureChanges(clutter_share=0.5))
+    with pytest.raises(ConfigError, match="clutter_share"):
+        train(TrainRequest((small_set,), tmp_path / "f.onnx", NET, settings))
