@@ -17,8 +17,10 @@ class Expected(NamedTuple):
     """What N tracks are expected to show S sensors.
 
     Attributes:
-        position: (N, S, 2) expected centre of a detection of sensor s on track i (px).
-        position_var: (N, S, 2) its variances, before the detection's white noise (px²).
+        position: (N, S, 2) expected centre of a detection of sensor s on track i (px), but for what lasts.
+        position_var: (N, S, 2) its variances, before the detection's noise (px²).
+        lasting: (N, S, 2, 3) what a lasting error of the sensor adds at spread 1: to the centre (px), twice
+            its covariance with the centre and its variance (px²).
         noise: (N, S, 2) variances of that noise, at weight 1 (px²).
         log_size: (N, 2) predicted ln width, ln height.
         log_size_var: (N, 2) their variances.
@@ -28,6 +30,7 @@ class Expected(NamedTuple):
 
     position: FloatArray
     position_var: FloatArray
+    lasting: FloatArray
     noise: FloatArray
     log_size: FloatArray
     log_size_var: FloatArray
@@ -42,6 +45,7 @@ class Found(NamedTuple):
         z: (M, 2) detected centres (px).
         log_size: (M, 2) detected ln width, ln height.
         weight: (M,) factor on a detection's measurement variance (g of the paper).
+        spread: (M,) factor on all standard deviations of its noise.
         sensor: (M,) sensor of each detection, 0 … S − 1.
         cut: (M, 2) which sides the edges of the picture cut, along x and y (`filters.cut_boxes`).
         side: (M, 2) coordinate of the side that shows where one is cut (px).
@@ -50,6 +54,7 @@ class Found(NamedTuple):
     z: FloatArray
     log_size: FloatArray
     weight: FloatArray
+    spread: FloatArray
     sensor: IntArray
     cut: IntArray
     side: FloatArray
@@ -125,8 +130,8 @@ def _fill(
     A function of its own, because arrays that may be replaced inside the loop make it five times slower.
     """
     rows, cols, d2, log_density, log_size_density = pairs
-    position, position_var, noise, log_size, log_size_var, size_noise, last_cut = expected
-    z, z_log_size, weight, sensor, cut, side = found
+    position, position_var, lasting, noise, log_size, log_size_var, size_noise, last_cut = expected
+    z, z_log_size, weight, spread, sensor, cut, side = found
     num_tracks = position.shape[0]
     num_dets = z.shape[0]
     capacity = len(rows)
@@ -136,7 +141,8 @@ def _fill(
     order = np.argsort(z[:, 0], kind="mergesort")
     x_sorted = z[order, 0]
     y_sorted = z[order, 1]
-    heaviest = np.max(weight)
+    narrowest, widest = np.min(spread), np.max(spread)
+    heaviest = np.max(weight) * widest * widest
     constants = log_constants(likelihood.freedom)
     unseen_density = -math.log(likelihood.log_size_range)
     longest, low, high = np.empty(2), np.empty(2), np.empty(2)
@@ -148,11 +154,15 @@ def _fill(
             # The middle of the part that shows lies within half a size of the centre.
             reach, more = _reach(longest[axis], log_size[i, axis], log_size_var[i, axis])
             for s in range(noise.shape[1]):
+                parts = lasting[i, s, axis]
+                shift, shared, own = parts[0], parts[1], parts[2]
                 var = position_var[i, s, axis] + noise[i, s, axis] * heaviest + more
+                var += max(shared, 0.0) * widest + min(shared, 0.0) * narrowest + own * widest * widest
                 # A hair wider than any gate, so that rounding never decides here.
                 half = 1.000001 * math.sqrt(gate * var) + reach
-                low[axis] = min(low[axis], position[i, s, axis] - half)
-                high[axis] = max(high[axis], position[i, s, axis] + half)
+                near, far = position[i, s, axis] + shift * narrowest, position[i, s, axis] + shift * widest
+                low[axis] = min(low[axis], min(near, far) - half)
+                high[axis] = max(high[axis], max(near, far) + half)
         right, top, bottom = high[0], low[1], high[1]
         k = np.searchsorted(x_sorted, low[0])
         first = count
@@ -166,8 +176,10 @@ def _fill(
             distance, det = 0.0, 1.0
             # y first: the detections are sorted by x, so that it rules out more of what is left.
             for axis in (1, 0):
-                where, var = position[i, s, axis], position_var[i, s, axis]
-                white = noise[i, s, axis] * weight[j]
+                f, parts = spread[j], lasting[i, s, axis]
+                where = position[i, s, axis] + f * parts[0]
+                var = position_var[i, s, axis] + f * parts[1] + f * f * parts[2]
+                white = noise[i, s, axis] * weight[j] * f * f
                 off, S = z[j, axis] - where, var + white
                 if cut[j, axis] != WHOLE:
                     known = log_size[i, axis], log_size_var[i, axis]
@@ -189,7 +201,7 @@ def _fill(
                 if cut[j, axis] and e <= 0.0:
                     continue  # the rest of the vehicle is outside
                 seen += 1
-                V = log_size_var[i, axis] + size_noise[s, axis]
+                V = log_size_var[i, axis] + spread[j] * spread[j] * size_noise[s, axis]
                 size_distance += e * e / V
                 size_det *= V
             if size_distance > size_gate:

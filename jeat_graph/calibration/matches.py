@@ -35,6 +35,7 @@ class SensorMatches:
         key: (C, 2) sequence and object of each correct one.
         t: (C,) time (s).
         box: (C, 4) the detected box (px).
+        hit_score: (C,) its score.
         seen: (G,) for each true box in view of a scan, whether it was detected.
         speed: (G,) its image speed (px/s), NaN where not known.
         visible: (G,) the part of it that no nearer vehicle hides, by the rule of the tracker.
@@ -48,6 +49,7 @@ class SensorMatches:
     key: IntArray
     t: FloatArray
     box: FloatArray
+    hit_score: FloatArray
     seen: BoolArray
     speed: FloatArray
     visible: FloatArray
@@ -77,7 +79,8 @@ class SensorMatches:
             ],
             dtype=bool,
         )
-        rows = {name: getattr(self, name)[whole] for name in ("residual", "side", "key", "t", "box")}
+        columns = ("residual", "side", "key", "t", "box", "hit_score")
+        rows = {name: getattr(self, name)[whole] for name in columns}
         return replace(self, **rows)
 
 
@@ -132,6 +135,7 @@ def match_sensor(detections: Detections, truth: GroundTruth, sensor: str, sequen
         columns["key"].append(np.column_stack([np.full(len(g), sequence), ids[g]]))
         columns["t"].append(np.full(len(g), scan.t))
         columns["box"].append(found)
+        columns["hit_score"].append(scan.scores[good])
         columns["seen"].append(seen[~ignored])
         columns["speed"].append(speed[~ignored])
         visible = 1.0 - occluded_fraction(boxes, np.ones(len(boxes)))

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.calibration.matches import SensorMatches
+from jeat_graph.calibration.score_noise import factors
 from jeat_graph.config.kernel_form import error_states
 from jeat_graph.config.schema import SensorConfig
 from jeat_graph.data.arrays import FloatArray, IntArray
@@ -75,7 +76,8 @@ def measured_tracks(
     side = box[:, 2:]
     size = np.sqrt(side.prod(axis=1))
     of_axis = np.vectorize(base_variance, otypes=[float])
-    variance = of_axis(sigma[:, None], rho, side, rho_size[:, None], size[:, None])
+    by_score = np.concatenate([factors(m.hit_score, s.score_noise) for m, s in parts])[:, None] ** 2
+    variance = by_score * of_axis(sigma[:, None], rho, side, rho_size[:, None], size[:, None])
 
     def sort(column: npt.NDArray[Any]) -> npt.NDArray[Any]:
         return np.ascontiguousarray(column[order])
@@ -90,7 +92,7 @@ def measured_tracks(
         side=sort(size),
         start=start,
         log_size=sort(np.log(side) - bias[:, 2:]),
-        log_size_var=sort(log_sigma**2),
+        log_size_var=sort(by_score * log_sigma**2),
     )
 
 
@@ -99,6 +101,5 @@ def _one_a_period(m: SensorMatches) -> SensorMatches:
     period = np.floor(m.t / _PERIOD_S + 1e-6).astype(np.int64)
     first = np.unique(np.column_stack([m.key, period]), axis=0, return_index=True)[1]
     rows = np.sort(first)
-    return replace(
-        m, key=m.key[rows], t=m.t[rows], box=m.box[rows], residual=m.residual[rows], side=m.side[rows]
-    )
+    columns = ("key", "t", "box", "residual", "side", "hit_score")
+    return replace(m, **{name: getattr(m, name)[rows] for name in columns})

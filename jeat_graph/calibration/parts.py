@@ -32,6 +32,7 @@ SENSOR_PARTS = {
         "bias_std",
     ),
     _SIZE: ("sigma_log_width", "sigma_log_height"),
+    "noise by score": ("score_noise",),
     "reliability": ("p_detect", "clutter_per_scan", "precision", "score_precision", "blind_speed"),
 }
 #: The parts, in the order in which they are tried.

@@ -30,7 +30,7 @@ def rounded(config: Config, digits: int = _DIGITS) -> Config:
 def _section(section: Any, digits: int) -> Any:
     values = {f.name: _value(getattr(section, f.name), digits) for f in fields(section)}
     # Scores may crowd near 1; the knots are rounded where they are made, and stay apart.
-    for knots in ("score_precision", "score_fit"):
+    for knots in ("score_precision", "score_fit", "score_noise"):
         values.pop(knots, None)
     return replace(section, **values)
 

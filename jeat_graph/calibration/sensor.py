@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import isotonic_regression, minimize, minimize_scalar
 
 from jeat_graph.calibration.matches import SensorMatches
 from jeat_graph.calibration.memory import fit_memory
+from jeat_graph.calibration.score_noise import factors, fit_score_noise
 from jeat_graph.config.schema import SensorConfig
 from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.errors import DataError
 
 _MIN_PAIRS = 20
 _MAX_KNOTS = 12
+_ROUNDS = 4
 # A vehicle of which this part is free counts as in full view.
 _IN_VIEW = 0.9
 
@@ -37,31 +40,34 @@ def calibrate_sensor(matches: SensorMatches, known: SensorConfig) -> SensorConfi
         raise DataError(f"only {found}; at least {_MIN_PAIRS} are needed")
     bias = np.median(matches.residual, axis=0)
     centred = matches.residual - bias
-    sigma_x, rho_x = fit_noise(centred[:, 0] * matches.side[:, 0], matches.side[:, 0])
-    sigma_y, rho_y = fit_noise(centred[:, 1] * matches.side[:, 1], matches.side[:, 1])
-    # One floor for both axes; each axis' own part goes with its side.
-    sigma = float(max(np.sqrt(0.5 * (sigma_x**2 + sigma_y**2)), 0.1))
-    # The shape is that of the bulk; the scale is that of all, for the filter has no other word for the tails.
-    bulk = np.hypot(sigma, np.array([rho_x, rho_y]) * matches.side)
-    tails = np.sqrt(np.mean((centred[:, :2] * matches.side / bulk) ** 2, axis=0))
-    sigma = float(max(sigma * np.sqrt(np.mean(tails**2)), 0.1))
-    rho_x, rho_y = float(min(rho_x * tails[0], 1.0)), float(min(rho_y * tails[1], 1.0))
-    spread = np.hypot(sigma, np.array([rho_x, rho_y]) * matches.side)
-    share, memory = fit_memory(centred[:, :2] * matches.side / spread, matches.key, matches.t)
+    # Small boxes have low scores: what is due to which is told apart by turns, which settles fast.
+    knots: tuple[tuple[float, float], ...] = ()
+    for _ in range(_ROUNDS):
+        by_score = factors(matches.hit_score, knots)[:, None]
+        noise = _fit_box_noise(centred / by_score, matches.side)
+        # Errors in units of the noise without scores.
+        knots = fit_score_noise(matches.hit_score, _whitened(centred, matches.side, noise))
+        if not knots:
+            noise = _fit_box_noise(centred, matches.side)
+            break
+    by_score = factors(matches.hit_score, knots)[:, None]
+    white = _whitened(centred / by_score, matches.side, noise)
+    share, memory = fit_memory(white[:, :2], matches.key, matches.t)
     p_detect, blind = fit_detection(matches.seen, matches.speed, matches.visible)
     precision = np.clip((correct + 0.5) / (len(matches.correct) + 1.0), 0.001, 0.999)
     false = ~matches.correct
     return replace(
         known,
-        sigma_px=sigma,
-        rho_x=rho_x,
-        rho_y=rho_y,
+        sigma_px=noise.sigma_px,
+        rho_x=noise.rho[0],
+        rho_y=noise.rho[1],
         # What goes with sqrt(w h) is in the parts that go with the sides.
         rho_size=0.0,
         correlated_share=share,
         memory_s=memory,
-        sigma_log_width=float(max(np.sqrt(np.mean(centred[:, 2] ** 2)), 0.005)),
-        sigma_log_height=float(max(np.sqrt(np.mean(centred[:, 3] ** 2)), 0.005)),
+        sigma_log_width=noise.log_size[0],
+        sigma_log_height=noise.log_size[1],
+        score_noise=knots,
         bias=(float(bias[0]), float(bias[1]), float(bias[2]), float(bias[3])),
         # With truth it is known, and nothing is left to be learnt.
         bias_std=0.0,
@@ -71,6 +77,37 @@ def calibrate_sensor(matches: SensorMatches, known: SensorConfig) -> SensorConfi
         score_precision=fit_precision(matches.score, matches.correct),
         blind_speed=blind,
     )
+
+
+class _BoxNoise(NamedTuple):
+    """Noise of boxes: σ (px), ρ of both axes, and the standard deviations of ln width and ln height."""
+
+    sigma_px: float
+    rho: tuple[float, float]
+    log_size: tuple[float, float]
+
+
+def _fit_box_noise(residual: FloatArray, side: FloatArray) -> _BoxNoise:
+    """Fit the noise to errors without bias (C, 4), as `SensorMatches.residual`, of boxes of sides (C, 2)."""
+    sigma_x, rho_x = fit_noise(residual[:, 0] * side[:, 0], side[:, 0])
+    sigma_y, rho_y = fit_noise(residual[:, 1] * side[:, 1], side[:, 1])
+    # One floor for both axes; each axis' own part goes with its side.
+    sigma = float(max(np.sqrt(0.5 * (sigma_x**2 + sigma_y**2)), 0.1))
+    # The shape is that of the bulk; the scale is that of all, for the filter has no other word for the tails.
+    bulk = np.hypot(sigma, np.array([rho_x, rho_y]) * side)
+    tails = np.sqrt(np.mean((residual[:, :2] * side / bulk) ** 2, axis=0))
+    log_size = np.maximum(np.sqrt(np.mean(residual[:, 2:] ** 2, axis=0)), 0.005)
+    return _BoxNoise(
+        float(max(sigma * np.sqrt(np.mean(tails**2)), 0.1)),
+        (float(min(rho_x * tails[0], 1.0)), float(min(rho_y * tails[1], 1.0))),
+        (float(log_size[0]), float(log_size[1])),
+    )
+
+
+def _whitened(residual: FloatArray, side: FloatArray, noise: _BoxNoise) -> FloatArray:
+    """Errors (C, 4) in units of their standard deviations."""
+    spread = np.hypot(noise.sigma_px, np.array(noise.rho) * side)
+    return np.hstack([residual[:, :2] * side / spread, residual[:, 2:] / np.array(noise.log_size)])
 
 
 def robust_std(values: FloatArray) -> float:

@@ -18,8 +18,8 @@ from jeat_graph.config.schema import Config, SensorConfig
 from jeat_graph.data.arrays import FloatArray, IntArray
 
 _SCALARS = (bool, int, float)
-# Of a sensor whose scores say nothing of how boxes fit.
-_ALWAYS_FITS = ((0.0, 1.0),)
+# Of a sensor whose scores say nothing of how boxes fit, or of how exact they are.
+_ALWAYS_ONE = ((0.0, 1.0),)
 
 
 def _members(section: type[Any]) -> dict[str, type[Any]]:
@@ -87,6 +87,8 @@ class SensorArrays(NamedTuple):
         curve_precision: (S, K) its values.
         fit_score: (S, K) knots of the probability that the box of a track with such a detection fits.
         fit_share: (S, K) its values; 1 where scores say nothing of it.
+        noise_score: (S, K) knots of how exact a box of a score is.
+        noise_factor: (S, K) its values: factors on standard deviations; 1 where scores say nothing of it.
         tempering: (S,) exponent on evidence.
         blind_speed: (S,) px/s.
         least_overlap: (S,) least IoU with a track that another sensor has seen; 0: any.
@@ -111,6 +113,8 @@ class SensorArrays(NamedTuple):
     curve_precision: FloatArray
     fit_score: FloatArray
     fit_share: FloatArray
+    noise_score: FloatArray
+    noise_factor: FloatArray
     tempering: FloatArray
     blind_speed: FloatArray
     least_overlap: FloatArray
@@ -154,7 +158,8 @@ def sensor_arrays(config: Config) -> SensorArrays:
     """Collect the parameters of the sensors into arrays, in the order of `config.sensor_names`."""
     sensors = [config.sensors[name] for name in config.sensor_names]
     score, precision = _padded([s.score_precision for s in sensors])
-    fit_score, fit_share = _padded([s.score_fit or _ALWAYS_FITS for s in sensors])
+    fit_score, fit_share = _padded([s.score_fit or _ALWAYS_ONE for s in sensors])
+    noise_score, noise_factor = _padded([s.score_noise or _ALWAYS_ONE for s in sensors])
     error, correlation_time_s = error_states(sensors)
     same = {
         name: np.array([getattr(s, name) for s in sensors], dtype=np.float64)
@@ -175,6 +180,8 @@ def sensor_arrays(config: Config) -> SensorArrays:
         curve_precision=precision,
         fit_score=fit_score,
         fit_share=fit_share,
+        noise_score=noise_score,
+        noise_factor=noise_factor,
         disagreement=power,
         prior_trust=lifecycle.agreement_prior**power,
     )

@@ -8,6 +8,9 @@ from dataclasses import dataclass, field
 from jeat_graph.config.fields import LARGEST, Section, choice, number
 from jeat_graph.data.errors import ConfigError
 
+#: A score never says that a box is more exact, or less, than this against what its sensor's usually are.
+LEAST_FACTOR, MOST_FACTOR = 0.1, 10.0
+
 
 @dataclass(frozen=True)
 class SensorConfig(Section):
@@ -55,6 +58,13 @@ class SensorConfig(Section):
             "sees it: (score, probability) knots, both rising; none: its scores say nothing of that"
         },
     )
+    score_noise: tuple[tuple[float, float], ...] = field(
+        default=(),
+        metadata={
+            "doc": "how exact a box of this score is: (score, factor on standard deviations of its noise) "
+            "knots, scores rising, factors falling; none: its scores say nothing of that"
+        },
+    )
     tempering: float = number(
         0.4, "1", "exponent on evidence, below 1 where false boxes repeat in time", 0.01, 1.0
     )
@@ -93,6 +103,14 @@ class SensorConfig(Section):
             rising = all(b[0] > a[0] and b[1] >= a[1] for a, b in itertools.pairwise(knots))
             if not (inside and rising):
                 raise ConfigError(f"{name}: scores must rise, {what} must not fall, all in [0, 1]")
+        factors = self.score_noise
+        inside = all(0 <= s <= 1 and LEAST_FACTOR <= f <= MOST_FACTOR for s, f in factors)
+        falling = all(b[0] > a[0] and b[1] <= a[1] for a, b in itertools.pairwise(factors))
+        if not (inside and falling):
+            raise ConfigError(
+                "score_noise: scores must rise in [0, 1], factors must not rise, "
+                f"from {MOST_FACTOR:g} to {LEAST_FACTOR:g}"
+            )
 
 
 @dataclass(frozen=True)

@@ -54,6 +54,7 @@ class Batch(NamedTuple):
         log_score: (M,) ln of the score's likelihood ratio.
         score_odds: (M,) log odds of the score itself.
         weight: (M,) factor on the measurement variance (g of the paper).
+        spread: (M,) factor on all standard deviations of its noise, by its score.
         sensor: (M,) sensor index.
         present: (S,) which sensors looked, including those that found nothing.
         cut: (M, 2) which sides the edges of the picture cut, along x and y (`filters.cut_boxes`).
@@ -71,6 +72,7 @@ class Batch(NamedTuple):
     log_score: FloatArray
     score_odds: FloatArray
     weight: FloatArray
+    spread: FloatArray
     sensor: IntArray
     present: BoolArray
     cut: IntArray
@@ -150,6 +152,7 @@ def prepare(arrivals: Arrivals, offsets: FloatArray, model: Model) -> Batch:
     log_score = np.empty(num)
     odds = np.empty(num)
     weight = np.empty(num)
+    spread = np.empty(num)
     cut = np.zeros((num, 2), dtype=np.int64)
     seen_side = np.zeros((num, 2))
     for j in range(num):
@@ -180,5 +183,6 @@ def prepare(arrivals: Arrivals, offsets: FloatArray, model: Model) -> Batch:
         log_score[j] = log_score_ratio(precision[j], sensors.precision[s])
         odds[j] = score_odds(scores[j])
         weight[j] = score_weight(scores[j], noise.score_floor) if noise.score_weighting else 1.0
-    found = z, log_size, plain, corrected, precision, fit, log_score, odds, weight
+        spread[j] = interpolate(scores[j], sensors.noise_score[s], sensors.noise_factor[s])
+    found = z, log_size, plain, corrected, precision, fit, log_score, odds, weight, spread
     return Batch(arrivals.t, *found, sensor, arrivals.present, cut, seen_side, arrivals.alike)

@@ -179,7 +179,7 @@ def _check_fused(request: TrainRequest) -> None:
         return
     if request.settings.pictures.clutter_share > 0.0:
         raise ConfigError(
-            "pictures.clutter_share: shapes are drawn for networks of pictures alone; events would not show them"
+            "pictures.clutter_share: shapes are drawn for networks of pictures alone; no event shows them"
         )
     if not request.settings.fused.hold_pictures:
         return

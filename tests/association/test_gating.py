@@ -15,9 +15,14 @@ NORMAL = Likelihood(0.0, 3.0)
 
 def random_scene(rng, tracks, dets, sensors=2, width=300.0):
     """Arguments of `gated_pairs` up to the gates."""
+    lasting_std = rng.uniform(0.5, 5.0, (tracks, sensors, 2))
+    position_var = rng.uniform(1.0, 60.0, (tracks, sensors, 2))
+    shared = rng.uniform(-0.9, 0.9, (tracks, sensors, 2)) * lasting_std * np.sqrt(position_var)
+    lasting = np.stack([rng.normal(0.0, 4.0, shared.shape), 2.0 * shared, lasting_std**2], axis=-1)
     expected = Expected(
         rng.uniform(0.0, width, (tracks, 1, 2)) + rng.normal(0.0, 2.0, (tracks, sensors, 2)),
-        rng.uniform(1.0, 60.0, (tracks, sensors, 2)),
+        position_var,
+        lasting,
         rng.uniform(1.0, 30.0, (tracks, sensors, 2)),
         rng.normal(4.0, 0.3, (tracks, 2)),
         rng.uniform(0.001, 0.05, (tracks, 2)),
@@ -28,6 +33,7 @@ def random_scene(rng, tracks, dets, sensors=2, width=300.0):
         rng.uniform(0.0, width, (dets, 2)),
         rng.normal(4.0, 0.3, (dets, 2)),
         rng.uniform(1.0, 10.0, dets),
+        rng.uniform(0.2, 3.0, dets),
         rng.integers(0, sensors, dets),
         np.zeros((dets, 2), dtype=np.int64),
         np.zeros((dets, 2)),
@@ -36,17 +42,19 @@ def random_scene(rng, tracks, dets, sensors=2, width=300.0):
 
 
 def all_pairs(expected, found, _, gate, size_gate):
-    position, var, noise, log_size, size_var, size_noise, _ = expected
-    z, z_size, weight, sensor, _, _ = found
+    position, var, lasting, noise, log_size, size_var, size_noise, _ = expected
+    z, z_size, weight, spread, sensor, _, _ = found
     out = []
     for i in range(len(position)):
         for j in range(len(z)):
-            S = var[i, sensor[j]] + noise[i, sensor[j]] * weight[j]
-            d2 = ((z[j] - position[i, sensor[j]]) ** 2 / S).sum()
-            V = size_var[i] + size_noise[sensor[j]]
+            s, f = sensor[j], spread[j]
+            centre = position[i, s] + f * lasting[i, s, :, 0]
+            S = var[i, s] + f * lasting[i, s, :, 1] + f**2 * (lasting[i, s, :, 2] + noise[i, s] * weight[j])
+            d2 = ((z[j] - centre) ** 2 / S).sum()
+            V = size_var[i] + f**2 * size_noise[s]
             size_d2 = ((z_size[j] - log_size[i]) ** 2 / V).sum()
             if d2 <= gate and size_d2 <= size_gate:
-                density = multivariate_normal.logpdf(z[j], position[i, sensor[j]], np.diag(S))
+                density = multivariate_normal.logpdf(z[j], centre, np.diag(S))
                 size_density = multivariate_normal.logpdf(z_size[j], log_size[i], np.diag(V))
                 out.append((i, j, d2, density, size_density))
     return out
@@ -83,11 +91,11 @@ def test_more_pairs_than_rows_and_columns_are_all_kept():
 
 
 def test_a_detection_on_the_gate_is_inside():
-    one, flat = np.ones((1, 2)), np.zeros((1, 2))
+    one, flat, none = np.ones((1, 2)), np.zeros((1, 2)), np.zeros((1, 2), dtype=np.int64)
     z = np.array([[6.0, 0.0]])
     arguments = (
-        Expected(flat[None], one[None], np.ones((1, 1, 2)), flat, one, one, np.zeros((1, 2), dtype=np.int64)),
-        Found(z, flat, np.ones(1), np.zeros(1, dtype=np.int64), np.zeros((1, 2), dtype=np.int64), flat),
+        Expected(flat[None], one[None], np.zeros((1, 1, 2, 3)), one[None], flat, one, one, none),
+        Found(z, flat, np.ones(1), np.ones(1), none[0, :1], none, flat),
         NORMAL,
     )
     assert len(gated_pairs(*arguments, 18.0, np.inf)[0]) == 1
@@ -112,6 +120,7 @@ def one_cut(cut, side, shown, centre=100.0, width=80.0, size_var=0.04, last_cut=
     track = Expected(
         np.array([[[centre, 50.0]]]),
         np.full((1, 1, 2), position_var),
+        np.zeros((1, 1, 2, 3)),
         np.full((1, 1, 2), 5.0),
         np.log([[width, 40.0]]),
         np.full((1, 2), size_var),
@@ -122,6 +131,7 @@ def one_cut(cut, side, shown, centre=100.0, width=80.0, size_var=0.04, last_cut=
     found = Found(
         np.array([[middle, 50.0]]),
         np.log([[shown, 40.0]]),
+        np.ones(1),
         np.ones(1),
         np.zeros(1, dtype=np.int64),
         np.array([[cut, 0]]),
@@ -191,8 +201,10 @@ def test_of_a_vehicle_that_shows_more_than_its_known_size_the_centre_is_that_of_
 def cut_residual(scene, i, j, axis):
     """Difference of detection j from track i along an axis, and its variance, for one that is cut or not."""
     expected, found, _ = scene
-    s, weight = found.sensor[j], found.weight[j]
-    var = expected.position_var[i, s, axis] + expected.noise[i, s, axis] * weight
+    s, weight, f = found.sensor[j], found.weight[j], found.spread[j]
+    shift, shared, own = expected.lasting[i, s, axis]
+    var = expected.position_var[i, s, axis] + f * shared
+    var += f**2 * (own + expected.noise[i, s, axis] * weight)
     centre, cut = found.z[j, axis], found.cut[j, axis]
     if cut == BOTH_CUT:
         return 0.0, var + np.exp(found.log_size[j, axis]) ** 2 / (2.0 * np.pi)
@@ -200,7 +212,7 @@ def cut_residual(scene, i, j, axis):
         half = 0.5 * np.exp(max(expected.log_size[i, axis], found.log_size[j, axis]))
         centre = found.side[j, axis] + (half if cut == HIGH_CUT else -half)
         var += half**2 * expected.log_size_var[i, axis]
-    return centre - expected.position[i, s, axis], var
+    return centre - expected.position[i, s, axis] - f * shift, var
 
 
 def test_no_pair_with_a_box_that_is_cut_lies_outside_the_window():

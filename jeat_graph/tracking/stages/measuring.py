@@ -48,10 +48,12 @@ def measure(
     for k in range(pairs.shape[1]):
         i, j = pairs[0, k], pairs[1, k]
         out.track[k], out.detection[k] = i, j
+        spread = batch.spread[j]
+        factor = spread * spread * batch.weight[j]
         for axis in range(2):
-            cut, noise = batch.cut[j, axis], expectation.white[i, s, axis] * batch.weight[j]
+            cut, noise = batch.cut[j, axis], expectation.white[i, s, axis] * factor
             z, white, log_size = batch.z[j, axis], noise, batch.log_size[j, axis]
-            log_size_var = size_var[s, axis]
+            log_size_var = spread * spread * size_var[s, axis]
             if cut != WHOLE:
                 known, known_var = size_mean[i, axis, 0], size_cov[i, axis, 0, 0]
                 if cut == BOTH_CUT:
@@ -62,7 +64,7 @@ def measure(
                 log_size, log_size_var = max(known, log_size), UNKNOWN
             out.z[k, axis], out.log_size[k, axis] = z, log_size
             out.white[k, axis], out.noise[k, axis] = white, noise
-            out.coloured_std[k, axis] = expectation.coloured_std[i, s, axis]
+            out.coloured_std[k, axis] = spread * expectation.coloured_std[i, s, axis]
             out.log_size_var[k, axis] = log_size_var
     return out
 
@@ -72,17 +74,17 @@ def first_view(batch: Batch, i: int, j: int, sensors: SensorArrays) -> Measured:
     """Say what detection `j` measures for row `i`, of unknown size; one that is cut may be much larger."""
     s, own = batch.sensor[j], no_measurements(1)
     own.track[0], own.detection[0] = i, j
-    size = math.sqrt(batch.boxes[j, 2] * batch.boxes[j, 3])
+    size, spread = math.sqrt(batch.boxes[j, 2] * batch.boxes[j, 3]), batch.spread[j]
     for axis in range(2):
         side = batch.boxes[j, 2 + axis]
         base = base_variance(sensors.sigma_px[s], sensors.rho[s, axis], side, sensors.rho_size[s], size)
         r, h = split_noise(base, s, sensors)
-        noise = r * batch.weight[j]
+        noise = r * spread * spread * batch.weight[j]
         z, white, log_size, log_size_var = (
             batch.z[j, axis],
             noise,
             batch.log_size[j, axis],
-            sensors.size_var[s, axis],
+            spread * spread * sensors.size_var[s, axis],
         )
         cut = batch.cut[j, axis]
         if cut != WHOLE:
@@ -93,7 +95,7 @@ def first_view(batch: Batch, i: int, j: int, sensors: SensorArrays) -> Measured:
                 z, _ = centre_from_side(cut, batch.side[j, axis], log_size, 0.0)
             white += half_var
         own.z[0, axis], own.log_size[0, axis], own.log_size_var[0, axis] = z, log_size, log_size_var
-        own.white[0, axis], own.coloured_std[0, axis], own.noise[0, axis] = white, h, noise
+        own.white[0, axis], own.coloured_std[0, axis], own.noise[0, axis] = white, spread * h, noise
     return own
 
 

@@ -12,7 +12,7 @@ from jeat_graph.association.boxes import occluded_fraction, track_boxes, visible
 from jeat_graph.config.kernel_form import Model, SensorArrays, Settings
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.filters.coasting import forget
-from jeat_graph.filters.coloured_noise import expected, predict_errors
+from jeat_graph.filters.coloured_noise import MOTION, predict_errors
 from jeat_graph.filters.existence import motion_visibility, unsure_visibility
 from jeat_graph.filters.fit import fade
 from jeat_graph.filters.jerk import track_jerk
@@ -217,14 +217,17 @@ class Expectation(NamedTuple):
     """Where the next detection of each sensor on each track is expected.
 
     Attributes:
-        centre: (N, S, 2) expected centre (px).
-        var: (N, S, 2) its variance before the detection's white noise (px²).
+        centre: (N, S, 2) expected centre without the sensor's lasting error (px): that of the track.
+        var: (N, S, 2) its variance (px²).
+        lasting: (N, S, 2, 3) what that error adds: to the centre (px), twice its covariance with the centre
+            and its variance (px²); the first two go with the detection's spread, the third with its square.
         white: (N, S, 2) variance of that noise at weight 1 (px²).
         coloured_std: (N, S, 2) standard deviation of the coloured part of the noise (px), 0 for none.
     """
 
     centre: FloatArray
     var: FloatArray
+    lasting: FloatArray
     white: FloatArray
     coloured_std: FloatArray
 
@@ -242,12 +245,17 @@ def expect_detections(tracks: TrackArrays, n: int, occluded: FloatArray, model: 
     sensors, growth = model.sensors, model.settings.noise.hidden_growth
     shape = (n, len(sensors.sigma_px), 2)
     centre, var, white, coloured_std = np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape)
+    lasting = np.zeros((*shape, 3))
     for i in range(n):
         more = hidden_excess(occluded[i], growth)
         for s in range(shape[1]):
             for axis in range(2):
                 r, h = split_noise(detection_variance(tracks, i, s, axis, sensors), s, sensors)
                 white[i, s, axis], coloured_std[i, s, axis] = r + more * (r + h * h), h
-                z, V = expected(tracks.mean[i, axis], tracks.cov[i, axis], h, sensors.error[s])
-                centre[i, s, axis], var[i, s, axis] = z, V
-    return Expectation(centre, var, white, coloured_std)
+                m, P = tracks.mean[i, axis], tracks.cov[i, axis]
+                centre[i, s, axis], var[i, s, axis] = m[0], P[0, 0]
+                if sensors.error[s] >= 0:
+                    e = MOTION + sensors.error[s]
+                    parts = lasting[i, s, axis]
+                    parts[0], parts[1], parts[2] = h * m[e], 2.0 * h * P[0, e], h * h * P[e, e]
+    return Expectation(centre, var, lasting, white, coloured_std)
