@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 from jeat_graph.calibration.cuts import folds, shorten
 from jeat_graph.calibration.supervised import MatchedSensors, Recording, measure_sensors, with_sensors
-from jeat_graph.calibration.verdict import Verdict, better, judge
+from jeat_graph.calibration.verdict import Verdict, better, judge, scene_error
 from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import DataError
 
@@ -121,8 +121,11 @@ def choose_parts(
         return with_parts(whole, PARTS), ()
     try:
         halves = [measure_sensors(other, base) for other in reversed(parts)]
+        scatter = scene_error(recordings)
         kept, choices = _choose(
-            lambda some: judge([with_parts(half, some) for half in halves], parts),
+            lambda some: replace(
+                judge([with_parts(half, some) for half in halves], parts), scene_error=scatter
+            ),
             progress or (lambda _: None),
         )
     except DataError:

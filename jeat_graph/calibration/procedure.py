@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 from jeat_graph.calibration.cuts import folds, shorten
 from jeat_graph.calibration.matches import SensorMatches, match_sensor
-from jeat_graph.calibration.noise_scale import scale_noise
 from jeat_graph.calibration.offset import (
     Lag,
     earliest_on_time,
@@ -22,6 +21,7 @@ from jeat_graph.calibration.score_fit import SCORE_FIT, choose_score_fit, measur
 from jeat_graph.calibration.supervised import Recording, calibrate
 from jeat_graph.calibration.tracked import follow
 from jeat_graph.calibration.tune import Choice, tune, tuned_settings
+from jeat_graph.calibration.verdict import judge
 from jeat_graph.calibration.written_variances import measure_written_variances
 from jeat_graph.config.schema import Config, InputConfig
 from jeat_graph.data.detections import Detections
@@ -33,9 +33,8 @@ from jeat_graph.runs.latency import taken_off
 # How often lags are looked for, each time in what those found before leave.
 _ROUNDS = 4
 _PASSES = 2
-# About so many scans are tracked for each factor on the noise.
+# About so many scans are tracked to measure what is written.
 _SCANS = 6000
-NOISE_FACTOR = "noise of the centre, factor"
 POSITION_SCALE, LASTING_ERROR = "output.position_scale", "output.lasting_error"
 
 
@@ -99,17 +98,15 @@ def calibrate_with_truth(
     if progress is not None:
         progress(SCORE_FIT)
     config = measure_written_variances(config, short, base.output)
-    config, factor, verdict = scale_noise(config, folds(short))
-    if factor != 1.0:
-        config = measure_written_variances(config, short, base.output)
+    halves = folds(short)
+    score = judge([config] * len(halves), halves).objective
     choices = (
         *choices,
-        Choice(NOISE_FACTOR, factor, verdict.objective),
-        Choice(POSITION_SCALE, config.output.position_scale, verdict.objective),
-        Choice(LASTING_ERROR, config.output.lasting_error, verdict.objective),
+        Choice(POSITION_SCALE, config.output.position_scale, score),
+        Choice(LASTING_ERROR, config.output.lasting_error, score),
     )
     if progress is not None:
-        progress(NOISE_FACTOR)
+        progress(POSITION_SCALE)
     return Calibration(with_lags(config, lags), tuple(lags), parts, choices)
 
 

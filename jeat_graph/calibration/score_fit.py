@@ -21,7 +21,7 @@ from jeat_graph.calibration.parts import PartChoice
 from jeat_graph.calibration.sensor import fit_precision
 from jeat_graph.calibration.supervised import Recording
 from jeat_graph.calibration.tracked import taken_in_scan
-from jeat_graph.calibration.verdict import CHANCE, judge
+from jeat_graph.calibration.verdict import CHANCE, judge, scene_error
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.detections import Detections
@@ -71,7 +71,8 @@ def choose_score_fit(config: Config, recordings: Sequence[Recording]) -> tuple[C
 
     It is a share that was counted, not a setting that was tried, and where scores say nothing it changes
     nothing. Asked to win by more than chance, three recordings of walkers never kept what gained the other
-    three nine points of MOTA; half of three are too few to measure it at all.
+    three nine points of MOTA; half of three are too few to measure it at all. So it has to lose by more than
+    scenes scatter.
 
     Returns:
         The configuration, and what was decided; None where there are too few recordings to decide.
@@ -81,7 +82,7 @@ def choose_score_fit(config: Config, recordings: Sequence[Recording]) -> tuple[C
         return measure_score_fit(config, recordings), None
     halves = [measure_score_fit(config, other) for other in reversed(parts)]
     now, then = judge([config] * len(parts), parts), judge(halves, parts)
-    kept = then.objective >= now.objective - CHANCE
+    kept = then.objective >= now.objective - max(CHANCE, scene_error(recordings))
     choice = PartChoice(SCORE_FIT, kept, then.objective - now.objective)
     return (measure_score_fit(config, recordings) if kept else config), choice
 

@@ -9,6 +9,7 @@ import pytest
 
 from jeat_graph.calibration import score_fit as module
 from jeat_graph.calibration.score_fit import SCORE_FIT, choose_score_fit, measure_score_fit
+from jeat_graph.calibration.verdict import Verdict
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Detections
 from jeat_graph.runs.declaring import fit_input
@@ -89,3 +90,21 @@ def test_a_sensor_that_saw_nothing_is_left_as_it_is(recordings, base):
     found = measure_score_fit(both, with_ghosts(recordings, 3))
     assert found.sensors["evt"] == both.sensors["evt"]
     assert found.sensors["rgb"].score_fit
+
+
+@pytest.mark.parametrize(("loss", "kept"), [(0.3, True), (0.6, False)])
+def test_what_loses_less_than_scenes_scatter_has_lost_nothing(recordings, base, monkeypatch, loss, kept):
+    """Half of a handful of recordings is too little to say that scores mean nothing."""
+    scores = iter((80.0, 80.0 - loss))
+
+    def judged(configs, parts):
+        each = np.full(2, next(scores))
+        return Verdict(each, np.ones(2), np.arange(2), 0.0, each, np.ones(2))
+
+    monkeypatch.setattr(module, "judge", judged)
+    monkeypatch.setattr(module, "scene_error", lambda recordings: 0.5)
+    monkeypatch.setattr(module, "measure_score_fit", lambda config, recordings: config)
+    choice = choose_score_fit(base, recordings)[1]
+    assert choice is not None
+    assert choice.kept == kept
+    assert choice.gain == pytest.approx(-loss)

@@ -117,7 +117,15 @@ def test_a_gain_that_the_parts_of_the_time_disagree_about_is_chance():
     assert not better(one_recording([85.0, 72.0, 88.0, 73.0, 84.0, 87.0]), now, LEAST)
 
 
-def test_what_a_single_scene_gains_has_to_be_more_than_scenes_scatter():
+def test_scenes_that_agree_by_luck_do_not_tell_how_far_scenes_scatter():
+    """A factor of .7 on the noise of four sequences of cars; of a fifth, that shakes, it cost two points."""
+    now = verdict([91.87, 93.02, 79.03, 94.82], weight=[1307, 673, 1339, 1413])
+    then = verdict([91.88, 93.26, 79.24, 94.93], weight=[1307, 673, 1339, 1413])
+    assert better(then, now, 0.05, 2.0)
+    assert not better(replace(then, scene_error=4.0 / np.sqrt(96.0)), now, 0.05, 2.0)
+
+
+def test_what_scenes_gain_has_to_be_more_than_scenes_scatter():
     now = [80.0, 80.0]
     for gain, decided in ((1.0, False), (2.0, True)):
         one = replace(verdict([80.0 + gain] * 2), scene_error=1.5)
@@ -127,13 +135,16 @@ def test_what_a_single_scene_gains_has_to_be_more_than_scenes_scatter():
     assert not better(replace(verdict([79.0] * 2), scene_error=1.5), verdict(now, penalty=5.0), LEAST)
 
 
-def test_scenes_scatter_by_the_root_of_their_objects_and_several_tell_it_themselves(recordings):
+def test_scenes_scatter_by_the_root_of_all_their_objects(recordings):
     detections, truth = recordings[0]
     people = np.unique(truth.object_id[~truth.ignore])
     few = replace(truth, ignore=truth.ignore | ~np.isin(truth.object_id, people[:3]))
     whole, part = (scene_error([(detections, one)]) for one in (truth, few))
     assert part == pytest.approx(whole * np.sqrt(len(people) / 3.0))
-    assert scene_error(list(recordings[:1]) * 2) == 0.0
+    # The mean of independent scenes: numbers of objects that differ add up, and people of two scenes are two.
+    assert scene_error([(detections, truth)] * 4) == pytest.approx(whole / 2.0)
+    both = scene_error([(detections, truth), (detections, few)])
+    assert both == pytest.approx(1.0 / np.sqrt(whole**-2 + part**-2))
 
 
 def test_nothing_to_find_is_no_verdict():
