@@ -41,7 +41,7 @@ class OursOnSet:
 
 
 def rows_of(one: RealSet, calibrate: bool) -> list[OursOnSet]:
-    """The rows of a set: each stream as it comes, and all of them calibrated or with parts switched off."""
+    """The rows of a set: each stream as it comes and calibrated, and all of them with parts switched off."""
     out = [OursOnSet(f"default, {' + '.join(s)}", s) for s in reversed(one.streams)]
     every = one.streams[-1]
     out.append(OursOnSet("default without NIS adaptation", every, changes=("noise.adaptation_rate=0.0",)))
@@ -50,6 +50,7 @@ def rows_of(one: RealSet, calibrate: bool) -> list[OursOnSet]:
     out.append(OursOnSet("default without disagreement", every, changes=("lifecycle.disagreement=0.0",)))
     if calibrate and len(one.recordings) > 1:
         out += [OursOnSet(how, every, how) for how in (BLIND, TRUTH)]
+        out += [OursOnSet(f"{TRUTH}, {s[0]}", s, TRUTH) for s in one.streams[:-1]]
     return out
 
 

@@ -39,9 +39,6 @@ SENSOR_PARTS = {
 PARTS = (*SENSOR_PARTS, _BIRTHS)
 # What a change must gain (per cent) to be made: less is chance.
 _LEAST_GAIN = 0.2
-# As many standard errors, too: of two halves of a set of real recordings one gained two of them and the
-# other lost as much.
-_LEAST_ERRORS = 2.0
 
 
 @dataclass(frozen=True)
@@ -52,7 +49,7 @@ class PartChoice:
         part: one of `PARTS`, or another name of what was estimated.
         kept: whether the calibrated values are kept.
         gain: what they gain over the base's on recordings that they were not estimated from, with the parts
-            kept so far: (MOTA + IDF1 + HOTA) / 3 (per cent).
+            kept so far: (MOTA + IDF1 + HOTA) / 3 (per cent); 0 where that cannot be told.
     """
 
     part: str
@@ -109,16 +106,17 @@ def choose_parts(
         progress: called with the name of each part when it is decided.
 
     Returns:
-        The configuration, and what was decided of each part; of none where a half is too small to be
-        calibrated from.
+        The configuration, and what was decided of each part. Where a half is too small to be calibrated from,
+        nothing can be held against the base, and it stays.
 
     Raises:
         DataError: as `supervised.calibrate`.
     """
     whole = measure_sensors(recordings, base)
     parts = folds(shorten(recordings, max_scans))
+    unknown = tuple(PartChoice(part, False, 0.0) for part in PARTS)
     if len(parts) < 2:
-        return with_parts(whole, PARTS), ()
+        return with_parts(whole, ()), unknown
     try:
         halves = [measure_sensors(other, base) for other in reversed(parts)]
         scatter = scene_error(recordings)
@@ -129,7 +127,7 @@ def choose_parts(
             progress or (lambda _: None),
         )
     except DataError:
-        return with_parts(whole, PARTS), ()
+        return with_parts(whole, ()), unknown
     return with_parts(whole, kept), choices
 
 
@@ -139,14 +137,14 @@ def _choose(
     """Choose parts: leave some out of all where all together beat the base, else add some to none."""
     now, every = verdict(()), verdict(PARTS)
     kept: list[str] = []
-    if better(every, now, _LEAST_GAIN, _LEAST_ERRORS):
+    if better(every, now, _LEAST_GAIN):
         kept, now = list(PARTS), every
     choices = []
     for part in PARTS:
         turned = [one for one in PARTS if (one in kept) != (one == part)]
         other = verdict(turned)
-        gain = (other.objective - now.objective) * (1.0 if part in turned else -1.0)
-        if better(other, now, _LEAST_GAIN, _LEAST_ERRORS):
+        gain = (other.mean - now.mean) * (1.0 if part in turned else -1.0)
+        if better(other, now, _LEAST_GAIN):
             kept, now = turned, other
         choices.append(PartChoice(part, part in kept, gain))
         progress(part)

@@ -99,7 +99,7 @@ def calibrate_with_truth(
         progress(SCORE_FIT)
     config = measure_written_variances(config, short, base.output)
     halves = folds(short)
-    score = judge([config] * len(halves), halves).objective
+    score = judge([config] * len(halves), halves).mean
     choices = (
         *choices,
         Choice(POSITION_SCALE, config.output.position_scale, score),

@@ -82,8 +82,8 @@ def choose_score_fit(config: Config, recordings: Sequence[Recording]) -> tuple[C
         return measure_score_fit(config, recordings), None
     halves = [measure_score_fit(config, other) for other in reversed(parts)]
     now, then = judge([config] * len(parts), parts), judge(halves, parts)
-    kept = then.objective >= now.objective - max(CHANCE, scene_error(recordings))
-    choice = PartChoice(SCORE_FIT, kept, then.objective - now.objective)
+    kept = then.mean >= now.mean - max(CHANCE, scene_error(recordings))
+    choice = PartChoice(SCORE_FIT, kept, then.mean - now.mean)
     return (measure_score_fit(config, recordings) if kept else config), choice
 
 

@@ -189,17 +189,17 @@ def _choose_value(
     """
     candidates = [setting.apply(config, value) for value in setting.values]
     verdicts = [verdict(candidate) for candidate in candidates]
-    objectives = [one.objective for one in verdicts]
-    stable = plateau(objectives) if setting.ordered else objectives
+    scores = [one.mean for one in verdicts]
+    stable = plateau(scores) if setting.ordered else scores
     best = int(np.argmax(stable))
     here = candidates.index(config) if config in candidates else None
     now = verdict(config)
-    gain = stable[best] - (now.objective if here is None else stable[here])
+    gain = stable[best] - (now.mean if here is None else stable[here])
     if gain < _LEAST_GAIN or not better(verdicts[best], now, _LEAST_GAIN):
         if here is None:
             return config, None
         best = here
-    return candidates[best], Choice(setting.name, setting.values[best], objectives[best])
+    return candidates[best], Choice(setting.name, setting.values[best], scores[best])
 
 
 def _temper_all(config: Config, value: float) -> Config:

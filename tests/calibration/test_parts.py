@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from jeat_graph.calibration import parts as module
+from jeat_graph.calibration.cuts import cut_scans, cut_truth
 from jeat_graph.calibration.parts import PARTS, choose_parts, with_parts
 from jeat_graph.calibration.supervised import calibrate, measure_sensors, with_sensors
 from jeat_graph.calibration.verdict import Verdict
@@ -78,6 +79,16 @@ def test_a_part_that_does_worse_on_the_other_half_goes_back_to_the_base(recordin
     assert births.gain < -10.0
 
 
+def test_what_nothing_is_left_to_check_by_goes_back_to_the_base(recordings, base):
+    """Six scans show some thirty vehicles, of which one can calibrate, and half of them too few."""
+    detections, truth = recordings[0]
+    few = cut_scans(detections, 0, 6), cut_truth(truth, -np.inf, float(detections.scan_t[5]))
+    config, choices = choose_parts([few], base)
+    assert [(choice.part, choice.kept, choice.gain) for choice in choices] == [(p, False, 0.0) for p in PARTS]
+    assert (config.motion, config.size, config.birth) == (base.motion, base.size, base.birth)
+    assert config.sensors["rgb"].sigma_px == base.sensors["rgb"].sigma_px
+
+
 @pytest.mark.parametrize(
     ("scores", "kept", "gains"),
     [
@@ -91,7 +102,7 @@ def test_the_base_stays_but_for_what_wins(scores, kept, gains):
     def verdict(some):
         score = scores["".join("nsrb"[k] for k, part in enumerate(PARTS) if part in some)]
         each = np.full(6, score)
-        return Verdict(each, np.ones(6), np.arange(6) % 2, 0.0, each, np.ones(6))
+        return Verdict(each, np.ones(6), np.arange(6) % 2, each, np.ones(6))
 
     found, choices = module._choose(verdict, lambda _: None)
     assert found == [part for k, part in enumerate(PARTS) if "nsrb"[k] in kept]

@@ -99,7 +99,7 @@ def test_what_loses_less_than_scenes_scatter_has_lost_nothing(recordings, base, 
 
     def judged(configs, parts):
         each = np.full(2, next(scores))
-        return Verdict(each, np.ones(2), np.arange(2), 0.0, each, np.ones(2))
+        return Verdict(each, np.ones(2), np.arange(2), each, np.ones(2))
 
     monkeypatch.setattr(module, "judge", judged)
     monkeypatch.setattr(module, "scene_error", lambda recordings: 0.5)

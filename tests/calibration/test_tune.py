@@ -78,7 +78,7 @@ def test_one_instant_is_not_split():
 
 def objective(config, training):
     parts = folds(training)
-    return judge([config] * len(parts), parts).objective
+    return judge([config] * len(parts), parts).mean
 
 
 @pytest.fixture(scope="module")
@@ -136,7 +136,7 @@ def test_a_setting_that_wins_on_one_half_only_is_not_chosen(recordings, monkeypa
         calls["parts"] += 1
         gain = configs[0].output.max_gap_scans - 0.5
         accuracy = np.array([50.0 + 10.0 * gain, 50.0 - gain])
-        return Verdict(accuracy, np.ones(2), np.arange(2), 0.0, accuracy, np.ones(2))
+        return Verdict(accuracy, np.ones(2), np.arange(2), accuracy, np.ones(2))
 
     monkeypatch.setattr(module, "judge", judged)
     chosen, _ = tune(start, recordings[:1], passes=1)
@@ -150,7 +150,7 @@ def test_a_value_that_the_base_brings_along_stays_where_no_other_does_better(rec
     start = load_config("default")
     same = np.full(2, 50.0)
     monkeypatch.setattr(
-        module, "judge", lambda configs, parts: Verdict(same, np.ones(2), np.arange(2), 0.0, same, np.ones(2))
+        module, "judge", lambda configs, parts: Verdict(same, np.ones(2), np.arange(2), same, np.ones(2))
     )
     assert tune(start, recordings[:1], passes=1) == (start, tune(start, recordings[:1], passes=1)[1])
 
