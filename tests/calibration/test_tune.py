@@ -85,7 +85,7 @@ def objective(config, training):
 def tuned(recordings):
     training = shorten(recordings, 200)
     start = calibrate(training, load_config("default"))
-    start = replace(start, output=replace(start.output, max_gap_scans=0.0, max_gap_s=5.0))
+    start = replace(start, lifecycle=replace(start.lifecycle, confirm_existence=0.9999))
     return training, start, tune(start, training, passes=1)
 
 
@@ -95,11 +95,11 @@ def test_tuning_never_ends_below_its_start(tuned):
 
 
 def test_a_harmful_setting_is_repaired(tuned):
-    # Vehicles that have left are reported for five seconds: that must not survive.
+    # Only what is as good as certain is believed, a third of all is never reported: that must not survive,
+    # be it that less is asked for or that evidence counts for more.
     training, start, (config, choices) = tuned
-    assert config.output.max_gap_scans > 0.0
     assert {c.name for c in choices} <= {k.name for k in tuned_settings(start)}
-    assert objective(config, training) > objective(start, training) + 0.5
+    assert objective(config, training) > objective(start, training) + 20.0
 
 
 def test_tuning_is_deterministic(tuned, monkeypatch):
@@ -108,7 +108,8 @@ def test_tuning_is_deterministic(tuned, monkeypatch):
 
     training, start, (_, choices) = tuned
     monkeypatch.setattr(module, "tuned_settings", lambda config: tuned_settings(config)[:2])
-    assert tune(start, training, passes=1)[1] == choices[:2]
+    assert choices[0].name == "tempering"
+    assert tune(start, training, passes=1)[1] == choices[:1]
 
 
 def test_each_sensor_of_several_has_a_tempering_of_its_own():
