@@ -42,8 +42,9 @@ def fit_score_noise(score: FloatArray, error: FloatArray) -> tuple[tuple[float, 
         return ()
     square = square / mean
     count = int(np.clip(len(score) // _LEAST_IN_BIN, 1, _MAX_KNOTS))
-    edges = np.unique(np.quantile(score, np.linspace(0.0, 1.0, count + 1)))
-    bins = np.clip(np.searchsorted(edges, score, side="right") - 1, 0, max(len(edges) - 2, 0))
+    # Boxes of one score are in one bin, however many they are.
+    edges = np.unique(np.quantile(score, np.arange(1, count) / count))
+    bins = np.searchsorted(edges, score, side="right")
     weight = np.bincount(bins).astype(float)
     used = weight > 0
     weight, centre = weight[used], np.bincount(bins, score)[used] / weight[used]

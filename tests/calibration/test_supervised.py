@@ -97,6 +97,7 @@ def test_each_field_of_a_sensor_is_estimated_or_else_the_bases(recordings):
         "precision": 0.3,
         "score_precision": ((0.0, 0.5),),
         "blind_speed": 40.0,
+        "score_noise": ((0.0, 3.0),),
     }
     assert {f.name for f in fields(SensorConfig)} == {*kept, *estimated}
     plain = SensorConfig()

@@ -117,6 +117,10 @@ def test_an_unknown_preset_names_the_nearest_one():
         ("sensors.rgb.score_precision=[]", ["sensors.rgb.score_precision", "at least one"]),
         ("sensors.rgb.score_fit=[[0.5, 0.9], [0.6, 0.8]]", ["sensors.rgb.score_fit", "fall"]),
         ("sensors.rgb.score_fit=[[0.5, 1.1]]", ["sensors.rgb.score_fit", "[0, 1]"]),
+        ("sensors.rgb.score_noise=[[0.5, 1.0], [0.6, 1.1]]", ["sensors.rgb.score_noise", "must not rise"]),
+        ("sensors.rgb.score_noise=[[0.5, 1.0], [0.5, 0.9]]", ["sensors.rgb.score_noise", "must rise"]),
+        ("sensors.rgb.score_noise=[[0.5, 0.0]]", ["sensors.rgb.score_noise", "0.1"]),
+        ("sensors.rgb.score_noise=[[0.5, 11.0]]", ["sensors.rgb.score_noise", "10"]),
         ("motion=3", ["motion", "key: value"]),
     ],
 )
