@@ -11,6 +11,7 @@ from numba import njit
 from jeat_graph.association.densities import Likelihood, log_constants, log_density_of
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.filters.cut_boxes import BOTH_CUT, HIGH_CUT, WHOLE, centre_from_part
+from jeat_graph.filters.noise import scored_noise
 
 
 class Expected(NamedTuple):
@@ -19,8 +20,9 @@ class Expected(NamedTuple):
     Attributes:
         position: (N, S, 2) expected centre of a detection of sensor s on track i (px), but for what lasts.
         position_var: (N, S, 2) its variances, before the detection's noise (px²).
-        lasting: (N, S, 2, 3) what a lasting error of the sensor adds at spread 1: to the centre (px), twice
-            its covariance with the centre and its variance (px²).
+        lasting: (N, S, 2, 4) what a lasting error of the sensor adds at spread 1: to the centre (px), twice
+            its covariance with the centre and its variance (px²), and its standard deviation where nothing is
+            known of it (px).
         noise: (N, S, 2) variances of that noise, at weight 1 (px²).
         log_size: (N, 2) predicted ln width, ln height.
         log_size_var: (N, 2) their variances.
@@ -141,8 +143,9 @@ def _fill(
     order = np.argsort(z[:, 0], kind="mergesort")
     x_sorted = z[order, 0]
     y_sorted = z[order, 1]
-    narrowest, widest = np.min(spread), np.max(spread)
-    heaviest = np.max(weight) * widest * widest
+    widest, heaviest = np.max(spread), np.max(weight)
+    # Of the error that lasts no detection has more than the usual.
+    least, most = min(np.min(spread), 1.0), min(widest, 1.0)
     constants = log_constants(likelihood.freedom)
     unseen_density = -math.log(likelihood.log_size_range)
     longest, low, high = np.empty(2), np.empty(2), np.empty(2)
@@ -154,13 +157,13 @@ def _fill(
             # The middle of the part that shows lies within half a size of the centre.
             reach, more = _reach(longest[axis], log_size[i, axis], log_size_var[i, axis])
             for s in range(noise.shape[1]):
-                parts = lasting[i, s, axis]
-                shift, shared, own = parts[0], parts[1], parts[2]
-                var = position_var[i, s, axis] + noise[i, s, axis] * heaviest + more
-                var += max(shared, 0.0) * widest + min(shared, 0.0) * narrowest + own * widest * widest
+                shift, shared, own, std = _lasting(lasting[i, s, axis])
+                white = scored_noise(noise[i, s, axis], std, widest)[0] * heaviest
+                var = position_var[i, s, axis] + white + more
+                var += max(shared, 0.0) * most + min(shared, 0.0) * least + own * most * most
                 # A hair wider than any gate, so that rounding never decides here.
                 half = 1.000001 * math.sqrt(gate * var) + reach
-                near, far = position[i, s, axis] + shift * narrowest, position[i, s, axis] + shift * widest
+                near, far = position[i, s, axis] + shift * least, position[i, s, axis] + shift * most
                 low[axis] = min(low[axis], min(near, far) - half)
                 high[axis] = max(high[axis], max(near, far) + half)
         right, top, bottom = high[0], low[1], high[1]
@@ -176,10 +179,11 @@ def _fill(
             distance, det = 0.0, 1.0
             # y first: the detections are sorted by x, so that it rules out more of what is left.
             for axis in (1, 0):
-                f, parts = spread[j], lasting[i, s, axis]
-                where = position[i, s, axis] + f * parts[0]
-                var = position_var[i, s, axis] + f * parts[1] + f * f * parts[2]
-                white = noise[i, s, axis] * weight[j] * f * f
+                shift, shared, own, std = _lasting(lasting[i, s, axis])
+                white = scored_noise(noise[i, s, axis], std, spread[j])[0] * weight[j]
+                lasts = min(spread[j], 1.0)
+                where = position[i, s, axis] + lasts * shift
+                var = position_var[i, s, axis] + lasts * shared + lasts * lasts * own
                 off, S = z[j, axis] - where, var + white
                 if cut[j, axis] != WHOLE:
                     known = log_size[i, axis], log_size_var[i, axis]
@@ -226,6 +230,12 @@ def _fill(
             )
             count += 1
     return count
+
+
+@njit(cache=True, inline="always")
+def _lasting(parts: FloatArray) -> tuple[float, float, float, float]:
+    """Return the four parts of `Expected.lasting`."""
+    return parts[0], parts[1], parts[2], parts[3]
 
 
 @njit(cache=True)

@@ -32,6 +32,26 @@ def score_weight(score: float, floor: float) -> float:
 
 
 @njit(cache=True)
+def scored_noise(white: float, coloured_std: float, spread: float) -> tuple[float, float]:
+    """Split the noise of a detection that is `spread` times as inexact as its sensor's usually are.
+
+    What it has of error beyond the usual is white: a detector in doubt guesses anew in every picture. Taken
+    for more of the error that lasts, one doubtful box far off would move a track the other way.
+
+    Args:
+        white: variance of the usual white part (px²).
+        coloured_std: standard deviation of the usual part that is correlated in time (px).
+        spread: factor on the standard deviation of the whole.
+
+    Returns:
+        The same two of the detection; its whole variance is spread² (white + coloured_std²).
+    """
+    lasting = min(spread, 1.0)
+    more = spread * spread - lasting * lasting
+    return spread * spread * white + more * coloured_std * coloured_std, lasting * coloured_std
+
+
+@njit(cache=True)
 def adapt_scale(scale: float, nis: float, rate: float, low: float, high: float) -> float:
     """One step of the noise scale of a track and sensor (paper eq. 5, n_z = 2).
 

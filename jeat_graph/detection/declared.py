@@ -2,7 +2,7 @@
 
 Beside `NAME.onnx` it is `NAME.tracking.yaml`, with the section `sensor` (keys as of `sensors.NAME` in a
 configuration) and, if wanted, `birth: {max_overlap: …}`, `merge: {apart_overlap: …}` and `beside: SENSOR`:
-without that sensor only what its scores say of tracks counts.
+without that sensor only what its scores say of boxes and of tracks counts.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR, FUSED_S
 from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION, network_file
 
 _SUFFIX = ".tracking.yaml"
-# What scores say of how tracks fit was measured of each sensor alone.
-_ALWAYS = "score_fit"
+# What scores say of how exact boxes are, and how tracks fit, was measured of each sensor alone.
+_ALWAYS = ("score_noise", "score_fit")
 _KINDS = {FRAMES_SENSOR: FRAMES, EVENTS_SENSOR: EVENTS, FUSED_SENSOR: FUSED}
 
 
@@ -93,7 +93,7 @@ def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lam
         assert isinstance(declared, _Declared)
         facts = tree.get("sensor", {})
         if declared.beside and declared.beside not in detectors:
-            facts = {key: value for key, value in facts.items() if key == _ALWAYS}
+            facts = {key: value for key, value in facts.items() if key in _ALWAYS}
             if not facts:
                 continue
         else:

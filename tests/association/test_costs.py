@@ -20,6 +20,7 @@ def two_sensors(residual, variances, weights=(1.0, 1.0), track_var=4.0):
     expected = Expected(
         np.zeros((1, 2, 2)),
         np.full((1, 2, 2), track_var),
+        np.zeros((1, 2, 2, 4)),
         np.repeat(np.array(variances), 2).reshape(1, 2, 2),
         flat,
         small,
@@ -27,8 +28,8 @@ def two_sensors(residual, variances, weights=(1.0, 1.0), track_var=4.0):
         np.zeros((1, 2), dtype=np.int64),
     )
     cut = np.zeros((2, 2), dtype=np.int64), np.zeros((2, 2))
-    measured = np.full((2, 2), residual), np.zeros((2, 2)), np.array(weights), np.array([0, 1])
-    pairs = gated_pairs(expected, Found(*measured, *cut), Likelihood(0.0, 3.0), 1e6, np.inf)
+    measured = np.full((2, 2), residual), np.zeros((2, 2)), np.array(weights), np.ones(2)
+    pairs = gated_pairs(expected, Found(*measured, np.array([0, 1]), *cut), Likelihood(0.0, 3.0), 1e6, np.inf)
     p_detect, sensor = np.full((1, 2), 0.9), np.array([0, 1])
     evidence = log_evidence(pairs, p_detect, np.zeros(2), np.full(2, -10.0), sensor)
     return pairs.d2, likelihood_cost(pairs.rows, pairs.cols, evidence, np.array([0.9]), p_detect, sensor)

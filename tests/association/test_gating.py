@@ -18,7 +18,9 @@ def random_scene(rng, tracks, dets, sensors=2, width=300.0):
     lasting_std = rng.uniform(0.5, 5.0, (tracks, sensors, 2))
     position_var = rng.uniform(1.0, 60.0, (tracks, sensors, 2))
     shared = rng.uniform(-0.9, 0.9, (tracks, sensors, 2)) * lasting_std * np.sqrt(position_var)
-    lasting = np.stack([rng.normal(0.0, 4.0, shared.shape), 2.0 * shared, lasting_std**2], axis=-1)
+    usual_std = lasting_std * rng.uniform(1.0, 2.0, shared.shape)
+    shift = rng.normal(0.0, 4.0, shared.shape)
+    lasting = np.stack([shift, 2.0 * shared, lasting_std**2, usual_std], axis=-1)
     expected = Expected(
         rng.uniform(0.0, width, (tracks, 1, 2)) + rng.normal(0.0, 2.0, (tracks, sensors, 2)),
         position_var,
@@ -48,8 +50,10 @@ def all_pairs(expected, found, _, gate, size_gate):
     for i in range(len(position)):
         for j in range(len(z)):
             s, f = sensor[j], spread[j]
-            centre = position[i, s] + f * lasting[i, s, :, 0]
-            S = var[i, s] + f * lasting[i, s, :, 1] + f**2 * (lasting[i, s, :, 2] + noise[i, s] * weight[j])
+            c, (shift, shared, own, usual) = min(f, 1.0), lasting[i, s].T
+            centre = position[i, s] + c * shift
+            S = var[i, s] + c * shared + c**2 * own
+            S += (f**2 * noise[i, s] + (f**2 - c**2) * usual**2) * weight[j]
             d2 = ((z[j] - centre) ** 2 / S).sum()
             V = size_var[i] + f**2 * size_noise[s]
             size_d2 = ((z_size[j] - log_size[i]) ** 2 / V).sum()
@@ -94,7 +98,7 @@ def test_a_detection_on_the_gate_is_inside():
     one, flat, none = np.ones((1, 2)), np.zeros((1, 2)), np.zeros((1, 2), dtype=np.int64)
     z = np.array([[6.0, 0.0]])
     arguments = (
-        Expected(flat[None], one[None], np.zeros((1, 1, 2, 3)), one[None], flat, one, one, none),
+        Expected(flat[None], one[None], np.zeros((1, 1, 2, 4)), one[None], flat, one, one, none),
         Found(z, flat, np.ones(1), np.ones(1), none[0, :1], none, flat),
         NORMAL,
     )
@@ -120,7 +124,7 @@ def one_cut(cut, side, shown, centre=100.0, width=80.0, size_var=0.04, last_cut=
     track = Expected(
         np.array([[[centre, 50.0]]]),
         np.full((1, 1, 2), position_var),
-        np.zeros((1, 1, 2, 3)),
+        np.zeros((1, 1, 2, 4)),
         np.full((1, 1, 2), 5.0),
         np.log([[width, 40.0]]),
         np.full((1, 2), size_var),
@@ -202,9 +206,10 @@ def cut_residual(scene, i, j, axis):
     """Difference of detection j from track i along an axis, and its variance, for one that is cut or not."""
     expected, found, _ = scene
     s, weight, f = found.sensor[j], found.weight[j], found.spread[j]
-    shift, shared, own = expected.lasting[i, s, axis]
-    var = expected.position_var[i, s, axis] + f * shared
-    var += f**2 * (own + expected.noise[i, s, axis] * weight)
+    shift, shared, own, usual = expected.lasting[i, s, axis]
+    c = min(f, 1.0)
+    var = expected.position_var[i, s, axis] + c * shared + c**2 * own
+    var += (f**2 * expected.noise[i, s, axis] + (f**2 - c**2) * usual**2) * weight
     centre, cut = found.z[j, axis], found.cut[j, axis]
     if cut == BOTH_CUT:
         return 0.0, var + np.exp(found.log_size[j, axis]) ** 2 / (2.0 * np.pi)
@@ -212,7 +217,7 @@ def cut_residual(scene, i, j, axis):
         half = 0.5 * np.exp(max(expected.log_size[i, axis], found.log_size[j, axis]))
         centre = found.side[j, axis] + (half if cut == HIGH_CUT else -half)
         var += half**2 * expected.log_size_var[i, axis]
-    return centre - expected.position[i, s, axis] - f * shift, var
+    return centre - expected.position[i, s, axis] - c * shift, var
 
 
 def test_no_pair_with_a_box_that_is_cut_lies_outside_the_window():

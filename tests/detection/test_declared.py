@@ -28,8 +28,9 @@ def test_who_looks_at_nothing_or_has_no_weights_says_nothing():
     assert {line.split(".")[1] for line in only if line.startswith("sensors")} == {"evt"}
     # What is known of the events' boxes was found, and pays, beside pictures.
     alone = declared_settings(DetectRequest(events="b", detector_events="sehn"))
-    # But for what their scores say of tracks, which was measured of each sensor alone.
-    assert [line.split("=")[0] for line in alone] == ["sensors.evt.score_fit", "merge.apart_overlap"]
+    # But for what their scores say of boxes and tracks, which was measured of each sensor alone.
+    names = ["sensors.evt.score_noise", "sensors.evt.score_fit", "merge.apart_overlap"]
+    assert [line.split("=")[0] for line in alone] == names
 
 
 def test_a_network_of_ones_own(tmp_path):

@@ -16,7 +16,7 @@ from jeat_graph.filters.cut_boxes import (
     centre_from_part,
     centre_from_side,
 )
-from jeat_graph.filters.noise import base_variance
+from jeat_graph.filters.noise import base_variance, scored_noise
 from jeat_graph.tracking.batch import Batch, Measured, no_measurements
 from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.stages.predicting import Expectation, split_noise
@@ -49,9 +49,10 @@ def measure(
         i, j = pairs[0, k], pairs[1, k]
         out.track[k], out.detection[k] = i, j
         spread = batch.spread[j]
-        factor = spread * spread * batch.weight[j]
         for axis in range(2):
-            cut, noise = batch.cut[j, axis], expectation.white[i, s, axis] * factor
+            usual, lasting = expectation.white[i, s, axis], expectation.coloured_std[i, s, axis]
+            noise, h = scored_noise(usual, lasting, spread)
+            cut, noise = batch.cut[j, axis], noise * batch.weight[j]
             z, white, log_size = batch.z[j, axis], noise, batch.log_size[j, axis]
             log_size_var = spread * spread * size_var[s, axis]
             if cut != WHOLE:
@@ -64,7 +65,7 @@ def measure(
                 log_size, log_size_var = max(known, log_size), UNKNOWN
             out.z[k, axis], out.log_size[k, axis] = z, log_size
             out.white[k, axis], out.noise[k, axis] = white, noise
-            out.coloured_std[k, axis] = spread * expectation.coloured_std[i, s, axis]
+            out.coloured_std[k, axis] = h
             out.log_size_var[k, axis] = log_size_var
     return out
 
@@ -78,8 +79,8 @@ def first_view(batch: Batch, i: int, j: int, sensors: SensorArrays) -> Measured:
     for axis in range(2):
         side = batch.boxes[j, 2 + axis]
         base = base_variance(sensors.sigma_px[s], sensors.rho[s, axis], side, sensors.rho_size[s], size)
-        r, h = split_noise(base, s, sensors)
-        noise = r * spread * spread * batch.weight[j]
+        r, h = scored_noise(*split_noise(base, s, sensors), spread)
+        noise = r * batch.weight[j]
         z, white, log_size, log_size_var = (
             batch.z[j, axis],
             noise,
@@ -95,7 +96,7 @@ def first_view(batch: Batch, i: int, j: int, sensors: SensorArrays) -> Measured:
                 z, _ = centre_from_side(cut, batch.side[j, axis], log_size, 0.0)
             white += half_var
         own.z[0, axis], own.log_size[0, axis], own.log_size_var[0, axis] = z, log_size, log_size_var
-        own.white[0, axis], own.coloured_std[0, axis], own.noise[0, axis] = white, spread * h, noise
+        own.white[0, axis], own.coloured_std[0, axis], own.noise[0, axis] = white, h, noise
     return own
 
 

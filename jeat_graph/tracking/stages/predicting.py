@@ -219,8 +219,8 @@ class Expectation(NamedTuple):
     Attributes:
         centre: (N, S, 2) expected centre without the sensor's lasting error (px): that of the track.
         var: (N, S, 2) its variance (px²).
-        lasting: (N, S, 2, 3) what that error adds: to the centre (px), twice its covariance with the centre
-            and its variance (px²); the first two go with the detection's spread, the third with its square.
+        lasting: (N, S, 2, 4) what that error adds: to the centre (px), twice its covariance with the centre
+            and its variance (px²), and its standard deviation where nothing is known of it (px).
         white: (N, S, 2) variance of that noise at weight 1 (px²).
         coloured_std: (N, S, 2) standard deviation of the coloured part of the noise (px), 0 for none.
     """
@@ -245,7 +245,7 @@ def expect_detections(tracks: TrackArrays, n: int, occluded: FloatArray, model: 
     sensors, growth = model.sensors, model.settings.noise.hidden_growth
     shape = (n, len(sensors.sigma_px), 2)
     centre, var, white, coloured_std = np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape)
-    lasting = np.zeros((*shape, 3))
+    lasting = np.zeros((*shape, 4))
     for i in range(n):
         more = hidden_excess(occluded[i], growth)
         for s in range(shape[1]):
@@ -257,5 +257,6 @@ def expect_detections(tracks: TrackArrays, n: int, occluded: FloatArray, model: 
                 if sensors.error[s] >= 0:
                     e = MOTION + sensors.error[s]
                     parts = lasting[i, s, axis]
-                    parts[0], parts[1], parts[2] = h * m[e], 2.0 * h * P[0, e], h * h * P[e, e]
+                    parts[0], parts[1] = h * m[e], 2.0 * h * P[0, e]
+                    parts[2], parts[3] = h * h * P[e, e], h
     return Expectation(centre, var, lasting, white, coloured_std)
