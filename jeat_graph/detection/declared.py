@@ -1,8 +1,9 @@
 """What the tracker is told of a network: a file beside it, which holds what was measured of its boxes.
 
 Beside `NAME.onnx` it is `NAME.tracking.yaml`, with the section `sensor` (keys as of `sensors.NAME` in a
-configuration) and, if wanted, `birth: {max_overlap: …}`, `merge: {apart_overlap: …}` and `beside: SENSOR`:
-without that sensor only what its scores say of boxes and of tracks counts.
+configuration) and, if wanted, `birth: {max_overlap: …}`, `merge: {apart_overlap: …}`,
+`output: {position_scale: …, lasting_error: …}` and `beside: SENSOR`: without that sensor only what its scores
+say of boxes and of tracks counts, and what is said of the output.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION, network_fi
 _SUFFIX = ".tracking.yaml"
 # What scores say of how exact boxes are, and how tracks fit, was measured of each sensor alone.
 _ALWAYS = ("score_noise", "score_fit")
+_LEAST = ("birth.max_overlap", "merge.apart_overlap", "output.position_scale", "output.lasting_error")
 _KINDS = {FRAMES_SENSOR: FRAMES, EVENTS_SENSOR: EVENTS, FUSED_SENSOR: FUSED}
 
 
@@ -37,18 +39,25 @@ class _Merge(Section):
 
 
 @dataclass(frozen=True)
+class _Output(Section):
+    position_scale: float = number(1.0, "1", "factor on the variances of positions as written", 1e-3, 1.0)
+    lasting_error: float = number(1.0, "1", "what boxes are off by as long as seen, per height", 0.0, 1.0)
+
+
+@dataclass(frozen=True)
 class _Declared:
     beside: str = ""
     sensor: SensorConfig = field(default_factory=SensorConfig)
     birth: _Birth = field(default_factory=_Birth)
     merge: _Merge = field(default_factory=_Merge)
+    output: _Output = field(default_factory=_Output)
 
 
 def declared_settings(request: DetectRequest, say: Callable[[str], object] = lambda _: None) -> list[str]:
     """Return what files beside the networks say of them, as `key=value` settings of the tracker.
 
-    Of several `birth.max_overlap` and `merge.apart_overlap` the smallest counts. A network without such a
-    file, and the detectors without weights, say nothing.
+    Of several values outside of the sensors the smallest counts: tracks are as exact as the more exact of
+    their sensors. A network without such a file, and the detectors without weights, say nothing.
 
     Args:
         request: what detects.
@@ -77,7 +86,7 @@ def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lam
         ConfigError: a detector that is not known, or a file that cannot be read or holds something else.
     """
     found: list[str] = []
-    least = {"birth.max_overlap": 1.0, "merge.apart_overlap": 1.0}
+    least = dict.fromkeys(_LEAST, 1.0)
     for sensor, detector in detectors.items():
         if detector == MOTION:
             continue
@@ -99,6 +108,9 @@ def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lam
         else:
             least["birth.max_overlap"] = min(least["birth.max_overlap"], declared.birth.max_overlap)
         least["merge.apart_overlap"] = min(least["merge.apart_overlap"], declared.merge.apart_overlap)
+        said = declared.output.position_scale, declared.output.lasting_error
+        for key, value in zip(_LEAST[2:], said, strict=True):
+            least[key] = min(least[key], value)
         found += [f"sensors.{sensor}.{key}={json.dumps(value)}" for key, value in facts.items()]
         say(f"sensor {sensor!r}: its boxes are taken for what {path.name} says (any other --config: not)")
     return found + [f"{key}={value}" for key, value in least.items() if value < 1.0]

@@ -18,6 +18,9 @@ def test_networks_of_the_package_are_declared_as_their_preset_declares_them(netw
     assert found.sensors == preset.sensors
     assert found.birth.max_overlap == preset.birth.max_overlap
     assert found.merge == preset.merge
+    assert found.output.position_scale == preset.output.position_scale
+    # Of two the more exact one counts.
+    assert found.output.lasting_error == preset.output.lasting_error
     assert found.motion == load_config("default").motion
     assert [line.split(":")[0] for line in said] == ["sensor 'rgb'", "sensor 'evt'"]
 
@@ -30,6 +33,7 @@ def test_who_looks_at_nothing_or_has_no_weights_says_nothing():
     alone = declared_settings(DetectRequest(events="b", detector_events="sehn"))
     # But for what their scores say of boxes and tracks, which was measured of each sensor alone.
     names = ["sensors.evt.score_noise", "sensors.evt.score_fit", "merge.apart_overlap"]
+    names += ["output.position_scale", "output.lasting_error"]
     assert [line.split("=")[0] for line in alone] == names
 
 
@@ -46,6 +50,7 @@ def test_a_network_of_ones_own(tmp_path):
     assert declared_settings(request) == []
     for wrong in (
         "merge: {apart_overlap: 2}",
+        "output: {position_scale: 0}",
         "sensor: {p_detekt: 0.7}",
         "sensors: {}",
         "sensor: 3",
