@@ -93,18 +93,22 @@ def test_what_nothing_is_left_to_check_by_goes_back_to_the_base(recordings, base
     ("scores", "kept", "gains"),
     [
         # All of them win over the base, and win more without the births.
-        ({"": 50.0, "nsrb": 60.0, "srb": 40.0, "nrb": 55.0, "nsb": 52.0, "nsr": 63.0}, "nsr", (20, 5, 8, -3)),
+        (
+            {"": 50, "nsfrb": 60, "sfrb": 40, "nfrb": 55, "nsrb": 57, "nsfb": 52, "nsfr": 63},
+            "nsfr",
+            (20, 5, 3, 8, -3),
+        ),
         # Together they lose; the reliability alone wins.
-        ({"": 50.0, "nsrb": 40.0, "n": 45.0, "s": 49.0, "r": 53.0, "rb": 52.0}, "r", (-5, -1, 3, -1)),
+        ({"": 50, "nsfrb": 40, "n": 45, "s": 49, "f": 48, "r": 53, "rb": 52}, "r", (-5, -1, -2, 3, -1)),
     ],
 )
 def test_the_base_stays_but_for_what_wins(scores, kept, gains):
     def verdict(some):
-        score = scores["".join("nsrb"[k] for k, part in enumerate(PARTS) if part in some)]
-        each = np.full(6, score)
+        score = scores["".join("nsfrb"[k] for k, part in enumerate(PARTS) if part in some)]
+        each = np.full(6, float(score))
         return Verdict(each, np.ones(6), np.arange(6) % 2, each, np.ones(6))
 
     found, choices = module._choose(verdict, lambda _: None)
-    assert found == [part for k, part in enumerate(PARTS) if "nsrb"[k] in kept]
+    assert found == [part for k, part in enumerate(PARTS) if "nsfrb"[k] in kept]
     assert [choice.gain for choice in choices] == pytest.approx(list(gains))
     assert [choice.kept for choice in choices] == [part in found for part in PARTS]
