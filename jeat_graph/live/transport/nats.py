@@ -192,9 +192,15 @@ class NatsSink:
         self._most = address.number("most", MOST_OPEN, low=1)
         self._connection = _Connection(address)
         self._open: deque[tuple[bytes, Any]] = deque()
+        self._reconnects = 0
 
     def send(self, message: bytes) -> None:
-        """Publish; waits while too many are on their way."""
+        """Publish; waits while too many are on their way, and after a lost connection until none is."""
+        link = self._connection
+        if self._reconnects != link.reconnects or not link.client.is_connected:
+            # What was on its way may be lost and has to be sent again, before what comes after it.
+            self._wait(0)
+            self._reconnects = link.reconnects
         self._wait(self._most - 1)
         self._open.append((message, self._publish(message)))
 
