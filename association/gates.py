@@ -18,10 +18,10 @@ class Expected(NamedTuple):
     """What N tracks are expected to show S sensors.
 
     Attributes:
-        position: (N, S, 2) expected centre of a detection of sensor s on track i (px), but for what lasts.
-        position_var: (N, S, 2) its variances, before the detection's noise (px²).
-        lasting: (N, S, 2, 4) what a lasting error of the sensor adds at spread 1: to the centre (px), twice
-            its covariance with the centre and its variance (px²), and its standard deviation where nothing is
+        position: (N, S, 2) expected centre of a detection of sensor s on track i, of spread 1 (px).
+        position_var: (N, S, 2) its variances, before the detection's white noise (px²).
+        lasting: (N, S, 2, 4) what of them a lasting error of the sensor adds: to the centre (px), twice its
+            covariance with the centre and its variance (px²), and its standard deviation where nothing is
             known of it (px).
         noise: (N, S, 2) variances of that noise, at weight 1 (px²).
         log_size: (N, 2) predicted ln width, ln height.
@@ -157,13 +157,17 @@ def _fill(
             # The middle of the part that shows lies within half a size of the centre.
             reach, more = _reach(longest[axis], log_size[i, axis], log_size_var[i, axis])
             for s in range(noise.shape[1]):
-                shift, shared, own, std = _lasting(lasting[i, s, axis])
-                white = scored_noise(noise[i, s, axis], std, widest)[0] * heaviest
-                var = position_var[i, s, axis] + white + more
-                var += max(shared, 0.0) * most + min(shared, 0.0) * least + own * most * most
+                near = far = position[i, s, axis]
+                var, white = position_var[i, s, axis], noise[i, s, axis]
+                if least < 1.0 or widest > 1.0:
+                    parts = lasting[i, s, axis]
+                    white = scored_noise(white, parts[3], widest)[0]
+                    # A covariance below zero takes less off the variance where less of the error lasts.
+                    var -= (1.0 - least) * min(parts[1], 0.0)
+                    near, far = near - (1.0 - least) * parts[0], near - (1.0 - most) * parts[0]
+                var += white * heaviest + more
                 # A hair wider than any gate, so that rounding never decides here.
                 half = 1.000001 * math.sqrt(gate * var) + reach
-                near, far = position[i, s, axis] + shift * least, position[i, s, axis] + shift * most
                 low[axis] = min(low[axis], min(near, far) - half)
                 high[axis] = max(high[axis], max(near, far) + half)
         right, top, bottom = high[0], low[1], high[1]
@@ -179,11 +183,13 @@ def _fill(
             distance, det = 0.0, 1.0
             # y first: the detections are sorted by x, so that it rules out more of what is left.
             for axis in (1, 0):
-                shift, shared, own, std = _lasting(lasting[i, s, axis])
-                white = scored_noise(noise[i, s, axis], std, spread[j])[0] * weight[j]
-                lasts = min(spread[j], 1.0)
-                where = position[i, s, axis] + lasts * shift
-                var = position_var[i, s, axis] + lasts * shared + lasts * lasts * own
+                where, var, white = position[i, s, axis], position_var[i, s, axis], noise[i, s, axis]
+                if spread[j] != 1.0:
+                    parts, lasts = lasting[i, s, axis], min(spread[j], 1.0)
+                    white = scored_noise(white, parts[3], spread[j])[0]
+                    where -= (1.0 - lasts) * parts[0]
+                    var -= (1.0 - lasts) * parts[1] + (1.0 - lasts * lasts) * parts[2]
+                white *= weight[j]
                 off, S = z[j, axis] - where, var + white
                 if cut[j, axis] != WHOLE:
                     known = log_size[i, axis], log_size_var[i, axis]
@@ -230,12 +236,6 @@ def _fill(
             )
             count += 1
     return count
-
-
-@njit(cache=True, inline="always")
-def _lasting(parts: FloatArray) -> tuple[float, float, float, float]:
-    """Return the four parts of `Expected.lasting`."""
-    return parts[0], parts[1], parts[2], parts[3]
 
 
 @njit(cache=True)

@@ -23,7 +23,7 @@ def random_scene(rng, tracks, dets, sensors=2, width=300.0):
     lasting = np.stack([shift, 2.0 * shared, lasting_std**2, usual_std], axis=-1)
     expected = Expected(
         rng.uniform(0.0, width, (tracks, 1, 2)) + rng.normal(0.0, 2.0, (tracks, sensors, 2)),
-        position_var,
+        position_var + 2.0 * shared + lasting_std**2,
         lasting,
         rng.uniform(1.0, 30.0, (tracks, sensors, 2)),
         rng.normal(4.0, 0.3, (tracks, 2)),
@@ -51,8 +51,9 @@ def all_pairs(expected, found, _, gate, size_gate):
         for j in range(len(z)):
             s, f = sensor[j], spread[j]
             c, (shift, shared, own, usual) = min(f, 1.0), lasting[i, s].T
-            centre = position[i, s] + c * shift
-            S = var[i, s] + c * shared + c**2 * own
+            centre = position[i, s] - (1.0 - c) * shift
+            # What the track's own place has, and the part of the lasting error that this detection shows.
+            S = (var[i, s] - shared - own) + c * shared + c**2 * own
             S += (f**2 * noise[i, s] + (f**2 - c**2) * usual**2) * weight[j]
             d2 = ((z[j] - centre) ** 2 / S).sum()
             V = size_var[i] + f**2 * size_noise[s]
@@ -208,7 +209,7 @@ def cut_residual(scene, i, j, axis):
     s, weight, f = found.sensor[j], found.weight[j], found.spread[j]
     shift, shared, own, usual = expected.lasting[i, s, axis]
     c = min(f, 1.0)
-    var = expected.position_var[i, s, axis] + c * shared + c**2 * own
+    var = expected.position_var[i, s, axis] - shared - own + c * shared + c**2 * own
     var += (f**2 * expected.noise[i, s, axis] + (f**2 - c**2) * usual**2) * weight
     centre, cut = found.z[j, axis], found.cut[j, axis]
     if cut == BOTH_CUT:
@@ -217,7 +218,7 @@ def cut_residual(scene, i, j, axis):
         half = 0.5 * np.exp(max(expected.log_size[i, axis], found.log_size[j, axis]))
         centre = found.side[j, axis] + (half if cut == HIGH_CUT else -half)
         var += half**2 * expected.log_size_var[i, axis]
-    return centre - expected.position[i, s, axis] - c * shift, var
+    return centre - expected.position[i, s, axis] + (1.0 - c) * shift, var
 
 
 def test_no_pair_with_a_box_that_is_cut_lies_outside_the_window():

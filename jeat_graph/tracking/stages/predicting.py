@@ -12,7 +12,7 @@ from jeat_graph.association.boxes import occluded_fraction, track_boxes, visible
 from jeat_graph.config.kernel_form import Model, SensorArrays, Settings
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.filters.coasting import forget
-from jeat_graph.filters.coloured_noise import MOTION, predict_errors
+from jeat_graph.filters.coloured_noise import MOTION, expected, predict_errors
 from jeat_graph.filters.existence import motion_visibility, unsure_visibility
 from jeat_graph.filters.fit import fade
 from jeat_graph.filters.jerk import track_jerk
@@ -217,10 +217,11 @@ class Expectation(NamedTuple):
     """Where the next detection of each sensor on each track is expected.
 
     Attributes:
-        centre: (N, S, 2) expected centre without the sensor's lasting error (px): that of the track.
-        var: (N, S, 2) its variance (px²).
-        lasting: (N, S, 2, 4) what that error adds: to the centre (px), twice its covariance with the centre
-            and its variance (px²), and its standard deviation where nothing is known of it (px).
+        centre: (N, S, 2) expected centre (px).
+        var: (N, S, 2) its variance before the detection's white noise (px²).
+        lasting: (N, S, 2, 4) what of them the sensor's lasting error adds: to the centre (px), twice its
+            covariance with the centre and its variance (px²), and its standard deviation where nothing is
+            known of it (px).
         white: (N, S, 2) variance of that noise at weight 1 (px²).
         coloured_std: (N, S, 2) standard deviation of the coloured part of the noise (px), 0 for none.
     """
@@ -253,7 +254,7 @@ def expect_detections(tracks: TrackArrays, n: int, occluded: FloatArray, model: 
                 r, h = split_noise(detection_variance(tracks, i, s, axis, sensors), s, sensors)
                 white[i, s, axis], coloured_std[i, s, axis] = r + more * (r + h * h), h
                 m, P = tracks.mean[i, axis], tracks.cov[i, axis]
-                centre[i, s, axis], var[i, s, axis] = m[0], P[0, 0]
+                centre[i, s, axis], var[i, s, axis] = expected(m, P, h, sensors.error[s])
                 if sensors.error[s] >= 0:
                     e = MOTION + sensors.error[s]
                     parts = lasting[i, s, axis]
