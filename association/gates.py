@@ -20,10 +20,10 @@ class Expected(NamedTuple):
     Attributes:
         position: (N, S, 2) expected centre of a detection of sensor s on track i, of spread 1 (px).
         position_var: (N, S, 2) its variances, before the detection's white noise (px²).
-        lasting: (N, S, 2, 4) what of them a lasting error of the sensor adds: to the centre (px), twice its
-            covariance with the centre and its variance (px²), and its standard deviation where nothing is
-            known of it (px).
+        lasting: (N, S, 2, 3) what of them a lasting error of the sensor adds: to the centre (px), twice its
+            covariance with the centre and its variance (px²); not looked at where all spreads are 1.
         noise: (N, S, 2) variances of that noise, at weight 1 (px²).
+        coloured_std: (N, S, 2) standard deviations of the lasting error (px).
         log_size: (N, 2) predicted ln width, ln height.
         log_size_var: (N, 2) their variances.
         size_noise: (S, 2) measurement variances of ln width, ln height.
@@ -34,6 +34,7 @@ class Expected(NamedTuple):
     position_var: FloatArray
     lasting: FloatArray
     noise: FloatArray
+    coloured_std: FloatArray
     log_size: FloatArray
     log_size_var: FloatArray
     size_noise: FloatArray
@@ -132,7 +133,8 @@ def _fill(
     A function of its own, because arrays that may be replaced inside the loop make it five times slower.
     """
     rows, cols, d2, log_density, log_size_density = pairs
-    position, position_var, lasting, noise, log_size, log_size_var, size_noise, last_cut = expected
+    position, position_var, lasting, noise, coloured_std = expected[:5]
+    log_size, log_size_var, size_noise, last_cut = expected[5:]
     z, z_log_size, weight, spread, sensor, cut, side = found
     num_tracks = position.shape[0]
     num_dets = z.shape[0]
@@ -161,7 +163,7 @@ def _fill(
                 var, white = position_var[i, s, axis], noise[i, s, axis]
                 if least < 1.0 or widest > 1.0:
                     parts = lasting[i, s, axis]
-                    white = scored_noise(white, parts[3], widest)[0]
+                    white = scored_noise(white, coloured_std[i, s, axis], widest)[0]
                     # A covariance below zero takes less off the variance where less of the error lasts.
                     var -= (1.0 - least) * min(parts[1], 0.0)
                     near, far = near - (1.0 - least) * parts[0], near - (1.0 - most) * parts[0]
@@ -186,7 +188,7 @@ def _fill(
                 where, var, white = position[i, s, axis], position_var[i, s, axis], noise[i, s, axis]
                 if spread[j] != 1.0:
                     parts, lasts = lasting[i, s, axis], min(spread[j], 1.0)
-                    white = scored_noise(white, parts[3], spread[j])[0]
+                    white = scored_noise(white, coloured_std[i, s, axis], spread[j])[0]
                     where -= (1.0 - lasts) * parts[0]
                     var -= (1.0 - lasts) * parts[1] + (1.0 - lasts * lasts) * parts[2]
                 white *= weight[j]

@@ -41,18 +41,19 @@ def fade(fit: FloatArray, dt: float, memory_s: float) -> None:
 
 
 @njit(cache=True)
-def exactness(log_size: FloatArray, noise: FloatArray, coloured_std: FloatArray) -> float:
-    """Return w of a detection.
+def exactness(log_size: FloatArray, noise: FloatArray, coloured_std: FloatArray, spread: float) -> float:
+    """Return w of a detection, as if it were as exact as usual: what its score says of that, is in the fit.
 
     Args:
         log_size: (2,) ln width and ln height (ln px).
         noise: (2,) variances of the white part of its centre's noise (px²).
         coloured_std: (2,) standard deviations of the part that is correlated in time (px).
+        spread: factor within these on the usual standard deviations.
     """
     area = math.exp(log_size[0] + log_size[1])
     var_x = noise[0] + coloured_std[0] * coloured_std[0]
     var_y = noise[1] + coloured_std[1] * coloured_std[1]
-    return area / math.sqrt(var_x * var_y)
+    return area / math.sqrt(var_x * var_y) * spread * spread
 
 
 @njit(cache=True)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 
 from jeat_graph.config.fields import Section, number
 from jeat_graph.config.section_tree import build, read_tree
@@ -22,7 +22,6 @@ from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION, network_fi
 _SUFFIX = ".tracking.yaml"
 # What scores say of how exact boxes are, and how tracks fit, was measured of each sensor alone.
 _ALWAYS = ("score_noise", "score_fit")
-_LEAST = ("birth.max_overlap", "merge.apart_overlap", "output.position_scale", "output.lasting_error")
 _KINDS = {FRAMES_SENSOR: FRAMES, EVENTS_SENSOR: EVENTS, FUSED_SENSOR: FUSED}
 
 
@@ -86,7 +85,7 @@ def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lam
         ConfigError: a detector that is not known, or a file that cannot be read or holds something else.
     """
     found: list[str] = []
-    least = dict.fromkeys(_LEAST, 1.0)
+    least: dict[str, float] = {}
     for sensor, detector in detectors.items():
         if detector == MOTION:
             continue
@@ -100,17 +99,16 @@ def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lam
         except ConfigError as error:
             raise ConfigError(f"{path}: {error}") from None
         assert isinstance(declared, _Declared)
-        facts = tree.get("sensor", {})
+        facts, sections = tree.get("sensor", {}), ["birth", "merge", "output"]
         if declared.beside and declared.beside not in detectors:
             facts = {key: value for key, value in facts.items() if key in _ALWAYS}
             if not facts:
                 continue
-        else:
-            least["birth.max_overlap"] = min(least["birth.max_overlap"], declared.birth.max_overlap)
-        least["merge.apart_overlap"] = min(least["merge.apart_overlap"], declared.merge.apart_overlap)
-        said = declared.output.position_scale, declared.output.lasting_error
-        for key, value in zip(_LEAST[2:], said, strict=True):
-            least[key] = min(least[key], value)
+            sections.remove("birth")
+        for section in sections:
+            for key, value in asdict(getattr(declared, section)).items():
+                name = f"{section}.{key}"
+                least[name] = min(least.get(name, 1.0), value)
         found += [f"sensors.{sensor}.{key}={json.dumps(value)}" for key, value in facts.items()]
         say(f"sensor {sensor!r}: its boxes are taken for what {path.name} says (any other --config: not)")
     return found + [f"{key}={value}" for key, value in least.items() if value < 1.0]

@@ -20,8 +20,9 @@ def two_sensors(residual, variances, weights=(1.0, 1.0), track_var=4.0):
     expected = Expected(
         np.zeros((1, 2, 2)),
         np.full((1, 2, 2), track_var),
-        np.zeros((1, 2, 2, 4)),
+        np.zeros((0, 0, 0, 0)),
         np.repeat(np.array(variances), 2).reshape(1, 2, 2),
+        np.zeros((1, 2, 2)),
         flat,
         small,
         np.full((2, 2), 0.01),

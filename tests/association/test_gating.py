@@ -20,12 +20,13 @@ def random_scene(rng, tracks, dets, sensors=2, width=300.0):
     shared = rng.uniform(-0.9, 0.9, (tracks, sensors, 2)) * lasting_std * np.sqrt(position_var)
     usual_std = lasting_std * rng.uniform(1.0, 2.0, shared.shape)
     shift = rng.normal(0.0, 4.0, shared.shape)
-    lasting = np.stack([shift, 2.0 * shared, lasting_std**2, usual_std], axis=-1)
+    lasting = np.stack([shift, 2.0 * shared, lasting_std**2], axis=-1)
     expected = Expected(
         rng.uniform(0.0, width, (tracks, 1, 2)) + rng.normal(0.0, 2.0, (tracks, sensors, 2)),
         position_var + 2.0 * shared + lasting_std**2,
         lasting,
         rng.uniform(1.0, 30.0, (tracks, sensors, 2)),
+        usual_std,
         rng.normal(4.0, 0.3, (tracks, 2)),
         rng.uniform(0.001, 0.05, (tracks, 2)),
         rng.uniform(0.005, 0.05, (sensors, 2)),
@@ -44,17 +45,17 @@ def random_scene(rng, tracks, dets, sensors=2, width=300.0):
 
 
 def all_pairs(expected, found, _, gate, size_gate):
-    position, var, lasting, noise, log_size, size_var, size_noise, _ = expected
+    position, var, lasting, noise, usual, log_size, size_var, size_noise, _ = expected
     z, z_size, weight, spread, sensor, _, _ = found
     out = []
     for i in range(len(position)):
         for j in range(len(z)):
             s, f = sensor[j], spread[j]
-            c, (shift, shared, own, usual) = min(f, 1.0), lasting[i, s].T
+            c, (shift, shared, own) = min(f, 1.0), lasting[i, s].T
             centre = position[i, s] - (1.0 - c) * shift
             # What the track's own place has, and the part of the lasting error that this detection shows.
             S = (var[i, s] - shared - own) + c * shared + c**2 * own
-            S += (f**2 * noise[i, s] + (f**2 - c**2) * usual**2) * weight[j]
+            S += (f**2 * noise[i, s] + (f**2 - c**2) * usual[i, s] ** 2) * weight[j]
             d2 = ((z[j] - centre) ** 2 / S).sum()
             V = size_var[i] + f**2 * size_noise[s]
             size_d2 = ((z_size[j] - log_size[i]) ** 2 / V).sum()
@@ -99,7 +100,7 @@ def test_a_detection_on_the_gate_is_inside():
     one, flat, none = np.ones((1, 2)), np.zeros((1, 2)), np.zeros((1, 2), dtype=np.int64)
     z = np.array([[6.0, 0.0]])
     arguments = (
-        Expected(flat[None], one[None], np.zeros((1, 1, 2, 4)), one[None], flat, one, one, none),
+        Expected(flat[None], one[None], np.zeros((0, 0, 0, 0)), one[None], flat[None], flat, one, one, none),
         Found(z, flat, np.ones(1), np.ones(1), none[0, :1], none, flat),
         NORMAL,
     )
@@ -125,8 +126,9 @@ def one_cut(cut, side, shown, centre=100.0, width=80.0, size_var=0.04, last_cut=
     track = Expected(
         np.array([[[centre, 50.0]]]),
         np.full((1, 1, 2), position_var),
-        np.zeros((1, 1, 2, 4)),
+        np.zeros((0, 0, 0, 0)),
         np.full((1, 1, 2), 5.0),
+        np.zeros((1, 1, 2)),
         np.log([[width, 40.0]]),
         np.full((1, 2), size_var),
         np.full((1, 2), 0.01),
@@ -207,7 +209,8 @@ def cut_residual(scene, i, j, axis):
     """Difference of detection j from track i along an axis, and its variance, for one that is cut or not."""
     expected, found, _ = scene
     s, weight, f = found.sensor[j], found.weight[j], found.spread[j]
-    shift, shared, own, usual = expected.lasting[i, s, axis]
+    shift, shared, own = expected.lasting[i, s, axis]
+    usual = expected.coloured_std[i, s, axis]
     c = min(f, 1.0)
     var = expected.position_var[i, s, axis] - shared - own + c * shared + c**2 * own
     var += (f**2 * expected.noise[i, s, axis] + (f**2 - c**2) * usual**2) * weight

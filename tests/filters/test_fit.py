@@ -89,7 +89,7 @@ def test_fragments_that_were_joined_count_one_another():
 
 def test_who_sees_nothing_for_long_leaves_the_say_to_others():
     now = np.zeros((1, 2))
-    exact = exactness(np.log([40.0, 30.0]), np.array([1.0, 0.5]), np.array([0.0, 0.7]))
+    exact = exactness(np.log([40.0, 30.0]), np.array([1.0, 0.5]), np.array([0.0, 0.7]), 1.0)
     assert exact == pytest.approx(40.0 * 30.0 / np.sqrt(1.0 * 0.99))
     take(now[0], 0.2, exact)
     take(now[0], 0.9, exact / 50.0)
@@ -105,3 +105,9 @@ def test_without_any_weight_left_the_last_word_stays():
     fade(now, 1e6, MEMORY_S)
     assert now[0, WEIGHT] == 0.0
     assert now[0, MEAN] == pytest.approx(0.3)
+
+
+def test_a_doubtful_box_weighs_as_if_it_were_as_exact_as_usual():
+    usual = exactness(np.log([40.0, 30.0]), np.array([1.0, 0.5]), np.array([0.0, 0.7]), 1.0)
+    doubtful = exactness(np.log([40.0, 30.0]), 9.0 * np.array([1.0, 0.5]), 3.0 * np.array([0.0, 0.7]), 3.0)
+    assert doubtful == pytest.approx(usual, rel=1e-12)

@@ -54,6 +54,7 @@ def judge_pairs(
             expectation.var,
             expectation.lasting,
             expectation.white,
+            expectation.coloured_std,
             tracks.size_mean[:n, :, 0],
             tracks.size_cov[:n, :, 0, 0],
             sensors.size_var,

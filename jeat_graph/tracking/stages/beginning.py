@@ -165,9 +165,8 @@ def start_track(
     tracks.worth[i] = 1.0
     tracks.worthy[i] = True
     tracks.fit[i] = 0.0
-    usual = batch.spread[j] * batch.spread[j]
-    w = exactness(view.log_size[0], view.noise[0], view.coloured_std[0])
-    take(tracks.fit[i], batch.fit[j], usual * w)
+    noise_of = view.noise[0], view.coloured_std[0], batch.spread[j]
+    take(tracks.fit[i], batch.fit[j], exactness(view.log_size[0], *noise_of))
     tracks.t_birth[i] = t
     tracks.born_at[i] = z
     tracks.last_box[i] = -np.inf

@@ -219,9 +219,9 @@ class Expectation(NamedTuple):
     Attributes:
         centre: (N, S, 2) expected centre (px).
         var: (N, S, 2) its variance before the detection's white noise (px²).
-        lasting: (N, S, 2, 4) what of them the sensor's lasting error adds: to the centre (px), twice its
-            covariance with the centre and its variance (px²), and its standard deviation where nothing is
-            known of it (px).
+        lasting: (N, S, 2, 3) what of them the sensor's lasting error adds: to the centre (px), twice its
+            covariance with the centre and its variance (px²); (0, 0, 0, 0) where no sensor's scores say how
+            exact boxes are.
         white: (N, S, 2) variance of that noise at weight 1 (px²).
         coloured_std: (N, S, 2) standard deviation of the coloured part of the noise (px), 0 for none.
     """
@@ -246,7 +246,9 @@ def expect_detections(tracks: TrackArrays, n: int, occluded: FloatArray, model: 
     sensors, growth = model.sensors, model.settings.noise.hidden_growth
     shape = (n, len(sensors.sigma_px), 2)
     centre, var, white, coloured_std = np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape)
-    lasting = np.zeros((*shape, 4))
+    # Only a detection that is not as exact as usual asks for it.
+    by_score = np.min(sensors.noise_factor) < 1.0 or np.max(sensors.noise_factor) > 1.0
+    lasting = np.zeros((*shape, 3) if by_score else (0, 0, 0, 0))
     for i in range(n):
         more = hidden_excess(occluded[i], growth)
         for s in range(shape[1]):
@@ -255,9 +257,8 @@ def expect_detections(tracks: TrackArrays, n: int, occluded: FloatArray, model: 
                 white[i, s, axis], coloured_std[i, s, axis] = r + more * (r + h * h), h
                 m, P = tracks.mean[i, axis], tracks.cov[i, axis]
                 centre[i, s, axis], var[i, s, axis] = expected(m, P, h, sensors.error[s])
-                if sensors.error[s] >= 0:
+                if by_score and sensors.error[s] >= 0:
                     e = MOTION + sensors.error[s]
                     parts = lasting[i, s, axis]
-                    parts[0], parts[1] = h * m[e], 2.0 * h * P[0, e]
-                    parts[2], parts[3] = h * h * P[e, e], h
+                    parts[0], parts[1], parts[2] = h * m[e], 2.0 * h * P[0, e], h * h * P[e, e]
     return Expectation(centre, var, lasting, white, coloured_std)

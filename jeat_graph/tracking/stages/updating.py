@@ -130,9 +130,8 @@ def take_in(
         )
         hits[i] += 1
         score_odds[i] += (batch.score_odds[j] - score_odds[i]) / hits[i]
-        w = exactness(measured.log_size[k], measured.noise[k], measured.coloured_std[k])
-        # What its score says of how exact it is, is in the fit.
-        take(fit[i], batch.fit[j], w * batch.spread[j] * batch.spread[j])
+        noise_of = measured.noise[k], measured.coloured_std[k], batch.spread[j]
+        take(fit[i], batch.fit[j], exactness(measured.log_size[k], *noise_of))
         t_update[i] = batch.t
         used[i] |= 1 << s
         seen_by[i] |= 1 << s
