@@ -22,6 +22,12 @@ class OutputConfig(Section):
         False,
         "scans count only while several sensors look; one alone is given `max_gap_s`: nobody fills its gaps",
     )
+    gap_memory: float = number(
+        0.0,
+        "1",
+        "what nobody sees is reported for longer where most of the last so many such tracks were found again "
+        "where they were expected; 0: never",
+    )
     min_fit: float = number(
         0.5,
         "1",

@@ -12,6 +12,7 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.filters.cut_boxes import WHOLE
 from jeat_graph.filters.fit import MEAN
+from jeat_graph.filters.gaps import longest_right_gap
 from jeat_graph.tracking.classes import ClassTally
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
@@ -24,7 +25,21 @@ _LOOKS_S = 1.0
 
 
 def longest_gap_s(scene: SceneState, model: Model, t: float) -> float:
-    """Time since its last update up to which a track is reported (s).
+    """Time since its last update up to which a track is reported (s): the usual, or more where that is right.
+
+    Args:
+        scene: what is learnt of the sensors, and of tracks that nobody saw for a while.
+        model: sensors and settings.
+        t: now (s).
+    """
+    usual = _usual_gap_s(scene, model, t)
+    if model.settings.output.gap_memory <= 0.0:
+        return usual
+    return float(longest_right_gap(scene.gap_share, usual))
+
+
+def _usual_gap_s(scene: SceneState, model: Model, t: float) -> float:
+    """Time since its last update up to which a track is reported whatever became of others (s).
 
     In scans of the sensor that needs most time: one that finds one vehicle in two has to be given more of
     them than one that finds all (P_D⁻², and as much again because the P_D of tracks that were found is larger

@@ -12,6 +12,7 @@ from jeat_graph.config.kernel_form import SensorArrays
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 from jeat_graph.filters.box_offsets import NUM_SUMS
+from jeat_graph.filters.gaps import LENGTHS, PRIOR_GAPS, PRIOR_SHARE
 from jeat_graph.filters.manoeuvre import prior_weights
 
 # What lasts usually has scores of about .9; that is held to be known from five seconds of a track.
@@ -64,6 +65,7 @@ class TrackArrays(NamedTuple):
         worthy: (C,) whether it may be reported: things of such scores last often enough to be believed of one
             sensor alone, and it has moved where only sensors that see nothing stand have seen it.
         fit: (C, 2) how likely its box fits, by the scores of its detections (`filters.fit`).
+        t_shown: (C,) when nobody saw it last while all but the gap spoke for reporting it (s).
     """
 
     mean: FloatArray
@@ -99,6 +101,7 @@ class TrackArrays(NamedTuple):
     worth: FloatArray
     worthy: npt.NDArray[np.bool_]
     fit: FloatArray
+    t_shown: FloatArray
 
 
 #: What is counted of a sensor's recent detections on lasting tracks while another sensor looked too, in
@@ -164,6 +167,9 @@ class SceneState(NamedTuple):
         usual_jerk: (K,) recent mean weight of each density of jerk over the confirmed tracks.
         field: (S, 2) how far each sensor's boxes reach to the left and to the right (px), from +inf, -inf.
         field_witnesses: (S,) over how many vehicles they were.
+        gap_share: (L,) of the tracks that nobody saw for so long, those found again as expected
+            (`filters.gaps`).
+        gap_seen: (L,) on how many each share rests.
     """
 
     clutter: FloatArray
@@ -195,6 +201,8 @@ class SceneState(NamedTuple):
     usual_jerk: FloatArray
     field: FloatArray
     field_witnesses: FloatArray
+    gap_share: FloatArray
+    gap_seen: FloatArray
 
 
 def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
@@ -235,6 +243,8 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
         usual_jerk=prior_weights(config.motion.manoeuvre_prior, config.motion.densities),
         field=np.tile([np.inf, -np.inf], (num_sensors, 1)),
         field_witnesses=np.zeros(num_sensors),
+        gap_share=np.full(LENGTHS, PRIOR_SHARE),
+        gap_seen=np.full(LENGTHS, PRIOR_GAPS),
     )
 
 
@@ -275,6 +285,7 @@ def allocate(capacity: int, num_sensors: int, num_errors: int = 0, densities: in
         worth=np.ones(capacity),
         worthy=np.ones(capacity, dtype=np.bool_),
         fit=np.zeros((capacity, 2)),
+        t_shown=np.zeros(capacity),
     )
 
 

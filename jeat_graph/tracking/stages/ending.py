@@ -13,6 +13,7 @@ from jeat_graph.config.kernel_form import Model, Settings
 from jeat_graph.config.schema import ImageConfig
 from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.tracking.compaction import keep_rows
+from jeat_graph.tracking.stages.gaps import learn_lost
 from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.stages.learning import scan_weight
 from jeat_graph.tracking.stages.worth import learn_ended
@@ -92,6 +93,7 @@ def remove_ended(tracks: TrackArrays, n: int, t: float, scene: SceneState, model
         if remove[i] or gap > most or doubted or broken or (lifecycle.leave_picture and outside):
             if not (remove[i] or outside or broken):
                 learn_ended(tracks, i, scene, model)
+                learn_lost(tracks, i, scene, model)
             if not (tracks.confirmed[i] or remove[i] or outside or broken):
                 _count_fruitless(tracks.hits[i], tracks.seen_by[i], scene, model)
             continue
