@@ -12,15 +12,14 @@ from jeat_graph.config.kernel_form import SensorArrays
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 from jeat_graph.filters.box_offsets import NUM_SUMS
-from jeat_graph.filters.gaps import LENGTHS, PRIOR_GAPS, PRIOR_SHARE
+from jeat_graph.filters.gaps import KINDS, LENGTHS, PRIOR_GAPS, PRIOR_SHARE
 from jeat_graph.filters.manoeuvre import prior_weights
+from jeat_graph.tracking.claims import CLAIMS, PLACES
 
 # What lasts usually has scores of about .9; that is held to be known from five seconds of a track.
 _USUAL_ODDS, _USUAL_WEIGHT = 2.2, 5.0
 # The share of what comes again in vain is held to be known from ten.
 _USUAL_VAIN_WEIGHT = 10.0
-#: Strips of the picture, side by side, by which claims are kept apart.
-PLACES = 16
 #: How hard the tracks of a scene usually manoeuvre is the mean of so many seconds of a track.
 USUAL_JERK_S = 30.0
 
@@ -66,6 +65,8 @@ class TrackArrays(NamedTuple):
             sensor alone, and it has moved where only sensors that see nothing stand have seen it.
         fit: (C, 2) how likely its box fits, by the scores of its detections (`filters.fit`).
         t_shown: (C,) when nobody saw it last while all but the gap spoke for reporting it (s).
+        gap_hidden: (C,) bit k is set where it was hidden when unseen for length k (`filters.gaps`).
+        covered: (C,) part of its box that another track hid in the last step.
     """
 
     mean: FloatArray
@@ -102,27 +103,8 @@ class TrackArrays(NamedTuple):
     worthy: npt.NDArray[np.bool_]
     fit: FloatArray
     t_shown: FloatArray
-
-
-#: What is counted of a sensor's recent detections on lasting tracks while another sensor looked too, in
-#: seconds of a track: all; those on tracks that another sensor has seen, and those of them whose score is
-#: above the mean log odds of theirs and that are on tracks that have moved; the same of the detections on
-#: tracks that the sensor alone has seen. The sums of the squares of the tracks' deviations from that mean
-#: (log odds² s), of the squares of all deviations, and of their products with those of the next detection.
-CLAIMS = np.dtype(
-    [
-        (name, np.float64)
-        for name in (
-            "all",
-            "agreed",
-            "agreed_high",
-            "lonely_high",
-            "score_spread",
-            "score_square",
-            "score_kept",
-        )
-    ]
-)
+    gap_hidden: IntArray
+    covered: FloatArray
 
 
 class SceneState(NamedTuple):
@@ -167,9 +149,9 @@ class SceneState(NamedTuple):
         usual_jerk: (K,) recent mean weight of each density of jerk over the confirmed tracks.
         field: (S, 2) how far each sensor's boxes reach to the left and to the right (px), from +inf, -inf.
         field_witnesses: (S,) over how many vehicles they were.
-        gap_share: (L,) of the tracks that nobody saw for so long, those found again as expected
-            (`filters.gaps`).
-        gap_seen: (L,) on how many each share rests.
+        gap_share: (2, L) of the tracks that nobody saw for so long, in the open and hidden, those found
+            again as expected (`filters.gaps`).
+        gap_seen: (2, L) on how many each share rests.
     """
 
     clutter: FloatArray
@@ -243,8 +225,8 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
         usual_jerk=prior_weights(config.motion.manoeuvre_prior, config.motion.densities),
         field=np.tile([np.inf, -np.inf], (num_sensors, 1)),
         field_witnesses=np.zeros(num_sensors),
-        gap_share=np.full(LENGTHS, PRIOR_SHARE),
-        gap_seen=np.full(LENGTHS, PRIOR_GAPS),
+        gap_share=np.full((KINDS, LENGTHS), PRIOR_SHARE),
+        gap_seen=np.full((KINDS, LENGTHS), PRIOR_GAPS),
     )
 
 
@@ -286,6 +268,8 @@ def allocate(capacity: int, num_sensors: int, num_errors: int = 0, densities: in
         worthy=np.ones(capacity, dtype=np.bool_),
         fit=np.zeros((capacity, 2)),
         t_shown=np.zeros(capacity),
+        gap_hidden=np.zeros(capacity, dtype=np.int64),
+        covered=np.zeros(capacity),
     )
 
 

@@ -54,7 +54,8 @@ def test_until_the_slowest_sensors_next_scan_nothing_is_missed():
     """Of six vehicles the fast sensor sees five, the slow one all until its last two scans."""
     rates = {"slow": 20, "fast": 100}
     sensors = [f"sensors.{name}={{rate_hz: {rate}, disagreement: 0}}" for name, rate in rates.items()]
-    tracker = Tracker(load_config("default", ["smoother.engine=none", "output.max_gap_scans=0.4", *sensors]))
+    options = ["smoother.engine=none", "output.max_gap_scans=0.4", "output.gap_memory=0", *sensors]
+    tracker = Tracker(load_config("default", options))
     reported = {}
     for k in range(300):
         t = 0.01 * k
