@@ -4,10 +4,9 @@ A track that no sensor finds is hidden for a moment and goes on where it is expe
 elsewhere, or was never there. Which is more likely differs by scene and detector, and shows itself: some
 tracks are found again, at the expected place or beside it, and others end. So for each length of a gap the
 share is counted of the tracks that were found again where they were expected, of all that had been unseen
-for so long: by itself for those that other tracks hide and for those that stand in the open, where a sensor
-that finds nothing says more. As long as that share is above one half, a row that is written is right more
-often than wrong. A track that ends counts as wrong although a vehicle may still be there: the share is
-rather too small than too large.
+for so long. As long as that share is above one half, a row that is written is right more often than wrong.
+A track that ends counts as wrong although a vehicle may still be there: the share is rather too small than
+too large. (To count those that another track hides by themselves was tried, and gained nothing.)
 """
 
 from __future__ import annotations
@@ -17,10 +16,6 @@ from numba import njit
 
 from jeat_graph.data.arrays import FloatArray
 
-#: A track is hidden where another one covers more than so much of it.
-HIDDEN = 0.5
-#: Rows of the shares: of tracks in the open, and of hidden ones.
-KINDS = 2
 #: So many lengths of gaps are told apart.
 LENGTHS = 18
 # Where each length begins (s), from .02 s to 7 s in steps of the same factor, and where the last one ends.
@@ -45,51 +40,31 @@ def length_of(gap_s: float) -> int:
 
 
 @njit(cache=True)
-def note_hidden(lengths: int, before_s: float, gap_s: float, hidden: bool) -> int:
-    """Return at which lengths a track was hidden, one bit each, when its gap has grown.
-
-    Args:
-        lengths: what was known before.
-        before_s: the gap then (s); not above 0 where the track was seen.
-        gap_s: the gap now (s).
-        hidden: whether it is hidden now, which holds for all lengths in between.
-    """
-    first = length_of(before_s) + 1
-    known = lengths & ((1 << first) - 1)
-    for k in range(first, length_of(gap_s) + 1):
-        known |= int(hidden) << k
-    return known
-
-
-@njit(cache=True)
-def count_right(share: FloatArray, seen: FloatArray, lengths: int, gap_s: float, memory: float) -> None:
+def count_right(share: FloatArray, seen: FloatArray, gap_s: float, memory: float) -> None:
     """Take in, in place, that a track was found again where it was expected: it was there all the time.
 
     Args:
-        share: (KINDS, LENGTHS) of the tracks unseen for so long, those that were found again as expected.
-        seen: (KINDS, LENGTHS) on how many tracks each share rests.
-        lengths: at which lengths it was hidden (`note_hidden`).
+        share: (LENGTHS,) of the tracks unseen for so long, those that were found again as expected.
+        seen: (LENGTHS,) on how many tracks each share rests.
         gap_s: for how long it was unseen (s).
         memory: the shares rest on no more than so many of the last tracks.
     """
     for k in range(length_of(gap_s) + 1):
-        _take(share, seen, lengths >> k & 1, k, 1.0, memory)
+        _take(share, seen, k, 1.0, memory)
 
 
 @njit(cache=True)
-def count_wrong(
-    share: FloatArray, seen: FloatArray, lengths: int, gap_s: float, found: bool, memory: float
-) -> None:
+def count_wrong(share: FloatArray, seen: FloatArray, gap_s: float, found: bool, memory: float) -> None:
     """Take in, in place, that a track was found elsewhere, or has ended; the rest as in `count_right`."""
     last = length_of(gap_s)
     for k in range(max(last - _DRIFTED, 0) if found else 0, last + 1):
-        _take(share, seen, lengths >> k & 1, k, 0.0, memory)
+        _take(share, seen, k, 0.0, memory)
 
 
 @njit(cache=True)
-def _take(share: FloatArray, seen: FloatArray, kind: int, k: int, value: float, memory: float) -> None:
-    seen[kind, k] = min(seen[kind, k] + 1.0, memory)
-    share[kind, k] += (value - share[kind, k]) / seen[kind, k]
+def _take(share: FloatArray, seen: FloatArray, k: int, value: float, memory: float) -> None:
+    seen[k] = min(seen[k] + 1.0, memory)
+    share[k] += (value - share[k]) / seen[k]
 
 
 @njit(cache=True)
@@ -97,7 +72,7 @@ def longest_right_gap(share: FloatArray, usual_s: float) -> float:
     """Return the gap (s) up to which more tracks are found again as expected than not; `usual_s` at least.
 
     Args:
-        share: (LENGTHS,) of one kind of tracks, as in `count_right`.
+        share: (LENGTHS,) as in `count_right`.
         usual_s: up to which gap tracks are reported whatever became of others (s).
     """
     longest = usual_s

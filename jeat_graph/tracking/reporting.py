@@ -12,7 +12,7 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.filters.cut_boxes import WHOLE
 from jeat_graph.filters.fit import MEAN
-from jeat_graph.filters.gaps import HIDDEN, longest_right_gap
+from jeat_graph.filters.gaps import longest_right_gap
 from jeat_graph.tracking.classes import ClassTally
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
@@ -24,10 +24,8 @@ _OVERDUE = 1.5
 _LOOKS_S = 1.0
 
 
-def longest_gaps_s(scene: SceneState, model: Model, t: float) -> tuple[float, float]:
+def longest_gap_s(scene: SceneState, model: Model, t: float) -> float:
     """Time since its last update up to which a track is reported (s): the usual, or more where that is right.
-
-    Of tracks in the open, and of those that another one hides.
 
     Args:
         scene: what is learnt of the sensors, and of tracks that nobody saw for a while.
@@ -36,8 +34,8 @@ def longest_gaps_s(scene: SceneState, model: Model, t: float) -> tuple[float, fl
     """
     usual = _usual_gap_s(scene, model, t)
     if model.settings.output.gap_memory <= 0.0:
-        return usual, usual
-    return longest_right_gap(scene.gap_share[0], usual), longest_right_gap(scene.gap_share[1], usual)
+        return usual
+    return float(longest_right_gap(scene.gap_share, usual))
 
 
 def _usual_gap_s(scene: SceneState, model: Model, t: float) -> float:
@@ -116,14 +114,14 @@ def report(
     tracks: TrackArrays,
     num_tracks: int,
     t: float,
-    max_gaps_s: tuple[float, float],
+    max_gap_s: float,
     image: ImageConfig,
     output: OutputConfig,
     by_existence: bool,
 ) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray, FloatArray, IntArray, FloatArray]:
     """Collect the confirmed tracks that are alive now: `columns_of` the `reported_rows`."""
     boxes = track_boxes(tracks.mean[:num_tracks], tracks.size_mean[:num_tracks])
-    rows = reported_rows(tracks, boxes, t, max_gaps_s, image, output, by_existence)
+    rows = reported_rows(tracks, boxes, t, max_gap_s, image, output, by_existence)
     return columns_of(tracks, rows, boxes[rows], t, image, output)
 
 
@@ -132,7 +130,7 @@ def reported_rows(
     tracks: TrackArrays,
     boxes: FloatArray,
     t: float,
-    max_gaps_s: tuple[float, float],
+    max_gap_s: float,
     image: ImageConfig,
     output: OutputConfig,
     by_existence: bool,
@@ -143,7 +141,7 @@ def reported_rows(
         tracks: state of all tracks.
         boxes: (n, 4) of the living ones (px).
         t: time of the state (s).
-        max_gaps_s: time since its last update up to which a track is reported, in the open and hidden (s).
+        max_gap_s: time since its last update up to which a track is reported (s).
         image: the kernels' form of that section; two sections are handed over faster than all.
         output: the same.
         by_existence: whether tracks live by their probability of existence.
@@ -157,8 +155,7 @@ def reported_rows(
         if not (tracks.confirmed[i] and tracks.worthy[i]):
             continue
         gap = t - tracks.t_update[i]
-        longest = max_gaps_s[1] if tracks.covered[i] > HIDDEN else max_gaps_s[0]
-        if gap > longest and not tracks.standing[i]:
+        if gap > max_gap_s and not tracks.standing[i]:
             continue
         if by_existence and tracks.existence[i] < output.min_existence:
             continue

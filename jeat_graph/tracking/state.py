@@ -12,7 +12,7 @@ from jeat_graph.config.kernel_form import SensorArrays
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 from jeat_graph.filters.box_offsets import NUM_SUMS
-from jeat_graph.filters.gaps import KINDS, LENGTHS, PRIOR_GAPS, PRIOR_SHARE
+from jeat_graph.filters.gaps import LENGTHS, PRIOR_GAPS, PRIOR_SHARE
 from jeat_graph.filters.manoeuvre import prior_weights
 from jeat_graph.tracking.claims import CLAIMS, PLACES
 
@@ -65,8 +65,6 @@ class TrackArrays(NamedTuple):
             sensor alone, and it has moved where only sensors that see nothing stand have seen it.
         fit: (C, 2) how likely its box fits, by the scores of its detections (`filters.fit`).
         t_shown: (C,) when nobody saw it last while all but the gap spoke for reporting it (s).
-        gap_hidden: (C,) bit k is set where it was hidden when unseen for length k (`filters.gaps`).
-        covered: (C,) part of its box that another track hid in the last step.
     """
 
     mean: FloatArray
@@ -103,8 +101,6 @@ class TrackArrays(NamedTuple):
     worthy: npt.NDArray[np.bool_]
     fit: FloatArray
     t_shown: FloatArray
-    gap_hidden: IntArray
-    covered: FloatArray
 
 
 class SceneState(NamedTuple):
@@ -149,9 +145,9 @@ class SceneState(NamedTuple):
         usual_jerk: (K,) recent mean weight of each density of jerk over the confirmed tracks.
         field: (S, 2) how far each sensor's boxes reach to the left and to the right (px), from +inf, -inf.
         field_witnesses: (S,) over how many vehicles they were.
-        gap_share: (2, L) of the tracks that nobody saw for so long, in the open and hidden, those found
-            again as expected (`filters.gaps`).
-        gap_seen: (2, L) on how many each share rests.
+        gap_share: (L,) of the tracks that nobody saw for so long, those found again as expected
+            (`filters.gaps`).
+        gap_seen: (L,) on how many each share rests.
     """
 
     clutter: FloatArray
@@ -225,8 +221,8 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
         usual_jerk=prior_weights(config.motion.manoeuvre_prior, config.motion.densities),
         field=np.tile([np.inf, -np.inf], (num_sensors, 1)),
         field_witnesses=np.zeros(num_sensors),
-        gap_share=np.full((KINDS, LENGTHS), PRIOR_SHARE),
-        gap_seen=np.full((KINDS, LENGTHS), PRIOR_GAPS),
+        gap_share=np.full(LENGTHS, PRIOR_SHARE),
+        gap_seen=np.full(LENGTHS, PRIOR_GAPS),
     )
 
 
@@ -268,8 +264,6 @@ def allocate(capacity: int, num_sensors: int, num_errors: int = 0, densities: in
         worthy=np.ones(capacity, dtype=np.bool_),
         fit=np.zeros((capacity, 2)),
         t_shown=np.zeros(capacity),
-        gap_hidden=np.zeros(capacity, dtype=np.int64),
-        covered=np.zeros(capacity),
     )
 
 

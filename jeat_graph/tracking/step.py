@@ -55,7 +55,6 @@ def step(
     doubt_scores(batch, scene, model)
     extend_fields(batch, scene)
     occluded = occlusion(tracks, n)
-    tracks.covered[:n] = occluded
     p_found, p_detect = current_p_detect(tracks, n, batch, occluded, scene, model)
     expectation = expect_detections(tracks, n, occluded, model)
     association = associate(tracks, n, batch, expectation, p_found, scene, model)

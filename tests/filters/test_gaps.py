@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from jeat_graph.filters.gaps import (
-    KINDS,
     LENGTHS,
     PRIOR_GAPS,
     PRIOR_SHARE,
@@ -12,7 +11,6 @@ from jeat_graph.filters.gaps import (
     count_wrong,
     length_of,
     longest_right_gap,
-    note_hidden,
 )
 
 # Where each length begins (s).
@@ -20,7 +18,7 @@ BEGINS = 0.02 * 2.0 ** (np.arange(LENGTHS) / 2.0)
 
 
 def start():
-    return np.full((KINDS, LENGTHS), PRIOR_SHARE), np.full((KINDS, LENGTHS), PRIOR_GAPS)
+    return np.full(LENGTHS, PRIOR_SHARE), np.full(LENGTHS, PRIOR_GAPS)
 
 
 @pytest.mark.parametrize("k", range(LENGTHS))
@@ -34,24 +32,23 @@ def test_what_is_shorter_or_longer_than_all_has_its_place_too():
     assert length_of(1e9) == LENGTHS - 1
 
 
-def test_the_share_is_that_of_the_tracks_unseen_for_at_least_so_long_by_whether_they_were_hidden():
+def test_the_share_is_that_of_the_tracks_unseen_for_at_least_so_long():
     rng = np.random.default_rng(3)
     share, seen = start()
-    hits, count = PRIOR_SHARE * PRIOR_GAPS * np.ones((KINDS, LENGTHS)), PRIOR_GAPS * np.ones((KINDS, LENGTHS))
+    hits, count = np.full(LENGTHS, PRIOR_SHARE * PRIOR_GAPS), np.full(LENGTHS, PRIOR_GAPS)
     for _ in range(400):
-        gap, hidden = rng.exponential(0.3), rng.random(LENGTHS) < 0.5
-        lengths = sum(1 << k for k in np.flatnonzero(hidden).tolist())
+        gap = rng.exponential(0.3)
         what = rng.choice(["right", "elsewhere", "ended"])
         if what == "right":
-            count_right(share, seen, lengths, gap, 1e9)
+            count_right(share, seen, gap, 1e9)
         else:
-            count_wrong(share, seen, lengths, gap, what == "elsewhere", 1e9)
+            count_wrong(share, seen, gap, what == "elsewhere", 1e9)
         for k in np.flatnonzero(gap >= BEGINS):
             # Where it drifted, nothing is known of lengths that end before half of its own.
             if what == "elsewhere" and 1.001 * BEGINS[k] < 0.5 * BEGINS[gap >= BEGINS][-1]:
                 continue
-            hits[int(hidden[k]), k] += what == "right"
-            count[int(hidden[k]), k] += 1
+            hits[k] += what == "right"
+            count[k] += 1
     np.testing.assert_allclose(share, hits / count, rtol=1e-12)
     np.testing.assert_array_equal(seen, count)
 
@@ -59,29 +56,17 @@ def test_the_share_is_that_of_the_tracks_unseen_for_at_least_so_long_by_whether_
 def test_only_the_last_tracks_count():
     share, seen = start()
     for _ in range(500):
-        count_wrong(share, seen, 0, 0.1, False, 50.0)
+        count_wrong(share, seen, 0.1, False, 50.0)
     for _ in range(200):
-        count_right(share, seen, 0, 0.1, 50.0)
+        count_right(share, seen, 0.1, 50.0)
     reached = BEGINS <= 0.1
-    assert (share[0, reached] > 1.0 - (1.0 - 1.0 / 50.0) ** 200).all()
-    assert (share[0, ~reached] == PRIOR_SHARE).all()
-    assert (share[1] == PRIOR_SHARE).all()
-    assert (seen[0, reached] == 50.0).all()
-
-
-def test_a_gap_that_grows_keeps_what_was_known_of_its_shorter_lengths():
-    lengths = note_hidden(-1, -3.0, 0.05, True)  # seen just before: what was known is of an older gap
-    assert lengths == 0b111
-    lengths = note_hidden(lengths, 0.05, 0.051, False)  # of the same length
-    assert lengths == 0b111
-    lengths = note_hidden(lengths, 0.051, 0.12, False)
-    assert lengths == 0b111
-    lengths = note_hidden(lengths, 0.12, 0.25, True)
-    assert lengths == 0b11000111
+    assert (share[reached] > 1.0 - (1.0 - 1.0 / 50.0) ** 200).all()
+    assert (share[~reached] == PRIOR_SHARE).all()
+    assert (seen[reached] == 50.0).all()
 
 
 def test_tracks_are_reported_up_to_the_first_length_at_which_most_are_wrong():
-    share = start()[0][0]
+    share = start()[0]
     assert longest_right_gap(share, 0.12) == 0.12
     share[:] = 0.0
     share[5:8] = 0.7  # .113 s to .32 s
@@ -93,7 +78,7 @@ def test_tracks_are_reported_up_to_the_first_length_at_which_most_are_wrong():
 
 
 def test_a_share_of_one_half_is_not_enough():
-    share = start()[0][0]
+    share = start()[0]
     share[:] = 0.5
     assert longest_right_gap(share, 0.0) == 0.0
     share[:] = np.nextafter(0.5, 1.0)

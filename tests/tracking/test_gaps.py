@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from jeat_graph import Tracker, load_config
-from jeat_graph.tracking.reporting import longest_gaps_s
+from jeat_graph.tracking.reporting import longest_gap_s
 
 RATE_HZ, GAP = 20.0, 8
 PERIOD = 1.0 / RATE_HZ
@@ -40,8 +40,8 @@ def drive(comes_back, overrides=(), scans=600):
     return tracker, np.array(unseen)
 
 
-def gaps_s(tracker):
-    return longest_gaps_s(tracker._scene, tracker._model, tracker._t)
+def gap_s(tracker):
+    return longest_gap_s(tracker._scene, tracker._model, tracker._t)
 
 
 def test_walkers_who_always_come_out_where_they_were_expected_are_reported_while_hidden():
@@ -58,49 +58,15 @@ def test_where_they_do_not_come_back_nothing_changes():
     tracker, unseen = drive(comes_back=False)
     _, usual = drive(comes_back=False, overrides=["output.gap_memory=0"])
     np.testing.assert_array_equal(unseen, usual)
-    assert max(gaps_s(tracker)) < 3 * PERIOD
+    assert gap_s(tracker) < 3 * PERIOD
 
 
 def test_what_changes_is_learnt_anew():
     tracker, _ = drive(comes_back=True)
-    in_the_open, hidden = gaps_s(tracker)
-    assert in_the_open >= GAP * PERIOD * 0.9
-    assert hidden < 3 * PERIOD  # nobody ever hid another
+    assert gap_s(tracker) >= GAP * PERIOD * 0.9
     memory = ["output.gap_memory=20"]
     tracker, _ = drive(comes_back=True, overrides=memory)
     for k in range(600, 1500):  # nobody is found again: everybody new stays for .4 s
         x = 100.0 + 700.0 * ((k // 8) % 4)
         tracker.step((k * PERIOD, "rgb", [[x, 300.0, 40.0, 80.0]], [0.9]))
-    assert max(gaps_s(tracker)) < 3 * PERIOD
-
-
-def test_who_goes_behind_another_is_told_from_who_is_gone():
-    """Behind a column walkers vanish for .7 s and come out again; in the open they vanish for good."""
-    tracker = Tracker(
-        load_config("default", ["smoother.engine=none", "image.width=1200", "image.height=900"])
-    )
-    rng, behind = np.random.default_rng(1), []
-    for k in range(1200):
-        boxes = [[500.0, 100.0, 60.0, 300.0]]
-        for since in range(k % 50, min(k + 1, 150), 50):
-            x = 340.0 + 4.0 * since
-            if not 500.0 < x + 20.0 < 560.0:
-                boxes.append([x, 200.0, 40.0, 80.0])
-        for lane in range(3):
-            if (k + 13 * lane) % 40 < 15:
-                boxes.append(
-                    [
-                        100.0 + 2.0 * ((k + 13 * lane) % 40) + 350.0 * ((k // 40) % 3),
-                        500.0 + 100.0 * lane,
-                        40.0,
-                        80.0,
-                    ]
-                )
-        found = np.array(boxes) + rng.normal(0.0, 0.4, (len(boxes), 4))
-        table = tracker.step((k * PERIOD, "rgb", found, np.full(len(boxes), 0.9)))
-        hidden = (table.boxes[:, 0] > 480) & (table.boxes[:, 0] < 540) & (table.boxes[:, 3] < 150)
-        behind.append(int((hidden & (table.used == 0)).sum()))
-    in_the_open, hidden_s = gaps_s(tracker)
-    assert in_the_open < 3 * PERIOD
-    assert hidden_s > 0.6
-    assert sum(behind[-100:]) >= 20  # two walkers of 14 scans each
+    assert gap_s(tracker) < 3 * PERIOD

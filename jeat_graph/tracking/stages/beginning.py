@@ -170,7 +170,6 @@ def start_track(
     tracks.t_birth[i] = t
     tracks.born_at[i] = z
     tracks.t_shown[i] = 0.0
-    tracks.covered[i] = 0.0
     tracks.last_box[i] = -np.inf
     tracks.seen_apart[i] = -np.inf
     remember_box(tracks, i, batch, j)

@@ -9,7 +9,7 @@ from jeat_graph.association.overlap import overlap
 from jeat_graph.config.kernel_form import Model
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.filters.fit import MEAN
-from jeat_graph.filters.gaps import HIDDEN, count_right, count_wrong, note_hidden
+from jeat_graph.filters.gaps import count_right, count_wrong
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.inner import inner
@@ -34,11 +34,11 @@ def learn_found(
         if tracks.t_shown[i] > tracks.t_update[i]:
             j = np.max(association.match[i])
             if j >= 0:
-                gap, lengths = tracks.t_shown[i] - tracks.t_update[i], tracks.gap_hidden[i]
+                gap = tracks.t_shown[i] - tracks.t_update[i]
                 if overlap(_box(tracks, i), batch.boxes[j]) >= _FITS:
-                    count_right(scene.gap_share, scene.gap_seen, lengths, gap, memory)
+                    count_right(scene.gap_share, scene.gap_seen, gap, memory)
                 else:
-                    count_wrong(scene.gap_share, scene.gap_seen, lengths, gap, True, memory)
+                    count_wrong(scene.gap_share, scene.gap_seen, gap, True, memory)
 
 
 @inner
@@ -46,7 +46,7 @@ def learn_lost(tracks: TrackArrays, i: int, scene: SceneState, model: Model) -> 
     """Learn from track `i`, which ends, that it was not to be found again, in place."""
     memory, gap = model.settings.output.gap_memory, tracks.t_shown[i] - tracks.t_update[i]
     if memory > 0.0 and gap > 0.0:
-        count_wrong(scene.gap_share, scene.gap_seen, tracks.gap_hidden[i], gap, False, memory)
+        count_wrong(scene.gap_share, scene.gap_seen, gap, False, memory)
 
 
 @inner
@@ -65,8 +65,6 @@ def note_shown(tracks: TrackArrays, n: int, t: float, model: Model) -> None:
             continue
         visible = visible_fraction(_box(tracks, i), image.width, image.height) if output.clip else 1.0
         if visible >= output.min_visible:
-            before, seen, hidden = tracks.t_shown[i], tracks.t_update[i], tracks.covered[i] > HIDDEN
-            tracks.gap_hidden[i] = note_hidden(tracks.gap_hidden[i], before - seen, t - seen, hidden)
             tracks.t_shown[i] = t
 
 
