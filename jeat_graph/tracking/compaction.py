@@ -46,7 +46,7 @@ def keep_rows(tracks: TrackArrays, rows: IntArray) -> None:
     _shift(tracks.hits, rows, first)
     _shift(tracks.t_birth, rows, first)
     _shift(tracks.born_at, rows, first)
-    _shift(tracks.t_shown, rows, first)
+    _shift(tracks.t_missed, rows, first)
     _shift(tracks.t_update, rows, first)
     _shift(tracks.used, rows, first)
     _shift(tracks.seen_by, rows, first)

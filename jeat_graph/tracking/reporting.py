@@ -16,8 +16,8 @@ from jeat_graph.filters.gaps import longest_right_gap
 from jeat_graph.tracking.classes import ClassTally
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
-# A sensor of less than this share of the greatest trust, or that sees so much less likely, is not waited for.
-_TRUSTED = 0.5
+#: A sensor of less than this share of the greatest trust, or that sees so much less likely, none waits for.
+TRUSTED = 0.5
 # A scan that is so many periods after the last has not come.
 _OVERDUE = 1.5
 # A sensor without a scan for so long does not look (s).
@@ -60,7 +60,7 @@ def _usual_gap_s(scene: SceneState, model: Model, t: float) -> float:
         return most
     believed = scene.trust * (1.0 - scene.blind)
     if output.scans_of_several:
-        sees = (scene.last_look >= t - _LOOKS_S) & (believed >= _TRUSTED * believed.max())
+        sees = (scene.last_look >= t - _LOOKS_S) & (believed >= TRUSTED * believed.max())
         if np.count_nonzero(sees) < 2:
             return most
     wait = float(
@@ -90,7 +90,7 @@ def _longest_wait(
     """
     longest = 0.0
     for s in range(len(trust)):
-        if trust[s] >= _TRUSTED * trust.max():
+        if trust[s] >= TRUSTED * trust.max():
             squared = p_detect[s] * p_detect[s]
             due = since_s[s] if since_s[s] < _OVERDUE * period_s[s] else 0.0
             longest = max(longest, min(scans * period_s[s] / (squared * squared), most) + due)
@@ -151,25 +151,44 @@ def reported_rows(
     """
     rows = np.empty(len(boxes), dtype=np.int64)
     count = 0
+    confirmed, worthy, existence, fit = tracks.confirmed, tracks.worthy, tracks.existence, tracks.fit
     for i in range(len(boxes)):
-        if not (tracks.confirmed[i] and tracks.worthy[i]):
-            continue
         gap = t - tracks.t_update[i]
         if gap > max_gap_s and not tracks.standing[i]:
             continue
-        if by_existence and tracks.existence[i] < output.min_existence:
+        if not is_believed(confirmed[i], worthy[i], existence[i], fit[i, MEAN], output, by_existence):
             continue
-        if tracks.fit[i, MEAN] < output.min_fit:
-            continue
-        if output.clip:
-            visible = visible_fraction(boxes[i], image.width, image.height)
-            # What was detected just now does show, however little of it.
-            shown = image.edge_px > 0.0 and tracks.used[i] != 0
-            if visible <= 0.0 or (visible < output.min_visible and not shown):
-                continue
-        rows[count] = i
-        count += 1
+        if shows(boxes[i], tracks.used[i] != 0, image, output):
+            rows[count] = i
+            count += 1
     return rows[:count]
+
+
+@njit(cache=True)
+def is_believed(
+    confirmed: bool, worthy: bool, existence: float, fit: float, output: OutputConfig, by_existence: bool
+) -> bool:
+    """Whether a track is taken for a vehicle, and its box for a fitting one, surely enough to be reported.
+
+    Args:
+        confirmed: whether it has been.
+        worthy: whether what has such scores is to be believed.
+        existence: its probability.
+        fit: probability that its box fits, by its scores.
+        output: the kernels' form of that section.
+        by_existence: whether tracks live by their probability of existence.
+    """
+    alive = existence >= output.min_existence or not by_existence
+    return confirmed and worthy and alive and fit >= output.min_fit
+
+
+@njit(cache=True)
+def shows(box: FloatArray, detected: bool, image: ImageConfig, output: OutputConfig) -> bool:
+    """Whether enough of a box (4,) lies in the picture, or any of what was just detected and may be cut."""
+    if not output.clip:
+        return True
+    visible = visible_fraction(box, image.width, image.height)
+    return visible > 0.0 and (visible >= output.min_visible or (image.edge_px > 0.0 and detected))
 
 
 @njit(cache=True)

@@ -64,7 +64,8 @@ class TrackArrays(NamedTuple):
         worthy: (C,) whether it may be reported: things of such scores last often enough to be believed of one
             sensor alone, and it has moved where only sensors that see nothing stand have seen it.
         fit: (C, 2) how likely its box fits, by the scores of its detections (`filters.fit`).
-        t_shown: (C,) when nobody saw it last while all but the gap spoke for reporting it (s).
+        t_missed: (C,) when it was missed last while all but the gap spoke for reporting it (s); before that
+            minus infinity.
     """
 
     mean: FloatArray
@@ -100,7 +101,7 @@ class TrackArrays(NamedTuple):
     worth: FloatArray
     worthy: npt.NDArray[np.bool_]
     fit: FloatArray
-    t_shown: FloatArray
+    t_missed: FloatArray
 
 
 class SceneState(NamedTuple):
@@ -263,7 +264,7 @@ def allocate(capacity: int, num_sensors: int, num_errors: int = 0, densities: in
         worth=np.ones(capacity),
         worthy=np.ones(capacity, dtype=np.bool_),
         fit=np.zeros((capacity, 2)),
-        t_shown=np.zeros(capacity),
+        t_missed=np.full(capacity, -np.inf),
     )
 
 

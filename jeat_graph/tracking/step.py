@@ -10,7 +10,7 @@ from jeat_graph.tracking.stages.associating import associate
 from jeat_graph.tracking.stages.beginning import give_birth
 from jeat_graph.tracking.stages.comparing import learn_boxes
 from jeat_graph.tracking.stages.ending import confirm, remove_ended
-from jeat_graph.tracking.stages.gaps import learn_found, note_shown
+from jeat_graph.tracking.stages.gaps import learn_found, note_missed
 from jeat_graph.tracking.stages.learning import count_looks, learn_scene
 from jeat_graph.tracking.stages.looking import count_witnesses, extend_fields
 from jeat_graph.tracking.stages.predicting import current_p_detect, expect_detections, occlusion, predict_all
@@ -71,7 +71,7 @@ def step(
     count_looks(tracks, n, batch, association, p_detect, scene, settings)
     judge_worth(tracks, n, scene, model)
     confirm(tracks, n, batch.t, settings)
-    note_shown(tracks, n, batch.t, model)
+    note_missed(tracks, n, batch, scene, model)
     n = remove_ended(tracks, n, batch.t, scene, model)
     n, next_id = give_birth(tracks, n, next_id, batch, association, scene, model, log)
     # Vehicles that this batch could have shown and did not are rarer from now on.

@@ -195,7 +195,7 @@ def test_boxes_of_coco_are_read_faster_than_by_pythons_own_reader_and_conversion
         )
         return image, category, score, np.array([entry["bbox"] for entry in entries])
 
-    # .3 to .7 measured, by how warm Python's memory is; three times it where entries are checked one by one.
+    # .3 to .7 measured, by how warm Python's memory is; 3 where entries are checked one by one.
     coco, tree = least(
         lambda: read_detections(results, rate_hz=20.0), plain, until=lambda coco, tree: coco < tree
     )

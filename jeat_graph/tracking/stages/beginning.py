@@ -169,7 +169,7 @@ def start_track(
     take(tracks.fit[i], batch.fit[j], exactness(view.log_size[0], *noise_of))
     tracks.t_birth[i] = t
     tracks.born_at[i] = z
-    tracks.t_shown[i] = 0.0
+    tracks.t_missed[i] = -np.inf
     tracks.last_box[i] = -np.inf
     tracks.seen_apart[i] = -np.inf
     remember_box(tracks, i, batch, j)

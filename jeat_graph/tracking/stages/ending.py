@@ -91,9 +91,11 @@ def remove_ended(tracks: TrackArrays, n: int, t: float, scene: SceneState, model
         # A state that overflowed (a coasting track on wild input) must not survive as NaN.
         broken = not (math.isfinite(x) and math.isfinite(y))
         if remove[i] or gap > most or doubted or broken or (lifecycle.leave_picture and outside):
+            if not (outside or broken):
+                # Two tracks of one vehicle were one too many in the table, too.
+                learn_lost(tracks.t_missed[i], tracks.t_update[i], scene, model)
             if not (remove[i] or outside or broken):
                 learn_ended(tracks, i, scene, model)
-                learn_lost(tracks, i, scene, model)
             if not (tracks.confirmed[i] or remove[i] or outside or broken):
                 _count_fruitless(tracks.hits[i], tracks.seen_by[i], scene, model)
             continue

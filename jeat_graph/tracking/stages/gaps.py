@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from jeat_graph.association.boxes import track_boxes, visible_fraction
+from jeat_graph.association.boxes import clip_boxes, track_boxes
 from jeat_graph.association.overlap import overlap
 from jeat_graph.config.kernel_form import Model
+from jeat_graph.config.schema import ImageConfig
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.filters.fit import MEAN
 from jeat_graph.filters.gaps import count_right, count_wrong
 from jeat_graph.tracking.batch import Batch
+from jeat_graph.tracking.reporting import TRUSTED, is_believed, shows
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.state import SceneState, TrackArrays
@@ -25,49 +27,73 @@ def learn_found(
 ) -> None:
     """Learn from tracks that are found again whether they were where they had been expected, in place.
 
-    Called before the detections are taken in.
+    Called before the detections are taken in. Of several sensors' boxes the one that fits best counts.
     """
-    memory = model.settings.output.gap_memory
+    memory, image = model.settings.output.gap_memory, model.settings.image
     if memory <= 0.0:
         return
+    match, t_missed, t_update = association.match, tracks.t_missed, tracks.t_update
     for i in range(n):
-        if tracks.t_shown[i] > tracks.t_update[i]:
-            j = np.max(association.match[i])
-            if j >= 0:
-                gap = tracks.t_shown[i] - tracks.t_update[i]
-                if overlap(_box(tracks, i), batch.boxes[j]) >= _FITS:
-                    count_right(scene.gap_share, scene.gap_seen, gap, memory)
-                else:
-                    count_wrong(scene.gap_share, scene.gap_seen, gap, True, memory)
+        # What another sensor missed at this very time is no gap.
+        if not t_update[i] < t_missed[i] < batch.t or np.max(match[i]) < 0:
+            continue
+        box, best = _shown_box(tracks.mean[i : i + 1], tracks.size_mean[i : i + 1], image), 0.0
+        for s in range(match.shape[1]):
+            if match[i, s] >= 0:
+                best = max(best, overlap(box, batch.boxes[match[i, s]]))
+        gap = t_missed[i] - t_update[i]
+        if best >= _FITS:
+            count_right(scene.gap_share, scene.gap_seen, gap, memory)
+        else:
+            count_wrong(scene.gap_share, scene.gap_seen, gap, True, memory)
 
 
 @inner
-def learn_lost(tracks: TrackArrays, i: int, scene: SceneState, model: Model) -> None:
-    """Learn from track `i`, which ends, that it was not to be found again, in place."""
-    memory, gap = model.settings.output.gap_memory, tracks.t_shown[i] - tracks.t_update[i]
-    if memory > 0.0 and gap > 0.0:
-        count_wrong(scene.gap_share, scene.gap_seen, gap, False, memory)
+def learn_lost(t_missed: float, t_update: float, scene: SceneState, model: Model) -> None:
+    """Learn from a track, which ends, that it was not to be found again, in place.
 
-
-@inner
-def note_shown(tracks: TrackArrays, n: int, t: float, model: Model) -> None:
-    """Note down, in place, which of the first `n` tracks that nobody sees could be reported at time `t` (s).
-
-    They are reported if their gap is not too long, which is what is to be learnt.
+    Args:
+        t_missed: when it was missed last (s).
+        t_update: when it was seen last (s).
+        scene: what is learnt.
+        model: sensors and settings.
     """
-    image, output = model.settings.image, model.settings.output
-    if output.gap_memory <= 0.0:
-        return
-    for i in range(n):
-        if tracks.t_update[i] >= t or tracks.standing[i] or not (tracks.confirmed[i] and tracks.worthy[i]):
-            continue
-        if tracks.existence[i] < output.min_existence or tracks.fit[i, MEAN] < output.min_fit:
-            continue
-        visible = visible_fraction(_box(tracks, i), image.width, image.height) if output.clip else 1.0
-        if visible >= output.min_visible:
-            tracks.t_shown[i] = t
+    memory = model.settings.output.gap_memory
+    if memory > 0.0 and t_missed > t_update:
+        count_wrong(scene.gap_share, scene.gap_seen, t_missed - t_update, False, memory)
 
 
 @inner
-def _box(tracks: TrackArrays, i: int) -> FloatArray:
-    return track_boxes(tracks.mean[i : i + 1], tracks.size_mean[i : i + 1])[0]
+def note_missed(tracks: TrackArrays, n: int, batch: Batch, scene: SceneState, model: Model) -> None:
+    """Note down, in place, which of the first `n` tracks are missed now that would else be reported.
+
+    Where only sensors look that nobody waits for, nothing is missed: what is found after so short a gap says
+    nothing of gaps in which it could have been found.
+    """
+    settings = model.settings
+    image, output, by_existence = settings.image, settings.output, settings.lifecycle.by_existence
+    if output.gap_memory <= 0.0 or not _somebody_looks(batch, scene):
+        return
+    confirmed, worthy, existence, fit = tracks.confirmed, tracks.worthy, tracks.existence, tracks.fit
+    for i in range(n):
+        if tracks.t_update[i] >= batch.t or tracks.standing[i]:
+            continue
+        if not is_believed(confirmed[i], worthy[i], existence[i], fit[i, MEAN], output, by_existence):
+            continue
+        box = track_boxes(tracks.mean[i : i + 1], tracks.size_mean[i : i + 1])[0]
+        if shows(box, False, image, output):
+            tracks.t_missed[i] = batch.t
+
+
+@inner
+def _somebody_looks(batch: Batch, scene: SceneState) -> bool:
+    """Whether a sensor looks now that is waited for."""
+    believed = scene.trust * (1.0 - scene.blind)
+    return bool(np.any(batch.present & (believed >= TRUSTED * np.max(believed))))
+
+
+@inner
+def _shown_box(mean: FloatArray, size_mean: FloatArray, image: ImageConfig) -> FloatArray:
+    """The box (4,) of one track; where boxes may be cut, the part in the picture."""
+    boxes = track_boxes(mean, size_mean)
+    return clip_boxes(boxes, image.width, image.height)[0] if image.edge_px > 0.0 else boxes[0]

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.config.kernel_form import Model
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.filters.running_mean import take_into_mean
 from jeat_graph.filters.sides import mean_side
 from jeat_graph.filters.worth import doubt_worth, learn_worth, worth_of
 from jeat_graph.tracking.batch import LEAST_PRECISION, Batch
@@ -103,8 +103,10 @@ def learn_lasting(
             if tracks.lasting[i]:
                 learn_worth(mean, cov, batch.score_odds[j], True, weight)
                 memory_s = lifecycle.worth_memory_s
-                _average(scene.vain, scene.vain_seen, s, 0.0, weight, memory_s)
-                _average(scene.lasting_odds, scene.lasting_seen, s, batch.score_odds[j], weight, memory_s)
+                take_into_mean(scene.vain, scene.vain_seen, s, 0.0, weight, memory_s)
+                take_into_mean(
+                    scene.lasting_odds, scene.lasting_seen, s, batch.score_odds[j], weight, memory_s
+                )
             elif old and tracks.hits[i] >= _LEAST_HITS:
                 tracks.lasting[i] = True
                 if tracks.seen_by[i] == 1 << s:
@@ -127,25 +129,7 @@ def learn_ended(tracks: TrackArrays, i: int, scene: SceneState, model: Model) ->
         # What stood there for longer may be a vehicle that stands: it counts neither way.
         if tracks.t_update[i] - tracks.t_birth[i] < lifecycle.lasting_s:
             again = weight - model.sensors.period_s[s]
-            _average(scene.vain, scene.vain_seen, s, 1.0, again, lifecycle.worth_memory_s)
-
-
-@inner
-def _average(
-    mean: FloatArray, seen: FloatArray, s: int, value: float, weight: float, memory_s: float
-) -> None:
-    """Take a value into sensor `s`'s running mean, in place.
-
-    Args:
-        mean: (S,) of each sensor.
-        seen: (S,) what each rests on, in seconds of a track.
-        s: the sensor.
-        value: what is taken in.
-        weight: the seconds that it stands for.
-        memory_s: the mean rests on no more than these.
-    """
-    seen[s] = min(seen[s] + weight, memory_s)
-    mean[s] += weight / seen[s] * (value - mean[s])
+            take_into_mean(scene.vain, scene.vain_seen, s, 1.0, again, lifecycle.worth_memory_s)
 
 
 @inner
