@@ -13,7 +13,7 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.reporting import (
     as_table,
     columns_of,
-    longest_gap_s,
+    longest_gaps_s,
     remain,
     reported_rows,
     written_scale,
@@ -47,10 +47,10 @@ def predict_reported(now: Snapshot, t: float, model: Model, sensors: tuple[str, 
     here = 0.0 if now.t is None else now.t
     settings, tracks = model.settings, now.tracks
     sections = (settings.image, settings.output)
-    gap = longest_gap_s(now.scene, model, here)
+    gaps = longest_gaps_s(now.scene, model, here)
     # Who is reported is decided now: what has just been detected is no less there for looking ahead.
     boxes = track_boxes(tracks.mean[: now.num_tracks], tracks.size_mean[: now.num_tracks])
-    rows = reported_rows(tracks, boxes, here, gap, *sections, settings.lifecycle.by_existence)
+    rows = reported_rows(tracks, boxes, here, gaps, *sections, settings.lifecycle.by_existence)
     predict_all(tracks, now.num_tracks, max(t - here, 0.0), now.scene, model)
     boxes = track_boxes(tracks.mean[rows], tracks.size_mean[rows])
     left = remain(boxes, *sections)

@@ -18,14 +18,18 @@ from jeat_graph.tracking.state import SceneState, TrackArrays
 
 #: A sensor of less than this share of the greatest trust, or that sees so much less likely, none waits for.
 TRUSTED = 0.5
+# Rounding may leave a little less of a box.
+_WHOLE = 1.0 - 1e-9
 # A scan that is so many periods after the last has not come.
 _OVERDUE = 1.5
 # A sensor without a scan for so long does not look (s).
 _LOOKS_S = 1.0
 
 
-def longest_gap_s(scene: SceneState, model: Model, t: float) -> float:
-    """Time since its last update up to which a track is reported (s): the usual, or more where that is right.
+def longest_gaps_s(scene: SceneState, model: Model, t: float) -> tuple[float, float]:
+    """Times since its last update up to which a track is reported (s): the usual, and where more is right.
+
+    The second holds for what is whole in the picture: what becomes of those that leave it, nobody sees.
 
     Args:
         scene: what is learnt of the sensors, and of tracks that nobody saw for a while.
@@ -34,8 +38,8 @@ def longest_gap_s(scene: SceneState, model: Model, t: float) -> float:
     """
     usual = _usual_gap_s(scene, model, t)
     if model.settings.output.gap_memory <= 0.0:
-        return usual
-    return float(longest_right_gap(scene.gap_share, usual))
+        return usual, usual
+    return usual, float(longest_right_gap(scene.gap_share, usual))
 
 
 def _usual_gap_s(scene: SceneState, model: Model, t: float) -> float:
@@ -114,14 +118,14 @@ def report(
     tracks: TrackArrays,
     num_tracks: int,
     t: float,
-    max_gap_s: float,
+    max_gaps_s: tuple[float, float],
     image: ImageConfig,
     output: OutputConfig,
     by_existence: bool,
 ) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray, FloatArray, IntArray, FloatArray]:
     """Collect the confirmed tracks that are alive now: `columns_of` the `reported_rows`."""
     boxes = track_boxes(tracks.mean[:num_tracks], tracks.size_mean[:num_tracks])
-    rows = reported_rows(tracks, boxes, t, max_gap_s, image, output, by_existence)
+    rows = reported_rows(tracks, boxes, t, max_gaps_s, image, output, by_existence)
     return columns_of(tracks, rows, boxes[rows], t, image, output)
 
 
@@ -130,7 +134,7 @@ def reported_rows(
     tracks: TrackArrays,
     boxes: FloatArray,
     t: float,
-    max_gap_s: float,
+    max_gaps_s: tuple[float, float],
     image: ImageConfig,
     output: OutputConfig,
     by_existence: bool,
@@ -141,7 +145,7 @@ def reported_rows(
         tracks: state of all tracks.
         boxes: (n, 4) of the living ones (px).
         t: time of the state (s).
-        max_gap_s: time since its last update up to which a track is reported (s).
+        max_gaps_s: times since its last update up to which a track is reported (`longest_gaps_s`).
         image: the kernels' form of that section; two sections are handed over faster than all.
         output: the same.
         by_existence: whether tracks live by their probability of existence.
@@ -154,7 +158,8 @@ def reported_rows(
     confirmed, worthy, existence, fit = tracks.confirmed, tracks.worthy, tracks.existence, tracks.fit
     for i in range(len(boxes)):
         gap = t - tracks.t_update[i]
-        if gap > max_gap_s and not tracks.standing[i]:
+        longest = max_gaps_s[1] if is_whole(boxes[i], image) else max_gaps_s[0]
+        if gap > longest and not tracks.standing[i]:
             continue
         if not is_believed(confirmed[i], worthy[i], existence[i], fit[i, MEAN], output, by_existence):
             continue
@@ -189,6 +194,12 @@ def shows(box: FloatArray, detected: bool, image: ImageConfig, output: OutputCon
         return True
     visible = visible_fraction(box, image.width, image.height)
     return visible > 0.0 and (visible >= output.min_visible or (image.edge_px > 0.0 and detected))
+
+
+@njit(cache=True)
+def is_whole(box: FloatArray, image: ImageConfig) -> bool:
+    """Whether all of a box (4,) lies in the picture."""
+    return visible_fraction(box, image.width, image.height) >= _WHOLE
 
 
 @njit(cache=True)

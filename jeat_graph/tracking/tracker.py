@@ -25,7 +25,7 @@ from jeat_graph.tracking.direct_call import DirectCall
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.notice import notice_if_cold
 from jeat_graph.tracking.prediction import Prediction, predict_reported
-from jeat_graph.tracking.reporting import as_table, longest_gap_s, report
+from jeat_graph.tracking.reporting import as_table, longest_gaps_s, report
 from jeat_graph.tracking.saving import SavedTracks
 from jeat_graph.tracking.scans import ScanLike, arrivals_of, as_scans
 from jeat_graph.tracking.sensor_state import SensorState, sensor_states
@@ -249,9 +249,9 @@ class Tracker(SavedTracks):
         t = 0.0 if self._t is None else self._t
         settings = self._model.settings
         by_existence = settings.lifecycle.by_existence
-        gap = longest_gap_s(self._scene, self._model, t)
+        gaps = longest_gaps_s(self._scene, self._model, t)
         columns = self._report(
-            self._tracks, self._num_tracks, t, gap, settings.image, settings.output, by_existence
+            self._tracks, self._num_tracks, t, gaps, settings.image, settings.output, by_existence
         )
         return as_table(columns, self.sensor_names, self._classes)
 

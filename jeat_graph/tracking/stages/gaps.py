@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from jeat_graph.association.boxes import clip_boxes, track_boxes
+from jeat_graph.association.boxes import track_boxes
 from jeat_graph.association.overlap import overlap
 from jeat_graph.config.kernel_form import Model
-from jeat_graph.config.schema import ImageConfig
-from jeat_graph.data.arrays import FloatArray
 from jeat_graph.filters.fit import MEAN
 from jeat_graph.filters.gaps import count_right, count_wrong
 from jeat_graph.tracking.batch import Batch
-from jeat_graph.tracking.reporting import TRUSTED, is_believed, shows
+from jeat_graph.tracking.reporting import TRUSTED, is_believed, is_whole
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.state import SceneState, TrackArrays
@@ -29,7 +27,7 @@ def learn_found(
 
     Called before the detections are taken in. Of several sensors' boxes the one that fits best counts.
     """
-    memory, image = model.settings.output.gap_memory, model.settings.image
+    memory = model.settings.output.gap_memory
     if memory <= 0.0:
         return
     match, t_missed, t_update = association.match, tracks.t_missed, tracks.t_update
@@ -37,7 +35,7 @@ def learn_found(
         # What another sensor missed at this very time is no gap.
         if not t_update[i] < t_missed[i] < batch.t or np.max(match[i]) < 0:
             continue
-        box, best = _shown_box(tracks.mean[i : i + 1], tracks.size_mean[i : i + 1], image), 0.0
+        box, best = track_boxes(tracks.mean[i : i + 1], tracks.size_mean[i : i + 1])[0], 0.0
         for s in range(match.shape[1]):
             if match[i, s] >= 0:
                 best = max(best, overlap(box, batch.boxes[match[i, s]]))
@@ -68,7 +66,8 @@ def note_missed(tracks: TrackArrays, n: int, batch: Batch, scene: SceneState, mo
     """Note down, in place, which of the first `n` tracks are missed now that would else be reported.
 
     Where only sensors look that nobody waits for, nothing is missed: what is found after so short a gap says
-    nothing of gaps in which it could have been found.
+    nothing of gaps in which it could have been found. What the picture's edge cuts may have left, and is not
+    judged by what becomes of the others.
     """
     settings = model.settings
     image, output, by_existence = settings.image, settings.output, settings.lifecycle.by_existence
@@ -81,7 +80,7 @@ def note_missed(tracks: TrackArrays, n: int, batch: Batch, scene: SceneState, mo
         if not is_believed(confirmed[i], worthy[i], existence[i], fit[i, MEAN], output, by_existence):
             continue
         box = track_boxes(tracks.mean[i : i + 1], tracks.size_mean[i : i + 1])[0]
-        if shows(box, False, image, output):
+        if is_whole(box, image):
             tracks.t_missed[i] = batch.t
 
 
@@ -90,10 +89,3 @@ def _somebody_looks(batch: Batch, scene: SceneState) -> bool:
     """Whether a sensor looks now that is waited for."""
     believed = scene.trust * (1.0 - scene.blind)
     return bool(np.any(batch.present & (believed >= TRUSTED * np.max(believed))))
-
-
-@inner
-def _shown_box(mean: FloatArray, size_mean: FloatArray, image: ImageConfig) -> FloatArray:
-    """The box (4,) of one track; where boxes may be cut, the part in the picture."""
-    boxes = track_boxes(mean, size_mean)
-    return clip_boxes(boxes, image.width, image.height)[0] if image.edge_px > 0.0 else boxes[0]
