@@ -13,7 +13,9 @@ class OutputConfig(Section):
 
     min_existence: float = number(0.5, "1", "reported only above this probability of existence", 0.0, 1.0)
     max_gap_s: float = number(
-        0.12, "s", "reported only if updated within this time (paper: as long as it lives)"
+        0.12,
+        "s",
+        "reported only if updated within this time, but for `gap_memory` (paper: as long as it lives)",
     )
     max_gap_scans: float = number(
         0.0, "scans", "the same in scans of the slowest sensor, over P_D⁴; the less counts; 0: no bound"
@@ -25,7 +27,7 @@ class OutputConfig(Section):
     gap_memory: float = number(
         0.0,
         "1",
-        "what nobody sees is reported for longer where most of the last so many such tracks were found again "
+        "what nobody sees is reported for longer where most of about so many such tracks were found again "
         "where they were expected; 0: never",
     )
     min_fit: float = number(

@@ -10,7 +10,7 @@ from jeat_graph.detection.declared import declared_settings
 from jeat_graph.detection.detecting import DetectRequest
 
 
-@pytest.mark.parametrize("network", ["sehn", "sehn-int8", "sehn-fast"])
+@pytest.mark.parametrize("network", ["sehn", "sehn-int8"])
 def test_networks_of_the_package_are_declared_as_their_preset_declares_them(network):
     said: list[str] = []
     asked = DetectRequest(frames="a", events="b", detector_frames=network, detector_events=network)
@@ -23,6 +23,20 @@ def test_networks_of_the_package_are_declared_as_their_preset_declares_them(netw
     assert found.output.lasting_error == preset.output.lasting_error
     assert found.motion == load_config("default").motion
     assert [line.split(":")[0] for line in said] == ["sensor 'rgb'", "sensor 'evt'"]
+
+
+def test_of_the_fast_networks_larger_errors_and_more_misses_are_declared():
+    def declared(network):
+        asked = DetectRequest(frames="a", events="b", detector_frames=network, detector_events=network)
+        return load_config("default", declared_settings(asked))
+
+    fast, exact = declared("sehn-fast"), declared("sehn")
+    assert list(fast.sensors) == list(exact.sensors)
+    for name, sensor in fast.sensors.items():
+        assert sensor.p_detect < exact.sensors[name].p_detect
+        assert len(sensor.score_noise) == len(sensor.score_fit) == 12
+    assert fast.sensors["rgb"].sigma_px > exact.sensors["rgb"].sigma_px
+    assert (fast.birth, fast.merge, fast.output) == (exact.birth, exact.merge, exact.output)
 
 
 def test_who_looks_at_nothing_or_has_no_weights_says_nothing():
