@@ -16,8 +16,8 @@ from jeat_graph.filters.gaps import longest_right_gap
 from jeat_graph.tracking.classes import ClassTally
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
-#: A sensor of less than this share of the greatest trust, or that sees so much less likely, none waits for.
-TRUSTED = 0.5
+# A sensor of less than this share of the greatest trust, or that sees so much less likely, is not waited for.
+_TRUSTED = 0.5
 # Rounding may leave a little less of a box.
 _WHOLE = 1.0 - 1e-9
 # A scan that is so many periods after the last has not come.
@@ -42,6 +42,18 @@ def longest_gaps_s(scene: SceneState, model: Model, t: float) -> tuple[float, fl
     return usual, float(longest_right_gap(scene.gap_share, usual))
 
 
+@njit(cache=True)
+def waited_for(trust: FloatArray, blind: FloatArray) -> BoolArray:
+    """Which sensors are waited for: those that are believed at least half as far as the best one.
+
+    Args:
+        trust: (S,) how far the others bear each out.
+        blind: (S,) probability that it is blind as a whole.
+    """
+    believed = trust * (1.0 - blind)
+    return believed >= _TRUSTED * np.max(believed)
+
+
 def _usual_gap_s(scene: SceneState, model: Model, t: float) -> float:
     """Time since its last update up to which a track is reported whatever became of others (s).
 
@@ -62,13 +74,13 @@ def _usual_gap_s(scene: SceneState, model: Model, t: float) -> float:
     scans, most = output.max_gap_scans, float(output.max_gap_s)
     if scans == 0.0:
         return most
-    believed = scene.trust * (1.0 - scene.blind)
+    waited = waited_for(scene.trust, scene.blind)
     if output.scans_of_several:
-        sees = (scene.last_look >= t - _LOOKS_S) & (believed >= TRUSTED * believed.max())
+        sees = (scene.last_look >= t - _LOOKS_S) & waited
         if np.count_nonzero(sees) < 2:
             return most
     wait = float(
-        _longest_wait(scene.p_detect, believed, model.sensors.period_s, t - scene.last_look, scans, most)
+        _longest_wait(scene.p_detect, waited, model.sensors.period_s, t - scene.last_look, scans, most)
     )
     return min(wait, most) if output.scans_of_several else wait
 
@@ -76,7 +88,7 @@ def _usual_gap_s(scene: SceneState, model: Model, t: float) -> float:
 @njit(cache=True)
 def _longest_wait(
     p_detect: FloatArray,
-    trust: FloatArray,
+    waited: BoolArray,
     period_s: FloatArray,
     since_s: FloatArray,
     scans: float,
@@ -86,15 +98,15 @@ def _longest_wait(
 
     Args:
         p_detect: (S,) probability of detecting a vehicle.
-        trust: (S,) how far each is believed.
+        waited: (S,) which are waited for.
         period_s: (S,) time between two scans.
         since_s: (S,) time since the last.
         scans: so many P_D⁻⁴ scans of a sensor are waited for,
         most: but no more than this time (s).
     """
     longest = 0.0
-    for s in range(len(trust)):
-        if trust[s] >= TRUSTED * trust.max():
+    for s in range(len(waited)):
+        if waited[s]:
             squared = p_detect[s] * p_detect[s]
             due = since_s[s] if since_s[s] < _OVERDUE * period_s[s] else 0.0
             longest = max(longest, min(scans * period_s[s] / (squared * squared), most) + due)
@@ -158,8 +170,8 @@ def reported_rows(
     confirmed, worthy, existence, fit = tracks.confirmed, tracks.worthy, tracks.existence, tracks.fit
     for i in range(len(boxes)):
         gap = t - tracks.t_update[i]
-        longest = max_gaps_s[1] if is_whole(boxes[i], image) else max_gaps_s[0]
-        if gap > longest and not tracks.standing[i]:
+        late = gap > max_gaps_s[0] and not tracks.standing[i]
+        if late and (gap > max_gaps_s[1] or not is_whole(boxes[i], image)):
             continue
         if not is_believed(confirmed[i], worthy[i], existence[i], fit[i, MEAN], output, by_existence):
             continue

@@ -10,7 +10,7 @@ from jeat_graph.config.kernel_form import Model
 from jeat_graph.filters.fit import MEAN
 from jeat_graph.filters.gaps import count_right, count_wrong
 from jeat_graph.tracking.batch import Batch
-from jeat_graph.tracking.reporting import TRUSTED, is_believed, is_whole
+from jeat_graph.tracking.reporting import is_believed, is_whole, waited_for
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.state import SceneState, TrackArrays
@@ -71,7 +71,7 @@ def note_missed(tracks: TrackArrays, n: int, batch: Batch, scene: SceneState, mo
     """
     settings = model.settings
     image, output, by_existence = settings.image, settings.output, settings.lifecycle.by_existence
-    if output.gap_memory <= 0.0 or not _somebody_looks(batch, scene):
+    if output.gap_memory <= 0.0 or not np.any(batch.present & waited_for(scene.trust, scene.blind)):
         return
     confirmed, worthy, existence, fit = tracks.confirmed, tracks.worthy, tracks.existence, tracks.fit
     for i in range(n):
@@ -82,10 +82,3 @@ def note_missed(tracks: TrackArrays, n: int, batch: Batch, scene: SceneState, mo
         box = track_boxes(tracks.mean[i : i + 1], tracks.size_mean[i : i + 1])[0]
         if is_whole(box, image):
             tracks.t_missed[i] = batch.t
-
-
-@inner
-def _somebody_looks(batch: Batch, scene: SceneState) -> bool:
-    """Whether a sensor looks now that is waited for."""
-    believed = scene.trust * (1.0 - scene.blind)
-    return bool(np.any(batch.present & (believed >= TRUSTED * np.max(believed))))
