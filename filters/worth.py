@@ -4,11 +4,13 @@ A detector takes some bush for a vehicle again and again. Boxes that come back t
 expected say that something is there, not that it is a vehicle: beside "a vehicle" and "chance" there is a
 third cause, a false thing. Where no other sensor has seen a track, only its score can tell the two apart,
 and what a score means differs between detectors. What shows itself is whether things of that score last. So
-for each sensor the probability that a box of score s belongs to something that lasts is
+for each sensor the probability that a box belongs to something that lasts is
 
-    q(s) = 1 / (1 + exp(−a − b ln(s / (1 − s)))),
+    q(p) = 1 / (1 + exp(−a − b ln(p / (1 − p)))),
 
-and the two numbers (a, b) are learnt by Bayes' rule while the tracker runs, each box weighing as much as the
+with p the precision that the sensor's curve gives for its score. Where such a curve was measured, it is
+believed at first, a = 0 and b = 1; where nobody says what scores mean, p is nearly the score itself. The two
+numbers (a, b) are learnt by Bayes' rule while the tracker runs, each box weighing as much as the
 time it stands for (logistic regression step by step: Spiegelhalter, Lauritzen, "Sequential updating of
 conditional probabilities on directed graphical structures", Networks 20, 1990). A sensor whose scores say
 nothing ends with b = 0: then none of its tracks is told from another.
@@ -22,16 +24,7 @@ from numba import njit
 
 from jeat_graph.data.arrays import FloatArray
 
-# Scores closer to none and to one are not told apart.
-_LEAST_SCORE = 0.01
 _MOST_ODDS = 30.0
-
-
-@njit(cache=True)
-def score_odds(score: float) -> float:
-    """Log odds of a score, ln(s / (1 − s)), within bounds."""
-    s = min(max(score, _LEAST_SCORE), 1.0 - _LEAST_SCORE)
-    return math.log(s / (1.0 - s))
 
 
 @njit(cache=True)

@@ -111,10 +111,15 @@ class LifecycleConfig(Section):
     )
     lasting_s: float = number(1.0, "s", "what is tracked for so long has lasted", open_low=True)
     worth_half: float = number(
-        0.65, "1", "probability that boxes of score one half last, before it is learnt", 0.001, 0.999
+        0.65,
+        "1",
+        "probability that boxes of score one half last, before it is learnt, of a sensor whose scores nobody "
+        "has measured (`score_precision`)",
+        0.001,
+        0.999,
     )
     worth_slope: float = number(
-        1.0, "1", "how its log odds rise with those of the score, before it is learnt"
+        1.0, "1", "how its log odds rise with those of the score, before it is learnt, of such a sensor"
     )
     worth_std: float = number(1.0, "1", "standard deviation of both assumptions", open_low=True)
     usual_vain: float = number(

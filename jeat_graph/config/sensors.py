@@ -10,6 +10,8 @@ from jeat_graph.data.errors import ConfigError
 
 #: A score never says that a box is more exact, or less, than this against what its sensor's usually are.
 LEAST_FACTOR, MOST_FACTOR = 0.1, 10.0
+# What scores mean where nobody says so: the precision itself.
+_ANY_SCORES = ((0.0, 0.02), (1.0, 0.98))
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ class SensorConfig(Section):
     clutter_per_scan: float = number(0.3, "boxes", "mean number of false boxes a scan", open_low=True)
     precision: float = number(0.9, "1", "fraction of its boxes that are vehicles", 0.001, 0.999)
     score_precision: tuple[tuple[float, float], ...] = field(
-        default=((0.0, 0.02), (1.0, 0.98)),
+        default=_ANY_SCORES,
         metadata={
             "doc": "calibrated precision of a box of this score: (score, precision) knots, both rising"
         },
@@ -92,6 +94,11 @@ class SensorConfig(Section):
     late_s: float | None = number(
         None, "s", "how late its scans may come in live use, if not as live.late_s says"
     )
+
+    @property
+    def knows_scores(self) -> bool:
+        """Whether somebody said what its scores mean."""
+        return self.score_precision != _ANY_SCORES
 
     def __post_init__(self) -> None:
         super().__post_init__()

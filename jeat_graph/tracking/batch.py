@@ -14,7 +14,6 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.filters.box_offsets import centre_offset
 from jeat_graph.filters.cut_boxes import LOW_CUT, cut_of
 from jeat_graph.filters.noise import score_weight
-from jeat_graph.filters.worth import score_odds
 
 # A calibrated precision is never certain, or a single score would outweigh all else that is known.
 LEAST_PRECISION, _MOST_PRECISION = 0.002, 0.998
@@ -52,7 +51,7 @@ class Batch(NamedTuple):
         precision: (M,) calibrated precision.
         fit: (M,) probability that the box of a track that takes it fits, by its score.
         log_score: (M,) ln of the score's likelihood ratio.
-        score_odds: (M,) log odds of the score itself.
+        score_odds: (M,) log odds of that precision.
         weight: (M,) factor on the measurement variance (g of the paper).
         spread: (M,) factor on all standard deviations of its noise, by its score.
         sensor: (M,) sensor index.
@@ -181,7 +180,7 @@ def prepare(arrivals: Arrivals, offsets: FloatArray, model: Model) -> Batch:
         precision[j] = min(max(calibrated, LEAST_PRECISION), _MOST_PRECISION)
         fit[j] = interpolate(scores[j], sensors.fit_score[s], sensors.fit_share[s])
         log_score[j] = log_score_ratio(precision[j], sensors.precision[s])
-        odds[j] = score_odds(scores[j])
+        odds[j] = math.log(precision[j] / (1.0 - precision[j]))
         weight[j] = score_weight(scores[j], noise.score_floor) if noise.score_weighting else 1.0
         spread[j] = interpolate(scores[j], sensors.noise_score[s], sensors.noise_factor[s])
     found = z, log_size, plain, corrected, precision, fit, log_score, odds, weight, spread

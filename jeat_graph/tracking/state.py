@@ -18,6 +18,8 @@ from jeat_graph.tracking.claims import CLAIMS, PLACES
 
 # What lasts usually has scores of about .9; that is held to be known from five seconds of a track.
 _USUAL_ODDS, _USUAL_WEIGHT = 2.2, 5.0
+# A precision that was measured is believed as it is: a and b of `filters.worth`.
+_AS_MEASURED = 0.0, 1.0
 # The share of what comes again in vain is held to be known from ten.
 _USUAL_VAIN_WEIGHT = 10.0
 #: How hard the tracks of a scene usually manoeuvre is the mean of so many seconds of a track.
@@ -51,7 +53,7 @@ class TrackArrays(NamedTuple):
         t_update: (C,) time of the last one (s).
         used: (C,) bit s is set where sensor s's detection was taken in the last step.
         seen_by: (C,) bit s is set where sensor s's detection was ever taken.
-        score_odds: (C,) mean log odds of the scores of its detections.
+        score_odds: (C,) mean log odds of the precisions of its detections.
         jerk_mean: (C, K, 2, 3 + B) its motion under K densities of jerk (`filters/manoeuvre.py`).
         jerk_cov: (C, K, 2, 3 + B, 3 + B) covariance of each.
         jerk_weight: (C, K) probability of each density.
@@ -188,8 +190,6 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
     """Return what is held of a scene of S sensors before the first scan."""
     num_sensors = len(sensors.p_detect)
     # Of a sensor that is the only one, nothing can be told but by itself.
-    half = config.lifecycle.worth_half
-    assumed = [math.log(half / (1.0 - half)), config.lifecycle.worth_slope]
     doubt = config.lifecycle.first_doubt if num_sensors > 1 else 0.0
     places = PLACES if config.lifecycle.field_doubt > 0.0 and num_sensors > 1 else 1
     return SceneState(
@@ -214,7 +214,7 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
         vain_seen=np.full(num_sensors, _USUAL_VAIN_WEIGHT),
         gained=np.zeros(num_sensors),
         lost=np.zeros(num_sensors),
-        worth_mean=np.tile(assumed, (num_sensors, 1)),
+        worth_mean=_first_worth(config),
         worth_cov=np.tile(config.lifecycle.worth_std**2 * np.eye(2), (num_sensors, 1, 1)),
         pair_sums=np.zeros((num_sensors, num_sensors, 2, NUM_SUMS)),
         offsets=np.zeros((num_sensors, 2, 6)),
@@ -225,6 +225,15 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
         gap_share=np.full(LENGTHS, PRIOR_SHARE),
         gap_seen=np.full(LENGTHS, PRIOR_GAPS),
     )
+
+
+def _first_worth(config: Config) -> FloatArray:
+    """What precisions say of what lasts (S, 2), before that is learnt: themselves, where measured."""
+    lifecycle = config.lifecycle
+    half = lifecycle.worth_half
+    assumed = math.log(half / (1.0 - half)), lifecycle.worth_slope
+    sensors = [config.sensors[name] for name in config.sensor_names]
+    return np.array([_AS_MEASURED if s.knows_scores else assumed for s in sensors], dtype=np.float64)
 
 
 def allocate(capacity: int, num_sensors: int, num_errors: int = 0, densities: int = 0) -> TrackArrays:

@@ -85,7 +85,7 @@ def objective(config, training):
 def tuned(recordings):
     training = shorten(recordings, 200)
     start = calibrate(training, load_config("default"))
-    start = replace(start, lifecycle=replace(start.lifecycle, confirm_existence=0.9999))
+    start = replace(start, lifecycle=replace(start.lifecycle, confirm_existence=0.99999))
     return training, start, tune(start, training, passes=1)
 
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jeat_graph.filters.worth import doubt_worth, learn_worth, score_odds, worth_of
+from jeat_graph.filters.worth import doubt_worth, learn_worth, worth_of
 
 ODDS = st.floats(-4.0, 4.0)
 
@@ -50,7 +50,7 @@ def test_what_is_true_of_a_detector_is_learnt_within_what_is_stated(a, b):
 
 def test_scores_that_mean_nothing_tell_no_track_from_another():
     mean, _ = follow(1.5, 0.0, 3000)
-    worth = [worth_of(mean, score_odds(score)) for score in (0.1, 0.5, 0.9)]
+    worth = [worth_of(mean, odds) for odds in (-2.0, 0.0, 2.0)]
     assert max(worth) - min(worth) < 0.1
     assert min(worth) > 0.7
 

@@ -153,3 +153,21 @@ def test_unless_it_moves_or_the_camera_sees_it_too_or_would_not(how):
     shown, smoothed = flickering(0.2, **how)
     assert shown > 0.9
     assert smoothed > 0
+
+
+def test_scores_that_were_measured_are_believed_as_measured(state):
+    """Of one sensor the precision by score is known, of the other not: a and b, and log odds of a box."""
+    curve = "score_precision=[[0.2, 0.1], [0.8, 0.9]]"
+    config = load_config(
+        "default", ["sensors.one={rate_hz: 10}", f"sensors.one.{curve}", "sensors.two={rate_hz: 10}"]
+    )
+    tracker = Tracker(config, image=(1242, 375))
+    worth = dict(zip(config.sensor_names, tracker._scene.worth_mean, strict=True))
+    assert worth["one"].tolist() == [0.0, 1.0]
+    half = config.lifecycle.worth_half
+    assert worth["two"].tolist() == [np.log(half / (1.0 - half)), config.lifecycle.worth_slope]
+    tracker.step((0.0, "one", [BUSH], [0.5]))  # a precision of one half
+    tracker.step((0.01, "two", [BUSH + np.array([200.0, 0.0, 0.0, 0.0])], [0.5]))
+    np.testing.assert_allclose(state(tracker)["score_odds"], [0.0, 0.0], rtol=0, atol=1e-12)
+    tracker.step((0.1, "one", [BUSH + np.array([400.0, 0.0, 0.0, 0.0])], [0.95]))
+    np.testing.assert_allclose(state(tracker)["score_odds"][-1], np.log(9.0), rtol=1e-12)
