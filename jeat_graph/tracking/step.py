@@ -6,7 +6,7 @@ from numba import njit
 
 from jeat_graph.config.kernel_form import Model
 from jeat_graph.tracking.batch import Arrivals, prepare
-from jeat_graph.tracking.stages.associating import associate
+from jeat_graph.tracking.stages.associating import associate, excuse_misfits
 from jeat_graph.tracking.stages.beginning import give_birth
 from jeat_graph.tracking.stages.comparing import learn_boxes
 from jeat_graph.tracking.stages.ending import confirm, remove_ended
@@ -58,6 +58,7 @@ def step(
     p_found, p_detect = current_p_detect(tracks, n, batch, occluded, scene, model)
     expectation = expect_detections(tracks, n, occluded, model)
     association = associate(tracks, n, batch, expectation, p_found, scene, model)
+    excuse_misfits(tracks, n, batch, association, p_detect, model)
     judge_sight(tracks, n, batch, association, p_detect, scene, model)
     learn_found(tracks, n, batch, association, scene, model)
     update_matched(tracks, batch, expectation, association, scene, model, log)

@@ -15,6 +15,9 @@ ROUGH = (
 )
 
 
+P_DETECT = 0.9
+
+
 def of_size(times):
     """A box of the same centre whose IoU with `BOX` is 1 / times²."""
     size = times * BOX[2:]
@@ -60,3 +63,53 @@ def test_a_box_that_the_picture_cuts_is_compared_with_the_part_that_shows(state)
         seen = [[max(left, 0.0), 300.0, min(left, 0.0) + 60.0, 40.0]]
         tracker.step([(0.05 * k, "rgb", seen, [0.9]), (0.05 * k, "evt", seen, [0.9])])
     assert state(tracker)["hits"].tolist() == [16]
+
+
+def existence_beside(misfit, overlap, state, scans=6):
+    """Existence of a track of `rgb` after scans in which the events show `misfit`, or nothing."""
+    changes = [
+        *ROUGH,
+        "sensors.evt.least_overlap=0.6",
+        f"sensors.evt.p_detect={P_DETECT}",
+        f"birth.max_overlap={overlap}",
+    ]
+    tracker = Tracker(load_config("highway", changes))
+    for k in range(scans):
+        tracker.step((0.05 * k, "rgb", [BOX.tolist()], [0.9]))
+        scores = [0.5] * len(misfit)
+        tracker.step((0.05 * k + 0.01, "evt", misfit, scores))
+    first = state(tracker)
+    assert first["seen_by"][0] == 2, "the events' box was taken"
+    return first["existence"][0], first["p_detect"][0, 0], tracker.num_tracks
+
+
+def test_a_worse_outline_of_a_vehicle_is_no_miss(state):
+    """A box of IoU .44: for the track it is too bad, and it begins none of its own."""
+    beside, own, tracks = existence_beside(of_size(1.5), 0.3, state)
+    missed, less, _ = existence_beside([], 0.3, state)
+    assert tracks == 1
+    assert beside > missed
+    assert less < own == P_DETECT
+
+
+def test_a_box_that_may_be_a_vehicle_of_its_own_excuses_nobody(state):
+    beside, own, tracks = existence_beside(of_size(1.5), 0.5, state, scans=1)
+    excused, _, _ = existence_beside(of_size(1.5), 0.3, state, scans=1)
+    assert tracks == 2
+    assert beside < excused
+    assert own < P_DETECT
+
+
+def test_one_outline_excuses_one_track(state):
+    """Two tracks that overlap: the box is a worse outline of the nearer one, and the other was missed."""
+    second = BOX + np.array([45.0, 0.0, 0.0, 0.0])
+    changes = [*ROUGH, "sensors.evt.least_overlap=0.6", "birth.max_overlap=0.2"]
+    tracker = Tracker(load_config("highway", changes))
+    for k in range(5):
+        tracker.step((0.05 * k, "rgb", [BOX.tolist(), second.tolist()], [0.9, 0.9]))
+    before = state(tracker)["p_detect"][:, 0].copy()
+    tracker.step((0.21, "evt", [[497.0, 300.0, 106.0, 40.0]], [0.9]))  # IoU .57 with one, .54 with the other
+    assert state(tracker)["hits"].tolist() == [5, 5]
+    after = state(tracker)["p_detect"][:, 0]
+    assert after[0] == before[0]
+    assert after[1] < before[1]

@@ -133,3 +133,40 @@ def associate(
             evidence[rows[p], s] = pair_evidence[p]
             taken[cols[p]] = 1
     return Association(match, evidence, taken)
+
+
+@inner
+def excuse_misfits(
+    tracks: TrackArrays, n: int, batch: Batch, association: Association, p_detect: FloatArray, model: Model
+) -> None:
+    """Set P_D to 0, in place, of looks whose box of the track was refused for its fit (`least_overlap`).
+
+    A box that coincides with a track begins none of its own. Where it is no vehicle's but this one's, only a
+    worse outline of it, the sensor has not missed the track: the look says nothing.
+
+    Args:
+        tracks: the state, predicted to the time of the batch.
+        n: number of tracks.
+        batch: all detections of the step.
+        association: which track takes which of them.
+        p_detect: (n, S) of this look, changed.
+        model: sensors and settings.
+    """
+    sensors, image = model.sensors, model.settings.image
+    if np.max(sensors.least_overlap) <= 0.0:
+        return
+    boxes = track_boxes(tracks.mean[:n], tracks.size_mean[:n])
+    if image.edge_px > 0.0:
+        boxes = clip_boxes(boxes, image.width, image.height)
+    for j in range(len(batch.sensor)):
+        s = batch.sensor[j]
+        if association.taken[j] or sensors.least_overlap[s] <= 0.0:
+            continue
+        most, nearest = model.settings.birth.max_overlap, np.int64(-1)
+        for i in range(n):
+            if association.match[i, s] < 0:
+                common = overlap(batch.boxes[j], boxes[i])
+                if common > most:
+                    most, nearest = common, np.int64(i)
+        if nearest >= 0:
+            p_detect[nearest, s] = 0.0
