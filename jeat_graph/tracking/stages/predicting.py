@@ -27,8 +27,6 @@ from jeat_graph.tracking.state import SceneState, TrackArrays
 
 # A small rest remains: what should be invisible is still taken if it is detected.
 _LEAST_VISIBLE = 1e-5
-# Probability of blindness from which on a camera that finds nothing counts as none.
-_SURELY = 0.99
 # A camera that has not looked in so many of its periods is not there.
 _LATE_PERIODS = 3.0
 
@@ -148,8 +146,8 @@ def current_p_detect(
     speed.
 
     Returns:
-        For a detection, and for a miss. They differ for an event camera that is alone: a new track's speed is
-        not known, which is not to stand still, and nobody else will find it. A miss goes by the most likely
+        For a detection, and for a miss. They differ for an event camera as far as nobody else will find the
+        track: a new track's speed is not known, which is not to stand still. A miss goes by the most likely
         speed: misses in a row all follow from one and the same unknown speed, and to count the doubt anew
         with each would soon end a vehicle that is far and slow.
     """
@@ -157,8 +155,8 @@ def current_p_detect(
     missed = np.zeros((n, len(present)))
     boxes = track_boxes(tracks.mean[:n], tracks.size_mean[:n])
     fields, width = known_fields(scene, model), image.width
-    alone = not _somebody_sees_still(batch, scene, model)
-    found = np.zeros((n, len(present))) if alone else missed
+    found = np.zeros((n, len(present))) if np.max(sensors.blind_speed) > 0.0 else missed
+    waits_for, usual = _who_sees_still(batch, scene, model), model.settings.lifecycle.hidden_prior
     for i in range(n):
         inside = visible_fraction(boxes[i], image.width, image.height) * (1.0 - occluded[i])
         for s in range(len(present)):
@@ -168,25 +166,46 @@ def current_p_detect(
                 likely = motion_visibility(v, blind_speed)
                 here *= looks_at(tracks.mean[i, 0, 0], scene.field[s], fields[s], width)
                 missed[i, s] = own * max(here * likely, _LEAST_VISIBLE)
-                if alone:
-                    prior_var = new_velocity_var(mean_side(tracks.size_mean[i]), model.settings)
-                    unsure = unsure_visibility(v, tracks.cov[i, :, 1, 1], prior_var, blind_speed)
-                    found[i, s] = own * max(here * max(likely, unsure), _LEAST_VISIBLE)
+                found[i, s] = missed[i, s]
+                if blind_speed > 0.0:
+                    alone = _without_others(tracks.hidden[i], waits_for, usual)
+                    if alone > likely:
+                        prior_var = new_velocity_var(mean_side(tracks.size_mean[i]), model.settings)
+                        unsure = unsure_visibility(v, tracks.cov[i, :, 1, 1], prior_var, blind_speed)
+                        found[i, s] = own * max(here * max(likely, alone * unsure), _LEAST_VISIBLE)
     return found, missed
 
 
 @inner
-def _somebody_sees_still(batch: Batch, scene: SceneState, model: Model) -> bool:
-    """Whether a sensor looks, or has of late, that sees what stands still and may not be blind."""
+def _without_others(hidden: FloatArray, waits_for: FloatArray, usual: float) -> float:
+    """Return the probability that a track will be found by none of the sensors that see what stands still.
+
+    What one of them has not looked for yet waits for its look, and counts as found: boxes of events repeat,
+    false ones too. A miss says that the track may be hidden from it.
+
+    Args:
+        hidden: (S,) probability that the track is hidden from each sensor.
+        waits_for: (S,) of `_who_sees_still`.
+        usual: `hidden` of what no look has missed.
+    """
+    alone = 1.0
+    for s in range(len(hidden)):
+        alone *= 1.0 - waits_for[s] * min((1.0 - hidden[s]) / (1.0 - usual), 1.0)
+    return alone
+
+
+@inner
+def _who_sees_still(batch: Batch, scene: SceneState, model: Model) -> FloatArray:
+    """Probability (S,) that a sensor looks, or has of late, that sees what stands still and is not blind."""
     sensors, begin = model.sensors, np.min(scene.first_look)
-    for s in range(len(batch.present)):
+    sees = np.zeros(len(batch.present))
+    for s in range(len(sees)):
         looks = batch.present[s] or has_looked(s, batch.t, scene, model)
         # One that has not looked at all may still begin.
         looks = looks or batch.t - begin <= _LATE_PERIODS * sensors.period_s[s]
-        sees = max(scene.blind[s], scene.unproven[s]) < _SURELY
-        if looks and sees and sensors.blind_speed[s] <= 0.0:
-            return True
-    return False
+        if looks and sensors.blind_speed[s] <= 0.0:
+            sees[s] = 1.0 - max(scene.blind[s], scene.unproven[s])
+    return sees
 
 
 @inlined
