@@ -14,7 +14,7 @@ from jeat_graph.association.gates import Expected, Found, Pairs, gated_pairs
 from jeat_graph.association.joint import associate_joint, associate_sequential, associate_slots
 from jeat_graph.association.methods import JOINT, SLOTS
 from jeat_graph.association.overlap import overlap
-from jeat_graph.config.kernel_form import Model
+from jeat_graph.config.kernel_form import Model, Settings
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.inner import inner
@@ -74,6 +74,14 @@ def judge_pairs(
 
 
 @inner
+def shown_boxes(tracks: TrackArrays, n: int, settings: Settings) -> FloatArray:
+    """Boxes (n, 4) of the first `n` tracks; where boxes may be cut, the part in the picture."""
+    boxes = track_boxes(tracks.mean[:n], tracks.size_mean[:n])
+    image = settings.image
+    return clip_boxes(boxes, image.width, image.height) if image.edge_px > 0.0 else boxes
+
+
+@inner
 def _fitting(pairs: Pairs, tracks: TrackArrays, n: int, batch: Batch, model: Model) -> Pairs:
     """Leave out the pairs whose boxes fit less than the sensor's do that are right (`least_overlap`).
 
@@ -81,9 +89,7 @@ def _fitting(pairs: Pairs, tracks: TrackArrays, n: int, batch: Batch, model: Mod
     little where it disagrees; its noise, the same for all of its boxes, would let it draw the track off. What
     it alone has seen is left to it.
     """
-    boxes, image = track_boxes(tracks.mean[:n], tracks.size_mean[:n]), model.settings.image
-    if image.edge_px > 0.0:
-        boxes = clip_boxes(boxes, image.width, image.height)
+    boxes = shown_boxes(tracks, n, model.settings)
     fit = np.ones(len(pairs.rows), dtype=np.bool_)
     for p in range(len(fit)):
         i, j = pairs.rows[p], pairs.cols[p]
@@ -152,12 +158,10 @@ def excuse_misfits(
         p_detect: (n, S) of this look, changed.
         model: sensors and settings.
     """
-    sensors, image = model.sensors, model.settings.image
+    sensors = model.sensors
     if np.max(sensors.least_overlap) <= 0.0:
         return
-    boxes = track_boxes(tracks.mean[:n], tracks.size_mean[:n])
-    if image.edge_px > 0.0:
-        boxes = clip_boxes(boxes, image.width, image.height)
+    boxes = shown_boxes(tracks, n, model.settings)
     for j in range(len(batch.sensor)):
         s = batch.sensor[j]
         if association.taken[j] or sensors.least_overlap[s] <= 0.0:

@@ -7,14 +7,13 @@ import math
 import numpy as np
 
 from jeat_graph.association.births import choose_births
-from jeat_graph.association.boxes import clip_boxes, track_boxes
-from jeat_graph.config.kernel_form import Model, Settings
+from jeat_graph.config.kernel_form import Model
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.filters.cut_boxes import BOTH_CUT, WHOLE
 from jeat_graph.filters.fit import exactness, take
 from jeat_graph.filters.prior import write_prior, write_size_prior
 from jeat_graph.tracking.batch import Batch
-from jeat_graph.tracking.stages.associating import Association
+from jeat_graph.tracking.stages.associating import Association, shown_boxes
 from jeat_graph.tracking.stages.comparing import remember_box
 from jeat_graph.tracking.stages.ending import confirm, has_left
 from jeat_graph.tracking.stages.inner import inner
@@ -75,14 +74,6 @@ def give_birth(
     judge_worth(tracks, n + len(parents), scene, model)
     confirm(tracks, n + len(parents), batch.t, settings)
     return n + len(parents), next_id + len(parents)
-
-
-@inner
-def shown_boxes(tracks: TrackArrays, n: int, settings: Settings) -> FloatArray:
-    """Boxes (n, 4) of the first `n` tracks; where boxes may be cut, the part in the picture."""
-    boxes = track_boxes(tracks.mean[:n], tracks.size_mean[:n])
-    image = settings.image
-    return clip_boxes(boxes, image.width, image.height) if image.edge_px > 0.0 else boxes
 
 
 @inner

@@ -165,14 +165,15 @@ def current_p_detect(
                 here, own = inside * (1.0 - tracks.hidden[i, s]), tracks.p_detect[i, s]
                 likely = motion_visibility(v, blind_speed)
                 here *= looks_at(tracks.mean[i, 0, 0], scene.field[s], fields[s], width)
-                missed[i, s] = own * max(here * likely, _LEAST_VISIBLE)
-                found[i, s] = missed[i, s]
+                visible = likely
                 if blind_speed > 0.0:
                     alone = _without_others(tracks.hidden[i], waits_for, usual)
                     if alone > likely:
                         prior_var = new_velocity_var(mean_side(tracks.size_mean[i]), model.settings)
                         unsure = unsure_visibility(v, tracks.cov[i, :, 1, 1], prior_var, blind_speed)
-                        found[i, s] = own * max(here * max(likely, alone * unsure), _LEAST_VISIBLE)
+                        visible = max(likely, alone * unsure)
+                missed[i, s] = own * max(here * likely, _LEAST_VISIBLE)
+                found[i, s] = own * max(here * visible, _LEAST_VISIBLE)
     return found, missed
 
 
