@@ -72,4 +72,6 @@ def track_jerk(
     """
     side = mean_side(size_mean)
     growth = common_growth(size_mean[0, 1], size_mean[1, 1])
-    return factor * jerk_density(side, growth, jerk_px, jerk_per_size, jerk_per_growth)
+    # What passes the camera jerks by perspective however calmly it goes.
+    perspective = max(factor, 1.0) * jerk_per_growth
+    return jerk_density(side, growth, factor * jerk_px, factor * jerk_per_size, perspective)

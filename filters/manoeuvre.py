@@ -1,9 +1,11 @@
-"""How hard a track manoeuvres, learnt while it runs: its motion filtered under several densities of jerk.
+"""How hard a track manoeuvres, learnt while it runs: its motion filtered under three densities of jerk.
 
 What turns (a roundabout, players, a camera held in the hand) changes its acceleration faster than traffic
-on a straight road. A filter too stiff for it lags behind and its innovations grow, and from their size
-alone that cannot be told from noisy boxes. From their order it can: a lag has the same sign scan after
-scan. So each track carries a few filters beside its own that differ in the density of the jerk alone, and
+on a straight road, and a walker who goes straight on changes it less. A filter too stiff lags behind and its
+innovations grow, and from their size alone that cannot be told from noisy boxes. From their order it can: a
+lag has the same sign scan after scan. A filter too loose follows the errors of the boxes, and takes the box
+of whoever comes by for that of a track it has lost sight of. So each track carries three filters beside its
+own that differ in the density of the jerk alone: a calm one, the usual one, that of a manoeuvre; and
 Bayes' rule weighs them by how well each foretold the detections. Source: autonomous multiple models, Bar-
 Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation, ch. 11.6.2; the weights
 relax to what is usual of the scene, for manoeuvres begin and end, and the tracker itself goes by one filter
@@ -28,24 +30,41 @@ _MOST_EVIDENCE = 3.0
 _LEAST_WEIGHT = 1e-3
 
 
-def prior_weights(more: float, densities: int) -> FloatArray:
-    """Weights (K,) of the densities before anything is known, each `more` times the one before."""
-    weight = more ** np.arange(densities, dtype=np.float64)
-    return weight / weight.sum() if densities else weight
+def prior_weights(calm: float, harder: float) -> FloatArray:
+    """Weights (3,) of the densities before anything is known, in the order of `density_factor`.
+
+    Args:
+        calm: that of the calm one, as a part of the usual one's.
+        harder: that of a manoeuvre, likewise.
+    """
+    weight = np.array([calm, 1.0, harder])
+    return weight / weight.sum()
 
 
 @njit(cache=True)
-def mean_factor(weight: FloatArray, step: float) -> float:
-    """Factor on the density of a track's jerk: the geometric mean of 1, step, step², … under the weights.
+def density_factor(k: int, calmer: float, harder: float) -> float:
+    """Factor of density `k` on the usual one: calm, usual, a manoeuvre.
 
     Args:
-        weight: (K,) probability of each density.
-        step: factor from one density to the next, >= 1.
+        k: from 0.
+        calmer: how many times calmer than usual the first is, >= 1.
+        harder: how many times harder than usual the last is, >= 1.
     """
-    power = 0.0
-    for k in range(len(weight)):
-        power += k * weight[k]
-    return math.exp(power * math.log(step))
+    if k == 1:
+        return 1.0
+    return 1.0 / calmer if k == 0 else harder
+
+
+@njit(cache=True)
+def mean_factor(weight: FloatArray, calmer: float, harder: float) -> float:
+    """Factor on the density of a track's jerk: the geometric mean of the factors under the weights.
+
+    Args:
+        weight: (3,) probability of each density.
+        calmer: as in `density_factor`.
+        harder: as there.
+    """
+    return math.exp(weight[2] * math.log(harder) - weight[0] * math.log(calmer))
 
 
 @njit(cache=True)
@@ -87,11 +106,13 @@ def weigh_manoeuvres(
     R: FloatArray,
     coloured_std: FloatArray,
     error: int,
-    whole: BoolArray,
+    say: FloatArray,
 ) -> float:
     """Update the filters of one track with a detection and weigh them by how well they foretold it, in place.
 
-    Eight arguments: those of `update_centre`, the weights, and which axes have a say.
+    Noise may be assumed to be wide, for association. Beside it the calmest motion explains everything, so
+    that one has to do better than the usual one beside noise as it is; a manoeuvre, as it is assumed.
+    Eight arguments: those of `update_centre`, the weights, and what the axes have to say.
 
     Args:
         mean: (K, 2, 3 + B) per density and axis.
@@ -101,21 +122,25 @@ def weigh_manoeuvres(
         R: (2,) variances of the white part (px²).
         coloured_std: (2,) standard deviation of the coloured part (px).
         error: the sensor's error state, counted from 0, or -1.
-        whole: (2,) the axes along which the box is whole; where it is cut, little is measured.
+        say: (2,) how many times smaller than expected the squares of innovations usually are along each axis;
+            0 where the box is cut, and little is measured.
 
     Returns:
         The normalised innovation squared, the mean over the densities: what of it no manoeuvre explains.
     """
     K = len(weight)
-    fit, square, best = np.zeros(K), np.empty(K), -np.inf
+    fit, square, calm = np.zeros(K), np.empty(K), 0.0
     for k in range(K):
         for axis in range(2):
-            if whole[axis]:
+            if say[axis] > 0.0:
                 e, V = expected(mean[k, axis], cov[k, axis], coloured_std[axis], error)
                 fit[k] += log_gaussian(z[axis] - e, V + R[axis])
-        best = max(best, fit[k])
+                if k < 2:
+                    sign = 1.0 if k == 0 else -1.0
+                    calm += sign * log_gaussian(z[axis] - e, (V + R[axis]) / say[axis])
         square[k] = update_centre(mean[k], cov[k], z, R, coloured_std, error)
-    total, nis = 0.0, 0.0
+    fit[0] = fit[1] + calm
+    best, total, nis = np.max(fit), 0.0, 0.0
     for k in range(K):
         weight[k] *= math.exp(max(fit[k] - best, -_MOST_EVIDENCE))
         total += weight[k]

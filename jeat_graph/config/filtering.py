@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from jeat_graph.config.fields import Section, flag, number
 from jeat_graph.data.errors import ConfigError
 
-# Densities of jerk between which innovations choose: that of calm traffic, of turns, of sport.
+# Densities of jerk between which innovations choose: a calm one, the usual one, that of a manoeuvre.
 _DENSITIES = 3
 
 
@@ -39,16 +39,26 @@ class MotionConfig(Section):
     manoeuvre_step: float = number(
         1.0,
         "1",
-        "factor from one to the next of three densities of jerk between which a track's innovations choose; "
-        "1: no choice",
+        "how many times as hard as usual a manoeuvre is, by the root density of its jerk; with `calm_step` "
+        "1, too, a track's innovations choose nothing",
         1.0,
         100.0,
+    )
+    calm_step: float = number(
+        1.0,
+        "1",
+        "how many times calmer than usual a track may go, by the same",
+        1.0,
+        100.0,
+    )
+    calm_prior: float = number(
+        0.1, "1", "probability that it does before anything is known, as a part of the usual's", 0.0, 1.0
     )
     manoeuvre_memory_s: float = number(2.0, "s", "how long a manoeuvre lasts", open_low=True)
     manoeuvre_prior: float = number(
         0.05,
         "1",
-        "probability of each of them before anything is known, as a part of the one before",
+        "probability of a manoeuvre before anything is known, as a part of the usual's",
         0.0,
         1.0,
     )
@@ -63,7 +73,7 @@ class MotionConfig(Section):
     @property
     def densities(self) -> int:
         """Number of densities of jerk between which a track's innovations choose; 0: there is no choice."""
-        return _DENSITIES if self.manoeuvre_step > 1.0 else 0
+        return _DENSITIES if max(self.manoeuvre_step, self.calm_step) > 1.0 else 0
 
 
 @dataclass(frozen=True)

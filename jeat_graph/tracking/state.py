@@ -24,6 +24,8 @@ _AS_MEASURED = 0.0, 1.0
 _USUAL_VAIN_WEIGHT = 10.0
 #: How hard the tracks of a scene usually manoeuvre is the mean of so many seconds of a track.
 USUAL_JERK_S = 30.0
+# That innovations are as large as expected is held for so many detections before any was seen.
+_FIRST_INNOVATIONS = 20.0
 
 
 class TrackArrays(NamedTuple):
@@ -145,6 +147,9 @@ class SceneState(NamedTuple):
         offsets: (S, 2, 6) what each sensor is off by along each axis: share of the side, px, ln side, px per
             px of the place along x and y.
         pair_factors: (S, S, 2, 2) factors on the variances that are assumed of their differences.
+        innovation: (S,) recent mean of the normalised innovation squared of confirmed tracks, over its two
+            degrees of freedom; followed where a density of jerk is chosen.
+        innovation_seen: (S,) on how many detections it rests.
         usual_jerk: (K,) recent mean weight of each density of jerk over the confirmed tracks.
         field: (S, 2) how far each sensor's boxes reach to the left and to the right (px), from +inf, -inf.
         field_witnesses: (S,) over how many vehicles they were.
@@ -179,6 +184,8 @@ class SceneState(NamedTuple):
     pair_sums: FloatArray
     offsets: FloatArray
     pair_factors: FloatArray
+    innovation: FloatArray
+    innovation_seen: FloatArray
     usual_jerk: FloatArray
     field: FloatArray
     field_witnesses: FloatArray
@@ -191,6 +198,7 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
     num_sensors = len(sensors.p_detect)
     # Of a sensor that is the only one, nothing can be told but by itself.
     doubt = config.lifecycle.first_doubt if num_sensors > 1 else 0.0
+    motion = config.motion
     places = PLACES if config.lifecycle.field_doubt > 0.0 and num_sensors > 1 else 1
     return SceneState(
         clutter=sensors.clutter_per_scan.copy(),
@@ -219,7 +227,9 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
         pair_sums=np.zeros((num_sensors, num_sensors, 2, NUM_SUMS)),
         offsets=np.zeros((num_sensors, 2, 6)),
         pair_factors=np.ones((num_sensors, num_sensors, 2, 2)),
-        usual_jerk=prior_weights(config.motion.manoeuvre_prior, config.motion.densities),
+        innovation=np.ones(num_sensors),
+        innovation_seen=np.full(num_sensors, _FIRST_INNOVATIONS),
+        usual_jerk=prior_weights(motion.calm_prior, motion.manoeuvre_prior)[: motion.densities],
         field=np.tile([np.inf, -np.inf], (num_sensors, 1)),
         field_witnesses=np.zeros(num_sensors),
         gap_share=np.full(LENGTHS, PRIOR_SHARE),

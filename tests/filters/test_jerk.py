@@ -42,7 +42,17 @@ def test_a_standing_track_has_a_part_of_it():
     size = np.array([[4.0, 0.3], [3.0, 0.1]])
     full = track_jerk(size, 1.0, 0.5, 2.0, 1.0)
     assert full == pytest.approx(jerk_density(np.exp(3.5), 0.1, 1.0, 0.5, 2.0))
-    assert track_jerk(size, 1.0, 0.5, 2.0, 0.1) == pytest.approx(0.1 * full)
+    assert track_jerk(size, 1.0, 0.5, 0.0, 0.1) == pytest.approx(0.1 * (1.0 + 0.5 * np.exp(3.5)))
+
+
+def test_perspective_is_not_calm_but_a_manoeuvre_is_more_of_all():
+    """However calmly a car drives past: its image jerks by the growth of its distances."""
+    size = np.array([[4.0, 0.6], [4.0, 0.6]])
+    perspective = jerk_density(np.exp(4.0), 0.6, 0.0, 0.0, 2.0)
+    assert track_jerk(size, 0.0, 0.5, 2.0, 0.1) == pytest.approx(
+        np.hypot(0.1 * 0.5 * np.exp(4.0), perspective)
+    )
+    assert track_jerk(size, 1.0, 0.5, 2.0, 3.0) == pytest.approx(3.0 * track_jerk(size, 1.0, 0.5, 2.0, 1.0))
 
 
 @pytest.mark.parametrize(

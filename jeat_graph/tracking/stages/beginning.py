@@ -66,7 +66,7 @@ def give_birth(
         if partner[j] >= 0:
             i = n + partner[j]
             view = second_view(tracks, i, batch, j, model.sensors)
-            take_in(tracks, view, batch.sensor[j], batch, model, log)
+            take_in(tracks, view, batch.sensor[j], batch, scene, model, log)
             remember_box(tracks, i, batch, j)
             tracks.hidden[i, batch.sensor[j]] = 0.0
             # Two sensors' false boxes seldom coincide: each view's chance to be false remains.

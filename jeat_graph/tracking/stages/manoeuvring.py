@@ -4,14 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from jeat_graph.config.kernel_form import Model
+from jeat_graph.config.kernel_form import Model, SensorArrays
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.filters.cut_boxes import WHOLE, floor_of_centre
 from jeat_graph.filters.jerk import track_jerk
-from jeat_graph.filters.manoeuvre import mean_factor, predict_manoeuvres, relax_weights, weigh_manoeuvres
+from jeat_graph.filters.manoeuvre import (
+    density_factor,
+    mean_factor,
+    predict_manoeuvres,
+    relax_weights,
+    weigh_manoeuvres,
+)
+from jeat_graph.filters.running_mean import take_into_mean
 from jeat_graph.tracking.batch import Measured
 from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.state import USUAL_JERK_S, SceneState, TrackArrays
+
+# How large a sensor's innovations are is the mean of so many of late.
+_INNOVATIONS = 1000.0
+# One odd box counts for no more than what one in a hundred exceeds (chi squared, two degrees of freedom).
+_MOST_NIS = 9.2
+# However small they are: a detector without noise would make a manoeuvre of a rounding error.
+_LEAST_INNOVATION = 0.1
 
 
 @inner
@@ -19,13 +33,15 @@ def choose_jerk(tracks: TrackArrays, n: int, dt: float, scene: SceneState, model
     """Say by which factor each track's jerk is greater than usual over the next `dt` seconds, in place.
 
     False boxes jump about, which is no manoeuvre: a track that followed them would take in ever more
-    of them. So tracks that are not confirmed have the usual jerk.
+    of them. So tracks that are not confirmed have the usual jerk of the scene, or less.
     """
     motion = model.settings.motion
+    calmer, harder = motion.calm_step, motion.manoeuvre_step
     relax_weights(tracks.jerk_weight[:n], scene.usual_jerk, dt, motion.manoeuvre_memory_s)
+    usual = min(mean_factor(scene.usual_jerk, calmer, harder), 1.0)
     for i in range(n):
-        factor = mean_factor(tracks.jerk_weight[i], motion.manoeuvre_step)
-        tracks.jerk_factor[i] = factor if tracks.confirmed[i] else 1.0
+        factor = mean_factor(tracks.jerk_weight[i], calmer, harder)
+        tracks.jerk_factor[i] = factor if tracks.confirmed[i] else usual
 
 
 @inner
@@ -38,13 +54,15 @@ def predict_manoeuvring(
     jerk, lost = np.empty(n * K), np.empty(n * K, dtype=np.bool_)
     confirmed, share = 0, np.zeros(K)
     for i in range(n):
-        density = track_jerk(
-            tracks.size_mean[i], motion.jerk_px, motion.jerk_per_size, motion.jerk_per_growth, 1.0
-        )
         confirmed += 1 if tracks.confirmed[i] else 0
         for k in range(K):
-            jerk[i * K + k] = density
-            density *= motion.manoeuvre_step
+            jerk[i * K + k] = track_jerk(
+                tracks.size_mean[i],
+                motion.jerk_px,
+                motion.jerk_per_size,
+                motion.jerk_per_growth,
+                density_factor(k, motion.calm_step, motion.manoeuvre_step),
+            )
             lost[i * K + k] = unseen[i]
             if tracks.confirmed[i]:
                 share[k] += tracks.jerk_weight[i, k]
@@ -58,27 +76,45 @@ def predict_manoeuvring(
 
 
 @inner
-def weigh_jerk(tracks: TrackArrays, measured: Measured, cut: IntArray, error: int, nis: FloatArray) -> None:
-    """Weigh the densities of K tracks by the detections that they have just taken, in place.
+def weigh_jerk(
+    tracks: TrackArrays,
+    measured: Measured,
+    s: int,
+    cut: IntArray,
+    nis: FloatArray,
+    scene: SceneState,
+    sensors: SensorArrays,
+) -> None:
+    """Weigh the densities of K tracks by the detections of sensor `s` that they have just taken, in place.
+
+    How large the sensor's innovations usually are is followed beside it.
 
     Args:
         tracks: state of all tracks.
         measured: what these detections measure.
+        s: the sensor.
         cut: (M, 2) which sides of all detections the edges of the picture cut.
-        error: the sensor's error state, counted from 0, or -1.
         nis: (K,) normalised innovation squared; lowered to what of it no manoeuvre explains.
+        scene: what is learnt of the sensor's innovations; updated.
+        sensors: parameters of the sensors.
     """
+    error = sensors.error[s]
     track, detection, z = measured.track, measured.detection, measured.z
     white, coloured_std = measured.white, measured.coloured_std
     mean, cov, weight = tracks.jerk_mean, tracks.jerk_cov, tracks.jerk_weight
-    size_mean, size_cov, whole = tracks.size_mean, tracks.size_cov, np.empty(2, dtype=np.bool_)
+    size_mean, size_cov, say = tracks.size_mean, tracks.size_cov, np.empty(2)
+    exactness = 1.0 / min(max(scene.innovation[s], _LEAST_INNOVATION), 1.0)
     for m in range(len(track)):
         i, j = track[m], detection[m]
-        whole[0], whole[1] = cut[j, 0] == WHOLE, cut[j, 1] == WHOLE
-        left = weigh_manoeuvres(mean[i], cov[i], weight[i], z[m], white[m], coloured_std[m], error, whole)
-        nis[m] = min(nis[m], left)
         for axis in range(2):
-            if not whole[axis]:
+            say[axis] = exactness if cut[j, axis] == WHOLE else 0.0
+        left = weigh_manoeuvres(mean[i], cov[i], weight[i], z[m], white[m], coloured_std[m], error, say)
+        nis[m] = min(nis[m], left)
+        if tracks.confirmed[i] and say[0] > 0.0 and say[1] > 0.0:
+            square = min(nis[m], _MOST_NIS) / 2.0
+            take_into_mean(scene.innovation, scene.innovation_seen, s, square, 1.0, _INNOVATIONS)
+        for axis in range(2):
+            if say[axis] == 0.0:
                 for k in range(weight.shape[1]):
                     floor_of_centre(
                         cut[j, axis], size_mean[i, axis, 0], size_cov[i, axis, 0, 0], cov[i, k, axis]

@@ -103,7 +103,13 @@ def hold_still(tracks: TrackArrays, track: IntArray, std_per_size: float) -> Non
 
 @inner
 def take_in(
-    tracks: TrackArrays, measured: Measured, s: int, batch: Batch, model: Model, log: UpdateLog
+    tracks: TrackArrays,
+    measured: Measured,
+    s: int,
+    batch: Batch,
+    scene: SceneState,
+    model: Model,
+    log: UpdateLog,
 ) -> None:
     """Update tracks with the detections of sensor `s` that they take: filter, size, noise scale, standing."""
     settings, error, track = model.settings, model.sensors.error[s], measured.track
@@ -118,7 +124,7 @@ def take_in(
         log_innovations(log, nis, tracks.scale[track, s])
     if tracks.jerk_weight.shape[1]:
         # A lag behind what turns is no noise of the boxes.
-        weigh_jerk(tracks, measured, batch.cut, error, nis)
+        weigh_jerk(tracks, measured, s, batch.cut, nis, scene, model.sensors)
     take_sizes(tracks, measured, batch)
     hold_still(tracks, track, settings.standing.speed_std_per_size)
     noise, scale, hits, score_odds = settings.noise, tracks.scale, tracks.hits, tracks.score_odds
@@ -145,6 +151,7 @@ def take_pairs(
     batch: Batch,
     expectation: Expectation,
     evidence: FloatArray,
+    scene: SceneState,
     model: Model,
     log: UpdateLog,
 ) -> None:
@@ -157,11 +164,12 @@ def take_pairs(
         batch: all detections of the step.
         expectation: of all tracks.
         evidence: (K,) tempered ln Λ of each pair.
+        scene: what is learnt of the sensors.
         model: sensors and settings.
         log: takes down what the tracks take in.
     """
     measured = measure(tracks, pairs, batch, expectation, s, model.sensors)
-    take_in(tracks, measured, s, batch, model, log)
+    take_in(tracks, measured, s, batch, scene, model, log)
     if model.settings.lifecycle.by_existence:
         existence = tracks.existence
         for k in range(pairs.shape[1]):
@@ -194,7 +202,7 @@ def update_matched(
             i = track[k]
             pairs[0, k], pairs[1, k] = i, match[i, s]
             evidence[k] = believed * association.evidence[i, s]
-        take_pairs(tracks, pairs, s, batch, expectation, evidence, model, log)
+        take_pairs(tracks, pairs, s, batch, expectation, evidence, scene, model, log)
 
 
 @inner
@@ -243,4 +251,4 @@ def take_second_views(
                 tempered[count] = believed * evidence[chosen]
                 count += 1
         if count:
-            take_pairs(tracks, pairs[:, :count].copy(), s, batch, expectation, tempered, model, log)
+            take_pairs(tracks, pairs[:, :count].copy(), s, batch, expectation, tempered, scene, model, log)
