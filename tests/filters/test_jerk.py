@@ -38,7 +38,7 @@ def test_beyond_a_growth_of_four_a_second_it_grows_no_more():
     assert jerk_density(40.0, 4.1, 3.0, 0.5, 7.0) == jerk_density(40.0, -1e3, 3.0, 0.5, 7.0) == fastest
 
 
-def test_a_standing_track_has_a_part_of_it():
+def test_a_calm_track_has_a_part_of_it():
     size = np.array([[4.0, 0.3], [3.0, 0.1]])
     full = track_jerk(size, 1.0, 0.5, 2.0, 1.0)
     assert full == pytest.approx(jerk_density(np.exp(3.5), 0.1, 1.0, 0.5, 2.0))

@@ -43,12 +43,13 @@ def jerk_of(tracks: TrackArrays, track: IntArray, settings: Settings) -> FloatAr
     )
     for k in range(len(track)):
         i = track[k]
-        out[k] = track_jerk(
+        part = still if standing[i] else 1.0
+        out[k] = part * track_jerk(
             size_mean[i],
             motion.jerk_px,
             motion.jerk_per_size,
             motion.jerk_per_growth,
-            factor[i] * still if standing[i] else factor[i],
+            factor[i],
         )
     return out
 
