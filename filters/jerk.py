@@ -68,7 +68,7 @@ def track_jerk(
         jerk_px: as there.
         jerk_per_size: as there.
         jerk_per_growth: as there.
-        factor: 1; less of a calm track, more of one that manoeuvres.
+        factor: 1; less of a calm track, but perspective stays, and more of one that manoeuvres.
     """
     side = mean_side(size_mean)
     growth = common_growth(size_mean[0, 1], size_mean[1, 1])

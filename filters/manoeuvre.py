@@ -34,8 +34,8 @@ def prior_weights(calm: float, harder: float) -> FloatArray:
     """Weights (3,) of the densities before anything is known, in the order of `density_factor`.
 
     Args:
-        calm: that of the calm one, as a part of the usual one's.
-        harder: that of a manoeuvre, likewise.
+        calm: odds of the calm one against the usual one.
+        harder: odds of a manoeuvre, likewise.
     """
     weight = np.array([calm, 1.0, harder])
     return weight / weight.sum()
@@ -107,7 +107,7 @@ def weigh_manoeuvres(
     coloured_std: FloatArray,
     error: int,
     say: FloatArray,
-) -> float:
+) -> tuple[float, float]:
     """Update the filters of one track with a detection and weigh them by how well they foretold it, in place.
 
     Noise may be assumed to be wide, for association. Beside it the calmest motion explains everything, so
@@ -115,9 +115,9 @@ def weigh_manoeuvres(
     Eight arguments: those of `update_centre`, the weights, and what the axes have to say.
 
     Args:
-        mean: (K, 2, 3 + B) per density and axis.
-        cov: (K, 2, 3 + B, 3 + B) covariance.
-        weight: (K,) probability of each density.
+        mean: (3, 2, 3 + B) per density and axis.
+        cov: (3, 2, 3 + B, 3 + B) covariance.
+        weight: (3,) probability of each density.
         z: (2,) measured centre (px).
         R: (2,) variances of the white part (px²).
         coloured_std: (2,) standard deviation of the coloured part (px).
@@ -126,7 +126,8 @@ def weigh_manoeuvres(
             0 where the box is cut, and little is measured.
 
     Returns:
-        The normalised innovation squared, the mean over the densities: what of it no manoeuvre explains.
+        The normalised innovation squared, the mean over the densities: what of it no manoeuvre explains; and
+        that of the usual density.
     """
     K = len(weight)
     fit, square, calm = np.zeros(K), np.empty(K), 0.0
@@ -147,7 +148,7 @@ def weigh_manoeuvres(
         nis += weight[k] * square[k]
     for k in range(K):
         weight[k] /= total
-    return nis / total
+    return nis / total, square[1]
 
 
 @njit(cache=True)

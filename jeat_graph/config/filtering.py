@@ -47,18 +47,18 @@ class MotionConfig(Section):
     calm_step: float = number(
         1.0,
         "1",
-        "how many times calmer than usual a track may go, by the same",
+        "how many times calmer than usual a track may go, by the same; 1: no calmer",
         1.0,
         100.0,
     )
     calm_prior: float = number(
-        0.1, "1", "probability that it does before anything is known, as a part of the usual's", 0.0, 1.0
+        0.1, "1", "odds that it does against the usual, before anything is known", 0.0, 100.0
     )
     manoeuvre_memory_s: float = number(2.0, "s", "how long a manoeuvre lasts", open_low=True)
     manoeuvre_prior: float = number(
         0.05,
         "1",
-        "probability of a manoeuvre before anything is known, as a part of the usual's",
+        "odds of a manoeuvre against the usual, before anything is known",
         0.0,
         1.0,
     )
@@ -74,6 +74,14 @@ class MotionConfig(Section):
     def densities(self) -> int:
         """Number of densities of jerk between which a track's innovations choose; 0: there is no choice."""
         return _DENSITIES if max(self.manoeuvre_step, self.calm_step) > 1.0 else 0
+
+    @property
+    def first_odds(self) -> tuple[float, float]:
+        """Odds of the calm density and of a manoeuvre's against the usual one; 0 of one that is not there."""
+        return (
+            self.calm_prior if self.calm_step > 1.0 else 0.0,
+            self.manoeuvre_prior if self.manoeuvre_step > 1.0 else 0.0,
+        )
 
 
 @dataclass(frozen=True)

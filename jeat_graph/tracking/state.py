@@ -24,8 +24,7 @@ _AS_MEASURED = 0.0, 1.0
 _USUAL_VAIN_WEIGHT = 10.0
 #: How hard the tracks of a scene usually manoeuvre is the mean of so many seconds of a track.
 USUAL_JERK_S = 30.0
-# That innovations are as large as expected is held for so many detections before any was seen.
-_FIRST_INNOVATIONS = 20.0
+_FIRST_INNOVATIONS_S = 1.5  # of a track: from so many it is held to be known that they are as expected
 
 
 class TrackArrays(NamedTuple):
@@ -147,9 +146,9 @@ class SceneState(NamedTuple):
         offsets: (S, 2, 6) what each sensor is off by along each axis: share of the side, px, ln side, px per
             px of the place along x and y.
         pair_factors: (S, S, 2, 2) factors on the variances that are assumed of their differences.
-        innovation: (S,) recent mean of the normalised innovation squared of confirmed tracks, over its two
-            degrees of freedom; followed where a density of jerk is chosen.
-        innovation_seen: (S,) on how many detections it rests.
+        innovation: (S,) recent mean of half the normalised innovation squared of confirmed tracks, at the
+            usual density of jerk; followed where a density is chosen.
+        innovation_seen: (S,) what that mean rests on, in seconds of a track.
         usual_jerk: (K,) recent mean weight of each density of jerk over the confirmed tracks.
         field: (S, 2) how far each sensor's boxes reach to the left and to the right (px), from +inf, -inf.
         field_witnesses: (S,) over how many vehicles they were.
@@ -198,7 +197,6 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
     num_sensors = len(sensors.p_detect)
     # Of a sensor that is the only one, nothing can be told but by itself.
     doubt = config.lifecycle.first_doubt if num_sensors > 1 else 0.0
-    motion = config.motion
     places = PLACES if config.lifecycle.field_doubt > 0.0 and num_sensors > 1 else 1
     return SceneState(
         clutter=sensors.clutter_per_scan.copy(),
@@ -228,8 +226,8 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
         offsets=np.zeros((num_sensors, 2, 6)),
         pair_factors=np.ones((num_sensors, num_sensors, 2, 2)),
         innovation=np.ones(num_sensors),
-        innovation_seen=np.full(num_sensors, _FIRST_INNOVATIONS),
-        usual_jerk=prior_weights(motion.calm_prior, motion.manoeuvre_prior)[: motion.densities],
+        innovation_seen=np.full(num_sensors, _FIRST_INNOVATIONS_S),
+        usual_jerk=prior_weights(*config.motion.first_odds)[: config.motion.densities],
         field=np.tile([np.inf, -np.inf], (num_sensors, 1)),
         field_witnesses=np.zeros(num_sensors),
         gap_share=np.full(LENGTHS, PRIOR_SHARE),

@@ -75,7 +75,7 @@ def test_the_weights_are_those_of_filters_that_run_apart():
     log_odds = np.log(weight[0])
     for z in white_jerk_path(rng, 12, 2 * SIZE) + detector_errors(rng, 12):
         predict_manoeuvres(mean, cov, DENSITIES, CORRELATION_TIME, DT, np.zeros(3, dtype=bool), 0.0)
-        nis = weigh_manoeuvres(mean[0], cov[0], weight[0], z, WHITE, COLOURED, 0, BOTH)
+        nis, usual = weigh_manoeuvres(mean[0], cov[0], weight[0], z, WHITE, COLOURED, 0, BOTH)
         each = np.empty(3)
         for k, (m, P) in enumerate(apart):
             predict(m, P, DENSITIES[k : k + 1], DT)
@@ -91,6 +91,7 @@ def test_the_weights_are_those_of_filters_that_run_apart():
         expected /= expected.sum()
         assert weight[0] == pytest.approx(expected)
         assert nis == pytest.approx(expected @ each)
+        assert usual == pytest.approx(each[1])
 
 
 @pytest.mark.parametrize("which", [0, 1, 2])

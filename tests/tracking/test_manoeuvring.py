@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.tracking.stages.predicting import jerk_of
 from jeat_graph.tracking.tracker import Tracker
 
 RATE_HZ, SECONDS, SIDE, RADIUS = 15.0, 8.0, 60.0, 130.0
@@ -83,8 +83,8 @@ def test_cars_that_go_straight_on_are_calm():
     factors, usual, causal, _ = follow(turning=False)
     _, _, stiff, _ = follow(False, *STIFF)
     assert (factors < 0.7).all()
-    assert usual[0] > 0.4  # and a new track is as calm
-    assert miss(causal, False) == pytest.approx(miss(stiff, False), rel=0.1)
+    assert usual[0] > 0.4
+    assert miss(causal, False) < 1.1 * miss(stiff, False)
 
 
 def test_who_goes_straight_on_is_expected_nearer_to_where_he_comes_out():
@@ -95,12 +95,12 @@ def test_who_goes_straight_on_is_expected_nearer_to_where_he_comes_out():
 
 def innovations(exact):
     """Normalised innovation squared that is learnt of a detector whose errors are a share of the side."""
-    config = load_config("default", [*DECLARED, *STIFF, "motion.calm_step=4"])
+    config = load_config("default", [*DECLARED, "motion.manoeuvre_step=1"])
     tracker, rng = Tracker(config, image=(1280, 720)), np.random.default_rng(1)
     for k in range(int(10 * RATE_HZ)):
         tracker.step(seen(k, rng, exact))
     assert tracker._scene.innovation[0] == 1.0  # of the sensor that sees nothing
-    assert tracker._scene.innovation_seen[1] > 500
+    assert tracker._scene.innovation_seen[1] > 30  # seconds of a track
     return tracker._scene.innovation[1]
 
 
@@ -109,6 +109,38 @@ def test_how_large_innovations_are_is_learnt():
     small, large = innovations(0.02), innovations(0.04)
     assert 2.5 < large / small < 4.5
     assert large < 1.0
+
+
+def test_who_is_not_confirmed_is_as_calm_as_the_scene_and_never_harder_than_usual():
+    """A fifth car that has just come in, beside four that go straight on, or turn."""
+    for turning in (False, True):
+        tracker, rng = Tracker(load_config("default", DECLARED), image=(1280, 720)), np.random.default_rng(3)
+        for k in range(int(SECONDS * RATE_HZ)):
+            t, sensor, boxes, scores = seen(k, rng, turning=turning)
+            if k >= SECONDS * RATE_HZ - 2:
+                boxes, scores = np.vstack([boxes, [1100.0, 600.0, SIDE, SIDE]]), np.append(scores, 0.3)
+            tracker.step((t, sensor, boxes, scores))
+        tracks = tracker._tracks
+        new = np.flatnonzero(~tracks.confirmed[: tracker._num_tracks])
+        assert len(new) == 1
+        assert (tracks.jerk_factor[new[0]] < 0.7) if not turning else (tracks.jerk_factor[new[0]] <= 1.0)
+
+
+def test_a_track_that_stands_has_a_part_of_all_its_jerk():
+    """However calm it was before, and perspective included: as without densities to choose between."""
+    settings = load_config("default", [*DECLARED, "standing.enabled=true"])
+    tracker = Tracker(settings, image=(1280, 720))
+    for k in range(3):
+        tracker.step(seen(k, np.random.default_rng(k)))
+    tracks, model = tracker._tracks, tracker._model
+    tracks.size_mean[:4, :, 1], tracks.jerk_factor[:4] = 0.5, 0.3
+    rows = np.arange(4)
+    tracks.standing[:4] = True
+    jerk = jerk_of.py_func  # the kernel has no entry from Python
+    still = jerk(tracks, rows, model.settings)
+    tracks.standing[:4], tracks.jerk_factor[:4] = False, 1.0
+    usual = jerk(tracks, rows, model.settings)
+    np.testing.assert_allclose(still, settings.standing.jerk_factor * usual, rtol=1e-12)
 
 
 def test_a_saved_tracker_goes_on_turning_with_the_same_bytes(tmp_path):

@@ -20,20 +20,20 @@ from jeat_graph.tracking.batch import Measured
 from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.state import USUAL_JERK_S, SceneState, TrackArrays
 
-# How large a sensor's innovations are is the mean of so many of late.
-_INNOVATIONS = 1000.0
+# How large a sensor's innovations are is their mean over so many seconds of a track.
+_INNOVATIONS_S = 60.0
 # One odd box counts for no more than what one in a hundred exceeds (chi squared, two degrees of freedom).
 _MOST_NIS = 9.2
-# However small they are: a detector without noise would make a manoeuvre of a rounding error.
+# However small they are: of a detector without noise, rounding errors would decide what is calm.
 _LEAST_INNOVATION = 0.1
 
 
 @inner
 def choose_jerk(tracks: TrackArrays, n: int, dt: float, scene: SceneState, model: Model) -> None:
-    """Say by which factor each track's jerk is greater than usual over the next `dt` seconds, in place.
+    """Say by which factor each track's jerk differs from the usual one over the next `dt` seconds, in place.
 
     False boxes jump about, which is no manoeuvre: a track that followed them would take in ever more
-    of them. So tracks that are not confirmed have the usual jerk of the scene, or less.
+    of them. So tracks that are not confirmed have the mean jerk of the scene, but no more than the usual.
     """
     motion = model.settings.motion
     calmer, harder = motion.calm_step, motion.manoeuvre_step
@@ -103,16 +103,21 @@ def weigh_jerk(
     white, coloured_std = measured.white, measured.coloured_std
     mean, cov, weight = tracks.jerk_mean, tracks.jerk_cov, tracks.jerk_weight
     size_mean, size_cov, say = tracks.size_mean, tracks.size_cov, np.empty(2)
+    # Noise larger than assumed is the business of its own adaptation.
     exactness = 1.0 / min(max(scene.innovation[s], _LEAST_INNOVATION), 1.0)
     for m in range(len(track)):
         i, j = track[m], detection[m]
         for axis in range(2):
             say[axis] = exactness if cut[j, axis] == WHOLE else 0.0
-        left = weigh_manoeuvres(mean[i], cov[i], weight[i], z[m], white[m], coloured_std[m], error, say)
+        left, square = weigh_manoeuvres(
+            mean[i], cov[i], weight[i], z[m], white[m], coloured_std[m], error, say
+        )
         nis[m] = min(nis[m], left)
         if tracks.confirmed[i] and say[0] > 0.0 and say[1] > 0.0:
-            square = min(nis[m], _MOST_NIS) / 2.0
-            take_into_mean(scene.innovation, scene.innovation_seen, s, square, 1.0, _INNOVATIONS)
+            square = min(square, _MOST_NIS) / 2.0
+            take_into_mean(
+                scene.innovation, scene.innovation_seen, s, square, sensors.period_s[s], _INNOVATIONS_S
+            )
         for axis in range(2):
             if say[axis] == 0.0:
                 for k in range(weight.shape[1]):
@@ -124,7 +129,6 @@ def weigh_jerk(
 @inner
 def start_jerk(tracks: TrackArrays, i: int, scene: SceneState) -> None:
     """Start the filters of a new track `i` with its own state, and the weights that are usual."""
-    tracks.jerk_factor[i] = 1.0
     tracks.jerk_weight[i] = scene.usual_jerk
     for k in range(tracks.jerk_weight.shape[1]):
         tracks.jerk_mean[i, k] = tracks.mean[i]

@@ -49,7 +49,7 @@ def jerk_of(tracks: TrackArrays, track: IntArray, settings: Settings) -> FloatAr
             motion.jerk_px,
             motion.jerk_per_size,
             motion.jerk_per_growth,
-            factor[i],
+            max(factor[i], 1.0) if standing[i] else factor[i],
         )
     return out
 
