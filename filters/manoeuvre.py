@@ -37,8 +37,8 @@ def prior_weights(calm: float, harder: float) -> FloatArray:
         calm: odds of the calm one against the usual one.
         harder: odds of a manoeuvre, likewise.
     """
-    weight = np.array([calm, 1.0, harder])
-    return weight / weight.sum()
+    weight: FloatArray = np.array([calm, 1.0, harder]) / (calm + 1.0 + harder)
+    return weight
 
 
 @njit(cache=True)
