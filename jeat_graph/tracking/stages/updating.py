@@ -146,10 +146,9 @@ def take_in(
 @inner
 def take_pairs(
     tracks: TrackArrays,
-    pairs: IntArray,
+    measured: Measured,
     s: int,
     batch: Batch,
-    expectation: Expectation,
     evidence: FloatArray,
     scene: SceneState,
     model: Model,
@@ -159,21 +158,19 @@ def take_pairs(
 
     Args:
         tracks: state of all tracks.
-        pairs: (2, K) rows of the tracks, none of them twice, and the detection of each.
+        measured: what these detections measure, for no track twice.
         s: the sensor.
         batch: all detections of the step.
-        expectation: of all tracks.
         evidence: (K,) tempered ln Λ of each pair.
         scene: what is learnt of the sensors.
         model: sensors and settings.
         log: takes down what the tracks take in.
     """
-    measured = measure(tracks, pairs, batch, expectation, s, model.sensors)
     take_in(tracks, measured, s, batch, scene, model, log)
     if model.settings.lifecycle.by_existence:
-        existence = tracks.existence
-        for k in range(pairs.shape[1]):
-            existence[pairs[0, k]] = existence_after_hit(existence[pairs[0, k]], evidence[k])
+        existence, track = tracks.existence, measured.track
+        for k in range(len(track)):
+            existence[track[k]] = existence_after_hit(existence[track[k]], evidence[k])
 
 
 @inner
@@ -202,7 +199,8 @@ def update_matched(
             i = track[k]
             pairs[0, k], pairs[1, k] = i, match[i, s]
             evidence[k] = believed * association.evidence[i, s]
-        take_pairs(tracks, pairs, s, batch, expectation, evidence, scene, model, log)
+        measured = measure(tracks, pairs, batch, expectation, s, model.sensors)
+        take_pairs(tracks, measured, s, batch, evidence, scene, model, log)
 
 
 @inner
@@ -251,4 +249,6 @@ def take_second_views(
                 tempered[count] = believed * evidence[chosen]
                 count += 1
         if count:
-            take_pairs(tracks, pairs[:, :count].copy(), s, batch, expectation, tempered, scene, model, log)
+            chosen_pairs = pairs[:, :count].copy()
+            measured = measure(tracks, chosen_pairs, batch, expectation, s, model.sensors)
+            take_pairs(tracks, measured, s, batch, tempered, scene, model, log)
