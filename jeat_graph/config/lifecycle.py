@@ -134,6 +134,12 @@ class LifecycleConfig(Section):
     worth_memory_s: float = number(
         1000.0, "s", "time after which what was learnt of them is as uncertain as at first", open_low=True
     )
+    witness_odds: float = number(
+        0.0,
+        "ln",
+        "of several sensors one no longer counts among those that saw a track once it has missed it so often "
+        "that this speaks against it more than its detections for it, by so much; 0: it counts for good",
+    )
     least_move: float = number(
         0.0, "1", "what none saw but sensors blind to what stands must move by this share of its size; 0: not"
     )

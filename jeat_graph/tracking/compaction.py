@@ -1,4 +1,4 @@
-"""Removal of ended tracks from the arrays that hold the state of all tracks."""
+"""Room for more tracks, and removal of ended ones, in the arrays that hold the state of all."""
 
 from __future__ import annotations
 
@@ -8,7 +8,22 @@ import numpy.typing as npt
 from numba import njit
 
 from jeat_graph.data.arrays import IntArray
-from jeat_graph.tracking.state import TrackArrays
+from jeat_graph.tracking.state import TrackArrays, allocate
+
+
+def grow(tracks: TrackArrays, num_tracks: int, capacity: int) -> TrackArrays:
+    """Return arrays of at least `capacity` rows that hold the first `num_tracks` rows of `tracks`.
+
+    Capacity grows by doubling, so that n births cost O(n) copies in all.
+    """
+    old = len(tracks.existence)
+    if capacity <= old:
+        return tracks
+    errors, densities = tracks.mean.shape[2] - 3, tracks.jerk_weight.shape[1]
+    larger = allocate(max(capacity, 2 * old), tracks.scale.shape[1], errors, densities)
+    for source, target in zip(tracks, larger, strict=True):
+        target[:num_tracks] = source[:num_tracks]
+    return larger
 
 
 @njit(cache=True)
@@ -50,6 +65,7 @@ def keep_rows(tracks: TrackArrays, rows: IntArray) -> None:
     _shift(tracks.t_update, rows, first)
     _shift(tracks.used, rows, first)
     _shift(tracks.seen_by, rows, first)
+    _shift(tracks.witness, rows, first)
     _shift(tracks.score_odds, rows, first)
     if tracks.jerk_weight.shape[1]:
         _shift(tracks.jerk_mean, rows, first)

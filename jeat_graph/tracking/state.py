@@ -53,7 +53,8 @@ class TrackArrays(NamedTuple):
         born_at: (C, 2) place of its centre then (px).
         t_update: (C,) time of the last one (s).
         used: (C,) bit s is set where sensor s's detection was taken in the last step.
-        seen_by: (C,) bit s is set where sensor s's detection was ever taken.
+        seen_by: (C,) bit s is set where sensor s has seen it, unless it has missed it too often since.
+        witness: (C, S) ln of how much each sensor's detections of it and its misses speak for the track.
         score_odds: (C,) mean log odds of the precisions of its detections.
         jerk_mean: (C, K, 2, 3 + B) its motion under K densities of jerk (`filters/manoeuvre.py`).
         jerk_cov: (C, K, 2, 3 + B, 3 + B) covariance of each.
@@ -93,6 +94,7 @@ class TrackArrays(NamedTuple):
     t_update: FloatArray
     used: IntArray
     seen_by: IntArray
+    witness: FloatArray
     score_odds: FloatArray
     jerk_mean: FloatArray
     jerk_cov: FloatArray
@@ -270,6 +272,7 @@ def allocate(capacity: int, num_sensors: int, num_errors: int = 0, densities: in
         t_update=np.zeros(capacity),
         used=np.zeros(capacity, dtype=np.int64),
         seen_by=np.zeros(capacity, dtype=np.int64),
+        witness=np.zeros((capacity, num_sensors)),
         score_odds=np.zeros(capacity),
         jerk_mean=np.zeros((capacity, densities, 2, dim)),
         jerk_cov=np.zeros((capacity, densities, 2, dim, dim)),
@@ -283,18 +286,3 @@ def allocate(capacity: int, num_sensors: int, num_errors: int = 0, densities: in
         fit=np.zeros((capacity, 2)),
         t_missed=np.full(capacity, -np.inf),
     )
-
-
-def grow(tracks: TrackArrays, num_tracks: int, capacity: int) -> TrackArrays:
-    """Return arrays of at least `capacity` rows that hold the first `num_tracks` rows of `tracks`.
-
-    Capacity grows by doubling, so that n births cost O(n) copies in all.
-    """
-    old = len(tracks.existence)
-    if capacity <= old:
-        return tracks
-    errors, densities = tracks.mean.shape[2] - 3, tracks.jerk_weight.shape[1]
-    larger = allocate(max(capacity, 2 * old), tracks.scale.shape[1], errors, densities)
-    for source, target in zip(tracks, larger, strict=True):
-        target[:num_tracks] = source[:num_tracks]
-    return larger

@@ -21,6 +21,7 @@ from jeat_graph.data.interop import boxes_of
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.appearance import Compared, Looks, compare, embeddings_of, remember
 from jeat_graph.tracking.classes import ClassTally, check_names, count_votes
+from jeat_graph.tracking.compaction import grow
 from jeat_graph.tracking.direct_call import DirectCall
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.notice import notice_if_cold
@@ -30,7 +31,7 @@ from jeat_graph.tracking.saving import SavedTracks
 from jeat_graph.tracking.scans import ScanLike, arrivals_of, as_scans
 from jeat_graph.tracking.sensor_state import SensorState, sensor_states
 from jeat_graph.tracking.snapshot import Snapshot
-from jeat_graph.tracking.state import allocate, grow, start_scene
+from jeat_graph.tracking.state import allocate, start_scene
 from jeat_graph.tracking.step import step
 from jeat_graph.tracking.step_record import StepRecord, record_step
 from jeat_graph.tracking.update_log import allocate_log

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from jeat_graph import Tracker, load_config
-from jeat_graph.tracking.state import allocate, grow
+from jeat_graph.tracking.compaction import grow
+from jeat_graph.tracking.state import allocate
 
 PLAIN = ["smoother.engine=none"]
 

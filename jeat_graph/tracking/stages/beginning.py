@@ -167,6 +167,7 @@ def start_track(
     tracks.t_update[i] = t
     tracks.used[i] = 1 << s
     tracks.seen_by[i] = 1 << s
+    tracks.witness[i] = 0.0
     tracks.jerk_factor[i] = 1.0
     if len(log.rows) > 0:
         jerk = jerk_of(tracks, view.track, model.settings)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 from jeat_graph.config.kernel_form import Model, Settings
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.filters.existence import existence_after_miss, hidden_after_miss
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.inner import inner
+from jeat_graph.tracking.stages.worth import weigh_witness
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
 # Share of a sensor's configured clutter below which no estimate goes: without any, one detection were proof.
@@ -53,6 +56,7 @@ def count_looks(
             own = tracks.p_detect[i, s]
             if match[i, s] >= 0:
                 tracks.hidden[i, s] = 0.0
+                weigh_witness(tracks, i, s, max(association.evidence[i, s], 0.0), settings)
                 more = own + lifecycle.p_detect_weight * (1.0 - own)
                 tracks.p_detect[i, s] = min(more, lifecycle.p_detect_max)
                 continue
@@ -64,6 +68,9 @@ def count_looks(
             visible = p_detect[i, s] / own * sees
             if tracks.hidden[i, s] < 1.0:
                 awake = min(p_detect[i, s] / (1.0 - tracks.hidden[i, s]), _MOST_HIDDEN)
+                # By what the sensor usually finds: its own P_D of this track falls with the misses.
+                found = scene.p_detect[s] * min(awake / own, 1.0) * sees
+                weigh_witness(tracks, i, s, math.log(1.0 - found), settings)
                 hidden = min(hidden_after_miss(tracks.hidden[i, s], awake), _MOST_HIDDEN)
                 tracks.hidden[i, s] += sees * (hidden - tracks.hidden[i, s])
             less = own - lifecycle.p_detect_weight * visible * own

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numba import njit
 
-from jeat_graph.config.kernel_form import Model
+from jeat_graph.config.kernel_form import Model, Settings
 from jeat_graph.filters.running_mean import take_into_mean
 from jeat_graph.filters.sides import mean_side
 from jeat_graph.filters.worth import doubt_worth, learn_worth, worth_of
@@ -72,6 +72,29 @@ def only_sensor(seen_by: int, num_sensors: int) -> int:
         if seen_by == 1 << s:
             return s
     return -1
+
+
+@inlined
+def weigh_witness(tracks: TrackArrays, i: int, s: int, evidence: float, settings: Settings) -> None:
+    """Follow how far sensor `s` bears out that track `i` is a vehicle, in place.
+
+    What one sensor takes for a vehicle again and again is soon taken in by a false box of another, by chance,
+    and then it would be a thing that two have seen, for as long as it lasts. To be hidden from the other
+    excuses a few misses, and no hundred.
+
+    Args:
+        tracks: state.
+        i: the track.
+        s: the sensor.
+        evidence: ln of how much more likely this detection or miss is if the track is a vehicle in sight.
+        settings: with `lifecycle.witness_odds`, by how much misses must speak against it.
+    """
+    least = settings.lifecycle.witness_odds
+    if least > 0.0:
+        tracks.witness[i, s] = max(tracks.witness[i, s] + evidence, -least)
+        others = tracks.seen_by[i] & ~(1 << s)
+        if tracks.witness[i, s] <= -least and others != 0:
+            tracks.seen_by[i] = others
 
 
 @inner
