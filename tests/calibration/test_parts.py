@@ -45,6 +45,15 @@ def test_noise_and_the_motion_fitted_to_it_stay_together(base, measured):
     assert size.size != base.size
 
 
+def test_fitted_motion_is_the_usual_one_and_calm_and_hard_ones_stay_beside_it(base, measured):
+    motion = with_parts(measured, ("noise and motion",)).motion
+    assert motion.jerk_per_size != base.motion.jerk_per_size
+    assert motion.densities == base.motion.densities == 3
+    assert (motion.calm_step, motion.manoeuvre_step) == (base.motion.calm_step, base.motion.manoeuvre_step)
+    assert motion.first_odds == base.motion.first_odds
+    assert motion.unseen_memory_s == base.motion.unseen_memory_s
+
+
 def test_motion_is_estimated_for_the_size_noise_that_stays(measured, base):
     """The filter of the size tells how fast a vehicle comes near: how much of its motion is perspective."""
     mixed = {
