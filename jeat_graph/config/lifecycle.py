@@ -137,7 +137,7 @@ class LifecycleConfig(Section):
     witness_odds: float = number(
         0.0,
         "ln",
-        "of several sensors one no longer counts among those that saw a track once it has missed it so often "
+        "by existence: a sensor no longer counts among those that saw a track once it has missed it so often "
         "that this speaks against it more than its detections for it, by so much; 0: it counts for good",
     )
     least_move: float = number(

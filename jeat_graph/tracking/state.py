@@ -53,7 +53,7 @@ class TrackArrays(NamedTuple):
         born_at: (C, 2) place of its centre then (px).
         t_update: (C,) time of the last one (s).
         used: (C,) bit s is set where sensor s's detection was taken in the last step.
-        seen_by: (C,) bit s is set where sensor s has seen it, unless it has missed it too often since.
+        seen_by: (C,) bit s is set where sensor s counts as having seen it (`weigh_witness`).
         witness: (C, S) ln of how much each sensor's detections of it and its misses speak for the track.
         score_odds: (C,) mean log odds of the precisions of its detections.
         jerk_mean: (C, K, 2, 3 + B) its motion under K densities of jerk (`filters/manoeuvre.py`).

@@ -62,7 +62,7 @@ def most_trusted(seen_by: int, trust: FloatArray) -> float:
     ever seen is excused less.
 
     Args:
-        seen_by: bit s is set where sensor s has seen it.
+        seen_by: bit s is set where sensor s counts as having seen it.
         trust: (S,) of the sensors.
     """
     best = 0.0

@@ -58,7 +58,7 @@ def judge_sight(
         for i in range(n):
             if match[i, s] >= 0:
                 found += ratio_of_hit(existence[i], p_detect[i, s], association.evidence[i, s])
-            # What it alone has ever seen may as well have been nothing.
+            # What it alone counts as having seen may as well have been nothing.
             elif seen_by[i] & ~(1 << s):
                 missed += ratio_of_miss(existence[i], p_detect[i, s])
         for j in range(len(newcomer)):

@@ -54,7 +54,7 @@ def learn_trust(
 ) -> None:
     """Follow how far each present sensor is borne out by the others, in place.
 
-    A detection on a track that has lasted is borne out where another sensor has ever seen that track. A
+    A detection on a track that has lasted is borne out where another sensor counts as having seen that track. A
     sensor that is mostly alone where others look and see vehicles takes false things for vehicles again and
     again, unless the scores say that what it alone sees is of the same kind (`filters.agreement`). A look at
     a moment when the others are blind (their P_D is low), or at what is too slow for them or outside the part
@@ -253,7 +253,7 @@ def _claim(
     Args:
         s: the sensor.
         place: where the track is (`place_of`).
-        seen_by: bit o is set where sensor o has ever seen the track.
+        seen_by: bit o is set where sensor o counts as having seen the track.
         before: mean log odds of the track's scores before.
         odds: log odds of this score.
         weight: of the claim (s).

@@ -80,7 +80,7 @@ def weigh_witness(tracks: TrackArrays, i: int, s: int, evidence: float, settings
 
     What one sensor takes for a vehicle again and again is soon taken in by a false box of another, by chance,
     and then it would be a thing that two have seen, for as long as it lasts. To be hidden from the other
-    excuses a few misses, and no hundred.
+    excuses a few misses, and no hundred. The detection that began the track is not counted.
 
     Args:
         tracks: state.
@@ -93,7 +93,7 @@ def weigh_witness(tracks: TrackArrays, i: int, s: int, evidence: float, settings
     if least > 0.0:
         tracks.witness[i, s] = max(tracks.witness[i, s] + evidence, -least)
         others = tracks.seen_by[i] & ~(1 << s)
-        if tracks.witness[i, s] <= -least and others != 0:
+        if evidence < 0.0 and tracks.witness[i, s] <= -least and others != 0:
             tracks.seen_by[i] = others
 
 
