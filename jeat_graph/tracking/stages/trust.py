@@ -54,14 +54,13 @@ def learn_trust(
 ) -> None:
     """Follow how far each present sensor is borne out by the others, in place.
 
-    A detection on a track that has lasted is borne out where another sensor counts as having seen that track. A
-    sensor that is mostly alone where others look and see vehicles takes false things for vehicles again and
+    A detection on a track that has lasted is borne out where another sensor counts as having seen that track.
+    A sensor that is mostly alone where others look and see vehicles takes false things for vehicles again and
     again, unless the scores say that what it alone sees is of the same kind (`filters.agreement`). A look at
     a moment when the others are blind (their P_D is low), or at what is too slow for them or outside the part
-    of the picture that they look at, counts little;
-    while a sensor is the only one that looks, nothing is learnt of it; where no other ever has, what came
-    of its tracks tells (`trust_alone`). Where none is borne out, the best is believed so far that vehicles
-    live (`trust_of_best`).
+    of the picture that they look at, counts little; while a sensor is the only one that looks, nothing is
+    learnt of it; where no other ever has, what came of its tracks tells (`trust_alone`). Where none is borne
+    out, the best is believed so far that vehicles live (`trust_of_best`).
     """
     lifecycle, sensors = model.settings.lifecycle, model.sensors
     for s in range(len(batch.present)):
