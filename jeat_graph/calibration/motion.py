@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -187,12 +188,14 @@ def _minimise(loss: Callable[[FloatArray], float], first: FloatArray) -> FloatAr
     return np.asarray(minimize(loss, first, method="Nelder-Mead", options=options).x)
 
 
-def fit_motion(tracks: MeasuredTracks, size: SizeConfig) -> MotionConfig:
-    """Fit the motion model to measured tracks.
+def fit_motion(tracks: MeasuredTracks, size: SizeConfig, base: MotionConfig | None = None) -> MotionConfig:
+    """Fit the usual motion to measured tracks: one density of jerk, and the prior of a new track.
 
     Args:
         tracks: correct detections of all sensors, object by object.
         size: the size filter, which tells how fast a vehicle grows.
+        base: says what is not fitted, how far calm and manoeuvring are from the usual, and what holds while
+            nothing is seen; the defaults if not given.
 
     Raises:
         DataError: no track has three measurements.
@@ -223,7 +226,8 @@ def fit_motion(tracks: MeasuredTracks, size: SizeConfig) -> MotionConfig:
 
     first = np.log([2.0, 2.0, 1.0, 1.0])
     jerk, perspective, velocity, acceleration = np.exp(np.clip(_minimise(loss, first), -8.0, 8.0))
-    return MotionConfig(
+    return replace(
+        base or MotionConfig(),
         jerk_px=0.0,
         jerk_per_size=max(float(jerk), LEAST_JERK_PER_SIZE),
         jerk_per_growth=float(PERSPECTIVE_RESERVE * perspective),

@@ -11,7 +11,7 @@ from jeat_graph.calibration.matches import SensorMatches, match_sensor
 from jeat_graph.calibration.measured import measured_tracks
 from jeat_graph.calibration.motion import fit_motion, fit_size
 from jeat_graph.calibration.sensor import calibrate_sensor
-from jeat_graph.config.schema import BirthConfig, Config, ImageConfig, InputConfig, MotionConfig, SensorConfig
+from jeat_graph.config.schema import BirthConfig, Config, ImageConfig, InputConfig, SensorConfig
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.progress import with_progress
@@ -78,28 +78,10 @@ def with_sensors(measured: MatchedSensors, sensors: Mapping[str, SensorConfig]) 
     size = fit_size(tracks.t, tracks.log_size, tracks.log_size_var, tracks.start)
     return replace(
         config,
-        motion=_usual_motion(fit_motion(tracks, size), config.motion),
+        motion=fit_motion(tracks, size, config.motion),
         size=size,
         birth=fit_births(config, measured.matches, measured.recordings),
         input=InputConfig(picture=config.input.picture),
-    )
-
-
-def _usual_motion(fitted: MotionConfig, base: MotionConfig) -> MotionConfig:
-    """Motion as usual as it was fitted; how far calm and manoeuvring are from it, as the base has them.
-
-    One density of jerk is fitted to all tracks at once. What holds while nothing is seen cannot be told from
-    detections at all.
-    """
-    return replace(
-        base,
-        jerk_px=fitted.jerk_px,
-        jerk_per_size=fitted.jerk_per_size,
-        jerk_per_growth=fitted.jerk_per_growth,
-        velocity_std_px=fitted.velocity_std_px,
-        velocity_std_per_size=fitted.velocity_std_per_size,
-        acceleration_std_px=fitted.acceleration_std_px,
-        acceleration_std_per_size=fitted.acceleration_std_per_size,
     )
 
 
