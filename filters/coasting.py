@@ -46,7 +46,7 @@ def forget(
         memory_s: τ (s), > 0.
     """
     forget_acceleration(mean, cov, unseen, dt, memory_s)
-    _fade(size_mean, size_cov, _RATE, unseen, dt, memory_s)
+    forget_growth(size_mean, size_cov, unseen, dt, memory_s)
 
 
 @njit(cache=True)
@@ -63,6 +63,20 @@ def forget_acceleration(
         memory_s: τ (s), > 0.
     """
     _fade(mean, cov, _ACCELERATION, unseen, dt, memory_s)
+
+
+@njit(cache=True)
+def forget_growth(mean: FloatArray, cov: FloatArray, unseen: BoolArray, dt: float, memory_s: float) -> None:
+    """Let the growth alone die away, in place: `forget` for filters that know nothing of motion.
+
+    Args:
+        mean: (N, 2, 2) as there.
+        cov: (N, 2, 2, 2) as there.
+        unseen: (N,) as there.
+        dt: time step (s), >= 0.
+        memory_s: τ (s), > 0.
+    """
+    _fade(mean, cov, _RATE, unseen, dt, memory_s)
 
 
 @njit(cache=True)

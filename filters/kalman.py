@@ -12,7 +12,7 @@ import math
 from numba import njit
 
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.filters.motion import process_noise, size_process_noise
+from jeat_graph.filters.motion import process_noise
 
 # Below this a covariance entry is rounding dust; it would sink into subnormals, which slow every kernel.
 _FLUSH = 1e-250
@@ -57,25 +57,27 @@ def predict(mean: FloatArray, cov: FloatArray, jerk: FloatArray, dt: float) -> N
 
 
 @njit(cache=True)
-def predict_size(mean: FloatArray, cov: FloatArray, density: float, dt: float) -> None:
+def predict_size(mean: FloatArray, cov: FloatArray, density: FloatArray, dt: float) -> None:
     """Predict ln width and ln height of all tracks by `dt` seconds, in place.
 
     Args:
         mean: (N, 2, 2) per side [ln s, rate] (ln px, 1/s).
         cov: (N, 2, 2, 2) covariance per side.
-        density: root spectral density of the rate's driving noise (1/s^1.5).
+        density: (N,) root spectral density of the rate's driving noise (1/s^1.5).
         dt: time step (s), >= 0.
     """
-    Q = size_process_noise(dt, density)
     for i in range(mean.shape[0]):
+        # `size_process_noise`, written out.
+        q = density[i] * density[i]
+        q00, q01, q11 = q * dt * dt * dt / 3.0, 0.5 * q * dt * dt, q * dt
         for k in range(2):
             mean[i, k, 0] += dt * mean[i, k, 1]
             P = cov[i, k]
             p01 = P[0, 1] + dt * P[1, 1]
-            P[0, 0] += dt * (P[0, 1] + p01) + Q[0, 0]
-            P[0, 1] = p01 + Q[0, 1]
+            P[0, 0] += dt * (P[0, 1] + p01) + q00
+            P[0, 1] = p01 + q01
             P[1, 0] = P[0, 1]
-            P[1, 1] += Q[1, 1]
+            P[1, 1] += q11
 
 
 @njit(cache=True)

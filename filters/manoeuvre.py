@@ -68,6 +68,22 @@ def mean_factor(weight: FloatArray, calmer: float, harder: float) -> float:
 
 
 @njit(cache=True)
+def weigh(weight: FloatArray, fit: FloatArray) -> None:
+    """Weigh densities by how well each foretold one detection (Bayes' rule), in place.
+
+    Args:
+        weight: (K,) probability of each.
+        fit: (K,) log density of the detection under each.
+    """
+    best, total = np.max(fit), 0.0
+    for k in range(len(weight)):
+        weight[k] *= math.exp(max(fit[k] - best, -_MOST_EVIDENCE))
+        total += weight[k]
+    for k in range(len(weight)):
+        weight[k] /= total
+
+
+@njit(cache=True)
 def predict_manoeuvres(
     mean: FloatArray,
     cov: FloatArray,
@@ -141,14 +157,11 @@ def weigh_manoeuvres(
                     calm += sign * log_gaussian(z[axis] - e, (V + R[axis]) / say[axis])
         square[k] = update_centre(mean[k], cov[k], z, R, coloured_std, error)
     fit[0] = fit[1] + calm
-    best, total, nis = np.max(fit), 0.0, 0.0
+    weigh(weight, fit)
+    nis = 0.0
     for k in range(K):
-        weight[k] *= math.exp(max(fit[k] - best, -_MOST_EVIDENCE))
-        total += weight[k]
         nis += weight[k] * square[k]
-    for k in range(K):
-        weight[k] /= total
-    return nis / total, square[1]
+    return nis, square[1]
 
 
 @njit(cache=True)

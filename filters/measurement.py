@@ -10,6 +10,7 @@ import numpy as np
 #: - `z` (2,) centre (px); `r` (2,) variances of its white noise (px²), noise scale and score included.
 #: - `error` the sensor's error state, or -1; `coloured_std` (2,) standard deviations of that error (px).
 #: - `jerk` root spectral density of the track's jerk at the time (px/s^2.5), > 0.
+#: - `size_density` root spectral density of the rate of its ln size at the time (1/s^1.5).
 #: - `cut` (2,) which sides the edges of the picture cut (`cut_boxes.py`), `side` (2,) the side that shows
 #:   (px): there `z` and `r` are what that side and the track's size said of the centre.
 #: - `noise` (2,) what of `r` is the noise of boxes, and not what an unknown size adds where one is cut (px²).
@@ -28,6 +29,7 @@ MEASUREMENT = np.dtype(
         ("error", np.int64),
         ("coloured_std", np.float64, (2,)),
         ("jerk", np.float64),
+        ("size_density", np.float64),
         ("log_size", np.float64, (2,)),
         ("size_var", np.float64, (2,)),
         ("velocity_var", np.float64, (2,)),

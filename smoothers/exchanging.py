@@ -33,6 +33,7 @@ class TwoSided(NamedTuple):
     Attributes:
         t: (K,) times of the keys (s), strictly ascending.
         jerk: (K,) root spectral density of the jerk over the interval that ends at the key (px/s^2.5).
+        size_density: (K,) that of the rate of ln size (1/s^1.5).
         past_mean: (K, 2, 3) per axis [p, v, a] (px, px/s, px/s²), by all until the key.
         past_cov: (K, 2, 3, 3) its covariance.
         future_mean: (K, 2, 3) the same by all from the key on.
@@ -45,6 +46,7 @@ class TwoSided(NamedTuple):
 
     t: FloatArray
     jerk: FloatArray
+    size_density: FloatArray
     past_mean: FloatArray
     past_cov: FloatArray
     future_mean: FloatArray
@@ -56,14 +58,13 @@ class TwoSided(NamedTuple):
 
 
 @njit(cache=True)
-def exchange_gains(a: TwoSided, b: TwoSided, t: FloatArray, size_density: float) -> FloatArray:
+def exchange_gains(a: TwoSided, b: TwoSided, t: FloatArray) -> FloatArray:
     """By how much likelier two tracks are if they changed places at a moment.
 
     Args:
         a: one track.
         b: the other.
         t: (C,) moments (s), none of them the time of a key.
-        size_density: root spectral density of the rate of ln size (1/s^1.5).
 
     Returns:
         (C,) ln likelihood ratios of the exchange against none; -∞ where a track has no past or no future.
@@ -72,31 +73,28 @@ def exchange_gains(a: TwoSided, b: TwoSided, t: FloatArray, size_density: float)
     for c in range(len(t)):
         i, j = np.searchsorted(a.t, t[c]), np.searchsorted(b.t, t[c])
         if 0 < i < len(a.t) and 0 < j < len(b.t):
-            crossed = _joint(a, i - 1, a.jerk[i], b, j, size_density) + _joint(
-                b, j - 1, b.jerk[j], a, i, size_density
-            )
-            kept = _joint(a, i - 1, a.jerk[i], a, i, size_density) + _joint(
-                b, j - 1, b.jerk[j], b, j, size_density
-            )
+            crossed = _joint(a, i, b, j) + _joint(b, j, a, i)
+            kept = _joint(a, i, a, i) + _joint(b, j, b, j)
             out[c] = crossed - kept
     return out
 
 
 @njit(cache=True)
-def _joint(past: TwoSided, i: int, jerk: float, future: TwoSided, j: int, size_density: float) -> float:
-    """Log density with which the state of `past` at key i goes over into that of `future` at key j.
+def _joint(past: TwoSided, i: int, future: TwoSided, j: int) -> float:
+    """Log density with which `past`, at the key before i, goes over into `future` at key j.
 
-    How strongly the motion may change on the way is the past's to say: a vehicle about to pass below the
+    How strongly motion and size may change on the way is the past's to say: a vehicle about to pass below the
     camera is far less predictable than one that stands.
     """
-    dt = future.t[j] - past.t[i]
+    last, jerk = i - 1, past.jerk[i]
+    dt = future.t[j] - past.t[last]
     mean, cov, moved, none = np.empty(3), np.empty((3, 3)), np.empty((3, 3)), np.empty(0)
-    size, size_cov = past.past_size[i : i + 1].copy(), past.past_size_cov[i : i + 1].copy()
-    predict_size(size, size_cov, size_density, dt)
+    size, size_cov = past.past_size[last:i].copy(), past.past_size_cov[last:i].copy()
+    predict_size(size, size_cov, past.size_density[i : i + 1], dt)
     total = 0.0
     for axis in range(2):
-        step_mean(_MOTION, dt, none, past.past_mean[i, axis], mean)
-        step_cov(_MOTION, dt, jerk, none, none, past.past_cov[i, axis], moved, cov)
+        step_mean(_MOTION, dt, none, past.past_mean[last, axis], mean)
+        step_cov(_MOTION, dt, jerk, none, none, past.past_cov[last, axis], moved, cov)
         total += _log_density(future.future_mean[j, axis] - mean, cov + future.future_cov[j, axis])
         total += _log_density(
             future.future_size[j, axis] - size[0, axis], size_cov[0, axis] + future.future_size_cov[j, axis]

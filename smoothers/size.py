@@ -219,8 +219,8 @@ def filter_size(
     t: FloatArray,
     log_size: FloatArray,
     r: FloatArray,
-    density: float,
-) -> tuple[FloatArray, FloatArray]:
+    density: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Filter the sizes of one track, whose first measurement is its prior.
 
     Args:
@@ -229,12 +229,12 @@ def filter_size(
         t: (M,) times of the measurements (s), ascending.
         log_size: (M, 2) measured ln w and ln h (ln px).
         r: (M, 2) their variances.
-        density: root spectral density of the rate (1/s^1.5).
+        density: (M,) root spectral density of the rate since the measurement before (1/s^1.5).
 
     Returns:
-        (K, 2, 2) means and (K, 2, 2, 2) covariances by all until each key; keys are as `TrackData` has them.
+        (K,) densities of the keys, which are as `TrackData` has them, and (K, 2, 2) means and (K, 2, 2, 2)
+        covariances by all until each.
     """
-    drift = np.full(len(t) - 1, density)
-    later = t[1:], log_size[1:], r[1:]
-    _, _, mean, cov, _ = _filter(float(t[0]), prior_mean, prior_cov, *later, drift, density)
-    return mean, cov
+    later = t[1:], log_size[1:], r[1:], density[1:]
+    _, keys, mean, cov, _ = _filter(float(t[0]), prior_mean, prior_cov, *later, float(density[0]))
+    return keys, mean, cov

@@ -174,7 +174,7 @@ def growth_rates(
                     cov[0, side, 0, 0] = var[k, side]
                     cov[0, side, 1, 1] = rate_std**2
                 continue
-            predict_size(mean, cov, rate_density, dt)
+            predict_size(mean, cov, np.full(len(mean), rate_density), dt)
             out[k] = common_growth(mean[0, 0, 1], mean[0, 1, 1])
             for side in range(2):
                 update_block(mean[0, side], cov[0, side], log_size[k, side], var[k, side])

@@ -109,6 +109,40 @@ class SizeConfig(Section):
 
     rate_density: float = number(0.5, "1/s^1.5", "root spectral density of the rate's white driving noise")
     rate_std: float = number(0.5, "1/s", "std of a new track's rate of ln size")
+    change_step: float = number(
+        1.0,
+        "1",
+        "how many times as hard as usual boxes may change their size, by the root density of the rate; with "
+        "`calm_step` 1, too, a track's sizes choose nothing",
+        1.0,
+        100.0,
+    )
+    calm_step: float = number(
+        1.0, "1", "how many times calmer than usual they may change, by the same; 1: no calmer", 1.0, 100.0
+    )
+    change_prior: float = number(
+        1.0, "1", "odds of the hard changes against the usual, before anything is known", 0.0, 100.0
+    )
+    calm_prior: float = number(0.1, "1", "odds of the calm ones, likewise", 0.0, 100.0)
+    change_memory_s: float = number(2.0, "s", "how long boxes go on to change so", open_low=True)
+
+    @property
+    def hardest_density(self) -> float:
+        """Root spectral density of the rate where boxes change hardest (1/s^1.5)."""
+        return self.rate_density * self.change_step
+
+    @property
+    def densities(self) -> int:
+        """Number of densities between which a track's sizes choose; 0: there is no choice."""
+        return _DENSITIES if max(self.calm_step, self.change_step) > 1.0 else 0
+
+    @property
+    def first_odds(self) -> tuple[float, float]:
+        """Odds of the calm density and of the hard one against the usual; 0 of one that is not there."""
+        return (
+            self.calm_prior if self.calm_step > 1.0 else 0.0,
+            self.change_prior if self.change_step > 1.0 else 0.0,
+        )
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -16,7 +16,7 @@ from jeat_graph.config.schema import Config
 
 # What two scans are expected to tell apart at most, in lengths of a vehicle, T being the time between two: a
 # new track's velocity (over T) and acceleration (over T²), the root density of the jerk (over T^5/2), and the
-# rate of ln size (over T) and its density (over T³).
+# rate of ln size (over T) and its hardest density (over T³).
 _VELOCITY, _ACCELERATION, _JERK, _SIZE_RATE, _SIZE_DENSITY = 0.78, 0.3, 0.2, 0.2, 0.3
 # From this rate on scans come often enough: there the bounds are no narrower than the motion of `default`.
 _OFTEN_HZ = 4.9
@@ -53,7 +53,7 @@ def for_slow_scans(config: Config) -> Config:
         size=replace(
             size,
             rate_std=min(size.rate_std, _SIZE_RATE / period_s),
-            rate_density=min(size.rate_density, _SIZE_DENSITY / period_s**3),
+            rate_density=min(size.rate_density, _SIZE_DENSITY / size.change_step / period_s**3),
         ),
         lifecycle=replace(
             lifecycle,

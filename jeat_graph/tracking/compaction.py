@@ -1,14 +1,63 @@
-"""Room for more tracks, and removal of ended ones, in the arrays that hold the state of all."""
+"""Room for tracks, more room, and removal of ended ones, in the arrays that hold the state of all."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 from numba import njit
 
 from jeat_graph.data.arrays import IntArray
-from jeat_graph.tracking.state import TrackArrays, allocate
+from jeat_graph.tracking.state import TrackArrays
+
+
+def allocate(
+    capacity: int, num_sensors: int, num_errors: int = 0, densities: int = 0, size_densities: int = 0
+) -> TrackArrays:
+    """Allocate zeroed arrays for `capacity` tracks, S sensors, B error states, K and J densities."""
+    dim = 3 + num_errors
+    return TrackArrays(
+        mean=np.zeros((capacity, 2, dim)),
+        cov=np.zeros((capacity, 2, dim, dim)),
+        size_mean=np.zeros((capacity, 2, 2)),
+        size_cov=np.zeros((capacity, 2, 2, 2)),
+        cut=np.zeros((capacity, 2), dtype=np.int64),
+        rest_point=np.zeros((capacity, 2)),
+        rest_var=np.zeros((capacity, 2)),
+        rest_since=np.zeros(capacity),
+        standing_log_odds=np.zeros(capacity),
+        standing=np.zeros(capacity, dtype=np.bool_),
+        scale=np.zeros((capacity, num_sensors)),
+        p_detect=np.zeros((capacity, num_sensors)),
+        hidden=np.zeros((capacity, num_sensors)),
+        existence=np.zeros(capacity),
+        confirmed=np.zeros(capacity, dtype=np.bool_),
+        track_id=np.zeros(capacity, dtype=np.int64),
+        hits=np.zeros(capacity, dtype=np.int64),
+        t_birth=np.zeros(capacity),
+        born_at=np.zeros((capacity, 2)),
+        t_update=np.zeros(capacity),
+        used=np.zeros(capacity, dtype=np.int64),
+        seen_by=np.zeros(capacity, dtype=np.int64),
+        witness=np.zeros((capacity, num_sensors)),
+        score_odds=np.zeros(capacity),
+        jerk_mean=np.zeros((capacity, densities, 2, dim)),
+        jerk_cov=np.zeros((capacity, densities, 2, dim, dim)),
+        jerk_weight=np.zeros((capacity, densities)),
+        jerk_factor=np.ones(capacity),
+        size_trial_mean=np.zeros((capacity, size_densities, 2, 2)),
+        size_trial_cov=np.zeros((capacity, size_densities, 2, 2, 2)),
+        size_weight=np.zeros((capacity, size_densities)),
+        size_factor=np.ones(capacity),
+        lasting=np.zeros(capacity, dtype=np.bool_),
+        last_box=np.full((capacity, num_sensors, 5), -np.inf),
+        seen_apart=np.full((capacity, num_sensors), -np.inf),
+        worth=np.ones(capacity),
+        worthy=np.ones(capacity, dtype=np.bool_),
+        fit=np.zeros((capacity, 2)),
+        t_missed=np.full(capacity, -np.inf),
+    )
 
 
 def grow(tracks: TrackArrays, num_tracks: int, capacity: int) -> TrackArrays:
@@ -20,7 +69,8 @@ def grow(tracks: TrackArrays, num_tracks: int, capacity: int) -> TrackArrays:
     if capacity <= old:
         return tracks
     errors, densities = tracks.mean.shape[2] - 3, tracks.jerk_weight.shape[1]
-    larger = allocate(max(capacity, 2 * old), tracks.scale.shape[1], errors, densities)
+    sizes = tracks.size_weight.shape[1]
+    larger = allocate(max(capacity, 2 * old), tracks.scale.shape[1], errors, densities, sizes)
     for source, target in zip(tracks, larger, strict=True):
         target[:num_tracks] = source[:num_tracks]
     return larger
@@ -72,6 +122,11 @@ def keep_rows(tracks: TrackArrays, rows: IntArray) -> None:
         _shift(tracks.jerk_cov, rows, first)
         _shift(tracks.jerk_weight, rows, first)
         _shift(tracks.jerk_factor, rows, first)
+    if tracks.size_weight.shape[1]:
+        _shift(tracks.size_trial_mean, rows, first)
+        _shift(tracks.size_trial_cov, rows, first)
+        _shift(tracks.size_weight, rows, first)
+        _shift(tracks.size_factor, rows, first)
     _shift(tracks.lasting, rows, first)
     _shift(tracks.last_box, rows, first)
     _shift(tracks.seen_apart, rows, first)

@@ -60,6 +60,10 @@ class TrackArrays(NamedTuple):
         jerk_cov: (C, K, 2, 3 + B, 3 + B) covariance of each.
         jerk_weight: (C, K) probability of each density.
         jerk_factor: (C,) factor on the density of the jerk that follows from them.
+        size_trial_mean: (C, J, 2, 2) its size under J densities of the rate (`filters/resizing.py`).
+        size_trial_cov: (C, J, 2, 2, 2) covariance of each.
+        size_weight: (C, J) probability of each density.
+        size_factor: (C,) factor on the density of the rate of ln size that follows from them.
         lasting: (C,) whether it has lasted (`filters.worth`).
         last_box: (C, S, 5) each sensor's last whole box, as it saw it: time (s), centre (px), ln width and ln
             height.
@@ -100,6 +104,10 @@ class TrackArrays(NamedTuple):
     jerk_cov: FloatArray
     jerk_weight: FloatArray
     jerk_factor: FloatArray
+    size_trial_mean: FloatArray
+    size_trial_cov: FloatArray
+    size_weight: FloatArray
+    size_factor: FloatArray
     lasting: npt.NDArray[np.bool_]
     last_box: FloatArray
     seen_apart: FloatArray
@@ -152,6 +160,10 @@ class SceneState(NamedTuple):
             usual density of jerk; followed where a density is chosen.
         innovation_seen: (S,) what that mean rests on, in seconds of a track.
         usual_jerk: (K,) recent mean weight of each density of jerk over the confirmed tracks.
+        size_innovation: (S,) recent mean of the normalised innovation squared of a side's ln length, at the
+            usual density of its rate; followed where a density is chosen.
+        size_seen: (S,) what that mean rests on, in seconds of a track.
+        usual_resizing: (J,) recent mean weight of each density of that rate over the confirmed tracks.
         field: (S, 2) how far each sensor's boxes reach to the left and to the right (px), from +inf, -inf.
         field_witnesses: (S,) over how many vehicles they were.
         gap_share: (L,) of the tracks that nobody saw for so long, those found again as expected
@@ -188,6 +200,9 @@ class SceneState(NamedTuple):
     innovation: FloatArray
     innovation_seen: FloatArray
     usual_jerk: FloatArray
+    size_innovation: FloatArray
+    size_seen: FloatArray
+    usual_resizing: FloatArray
     field: FloatArray
     field_witnesses: FloatArray
     gap_share: FloatArray
@@ -230,6 +245,9 @@ def start_scene(sensors: SensorArrays, config: Config) -> SceneState:
         innovation=np.ones(num_sensors),
         innovation_seen=np.full(num_sensors, _FIRST_INNOVATIONS_S),
         usual_jerk=prior_weights(*config.motion.first_odds)[: config.motion.densities],
+        size_innovation=np.ones(num_sensors),
+        size_seen=np.full(num_sensors, _FIRST_INNOVATIONS_S),
+        usual_resizing=prior_weights(*config.size.first_odds)[: config.size.densities],
         field=np.tile([np.inf, -np.inf], (num_sensors, 1)),
         field_witnesses=np.zeros(num_sensors),
         gap_share=np.full(LENGTHS, PRIOR_SHARE),
@@ -244,45 +262,3 @@ def _first_worth(config: Config) -> FloatArray:
     assumed = math.log(half / (1.0 - half)), lifecycle.worth_slope
     sensors = [config.sensors[name] for name in config.sensor_names]
     return np.array([_AS_MEASURED if s.knows_scores else assumed for s in sensors], dtype=np.float64)
-
-
-def allocate(capacity: int, num_sensors: int, num_errors: int = 0, densities: int = 0) -> TrackArrays:
-    """Allocate zeroed arrays for `capacity` tracks, S sensors, B error states and K densities of jerk."""
-    dim = 3 + num_errors
-    return TrackArrays(
-        mean=np.zeros((capacity, 2, dim)),
-        cov=np.zeros((capacity, 2, dim, dim)),
-        size_mean=np.zeros((capacity, 2, 2)),
-        size_cov=np.zeros((capacity, 2, 2, 2)),
-        cut=np.zeros((capacity, 2), dtype=np.int64),
-        rest_point=np.zeros((capacity, 2)),
-        rest_var=np.zeros((capacity, 2)),
-        rest_since=np.zeros(capacity),
-        standing_log_odds=np.zeros(capacity),
-        standing=np.zeros(capacity, dtype=np.bool_),
-        scale=np.zeros((capacity, num_sensors)),
-        p_detect=np.zeros((capacity, num_sensors)),
-        hidden=np.zeros((capacity, num_sensors)),
-        existence=np.zeros(capacity),
-        confirmed=np.zeros(capacity, dtype=np.bool_),
-        track_id=np.zeros(capacity, dtype=np.int64),
-        hits=np.zeros(capacity, dtype=np.int64),
-        t_birth=np.zeros(capacity),
-        born_at=np.zeros((capacity, 2)),
-        t_update=np.zeros(capacity),
-        used=np.zeros(capacity, dtype=np.int64),
-        seen_by=np.zeros(capacity, dtype=np.int64),
-        witness=np.zeros((capacity, num_sensors)),
-        score_odds=np.zeros(capacity),
-        jerk_mean=np.zeros((capacity, densities, 2, dim)),
-        jerk_cov=np.zeros((capacity, densities, 2, dim, dim)),
-        jerk_weight=np.zeros((capacity, densities)),
-        jerk_factor=np.ones(capacity),
-        lasting=np.zeros(capacity, dtype=np.bool_),
-        last_box=np.full((capacity, num_sensors, 5), -np.inf),
-        seen_apart=np.full((capacity, num_sensors), -np.inf),
-        worth=np.ones(capacity),
-        worthy=np.ones(capacity, dtype=np.bool_),
-        fit=np.zeros((capacity, 2)),
-        t_missed=np.full(capacity, -np.inf),
-    )

@@ -21,7 +21,7 @@ from jeat_graph.data.interop import boxes_of
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.appearance import Compared, Looks, compare, embeddings_of, remember
 from jeat_graph.tracking.classes import ClassTally, check_names, count_votes
-from jeat_graph.tracking.compaction import grow
+from jeat_graph.tracking.compaction import allocate, grow
 from jeat_graph.tracking.direct_call import DirectCall
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.notice import notice_if_cold
@@ -31,7 +31,7 @@ from jeat_graph.tracking.saving import SavedTracks
 from jeat_graph.tracking.scans import ScanLike, arrivals_of, as_scans
 from jeat_graph.tracking.sensor_state import SensorState, sensor_states
 from jeat_graph.tracking.snapshot import Snapshot
-from jeat_graph.tracking.state import allocate, start_scene
+from jeat_graph.tracking.state import start_scene
 from jeat_graph.tracking.step import step
 from jeat_graph.tracking.step_record import StepRecord, record_step
 from jeat_graph.tracking.update_log import allocate_log
@@ -71,9 +71,9 @@ class Tracker(SavedTracks):
         self._diagnostics = diagnostics
         self._model = kernel_model(config)
         sensors = self._model.sensors
-        self._tracks = allocate(
-            _FIRST_CAPACITY, len(self.sensor_names), len(sensors.correlation_time_s), config.motion.densities
-        )
+        choices = config.motion.densities, config.size.densities
+        num_errors = len(sensors.correlation_time_s)
+        self._tracks = allocate(_FIRST_CAPACITY, len(self.sensor_names), num_errors, *choices)
         self._scene = start_scene(sensors, config)
         self._num_tracks = 0
         self._next_id = 1

@@ -46,6 +46,7 @@ def log_updates(
     log: UpdateLog,
     track_id: IntArray,
     jerk: FloatArray,
+    size_density: FloatArray,
     batch: Batch,
     measured: Measured,
     sensors: SensorArrays,
@@ -56,6 +57,7 @@ def log_updates(
         log: the log.
         track_id: (C,) identities of all tracks.
         jerk: (K,) root spectral density of each taking track's jerk (px/s^2.5).
+        size_density: (K,) that of the rate of its ln size (1/s^1.5).
         batch: all detections of the step.
         measured: what the taken ones measure of their tracks.
         sensors: parameters of the sensors.
@@ -73,6 +75,7 @@ def log_updates(
         row["birth"] = 0
         row["error"] = sensors.error[batch.sensor[j]]
         row["jerk"] = max(jerk[k], _LEAST_JERK)
+        row["size_density"] = size_density[k]
         row["rate_var"] = 0.0
         row["nis"] = math.nan
         row["scale"] = 1.0

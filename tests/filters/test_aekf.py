@@ -97,14 +97,14 @@ def test_size_filter_equals_a_dense_one():
     root = rng.normal(size=(20, 2, 2, 2))
     cov = root @ np.swapaxes(root, -1, -2) + 0.01 * np.eye(2)
     mean = rng.normal(size=(20, 2, 2))
-    dt, density, R = 0.07, 0.8, 0.01
+    dt, density, R = 0.07, rng.uniform(0.0, 2.0, 20), 0.01
     F = np.array([[1.0, dt], [0.0, 1.0]])
-    Q = density**2 * np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
+    Q = density[:, None, None] ** 2 * np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
     before = mean.copy(), cov.copy()
     predict_size(mean, cov, density, dt)
     for i in range(20):
         for side in range(2):
-            x, P = F @ before[0][i, side], F @ before[1][i, side] @ F.T + Q
+            x, P = F @ before[0][i, side], F @ before[1][i, side] @ F.T + Q[i]
             assert np.allclose(mean[i, side], x)
             assert np.allclose(cov[i, side], P)
             z = x[0] + rng.normal() * 0.1

@@ -12,8 +12,8 @@ import pytest
 
 from jeat_graph.config.kernel_form import kernel_settings
 from jeat_graph.config.reading import load_config
+from jeat_graph.tracking.compaction import allocate
 from jeat_graph.tracking.stages.ending import confirm
-from jeat_graph.tracking.state import allocate
 
 MOST = 64
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from jeat_graph import Tracker, load_config
-from jeat_graph.tracking.compaction import grow
-from jeat_graph.tracking.state import allocate
+from jeat_graph.tracking.compaction import allocate, grow
 
 PLAIN = ["smoother.engine=none"]
 

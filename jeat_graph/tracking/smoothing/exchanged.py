@@ -43,7 +43,7 @@ def exchange_histories(histories: Sequence[TrackHistory], config: Config) -> tup
             continue
         a, b = sides.of(i), sides.of(j)
         moments = _moments(a, b, start_t, end_t)
-        gains = exchange_gains(a, b, moments, config.size.rate_density)
+        gains = exchange_gains(a, b, moments)
         if len(gains) and gains.max() > least:
             moment = float(moments[gains.argmax()])
             past_i, past_j = found[i], found[j]
@@ -61,14 +61,13 @@ class _Sides:
     def __init__(self, histories: Sequence[TrackHistory], config: Config) -> None:
         self._histories = histories
         self._errors = ErrorStates.of(config)
-        self._density = config.size.rate_density
         self._known: dict[int, TwoSided] = {}
 
     def of(self, i: int) -> TwoSided:
         """Both sides of history i as it is now."""
         if i not in self._known:
             rows = self._histories[i].whole()
-            self._known[i] = two_sided(rows, rows[0], self._errors, self._density)
+            self._known[i] = two_sided(rows, rows[0], self._errors)
         return self._known[i]
 
     def forget(self, *changed: int) -> None:

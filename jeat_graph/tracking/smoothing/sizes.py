@@ -25,7 +25,9 @@ class SizeWindow:
     def append(self, measured: RecordArray) -> None:
         """Take in the sizes of measurements (M,)."""
         # Fields of records as arrays of their own, for one compiled form of what comes next.
-        self._parts.append(tuple(measured[name].copy() for name in ("t", "log_size", "size_var")))
+        self._parts.append(
+            tuple(measured[name].copy() for name in ("t", "log_size", "size_var", "size_density"))
+        )
 
     def smooth(self) -> SmoothedSize:
         """Smooth all since the base, given all measurements so far."""
@@ -39,16 +41,17 @@ class SizeWindow:
         past, later = ([column[part] for column in waiting] for part in (slice(count), slice(count, None)))
         filtered = self._solve(*past)
         self._base = Prior(float(filtered.t[-1]), filtered.mean[-1], filtered.cov[-1])
-        self._parts = [(later[0], later[1], later[2])]
+        self._parts = [tuple(later)]
 
     def _waiting(self) -> tuple[FloatArray, ...]:
-        """All measurements since the base: times (M,), sizes (M, 2), variances (M, 2)."""
+        """All measurements since the base: times (M,), sizes (M, 2), variances (M, 2), densities (M,)."""
         if not self._parts:
-            return np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2))
+            return np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0)
         if len(self._parts) > 1:
-            t, log_size, var = zip(*self._parts, strict=True)
-            self._parts = [(np.concatenate(t), np.concatenate(log_size), np.concatenate(var))]
+            self._parts = [tuple(np.concatenate(column) for column in zip(*self._parts, strict=True))]
         return self._parts[0]
 
-    def _solve(self, t: FloatArray, log_size: FloatArray, var: FloatArray) -> SmoothedSize:
-        return smooth_size(*self._base, t, log_size, var, np.full(len(t), self._density), self._density)
+    def _solve(
+        self, t: FloatArray, log_size: FloatArray, var: FloatArray, density: FloatArray
+    ) -> SmoothedSize:
+        return smooth_size(*self._base, t, log_size, var, density, self._density)

@@ -44,7 +44,8 @@ def stitch_histories(
         fragment_ends(histories, config),
         max_gap_s=config.smoother.stitch_max_gap_s,
         gate=float(chi2.ppf(config.smoother.stitch_gate_probability, FREEDOM)),
-        size_density=config.size.rate_density,
+        # How a box changes while nobody sees it, nothing tells.
+        size_density=config.size.hardest_density,
         hidden_s=config.smoother.stitch_hidden_s,
     )
     after = {int(a): b for b, a in enumerate(before.tolist()) if a >= 0}

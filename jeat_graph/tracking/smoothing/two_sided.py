@@ -17,23 +17,23 @@ from jeat_graph.tracking.smoothing.priors import ErrorStates, size_prior_of, tra
 _UNKNOWN = 1e4
 
 
-def two_sided(rows: RecordArray, birth: np.void, errors: ErrorStates, size_density: float) -> TwoSided:
+def two_sided(rows: RecordArray, birth: np.void, errors: ErrorStates) -> TwoSided:
     """Filter one track in both directions.
 
     Args:
         rows: (M,) its measurements in order of time, the first as its prior.
         birth: the record of a birth, for the variances of what a first detection does not tell.
         errors: the error states of the sensors.
-        size_density: root spectral density of the rate of ln size (1/s^1.5).
     """
-    t, jerk, *past = _filtered(rows, errors, size_density)
+    t, jerk, size_density, *past = _filtered(rows, errors)
     back = rows[::-1].copy()
     back["t"] = -back["t"]
-    # The jerk of a measurement is that of the time before it.
-    back["jerk"][1:] = rows["jerk"][:0:-1]
+    # What drives the changes before a measurement is noted with it.
+    for name in ("jerk", "size_density"):
+        back[name][1:] = rows[name][:0:-1]
     for name in ("velocity_var", "acceleration_var", "rate_var"):
         back[name][0] = _UNKNOWN * birth[name]
-    _, _, *turned = _filtered(back, errors, size_density)
+    _, _, _, *turned = _filtered(back, errors)
     future = [values[::-1].copy() for values in turned]
     for mean, cov in (future[:2], future[2:]):
         # Backward in time, velocities and rates have the other sign.
@@ -41,15 +41,15 @@ def two_sided(rows: RecordArray, birth: np.void, errors: ErrorStates, size_densi
         cov[:, :, 1, :] *= -1.0
         cov[:, :, :, 1] *= -1.0
     mean, cov, size, size_cov = future
-    return TwoSided(t, jerk, past[0], past[1], mean, cov, past[2], past[3], size, size_cov)
+    return TwoSided(t, jerk, size_density, past[0], past[1], mean, cov, past[2], past[3], size, size_cov)
 
 
-def _filtered(rows: RecordArray, errors: ErrorStates, size_density: float) -> tuple[FloatArray, ...]:
-    """Times and jerk of the keys; mean and covariance of the motion, and of the size, by all until each."""
+def _filtered(rows: RecordArray, errors: ErrorStates) -> tuple[FloatArray, ...]:
+    """Times, jerk and size densities of the keys; mean and covariance of motion and size by all until each."""
     track = track_data(rows, errors)
     mean, cov = filter_track(track)
     prior = size_prior_of(rows[0])
-    measured = rows["t"].copy(), rows["log_size"].copy(), rows["size_var"].copy()
-    size, size_cov = filter_size(prior.mean, prior.cov, *measured, size_density)
+    measured = rows["t"].copy(), rows["log_size"].copy(), rows["size_var"].copy(), rows["size_density"].copy()
+    size_density, size, size_cov = filter_size(prior.mean, prior.cov, *measured)
     motion = np.ascontiguousarray(mean[..., :MOTION]), np.ascontiguousarray(cov[..., :MOTION, :MOTION])
-    return track.t, track.jerk, *motion, size, size_cov
+    return track.t, track.jerk, size_density, *motion, size, size_cov

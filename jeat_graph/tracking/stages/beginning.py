@@ -21,6 +21,7 @@ from jeat_graph.tracking.stages.learning import scan_weight
 from jeat_graph.tracking.stages.manoeuvring import start_jerk
 from jeat_graph.tracking.stages.measuring import first_view, second_view
 from jeat_graph.tracking.stages.predicting import jerk_of, new_velocity_var
+from jeat_graph.tracking.stages.resizing import start_sizes
 from jeat_graph.tracking.stages.updating import take_in
 from jeat_graph.tracking.stages.worth import judge_worth
 from jeat_graph.tracking.state import SceneState, TrackArrays
@@ -58,6 +59,7 @@ def give_birth(
     for b in range(len(parents)):
         start_track(tracks, n + b, next_id + b, batch, parents[b], model, log)
         start_jerk(tracks, n + b, scene)
+        start_sizes(tracks, n + b, scene)
         tracks.existence[n + b] = existence[parents[b]]
         tracks.p_detect[n + b] = scene.p_detect
         tracks.hidden[n + b] = settings.lifecycle.hidden_prior * scene.trust[batch.sensor[parents[b]]]
@@ -169,7 +171,9 @@ def start_track(
     tracks.seen_by[i] = 1 << s
     tracks.witness[i] = 0.0
     tracks.jerk_factor[i] = 1.0
+    tracks.size_factor[i] = 1.0
     if len(log.rows) > 0:
         jerk = jerk_of(tracks, view.track, model.settings)
-        log_updates(log, tracks.track_id, jerk, batch, view, sensors)
+        size_density = model.settings.size.rate_density * tracks.size_factor[view.track]
+        log_updates(log, tracks.track_id, jerk, size_density, batch, view, sensors)
         log_birth(log, velocity_var, acceleration_var, rate_var)

@@ -21,11 +21,11 @@ from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.state import USUAL_JERK_S, SceneState, TrackArrays
 
 # How large a sensor's innovations are is their mean over so many seconds of a track.
-_INNOVATIONS_S = 60.0
+INNOVATIONS_S = 60.0
 # One odd box counts for no more than what one in a hundred exceeds (chi squared, two degrees of freedom).
 _MOST_NIS = 9.2
 # However small they are: of a detector without noise, rounding errors would decide what is calm.
-_LEAST_INNOVATION = 0.1
+LEAST_INNOVATION = 0.1
 
 
 @inner
@@ -104,7 +104,7 @@ def weigh_jerk(
     mean, cov, weight = tracks.jerk_mean, tracks.jerk_cov, tracks.jerk_weight
     size_mean, size_cov, say = tracks.size_mean, tracks.size_cov, np.empty(2)
     # Noise larger than assumed is the business of its own adaptation.
-    exactness = 1.0 / min(max(scene.innovation[s], _LEAST_INNOVATION), 1.0)
+    exactness = 1.0 / min(max(scene.innovation[s], LEAST_INNOVATION), 1.0)
     for m in range(len(track)):
         i, j = track[m], detection[m]
         for axis in range(2):
@@ -116,7 +116,7 @@ def weigh_jerk(
         if tracks.confirmed[i] and say[0] > 0.0 and say[1] > 0.0:
             square = min(square, _MOST_NIS) / 2.0
             take_into_mean(
-                scene.innovation, scene.innovation_seen, s, square, sensors.period_s[s], _INNOVATIONS_S
+                scene.innovation, scene.innovation_seen, s, square, sensors.period_s[s], INNOVATIONS_S
             )
         for axis in range(2):
             if say[axis] == 0.0:

@@ -23,6 +23,7 @@ from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.inner import inlined, inner
 from jeat_graph.tracking.stages.looking import known_fields, looks_at
 from jeat_graph.tracking.stages.manoeuvring import choose_jerk, predict_manoeuvring
+from jeat_graph.tracking.stages.resizing import predict_resizing, size_densities
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
 # A small rest remains: what should be invisible is still taken if it is detected.
@@ -107,10 +108,13 @@ def predict_all(tracks: TrackArrays, n: int, dt: float, scene: SceneState, model
     predict(tracks.mean[:n], tracks.cov[:n], jerk, dt)
     if len(sensors.correlation_time_s):
         predict_errors(tracks.mean[:n], tracks.cov[:n], sensors.correlation_time_s, dt)
-    predict_size(tracks.size_mean[:n], tracks.size_cov[:n], settings.size.rate_density, dt)
+    density = size_densities(tracks, n, dt, scene, model)
+    predict_size(tracks.size_mean[:n], tracks.size_cov[:n], density, dt)
     unseen = tracks.t_update[:n] < last_sight(scene)
     if manoeuvring:
         predict_manoeuvring(tracks, n, dt, unseen, scene, model)
+    if tracks.size_weight.shape[1] > 0:
+        predict_resizing(tracks, n, dt, unseen, scene, model)
     if settings.motion.unseen_memory_s > 0.0:
         memory_s = settings.motion.unseen_memory_s
         forget(

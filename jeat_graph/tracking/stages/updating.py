@@ -27,6 +27,7 @@ from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.stages.manoeuvring import weigh_jerk
 from jeat_graph.tracking.stages.measuring import measure
 from jeat_graph.tracking.stages.predicting import Expectation, expect_detections, jerk_of, occlusion
+from jeat_graph.tracking.stages.resizing import follow_cut, weigh_sizes
 from jeat_graph.tracking.state import SceneState, TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog, log_innovations, log_updates
 
@@ -116,7 +117,8 @@ def take_in(
     logs = len(log.rows) > 0
     if logs:
         jerk = jerk_of(tracks, track, settings)
-        log_updates(log, tracks.track_id, jerk, batch, measured, model.sensors)
+        size_density = settings.size.rate_density * tracks.size_factor[track]
+        log_updates(log, tracks.track_id, jerk, size_density, batch, measured, model.sensors)
     if settings.standing.enabled:
         judge_standing(tracks, measured, batch.t, settings)
     nis = take_centres(tracks, measured, error)
@@ -125,7 +127,12 @@ def take_in(
     if tracks.jerk_weight.shape[1]:
         # A lag behind what turns is no noise of the boxes.
         weigh_jerk(tracks, measured, s, batch.cut, nis, scene, model.sensors)
+    resizing = tracks.size_weight.shape[1] > 0
+    if resizing:
+        weigh_sizes(tracks, measured, s, batch.cut, scene, model.sensors)
     take_sizes(tracks, measured, batch)
+    if resizing:
+        follow_cut(tracks, measured, batch.cut)
     hold_still(tracks, track, settings.standing.speed_std_per_size)
     noise, scale, hits, score_odds = settings.noise, tracks.scale, tracks.hits, tracks.score_odds
     t_update, used, seen_by, fit = tracks.t_update, tracks.used, tracks.seen_by, tracks.fit
