@@ -17,7 +17,7 @@ WAVE = np.array([2.0, 1.6])  # rad/s, of widths and of heights
 
 
 def sides(t, breathing):
-    """Widths and heights (4, 2) of four vehicles at a time: all alike, or growing and shrinking by a third."""
+    """Widths and heights (4, 2) of four vehicles at a time: constant, or larger and smaller by a third."""
     phase = np.arange(4)[:, None] * 1.7 + WAVE * t
     return np.array([60.0, 40.0]) * np.exp(0.35 * np.sin(phase) if breathing else np.zeros((4, 2)))
 
@@ -25,8 +25,8 @@ def sides(t, breathing):
 def scan(k, rng, breathing):
     t = k / RATE_HZ
     size = sides(t, breathing)
-    centre = np.array([[100.0, 100.0], [100.0, 250.0], [100.0, 400.0], [100.0, 550.0]]) + [110.0 * t, 4.0 * t]
-    centre = centre + 1.5 * rng.normal(size=(4, 2))
+    lanes = np.array([[100.0, 100.0], [100.0, 250.0], [100.0, 400.0], [100.0, 550.0]])
+    centre = lanes + np.array([110.0 * t, 4.0 * t]) + 1.5 * rng.normal(size=(4, 2))
     found = size * np.exp(0.05 * rng.normal(size=(4, 2)))
     return t, "rgb", np.hstack([centre - 0.5 * found, found]), np.full(4, 0.9)
 

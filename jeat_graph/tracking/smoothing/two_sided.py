@@ -45,7 +45,7 @@ def two_sided(rows: RecordArray, birth: np.void, errors: ErrorStates) -> TwoSide
 
 
 def _filtered(rows: RecordArray, errors: ErrorStates) -> tuple[FloatArray, ...]:
-    """Times, jerk and size densities of the keys; mean and covariance of motion and size by all until each."""
+    """Times, jerk and size densities of the keys; mean and covariance of both by all until each."""
     track = track_data(rows, errors)
     mean, cov = filter_track(track)
     prior = size_prior_of(rows[0])

@@ -91,7 +91,7 @@ def evidence(rows):
 
 
 def exchanged_rows(a, b, moment):
-    """Both tracks with their futures exchanged; how strongly motion and size change then is the past's to say."""
+    """Both tracks with their futures exchanged; what drives the changes then is the past's to say."""
     i, j = np.searchsorted(a["t"], moment), np.searchsorted(b["t"], moment)
     first, second = np.concatenate([a[:i], b[j:]]), np.concatenate([b[:j], a[i:]])
     for name in ("jerk", "size_density"):
