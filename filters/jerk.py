@@ -10,7 +10,7 @@ from jeat_graph.data.arrays import FloatArray
 from jeat_graph.filters.sides import mean_side
 
 # Beyond this a growth is none that a picture shows for longer than a moment.
-_MOST_GROWTH = 4.0  # 1/s
+MOST_GROWTH = 4.0  # 1/s
 
 
 @njit(cache=True)
@@ -32,7 +32,7 @@ def jerk_density(
         jerk_per_size: part of drivers, per px of size (1/s^2.5).
         jerk_per_growth: part of perspective, in units of size · |growth|^2.5.
     """
-    g = min(abs(growth), _MOST_GROWTH)
+    g = min(abs(growth), MOST_GROWTH)
     drivers = jerk_px + jerk_per_size * side
     perspective = jerk_per_growth * side * g * g * math.sqrt(g)
     if perspective == 0.0:

@@ -9,12 +9,33 @@ them by how well each foretold the sizes, as with the densities of the jerk (`ma
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 
 from jeat_graph.data.arrays import BoolArray, FloatArray
+from jeat_graph.filters.jerk import MOST_GROWTH, common_growth
 from jeat_graph.filters.kalman import log_gaussian, update_block
 from jeat_graph.filters.manoeuvre import weigh
+
+
+@njit(cache=True)
+def resizing_density(size_mean: FloatArray, density: float, per_growth: float) -> float:
+    """Root spectral density of the rate of a track's ln size (1/s^1.5), perspective included.
+
+    Of a vehicle that passes at constant speed the growth g = d ln(size) / dt is 1 / (t₀ − t), so it grows by
+    itself at g², for about 1 / g; as the density of a white process that is g^1.5, however calm its size is
+    otherwise (`jerk.jerk_density` says the same of the jerk).
+
+    Args:
+        size_mean: (2, 2) ln width and ln height with their rates.
+        density: what it is without perspective.
+        per_growth: part of perspective, in units of |growth|^1.5.
+    """
+    g = min(abs(common_growth(size_mean[0, 1], size_mean[1, 1])), MOST_GROWTH)
+    perspective = per_growth * g * math.sqrt(g)
+    return density if perspective == 0.0 else math.sqrt(density * density + perspective * perspective)
 
 
 @njit(cache=True)

@@ -108,6 +108,9 @@ class SizeConfig(Section):
     """Filter of ln width and ln height: a nearly constant rate of change."""
 
     rate_density: float = number(0.5, "1/s^1.5", "root spectral density of the rate's white driving noise")
+    density_per_growth: float = number(
+        0.0, "1", "root spectral density of the rate's noise by perspective, in units of growth rate^1.5"
+    )
     rate_std: float = number(0.5, "1/s", "std of a new track's rate of ln size")
     change_step: float = number(
         1.0,

@@ -21,7 +21,7 @@ from jeat_graph.tracking.stages.learning import scan_weight
 from jeat_graph.tracking.stages.manoeuvring import start_jerk
 from jeat_graph.tracking.stages.measuring import first_view, second_view
 from jeat_graph.tracking.stages.predicting import jerk_of, new_velocity_var
-from jeat_graph.tracking.stages.resizing import start_sizes
+from jeat_graph.tracking.stages.resizing import size_density_of, start_sizes
 from jeat_graph.tracking.stages.updating import take_in
 from jeat_graph.tracking.stages.worth import judge_worth
 from jeat_graph.tracking.state import SceneState, TrackArrays
@@ -174,6 +174,6 @@ def start_track(
     tracks.size_factor[i] = 1.0
     if len(log.rows) > 0:
         jerk = jerk_of(tracks, view.track, model.settings)
-        size_density = model.settings.size.rate_density * tracks.size_factor[view.track]
+        size_density = size_density_of(tracks, view.track, model.settings)
         log_updates(log, tracks.track_id, jerk, size_density, batch, view, sensors)
         log_birth(log, velocity_var, acceleration_var, rate_var)

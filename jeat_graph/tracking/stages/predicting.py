@@ -23,7 +23,7 @@ from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.inner import inlined, inner
 from jeat_graph.tracking.stages.looking import known_fields, looks_at
 from jeat_graph.tracking.stages.manoeuvring import choose_jerk, predict_manoeuvring
-from jeat_graph.tracking.stages.resizing import predict_resizing, size_densities
+from jeat_graph.tracking.stages.resizing import choose_resizing, predict_resizing, size_density_of
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
 # A small rest remains: what should be invisible is still taken if it is detected.
@@ -108,12 +108,15 @@ def predict_all(tracks: TrackArrays, n: int, dt: float, scene: SceneState, model
     predict(tracks.mean[:n], tracks.cov[:n], jerk, dt)
     if len(sensors.correlation_time_s):
         predict_errors(tracks.mean[:n], tracks.cov[:n], sensors.correlation_time_s, dt)
-    density = size_densities(tracks, n, dt, scene, model)
+    resizing = tracks.size_weight.shape[1] > 0
+    if resizing:
+        choose_resizing(tracks, n, dt, scene, model)
+    density = size_density_of(tracks, np.arange(n), settings)
     predict_size(tracks.size_mean[:n], tracks.size_cov[:n], density, dt)
     unseen = tracks.t_update[:n] < last_sight(scene)
     if manoeuvring:
         predict_manoeuvring(tracks, n, dt, unseen, scene, model)
-    if tracks.size_weight.shape[1] > 0:
+    if resizing:
         predict_resizing(tracks, n, dt, unseen, scene, model)
     if settings.motion.unseen_memory_s > 0.0:
         memory_s = settings.motion.unseen_memory_s

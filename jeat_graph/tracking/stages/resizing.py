@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from jeat_graph.config.kernel_form import Model, SensorArrays
+from jeat_graph.config.kernel_form import Model, SensorArrays, Settings
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.filters.coasting import forget_growth
 from jeat_graph.filters.cut_boxes import WHOLE
 from jeat_graph.filters.kalman import predict_size
 from jeat_graph.filters.manoeuvre import density_factor, mean_factor, relax_weights
-from jeat_graph.filters.resizing import weigh_resizing
+from jeat_graph.filters.resizing import resizing_density, weigh_resizing
 from jeat_graph.filters.running_mean import take_into_mean
 from jeat_graph.tracking.batch import Measured
 from jeat_graph.tracking.stages.inner import inner
@@ -22,18 +22,25 @@ _MOST_NIS = 6.6
 
 
 @inner
-def size_densities(tracks: TrackArrays, n: int, dt: float, scene: SceneState, model: Model) -> FloatArray:
-    """Root spectral density (n,) of the rate of each track's ln size over the next `dt` seconds (1/s^1.5)."""
-    size, density = model.settings.size, np.full(n, model.settings.size.rate_density)
-    if tracks.size_weight.shape[1] == 0:
-        return density
+def size_density_of(tracks: TrackArrays, track: IntArray, settings: Settings) -> FloatArray:
+    """Root spectral density (K,) of the rate of ln size of the tracks in rows `track` (K,) now (1/s^1.5)."""
+    size, out = settings.size, np.empty(len(track))
+    for k in range(len(track)):
+        i = track[k]
+        density = tracks.size_factor[i] * size.rate_density
+        out[k] = resizing_density(tracks.size_mean[i], density, size.density_per_growth)
+    return out
+
+
+@inner
+def choose_resizing(tracks: TrackArrays, n: int, dt: float, scene: SceneState, model: Model) -> None:
+    """Say by which factor each track's size changes harder than usual over the next `dt` seconds, in place."""
+    size = model.settings.size
     relax_weights(tracks.size_weight[:n], scene.usual_resizing, dt, size.change_memory_s)
     usual = mean_factor(scene.usual_resizing, size.calm_step, size.change_step)
     for i in range(n):
         own = mean_factor(tracks.size_weight[i], size.calm_step, size.change_step)
         tracks.size_factor[i] = own if tracks.confirmed[i] else usual
-        density[i] *= tracks.size_factor[i]
-    return density
 
 
 @inner
@@ -47,7 +54,8 @@ def predict_resizing(
     for i in range(n):
         confirmed += 1 if tracks.confirmed[i] else 0
         for k in range(K):
-            density[i * K + k] = size.rate_density * density_factor(k, size.calm_step, size.change_step)
+            alone = size.rate_density * density_factor(k, size.calm_step, size.change_step)
+            density[i * K + k] = resizing_density(tracks.size_mean[i], alone, size.density_per_growth)
             lost[i * K + k] = unseen[i]
             if tracks.confirmed[i]:
                 share[k] += tracks.size_weight[i, k]

@@ -27,7 +27,7 @@ from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.stages.manoeuvring import weigh_jerk
 from jeat_graph.tracking.stages.measuring import measure
 from jeat_graph.tracking.stages.predicting import Expectation, expect_detections, jerk_of, occlusion
-from jeat_graph.tracking.stages.resizing import follow_cut, weigh_sizes
+from jeat_graph.tracking.stages.resizing import follow_cut, size_density_of, weigh_sizes
 from jeat_graph.tracking.state import SceneState, TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog, log_innovations, log_updates
 
@@ -117,7 +117,7 @@ def take_in(
     logs = len(log.rows) > 0
     if logs:
         jerk = jerk_of(tracks, track, settings)
-        size_density = settings.size.rate_density * tracks.size_factor[track]
+        size_density = size_density_of(tracks, track, settings)
         log_updates(log, tracks.track_id, jerk, size_density, batch, measured, model.sensors)
     if settings.standing.enabled:
         judge_standing(tracks, measured, batch.t, settings)
