@@ -83,23 +83,31 @@ def objective(config, training):
 
 @pytest.fixture(scope="module")
 def tuned(recordings):
-    training = shorten(recordings, 200)
+    training = shorten(recordings, 80)
     start = calibrate(training, load_config("default"))
     start = replace(start, lifecycle=replace(start.lifecycle, confirm_existence=0.99999))
     return training, start, tune(start, training, passes=1)
 
 
-def test_tuning_never_ends_below_its_start(tuned):
+@pytest.fixture(scope="module")
+def before_and_after(tuned):
+    """What tuning maximises, of the start and of the outcome."""
     training, start, (config, _) = tuned
-    assert objective(config, training) >= objective(start, training)
+    return objective(start, training), objective(config, training)
 
 
-def test_a_harmful_setting_is_repaired(tuned):
-    # Only what is as good as certain is believed, a third of all is never reported: that must not survive,
+def test_tuning_never_ends_below_its_start(before_and_after):
+    before, after = before_and_after
+    assert after >= before
+
+
+def test_a_harmful_setting_is_repaired(tuned, before_and_after):
+    # Only what is as good as certain is believed, hardly anything is ever reported: that must not survive,
     # be it that less is asked for or that evidence counts for more.
-    training, start, (config, choices) = tuned
+    _, start, (_, choices) = tuned
     assert {c.name for c in choices} <= {k.name for k in tuned_settings(start)}
-    assert objective(config, training) > objective(start, training) + 20.0
+    before, after = before_and_after
+    assert after > before + 20.0
 
 
 def test_tuning_is_deterministic(tuned, monkeypatch):
