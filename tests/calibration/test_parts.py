@@ -15,6 +15,11 @@ from jeat_graph.runs.declaring import fit_input
 
 
 @pytest.fixture(scope="module")
+def recordings(known):
+    return [known.recording(seed, duration_s=10.0) for seed in (1, 2)]
+
+
+@pytest.fixture(scope="module")
 def base(recordings):
     return fit_input(load_config("default"), recordings[0][0])[0]
 
@@ -80,7 +85,7 @@ def test_a_part_that_does_worse_on_the_other_half_goes_back_to_the_base(recordin
 
     monkeypatch.setattr(module, "with_parts", spoilt)
     told = []
-    config, choices = choose_parts(recordings, base, max_scans=200, progress=told.append)
+    config, choices = choose_parts(recordings, base, max_scans=100, progress=told.append)
     assert [choice.part for choice in choices] == list(PARTS) == told
     assert config.birth == base.birth
     births = next(choice for choice in choices if choice.part == "births")

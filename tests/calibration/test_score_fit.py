@@ -19,6 +19,11 @@ GOOD, BAD = 0.8, 0.4
 
 
 @pytest.fixture(scope="module")
+def recordings(known):
+    return [known.recording(seed, duration_s=8.0) for seed in (1, 2)]
+
+
+@pytest.fixture(scope="module")
 def base(recordings):
     return fit_input(load_config("default"), recordings[0][0])[0]
 

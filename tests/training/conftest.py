@@ -18,6 +18,12 @@ def one_thread():
         torch.set_num_threads(1)
 
 
+@pytest.fixture
+def no_plot(monkeypatch):
+    """A training without its plot, for tests that do not look at it: to draw takes as long as to learn."""
+    monkeypatch.setattr("jeat_graph.training.procedure.draw_log", lambda rows, path: None)
+
+
 @pytest.fixture(scope="session")
 def small_set(tmp_path_factory):
     """A data set of two segments."""

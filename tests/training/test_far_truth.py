@@ -75,6 +75,7 @@ def test_what_does_not_fit_is_refused(tmp_path, text, words):
         asking_for_far(truth(), tmp_path, 5.0)
 
 
+@pytest.mark.usefixtures("no_plot")
 def test_what_is_judged_stays_as_the_truth_has_it(tmp_path):
     from jeat_graph.io.truth_io import read_truth, write_truth
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -24,7 +25,13 @@ from jeat_graph.training.settings import NetSettings  # noqa: E402
 SIDE = (64, 32)
 
 
-def network(kind, path, twice=False):
+@pytest.fixture(scope="module")
+def network(tmp_path_factory):
+    """Write a network of a kind, once: tests read it only."""
+    return cache(partial(written, tmp_path_factory.mktemp("networks")))
+
+
+def written(folder, kind, twice=False):
     """A network that has seen something: its layers are not of one scale."""
     torch.manual_seed(4)
     settings = NetSettings(kind=kind, width=6)
@@ -34,14 +41,15 @@ def network(kind, path, twice=False):
         _, state = net(torch.rand(2, settings.channels, SIDE[1], SIDE[0]), state)
         state = tuple(one.detach() for one in state)
     card = {"net": {"kind": kind, "width": 6}, "side": list(SIDE), "tested": {}}
+    path = folder / f"{kind}-{twice}.onnx"
     write_onnx(net.eval(), SIDE, card, path, second_look=twice)
     return path
 
 
 @pytest.mark.parametrize("twice", [False, True])
 @pytest.mark.parametrize("kind", ["frames", "events"])
-def test_it_says_nearly_what_the_network_said(kind, twice, small_set, tmp_path, capsys):
-    source, out = network(kind, tmp_path / "net.onnx", twice), tmp_path / "small.onnx"
+def test_it_says_nearly_what_the_network_said(kind, twice, network, small_set, tmp_path, capsys):
+    source, out = network(kind, twice), tmp_path / "small.onnx"
     assert main(["train", kind, str(small_set), "--int8", str(source), "--out", str(out)]) == 0
     assert "wrote" in capsys.readouterr().out
     heads = [read_onnx_head(path) for path in (source, out)]
@@ -75,8 +83,8 @@ def test_it_says_nearly_what_the_network_said(kind, twice, small_set, tmp_path, 
 
 
 @pytest.mark.parametrize("kind", ["frames", "events"])
-def test_the_input_can_get_another_size(kind, small_set, tmp_path, capsys):
-    source, out = network(kind, tmp_path / "net.onnx"), tmp_path / "small.onnx"
+def test_the_input_can_get_another_size(kind, network, small_set, tmp_path, capsys):
+    source, out = network(kind), tmp_path / "small.onnx"
     command = ["train", kind, str(small_set), "--int8", str(source), "--out", str(out), "--size"]
     assert main([*command, "96x64"]) == 0
     head = read_onnx_head(out)
@@ -87,9 +95,9 @@ def test_the_input_can_get_another_size(kind, small_set, tmp_path, capsys):
     assert "--size: 90x64 must be whole multiples of 16 px" in capsys.readouterr().err
 
 
-def test_a_second_look_is_refused_where_half_the_input_does_not_fit(small_set, tmp_path, capsys):
+def test_a_second_look_is_refused_where_half_the_input_does_not_fit(network, small_set, tmp_path, capsys):
     """Said in one line, whether the size is asked for or is the network's own."""
-    source, out = network("frames", tmp_path / "net.onnx"), tmp_path / "small.onnx"
+    source, out = network("frames"), tmp_path / "small.onnx"
     command = ["train", "frames", str(small_set), "--int8", str(source), "--out", str(out)]
     sized = tmp_path / "sized.onnx"
     resized(source, (64, 48), sized)
@@ -99,8 +107,8 @@ def test_a_second_look_is_refused_where_half_the_input_does_not_fit(small_set, t
     assert not out.exists()
 
 
-def test_what_does_not_fit_is_refused(small_set, tmp_path, capsys):
-    source, out = network("frames", tmp_path / "net.onnx"), tmp_path / "small.onnx"
+def test_what_does_not_fit_is_refused(network, small_set, tmp_path, capsys):
+    source, out = network("frames"), tmp_path / "small.onnx"
     assert main(["train", "events", str(small_set), "--int8", str(source), "--out", str(out)]) == 2
     assert "--int8: the network is of frames, not of events" in capsys.readouterr().err
     with pytest.raises(DataError, match="nothing to look at"):

@@ -93,6 +93,7 @@ def test_another_training_s_checkpoint_is_refused(small_set, tmp_path):
         Trainer(TrainingJob(job.net, settings, split, SIZE, "cpu", tmp_path / "c", "another"))
 
 
+@pytest.mark.usefixtures("no_plot")
 def test_the_file_says_what_it_was_trained_on_and_how_good_it_is(small_set, tmp_path):
     settings = TrainSettings(crop_px=(32, 32), batch=2, epochs=0.5, judged=2, seed=5)
     done = train(TrainRequest((small_set,), tmp_path / "n.onnx", NetSettings(width=2), settings))
@@ -106,6 +107,7 @@ def test_the_file_says_what_it_was_trained_on_and_how_good_it_is(small_set, tmp_
     assert notes["names"] == "{0: 'vehicle'}"
 
 
+@pytest.mark.usefixtures("no_plot")
 def test_data_sets_are_told_apart_by_their_whole_names(small_set, tmp_path):
     lights = [tmp_path / "lux-0.5", tmp_path / "lux-0.7"]
     for link in lights:
