@@ -6,6 +6,7 @@ import gc
 import multiprocessing
 import os
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -103,6 +104,21 @@ def call(start):
         return completed(start(*arguments, env=env), given, timeout)
 
     return run
+
+
+@pytest.fixture(scope="session")
+def small_plots():
+    """A context in which a comparison's plots are of one track and coarse: else they take most of the time."""
+    from jeat_graph.drawing import comparison
+
+    @contextmanager
+    def small():
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(comparison, "MOST_TRACKS", 1)
+            patch.setitem(comparison._STYLE, "figure.dpi", 40)
+            yield
+
+    return small
 
 
 @pytest.fixture

@@ -23,10 +23,10 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def shown(folder):
+def shown(folder, small_plots):
     """What the comparison with the truth, in `out`, prints."""
     truth = str(folder / "sim" / "gt.csv")
-    with contextlib.redirect_stdout(io.StringIO()) as printed:
+    with small_plots(), contextlib.redirect_stdout(io.StringIO()) as printed:
         assert main(["compare", str(folder / "run"), "--gt", truth, "--out", str(folder / "out")]) == 0
     return printed.getvalue()
 
@@ -56,9 +56,10 @@ def test_without_truth_it_judges_consistency(folder, capsys):
 
 
 @pytest.mark.usefixtures("shown")
-def test_the_same_run_gives_the_same_bytes(folder):
+def test_the_same_run_gives_the_same_bytes(folder, small_plots):
     truth = str(folder / "sim" / "gt.csv")
-    assert main(["compare", str(folder / "run"), "--gt", truth, "--out", str(folder / "again")]) == 0
+    with small_plots():
+        assert main(["compare", str(folder / "run"), "--gt", truth, "--out", str(folder / "again")]) == 0
     first = sorted((folder / "out").iterdir())
     assert [path.name for path in first] == sorted(path.name for path in (folder / "again").iterdir())
     for path in first:

@@ -107,7 +107,7 @@ def moves(work: Callable[[], object]) -> list[float]:
     return sorted(set(shares))
 
 
-def test_judging_and_comparing_tell_how_far_they_are(recording, tmp_path):
+def test_judging_and_comparing_tell_how_far_they_are(recording, small_plots, tmp_path):
     run = tmp_path / "run"
     truth = str(recording / "gt.csv")
     assert main(["track", str(recording / "detections.csv"), "--out", str(run), "--config", "highway"]) == 0
@@ -122,7 +122,8 @@ def test_judging_and_comparing_tell_how_far_they_are(recording, tmp_path):
     )
     assert len(compared) > len(measured.tracks)
     assert len(moves(lambda: measured_run(run))) >= 60  # tracked again: as many as there were steps
-    assert len(moves(lambda: _compare(run, truth))) > len(measured.tracks)  # as `report` does it
+    with small_plots():
+        assert len(moves(lambda: _compare(run, truth))) > len(measured.tracks)  # as `report` does it
 
 
 def _compare(run: Path, truth: str) -> object:

@@ -101,13 +101,14 @@ def recording(tmp_path_factory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def full_run(recording, tmp_path_factory) -> SimpleNamespace:
+def full_run(recording, tmp_path_factory, small_plots) -> SimpleNamespace:
     """A run with all its tables, its truth, and its page."""
     out = tmp_path_factory.mktemp("run") / "run"
     assert main(["track", str(recording / "detections.csv"), "--out", str(out), "--diagnostics"]) == 0
     page = out.parent / "page.html"
     truth = recording / "gt.csv"
-    assert main(["report", str(out), "--gt", str(truth), "--out", str(page)]) == 0
+    with small_plots():
+        assert main(["report", str(out), "--gt", str(truth), "--out", str(page)]) == 0
     return SimpleNamespace(run=out, truth=truth, page=page, html=Page(page.read_text(encoding="utf-8")))
 
 
