@@ -24,7 +24,7 @@ def data(tmp_path_factory):
     """Two short simulated recordings, laid out as the real ones are."""
     folder = tmp_path_factory.mktemp("data")
     for seed in (5, 6):
-        one = simulated("day-sparse", seed, 0.8)
+        one = simulated("day-sparse", seed, 0.5)
         renamed = replace(one.detections, sensors=("lidar", "rgb"))
         path = folder / "kitti" / f"{seed:04d}"
         path.mkdir(parents=True)
