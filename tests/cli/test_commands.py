@@ -9,8 +9,6 @@ import pytest
 
 from jeat_graph.cli.main import COMMANDS, main
 
-from .conftest import as_user
-
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_each_command_explains_itself(command, capsys):
@@ -58,7 +56,7 @@ def test_wrong_usage_exits_with_2(arguments, capsys):
 
 
 def test_a_process_shows_no_progress_bar_and_no_traceback_in_a_pipe(recording, tmp_path, call):
-    good = as_user("track", recording / "detections.csv", "--out", tmp_path / "run")
+    good = call("track", recording / "detections.csv", "--out", tmp_path / "run")
     assert good.returncode == 0
     assert good.stdout.endswith(f"wrote {tmp_path / 'run'}\n")
     assert "%|" not in good.stderr

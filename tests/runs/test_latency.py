@@ -27,7 +27,7 @@ def delayed(detections, by=LATENCY_S):
 
 @pytest.fixture(scope="module")
 def recorded():
-    detections, truth = simulate("night", duration_s=2.5, seed=2)
+    detections, truth = simulate("night", duration_s=1.5, seed=2)
     t, sensor, boxes, scores, empty, _ = detections.to_rows()
     detections = Detections.from_rows(np.round(t * 1024.0) / 1024.0, sensor, boxes, scores, empty)
     return detections, truth
