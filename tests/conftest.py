@@ -108,7 +108,7 @@ def call(start):
 
 @pytest.fixture(scope="session")
 def small_plots():
-    """A context in which plots of a comparison are coarse and of one track: else they take most of the time."""
+    """A context in which plots of a comparison are coarse, and of one track: most of the time goes there."""
     from jeat_graph.drawing import comparison
 
     @contextmanager

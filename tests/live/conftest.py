@@ -18,15 +18,15 @@ sys.modules["live_tests"] = _package
 
 @pytest.fixture(scope="session")
 def simulated(tmp_path_factory):
-    """Make `detections.csv` and `gt.csv` of some simulated seconds, once a seed and duration; the folder."""
-    made: dict[tuple[int, float], Path] = {}
+    """Make `detections.csv` and `gt.csv` of some simulated seconds, once for the same; the folder."""
+    made: dict[tuple[int, float, str], Path] = {}
 
-    def make(seed: int, duration_s: float = 1.0) -> Path:
-        key = (seed, duration_s)
+    def make(seed: int, duration_s: float = 1.0, scenario: str = "night") -> Path:
+        key = (seed, duration_s, scenario)
         if key not in made:
             folder = tmp_path_factory.mktemp("simulated")
             options = ["--duration", str(duration_s), "--seed", str(seed)]
-            assert main(["simulate", "night", "--out", str(folder), *options]) == 0
+            assert main(["simulate", scenario, "--out", str(folder), *options]) == 0
             made[key] = folder
         return made[key]
 

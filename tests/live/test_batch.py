@@ -24,7 +24,7 @@ def manifest(tmp_path, simulated):
     def write(count: int, *more: str) -> Path:
         lines = ["name,detections,gt,set"]
         for k in range(count):
-            folder = simulated(k % 3)
+            folder = simulated(k % 3, scenario="night-sparse")
             lines.append(
                 f"r{k:02},{folder / 'detections.csv'},{folder / 'gt.csv'},output.min_existence=0.{k:02}"
             )
@@ -68,7 +68,7 @@ def test_a_batch_makes_the_runs_of_track_and_pools_their_scores(manifest, tmp_pa
 
 
 def test_with_a_camera_each_run_has_its_speeds_on_the_road(tmp_path, simulated):
-    folder, path, out = simulated(0), tmp_path / "m.csv", tmp_path / "out"
+    folder, path, out = simulated(0, scenario="night-sparse"), tmp_path / "m.csv", tmp_path / "out"
     path.write_text(
         "name,detections,camera\n"
         + "".join(
