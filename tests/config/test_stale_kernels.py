@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -23,15 +25,26 @@ def product(x):
 """
 APART = "from numba import njit\n@njit(cache=True)\ndef half(x):\n    return x / 2\n"
 RUN = """
-import pathlib, sys
-sys.path.insert(0, {folder!r})
+import os, pathlib, sys
+from numba import njit
 from jeat_graph.config.stale_kernels import drop_stale
-cache = {cache!r}
-gone = drop_stale({{"house": pathlib.Path({folder!r}) / "house"}}, cache and pathlib.Path(cache))
-from house.outer import product
-from house.apart import half
-half(1.0)
-print(product(21), gone, len(half.stats.cache_hits))
+
+def run(folder, cache):
+    sys.path.insert(0, folder)
+    gone = drop_stale({"house": pathlib.Path(folder) / "house"}, pathlib.Path(cache) if cache else None)
+    from house.outer import product
+    from house.apart import half
+    half(1.0)
+    print(product(21), gone, len(half.stats.cache_hits), flush=True)
+
+njit(lambda x: x)(1)  # what the compiler loads at its first use, each of the processes below has
+for _ in sys.stdin:
+    child = os.fork()
+    if not child:
+        run(*sys.argv[1:])
+        os._exit(0)
+    if os.waitpid(child, 0)[1]:
+        print("failed", flush=True)
 """
 
 
@@ -49,30 +62,40 @@ def house(tmp_path):
     return folder
 
 
-def answers(house: Path, cache: Path | None) -> list[int]:
+@contextlib.contextmanager
+def processes(house: Path, cache: Path | None) -> Iterator[Callable[[], list[int]]]:
+    """Give a function: what the next process that knows nothing of the house has to say."""
     environment = {k: v for k, v in os.environ.items() if not k.startswith("NUMBA_")}
     if cache:
         environment["NUMBA_CACHE_DIR"] = str(cache)
-    script = RUN.format(folder=str(house.parent), cache=str(cache) if cache else None)
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, env=environment, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    return [int(word) for word in done.stdout.split()]
+    command = [sys.executable, "-c", RUN, str(house.parent), str(cache or "")]
+    with subprocess.Popen(command, stdin=-1, stdout=-1, text=True, env=environment) as mother:
+        assert mother.stdin is not None
+        assert mother.stdout is not None
+
+        def answers() -> list[int]:
+            mother.stdin.write("\n")
+            mother.stdin.flush()
+            return [int(word) for word in mother.stdout.readline().split()]
+
+        yield answers
+        mother.stdin.close()
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes cannot be forked here")
 @pytest.mark.parametrize(
     "apart", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["beside the sources", "in a cache"]
 )
 def test_a_kernel_whose_callee_changed_is_compiled_anew_and_no_other(house, tmp_path, apart):
     cache = tmp_path / "cache" if apart else None
-    product, gone, kept = answers(house, cache)
-    assert (product, kept) == (42, 0)
-    product, gone, kept = answers(house, cache)
-    assert (product, gone, kept) == (42, 0, 1)
-    (house / "inner.py").write_text(INNER.format(factor=30), encoding="utf-8")
-    product, gone, kept = answers(house, cache)
-    assert (product, gone, kept) == (630, 2, 1)
+    with processes(house, cache) as answers:
+        product, gone, kept = answers()
+        assert (product, kept) == (42, 0)
+        product, gone, kept = answers()
+        assert (product, gone, kept) == (42, 0, 1)
+        (house / "inner.py").write_text(INNER.format(factor=30), encoding="utf-8")
+        product, gone, kept = answers()
+        assert (product, gone, kept) == (630, 2, 1)
 
 
 def test_code_of_unknown_origin_is_not_used(house):
