@@ -81,6 +81,8 @@ def test_indicators_of_varied_worlds_flash_in_amber(light):
                     assert (red == 0.0).mean() == pytest.approx(0.5, abs=0.1)
                     changes = np.count_nonzero(np.diff((red > 0.0).astype(int)) == 1)
                     assert abs(changes - 2.0 * look.blink_hz[v]) <= 1.0
+        if found:
+            break  # it takes a world or two until somebody is parked so, and another one shows nothing new
     assert found > 0
 
 
