@@ -187,7 +187,7 @@ def test_nothing_on_the_road_is_no_vehicle() -> None:
 
 def test_the_commands_offer_both(tmp_path: Path) -> None:
     sim, run, found = tmp_path / "sim", tmp_path / "run", {}
-    assert main(["simulate", "day-sparse", "--out", str(sim), "--duration", "1", "--seed", "2"]) == 0
+    assert main(["simulate", "day-sparse", "--out", str(sim), "--duration", "1.5", "--seed", "2"]) == 0
     camera_file = ["--camera", str(sim / "camera.yaml")]
     track = ["track", str(sim / "detections.csv"), "--config", "highway", "--out", str(run), *camera_file]
     assert main([*track, "--set", "smoother.road=graph"]) == 0

@@ -52,6 +52,7 @@ def test_a_network_learns_events_by_heart(small_set, tmp_path):
 slow = pytest.mark.slow
 
 
+@pytest.mark.usefixtures("no_plot")
 @pytest.mark.parametrize(
     "kind", ["frames", pytest.param("events", marks=slow), pytest.param("fused", marks=slow)]
 )
