@@ -101,7 +101,7 @@ def two_sensors(known):
     """The same vehicles seen by `rgb` and by `far`, whose stamps are two scans late."""
     out = []
     for seed in (0, 1):
-        detections, truth = known.recording(seed, duration_s=8.0, bias=(0.0, 0.0, 0.0, 0.0))
+        detections, truth = known.recording(seed, duration_s=12.0, bias=(0.0, 0.0, 0.0, 0.0))
         rng = np.random.default_rng(100 + seed)
         second = late(known.detect(rng, truth, "far", (0.0, 0.0, 0.0, 0.0)), 0.1)
         out.append((Detections.concatenate([detections, second]), truth))
@@ -116,7 +116,7 @@ def calibrated(two_sensors):
 def test_with_truth_a_late_sensor_is_found_and_its_latency_stored(calibrated):
     found = calibrated
     assert [lag.sensor for lag in found.lags if lag.found] == ["far"]
-    # Vehicles drive at 150 to 300 px/s and are measured to 2 px: two dozen of them tell 1 ms.
+    # Vehicles drive at 150 to 300 px/s and are measured to 2 px: a hundred of them tell 2 ms.
     assert found.config.sensors["far"].latency_s == pytest.approx(0.1, abs=0.005)
     assert found.config.sensors["rgb"].latency_s == 0.0
     # What the lag would have been taken for.

@@ -83,8 +83,8 @@ def test_variance_of_a_cut_box_owns_up_to_the_unknown_size(tracked):
     assert ratio[a_third].max() < 9.0
 
 
-# With a lag the size of the first sliver is a guess for ever: a tenth of the car.
-@pytest.mark.parametrize(("engine", "off"), [("rts", 8.0), ("fixed-lag-rts", 12.0), ("fixed-lag", 12.0)])
+# With a lag the size of the first sliver is a guess for ever: an eighth of the car.
+@pytest.mark.parametrize(("engine", "off"), [("rts", 8.0), ("fixed-lag-rts", 16.0), ("fixed-lag", 16.0)])
 def test_smoothed_boxes_end_where_what_shows_does(engine, off):
     _, smoothed, shown = crossing(3.0, engine=engine)
     assert len(smoothed) >= len(shown) - 2

@@ -34,7 +34,7 @@ def size_density_of(tracks: TrackArrays, track: IntArray, settings: Settings) ->
 
 @inner
 def choose_resizing(tracks: TrackArrays, n: int, dt: float, scene: SceneState, model: Model) -> None:
-    """Say by which factor each track's size changes harder than usual over the next `dt` seconds, in place."""
+    """Say how much harder than usual each track's size changes over the next `dt` seconds, in place."""
     size = model.settings.size
     relax_weights(tracks.size_weight[:n], scene.usual_resizing, dt, size.change_memory_s)
     usual = mean_factor(scene.usual_resizing, size.calm_step, size.change_step)
