@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from jeat_graph.filters.kalman import predict_size
+from jeat_graph.filters.kalman import predict_size, update_block
 from jeat_graph.filters.manoeuvre import density_factor, mean_factor, prior_weights, relax_weights
 from jeat_graph.filters.motion import size_process_noise, size_transition
-from jeat_graph.filters.resizing import weigh_resizing
+from jeat_graph.filters.resizing import resizing_density, weigh_resizing
 
 CALM, CHANGE, USUAL, DT = 4.0, 8.0, 0.4, 1 / 15
 DENSITIES = USUAL * np.array([density_factor(k, CALM, CHANGE) for k in range(3)])
@@ -115,3 +115,31 @@ def test_one_odd_box_does_not_decide():
     weigh_resizing(mean, cov, weight, np.full(2, 5.0), R, WHOLE, 1.0)
     assert weight[0] / weight[2] > 0.99 * calm * math.exp(-3.0)
     assert prior_weights(0.0, 0.0).tolist() == [0.0, 1.0, 0.0]
+
+
+def test_what_passes_at_constant_speed_is_followed_by_the_calmest():
+    """Its size goes with 1 / (t0 - t): a calm filter that knows of perspective lags by a good half."""
+    lags = []
+    for per_growth in (0.0, 1.0):
+        mean, cov = np.zeros((1, 2, 2)), np.zeros((1, 2, 2, 2))
+        cov[...] = np.diag([R[0], 0.7**2])
+        off = []
+        for k in range(1, 40):
+            true = math.log(3.0 / (3.0 - k * DT))
+            density = resizing_density(mean[0], DENSITIES[0], per_growth)
+            predict_size(mean, cov, np.array([density]), DT)
+            for side in range(2):
+                off.append(abs(true - mean[0, side, 0]))
+                update_block(mean[0, side], cov[0, side], true, R[side])
+        lags.append(max(off))
+    assert lags[1] < 0.6 * lags[0]
+
+
+def test_perspective_takes_growth_that_both_sides_share():
+    both, one = np.array([[4.0, 0.49], [4.0, 0.64]]), np.array([[4.0, 0.49], [4.0, -0.64]])
+    assert resizing_density(both, 0.1, 2.0) == pytest.approx(math.hypot(0.1, 2.0 * 0.343))
+    assert resizing_density(one, 0.1, 2.0) == 0.1
+    assert resizing_density(both, 0.1, 0.0) == 0.1
+    shrinking = both * np.array([1.0, -1.0])
+    assert resizing_density(shrinking, 0.1, 2.0) == resizing_density(both, 0.1, 2.0)
+    assert resizing_density(both * 1e6, 0.1, 1.0) == pytest.approx(math.hypot(0.1, 8.0))
