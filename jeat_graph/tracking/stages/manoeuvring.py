@@ -45,6 +45,24 @@ def choose_jerk(tracks: TrackArrays, n: int, dt: float, scene: SceneState, model
 
 
 @inner
+def follow_usual(usual: FloatArray, weight: FloatArray, confirmed: BoolArray, n: int, dt: float) -> None:
+    """Follow the weights (K,) that are usual of the confirmed among the first `n` tracks, in place.
+
+    Each confirmed track counts for the seconds that it lasts; what is older than a while is forgotten.
+    """
+    count, share = 0, np.zeros(len(usual))
+    for i in range(n):
+        if confirmed[i]:
+            count += 1
+            for k in range(len(usual)):
+                share[k] += weight[i, k]
+    if count:
+        gain = count * dt / (USUAL_JERK_S + count * dt)
+        for k in range(len(usual)):
+            usual[k] += gain * (share[k] / count - usual[k])
+
+
+@inner
 def predict_manoeuvring(
     tracks: TrackArrays, n: int, dt: float, unseen: BoolArray, scene: SceneState, model: Model
 ) -> None:
@@ -52,9 +70,7 @@ def predict_manoeuvring(
     motion = model.settings.motion
     K = tracks.jerk_weight.shape[1]
     jerk, lost = np.empty(n * K), np.empty(n * K, dtype=np.bool_)
-    confirmed, share = 0, np.zeros(K)
     for i in range(n):
-        confirmed += 1 if tracks.confirmed[i] else 0
         for k in range(K):
             jerk[i * K + k] = track_jerk(
                 tracks.size_mean[i],
@@ -64,15 +80,9 @@ def predict_manoeuvring(
                 density_factor(k, motion.calm_step, motion.manoeuvre_step),
             )
             lost[i * K + k] = unseen[i]
-            if tracks.confirmed[i]:
-                share[k] += tracks.jerk_weight[i, k]
     mean, cov, time = tracks.jerk_mean[:n], tracks.jerk_cov[:n], model.sensors.correlation_time_s
     predict_manoeuvres(mean, cov, jerk, time, dt, lost, motion.unseen_memory_s)
-    if confirmed:
-        # Each confirmed track counts for the seconds that it lasts; what is older than a while is forgotten.
-        gain = confirmed * dt / (USUAL_JERK_S + confirmed * dt)
-        for k in range(K):
-            scene.usual_jerk[k] += gain * (share[k] / confirmed - scene.usual_jerk[k])
+    follow_usual(scene.usual_jerk, tracks.jerk_weight, tracks.confirmed, n, dt)
 
 
 @inner

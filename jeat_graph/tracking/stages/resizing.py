@@ -14,8 +14,8 @@ from jeat_graph.filters.resizing import resizing_density, weigh_resizing
 from jeat_graph.filters.running_mean import take_into_mean
 from jeat_graph.tracking.batch import Measured
 from jeat_graph.tracking.stages.inner import inner
-from jeat_graph.tracking.stages.manoeuvring import INNOVATIONS_S, LEAST_INNOVATION
-from jeat_graph.tracking.state import USUAL_JERK_S, SceneState, TrackArrays
+from jeat_graph.tracking.stages.manoeuvring import INNOVATIONS_S, LEAST_INNOVATION, follow_usual
+from jeat_graph.tracking.state import SceneState, TrackArrays
 
 # One odd box counts for no more than what one in a hundred exceeds (chi squared, one degree of freedom).
 _MOST_NIS = 6.6
@@ -50,24 +50,17 @@ def predict_resizing(
     """Predict the sizes of the first `n` tracks under every density, and learn what is usual, in place."""
     size, K = model.settings.size, tracks.size_weight.shape[1]
     density, lost = np.empty(n * K), np.empty(n * K, dtype=np.bool_)
-    confirmed, share = 0, np.zeros(K)
     for i in range(n):
-        confirmed += 1 if tracks.confirmed[i] else 0
         for k in range(K):
             alone = size.rate_density * density_factor(k, size.calm_step, size.change_step)
             density[i * K + k] = resizing_density(tracks.size_mean[i], alone, size.density_per_growth)
             lost[i * K + k] = unseen[i]
-            if tracks.confirmed[i]:
-                share[k] += tracks.size_weight[i, k]
     mean = tracks.size_trial_mean[:n].reshape((n * K, 2, 2))
     cov = tracks.size_trial_cov[:n].reshape((n * K, 2, 2, 2))
     predict_size(mean, cov, density, dt)
     if model.settings.motion.unseen_memory_s > 0.0:
         forget_growth(mean, cov, lost, dt, model.settings.motion.unseen_memory_s)
-    if confirmed:
-        gain = confirmed * dt / (USUAL_JERK_S + confirmed * dt)
-        for k in range(K):
-            scene.usual_resizing[k] += gain * (share[k] / confirmed - scene.usual_resizing[k])
+    follow_usual(scene.usual_resizing, tracks.size_weight, tracks.confirmed, n, dt)
 
 
 @inner
