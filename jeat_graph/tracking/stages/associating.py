@@ -17,7 +17,7 @@ from jeat_graph.association.overlap import overlap
 from jeat_graph.config.kernel_form import Model, Settings
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.tracking.batch import Batch
-from jeat_graph.tracking.stages.inner import inner
+from jeat_graph.tracking.stages.inner import inlined, inner
 from jeat_graph.tracking.stages.predicting import Expectation
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
@@ -141,7 +141,7 @@ def associate(
     return Association(match, evidence, taken)
 
 
-@inner
+@inlined
 def excuse_misfits(
     tracks: TrackArrays, n: int, batch: Batch, association: Association, p_detect: FloatArray, model: Model
 ) -> None:

@@ -21,7 +21,7 @@ def compares(model: Model) -> bool:
     return bool(len(model.sensors.bias_std) > 1 and np.max(model.sensors.bias_std) > 0.0)
 
 
-@inner
+@inlined
 def learn_boxes(
     tracks: TrackArrays, n: int, batch: Batch, association: Association, scene: SceneState, model: Model
 ) -> None:

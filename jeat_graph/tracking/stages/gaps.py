@@ -12,14 +12,14 @@ from jeat_graph.filters.gaps import count_right, count_wrong
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.reporting import is_believed, is_whole, waited_for
 from jeat_graph.tracking.stages.associating import Association
-from jeat_graph.tracking.stages.inner import inner
+from jeat_graph.tracking.stages.inner import inlined, inner
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
 # By this intersection over union the tables are judged.
 _FITS = 0.5
 
 
-@inner
+@inlined
 def learn_found(
     tracks: TrackArrays, n: int, batch: Batch, association: Association, scene: SceneState, model: Model
 ) -> None:
@@ -61,7 +61,7 @@ def learn_lost(t_missed: float, t_update: float, scene: SceneState, model: Model
         count_wrong(scene.gap_share, scene.gap_seen, t_missed - t_update, False, memory)
 
 
-@inner
+@inlined
 def note_missed(tracks: TrackArrays, n: int, batch: Batch, scene: SceneState, model: Model) -> None:
     """Note down, in place, which of the first `n` tracks are missed now that would else be reported.
 

@@ -9,7 +9,7 @@ from jeat_graph.data.arrays import FloatArray
 from jeat_graph.filters.existence import existence_after_miss, hidden_after_miss
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.associating import Association
-from jeat_graph.tracking.stages.inner import inner
+from jeat_graph.tracking.stages.inner import inlined, inner
 from jeat_graph.tracking.stages.worth import weigh_witness
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
@@ -33,7 +33,7 @@ def scan_weight(s: int, model: Model) -> float:
     return min(model.sensors.period_s[s] / memory_s, 1.0) if memory_s > 0.0 else 0.0
 
 
-@inner
+@inlined
 def count_looks(
     tracks: TrackArrays,
     n: int,

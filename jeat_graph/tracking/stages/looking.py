@@ -8,7 +8,7 @@ from jeat_graph.config.kernel_form import Model
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.filters.field_of_view import extend_field, in_field
 from jeat_graph.tracking.batch import Batch
-from jeat_graph.tracking.stages.inner import inner
+from jeat_graph.tracking.stages.inner import inlined, inner
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
 # A track of fewer detections may be a false thing that came twice.
@@ -21,7 +21,7 @@ def learns_fields(scene: SceneState) -> bool:
     return bool(scene.claims.shape[1] > 1)
 
 
-@inner
+@inlined
 def extend_fields(batch: Batch, scene: SceneState) -> None:
     """Let each sensor's field reach as far as its boxes do, in place.
 
@@ -32,7 +32,7 @@ def extend_fields(batch: Batch, scene: SceneState) -> None:
             extend_field(batch.boxes[j], scene.field[batch.sensor[j]])
 
 
-@inner
+@inlined
 def count_witnesses(tracks: TrackArrays, n: int, match: IntArray, scene: SceneState) -> None:
     """Count by how many vehicles each sensor has shown where it looks, in place.
 

@@ -14,7 +14,7 @@ from jeat_graph.filters.blindness import (
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.stages.associating import Association
 from jeat_graph.tracking.stages.beginning import birth_existence
-from jeat_graph.tracking.stages.inner import inner
+from jeat_graph.tracking.stages.inner import inlined, inner
 from jeat_graph.tracking.stages.trust import looks_too
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
@@ -28,7 +28,7 @@ def others_look(s: int, t: float, scene: SceneState, model: Model) -> bool:
     return looking
 
 
-@inner
+@inlined
 def judge_sight(
     tracks: TrackArrays,
     n: int,

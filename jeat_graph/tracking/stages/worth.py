@@ -97,7 +97,7 @@ def weigh_witness(tracks: TrackArrays, i: int, s: int, evidence: float, settings
             tracks.seen_by[i] = others
 
 
-@inner
+@inlined
 def learn_lasting(
     tracks: TrackArrays, n: int, batch: Batch, association: Association, scene: SceneState, model: Model
 ) -> None:
@@ -155,7 +155,7 @@ def learn_ended(tracks: TrackArrays, i: int, scene: SceneState, model: Model) ->
             take_into_mean(scene.vain, scene.vain_seen, s, 1.0, again, lifecycle.worth_memory_s)
 
 
-@inner
+@inlined
 def doubt_scores(batch: Batch, scene: SceneState, model: Model) -> None:
     """Believe no score of a batch more than what lasts has borne out so far, in place."""
     if not model.settings.lifecycle.judges_worth:
