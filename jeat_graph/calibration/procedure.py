@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from jeat_graph.calibration.cuts import folds, shorten
+from jeat_graph.calibration.learning import LEARNT, choose_learnt, learn_sensors
 from jeat_graph.calibration.matches import SensorMatches, match_sensor
 from jeat_graph.calibration.offset import (
     Lag,
@@ -57,7 +58,7 @@ class Calibration:
 
 def steps_with_truth(config: Config) -> int:
     """How often `calibrate_with_truth` calls its `progress` at most."""
-    return len(PARTS) + _PASSES * len(tuned_settings(config)) + 2
+    return len(PARTS) + _PASSES * len(tuned_settings(config)) + 3
 
 
 def calibrate_with_truth(
@@ -97,6 +98,11 @@ def calibrate_with_truth(
         parts = (*parts, fits)
     if progress is not None:
         progress(SCORE_FIT)
+    config, learnt = choose_learnt(config, short)
+    if learnt is not None:
+        parts = (*parts, learnt)
+    if progress is not None:
+        progress(LEARNT)
     config = measure_written_variances(config, short, base.output)
     halves = folds(short)
     score = judge([config] * len(halves), halves).mean
@@ -111,12 +117,13 @@ def calibrate_with_truth(
 
 
 def calibrate_without_truth(recordings: Sequence[Detections], base: Config) -> Calibration:
-    """Calibrate from recordings alone: which sensors there are, how often they look, and their clocks.
+    """Calibrate from recordings alone: which sensors there are, their rates, clocks and worth.
 
     Confirmed tracks could stand in for truth, and say how many boxes are false, how many vehicles are missed
     and how large the errors are. Of real recordings they say it wrongly (tracks are confirmed on false boxes
     that repeat, and errors that last look like motion), and configurations that believed any of it tracked
-    worse than the base: half a point to ten of IDF1. All of that the tracker learns while it runs.
+    worse than the base: half a point to ten of IDF1. All of that the tracker learns while it runs. What it
+    learns of how far scores and sensors are to be believed is taken along (`learning`).
 
     Args:
         recordings: detections, with the latencies that `base` knows taken off their times.
@@ -140,7 +147,9 @@ def calibrate_without_truth(recordings: Sequence[Detections], base: Config) -> C
     lags = settled(find, with_progress(range(_ROUNDS)))
     association = replace(base.association, priority=())
     config = replace(base, association=association, input=InputConfig(picture=base.input.picture))
-    if found_lags(lags):
+    late_s = found_lags(lags)
+    config = learn_sensors([taken_off(detections, late_s) for detections in recordings], config)
+    if late_s:
         config = earliest_on_time(with_lags(config, lags))
     return Calibration(config, tuple(lags))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 from jeat_graph.config.schema import Config
@@ -38,6 +38,8 @@ def _section(section: Any, digits: int) -> Any:
 def _value(value: Any, digits: int) -> Any:
     if isinstance(value, float):
         return float(f"{value:.{digits}g}")
+    if is_dataclass(value):
+        return _section(value, digits)
     if isinstance(value, tuple):
         return tuple(_value(v, digits) for v in value)
     return value

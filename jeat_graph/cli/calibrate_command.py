@@ -158,7 +158,8 @@ def _without_truth(recordings: list[Detections], base: Config) -> Calibration:
     from jeat_graph.calibration.procedure import calibrate_without_truth
 
     print(
-        "no --gt: noise, reliability and motion cannot be known, and stay as in the base",
+        "no --gt: noise, reliability and motion cannot be known, and stay as in the base; what tracking "
+        "teaches of the sensors is taken along",
         file=sys.stderr,
     )
     with stages("calibrate", 1) as stage:
@@ -204,7 +205,8 @@ def describe(args: argparse.Namespace, picture: str, found: Calibration) -> str:
     else:
         lines += [
             "which sensors there are, their rates and their clocks: from the recordings, without truth.",
-            "noise, reliability and motion cannot be known without truth and stay as in the base.",
+            "noise, reliability and motion cannot be known without truth and stay as in the base;",
+            "sensors.*.learnt: what tracking these recordings taught of the sensors, to begin with.",
         ]
     lines += [f"image: from {picture}; all else from the base configuration {Path(args.config).name}."]
     return "\n".join(lines)
@@ -249,6 +251,19 @@ def summary(config: Config, found: Calibration) -> list[Table]:
         Table.from_records(sensors, title="Sensors", digits=digits),
         Table.from_records([motion], title="Motion"),
     ]
+    learnt: list[dict[str, Cell]] = [
+        {
+            "sensor": name,
+            "seen by others (s)": known.agreed_s,
+            "by it alone (s)": known.lonely_s,
+            "came to nothing (%)": 100.0 * known.vain,
+            "trust": known.trust,
+        }
+        for name, s in sorted(config.sensors.items())
+        if (known := s.learnt) is not None
+    ]
+    if learnt:
+        tables.append(Table.from_records(learnt, title="What tracking taught of the sensors"))
     if found.parts:
         parts: list[dict[str, Cell]] = [
             {"part": c.part, "gain on recordings left out": c.gain, "kept": "yes" if c.kept else "no"}

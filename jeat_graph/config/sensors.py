@@ -6,6 +6,7 @@ import itertools
 from dataclasses import dataclass, field
 
 from jeat_graph.config.fields import LARGEST, Section, choice, number
+from jeat_graph.config.learnt import LearntConfig
 from jeat_graph.data.errors import ConfigError
 
 #: A score never says that a box is more exact, or less, than this against what its sensor's usually are.
@@ -93,6 +94,10 @@ class SensorConfig(Section):
     )
     late_s: float | None = number(
         None, "s", "how late its scans may come in live use, if not as live.late_s says"
+    )
+    learnt: LearntConfig | None = field(
+        default=None,
+        metadata={"doc": "what was learnt of it in other recordings, to begin with"},
     )
 
     @property

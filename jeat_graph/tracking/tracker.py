@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.config.kernel_form import kernel_model
+from jeat_graph.config.learnt import LearntConfig
 from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import BoolArray, IntArray, RecordArray
@@ -24,6 +25,7 @@ from jeat_graph.tracking.classes import ClassTally, check_names, count_votes
 from jeat_graph.tracking.compaction import allocate, grow
 from jeat_graph.tracking.direct_call import DirectCall
 from jeat_graph.tracking.input_watch import InputWatch
+from jeat_graph.tracking.learnt import begin_with, learnt_of
 from jeat_graph.tracking.notice import notice_if_cold
 from jeat_graph.tracking.prediction import Prediction, predict_reported
 from jeat_graph.tracking.reporting import as_table, longest_gaps_s, report
@@ -74,7 +76,7 @@ class Tracker(SavedTracks):
         choices = config.motion.densities, config.size.densities
         num_errors = len(sensors.correlation_time_s)
         self._tracks = allocate(_FIRST_CAPACITY, len(self.sensor_names), num_errors, *choices)
-        self._scene = start_scene(sensors, config)
+        self._scene = begin_with(start_scene(sensors, config), config)
         self._num_tracks = 0
         self._next_id = 1
         self._t: float | None = None
@@ -203,6 +205,10 @@ class Tracker(SavedTracks):
     def sensor_states(self) -> dict[str, SensorState]:
         """Return what has been learnt of each sensor: clutter, detection probability, noise."""
         return sensor_states(self.snapshot(), self.sensor_names)
+
+    def learnt(self) -> dict[str, LearntConfig]:
+        """Return what has been learnt of the sensors that have looked: `sensors.NAME.learnt` of the next."""
+        return learnt_of(self._scene, self.config)
 
     def predict(self, t: float) -> Prediction:
         """Say where the tracks that are reported now will be at a time, and how surely.

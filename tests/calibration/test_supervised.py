@@ -9,6 +9,7 @@ from jeat_graph.calibration.matches import match_sensor
 from jeat_graph.calibration.measured import measured_tracks
 from jeat_graph.calibration.parts import SENSOR_PARTS
 from jeat_graph.calibration.supervised import calibrate
+from jeat_graph.config.learnt import LearntConfig
 from jeat_graph.config.reading import load_config
 from jeat_graph.config.schema import SensorConfig
 from jeat_graph.data.detections import Detections
@@ -78,7 +79,8 @@ def test_all_else_is_the_base_configuration(found):
 def test_each_field_of_a_sensor_is_estimated_or_else_the_bases(recordings):
     """From two bases that agree in nothing: what comes out alike is estimated, all else is carried over."""
     kept = {"tempering": 0.35, "disagreement": 3.0, "latency_s": 0.01, "late_s": 0.2, "least_overlap": 0.4}
-    tracked = {"score_fit": ((0.0, 0.1), (1.0, 0.9))}  # found by tracking, not of detections
+    # Found by tracking, not of detections.
+    tracked = {"score_fit": ((0.0, 0.1), (1.0, 0.9)), "learnt": LearntConfig(vain=0.3)}
     kept |= tracked
     estimated = {
         "rate_hz": 17.0,
