@@ -6,7 +6,7 @@ import argparse
 import dataclasses
 import io
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, get_args, get_type_hints
 
 from sphinx.application import Sphinx
 
@@ -93,7 +93,23 @@ def configuration_page() -> str:
         out.append(f"## {title}\n\n{about}{note}\n\n{head}\n|---|---|{'---|' * len(_PRESETS)}---|---|")
         out += [_row(title, item, values) for item in dataclasses.fields(section)]
         out.append("")
+        out += _inner_sections(title, section)
     return "\n".join(out)
+
+
+def _inner_sections(title: str, section: Any) -> list[str]:
+    """Write the sections that stand in fields of a section and that no preset has: their settings' defaults."""
+    out = []
+    for name, hint in get_type_hints(section).items():
+        inner = next((kind for kind in (hint, *get_args(hint)) if dataclasses.is_dataclass(kind)), None)
+        if inner is None:
+            continue
+        about = (inner.__doc__ or "").strip().split("\n\n")[0]
+        head = "| setting | meaning | default | unit | range |\n|---|---|---|---|---|"
+        out.append(f"## {title}.{name}\n\n{about}\n\n{head}")
+        out += [_row(f"{title}.{name}", item, [inner()]) for item in dataclasses.fields(inner)]
+        out.append("")
+    return out
 
 
 def _value_of_mapping(kind: Any) -> Any:
@@ -119,6 +135,8 @@ def _row(section: str, item: dataclasses.Field[Any], sections: list[Any]) -> str
 
 def _span(low: float, high: float, above: bool) -> str:
     """Bounds in words: an upper one that nothing reaches is none."""
+    if high >= _NO_BOUND and low <= -_NO_BOUND:
+        return "any number"
     if high >= _NO_BOUND:
         return f"{'>' if above else '≥'} {low:g}"
     return f"{f'above {low:g}' if above else f'{low:g}'} to {high:g}"
