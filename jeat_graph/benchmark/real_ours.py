@@ -50,7 +50,7 @@ def rows_of(one: RealSet, calibrate: bool) -> list[OursOnSet]:
     out.append(OursOnSet("default without disagreement", every, changes=("lifecycle.disagreement=0.0",)))
     if calibrate and len(one.recordings) > 1:
         out += [OursOnSet(how, every, how) for how in (BLIND, TRUTH)]
-        out += [OursOnSet(f"{TRUTH}, {s[0]}", s, TRUTH) for s in one.streams[:-1]]
+        out += [OursOnSet(f"{how}, {s[0]}", s, how) for s in one.streams[:-1] for how in (BLIND, TRUTH)]
     return out
 
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 from jeat_graph.calibration.cuts import folds
 from jeat_graph.calibration.parts import PartChoice
 from jeat_graph.calibration.supervised import Recording
-from jeat_graph.calibration.verdict import judge
+from jeat_graph.calibration.verdict import CHANCE, judge, scene_error
 from jeat_graph.config.learnt import LearntConfig
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
@@ -54,7 +54,8 @@ def learn_sensors(recordings: Sequence[Detections], config: Config) -> Config:
 def choose_learnt(config: Config, recordings: Sequence[Recording]) -> tuple[Config, PartChoice | None]:
     """Learn of the sensors, and keep it unless it loses on recordings that it was not learnt from.
 
-    A tracker learns the same in any case, only later, so it need not win by more than chance.
+    A tracker learns the same in any case, only later, so it need not win: to be left out it has to lose by
+    more than scenes scatter.
 
     Returns:
         The configuration, and what was decided; None where there are too few recordings to decide, or the
@@ -65,13 +66,18 @@ def choose_learnt(config: Config, recordings: Sequence[Recording]) -> tuple[Conf
         return config, None
     now = judge([config] * len(parts), parts)
     then = judge([learn_sensors(_detections(other), config) for other in reversed(parts)], parts)
-    kept = then.mean >= now.mean
+    kept = then.mean >= now.mean - max(CHANCE, scene_error(recordings))
     choice = PartChoice(LEARNT, kept, then.mean - now.mean)
     return (learn_sensors(_detections(recordings), config) if kept else config), choice
 
 
 def _detections(recordings: Sequence[Recording]) -> list[Detections]:
     return [detections for detections, _ in recordings]
+
+
+def without_learnt(config: Config) -> Config:
+    """Return the configuration as if nothing had been learnt of its sensors before."""
+    return replace(config, sensors={name: replace(s, learnt=None) for name, s in config.sensors.items()})
 
 
 def _with_learnt(config: Config, learnt: Mapping[str, LearntConfig]) -> Config:

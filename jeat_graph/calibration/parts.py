@@ -19,6 +19,7 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import DataError
 
 _CENTRE, _SIZE, _BIRTHS = "noise and motion", "noise and growth of the size", "births"
+_RELIABILITY = "reliability"
 #: Estimates of a sensor that are kept, or go back to the base's, together.
 SENSOR_PARTS = {
     _CENTRE: (
@@ -33,7 +34,7 @@ SENSOR_PARTS = {
     ),
     _SIZE: ("sigma_log_width", "sigma_log_height"),
     "noise by score": ("score_noise",),
-    "reliability": ("p_detect", "clutter_per_scan", "precision", "score_precision", "blind_speed"),
+    _RELIABILITY: ("p_detect", "clutter_per_scan", "precision", "score_precision", "blind_speed"),
 }
 #: The parts, in the order in which they are tried.
 PARTS = (*SENSOR_PARTS, _BIRTHS)
@@ -80,6 +81,9 @@ def with_parts(measured: MatchedSensors, parts: Sequence[str]) -> Config:
                 else s
                 for name, s in sensors.items()
             }
+    if _RELIABILITY in parts:
+        # What tracking taught of scores was learnt of what the base takes them to mean.
+        sensors = {name: replace(s, learnt=None) for name, s in sensors.items()}
     out = with_sensors(measured, sensors)
     if _SIZE not in parts:
         out = replace(out, size=base.size)

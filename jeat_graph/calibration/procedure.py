@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from jeat_graph.calibration.cuts import folds, shorten
-from jeat_graph.calibration.learning import LEARNT, choose_learnt, learn_sensors
+from jeat_graph.calibration.learning import LEARNT, choose_learnt, learn_sensors, without_learnt
 from jeat_graph.calibration.matches import SensorMatches, match_sensor
 from jeat_graph.calibration.offset import (
     Lag,
@@ -91,6 +91,10 @@ def calibrate_with_truth(
         config = measure_score_fit(calibrate(pairs, base), short)
         config = measure_written_variances(config, short, base.output)
         return Calibration(with_lags(config, lags), tuple(lags))
+    # First of all what the tracker learns without being told: estimates have to do better than that.
+    base, learnt = choose_learnt(base, short)
+    if progress is not None:
+        progress(LEARNT)
     config, parts = choose_parts(pairs, base, progress=progress)
     config, choices = tune(config, pairs, passes=_PASSES, progress=progress)
     config, fits = choose_score_fit(config, short)
@@ -98,11 +102,10 @@ def calibrate_with_truth(
         parts = (*parts, fits)
     if progress is not None:
         progress(SCORE_FIT)
-    config, learnt = choose_learnt(config, short)
     if learnt is not None:
-        parts = (*parts, learnt)
-    if progress is not None:
-        progress(LEARNT)
+        parts = (learnt, *parts)
+        if learnt.kept:
+            config = learn_sensors([detections for detections, _ in short], without_learnt(config))
     config = measure_written_variances(config, short, base.output)
     halves = folds(short)
     score = judge([config] * len(halves), halves).mean
