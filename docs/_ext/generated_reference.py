@@ -98,7 +98,7 @@ def configuration_page() -> str:
 
 
 def _inner_sections(title: str, section: Any) -> list[str]:
-    """Write the sections that stand in fields of a section and that no preset has: their settings' defaults."""
+    """Write the sections that stand in fields of a section and that no preset has, with their defaults."""
     out = []
     for name, hint in get_type_hints(section).items():
         inner = next((kind for kind in (hint, *get_args(hint)) if dataclasses.is_dataclass(kind)), None)

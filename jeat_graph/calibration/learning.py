@@ -13,7 +13,7 @@ from dataclasses import replace
 from jeat_graph.calibration.cuts import folds
 from jeat_graph.calibration.parts import PartChoice
 from jeat_graph.calibration.supervised import Recording
-from jeat_graph.calibration.verdict import CHANCE, judge, scene_error
+from jeat_graph.calibration.verdict import judge
 from jeat_graph.config.learnt import LearntConfig
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
@@ -54,8 +54,8 @@ def learn_sensors(recordings: Sequence[Detections], config: Config) -> Config:
 def choose_learnt(config: Config, recordings: Sequence[Recording]) -> tuple[Config, PartChoice | None]:
     """Learn of the sensors, and keep it unless it loses on recordings that it was not learnt from.
 
-    A tracker learns the same in any case, only later, so it need not win: to be left out it has to lose by
-    more than scenes scatter.
+    A tracker learns the same in any case, only later, so it need not win by more than chance. (To let it lose
+    by as much as scenes scatter was tried: walkers seen by one camera had three points of MOTA less.)
 
     Returns:
         The configuration, and what was decided; None where there are too few recordings to decide, or the
@@ -66,7 +66,7 @@ def choose_learnt(config: Config, recordings: Sequence[Recording]) -> tuple[Conf
         return config, None
     now = judge([config] * len(parts), parts)
     then = judge([learn_sensors(_detections(other), config) for other in reversed(parts)], parts)
-    kept = then.mean >= now.mean - max(CHANCE, scene_error(recordings))
+    kept = then.mean >= now.mean
     choice = PartChoice(LEARNT, kept, then.mean - now.mean)
     return (learn_sensors(_detections(recordings), config) if kept else config), choice
 
