@@ -77,12 +77,12 @@ def _others_look(s: int, scene: SceneState, config: Config) -> FloatArray:
     for o in range(len(scene.trust)):
         if o == s or not np.isfinite(scene.first_look[o]):
             continue
-        known = 0.0
+        known, (low, high) = 0.0, scene.field[o]
         if strips > 1:
             known = max(lifecycle.field_boxes * (scene.field_witnesses[o] - lifecycle.field_doubt), 0.0)
         for g in range(strips):
             x = (g + 0.5) * config.image.width / strips
-            chance[g] = max(chance[g], in_field(x, *scene.field[o], known) if known > 0.0 else 1.0)
+            chance[g] = max(chance[g], in_field(x, low, high, known) if known > 0.0 else 1.0)
     return chance
 
 
