@@ -6,7 +6,7 @@ import argparse
 import dataclasses
 import io
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import Any, get_type_hints
 
 from sphinx.application import Sphinx
 
@@ -80,7 +80,7 @@ def configuration_page() -> str:
     hints = get_type_hints(Config)
     for f in dataclasses.fields(Config):
         kind = hints[f.name]
-        section = kind if dataclasses.is_dataclass(kind) else _value_of_mapping(kind)
+        section = kind if dataclasses.is_dataclass(kind) else _section_within(kind)
         if section is None:
             continue
         values = [getattr(preset, f.name) for preset in presets]
@@ -88,7 +88,7 @@ def configuration_page() -> str:
         if section is not kind:
             title, note = f"{f.name}.NAME", f" The values are those of the sensor `{_SENSOR}`."
             values = [value[_SENSOR] for value in values]
-        about = (section.__doc__ or "").strip().split("\n\n")[0]
+        about = _about(section)
         head = f"| setting | meaning | {' | '.join(f'`{name}`' for name in _PRESETS)} | unit | range |"
         out.append(f"## {title}\n\n{about}{note}\n\n{head}\n|---|---|{'---|' * len(_PRESETS)}---|---|")
         out += [_row(title, item, values) for item in dataclasses.fields(section)]
@@ -101,19 +101,23 @@ def _inner_sections(title: str, section: Any) -> list[str]:
     """Write the sections that stand in fields of a section and that no preset has, with their defaults."""
     out = []
     for name, hint in get_type_hints(section).items():
-        inner = next((kind for kind in (hint, *get_args(hint)) if dataclasses.is_dataclass(kind)), None)
+        inner = _section_within(hint)
         if inner is None:
             continue
-        about = (inner.__doc__ or "").strip().split("\n\n")[0]
         head = "| setting | meaning | default | unit | range |\n|---|---|---|---|---|"
-        out.append(f"## {title}.{name}\n\n{about}\n\n{head}")
+        out.append(f"## {title}.{name}\n\n{_about(inner)}\n\n{head}")
         out += [_row(f"{title}.{name}", item, [inner()]) for item in dataclasses.fields(inner)]
         out.append("")
     return out
 
 
-def _value_of_mapping(kind: Any) -> Any:
-    """The section type of a mapping from names to sections, or None."""
+def _about(section: Any) -> str:
+    """The first paragraph of a section's docstring."""
+    return (section.__doc__ or "").strip().split("\n\n")[0]
+
+
+def _section_within(kind: Any) -> Any:
+    """The section type of a mapping from names to sections, or of a section that may be missing; or None."""
     candidates = [a for a in getattr(kind, "__args__", ()) if dataclasses.is_dataclass(a)]
     return candidates[0] if candidates else None
 

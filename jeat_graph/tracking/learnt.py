@@ -7,8 +7,6 @@ detector.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from jeat_graph.config.learnt import LearntConfig
@@ -77,12 +75,12 @@ def _others_look(s: int, scene: SceneState, config: Config) -> FloatArray:
     for o in range(len(scene.trust)):
         if o == s or not np.isfinite(scene.first_look[o]):
             continue
-        known, (low, high) = 0.0, scene.field[o]
-        if strips > 1:
-            known = max(lifecycle.field_boxes * (scene.field_witnesses[o] - lifecycle.field_doubt), 0.0)
+        # As `stages.looking.known_fields` has it; of none or less, `in_field` says 1.
+        known = lifecycle.field_boxes * (scene.field_witnesses[o] - lifecycle.field_doubt)
+        low, high = scene.field[o]
         for g in range(strips):
             x = (g + 0.5) * config.image.width / strips
-            chance[g] = max(chance[g], in_field(x, low, high, known) if known > 0.0 else 1.0)
+            chance[g] = max(chance[g], in_field(x, low, high, known))
     return chance
 
 
@@ -99,9 +97,11 @@ def begin_with(scene: SceneState, config: Config) -> SceneState:
         The same scene.
     """
     names = config.sensor_names
+    if not config.lifecycle.judges_worth:
+        return scene
     for s, name in enumerate(names):
         known = config.sensors[name].learnt
-        if known is None or not config.lifecycle.judges_worth:
+        if known is None:
             continue
         a, ab, b = known.worth_cov
         scene.worth_mean[s] = known.worth
@@ -113,15 +113,7 @@ def begin_with(scene: SceneState, config: Config) -> SceneState:
             claims[column] = getattr(known, key) / strips
         claims["all"] = (known.agreed_s + known.lonely_s) / strips
         scene.agreed_seen[s], scene.agreed_odds[s] = known.agreed_s, known.agreed_odds
-        scene.agreed_without[s] = _by_sensor(known.agreed_without, names)
+        without = dict(known.agreed_without)
+        scene.agreed_without[s] = [without.get(other, 0.0) for other in names]
         scene.borne_out[s], scene.trust[s] = known.borne_out, known.trust
     return scene
-
-
-def _by_sensor(seconds: Sequence[tuple[str, float]], names: Sequence[str]) -> FloatArray:
-    """Put seconds (S,) where their sensors stand; those of sensors that are not there are left out."""
-    out = np.zeros(len(names))
-    for name, s in seconds:
-        if name in names:
-            out[names.index(name)] = s
-    return out
