@@ -16,6 +16,7 @@ import numpy as np
 
 from jeat_graph.config.schema import Config, SensorConfig
 from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.lent import lent
 
 _SCALARS = (bool, int, float)
 # Of a sensor whose scores say nothing of how boxes fit, or of how exact they are.
@@ -45,11 +46,11 @@ def _sections() -> dict[str, type[Any]]:
 
 
 def _tuple_class(name: str, members: dict[str, type[Any]]) -> type[Any]:
-    """Make a named tuple and keep it in this module, where numba's cache on disk looks for it again."""
+    """Make a named tuple that is lent, in this module, where numba's cache on disk looks for it again."""
     made = NamedTuple(name, list(members.items()))  # type: ignore[misc]
     made.__module__ = __name__
     globals()[name] = made
-    return made
+    return lent(made)
 
 
 # Types are written as texts in the schema; to resolve them anew for every tracker took most of its setup.
@@ -66,6 +67,7 @@ else:
     Settings = _tuple_class("Settings", {**_SECTION_TUPLES, **_MEMBERS[Config]})
 
 
+@lent
 class SensorArrays(NamedTuple):
     """Parameters of the S sensors, in alphabetical order of their names (see `config.sensors`).
 
@@ -122,6 +124,7 @@ class SensorArrays(NamedTuple):
     prior_trust: FloatArray
 
 
+@lent
 class Model(NamedTuple):
     """All that a step of the tracker knows beforehand: its sensors and its settings.
 

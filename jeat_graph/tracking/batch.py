@@ -11,6 +11,7 @@ from numba import njit
 from jeat_graph.association.costs import log_score_ratio
 from jeat_graph.config.kernel_form import Model
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.lent import lent
 from jeat_graph.filters.box_offsets import centre_offset
 from jeat_graph.filters.cut_boxes import LOW_CUT, cut_of
 from jeat_graph.filters.noise import score_weight
@@ -19,6 +20,7 @@ from jeat_graph.filters.noise import score_weight
 LEAST_PRECISION, _MOST_PRECISION = 0.002, 0.998
 
 
+@lent
 class Arrivals(NamedTuple):
     """The detections of all scans of one instant, as they arrive.
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from jeat_graph.config.kernel_form import SensorArrays
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
+from jeat_graph.data.lent import lent
 from jeat_graph.filters.box_offsets import NUM_SUMS
 from jeat_graph.filters.gaps import LENGTHS, PRIOR_GAPS, PRIOR_SHARE
 from jeat_graph.filters.manoeuvre import prior_weights
@@ -27,6 +28,7 @@ USUAL_JERK_S = 30.0
 _FIRST_INNOVATIONS_S = 1.5  # of a track: from so many it is held to be known that they are as expected
 
 
+@lent
 class TrackArrays(NamedTuple):
     """Arrays of capacity C for tracks and S sensors; rows beyond the number of living tracks are unused.
 
@@ -117,6 +119,7 @@ class TrackArrays(NamedTuple):
     t_missed: FloatArray
 
 
+@lent
 class SceneState(NamedTuple):
     """What is learnt of the scene as a whole.
 

@@ -14,6 +14,7 @@ from numba import njit
 
 from jeat_graph.config.kernel_form import SensorArrays
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
+from jeat_graph.data.lent import lent
 from jeat_graph.filters.measurement import MEASUREMENT
 from jeat_graph.tracking.batch import Batch, Measured
 
@@ -21,6 +22,7 @@ from jeat_graph.tracking.batch import Batch, Measured
 _LEAST_JERK = 1e-6
 
 
+@lent
 class UpdateLog(NamedTuple):
     """The measurements that the last step gave to tracks.
 
