@@ -144,6 +144,12 @@ def test_without_truth_it_is_found_beside_the_other(two_sensors):
     found = calibrate_without_truth([detections for detections, _ in two_sensors], load_config("default"))
     assert found.config.sensors["far"].latency_s == pytest.approx(0.1, abs=0.01)
     assert found.config.sensors["rgb"].latency_s == 0.0
+    assert all(sensor.learnt is not None for sensor in found.config.sensors.values())
+
+
+def test_what_a_sensor_says_of_itself_while_it_is_alone_is_not_taken_along(two_sensors):
+    alone = [detections.select(("rgb",)) for detections, _ in two_sensors]
+    assert calibrate_without_truth(alone, load_config("default")).config.sensors["rgb"].learnt is None
 
 
 def test_what_the_base_knew_of_a_clock_is_kept(two_sensors):
