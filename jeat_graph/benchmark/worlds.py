@@ -19,9 +19,9 @@ from jeat_graph.benchmark import common
 from jeat_graph.benchmark.provenance import provenance
 from jeat_graph.config.argument_types import counting, drawn_size, positive
 from jeat_graph.data.errors import ConfigError
+from jeat_graph.data.processes import available_cores
 from jeat_graph.simulation.dataset.protocol import Protocol
 from jeat_graph.simulation.dataset.recording import record_dataset
-from jeat_graph.simulation.dataset.workers import available_cores
 from jeat_graph.simulation.imaging.config import load_imaging
 from jeat_graph.simulation.imaging.source import RenderedSource
 from jeat_graph.simulation.scenario import load_scenario

@@ -38,6 +38,8 @@ COMMANDS = (
     "road",
     "benchmark",
 )
+# These track in this process: where nothing is compiled yet, other processors help.
+_TRACKING = ("demo", "track", "stream", "calibrate", "compare")
 
 
 def build_parser(command: str | None = None) -> argparse.ArgumentParser:
@@ -72,6 +74,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = build_parser(command).parse_args(arguments)
     if kernel_cache.notice:
         print(f"jeat-graph: {kernel_cache.notice}", file=sys.stderr)
+    if args.command in _TRACKING:
+        import_module("jeat_graph.tracking.compiling").get_help()
     try:
         with in_good_order(args.command):
             code = int(args.run(args) or 0)

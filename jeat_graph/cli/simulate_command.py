@@ -158,9 +158,9 @@ def _detections(args: argparse.Namespace, scenario: Scenario) -> int:
 def _pictures(args: argparse.Namespace, scenario: Scenario) -> int:
     from tqdm import tqdm
 
+    from jeat_graph.data.processes import available_cores
     from jeat_graph.simulation.dataset.protocol import Protocol
     from jeat_graph.simulation.dataset.recording import record_dataset
-    from jeat_graph.simulation.dataset.workers import available_cores
     from jeat_graph.simulation.imaging.painter import paint_tile
     from jeat_graph.simulation.scenario import scenario_to_yaml
     from jeat_graph.tracking.notice import notice_if_cold

@@ -27,6 +27,12 @@ def end_with_parent() -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
+def available_cores() -> int:
+    """Return the number of cores that this process may use."""
+    affinity = getattr(os, "sched_getaffinity", None)
+    return len(affinity(0)) if affinity is not None else (os.cpu_count() or 1)
+
+
 @contextmanager
 def worker_pool(
     workers: int, begin: Callable[..., object] = end_with_parent, given: tuple[Any, ...] = ()

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jeat_graph.data.errors import JeatGraphError
+from jeat_graph.data.processes import available_cores
 from jeat_graph.live.engines import ENGINES, run_local, run_on_ray
 from jeat_graph.live.manifest import ManifestRow
 from jeat_graph.live.recording_job import FAILED, Job, Outcome, run_job
@@ -129,7 +130,7 @@ def _work(jobs: Sequence[Job], options: BatchOptions) -> dict[str, Outcome]:
         )
     else:
         results = run_local(
-            run_job, jobs, _lost, workers=options.workers or _cores(), retries=options.retries
+            run_job, jobs, _lost, workers=options.workers or available_cores(), retries=options.retries
         )
     found: dict[str, Outcome] = {}
     with tqdm(
@@ -144,13 +145,6 @@ def _work(jobs: Sequence[Job], options: BatchOptions) -> dict[str, Outcome]:
 
 def _lost(job: Job) -> Outcome:
     return Outcome(job.name, FAILED, {}, error="the worker process died each time (out of memory?)")
-
-
-def _cores() -> int:
-    import os
-
-    affinity = getattr(os, "sched_getaffinity", None)
-    return len(affinity(0)) if affinity is not None else (os.cpu_count() or 1)
 
 
 def _with_truth(

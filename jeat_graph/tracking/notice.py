@@ -8,7 +8,7 @@ from typing import Any
 
 from jeat_graph.data.progress import write_line
 
-NOTICE = "compiling {what} for this machine, once (one to two minutes; on a busy machine more) …"
+NOTICE = "compiling {what} for this machine, once (two to five minutes) …"
 _said: set[str] = set()
 
 

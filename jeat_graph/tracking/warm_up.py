@@ -5,6 +5,8 @@ Run `python -m jeat_graph.tracking.warm_up` after an installation or an update, 
 
 from __future__ import annotations
 
+import sys
+
 from jeat_graph.tracking.notice import notice_if_cold
 
 
@@ -21,6 +23,19 @@ def warm_up() -> None:
         tracker.finish()
 
 
-if __name__ == "__main__":
+def main(arguments: list[str]) -> None:
+    """Compile all, or with `--help-out K/N` what the other processes have not come to."""
+    from jeat_graph.config.reading import load_config
+    from jeat_graph.tracking.compiling import get_help, help_out
+
+    if arguments[:1] == ["--help-out"]:
+        k, _, number = arguments[1].partition("/")
+        help_out(int(k), int(number), load_config("default"))
+        return
     notice_if_cold()
+    get_help()
     warm_up()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

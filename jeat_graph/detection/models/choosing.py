@@ -82,7 +82,8 @@ def choose(
     import cv2
 
     keep = (found.scores >= score) & np.isfinite(found.corners).all(axis=1)
-    keep &= (found.corners[:, 2:] - found.corners[:, :2] > _CENTRES_PX).all(axis=1)
+    with np.errstate(invalid="ignore"):  # infinite corners are left out already
+        keep &= (found.corners[:, 2:] - found.corners[:, :2] > _CENTRES_PX).all(axis=1)
     if wanted is not None:
         keep &= np.isin(found.classes, list(wanted))
     corners, scores, classes = found.corners[keep], found.scores[keep], found.classes[keep]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -12,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from jeat_graph.data.errors import JeatGraphError
-from jeat_graph.data.processes import end_with_parent, worker_pool
+from jeat_graph.data.processes import available_cores, end_with_parent, worker_pool
 from jeat_graph.simulation.dataset.disk import check_disk
 from jeat_graph.simulation.dataset.protocol import Protocol
 from jeat_graph.simulation.dataset.segment_writer import write_segment
@@ -33,12 +32,6 @@ class _Worker:
 
 
 _worker: _Worker | None = None
-
-
-def available_cores() -> int:
-    """Return the number of cores that this process may use."""
-    affinity = getattr(os, "sched_getaffinity", None)
-    return len(affinity(0)) if affinity is not None else (os.cpu_count() or 1)
 
 
 def make_segments(
