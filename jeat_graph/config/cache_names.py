@@ -13,9 +13,10 @@ def save_under_own_names() -> None:
     the index of the one would lead to the code of the other. With own names what is lost, at worst, is an
     entry of the index, and that is compiled once more.
     """
-    from numba.core.caching import IndexDataCacheFile
+    from numba.core import caching
 
-    named = IndexDataCacheFile._data_name
+    cache_file: Any = caching.IndexDataCacheFile
+    named = cache_file._data_name
     if getattr(named, "of_process", False):
         return
 
@@ -24,4 +25,4 @@ def save_under_own_names() -> None:
         return f"{stem}.{os.getpid()}.{ending}"
 
     data_name.of_process = True  # type: ignore[attr-defined]
-    IndexDataCacheFile._data_name = data_name
+    cache_file._data_name = data_name

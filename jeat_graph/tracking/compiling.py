@@ -81,7 +81,7 @@ def help_out(k: int, number: int, config: Config) -> None:
 
 def stages() -> list[Any]:
     """Return the kernels that a step calls, in the order in which it does; none where nothing is compiled."""
-    function = getattr(step, "py_func", step)
+    function: Any = getattr(step, "py_func", step)
     called = [function.__globals__.get(name) for name in function.__code__.co_names]
     return [kernel for kernel in called if hasattr(kernel, "overloads")]
 
