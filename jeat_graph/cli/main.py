@@ -13,6 +13,7 @@ from jeat_graph.cli.options import Parser
 from jeat_graph.cli.terminal import Terminated, describe, in_good_order, write_anything
 from jeat_graph.config import kernel_cache
 from jeat_graph.data.errors import JeatGraphError
+from jeat_graph.tracking import notice
 from jeat_graph.version import __version__
 
 # Each module has HELP (one line), add_arguments(parser) and run(args). Modules are imported only when their
@@ -38,8 +39,11 @@ COMMANDS = (
     "road",
     "benchmark",
 )
-# These track in this process: where nothing is compiled yet, other processors help.
-_TRACKING = ("demo", "track", "stream", "calibrate", "compare")
+
+
+def _get_help() -> None:
+    """Have other processors help where the tracker has to be compiled."""
+    import_module("jeat_graph.tracking.compiling").get_help()
 
 
 def build_parser(command: str | None = None) -> argparse.ArgumentParser:
@@ -74,8 +78,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = build_parser(command).parse_args(arguments)
     if kernel_cache.notice:
         print(f"jeat-graph: {kernel_cache.notice}", file=sys.stderr)
-    if args.command in _TRACKING:
-        import_module("jeat_graph.tracking.compiling").get_help()
+    notice.when_cold = _get_help
     try:
         with in_good_order(args.command):
             code = int(args.run(args) or 0)

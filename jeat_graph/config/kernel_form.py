@@ -14,12 +14,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple, NewType
 
 import numpy as np
 
-from jeat_graph.config.cache_names import save_under_own_names
 from jeat_graph.config.schema import Config, SensorConfig
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.lent import lent
-
-save_under_own_names()
 
 _SCALARS = (bool, int, float)
 # Of a sensor whose scores say nothing of how boxes fit, or of how exact they are.

@@ -33,20 +33,23 @@ class Lent(types.NamedTuple):
     @property
     def mangling_args(self) -> tuple[str, tuple[()]]:
         """What stands for the type in names of kernels; else these have ten thousand letters."""
-        digest = hashlib.sha256(self.name.encode()).hexdigest()
-        return f"{self.instance_class.__name__}_{digest[:16]}", ()
+        made_of = self.instance_class
+        whole = f"{made_of.__module__} {made_of.__qualname__} {self.fields} {self.name}"
+        return f"{made_of.__name__}_{hashlib.sha256(whole.encode()).hexdigest()[:16]}", ()
 
 
 def lent(made_of: _Class) -> _Class:
     """Have kernels borrow the named tuples of this class that Python gives them.
 
-    A kernel may take such a tuple and hand it on, the whole of it or a lent tuple in it, but not return it to
-    Python. A tuple of the class that a kernel makes itself is an ordinary one, of another type to numba.
+    A kernel may take such a tuple and hand it on, the whole of it or a lent tuple in it; it can neither
+    return it to Python nor keep it in a list or a generator. A tuple of the class that a kernel makes itself
+    is an ordinary one, of another type to numba.
     """
 
     @typeof_impl.register(made_of)
-    def _(value: Any, context: Any) -> Lent:
-        return Lent(tuple(typeof_impl(field, context) for field in value), made_of)
+    def _(value: Any, context: Any) -> Lent | None:
+        fields = tuple(typeof_impl(field, context) for field in value)
+        return None if None in fields else Lent(fields, made_of)
 
     return made_of
 
@@ -58,6 +61,22 @@ class LentModel(models.TupleModel):
     def traverse(self, builder: Any) -> list[Any]:
         """Return that of which references are counted: nothing."""
         return []
+
+    def as_data(self, builder: Any, value: Any) -> Any:
+        """Refuse to be written where it would outlive the call: in a list, in the state of a generator."""
+        raise TypeError(f"{self._fe_type.instance_class.__name__} is lent to kernels: they can't keep it")
+
+    def get_return_type(self) -> Any:
+        """Return the type of what one kernel returns to another: the tuple, as it is."""
+        return self.get_value_type()
+
+    def as_return(self, builder: Any, value: Any) -> Any:
+        """Return it as it is."""
+        return value
+
+    def from_return(self, builder: Any, value: Any) -> Any:
+        """Return it as it is."""
+        return value
 
     def get_argument_type(self) -> Any:
         """Return the type of an argument."""
@@ -125,11 +144,12 @@ def _take(kind: Lent, given: Any, c: Any) -> NativeValue:
     """Take a tuple from Python, whose arrays are given back when the kernel has returned."""
     owned = types.NamedTuple(kind.types, kind.instance_class)
     native = c.unbox(owned, given)
+    place = cgutils.alloca_once_value(c.builder, native.value)
 
     def give_back() -> None:
         if native.cleanup is not None:
             native.cleanup()
-        c.context.nrt.decref(c.builder, owned, native.value)
+        c.context.nrt.decref(c.builder, owned, c.builder.load(place))
 
     return NativeValue(native.value, native.is_error, give_back)
 

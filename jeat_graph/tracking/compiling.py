@@ -7,12 +7,15 @@ find on disk what the others have compiled, and the first one, which came to tra
 from __future__ import annotations
 
 import atexit
+import os
 import subprocess
 import sys
+import threading
 from typing import Any
 
 import numpy as np
 
+from jeat_graph.config.cache_names import save_under_own_names
 from jeat_graph.config.kernel_form import kernel_model
 from jeat_graph.config.schema import Config
 from jeat_graph.data.processes import available_cores
@@ -21,7 +24,7 @@ from jeat_graph.filters.measurement import MEASUREMENT
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.compaction import allocate
 from jeat_graph.tracking.direct_call import machine_code
-from jeat_graph.tracking.notice import is_compiled
+from jeat_graph.tracking.notice import is_compiled, keeper
 from jeat_graph.tracking.scans import arrivals_of
 from jeat_graph.tracking.smoothing.online import TrackSmoothers
 from jeat_graph.tracking.smoothing.recorder import StepRecorder
@@ -41,24 +44,42 @@ def get_help() -> int:
     """Start processes that compile, one for each further processor; they end when done, or with this one.
 
     Returns:
-        How many: none where all is compiled, or there is one processor.
+        How many: none where all is compiled, nothing can be kept on disk, or there is one processor.
     """
-    if is_compiled(step):
+    if _helpers or is_compiled(step) or keeper(step) is None:
         return 0
     number = min(available_cores() - 1, _MOST_HELPERS)
-    if not _helpers:
-        atexit.register(_send_home)
+    if number < 1:
+        return 0
+    save_under_own_names()
+    atexit.register(_send_home)
     for k in range(number):
-        command = [sys.executable, "-m", "jeat_graph.tracking.warm_up", "--help-out", f"{k}/{number}"]
+        # -P: not what lies beside the user's files, should it have the name of a package.
+        command = [sys.executable, "-P", "-m", "jeat_graph.tracking.warm_up", "--help-out", f"{k}/{number}"]
         quiet = subprocess.DEVNULL
-        _helpers.append(subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet))
-    return number
+        try:
+            # What would be written to the pipe is nothing: it ends with this process, however that does.
+            helper = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=quiet, stderr=quiet)
+        except OSError:  # no more processes: it takes longer without
+            break
+        _helpers.append(helper)
+    return len(_helpers)
 
 
 def _send_home() -> None:
     for helper in _helpers:
         helper.kill()
         helper.wait()
+
+
+def end_with_pipe() -> None:
+    """End this process when the one ends that holds the other end of its standard input."""
+
+    def watch() -> None:
+        sys.stdin.buffer.read()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def help_out(k: int, number: int, config: Config) -> None:
@@ -69,6 +90,7 @@ def help_out(k: int, number: int, config: Config) -> None:
         number: of helpers.
         config: its numbers of sensors and densities do not matter.
     """
+    save_under_own_names()
     kernels = stages()[::-1]
     first = k * len(kernels) // number
     given = stage_arguments(config)

@@ -2,31 +2,37 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 from jeat_graph.data.progress import write_line
 
+TRACKER = "the tracker"
 NOTICE = "compiling {what} for this machine, once (two to five minutes) …"
+#: What is called where the tracker has to be compiled: the command line has other processors help.
+when_cold: Callable[[], object] | None = None
 _said: set[str] = set()
 
 
 def is_compiled(function: Any) -> bool:
-    """Tell whether machine code of a compiled function is there for this version of Python.
+    """Tell whether machine code of a function is kept for this processor, source, compiler and Python.
 
     Args:
         function: decorated with `njit(cache=True)`.
     """
     if not hasattr(function, "stats"):
         return True  # compilation is switched off (NUMBA_DISABLE_JIT)
-    version = f"py{sys.version_info.major}{sys.version_info.minor}"
-    module = function.__module__.rpartition(".")[2]
-    folder = Path(str(function.stats.cache_path))
-    return any(folder.glob(f"{module}.{function.__name__}-*.{version}.nbi"))
+    kept = keeper(function)
+    machine = function.targetctx.codegen().magic_tuple()
+    return kept is not None and any(key[1] == machine for key in kept._load_index())
 
 
-def notice_if_cold(function: Any = None, what: str = "the tracker") -> None:
+def keeper(function: Any) -> Any:
+    """Return what keeps the machine code of a function on disk; None where nothing does."""
+    return getattr(getattr(function, "_cache", None), "_cache_file", None)
+
+
+def notice_if_cold(function: Any = None, what: str = TRACKER) -> None:
     """Say on stderr that the first step will take a while, if it will; once in a process for each thing.
 
     Args:
@@ -40,3 +46,5 @@ def notice_if_cold(function: Any = None, what: str = "the tracker") -> None:
         from jeat_graph.tracking.step import step as function
     if not is_compiled(function):
         write_line(f"jeat-graph: {NOTICE.format(what=what)}")
+        if when_cold is not None and what == TRACKER:
+            when_cold()

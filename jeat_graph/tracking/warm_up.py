@@ -5,9 +5,10 @@ Run `python -m jeat_graph.tracking.warm_up` after an installation or an update, 
 
 from __future__ import annotations
 
+import os
 import sys
 
-from jeat_graph.tracking.notice import notice_if_cold
+from jeat_graph.tracking import notice
 
 
 def warm_up() -> None:
@@ -25,15 +26,19 @@ def warm_up() -> None:
 
 def main(arguments: list[str]) -> None:
     """Compile all, or with `--help-out K/N` what the other processes have not come to."""
-    from jeat_graph.config.reading import load_config
-    from jeat_graph.tracking.compiling import get_help, help_out
+    from jeat_graph.tracking.compiling import end_with_pipe, get_help, help_out
 
     if arguments[:1] == ["--help-out"]:
+        from jeat_graph.config.reading import load_config
+
+        end_with_pipe()
+        if hasattr(os, "nice"):
+            os.nice(10)  # who waits for it goes first
         k, _, number = arguments[1].partition("/")
         help_out(int(k), int(number), load_config("default"))
         return
-    notice_if_cold()
-    get_help()
+    notice.when_cold = get_help
+    notice.notice_if_cold()
     warm_up()
 
 

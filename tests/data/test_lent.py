@@ -135,6 +135,48 @@ def test_a_lent_tuple_cannot_be_returned():
         give_back(outer(1))
 
 
+@njit
+def generate(whole):
+    for x in whole.inner.x:
+        yield x * whole.plus
+
+
+def test_a_generator_cannot_keep_it():
+    """It would outlive the call that the arrays were lent for."""
+    with pytest.raises(TypeError, match="Outer is lent to kernels: they can't keep it"):
+        list(generate(outer(1)))
+
+
+@njit
+def list_both(whole):
+    both = [whole.inner, whole.inner]
+    return both[0].x[0]
+
+
+def test_a_list_cannot_keep_it():
+    with pytest.raises(TypeError, match="Inner is lent to kernels: they can't keep it"):
+        list_both(outer(1))
+
+
+@njit(no_cpython_wrapper=True, no_cfunc_wrapper=True)
+def choose(one, other, first):
+    return one.inner if first else other.inner
+
+
+@njit
+def chosen(one, other, first):
+    inner = choose(one, other, first)
+    return weigh(inner, one) + weigh(choose(one, other, not first), other)
+
+
+def test_a_kernel_may_return_it_to_another():
+    one, other = outer(1), outer(2)
+    for first in (True, False):
+        plain = weigh.py_func(one.inner if first else other.inner, one)
+        plain += weigh.py_func(other.inner if first else one.inner, other)
+        assert chosen(one, other, first) == plain
+
+
 def test_other_types_of_fields_compile_anew():
     whole = outer(1)
     single = whole._replace(inner=whole.inner._replace(x=whole.inner.x.astype(np.float32)))

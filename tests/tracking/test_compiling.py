@@ -78,6 +78,7 @@ def test_each_helper_begins_elsewhere(number, monkeypatch):
 
 class Helper:
     def __init__(self, command, **streams):
+        assert command[1] == "-P"  # not the folder of the user's files
         self.part, self.ended = command[-1], False
 
     def kill(self):
@@ -87,41 +88,69 @@ class Helper:
         assert self.ended
 
 
-@pytest.mark.parametrize(("cores", "parts"), [(1, []), (2, ["0/1"]), (9, ["0/3", "1/3", "2/3"])])
-def test_help_is_asked_for_where_nothing_is_compiled(cores, parts, monkeypatch):
+@pytest.fixture
+def cold(monkeypatch):
+    """A process that has compiled nothing; what it does at its end."""
     left = []
     monkeypatch.setattr(compiling, "_helpers", [])
     monkeypatch.setattr(compiling, "is_compiled", lambda function: False)
-    monkeypatch.setattr(compiling, "available_cores", lambda: cores)
+    monkeypatch.setattr(compiling, "keeper", lambda function: "a folder")
+    monkeypatch.setattr(compiling, "save_under_own_names", lambda: None)
     monkeypatch.setattr(compiling.subprocess, "Popen", Helper)
     monkeypatch.setattr(compiling.atexit, "register", left.append)
+    return left
+
+
+@pytest.mark.parametrize(("cores", "parts"), [(1, []), (2, ["0/1"]), (9, ["0/3", "1/3", "2/3"])])
+def test_help_is_asked_for_where_nothing_is_compiled(cores, parts, cold, monkeypatch):
+    monkeypatch.setattr(compiling, "available_cores", lambda: cores)
     assert compiling.get_help() == len(parts)
     assert [helper.part for helper in compiling._helpers] == parts
-    for end in left:
+    if parts:
+        assert compiling.get_help() == 0  # once is enough
+    for end in cold:
         end()
     assert all(helper.ended for helper in compiling._helpers)
 
 
-def test_no_help_is_needed_where_all_is_compiled(monkeypatch):
-    monkeypatch.setattr(compiling, "is_compiled", lambda function: True)
-    monkeypatch.setattr(compiling.subprocess, "Popen", Helper)
+def test_no_help_is_needed_where_all_is_compiled_or_nothing_kept(cold, monkeypatch):
+    monkeypatch.setattr(compiling, "available_cores", lambda: 4)
+    with monkeypatch.context() as compiled:
+        compiled.setattr(compiling, "is_compiled", lambda function: True)
+        assert compiling.get_help() == 0
+    monkeypatch.setattr(compiling, "keeper", lambda function: None)
     assert compiling.get_help() == 0
 
 
+def test_without_more_processes_it_only_takes_longer(cold, monkeypatch):
+    def refuse(command, **streams):
+        raise BlockingIOError("Resource temporarily unavailable")
+
+    monkeypatch.setattr(compiling, "available_cores", lambda: 4)
+    monkeypatch.setattr(compiling.subprocess, "Popen", refuse)
+    assert compiling.get_help() == 0
+
+
+def test_helpers_end_with_who_started_them():
+    wait = "from jeat_graph.tracking.compiling import end_with_pipe; end_with_pipe(); time.sleep(600)"
+    script = f"import time; {wait}"
+    helper = subprocess.Popen([sys.executable, "-c", script], stdin=subprocess.PIPE)
+    assert helper.poll() is None
+    helper.stdin.close()  # as the system does when a process ends, however it does
+    assert helper.wait(timeout=120) == 1
+
+
 def test_two_processes_that_save_at_once_do_not_write_into_one_file(tmp_path, monkeypatch):
-    cache_names.save_under_own_names()
-    cache_names.save_under_own_names()  # once is enough
+    named = IndexDataCacheFile._data_name
     cache = IndexDataCacheFile(str(tmp_path), "module.kernel-1.py311", "stamp")
-    monkeypatch.setattr(cache_names.os, "getpid", lambda: 41)
-    cache.save("for integers", "integer code")
-    # The other has read the index before that, and saves now.
-    monkeypatch.setattr(cache_names.os, "getpid", lambda: 42)
-    with monkeypatch.context() as late:
-        late.setattr(cache, "_load_index", dict)
-        cache.save("for numbers", "number code")
+    for what, index in (("integer", None), ("number", {})):
+        with monkeypatch.context() as process:
+            process.setattr(IndexDataCacheFile, "_data_name", named)
+            cache_names.save_under_own_names()
+            cache_names.save_under_own_names()  # once is enough
+            if index is not None:  # the second has read the index before the first saved
+                process.setattr(cache, "_load_index", lambda index=index: dict(index))
+            cache.save(f"for {what}s", f"{what} code")
     assert cache.load("for numbers") == "number code"
     assert cache.load("for integers") is None  # lost, and compiled once more
-    assert sorted(path.name for path in tmp_path.glob("*.nbc")) == [
-        "module.kernel-1.py311.1.41.nbc",
-        "module.kernel-1.py311.1.42.nbc",
-    ]
+    assert len({path.name for path in tmp_path.glob("module.kernel-1.py311.1.*.nbc")}) == 2
