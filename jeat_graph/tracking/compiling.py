@@ -58,7 +58,7 @@ def get_help() -> int:
         command = [sys.executable, "-P", "-m", "jeat_graph.tracking.warm_up", "--help-out", f"{k}/{number}"]
         quiet = subprocess.DEVNULL
         try:
-            # What would be written to the pipe is nothing: it ends with this process, however that does.
+            # Nothing is written to the pipe: it closes when this process ends, however it does.
             helper = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=quiet, stderr=quiet)
         except OSError:  # no more processes: it takes longer without
             break
@@ -76,7 +76,9 @@ def end_with_pipe() -> None:
     """End this process when the one ends that holds the other end of its standard input."""
 
     def watch() -> None:
-        sys.stdin.buffer.read()
+        # Not through `sys.stdin`, whose lock a thread must not hold when the interpreter shuts down.
+        while os.read(0, 1):
+            pass
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
