@@ -152,10 +152,10 @@ def calibrate_without_truth(recordings: Sequence[Detections], base: Config) -> C
     association = replace(base.association, priority=())
     config = replace(base, association=association, input=InputConfig(picture=base.input.picture))
     late_s = found_lags(lags)
-    taught = learn_sensors([taken_off(detections, late_s) for detections in recordings], config)
+    looked = {name for detections in recordings for name in detections.sensors}
     # What a sensor says of itself while it is alone, nobody bears out.
-    if sum(sensor.learnt is not None for sensor in taught.sensors.values()) > 1:
-        config = taught
+    if len(looked) > 1 and config.lifecycle.judges_worth:
+        config = learn_sensors([taken_off(detections, late_s) for detections in recordings], config)
     if late_s:
         config = earliest_on_time(with_lags(config, lags))
     return Calibration(config, tuple(lags))

@@ -21,8 +21,6 @@ import gc
 from numba.core.dispatcher import Dispatcher
 from jeat_graph.config.reading import load_config
 from jeat_graph.tracking import compiling
-from jeat_graph.tracking.direct_call import machine_code
-from jeat_graph.tracking.warm_up import warm_up
 
 def compiled():
     found = {}
