@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from functools import partial
 from importlib import import_module
 
 from jeat_graph.cli.options import Parser
@@ -41,9 +42,18 @@ COMMANDS = (
 )
 
 
-def _get_help() -> None:
-    """Have other processors help where the tracker has to be compiled."""
-    import_module("jeat_graph.tracking.compiling").get_help()
+# These begin to track at once where the tracker is not compiled; the others track so much, or are so much
+# about time, that they wait for it.
+_AT_ONCE = ("demo", "track", "stream")
+
+
+def _compile_for(command: str) -> None:
+    """Have other processors compile the tracker, and this one help or track meanwhile."""
+    compiling = import_module("jeat_graph.tracking.compiling")
+    if command in _AT_ONCE:
+        compiling.work_meanwhile(live=command == "stream")
+    else:
+        compiling.wait_with_help()
 
 
 def build_parser(command: str | None = None) -> argparse.ArgumentParser:
@@ -78,7 +88,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = build_parser(command).parse_args(arguments)
     if kernel_cache.notice:
         print(f"jeat-graph: {kernel_cache.notice}", file=sys.stderr)
-    notice.when_cold = _get_help
+    notice.when_cold = partial(_compile_for, args.command)
     try:
         with in_good_order(args.command):
             code = int(args.run(args) or 0)

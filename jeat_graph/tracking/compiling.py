@@ -1,30 +1,33 @@
 """Compile the tracker in several processes: each begins at another stage of a step.
 
 Compiling takes minutes of one processor. Processes that go through the stages of a step from different ends
-find on disk what the others have compiled, and the first one, which came to track, waits half as long.
+find on disk what the others have compiled. Who came to track waits half as long, or does not wait at all: it
+interprets the kernels until they are compiled (see `interim`).
 """
 
 from __future__ import annotations
 
-import atexit
-import os
+import math
 import subprocess
-import sys
-import threading
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from jeat_graph.config.cache_names import save_under_own_names
 from jeat_graph.config.kernel_form import kernel_model
+from jeat_graph.config.reading import load_config
 from jeat_graph.config.schema import Config
 from jeat_graph.data.processes import available_cores
+from jeat_graph.data.progress import write_line
 from jeat_graph.data.scan import Scan
 from jeat_graph.filters.measurement import MEASUREMENT
+from jeat_graph.tracking import notice
 from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.compaction import allocate
 from jeat_graph.tracking.direct_call import machine_code
-from jeat_graph.tracking.notice import is_compiled, keeper
+from jeat_graph.tracking.helpers import start_helpers
+from jeat_graph.tracking.interim import Interim, begin
+from jeat_graph.tracking.notice import is_compiled, keeper, say_compiling
 from jeat_graph.tracking.scans import arrivals_of
 from jeat_graph.tracking.smoothing.online import TrackSmoothers
 from jeat_graph.tracking.smoothing.recorder import StepRecorder
@@ -33,11 +36,53 @@ from jeat_graph.tracking.stages.predicting import Expectation
 from jeat_graph.tracking.state import start_scene
 from jeat_graph.tracking.step import step
 from jeat_graph.tracking.step_record import record_step
+from jeat_graph.tracking.tracker import Tracker
 from jeat_graph.tracking.update_log import allocate_log
 
+MEANWHILE = (
+    "the tracker is not compiled for this machine yet: it is slower until it is (two to five minutes, once)"
+)
 # More would compile the same kernels at the same time.
 _MOST_HELPERS = 3
+# Who tracks longer than that without machine code compiles, too: so much is lost at most.
+_PATIENCE_S = 60.0
 _helpers: list[subprocess.Popen[bytes]] = []
+
+
+def work_meanwhile(live: bool) -> None:
+    """Have the kernels interpreted until other processes have compiled them.
+
+    Args:
+        live: whether steps must not stop for minutes, whatever it costs: this process compiles nothing as
+            long as others do.
+    """
+    write_line(f"jeat-graph: {MEANWHILE}")
+    get_help()
+    # The first one compiles all of it, if the others have not.
+    first = _helpers[0] if _helpers else None
+    patience_s = math.inf if live and first is not None else _PATIENCE_S
+
+    def is_over() -> bool:
+        return first is not None and first.poll() is not None
+
+    begin(Interim(is_over, patience_s, say_compiling))
+
+
+def do_without() -> None:
+    """Have what is not compiled interpreted to the end of this process, which is no long one."""
+
+    def interpret() -> None:
+        write_line(f"jeat-graph: {MEANWHILE}")
+        begin(Interim(lambda: False))
+
+    notice.when_cold = interpret
+    notice.notice_if_cold()
+
+
+def wait_with_help() -> None:
+    """Have other processes compile, too, what this one compiles where it calls it."""
+    say_compiling()
+    get_help()
 
 
 def get_help() -> int:
@@ -51,48 +96,19 @@ def get_help() -> int:
     number = min(available_cores() - 1, _MOST_HELPERS)
     if number < 1:
         return 0
-    save_under_own_names()
-    atexit.register(_send_home)
-    for k in range(number):
-        # -P: not what lies beside the user's files, should it have the name of a package.
-        command = [sys.executable, "-P", "-m", "jeat_graph.tracking.warm_up", "--help-out", f"{k}/{number}"]
-        quiet = subprocess.DEVNULL
-        try:
-            # Nothing is written to the pipe: it closes when this process ends, however it does.
-            helper = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=quiet, stderr=quiet)
-        except OSError:  # no more processes: it takes longer without
-            break
-        _helpers.append(helper)
+    _helpers.extend(start_helpers("jeat_graph.tracking.warm_up", number))
     return len(_helpers)
 
 
-def _send_home() -> None:
-    for helper in _helpers:
-        helper.kill()
-        helper.wait()
-
-
-def end_with_pipe() -> None:
-    """End this process when the one ends that holds the other end of its standard input."""
-
-    def watch() -> None:
-        # Not through `sys.stdin`, whose lock a thread must not hold when the interpreter shuts down.
-        while os.read(0, 1):
-            pass
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
-
-
-def help_out(k: int, number: int, config: Config) -> None:
-    """Compile all stages of a step and the smoothers, as helper `k` of so many.
+def help_out(k: int, number: int) -> None:
+    """Compile what the other processes have not come to, as helper `k` of so many.
 
     Args:
-        k: from 0 on; each begins elsewhere, the first one at the end of a step.
+        k: from 0 on; each begins elsewhere: the first one at the end of a step, and what remains when the
+            stages are done is left to it; the last one with the smoothers.
         number: of helpers.
-        config: its numbers of sensors and densities do not matter.
     """
-    save_under_own_names()
+    config = load_config("default")  # its numbers of sensors and densities do not matter
     kernels = stages()[::-1]
     first = k * len(kernels) // number
     given = stage_arguments(config)
@@ -100,7 +116,18 @@ def help_out(k: int, number: int, config: Config) -> None:
         compile_smoothers(config)
     for kernel in kernels[first:] + kernels[:first]:
         machine_code(kernel, tuple(given[name] for name in _parameters(kernel)))
-    compile_smoothers(config)
+    if k == 0:
+        compile_all()
+
+
+def compile_all(presets: Sequence[str] = ("default", "highway", "paper")) -> None:
+    """Track a vehicle for a second with each preset, smoother included, which compiles all they need."""
+    for preset in presets:
+        tracker = Tracker(load_config(preset))
+        for k in range(20):
+            box = [100.0 + 5.0 * k, 100.0, 40.0, 30.0]
+            tracker.step([(0.05 * k, name, [box], [0.9]) for name in tracker.sensor_names])
+        tracker.finish()
 
 
 def stages() -> list[Any]:

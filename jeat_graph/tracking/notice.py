@@ -9,7 +9,7 @@ from jeat_graph.data.progress import write_line
 
 TRACKER = "the tracker"
 NOTICE = "compiling {what} for this machine, once (two to five minutes) …"
-#: What is called where the tracker has to be compiled: the command line has other processors help.
+#: What is called instead where the tracker has to be compiled: the command line has other processors help.
 when_cold: Callable[[], object] | None = None
 _said: set[str] = set()
 
@@ -44,7 +44,14 @@ def notice_if_cold(function: Any = None, what: str = TRACKER) -> None:
     _said.add(what)
     if function is None:
         from jeat_graph.tracking.step import step as function
-    if not is_compiled(function):
-        write_line(f"jeat-graph: {NOTICE.format(what=what)}")
-        if when_cold is not None and what == TRACKER:
-            when_cold()
+    if is_compiled(function):
+        return
+    if what != TRACKER or when_cold is None:
+        say_compiling(what)
+        return
+    when_cold()
+
+
+def say_compiling(what: str = TRACKER) -> None:
+    """Say on stderr that this process compiles something and goes on when it is done."""
+    write_line(f"jeat-graph: {NOTICE.format(what=what)}")

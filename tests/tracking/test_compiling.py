@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 
@@ -9,7 +10,6 @@ import pytest
 from numba.core.caching import IndexDataCacheFile
 
 from jeat_graph.config import cache_names
-from jeat_graph.config.reading import load_config
 from jeat_graph.tracking import compiling
 from jeat_graph.tracking.step import step
 
@@ -19,7 +19,6 @@ COMPILED = hasattr(step, "overloads")
 SCRIPT = """
 import gc
 from numba.core.dispatcher import Dispatcher
-from jeat_graph.config.reading import load_config
 from jeat_graph.tracking import compiling
 
 def compiled():
@@ -29,17 +28,11 @@ def compiled():
             found[f"{kernel.py_func.__module__}.{kernel.py_func.__qualname__}"] = len(kernel.overloads)
     return found
 
-config = load_config("default")
-compiling.help_out(0, 1, config)
+compiling.help_out(1, 2)
 helped = compiled()
 names = [f"{kernel.py_func.__module__}.{kernel.py_func.__qualname__}" for kernel in compiling.stages()]
 assert len(names) > 20 and all(helped[name] == 1 for name in names), helped
-from jeat_graph.tracking.tracker import Tracker
-tracker = Tracker(config)
-for k in range(20):
-    box = [100.0 + 5.0 * k, 100.0, 40.0, 30.0]
-    tracker.step([(0.05 * k, name, [box], [0.9]) for name in tracker.sensor_names])
-assert len(tracker.finish())
+compiling.compile_all(("default",))
 after = compiled()
 new = {name: count for name, count in after.items() if count != helped.get(name, 0)}
 print(*(name for name in new if name in names or "smooth" in name), sep="\\n")
@@ -60,56 +53,58 @@ def test_stages_are_in_the_order_of_a_step():
     assert (names[0], names[-1]) == ("predict_all", "give_birth")
 
 
-@pytest.mark.parametrize("number", [1, 2])
-def test_each_helper_begins_elsewhere(number, monkeypatch):
+def test_each_helper_begins_elsewhere(monkeypatch):
     ran = []
-    monkeypatch.setattr(compiling, "save_under_own_names", lambda: None)
     monkeypatch.setattr(compiling, "compile_smoothers", lambda config: ran.append("smoothers"))
+    monkeypatch.setattr(compiling, "compile_all", lambda: ran.append("all"))
     monkeypatch.setattr(compiling, "machine_code", lambda kernel, given: ran.append(kernel))
     kernels = compiling.stages()
-    compiling.help_out(0, number, load_config("default"))
-    assert ran == [*kernels[::-1], "smoothers"]
-    ran.clear()
-    compiling.help_out(number, number + 1, load_config("default"))
-    half = len(kernels) * number // (number + 1)
-    assert ran == ["smoothers", *kernels[::-1][half:], *kernels[::-1][:half], "smoothers"]
+    _, second, last = (len(kernels) * k // 3 for k in range(3))
+    for k, expected in enumerate(
+        (
+            [*kernels[::-1], "all"],
+            [*kernels[::-1][second:], *kernels[::-1][:second]],
+            ["smoothers", *kernels[::-1][last:], *kernels[::-1][:last]],
+        )
+    ):
+        ran.clear()
+        compiling.help_out(k, 3)
+        assert ran == expected
 
 
 class Helper:
-    def __init__(self, command, **streams):
-        assert command[1] == "-P"  # not the folder of the user's files
-        self.part, self.ended = command[-1], False
+    """A process that compiles until it is told that it has done so."""
 
-    def kill(self):
-        self.ended = True
+    done = False
 
-    def wait(self):
-        assert self.ended
+    def poll(self):
+        return 0 if self.done else None
 
 
 @pytest.fixture
 def cold(monkeypatch):
-    """A process that has compiled nothing; what it does at its end."""
-    left = []
+    """A process that has compiled nothing; which modules it has had run by how many helpers."""
+    asked = []
+
+    def start(module, number):
+        asked.append((module, number))
+        return [Helper() for _ in range(number)]
+
     monkeypatch.setattr(compiling, "_helpers", [])
     monkeypatch.setattr(compiling, "is_compiled", lambda function: False)
     monkeypatch.setattr(compiling, "keeper", lambda function: "a folder")
-    monkeypatch.setattr(compiling, "save_under_own_names", lambda: None)
-    monkeypatch.setattr(compiling.subprocess, "Popen", Helper)
-    monkeypatch.setattr(compiling.atexit, "register", left.append)
-    return left
+    monkeypatch.setattr(compiling, "start_helpers", start)
+    return asked
 
 
-@pytest.mark.parametrize(("cores", "parts"), [(1, []), (2, ["0/1"]), (9, ["0/3", "1/3", "2/3"])])
-def test_help_is_asked_for_where_nothing_is_compiled(cores, parts, cold, monkeypatch):
+@pytest.mark.parametrize(("cores", "number"), [(1, 0), (2, 1), (3, 2), (9, 3)])
+def test_help_is_asked_for_where_nothing_is_compiled(cores, number, cold, monkeypatch):
     monkeypatch.setattr(compiling, "available_cores", lambda: cores)
-    assert compiling.get_help() == len(parts)
-    assert [helper.part for helper in compiling._helpers] == parts
-    if parts:
+    assert compiling.get_help() == number
+    assert cold == [("jeat_graph.tracking.warm_up", number)] * (number > 0)
+    if number:
         assert compiling.get_help() == 0  # once is enough
-    for end in cold:
-        end()
-    assert all(helper.ended for helper in compiling._helpers)
+        assert len(cold) == 1
 
 
 def test_no_help_is_needed_where_all_is_compiled_or_nothing_kept(cold, monkeypatch):
@@ -119,24 +114,40 @@ def test_no_help_is_needed_where_all_is_compiled_or_nothing_kept(cold, monkeypat
         assert compiling.get_help() == 0
     monkeypatch.setattr(compiling, "keeper", lambda function: None)
     assert compiling.get_help() == 0
+    assert not cold
 
 
-def test_without_more_processes_it_only_takes_longer(cold, monkeypatch):
-    def refuse(command, **streams):
-        raise BlockingIOError("Resource temporarily unavailable")
+@pytest.mark.parametrize(
+    ("cores", "live", "patient"), [(2, False, False), (2, True, True), (1, False, False), (1, True, False)]
+)
+def test_only_what_is_live_and_has_help_is_interpreted_for_as_long_as_it_takes(
+    cores, live, patient, cold, monkeypatch, capsys
+):
+    begun = []
+    monkeypatch.setattr(compiling, "available_cores", lambda: cores)
+    monkeypatch.setattr(compiling, "Interim", lambda *given: given)
+    monkeypatch.setattr(compiling, "begin", begun.append)
+    compiling.work_meanwhile(live)
+    ((is_over, patience_s, _),) = begun
+    assert (patience_s == math.inf) is patient
+    assert not is_over()
+    if cores > 1:
+        compiling._helpers[0].done = True
+        assert is_over()
+    assert "not compiled for this machine yet" in capsys.readouterr().err
 
-    monkeypatch.setattr(compiling, "available_cores", lambda: 4)
-    monkeypatch.setattr(compiling.subprocess, "Popen", refuse)
-    assert compiling.get_help() == 0
 
-
-def test_helpers_end_with_who_started_them():
-    wait = "from jeat_graph.tracking.compiling import end_with_pipe; end_with_pipe(); time.sleep(600)"
-    script = f"import time; {wait}"
-    helper = subprocess.Popen([sys.executable, "-c", script], stdin=subprocess.PIPE)
-    assert helper.poll() is None
-    helper.stdin.close()  # as the system does when a process ends, however it does
-    assert helper.wait(timeout=120) == 1
+@pytest.mark.parametrize("compiled", [False, True])
+def test_a_short_process_interprets_what_is_not_compiled(compiled, cold, monkeypatch, capsys):
+    begun = []
+    monkeypatch.setattr(compiling.notice, "_said", set())
+    monkeypatch.setattr(compiling.notice, "when_cold", None)
+    monkeypatch.setattr(compiling.notice, "is_compiled", lambda function: compiled)
+    monkeypatch.setattr(compiling, "begin", begun.append)
+    compiling.do_without()
+    assert len(begun) == (not compiled)
+    assert ("not compiled for this machine yet" in capsys.readouterr().err) is not compiled
+    assert not cold
 
 
 def test_two_processes_that_save_at_once_do_not_write_into_one_file(tmp_path, monkeypatch):

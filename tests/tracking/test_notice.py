@@ -90,10 +90,18 @@ def test_each_thing_is_named_once(unsaid, capsys):
 def test_a_tracker_says_so_from_python_too(unsaid, capsys, monkeypatch):
     from jeat_graph import Tracker
 
+    monkeypatch.setattr(notice, "is_compiled", lambda _: False)
+    Tracker()
+    Tracker()
+    assert capsys.readouterr().err.count("jeat-graph: compiling the tracker for this machine, once") == 1
+
+
+def test_the_command_line_is_asked_instead(unsaid, capsys, monkeypatch):
     asked = []
     monkeypatch.setattr(notice, "is_compiled", lambda _: False)
     monkeypatch.setattr(notice, "when_cold", lambda: asked.append(1))
-    Tracker()
-    Tracker()
-    assert asked == [1]  # other processors help, where the command line asked for that
-    assert capsys.readouterr().err.count("jeat-graph: compiling the tracker for this machine, once") == 1
+    for _ in range(2):
+        notice.notice_if_cold()
+        notice.notice_if_cold(kernel(), "the renderer")
+    assert asked == [1]
+    assert [line.split()[2:4] for line in capsys.readouterr().err.splitlines()] == [["the", "renderer"]]
