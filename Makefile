@@ -1,6 +1,6 @@
 # Every target does its own set-up in .venv and needs only make and Python 3.11 or later.
 #
-#   make demo    from raw pictures and events to tracks on a film, and a longer simulation judged (in demo/)
+#   make demo    track simulated detections, and go from raw pictures and events to tracks on a film (in demo/)
 #   make test    run the tests, those of time by themselves
 #   make test-slow   run those that make test leaves out: endurance, destruction, training
 #   make test-all    run both
@@ -20,7 +20,10 @@ PYTHON ?= $(firstword $(foreach name,$(PYTHONS),$(shell $(name) -c \
 	'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $(name))))
 VENV := .venv
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
+# Without the bytecode of all that comes along, which takes as long as the rest; what is used is compiled then, ...
+PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check --no-compile
+# ... and kept, though some images forbid it: each of many processes would compile it anew.
+export PYTHONDONTWRITEBYTECODE :=
 # The build without what GPUs need, which takes gigabytes. Where pip does not find it by itself, give PIP_EXTRA_INDEX_URL
 # the address of PyTorch's index for processors.
 TORCH := torch==2.13.0+cpu
@@ -34,20 +37,11 @@ OTHER_KERNELS = OPENBLAS_CORETYPE=$(if $(filter x86_64 AMD64,$(shell uname -m)),
 	NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python .ci/kernels.py names)" \
 	NUMBA_CPU_NAME=generic NUMBA_CACHE_DIR=$(CURDIR)/$(VENV)/numba-generic
 
-.PHONY: demo clip test test-slow test-all compiled-for-tests test-portable licences live fuzz lint types bounds build docs clean
+.PHONY: demo test test-slow test-all compiled-for-tests test-portable licences live fuzz lint types bounds build docs clean
 .DELETE_ON_ERROR:
 
-# The clip is rendered on one core while the tracker is compiled on the other.
 demo: $(VENV)/.run
-	@$(MAKE) --no-print-directory -j 2 $(VENV)/.compiled clip
 	@$(BIN)/jeat-graph demo --from-raw --out demo
-
-clip: $(VENV)/.run
-	@$(BIN)/python -m jeat_graph.cli.demo_raw demo
-
-# Some images forbid Python to keep what it compiled: pytest would rewrite all assertions anew in each of its
-# processes, which takes as long as all else before the first test.
-test test-slow test-portable live fuzz: export PYTHONDONTWRITEBYTECODE :=
 
 test: compiled-for-tests
 	@echo "make: running the tests"
@@ -156,5 +150,5 @@ build/.wheel: $(SOURCES) $(shell find eval configs -name '*.py' -o -name '*.yaml
 build/.installed: build/.wheel
 	@echo "make: installing the wheel into build/venv"
 	@$(PYTHON) -m venv --clear build/venv
-	@build/venv/bin/python -m pip install -qq --disable-pip-version-check "$$(ls dist/*.whl)[lint]"
+	@build/venv/bin/python -m pip install -qq --disable-pip-version-check --no-compile "$$(ls dist/*.whl)[lint]"
 	@touch $@

@@ -24,6 +24,8 @@ COLUMNS = ("sensors", "MOTA", "IDF1", "HOTA", "FP", "FN", "IDSW")
 SCENARIO = "night-nolight"
 DURATION_S = 24.0
 SEED = 7
+#: Where the clip from raw recordings follows.
+SHORT_S = 5.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,19 +33,46 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("--scenario", default=SCENARIO, metavar="NAME", help=f"a scenario of `simulate` (default {SCENARIO})")
     add("--out", default="demo", metavar="DIR", help="folder to write into (default demo)")
-    add("--duration", type=float, default=DURATION_S, metavar="S", help=f"length (default {DURATION_S:g})")
+    add(
+        "--duration",
+        type=float,
+        metavar="S",
+        help=f"length (default {DURATION_S:g}, or {SHORT_S:g} with --from-raw)",
+    )
     add("--seed", type=int, default=SEED, metavar="N", help=f"seed of the simulation (default {SEED})")
     add_config(parser, "highway", settings=False)
     add(
         "--from-raw",
         action="store_true",
-        help="before that, go the whole way with a short clip: simulate pictures and events, find the "
-        "vehicles in them, track, judge, and draw a film and a strip of pictures",
+        help="go the whole way with a short clip as well: simulate pictures and events, find the vehicles in "
+        "them, track, judge, and draw a film and a strip of pictures",
     )
 
 
 def run(args: argparse.Namespace) -> int:
     """Simulate, track, judge, draw, and say where everything is."""
+    out = Path(args.out)
+    if not args.from_raw:
+        _show(args, out, DURATION_S if args.duration is None else args.duration)
+        _say_next()
+        return 0
+    from jeat_graph.cli.demo_raw import raw_meanwhile, render_clip, tell
+    from jeat_graph.tracking.compiling import do_without
+
+    if code := render_clip(out):
+        return code
+    with raw_meanwhile(out) as process:
+        if args.duration is None:
+            do_without()
+        _show(args, out, SHORT_S if args.duration is None else args.duration)
+        if code := tell(process, out):
+            return code
+    _say_next()
+    return 0
+
+
+def _show(args: argparse.Namespace, out: Path, duration_s: float) -> None:
+    """Track simulated detections and judge the tracks, and draw them."""
     from jeat_graph.config.reading import load_config
     from jeat_graph.io.detections_io import write_detections
     from jeat_graph.io.trajectories_io import read_trajectories
@@ -59,22 +88,16 @@ def run(args: argparse.Namespace) -> int:
 
     config = load_config(args.config)
     scenario = load_scenario(args.scenario)
-    out = Path(args.out)
-    if args.from_raw:
-        from jeat_graph.cli.demo_raw import go_the_whole_way
-
-        if code := go_the_whole_way(out):
-            return code
     with stages("demo", 1) as stage:
-        stage(f"simulating {args.duration:g} s")
-        recording = record(scenario, args.seed, args.duration)
+        stage(f"simulating {duration_s:g} s")
+        recording = record(scenario, args.seed, duration_s)
     directory = RunDirectory(out / "run")
     warnings = check_detections(recording.detections, config, args.scenario)
     source = out / "detections.csv"
     write_detections(recording.detections, source)
     write_truth(recording.truth, out / "gt.csv")
 
-    _say(f"{args.duration:g} s of {args.scenario} simulated; tracking with both sensors")
+    _say(f"{duration_s:g} s of {args.scenario} simulated; tracking with both sensors")
     origin = {"config_name": args.config, "inputs": describe_inputs([source])}
     origin["reading"] = {"detections": [str(source)]}  # as `track` has it: `compare` reads the inputs again
     details = RunRecord(source=origin, warnings=warnings)
@@ -95,11 +118,13 @@ def run(args: argparse.Namespace) -> int:
     print(f"tracks    {out / 'run'}: causal.csv and smoothed.csv")
     print(f"input     {source}, truth {out / 'gt.csv'}")
     print()
+
+
+def _say_next() -> None:
     print(
         "Next: track your own detections with `jeat-graph track my.csv --out run` (columns t, sensor, left,"
     )
     print("top, width, height, score), and judge them with `jeat-graph eval run --gt gt.csv`.")
-    return 0
 
 
 def _compare(recording: SimulatedRecording, config: Config, causal: Trajectories, smoothed: Path) -> Table:

@@ -14,7 +14,7 @@ from jeat_graph.cli.options import Parser
 from jeat_graph.cli.terminal import Terminated, describe, in_good_order, write_anything
 from jeat_graph.config import kernel_cache
 from jeat_graph.data.errors import JeatGraphError
-from jeat_graph.tracking import notice
+from jeat_graph.tracking import interim, notice
 from jeat_graph.version import __version__
 
 # Each module has HELP (one line), add_arguments(parser) and run(args). Modules are imported only when their
@@ -89,6 +89,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     if kernel_cache.notice:
         print(f"jeat-graph: {kernel_cache.notice}", file=sys.stderr)
     notice.when_cold = partial(_compile_for, args.command)
+    try:
+        return _run(args)
+    finally:
+        notice.forget()
+        interim.end()
+
+
+def _run(args: argparse.Namespace) -> int:
     try:
         with in_good_order(args.command):
             code = int(args.run(args) or 0)

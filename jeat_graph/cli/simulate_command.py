@@ -159,11 +159,10 @@ def _pictures(args: argparse.Namespace, scenario: Scenario) -> int:
     from tqdm import tqdm
 
     from jeat_graph.data.processes import available_cores
+    from jeat_graph.simulation.compiling import prepare_renderer
     from jeat_graph.simulation.dataset.protocol import Protocol
     from jeat_graph.simulation.dataset.recording import record_dataset
-    from jeat_graph.simulation.imaging.painter import paint_tile
     from jeat_graph.simulation.scenario import scenario_to_yaml
-    from jeat_graph.tracking.notice import notice_if_cold
 
     given = {
         "video": args.video or ("png" if args.world == "varied" else None),
@@ -183,8 +182,7 @@ def _pictures(args: argparse.Namespace, scenario: Scenario) -> int:
     total = protocol.segments * frames
     quiet = not sys.stderr.isatty()
     if not carla:
-        # Whatever is rendered, pictures or events, is painted tile by tile.
-        notice_if_cold(paint_tile, "the renderer")
+        prepare_renderer(alone=workers == 1)
     with (
         tqdm(total=total, desc="simulate", unit=" frames", disable=quiet, leave=False) as bar,
         refreshing(bar),

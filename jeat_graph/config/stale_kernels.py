@@ -17,7 +17,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 _RECORD = "kernels.json"
-_COMPILED = (".nbi", ".nbc")
+_COMPILED = (".nbi", ".nbc", ".spent")
 _IMPORT = re.compile(
     r"^[ \t]*(?:from[ \t]+([\w.]+)[ \t]+import[ \t]*(\([^)]*\)|[^\n]*)|import[ \t]+([\w.]+))", re.M
 )

@@ -21,7 +21,7 @@ _WAIT_S = 0.2
 
 
 class Interrupts:
-    """Ctrl-C and SIGTERM end the wait for a message at once, but never a step halfway.
+    """Ctrl-C, SIGTERM and SIGHUP end the wait for a message at once, but never a step halfway.
 
     Attributes:
         seen: the signal that came, or None.
@@ -35,7 +35,11 @@ class Interrupts:
     def __enter__(self) -> Self:
         # Only the main thread may set handlers; elsewhere interrupts stay what they are.
         with contextlib.suppress(ValueError):
-            for number in (signal.SIGINT, signal.SIGTERM):
+            for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+                number = getattr(signal, name, None)
+                # What `nohup` has set stays.
+                if number is None or (name == "SIGHUP" and signal.getsignal(number) == signal.SIG_IGN):
+                    continue
                 self._before[number] = signal.signal(number, self._on_signal)
         return self
 

@@ -7,9 +7,12 @@ interprets the kernels until they are compiled (see `interim`).
 
 from __future__ import annotations
 
+import atexit
+import contextlib
 import math
 import subprocess
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,7 +29,7 @@ from jeat_graph.tracking.batch import Batch
 from jeat_graph.tracking.compaction import allocate
 from jeat_graph.tracking.direct_call import machine_code
 from jeat_graph.tracking.helpers import start_helpers
-from jeat_graph.tracking.interim import Interim, begin
+from jeat_graph.tracking.interim import Interim, begin, end
 from jeat_graph.tracking.notice import is_compiled, keeper, say_compiling
 from jeat_graph.tracking.scans import arrivals_of
 from jeat_graph.tracking.smoothing.online import TrackSmoothers
@@ -44,8 +47,10 @@ MEANWHILE = (
 )
 # More would compile the same kernels at the same time.
 _MOST_HELPERS = 3
-# Who tracks longer than that without machine code compiles, too: so much is lost at most.
+# Who has interpreted for so long compiles, too: in this run, or in several too short for the helpers.
 _PATIENCE_S = 60.0
+# Beside what is compiled of a step, and thrown away with it when the sources change.
+_SPENT = "step.spent"
 _helpers: list[subprocess.Popen[bytes]] = []
 
 
@@ -56,16 +61,49 @@ def work_meanwhile(live: bool) -> None:
         live: whether steps must not stop for minutes, whatever it costs: this process compiles nothing as
             long as others do.
     """
+    before_s = _spent_before()
+    if not live and before_s > _PATIENCE_S:
+        wait_with_help()
+        return
     write_line(f"jeat-graph: {MEANWHILE}")
     get_help()
     # The first one compiles all of it, if the others have not.
     first = _helpers[0] if _helpers else None
-    patience_s = math.inf if live and first is not None else _PATIENCE_S
 
     def is_over() -> bool:
-        return first is not None and first.poll() is not None
+        return first is not None and first.poll() == 0
 
-    begin(Interim(is_over, patience_s, say_compiling))
+    def patience_s() -> float:
+        helped = first is not None and first.poll() is None
+        return math.inf if live and helped else _PATIENCE_S - before_s
+
+    interim = Interim(is_over, patience_s, say_compiling)
+    begin(interim)
+    atexit.register(lambda: _note_spent(before_s + interim.spent_s))
+
+
+def _note() -> Path | None:
+    """Return where it stands how long kernels were interpreted; None where nothing can be kept."""
+    kept = keeper(step)
+    return None if kept is None else Path(kept._cache_path) / _SPENT
+
+
+def _spent_before() -> float:
+    """Return how long earlier runs have interpreted kernels since they last changed (s)."""
+    note = _note()
+    try:
+        return float(note.read_text()) if note is not None else 0.0
+    except (OSError, ValueError):
+        return 0.0
+
+
+def _note_spent(spent_s: float) -> None:
+    note = _note()
+    if note is not None and not is_compiled(step):
+        with contextlib.suppress(OSError):
+            note.write_text(f"{spent_s:.1f}")
+    elif note is not None:
+        note.unlink(missing_ok=True)
 
 
 def do_without() -> None:
@@ -73,7 +111,7 @@ def do_without() -> None:
 
     def interpret() -> None:
         write_line(f"jeat-graph: {MEANWHILE}")
-        begin(Interim(lambda: False))
+        begin(Interim(lambda: False))  # nobody compiles
 
     notice.when_cold = interpret
     notice.notice_if_cold()
@@ -104,8 +142,9 @@ def help_out(k: int, number: int) -> None:
     """Compile what the other processes have not come to, as helper `k` of so many.
 
     Args:
-        k: from 0 on; each begins elsewhere: the first one at the end of a step, and what remains when the
-            stages are done is left to it; the last one with the smoothers.
+        k: from 0 on; each begins elsewhere: the first one at the end of a step, the last one with the
+            smoothers. What remains when the stages are done is left to the first one, the step as a whole at
+            last: where that is compiled, all is.
         number: of helpers.
     """
     config = load_config("default")  # its numbers of sensors and densities do not matter
@@ -117,6 +156,9 @@ def help_out(k: int, number: int) -> None:
     for kernel in kernels[first:] + kernels[:first]:
         machine_code(kernel, tuple(given[name] for name in _parameters(kernel)))
     if k == 0:
+        begin(Interim(lambda: False, parts=(step.__module__,)))
+        compile_all()
+        end()
         compile_all()
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -55,6 +56,10 @@ def part_of(arguments: Sequence[str]) -> tuple[int, int] | None:
     if list(arguments[:1]) != [_HELP_OUT]:
         return None
     end_with_pipe()
+    # Sent to all at once, they are for who started it, who may still need what is compiled.
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
     if hasattr(os, "nice"):
         os.nice(10)
     save_under_own_names()

@@ -32,7 +32,7 @@ class Interim:
 
     Args:
         is_over: says whether the kernels are compiled.
-        patience_s: time of interpreting after which this process compiles, too; infinity: it never does.
+        patience_s: says how long this process interprets before it compiles, too; infinity: it never does.
         impatient: called when that time has passed.
         parts: how the names of the modules begin whose kernels are interpreted.
     """
@@ -40,14 +40,19 @@ class Interim:
     def __init__(
         self,
         is_over: Callable[[], bool],
-        patience_s: float = math.inf,
+        patience_s: Callable[[], float] = lambda: math.inf,
         impatient: Callable[[], object] = lambda: None,
         parts: tuple[str, ...] = TRACKER,
     ) -> None:
         self._is_over, self._patience_s, self._impatient = is_over, patience_s, impatient
         self._parts = parts
         self._spent_s, self._asked = 0.0, time.perf_counter()
-        self._plain: dict[int, _Kernel] = {}
+        self._plain: dict[Any, _Kernel] = {}
+
+    @property
+    def spent_s(self) -> float:
+        """How long kernels were interpreted (s)."""
+        return self._spent_s
 
     def concerns(self, kernel: Any) -> bool:
         """Whether it is a kernel that is interpreted."""
@@ -62,16 +67,16 @@ class Interim:
         self._asked = now
         if self._is_over():
             return False
-        if self._spent_s > self._patience_s:
+        if self._spent_s > self._patience_s():
             self._impatient()
             return False
         return True
 
     def stand_in(self, kernel: Any) -> _Kernel:
         """Return what runs in place of a kernel; the time that it takes is counted."""
-        found = self._plain.get(id(kernel))
+        found = self._plain.get(kernel)
         if found is None:
-            found = self._plain[id(kernel)] = self._timed(plain(kernel))
+            found = self._plain[kernel] = self._timed(plain(kernel))
         return found
 
     def _timed(self, function: _Kernel) -> _Kernel:
@@ -97,12 +102,13 @@ def stand_in(kernel: Any) -> _Kernel | None:
     Args:
         kernel: decorated with `njit`.
     """
-    if _now is None or not _now.concerns(kernel):
+    now = _now
+    if now is None or not now.concerns(kernel):
         return None
-    if not _now.lasts():
+    if not now.lasts():
         end()
         return None
-    return _now.stand_in(kernel)
+    return now.stand_in(kernel)
 
 
 def begin(interim: Interim) -> None:
@@ -110,17 +116,18 @@ def begin(interim: Interim) -> None:
     global _now
     _now = interim
     # What numba calls where it has no machine code for the types of the arguments; what it returns is run.
-    Dispatcher._compile_for_args = _interpret_or_compile  # type: ignore[method-assign]
+    _DISPATCHER._compile_for_args = _interpret_or_compile
 
 
 def end() -> None:
     """Compile what is called from now on, or take it from the disk."""
     global _now
     _now = None
-    Dispatcher._compile_for_args = _compile  # type: ignore[method-assign]
+    _DISPATCHER._compile_for_args = _compile
 
 
-_compile = Dispatcher._compile_for_args
+_DISPATCHER: Any = Dispatcher
+_compile = _DISPATCHER._compile_for_args
 
 
 def _interpret_or_compile(kernel: Any, *arguments: Any, **named: Any) -> Any:

@@ -52,6 +52,13 @@ def notice_if_cold(function: Any = None, what: str = TRACKER) -> None:
     when_cold()
 
 
+def forget() -> None:
+    """Let the next command in this process say it again, and do about it what it does."""
+    global when_cold
+    when_cold = None
+    _said.discard(TRACKER)
+
+
 def say_compiling(what: str = TRACKER) -> None:
     """Say on stderr that this process compiles something and goes on when it is done."""
     write_line(f"jeat-graph: {NOTICE.format(what=what)}")

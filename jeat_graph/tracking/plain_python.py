@@ -15,7 +15,9 @@ from typing import Any
 
 import numpy as np
 
-# The globals of a module with plain kernels in them, by the identity of the module's own.
+from jeat_graph.data.c_math import lgamma
+
+# The globals of a module with plain kernels in them, by the identity of the module's own; modules stay.
 _plain_globals: dict[int, dict[str, Any]] = {}
 
 
@@ -67,5 +69,7 @@ def _as_in_c(name: str) -> Callable[..., float]:
 
 
 _C_MATH = SimpleNamespace(
-    **vars(math) | {name: _as_in_c(name) for name in ("exp", "expm1", "log", "log1p", "pow", "sqrt")}
+    **vars(math)
+    | {name: _as_in_c(name) for name in ("exp", "expm1", "log", "log1p", "pow", "sqrt")}
+    | {"lgamma": lgamma}
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
 from numba.core.caching import IndexDataCacheFile
@@ -57,12 +58,14 @@ def test_each_helper_begins_elsewhere(monkeypatch):
     ran = []
     monkeypatch.setattr(compiling, "compile_smoothers", lambda config: ran.append("smoothers"))
     monkeypatch.setattr(compiling, "compile_all", lambda: ran.append("all"))
+    monkeypatch.setattr(compiling, "begin", lambda interim: ran.append("begin"))
+    monkeypatch.setattr(compiling, "end", lambda: ran.append("end"))
     monkeypatch.setattr(compiling, "machine_code", lambda kernel, given: ran.append(kernel))
     kernels = compiling.stages()
     _, second, last = (len(kernels) * k // 3 for k in range(3))
     for k, expected in enumerate(
         (
-            [*kernels[::-1], "all"],
+            [*kernels[::-1], "begin", "all", "end", "all"],
             [*kernels[::-1][second:], *kernels[::-1][:second]],
             ["smoothers", *kernels[::-1][last:], *kernels[::-1][:last]],
         )
@@ -75,14 +78,14 @@ def test_each_helper_begins_elsewhere(monkeypatch):
 class Helper:
     """A process that compiles until it is told that it has done so."""
 
-    done = False
+    ended = None
 
     def poll(self):
-        return 0 if self.done else None
+        return self.ended
 
 
 @pytest.fixture
-def cold(monkeypatch):
+def cold(monkeypatch, tmp_path):
     """A process that has compiled nothing; which modules it has had run by how many helpers."""
     asked = []
 
@@ -92,7 +95,7 @@ def cold(monkeypatch):
 
     monkeypatch.setattr(compiling, "_helpers", [])
     monkeypatch.setattr(compiling, "is_compiled", lambda function: False)
-    monkeypatch.setattr(compiling, "keeper", lambda function: "a folder")
+    monkeypatch.setattr(compiling, "keeper", lambda function: SimpleNamespace(_cache_path=tmp_path))
     monkeypatch.setattr(compiling, "start_helpers", start)
     return asked
 
@@ -129,12 +132,48 @@ def test_only_what_is_live_and_has_help_is_interpreted_for_as_long_as_it_takes(
     monkeypatch.setattr(compiling, "begin", begun.append)
     compiling.work_meanwhile(live)
     ((is_over, patience_s, _),) = begun
-    assert (patience_s == math.inf) is patient
+    assert (patience_s() == math.inf) is patient
     assert not is_over()
-    if cores > 1:
-        compiling._helpers[0].done = True
-        assert is_over()
     assert "not compiled for this machine yet" in capsys.readouterr().err
+    if cores > 1:
+        compiling._helpers[0].ended = 1  # it has failed: nobody compiles
+        assert not is_over()
+        assert patience_s() == compiling._PATIENCE_S
+        compiling._helpers[0].ended = 0
+        assert is_over()
+
+
+def test_many_short_runs_are_patient_for_as_long_as_one(cold, monkeypatch, capsys):
+    left, begun = [], []
+    monkeypatch.setattr(compiling, "available_cores", lambda: 2)
+    monkeypatch.setattr(compiling, "begin", begun.append)
+    monkeypatch.setattr(compiling.atexit, "register", left.append)
+    for run in range(3):
+        compiling._helpers.clear()
+        compiling.work_meanwhile(live=False)
+        assert ("is not compiled" in capsys.readouterr().err) is (run < 2)  # then it is compiled at once
+        if run < 2:
+            begun[-1]._spent_s = 0.6 * compiling._PATIENCE_S
+            left.pop()()
+    assert len(begun) == 2
+    assert begun[1]._patience_s() == pytest.approx(0.4 * compiling._PATIENCE_S)
+    compiling.work_meanwhile(live=True)  # who is live is patient all the same
+    assert len(begun) == 3
+    monkeypatch.setattr(compiling, "is_compiled", lambda function: True)
+    compiling._note_spent(3.0)
+    assert compiling._spent_before() == 0.0
+
+
+def test_what_was_spent_is_forgotten_with_what_was_compiled(cold, tmp_path, monkeypatch):
+    from jeat_graph.config.stale_kernels import _remove
+
+    kept = tmp_path / "__pycache__"
+    kept.mkdir()
+    monkeypatch.setattr(compiling, "keeper", lambda function: SimpleNamespace(_cache_path=kept))
+    compiling._note_spent(3.0)
+    assert compiling._spent_before() == 3.0
+    _remove(str(tmp_path / "step.py"), None)
+    assert compiling._spent_before() == 0.0
 
 
 @pytest.mark.parametrize("compiled", [False, True])

@@ -36,7 +36,7 @@ def meanwhile(monkeypatch):
         state["impatient"] += 1
 
     def begin(patience_s=math.inf):
-        interim.begin(interim.Interim(lambda: state["over"], patience_s, complain))
+        interim.begin(interim.Interim(lambda: state["over"], lambda: patience_s, complain))
         return state
 
     monkeypatch.setattr(interim, "_POLL_S", 0.0)

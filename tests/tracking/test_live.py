@@ -6,11 +6,13 @@ from types import BuiltinFunctionType, FunctionType, ModuleType
 
 import numpy as np
 import pytest
+from numba.core.dispatcher import Dispatcher
 
 from jeat_graph import Tracker, load_config
 from jeat_graph.tracking.compaction import allocate, grow
 
 PLAIN = ["smoother.engine=none"]
+CODE = (type, ModuleType, FunctionType, BuiltinFunctionType, Dispatcher)
 
 
 def scans_100_hz(num, seed=0):
@@ -37,7 +39,7 @@ def bytes_held(owner):
     seen, waiting, total = set(), [vars(owner)], 0
     while waiting:
         item = waiting.pop()
-        if id(item) in seen or isinstance(item, type | ModuleType | FunctionType | BuiltinFunctionType):
+        if id(item) in seen or isinstance(item, CODE):
             continue
         seen.add(id(item))
         total += item.nbytes if isinstance(item, np.ndarray) else sys.getsizeof(item)

@@ -15,6 +15,7 @@ from jeat_graph.tracking import notice
 def unsaid(monkeypatch):
     """A process that has said nothing yet."""
     monkeypatch.setattr(notice, "_said", set())
+    monkeypatch.setattr(notice, "when_cold", None)
 
 
 class Kept:

@@ -290,6 +290,8 @@ def _others_agreement(s: int, scene: SceneState) -> float:
     most = 0.0
     for o in range(len(scene.trust)):
         if o != s:
-            claimed = scene.claims[o]["all"].sum()
+            claimed = 0.0
+            for part in scene.claims[o]["all"]:  # one by one, as without the compiler
+                claimed += part
             most = max(most, scene.agreed_without[o, s] / (claimed + _PRIOR_CLAIMS))
     return most
