@@ -79,7 +79,7 @@ def work_meanwhile(live: bool) -> None:
 
     interim = Interim(is_over, patience_s, say_compiling)
     begin(interim)
-    atexit.register(lambda: _note_spent(before_s + interim.spent_s))
+    atexit.register(lambda: _note_spent(interim.spent_s))
 
 
 def _note() -> Path | None:
@@ -97,13 +97,16 @@ def _spent_before() -> float:
         return 0.0
 
 
-def _note_spent(spent_s: float) -> None:
+def _note_spent(more_s: float) -> None:
+    """Note that kernels were interpreted for so much longer, if they are still not compiled."""
     note = _note()
-    if note is not None and not is_compiled(step):
-        with contextlib.suppress(OSError):
-            note.write_text(f"{spent_s:.1f}")
-    elif note is not None:
-        note.unlink(missing_ok=True)
+    if note is None:
+        return
+    with contextlib.suppress(OSError):
+        if is_compiled(step):
+            note.unlink(missing_ok=True)
+        else:
+            note.write_text(f"{_spent_before() + more_s:.1f}")
 
 
 def do_without() -> None:

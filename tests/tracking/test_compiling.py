@@ -94,6 +94,7 @@ def cold(monkeypatch, tmp_path):
         return [Helper() for _ in range(number)]
 
     monkeypatch.setattr(compiling, "_helpers", [])
+    monkeypatch.setattr(compiling.atexit, "register", lambda *given: None)
     monkeypatch.setattr(compiling, "is_compiled", lambda function: False)
     monkeypatch.setattr(compiling, "keeper", lambda function: SimpleNamespace(_cache_path=tmp_path))
     monkeypatch.setattr(compiling, "start_helpers", start)
