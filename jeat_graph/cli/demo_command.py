@@ -24,8 +24,8 @@ COLUMNS = ("sensors", "MOTA", "IDF1", "HOTA", "FP", "FN", "IDSW")
 SCENARIO = "night-nolight"
 DURATION_S = 24.0
 SEED = 7
-#: Where the clip from raw recordings follows.
-SHORT_S = 5.0
+#: Beside the clip from raw recordings, where the tracker may have to be interpreted.
+SHORT_S, SHORT_DENSITY = 8.0, "sparse"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--duration",
         type=float,
         metavar="S",
-        help=f"length (default {DURATION_S:g}, or {SHORT_S:g} with --from-raw)",
+        help=f"length (default {DURATION_S:g}, or {SHORT_S:g} of sparse traffic with --from-raw)",
     )
     add("--seed", type=int, default=SEED, metavar="N", help=f"seed of the simulation (default {SEED})")
     add_config(parser, "highway", settings=False)
@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     """Simulate, track, judge, draw, and say where everything is."""
     out = Path(args.out)
     if not args.from_raw:
-        _show(args, out, DURATION_S if args.duration is None else args.duration)
+        _show(args, out, DURATION_S if args.duration is None else args.duration, None)
         _say_next()
         return 0
     from jeat_graph.cli.demo_raw import raw_meanwhile, render_clip, tell
@@ -64,14 +64,16 @@ def run(args: argparse.Namespace) -> int:
     with raw_meanwhile(out) as process:
         if args.duration is None:
             do_without()
-        _show(args, out, SHORT_S if args.duration is None else args.duration)
+            _show(args, out, SHORT_S, SHORT_DENSITY)
+        else:
+            _show(args, out, args.duration, None)
         if code := tell(process, out):
             return code
     _say_next()
     return 0
 
 
-def _show(args: argparse.Namespace, out: Path, duration_s: float) -> None:
+def _show(args: argparse.Namespace, out: Path, duration_s: float, density: str | None) -> None:
     """Track simulated detections and judge the tracks, and draw them."""
     from jeat_graph.config.reading import load_config
     from jeat_graph.io.detections_io import write_detections
@@ -87,7 +89,7 @@ def _show(args: argparse.Namespace, out: Path, duration_s: float) -> None:
     from jeat_graph.tracking.notice import notice_if_cold
 
     config = load_config(args.config)
-    scenario = load_scenario(args.scenario)
+    scenario = load_scenario(args.scenario, density)
     with stages("demo", 1) as stage:
         stage(f"simulating {duration_s:g} s")
         recording = record(scenario, args.seed, duration_s)
