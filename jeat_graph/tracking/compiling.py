@@ -48,7 +48,7 @@ MEANWHILE = (
 # More would compile the same kernels at the same time.
 _MOST_HELPERS = 3
 # Who has interpreted for so long compiles, too: in this run, or in several too short for the helpers.
-_PATIENCE_S = 60.0
+_PATIENCE_S = 30.0
 # Beside what is compiled of a step, and thrown away with it when the sources change.
 _SPENT = "step.spent"
 _helpers: list[subprocess.Popen[bytes]] = []
