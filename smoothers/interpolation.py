@@ -15,6 +15,7 @@ from numba import njit
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.filters.motion import process_noise, transition
+from jeat_graph.smoothers.small_matrices import product
 from jeat_graph.smoothers.track_data import SmoothedTrack
 from jeat_graph.smoothers.transitions import motion_matrices
 
@@ -45,10 +46,10 @@ def bridge(since: float, span: float, jerk: float) -> tuple[FloatArray, FloatArr
     """
     s = since / span
     Q = process_noise(s, 1.0)
-    across = _product(Q, transition(1.0 - s).T)
-    Psi = _product(across, _WHOLE_INVERSE)
-    Lambda = transition(s) - _product(Psi, _WHOLE)
-    Sigma = Q - _product(Psi, across.T)
+    across = product(Q, transition(1.0 - s).T)
+    Psi = product(across, _WHOLE_INVERSE)
+    Lambda = transition(s) - product(Psi, _WHOLE)
+    Sigma = Q - product(Psi, across.T)
     units = (1.0, 1.0 / span, 1.0 / (span * span))
     density = jerk * jerk * span * span * span * span * span
     for i in range(3):
@@ -57,17 +58,6 @@ def bridge(since: float, span: float, jerk: float) -> tuple[FloatArray, FloatArr
             Psi[i, j] *= units[i] / units[j]
             Sigma[i, j] *= density * units[i] * units[j]
     return Lambda, Psi, Sigma
-
-
-@njit(cache=True)
-def _product(A: FloatArray, B: FloatArray) -> FloatArray:
-    """A B for matrices (3, n), (n, 3) too small for a library call."""
-    out = np.zeros((3, 3))
-    for i in range(3):
-        for k in range(B.shape[0]):
-            for j in range(3):
-                out[i, j] += A[i, k] * B[k, j]
-    return out
 
 
 def interpolate(track: SmoothedTrack, t: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -116,10 +106,10 @@ def _between(
         L, S, noise = bridge(query[i] - t[k0], t[k1] - t[k0], jerk[k1])
         for a in range(2):
             # [Λ Ψ] times the joint covariance of both ends, whose mixed block is the gain's.
-            cross = _product(gain[k0, a, :3], cov[k1, a, :, :3])
-            left = _product(L, cov[k0, a, :3, :3]) + _product(S, cross.T)
-            right = _product(L, cross) + _product(S, cov[k1, a, :3, :3])
-            whole = _product(left, L.T) + _product(right, S.T) + noise
+            cross = product(gain[k0, a, :3], cov[k1, a, :, :3])
+            left = product(L, cov[k0, a, :3, :3]) + product(S, cross.T)
+            right = product(L, cross) + product(S, cov[k1, a, :3, :3])
+            whole = product(left, L.T) + product(right, S.T) + noise
             for r in range(3):
                 m = 0.0
                 for c in range(3):

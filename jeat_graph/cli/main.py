@@ -14,7 +14,7 @@ from jeat_graph.cli.options import Parser
 from jeat_graph.cli.terminal import Terminated, describe, in_good_order, write_anything
 from jeat_graph.config import kernel_cache
 from jeat_graph.data.errors import JeatGraphError
-from jeat_graph.tracking import interim, notice
+from jeat_graph.tracking import notice
 from jeat_graph.version import __version__
 
 # Each module has HELP (one line), add_arguments(parser) and run(args). Modules are imported only when their
@@ -93,7 +93,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _run(args)
     finally:
         notice.forget()
-        interim.end()
 
 
 def _run(args: argparse.Namespace) -> int:

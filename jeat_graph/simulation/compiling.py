@@ -9,7 +9,6 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 
-from jeat_graph.data.processes import available_cores
 from jeat_graph.simulation.imaging.config import ImagingConfig
 from jeat_graph.simulation.imaging.event_run import run_physical
 from jeat_graph.simulation.imaging.painter import paint_tile
@@ -17,7 +16,7 @@ from jeat_graph.simulation.imaging.source import RenderedSource
 from jeat_graph.simulation.scenario import load_scenario
 from jeat_graph.tracking.helpers import part_of, start_helpers
 from jeat_graph.tracking.interim import Interim, begin
-from jeat_graph.tracking.notice import is_compiled, keeper, notice_if_cold
+from jeat_graph.tracking.notice import notice_if_cold
 
 _SIDE_PX = 16
 _FIRST = tuple(
@@ -34,8 +33,8 @@ def prepare_renderer(alone: bool) -> None:
     """
     # Whatever is rendered, pictures or events, is painted tile by tile.
     notice_if_cold(paint_tile, "the renderer")
-    if alone and available_cores() > 1 and not is_compiled(run_physical) and keeper(run_physical) is not None:
-        start_helpers("jeat_graph.simulation.compiling", 1)
+    if alone:
+        start_helpers("jeat_graph.simulation.compiling", run_physical, most=1)
 
 
 def help_out() -> None:

@@ -20,7 +20,6 @@ import numpy as np
 from jeat_graph.config.kernel_form import kernel_model
 from jeat_graph.config.reading import load_config
 from jeat_graph.config.schema import Config
-from jeat_graph.data.processes import available_cores
 from jeat_graph.data.progress import write_line
 from jeat_graph.data.scan import Scan
 from jeat_graph.filters.measurement import MEASUREMENT
@@ -132,12 +131,9 @@ def get_help() -> int:
     Returns:
         How many: none where all is compiled, nothing can be kept on disk, or there is one processor.
     """
-    if _helpers or is_compiled(step) or keeper(step) is None:
+    if _helpers:
         return 0
-    number = min(available_cores() - 1, _MOST_HELPERS)
-    if number < 1:
-        return 0
-    _helpers.extend(start_helpers("jeat_graph.tracking.warm_up", number))
+    _helpers.extend(start_helpers("jeat_graph.tracking.warm_up", step, _MOST_HELPERS))
     return len(_helpers)
 
 

@@ -9,22 +9,30 @@ import subprocess
 import sys
 import threading
 from collections.abc import Sequence
+from typing import Any
 
 from jeat_graph.config.cache_names import save_under_own_names
+from jeat_graph.data.processes import available_cores
+from jeat_graph.tracking.notice import is_compiled, keeper
 
 _HELP_OUT = "--help-out"
 
 
-def start_helpers(module: str, number: int) -> list[subprocess.Popen[bytes]]:
-    """Run a module in so many processes, each of which is told which one it is (see `part_of`).
+def start_helpers(module: str, kernel: Any, most: int) -> list[subprocess.Popen[bytes]]:
+    """Run a module in a process for each further processor, told which one it is (see `part_of`).
 
     Args:
         module: its dotted name.
-        number: how many.
+        kernel: decorated with `njit`; the last one that is compiled.
+        most: of so many processors at most.
 
     Returns:
-        The processes; fewer, or none, where the system has no more: it takes longer without.
+        The processes: none where the kernel is compiled, nothing can be kept on disk, or there is one
+        processor; fewer where the system has no more. It takes longer without.
     """
+    number = min(available_cores() - 1, most)
+    if number < 1 or is_compiled(kernel) or keeper(kernel) is None:
+        return []
     save_under_own_names()
     helpers: list[subprocess.Popen[bytes]] = []
     atexit.register(_send_home, helpers)

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numba.core.dispatcher import Dispatcher, OmittedArg
 
+from jeat_graph.tracking import notice
 from jeat_graph.tracking.plain_python import plain
 
 #: Parts of the package of which a tracker is made; kernels of pictures and events do too much for this.
@@ -115,6 +116,7 @@ def begin(interim: Interim) -> None:
     """Interpret kernels that Python calls, from now on, as is said there."""
     global _now
     _now = interim
+    notice.when_over = end
     # What numba calls where it has no machine code for the types of the arguments; what it returns is run.
     _DISPATCHER._compile_for_args = _interpret_or_compile
 

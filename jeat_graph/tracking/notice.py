@@ -11,6 +11,8 @@ TRACKER = "the tracker"
 NOTICE = "compiling {what} for this machine, once (two to five minutes) …"
 #: What is called instead where the tracker has to be compiled: the command line has other processors help.
 when_cold: Callable[[], object] | None = None
+#: Ends what was begun there, if anything was; said here, for asking the compiler's part would load all of it.
+when_over: Callable[[], object] | None = None
 _said: set[str] = set()
 
 
@@ -54,8 +56,10 @@ def notice_if_cold(function: Any = None, what: str = TRACKER) -> None:
 
 def forget() -> None:
     """Let the next command in this process say it again, and do about it what it does."""
-    global when_cold
-    when_cold = None
+    global when_cold, when_over
+    if when_over is not None:
+        when_over()
+    when_cold = when_over = None
     _said.discard(TRACKER)
 
 

@@ -15,25 +15,16 @@ from jeat_graph.smoothers.gtsam.linear_graph import LinearGraph
 from jeat_graph.smoothers.gtsam.scaling import unscale_cov, unscale_gain, unscale_mean
 from jeat_graph.smoothers.gtsam.whitened import prior_rows, segment_rows
 from jeat_graph.smoothers.rts import filter_track, observations, steps
+from jeat_graph.smoothers.small_matrices import product
 from jeat_graph.smoothers.track_data import SmoothedTrack, TrackData
 
 
 @njit(cache=True)
 def _marginals(cov: FloatArray, gain: FloatArray) -> None:
     """Turn conditional covariances (K, 2, n, n) into marginal ones, in place, from the last key back."""
-    size = cov.shape[-1]
-    moved = np.empty((size, size))
     for k in range(len(gain) - 2, -1, -1):
         for a in range(2):
-            for i in range(size):
-                for j in range(size):
-                    moved[i, j] = 0.0
-                    for m in range(size):
-                        moved[i, j] += gain[k, a, i, m] * cov[k + 1, a, m, j]
-            for i in range(size):
-                for j in range(size):
-                    for m in range(size):
-                        cov[k, a, i, j] += moved[i, m] * gain[k, a, j, m]
+            cov[k, a] += product(product(gain[k, a], cov[k + 1, a]), gain[k, a].T)
 
 
 def smooth_full(track: TrackData, weights: FloatArray | None = None) -> SmoothedTrack:

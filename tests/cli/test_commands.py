@@ -75,8 +75,9 @@ def test_a_reader_that_leaves_early_is_no_error(recording, tmp_path, start):
     assert process.wait() == 0
 
 
-def test_importing_the_package_is_light():
+@pytest.mark.parametrize("module", ["jeat_graph", "jeat_graph.cli.main"])
+def test_importing_the_package_is_light(module):
     heavy = "{'numba', 'gtsam', 'matplotlib', 'pyarrow'}"
-    code = f"import sys, jeat_graph; print(sorted({heavy} & set(sys.modules)))"
+    code = f"import sys, {module}; print(sorted({heavy} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"

@@ -9,6 +9,7 @@ import pytest
 
 from jeat_graph.simulation import compiling
 from jeat_graph.simulation.imaging.event_run import run_physical
+from jeat_graph.tracking import helpers as processes
 
 # In a process of its own: other tests call kernels with other types.
 SCRIPT = """
@@ -53,9 +54,11 @@ def test_it_compiles_what_comes_last_as_who_renders_calls_it(tmp_path):
 def test_help_is_asked_for_where_it_helps(alone, cores, compiled, kept, helpers, monkeypatch):
     asked = []
     monkeypatch.setattr(compiling, "notice_if_cold", lambda function, what: None)
-    monkeypatch.setattr(compiling, "available_cores", lambda: cores)
-    monkeypatch.setattr(compiling, "is_compiled", lambda function: compiled)
-    monkeypatch.setattr(compiling, "keeper", lambda function: kept)
-    monkeypatch.setattr(compiling, "start_helpers", lambda module, number: asked.append(module))
+    monkeypatch.setattr(processes, "available_cores", lambda: cores)
+    monkeypatch.setattr(processes, "is_compiled", lambda function: compiled)
+    monkeypatch.setattr(processes, "keeper", lambda function: kept)
+    monkeypatch.setattr(processes, "save_under_own_names", lambda: None)
+    monkeypatch.setattr(processes.subprocess, "Popen", lambda command, **streams: asked.append(command[3]))
+    monkeypatch.setattr(processes.atexit, "register", lambda *given: None)
     compiling.prepare_renderer(alone)
     assert asked == ["jeat_graph.simulation.compiling"] * helpers

@@ -11,7 +11,7 @@ import pytest
 from numba.core.caching import IndexDataCacheFile
 
 from jeat_graph.config import cache_names
-from jeat_graph.tracking import compiling
+from jeat_graph.tracking import compiling, helpers
 from jeat_graph.tracking.step import step
 
 COMPILED = hasattr(step, "overloads")
@@ -89,34 +89,36 @@ def cold(monkeypatch, tmp_path):
     """A process that has compiled nothing; which modules it has had run by how many helpers."""
     asked = []
 
-    def start(module, number):
-        asked.append((module, number))
-        return [Helper() for _ in range(number)]
+    class Started(Helper):
+        def __init__(self, command, **streams):
+            asked.append(command[3])
 
     monkeypatch.setattr(compiling, "_helpers", [])
+    monkeypatch.setattr(helpers.subprocess, "Popen", Started)
+    monkeypatch.setattr(helpers, "save_under_own_names", lambda: None)
     monkeypatch.setattr(compiling.atexit, "register", lambda *given: None)
-    monkeypatch.setattr(compiling, "is_compiled", lambda function: False)
-    monkeypatch.setattr(compiling, "keeper", lambda function: SimpleNamespace(_cache_path=tmp_path))
-    monkeypatch.setattr(compiling, "start_helpers", start)
+    for module in (compiling, helpers):
+        monkeypatch.setattr(module, "is_compiled", lambda function: False)
+        monkeypatch.setattr(module, "keeper", lambda function: SimpleNamespace(_cache_path=tmp_path))
     return asked
 
 
 @pytest.mark.parametrize(("cores", "number"), [(1, 0), (2, 1), (3, 2), (9, 3)])
 def test_help_is_asked_for_where_nothing_is_compiled(cores, number, cold, monkeypatch):
-    monkeypatch.setattr(compiling, "available_cores", lambda: cores)
+    monkeypatch.setattr(helpers, "available_cores", lambda: cores)
     assert compiling.get_help() == number
-    assert cold == [("jeat_graph.tracking.warm_up", number)] * (number > 0)
+    assert cold == ["jeat_graph.tracking.warm_up"] * number
     if number:
         assert compiling.get_help() == 0  # once is enough
-        assert len(cold) == 1
+        assert len(cold) == number
 
 
 def test_no_help_is_needed_where_all_is_compiled_or_nothing_kept(cold, monkeypatch):
-    monkeypatch.setattr(compiling, "available_cores", lambda: 4)
+    monkeypatch.setattr(helpers, "available_cores", lambda: 4)
     with monkeypatch.context() as compiled:
-        compiled.setattr(compiling, "is_compiled", lambda function: True)
+        compiled.setattr(helpers, "is_compiled", lambda function: True)
         assert compiling.get_help() == 0
-    monkeypatch.setattr(compiling, "keeper", lambda function: None)
+    monkeypatch.setattr(helpers, "keeper", lambda function: None)
     assert compiling.get_help() == 0
     assert not cold
 
@@ -128,7 +130,7 @@ def test_only_what_is_live_and_has_help_is_interpreted_for_as_long_as_it_takes(
     cores, live, patient, cold, monkeypatch, capsys
 ):
     begun = []
-    monkeypatch.setattr(compiling, "available_cores", lambda: cores)
+    monkeypatch.setattr(helpers, "available_cores", lambda: cores)
     monkeypatch.setattr(compiling, "Interim", lambda *given: given)
     monkeypatch.setattr(compiling, "begin", begun.append)
     compiling.work_meanwhile(live)
@@ -146,9 +148,9 @@ def test_only_what_is_live_and_has_help_is_interpreted_for_as_long_as_it_takes(
 
 def test_many_short_runs_are_patient_for_as_long_as_one(cold, monkeypatch, capsys):
     left, begun = [], []
-    monkeypatch.setattr(compiling, "available_cores", lambda: 2)
+    monkeypatch.setattr(helpers, "available_cores", lambda: 2)
     monkeypatch.setattr(compiling, "begin", begun.append)
-    monkeypatch.setattr(compiling.atexit, "register", left.append)
+    monkeypatch.setattr(compiling.atexit, "register", lambda what, *given: left.append(what))
     for run in range(3):
         compiling._helpers.clear()
         compiling.work_meanwhile(live=False)

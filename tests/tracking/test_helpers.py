@@ -29,6 +29,9 @@ def left(monkeypatch):
     """What is done when the process ends."""
     done = []
     monkeypatch.setattr(helpers, "save_under_own_names", lambda: None)
+    monkeypatch.setattr(helpers, "available_cores", lambda: 9)
+    monkeypatch.setattr(helpers, "is_compiled", lambda kernel: False)
+    monkeypatch.setattr(helpers, "keeper", lambda kernel: "a folder")
     monkeypatch.setattr(helpers.atexit, "register", lambda what, *given: done.append((what, given)))
     monkeypatch.setattr(helpers.subprocess, "Popen", Helper)
     return done
@@ -37,7 +40,7 @@ def left(monkeypatch):
 def test_each_is_told_which_one_it_is_and_is_ended_with_who_started_it(left, monkeypatch):
     monkeypatch.setattr(helpers, "end_with_pipe", lambda: None)
     monkeypatch.setattr(helpers.os, "nice", lambda by: None, raising=False)
-    started = helpers.start_helpers("some.module", 3)
+    started = helpers.start_helpers("some.module", None, most=3)
     assert all(helper.command[:4] == [sys.executable, "-P", "-m", "some.module"] for helper in started)
     assert [helpers.part_of(helper.command[4:]) for helper in started] == [(0, 3), (1, 3), (2, 3)]
     for what, given in left:
@@ -55,7 +58,7 @@ def test_without_more_processes_it_only_takes_longer(left, monkeypatch):
         raise BlockingIOError("Resource temporarily unavailable")
 
     monkeypatch.setattr(helpers.subprocess, "Popen", refuse)
-    assert helpers.start_helpers("some.module", 2) == []
+    assert helpers.start_helpers("some.module", None, most=2) == []
 
 
 def test_they_end_with_who_started_them():
