@@ -89,7 +89,7 @@ class BinnedDetector:
             raise DataError(f"events begin at {first_us} µs, before the last ones at {self._last_us} µs")
         self._last_us = last_us
         signal = EventArray.trusted(events.t_us, events.x, events.y, events.polarity)
-        if self._noise.settings.background or self._noise.settings.hot_pixels:
+        if self._noise.settings.alone or self._noise.settings.hot_pixels:
             signal = self._noise.keep(signal)
         return Signal(signal, first_us, last_us)
 

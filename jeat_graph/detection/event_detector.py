@@ -18,6 +18,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Scan
+from jeat_graph.detection.background import EventBackground
 from jeat_graph.detection.binned import BinnedDetector
 from jeat_graph.detection.components import Components, measured, weights, without_inner
 from jeat_graph.detection.linking import MarkedPixels, linked, marked_pixels
@@ -45,13 +46,16 @@ class EventDetector(BinnedDetector):
         ring = EventBins(size_px, bins, self.settings.bin_s)
         self._rate_hz = self.settings.rate(USUAL_RATE_HZ)
         super().__init__(size_px, sensor, self._rate_hz, ring, bins, self.settings)
+        self._background = EventBackground(size_px, self._rate_hz, self.settings.background)
         diagonal = math.hypot(*size_px)
         self._steps = max(1, round(self.settings.apart_s * self._rate_hz))
+        self._piece_steps = round(self.settings.pieces_s * self._rate_hz)
         self._near_px = max(2, round(self.settings.near_share * diagonal))
-        self._memory = CloudMemory(self._near_px, self._steps)
+        self._memory = CloudMemory(self._near_px, self._steps, self._piece_steps)
 
     def _emptied(self) -> None:
-        self._memory = CloudMemory(self._near_px, self._steps)
+        self._background.forget()
+        self._memory = CloudMemory(self._near_px, self._steps, self._piece_steps)
 
     def _look(self) -> Scan:
         settings = self.settings
@@ -76,7 +80,7 @@ class EventDetector(BinnedDetector):
     def _clouds(self) -> Components:
         """Link the window's events; boxes from the newest part, weights from all."""
         settings = self.settings
-        pixels = marked_pixels(self._bins.total)
+        pixels = marked_pixels(self._background.standing_out(self._bins.total))
         count, marked = linked(pixels, self._link_px(pixels), settings.least_events)
         count, marked = self._memory.relabel(count, marked)
         whole = weights(count, marked)

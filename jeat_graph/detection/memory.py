@@ -1,7 +1,8 @@
 """Compares groups of pixels with those of the step before, so that vehicles that pass each other stay two.
 
-A cloud that covers two clouds of a moment ago, which moved differently, is both of them: its pixels go to the
-nearer one. Clouds that lie together where one was a moment ago are pieces of it.
+A cloud that covers two clouds of a moment ago, which moved differently, is both of them: its pixels go to
+the nearer one. Clouds that lie together where one was a moment ago are pieces of it; where they stay apart,
+it was never one thing.
 """
 
 from __future__ import annotations
@@ -32,18 +33,22 @@ class CloudMemory:
             and clouds that do not move apart by it within `apart_steps` are not told apart.
         apart_steps: steps that a cloud must have been there to be remembered as one of two, and over which
             two must move differently.
+        piece_steps: steps for which the pieces of a cloud are put together after it was last whole.
 
     Attributes:
         boxes: (K, 4) of the last step.
         velocity: (K, 2) of their centres (px a step); 0 where a box is new.
     """
 
-    def __init__(self, link_px: int, apart_steps: int) -> None:
+    def __init__(self, link_px: int, apart_steps: int, piece_steps: int) -> None:
         self._link_px = float(link_px)
-        self._apart_steps = apart_steps
+        self._apart_steps, self._piece_steps = apart_steps, piece_steps
         self.boxes: FloatArray = np.zeros((0, 4))
         self.velocity: FloatArray = np.zeros((0, 2))
         self._age: IntArray = np.zeros(0, dtype=np.int64)
+        # Steps since a box was of one whole cloud; and the same with the step that is on, if it is.
+        self._broken: IntArray = np.zeros(0, dtype=np.int64)
+        self._broken_now = self._broken
 
     def expected(self) -> FloatArray:
         """Return where the boxes (K, 4) should be now (px)."""
@@ -61,6 +66,7 @@ class CloudMemory:
         Returns:
             The number of clouds, and the pixels with the clouds numbered anew.
         """
+        self._broken_now = np.zeros_like(self._broken)
         old = np.flatnonzero(self._age >= self._apart_steps)
         if not len(old) or not len(marked.group):
             return count, marked
@@ -73,9 +79,14 @@ class CloudMemory:
         extents, sizes = _extents(marked._replace(group=new), base + len(old))
         table = np.arange(base + len(old))
         for k, names in enumerate(pieces):
+            names = [name for name in dict.fromkeys(names) if sizes[name]]
+            if len(names) > 1:
+                self._broken_now[old[k]] = self._broken[old[k]] + 1
+                if self._broken_now[old[k]] > self._piece_steps:
+                    continue
             # A dark body fires at its ends only: pieces may be far apart, but within what it was.
             most_px = expected[k, 2:] + 2.0 * self._link_px
-            _join(table, list(dict.fromkeys(names)), extents, sizes, most_px)
+            _join(table, names, extents, sizes, most_px)
         there = np.zeros(len(table), dtype=bool)
         there[table[sizes > 0]] = True
         number = np.cumsum(there, dtype=np.int32)
@@ -125,7 +136,7 @@ class CloudMemory:
         """Keep the boxes (M, 4) of this step for the next."""
         expected = self.expected()
         velocity = np.zeros((len(boxes), 2))
-        age = np.zeros(len(boxes), dtype=np.int64)
+        age, broken = np.zeros(len(boxes), dtype=np.int64), np.zeros(len(boxes), dtype=np.int64)
         if len(boxes) and len(expected):
             overlap = _iou(boxes, expected)
             best = overlap.argmax(axis=1)
@@ -137,7 +148,9 @@ class CloudMemory:
             share = np.where(self._age[before] == 0, 1.0, _NEW_SHARE)[:, None]
             velocity[again] = share * moved + (1.0 - share) * self.velocity[before]
             age[again] = self._age[before] + 1
-        self.boxes, self.velocity, self._age = boxes.copy(), velocity, age
+            broken[again] = self._broken_now[before]
+        self.boxes, self.velocity, self._age, self._broken = boxes.copy(), velocity, age, broken
+        self._broken_now = np.zeros_like(broken)
 
     def _apart(self, which: IntArray) -> BoolArray:
         """Return which of some remembered boxes move differently from the first of them, and it."""
@@ -173,7 +186,6 @@ def _join(
         sizes: (names,) pixels of each.
         most_px: (2,) width and height that they may have together (px).
     """
-    names = [name for name in names if sizes[name]]
     whole = None
     for name in sorted(names, key=lambda name: (name != names[0], -sizes[name])):
         part = extents[name]

@@ -32,7 +32,7 @@ _NEIGHBOURS = 8
 class NoiseSettings(Section):
     """What is taken for noise in events and left out."""
 
-    background: bool = flag(True, "whether events that stand alone are left out")
+    alone: bool = flag(True, "whether events that stand alone are left out")
     support_s: float = number(
         0.03,
         "s",
@@ -81,8 +81,10 @@ class NoiseFilter:
         self._period_end = _LONG_AGO
 
     def keep(self, events: EventArray) -> EventArray:
-        """Return the events that are not noise."""
+        """Return the events that are not noise; the same ones where all are."""
         good = self.signal(events)
+        if good.all():
+            return events
         if events.by_motion is not None:
             return events.take(np.flatnonzero(good))
         return EventArray.trusted(*_taken(events.t_us, events.x, events.y, events.polarity, good))
@@ -103,16 +105,12 @@ class NoiseFilter:
             rows = slice(start, max(end, start + 1))
             if settings.hot_pixels:
                 _add(events.x[rows], events.y[rows], self._counts)
-            alone = _judge(
-                events.t_us[rows],
-                events.x[rows],
-                events.y[rows],
-                self._last,
-                self.hot,
-                (self._begin_us, round(settings.support_s * _US_PER_S), settings.background),
-                good[rows],
-            )
-            self.alone += int(alone)
+            x, y = events.x[rows], events.y[rows]
+            if settings.alone:
+                times = self._begin_us, round(settings.support_s * _US_PER_S)
+                self.alone += int(_judge(events.t_us[rows], x, y, self._last, self.hot, times, good[rows]))
+            else:
+                _leave_hot(x, y, self.hot, good[rows])
             start = rows.stop
         return good
 
@@ -155,15 +153,15 @@ def _judge(
     y: npt.NDArray[np.uint16],
     last: npt.NDArray[np.int32],
     hot: BoolArray,
-    settings: tuple[int, int, bool],
+    times: tuple[int, int],
     good: BoolArray,
 ) -> int:
     """Mark the events that are no noise in `good`, keep the last times; return how many stood alone."""
-    begin_us, support_us, background = settings
+    begin_us, support_us = times
     height, width = np.uint64(hot.shape[0]), np.uint64(hot.shape[1])
     one, two = np.uint64(1), np.uint64(2)
     flat, line = last.reshape(-1), np.uint64(last.shape[1])
-    any_hot, all_good = hot.any(), not background
+    any_hot = hot.any()
     alone = 0
     for k in range(len(t)):
         column, row = np.uint64(x[k]), np.uint64(y[k])
@@ -183,8 +181,18 @@ def _judge(
         near = newest >= since
         flat[here + one] = now
         alone += not near
-        good[k] = near | all_good
+        good[k] = near
     return alone
+
+
+@numba.njit(cache=True, nogil=True)
+def _leave_hot(x: npt.NDArray[np.uint16], y: npt.NDArray[np.uint16], hot: BoolArray, good: BoolArray) -> None:
+    """Mark the events in `good` that are in the picture and not of hot pixels."""
+    height, width = np.uint64(hot.shape[0]), np.uint64(hot.shape[1])
+    any_hot = hot.any()
+    for k in range(len(x)):
+        column, row = np.uint64(x[k]), np.uint64(y[k])
+        good[k] = column < width and row < height and not (any_hot and hot[row, column])
 
 
 @numba.njit(cache=True, nogil=True)

@@ -118,7 +118,8 @@ class PictureDetector:
         if marks is None:
             return None
         if self._memory is None and math.isfinite(step_s):
-            self._memory = CloudMemory(self._near_px, max(1, round(self.settings.apart_s / step_s)))
+            steps = max(1, round(self.settings.apart_s / step_s)), round(self.settings.pieces_s / step_s)
+            self._memory = CloudMemory(self._near_px, *steps)
         found = self._groups(marks)
         scores = 1.0 - np.exp(-found.pixels / self.settings.certain_pixels)
         return Scan(t, self.sensor, found.boxes, scores)

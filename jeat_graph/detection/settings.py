@@ -9,6 +9,7 @@ from pathlib import Path
 from jeat_graph.config.fields import Section, number
 from jeat_graph.config.section_tree import build, merge, read_tree, tree_of_changes
 from jeat_graph.data.errors import ConfigError
+from jeat_graph.detection.background import BackgroundSettings
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.noise import NoiseSettings
 
@@ -39,6 +40,9 @@ _RATE = (
     "networks beside pictures"
 )
 _APART = "two groups that run together stay two if they were there, and moved apart, for so long"
+_PIECES = (
+    "a group that falls into pieces, as a dark body does that is seen at its ends only, is one for so long"
+)
 
 
 @dataclass(frozen=True)
@@ -56,11 +60,14 @@ class EventSettings(Section):
     trim_share: float = number(0.2, "1", _TRIM, 0.0, 0.9)
     inside_share: float = number(0.6, "1", _INSIDE, 0.0, 1.0)
     apart_s: float = number(0.1, "s", _APART)
+    pieces_s: float = number(0.2, "s", _PIECES)
     certain_events: float = number(40.0, "1", "at so many events a score reaches 1 - 1/e", open_low=True)
     longest_gap_s: float = number(
         10.0, "s", "where the time of a file leaps ahead by more, no scans are made for the gap", 0.1
     )
-    noise: NoiseSettings = field(default_factory=NoiseSettings)
+    background: BackgroundSettings = field(default_factory=BackgroundSettings)
+    # What stands out of the background is no event that stands alone.
+    noise: NoiseSettings = field(default_factory=lambda: NoiseSettings(alone=False))
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -132,6 +139,7 @@ class PictureSettings(Section):
     trim_share: float = number(0.2, "1", _TRIM, 0.0, 0.9)
     inside_share: float = number(0.6, "1", _INSIDE, 0.0, 1.0)
     apart_s: float = number(0.2, "s", _APART)
+    pieces_s: float = number(0.2, "s", _PIECES)
     certain_pixels: float = number(
         40.0, "px", "at so many pixels of foreground a score reaches 1 - 1/e", open_low=True
     )

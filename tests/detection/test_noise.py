@@ -63,7 +63,7 @@ def test_a_hot_pixel_is_found_and_a_busy_edge_is_not():
         (t + k, 20 + k, 10 + j) for t in range(0, 3_000_000, 10_000) for k in range(3) for j in range(3)
     ]
     found = events(hot + flicker)
-    noise = NoiseFilter(SIZE, NoiseSettings(background=False))
+    noise = NoiseFilter(SIZE, NoiseSettings(alone=False))
     signal = noise.signal(found)
     assert np.argwhere(noise.hot).tolist() == [[5, 5]]
     late = (found.t_us > 1_100_000) & (found.x == 5)
@@ -73,7 +73,7 @@ def test_a_hot_pixel_is_found_and_a_busy_edge_is_not():
 
 def test_nothing_is_left_out_where_both_are_off():
     found = events([(t, t % 40, t % 30) for t in range(0, 2_000_000, 1000)])
-    assert NoiseFilter(SIZE, NoiseSettings(background=False, hot_pixels=False)).signal(found).all()
+    assert NoiseFilter(SIZE, NoiseSettings(alone=False, hot_pixels=False)).signal(found).all()
 
 
 def test_events_outside_the_picture_are_left_out():

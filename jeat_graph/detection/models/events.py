@@ -18,7 +18,6 @@ from jeat_graph.detection.models.event_places import EventPlaces, event_scale
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.models.onnx_head import CARD, OnnxHead, Port, read_onnx_head
 from jeat_graph.detection.models.output_reader import OutputReader, scan_within
-from jeat_graph.detection.noise import NoiseSettings
 from jeat_graph.detection.settings import USUAL_RATE_HZ, EventSettings
 from jeat_graph.detection.windows import EventBins
 
@@ -64,8 +63,9 @@ class ModelEventDetector(BinnedDetector):
     ) -> None:
         times = times or EventSettings()
         self._settings = settings or ModelSettings()
-        if not self._settings.noise_filter:
-            times = replace(times, noise=NoiseSettings(background=False, hot_pixels=False))
+        asked = self._settings.noise_filter
+        hot = asked and times.noise.hot_pixels
+        times = replace(times, noise=replace(times.noise, alone=asked, hot_pixels=hot))
         self._path = Path(path)
         head = read_onnx_head(path)
         self._input = _window_input(head, self._path)

@@ -68,7 +68,9 @@ class ModelSettings(Section):
     )
 
     noise_filter: bool = flag(
-        False, "whether a network of events is spared noise (events.noise); most were trained with all events"
+        False,
+        "whether a network of events is spared those that stand alone, and hot pixels (events.noise); most "
+        "were trained with all events",
     )
 
     channels: str = choice(
