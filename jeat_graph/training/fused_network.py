@@ -1,7 +1,9 @@
 """The network that looks at pictures and events at once: two backbones, summed at each level through gates.
 
 Pictures may be older than the events, or missing; so may the events. The network is told how old the picture
-is and what there is, and each cell weighs what the two sensors say. It is the family's early fusion.
+is and what there is, and each cell weighs what the two sensors say. What it has seen of both it remembers, at
+each level: of a vehicle that one dark picture hardly shows, several show more. It is the family's early
+fusion.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
+from jeat_graph.training.blocks import ConvGru
 from jeat_graph.training.network import (
     EVENTS_INPUT,
     PICTURE_INPUT,
@@ -19,8 +22,9 @@ from jeat_graph.training.network import (
     Head,
     VehicleNet,
     level_channels,
+    remembered,
 )
-from jeat_graph.training.settings import COLOURS, NetSettings
+from jeat_graph.training.settings import COLOURS, STRIDES, NetSettings
 
 #: Name of the input that says what there is: `TOLD` numbers.
 GIVEN_INPUT = "given"
@@ -74,6 +78,28 @@ class GatedSum(nn.Module):
         return of_picture * picture + of_events * events
 
 
+class Recall(nn.Module):
+    """Adds to the features of both what is remembered of those before: f + C h, with a memory h of f.
+
+    Args:
+        channels: of the features.
+    """
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.memory = ConvGru(channels)
+        self.carry = nn.Conv2d(channels, channels, 1)
+        # At first nothing is added: a network that starts from others is as good as they are.
+        nn.init.zeros_(self.carry.weight)
+        assert self.carry.bias is not None
+        nn.init.zeros_(self.carry.bias)
+
+    def forward(self, x: Tensor, state: Tensor, length: int, keep: float) -> tuple[Tensor, Tensor]:
+        """Return the sum and the last state; arguments as `remembered`."""
+        seen, state = remembered(self.memory, x, state, length, keep)
+        return x + self.carry(seen), state
+
+
 class FusedNet(VehicleNet):
     """Finds vehicles in pictures and events together.
 
@@ -83,10 +109,12 @@ class FusedNet(VehicleNet):
 
     def __init__(self, settings: NetSettings) -> None:
         events = Backbone(settings.channels, settings, has_memory=True)
-        super().__init__(settings, events.state_channels)
+        levels = level_channels(settings.width)
+        super().__init__(settings, (*events.states, *zip(levels, STRIDES, strict=True)))
         self.pictures = Backbone(COLOURS, settings, has_memory=False)
         self.events = events
-        self.join = nn.ModuleList(GatedSum(channels) for channels in level_channels(settings.width))
+        self.join = nn.ModuleList(GatedSum(channels) for channels in levels)
+        self.recall = nn.ModuleList(Recall(channels) for channels in levels)
         self.head = Head(settings.width)
 
     def hold_pictures(self) -> None:
@@ -101,14 +129,15 @@ class FusedNet(VehicleNet):
 
         Args:
             x: (L x B, 2 x bins, H, W) counts of events.
-            state: of the windows before.
+            state: of the windows before: that of the events, then that of both.
             length: L.
             seen: the pictures.
 
         Returns:
             Rows (L x B, N, 5), and the state after the last window.
         """
-        of_events, kept = self.events(x, state, length)
+        count = len(self.events.states)
+        of_events, kept = self.events(x, state[:count], length)
         of_pictures, _ = self.pictures(seen.pictures)
         age = torch.clamp(seen.given[:, 1:2] / _AGE_S, max=_MOST_AGES)
         told = torch.cat([seen.given[:, :1], age, seen.given[:, 2:]], dim=1)
@@ -116,6 +145,9 @@ class FusedNet(VehicleNet):
             join(picture[seen.which] if len(seen.which) else picture, events, told)
             for join, picture, events in zip(self.join, of_pictures, of_events, strict=True)
         ]
+        for k, (recall, before) in enumerate(zip(self.recall, state[count:], strict=True)):
+            levels[k], now = recall(levels[k], before, length, self.settings.memory_keep)
+            kept = (*kept, now)
         rows: Tensor = self.head((levels[0], levels[1], levels[2]))
         return rows, kept
 

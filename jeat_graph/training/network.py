@@ -20,7 +20,6 @@ from jeat_graph.training.settings import COARSEST, STRIDES, NetSettings
 PICTURE_INPUT, EVENTS_INPUT = "picture", "events"
 #: Numbers of a cell: two of the middle, two of the size, one of the class.
 ROW = 5
-_MEMORY_STRIDES = STRIDES[1:]
 #: Share of the cells with a vehicle that the first weights expect: so the many empty ones do not drown them.
 _PRIOR = 0.01
 #: A box is first about e cells wide: 11, 22 and 43 px.
@@ -39,7 +38,7 @@ class Backbone(nn.Module):
         has_memory: whether it remembers windows before, at the two coarser strides.
 
     Attributes:
-        state_channels: channels of each state, fine to coarse; empty without a memory.
+        states: channels and stride (px) of each state, fine to coarse; empty without a memory.
     """
 
     def __init__(self, channels: int, settings: NetSettings, has_memory: bool) -> None:
@@ -51,8 +50,8 @@ class Backbone(nn.Module):
         self.to_4 = nn.Sequential(ConvBlock(w, fine, 3, 2), CspBlock(fine, fine))
         self.to_8 = nn.Sequential(ConvBlock(fine, middle, 3, 2), CspBlock(middle, middle))
         self.to_16 = nn.Sequential(ConvBlock(middle, coarse, 3, 2), CspBlock(coarse, coarse, 2))
-        self.state_channels = (middle, coarse) if has_memory else ()
-        self.memory = nn.ModuleList(ConvGru(channels) for channels in self.state_channels)
+        self.states = ((middle, STRIDES[1]), (coarse, STRIDES[2])) if has_memory else ()
+        self.memory = nn.ModuleList(ConvGru(channels) for channels, _ in self.states)
 
     def forward(
         self, x: Tensor, state: Sequence[Tensor] = (), length: int = 1
@@ -61,17 +60,17 @@ class Backbone(nn.Module):
 
         Arguments as `DetectionNet.forward`.
         """
-        if self.state_channels:
+        if self.states:
             x = _cut_off(x)
         fine = self.to_4(self.stem(x))
         middle = self.to_8(fine)
         kept: tuple[Tensor, ...] = ()
-        if self.state_channels:
-            middle, now = _remembered(self.memory[0], middle, state[0], length, self._keep)
+        if self.states:
+            middle, now = remembered(self.memory[0], middle, state[0], length, self._keep)
             kept = (now,)
         coarse = self.to_16(middle)
-        if self.state_channels:
-            coarse, now = _remembered(self.memory[1], coarse, state[1], length, self._keep)
+        if self.states:
+            coarse, now = remembered(self.memory[1], coarse, state[1], length, self._keep)
             kept = (*kept, now)
         return (fine, middle, coarse), kept
 
@@ -113,19 +112,19 @@ class VehicleNet(nn.Module):
 
     Args:
         settings: what it looks like.
-        state_channels: channels of each state, fine to coarse; empty without a memory.
+        states: channels and stride (px) of each state; empty without a memory.
 
     Attributes:
         settings: the same.
-        state_channels: the same.
+        states: the same.
     """
 
-    def __init__(self, settings: NetSettings, state_channels: tuple[int, ...]) -> None:
+    def __init__(self, settings: NetSettings, states: tuple[tuple[int, int], ...]) -> None:
         super().__init__()
-        self.settings, self.state_channels = settings, state_channels
+        self.settings, self.states = settings, states
 
     def empty_state(self, batch: int, side: tuple[int, int]) -> tuple[Tensor, ...]:
-        """Return states of nothing seen, (batch, C, height/stride, width/stride) each, fine to coarse.
+        """Return states of nothing seen, (batch, C, height/stride, width/stride) each.
 
         Args:
             batch: how many sequences.
@@ -134,7 +133,7 @@ class VehicleNet(nn.Module):
         like = next(self.parameters())
         return tuple(
             torch.zeros(batch, channels, side[1] // s, side[0] // s, device=like.device, dtype=like.dtype)
-            for channels, s in zip(self.state_channels, _MEMORY_STRIDES, strict=False)
+            for channels, s in self.states
         )
 
     def learn(self, settled: bool) -> None:
@@ -170,7 +169,7 @@ class DetectionNet(VehicleNet):
 
     def __init__(self, settings: NetSettings) -> None:
         backbone = Backbone(settings.channels, settings, settings.has_memory)
-        super().__init__(settings, backbone.state_channels)
+        super().__init__(settings, backbone.states)
         self.backbone = backbone
         self.head = Head(settings.width)
 
@@ -211,10 +210,18 @@ def level_channels(width: int) -> tuple[int, int, int]:
     return 2 * width, 3 * width, 4 * width
 
 
-def _remembered(
+def remembered(
     memory: nn.Module, x: Tensor, state: Tensor, length: int, keep: float
 ) -> tuple[Tensor, Tensor]:
-    """Let a memory see windows (L x B, C, H, W) in their order; return what it says, and its last state."""
+    """Let a memory see windows (L x B, C, H, W) in their order; return what it says, and its last state.
+
+    Args:
+        memory: takes features and a state, and returns the next state.
+        x: features, as `DetectionNet.forward` has them.
+        state: (B, C, H, W) of the window before.
+        length: L.
+        keep: share of a state that is left at the next window.
+    """
     if length == 1:
         state = memory(x, keep * state)
         return state, state

@@ -51,7 +51,7 @@ class ServedNet(nn.Module):
     def forward(self, *values: Tensor) -> tuple[Tensor, ...]:
         """Return boxes and scores (1, 5, N), and the next states, of inputs and states."""
         shown, state = values[: len(self._names)], values[len(self._names) :]
-        count = len(self.net.state_channels)
+        count = len(self.net.states)
         boxes, kept = self._look(0, shown, state[:count])
         if len(self.looks) == 1:
             return (boxes, *kept)

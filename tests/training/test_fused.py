@@ -85,6 +85,19 @@ def test_an_old_picture_counts_otherwise_and_a_very_old_one_like_any_such():
     torch.testing.assert_close(older, said(net, moment(4, (1.0, 50.0, 1.0))))
 
 
+@pytest.mark.parametrize("keep", [0.0, 0.9])
+def test_earlier_pictures_are_remembered_for_as_long_as_the_memory_keeps(keep):
+    """Of two networks that see the same now, one saw another picture before; without events both times."""
+    net = used(17, NetSettings(kind="fused", width=4, memory_keep=keep))
+    rows = []
+    for seed in (18, 19):
+        earlier, now = moment(seed, (1.0, 0.0, 0.0)), moment(20, (1.0, 0.0, 0.0))
+        with torch.no_grad():
+            _, now[3:] = net.serve(earlier)
+        rows.append(said(net, now))
+    assert torch.equal(rows[0], rows[1]) == (keep == 0.0)
+
+
 def test_windows_together_are_windows_one_after_the_other():
     """Two sequences of three windows, of which the second has one picture for all."""
     net, generator = used(5), torch.Generator().manual_seed(6)
