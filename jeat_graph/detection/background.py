@@ -37,8 +37,8 @@ class BackgroundSettings(Section):
     sigmas: float = number(
         5.0,
         "σ",
-        "events count where so many more than usual are around them, in deviations of independent ones; 0: all "
-        "count",
+        "events count where so many more than usual are around them, in deviations of independent ones; 0: "
+        "all count",
         0.0,
     )
     around_px: int = number(5, "px", "side of the square in which events are counted", 1, 99)
