@@ -45,7 +45,7 @@ class BackgroundSettings(Section):
     adapt_s: float = number(2.0, "s", "what is usual follows in this time", open_low=True)
 
 
-class EventBackground:
+class UsualActivity:
     """Follows how many events each place has, and leaves in a window those that stand out.
 
     Args:

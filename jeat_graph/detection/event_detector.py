@@ -18,7 +18,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Scan
-from jeat_graph.detection.background import EventBackground
+from jeat_graph.detection.background import UsualActivity
 from jeat_graph.detection.binned import BinnedDetector
 from jeat_graph.detection.components import Components, measured, weights, without_inner
 from jeat_graph.detection.linking import MarkedPixels, linked, marked_pixels
@@ -46,7 +46,7 @@ class EventDetector(BinnedDetector):
         ring = EventBins(size_px, bins, self.settings.bin_s)
         self._rate_hz = self.settings.rate(USUAL_RATE_HZ)
         super().__init__(size_px, sensor, self._rate_hz, ring, bins, self.settings)
-        self._background = EventBackground(size_px, self._rate_hz, self.settings.background)
+        self._background = UsualActivity(size_px, self._rate_hz, self.settings.background)
         diagonal = math.hypot(*size_px)
         self._steps = max(1, round(self.settings.apart_s * self._rate_hz))
         self._piece_steps = round(self.settings.pieces_s * self._rate_hz)

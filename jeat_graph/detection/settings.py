@@ -60,7 +60,7 @@ class EventSettings(Section):
     trim_share: float = number(0.2, "1", _TRIM, 0.0, 0.9)
     inside_share: float = number(0.6, "1", _INSIDE, 0.0, 1.0)
     apart_s: float = number(0.1, "s", _APART)
-    pieces_s: float = number(0.2, "s", _PIECES)
+    pieces_s: float = number(0.5, "s", _PIECES)
     certain_events: float = number(40.0, "1", "at so many events a score reaches 1 - 1/e", open_low=True)
     longest_gap_s: float = number(
         10.0, "s", "where the time of a file leaps ahead by more, no scans are made for the gap", 0.1
@@ -139,7 +139,7 @@ class PictureSettings(Section):
     trim_share: float = number(0.2, "1", _TRIM, 0.0, 0.9)
     inside_share: float = number(0.6, "1", _INSIDE, 0.0, 1.0)
     apart_s: float = number(0.2, "s", _APART)
-    pieces_s: float = number(0.2, "s", _PIECES)
+    pieces_s: float = number(0.5, "s", _PIECES)
     certain_pixels: float = number(
         40.0, "px", "at so many pixels of foreground a score reaches 1 - 1/e", open_low=True
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import poisson
 
-from jeat_graph.detection.background import BackgroundSettings, EventBackground
+from jeat_graph.detection.background import BackgroundSettings, UsualActivity
 from jeat_graph.detection.components import Marked
 from jeat_graph.detection.event_detector import EventDetector
 from jeat_graph.detection.memory import CloudMemory
@@ -35,7 +35,7 @@ def around(window, side):
 
 def test_what_stands_out_is_what_a_slow_search_finds():
     settings = BackgroundSettings(sigmas=3.0, around_px=3, adapt_s=0.2)
-    background = EventBackground((32, 32), RATE_HZ, settings)
+    background = UsualActivity((32, 32), RATE_HZ, settings)
     shown = windows(0.4, 6, size=(32, 32))
     shown[3:, 10:16, 12:20] += 2
     mean = None
@@ -57,7 +57,7 @@ def test_what_stands_out_is_what_a_slow_search_finds():
 def test_at_first_a_vehicle_that_fills_half_of_what_is_near_stands_out_of_noise():
     window = windows(0.5, 1, size=(320, 200))[0]
     window[60:160, 100:180] += windows(2.0, 1, seed=3, size=(80, 100))[0]
-    found = EventBackground((320, 200), RATE_HZ, BackgroundSettings()).standing_out(window) > 0
+    found = UsualActivity((320, 200), RATE_HZ, BackgroundSettings()).standing_out(window) > 0
     shown = window > 0
     assert found[62:158, 102:178][shown[62:158, 102:178]].mean() > 0.95
     found[55:165, 95:185] = False
@@ -67,7 +67,7 @@ def test_at_first_a_vehicle_that_fills_half_of_what_is_near_stands_out_of_noise(
 @pytest.mark.parametrize("mean", [0.0005, 0.02, 0.2, 1.0, 4.0])
 def test_noise_of_any_strength_hardly_stands_out(mean):
     """By independent events a share of Q(5) would; that means are learnt and whole adds to it."""
-    background = EventBackground((96, 80), RATE_HZ, BackgroundSettings())
+    background = UsualActivity((96, 80), RATE_HZ, BackgroundSettings())
     found = [background.standing_out(window) > 0 for window in windows(mean, 200)]
     assert np.mean(found[20:]) < 1e-4
     # A mean of none in the squares of a hundred windows leaves no more than what two events are rarer than.
@@ -76,7 +76,7 @@ def test_noise_of_any_strength_hardly_stands_out(mean):
 
 def test_more_events_stand_out_until_they_are_usual():
     """A lamp that trembles is usual after some time; a vehicle that passes is not for as long as it takes."""
-    background = EventBackground((96, 80), RATE_HZ, BackgroundSettings(adapt_s=0.5))
+    background = UsualActivity((96, 80), RATE_HZ, BackgroundSettings(adapt_s=0.5))
     shown = windows(0.3, 500)
     lamp = windows(2.0, 500, seed=1)[:, :8, :8]
     shown[100:, 30:38, 40:48] += lamp[100:]
@@ -88,13 +88,13 @@ def test_more_events_stand_out_until_they_are_usual():
 
 def test_all_events_count_where_nothing_is_to_stand_out():
     window = windows(0.5, 1)[0]
-    background = EventBackground((96, 80), RATE_HZ, BackgroundSettings(sigmas=0.0))
+    background = UsualActivity((96, 80), RATE_HZ, BackgroundSettings(sigmas=0.0))
     np.testing.assert_array_equal(background.standing_out(window), window)
 
 
 @pytest.mark.parametrize("size", [(1, 1), (7, 3), (16, 16), (33, 100)])
 def test_pictures_of_any_size(size):
-    background = EventBackground(size, RATE_HZ, BackgroundSettings())
+    background = UsualActivity(size, RATE_HZ, BackgroundSettings())
     for window in windows(0.2, 3, size=size):
         assert background.standing_out(window).shape == window.shape
 
@@ -102,7 +102,7 @@ def test_pictures_of_any_size(size):
 def test_what_was_usual_is_forgotten():
     """After a leap in time the light may be another: what is usual is learnt anew, at once."""
     settings = BackgroundSettings()
-    first, then = EventBackground((96, 80), RATE_HZ, settings), EventBackground((96, 80), RATE_HZ, settings)
+    first, then = UsualActivity((96, 80), RATE_HZ, settings), UsualActivity((96, 80), RATE_HZ, settings)
     for window in windows(0.1, 5):
         first.standing_out(window)
     first.forget()
