@@ -47,8 +47,9 @@ def test_what_stands_out_is_what_a_slow_search_finds():
             continue  # what was usual at first: below
         least = mean + 3.0 * np.sqrt(mean) + 2.0
         np.testing.assert_array_equal(found, np.where(sums > least, window, 0))
-        share = max(1.0 / (0.2 * RATE_HZ), 1.0 / (k + 2.0))
-        mean += share * (np.minimum(sums, mean + 2.0 * np.sqrt(mean) + 1.0) - mean)
+        slow = 1.0 / (0.2 * RATE_HZ)
+        more = np.minimum(sums - mean, np.sqrt(mean) + 0.5)
+        mean += np.where(sums > least, slow * more, max(slow, 1.0 / (k + 2.0)) * (sums - mean))
         np.testing.assert_allclose(background._mean, mean, rtol=1e-5)
         mean = background._mean.astype(float)
     assert found[11:15, 13:19].all()
