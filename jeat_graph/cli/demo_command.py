@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from jeat_graph.simulation.simulate import SimulatedRecording
 
 HELP = "simulate a highway at night, track it with both sensors and with each alone, and show what comes out"
-COLUMNS = ("sensors", "MOTA", "IDF1", "HOTA", "FP", "FN", "IDSW")
+COLUMNS = ("sensors", "MOTA", "HOTA", "IDF1", "FP", "FN", "IDSW")
 SCENARIO = "night-nolight"
 DURATION_S = 24.0
 SEED = 7
