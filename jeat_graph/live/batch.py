@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.data.processes import available_cores
 from jeat_graph.io.locking import try_lock
+from jeat_graph.io.outputs import check_folder
 from jeat_graph.live.engines import ENGINES, run_local, run_on_ray
 from jeat_graph.live.manifest import ManifestRow
 from jeat_graph.live.recording_job import FAILED, Job, Outcome, run_job
@@ -86,8 +87,7 @@ def run_batch(recordings: Sequence[ManifestRow], out: str | Path, options: Batch
     folder = Path(out)
     if options.engine not in ENGINES:
         raise JeatGraphError(f"unknown engine {options.engine!r}; known: {', '.join(ENGINES)}")
-    if folder.exists() and not folder.is_dir():
-        raise JeatGraphError(f"{folder}: is a file; --out must be a folder")
+    check_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
     with _alone_in(folder):
         found = _work([_job(one, folder, options) for one in recordings], options)
