@@ -126,8 +126,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _counted(request: Request) -> bool:
     """Whether anything that is read may count frames: pictures, or a result or truth without times."""
-    from jeat_graph.eval.load import BY_FRAME
-    from jeat_graph.io.formats import recognise
+    from jeat_graph.io.formats import BY_FRAME, recognise
 
     files = [path for path in (request.run, request.truth) if path is not None and path.is_file()]
     return request.frames is not None or any(recognise(path) in BY_FRAME for path in files)
