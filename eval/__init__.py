@@ -1,1 +1,1 @@
-"""Evaluation: tracking metrics, motion errors, baselines, benchmarks."""
+"""Judging tracks: scores against truth, errors of motion, true variances, counts, and other trackers."""

@@ -16,9 +16,9 @@ from jeat_graph.data.progress import with_progress
 from jeat_graph.data.rates import ANY_RATE_HZ, median_rate_hz
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.pairing import check_lives, check_pair, check_truth
+from jeat_graph.io.formats import BY_FRAME
 from jeat_graph.io.scans_io import read_instants
 
-BY_FRAME = ("motchallenge", "kitti")
 SUFFIXES = (".csv", ".parquet")
 _SAME_RATE = 0.02  # relative: 29.97 Hz and 30 are one rate, 25 and 30 are two
 

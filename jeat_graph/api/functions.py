@@ -180,7 +180,8 @@ def calibrate(
 
     Args:
         detections: one recording or several, or their files.
-        truth: the truth of each; without it only sensors, their rates and their clocks are found.
+        truth: the truth of each; without it only sensors, their rates and their clocks are found and, of
+            several sensors, what tracking taught of them (`sensors.NAME.learnt`).
         base: where all that is not estimated comes from.
         image: width and height of the picture (px), if not those of `base`.
         tuned: with truth, also choose by tracking the recordings what matched detections cannot tell; takes

@@ -1,1 +1,1 @@
-"""Benchmarks: the tables of accuracy, ablation and speed that the README shows."""
+"""What `jeat-graph benchmark` measures: one module a table of docs/benchmarks, and their inputs."""

@@ -8,7 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jeat_graph.benchmark import common
-from jeat_graph.benchmark.judging import OursJob, in_processes, judge_ours, judge_recordings, summarise
+from jeat_graph.benchmark.judging import (
+    HEADLINE,
+    OursJob,
+    in_processes,
+    judge_ours,
+    judge_recordings,
+    summarise,
+)
 from jeat_graph.benchmark.provenance import provenance
 from jeat_graph.benchmark.recordings import kitti
 from jeat_graph.benchmark.steps import rows, without
@@ -17,8 +24,6 @@ from jeat_graph.config.schema import Config
 
 if TYPE_CHECKING:
     from jeat_graph.eval.tables import Table
-
-_METRICS = ("MOTA", "IDF1", "HOTA")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -76,8 +81,8 @@ def tables(result: Mapping[str, Any]) -> dict[str, Table]:
     out = {
         "ablation": common.scenario_table(
             result["summary"],
-            f"From paper to default, simulated: {' / '.join(_METRICS)}, {common.over_seeds(count)}",
-            _METRICS,
+            f"From paper to default, simulated: {' / '.join(HEADLINE)}, {common.over_seeds(count)}",
+            HEADLINE,
         )
     }
     if "kitti" in result:

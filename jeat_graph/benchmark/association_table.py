@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 from jeat_graph.benchmark.common import over_seeds, scenario_cell
 from jeat_graph.benchmark.contenders import Ours
-from jeat_graph.benchmark.judging import OursJob, in_processes, judge_ours, summarise
+from jeat_graph.benchmark.judging import HEADLINE, OursJob, in_processes, judge_ours, summarise
 
 if TYPE_CHECKING:
     from jeat_graph.eval.tables import Cell, Table
 
 SYNCHRONOUS = "night-synchronous"
-METRICS = ("MOTA", "HOTA", "IDF1")
 
 
 def judge_synchronous(
@@ -54,12 +53,12 @@ def association_table(result: Mapping[str, Any]) -> Table | None:
     for entry in summary:
         if entry["row"] in names:
             name = names[entry["row"]]
-            cells.setdefault(name, {"": name})[entry["scenario"]] = scenario_cell(entry, METRICS)
+            cells.setdefault(name, {"": name})[entry["scenario"]] = scenario_cell(entry, HEADLINE)
     for record in result.get("kitti", ()):
         if record["row"] in names:
             pooled = {"seeds": 1, **record["scores"]}
-            cells[names[record["row"]]]["KITTI"] = scenario_cell(pooled, METRICS)
+            cells[names[record["row"]]]["KITTI"] = scenario_cell(pooled, HEADLINE)
     columns = list(dict.fromkeys(k for row in cells.values() for k in row))
     seeds = over_seeds(len(result["settings"]["seeds"]))
-    title = f"Ways of association, both sensors: {' / '.join(METRICS)}, {seeds}"
+    title = f"Ways of association, both sensors: {' / '.join(HEADLINE)}, {seeds}"
     return Table.from_records(list(cells.values()), columns, title=title)

@@ -17,8 +17,8 @@ from jeat_graph.benchmark.common import over_seeds
 from jeat_graph.benchmark.contenders import NAMES
 from jeat_graph.benchmark.foreign_routes import Route, crossing, roundabout, square, street
 from jeat_graph.benchmark.foreign_scenes import populate
-from jeat_graph.benchmark.judging import spread
-from jeat_graph.benchmark.real_ours import METRICS, OursOnSet, judge_row
+from jeat_graph.benchmark.judging import HEADLINE, spread, spread_text
+from jeat_graph.benchmark.real_ours import OursOnSet, judge_row
 from jeat_graph.benchmark.real_sets import RealSet
 from jeat_graph.benchmark.recordings import JudgedRecording
 from jeat_graph.data.detections import Detections
@@ -175,20 +175,15 @@ def worlds_table(records: Sequence[Mapping[str, Any]], seeds: int) -> Table:
         cells: dict[str, Cell] = {"": world}
         for kind in ("causal", "smoothed"):
             mine = [r["scores"] for r in here if r["row"] == DEFAULT and r["kind"] == kind]
-            cells[f"default, {kind}"] = " / ".join(_text([s[m] for s in mine]) for m in METRICS)
+            cells[f"default, {kind}"] = " / ".join(spread_text([s[m] for s in mine]) for m in HEADLINE)
         others = dict.fromkeys(r["row"] for r in here if r["row"] != DEFAULT)
-        for m in METRICS if others else ():
+        for m in HEADLINE if others else ():
             by_row = {row: [r["scores"][m] for r in here if r["row"] == row] for row in others}
             best = max(by_row, key=lambda row: spread(by_row[row])[0])
-            cells[f"most {m} of another"] = f"{_text(by_row[best])} ({best})"
+            cells[f"most {m} of another"] = f"{spread_text(by_row[best])} ({best})"
         out.append(cells)
-    title = f"Other worlds, simulated: {' / '.join(METRICS)}, {over_seeds(seeds)}"
+    title = f"Other worlds, simulated: {' / '.join(HEADLINE)}, {over_seeds(seeds)}"
     return Table.from_records(out, list(out[0]), title=title)
-
-
-def _text(values: Sequence[float]) -> str:
-    middle, deviation = spread(values)
-    return f"{middle:.1f}" + (f"±{deviation:.1f}" if len(values) > 1 else "")
 
 
 def _record(job: WorldJob, row: str, kind: str, scores: Mapping[str, float]) -> dict[str, Any]:
@@ -197,5 +192,5 @@ def _record(job: WorldJob, row: str, kind: str, scores: Mapping[str, float]) -> 
         "seed": job.seed,
         "row": row,
         "kind": kind,
-        "scores": {name: float(scores[name]) for name in (*METRICS, "FP", "FN", "IDSW")},
+        "scores": {name: float(scores[name]) for name in (*HEADLINE, "FP", "FN", "IDSW")},
     }

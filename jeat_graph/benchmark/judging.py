@@ -16,6 +16,8 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.processes import worker_pool
 
 METRICS = ("MOTA", "MOTP", "HOTA", "IDF1")
+#: What a tracker is judged by where three numbers have to do, in this order in every table.
+HEADLINE = ("MOTA", "HOTA", "IDF1")
 COUNTS = ("FP", "FN", "IDSW")
 _Job = TypeVar("_Job")
 _Result = TypeVar("_Result")
@@ -132,6 +134,12 @@ def in_processes(
 def spread(values: Sequence[float]) -> tuple[float, float]:
     """Mean and standard deviation over seeds; 0 for one seed."""
     return mean(values), stdev(values) if len(values) > 1 else 0.0
+
+
+def spread_text(values: Sequence[float]) -> str:
+    """Mean and standard deviation of a score over runs, as `87.1±0.4`; of one run the score alone."""
+    middle, deviation = spread(values)
+    return f"{middle:.1f}" + (f"±{deviation:.1f}" if len(values) > 1 else "")
 
 
 def summarise(records: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:

@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING, Any
 from jeat_graph.benchmark import common
 from jeat_graph.benchmark.contenders import NAMES
 from jeat_graph.benchmark.foreign import WorldJob, judge_world, worlds, worlds_table
-from jeat_graph.benchmark.judging import in_processes, summarise
+from jeat_graph.benchmark.judging import HEADLINE, in_processes, summarise
 from jeat_graph.benchmark.peer_cache import PeerCache, cache_key
 from jeat_graph.benchmark.peer_search import peers_here
 from jeat_graph.benchmark.provenance import provenance
 from jeat_graph.benchmark.real_copies import CopyJob, copies_table, judge_copy
-from jeat_graph.benchmark.real_ours import METRICS, OursOnSet, judge_row, rows_of
+from jeat_graph.benchmark.real_ours import OursOnSet, judge_row, rows_of
 from jeat_graph.benchmark.real_sets import RealSet, real_set, real_sets
 from jeat_graph.benchmark.robustness import PRESETS, judge_variation, variations
 from jeat_graph.config.argument_types import natural
@@ -165,8 +165,8 @@ def tables(result: Mapping[str, Any]) -> dict[str, Table]:
         seeds = common.over_seeds(len(result["settings"]["seeds"]))
         out["robustness"] = common.scenario_table(
             _turned(result["robustness_summary"]),
-            f"Odd detectors, simulated: {' / '.join(METRICS)}, {seeds}",
-            METRICS,
+            f"Odd detectors, simulated: {' / '.join(HEADLINE)}, {seeds}",
+            HEADLINE,
         )
     return out
 
@@ -180,7 +180,7 @@ def set_table(name: str, ours: Sequence[Mapping[str, Any]], peers: Sequence[Mapp
         records.append(
             {
                 "": e["row"],
-                "causal " + " / ".join(METRICS): _cell(e["causal"]),
+                "causal " + " / ".join(HEADLINE): _cell(e["causal"]),
                 "smoothed": _cell(e["smoothed"]),
                 **{k: e["causal"][k] for k in ("FP", "FN", "IDSW")},
                 "ANEES": round(e["nees"]["causal"].get("anees", float("nan")), 2),
@@ -191,7 +191,7 @@ def set_table(name: str, ours: Sequence[Mapping[str, Any]], peers: Sequence[Mapp
         records.append(
             {
                 "": e["row"],
-                "causal " + " / ".join(METRICS): _cell(e["scores"]),
+                "causal " + " / ".join(HEADLINE): _cell(e["scores"]),
                 **{k: e["scores"][k] for k in ("FP", "FN", "IDSW")},
             }
         )
@@ -200,7 +200,7 @@ def set_table(name: str, ours: Sequence[Mapping[str, Any]], peers: Sequence[Mapp
 
 
 def _cell(scores: Mapping[str, float]) -> str:
-    return " / ".join(f"{scores[m]:.1f}" for m in METRICS)
+    return " / ".join(f"{scores[m]:.1f}" for m in HEADLINE)
 
 
 def _turned(entries: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:

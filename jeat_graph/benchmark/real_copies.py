@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from jeat_graph.benchmark.contenders import NAMES
-from jeat_graph.benchmark.judging import spread
-from jeat_graph.benchmark.real_ours import METRICS, OursOnSet, judge_row
+from jeat_graph.benchmark.judging import HEADLINE, spread_text
+from jeat_graph.benchmark.real_ours import OursOnSet, judge_row
 from jeat_graph.benchmark.real_sets import RealSet, real_set
 from jeat_graph.data.detections import Detections
 
@@ -87,18 +87,13 @@ def copies_table(name: str, records: Sequence[Mapping[str, Any]], copies: int) -
     for row in dict.fromkeys(r["row"] for r in records):
         mine = [r for r in records if r["row"] == row]
         cells: dict[str, Cell] = {"": row}
-        for kind, column in (("causal", "causal " + " / ".join(METRICS)), ("smoothed", "smoothed")):
+        for kind, column in (("causal", "causal " + " / ".join(HEADLINE)), ("smoothed", "smoothed")):
             scores = [r["scores"] for r in mine if r["kind"] == kind]
             if scores:
-                cells[column] = " / ".join(_mean_and_spread([s[m] for s in scores]) for m in METRICS)
+                cells[column] = " / ".join(spread_text([s[m] for s in scores]) for m in HEADLINE)
         out.append(cells)
     title = f"{name}, mean of {copies} altered copies (± standard deviation over them)"
     return Table.from_records(out, list(out[0]), title=title)
-
-
-def _mean_and_spread(values: Sequence[float]) -> str:
-    middle, deviation = spread(values)
-    return f"{middle:.1f}±{deviation:.1f}"
 
 
 def _record(job: CopyJob, row: str, kind: str, scores: Mapping[str, float]) -> dict[str, Any]:
@@ -107,5 +102,5 @@ def _record(job: CopyJob, row: str, kind: str, scores: Mapping[str, float]) -> d
         "copy": job.seed,
         "row": row,
         "kind": kind,
-        "scores": {m: float(scores[m]) for m in METRICS},
+        "scores": {m: float(scores[m]) for m in HEADLINE},
     }

@@ -16,8 +16,6 @@ from jeat_graph.runs.declaring import fit_input, own_picture
 from jeat_graph.runs.latency import at_measurement
 from jeat_graph.tracking.whole import both_tables
 
-#: What a set is judged by.
-METRICS = ("MOTA", "IDF1", "HOTA")
 DEFAULT, BLIND, TRUTH = "default", "calibrated blindly", "calibrated with truth"
 
 

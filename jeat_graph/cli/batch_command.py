@@ -6,6 +6,7 @@ import argparse
 import sys
 
 from jeat_graph.cli.options import add_config, add_formats, add_image, add_smoother, extra_formats, overrides
+from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import counting, natural
 
 HELP = "track many recordings in parallel, each once; failures are collected in a table"
@@ -67,5 +68,5 @@ def run(args: argparse.Namespace) -> int:
     )
     print(f"wrote {args.out}: see {TABLE}")
     for one in result.failed:
-        print(f"jeat-graph batch: {one.name}: {one.error}", file=sys.stderr)
+        say("batch", f"{one.name}: {one.error}")
     return 1 if result.failed else 0

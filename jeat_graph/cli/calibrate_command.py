@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from jeat_graph.cli.options import add_config, add_image, add_reading, reading
 from jeat_graph.cli.progress import stages
+from jeat_graph.cli.terminal import say
 from jeat_graph.data.errors import ConfigError, DataError
 
 if TYPE_CHECKING:
@@ -84,7 +85,7 @@ def _size_beside(paths: list[str], shown: Facts | None) -> Facts | None:
     facts = facts_beside(paths) if shown is None else shown
     if facts is None or facts.size_px is None:
         return None
-    print(f"picture of {facts.size_px[0]} x {facts.size_px[1]} px, as {facts.origin} says", file=sys.stderr)
+    say("calibrate", f"picture of {facts.size_px[0]} x {facts.size_px[1]} px, as {facts.origin} says")
     return facts
 
 
@@ -127,9 +128,9 @@ def with_image(base: Config, recordings: list[Detections], size: tuple[int, int]
             f"boxes reach to {right:g}, {bottom:g} px, beyond the {width:g} x {height:g} px of the base "
             "configuration's picture; give its size as --image WxH"
         )
-    print(
+    say(
+        "calibrate",
         f"picture of {width:g} x {height:g} px, from the base configuration (--image WxH changes it)",
-        file=sys.stderr,
     )
     return base
 
@@ -139,7 +140,7 @@ def _with_truth(recordings: list[tuple[Detections, GroundTruth]], base: Config, 
 
     from jeat_graph.calibration.procedure import calibrate_with_truth, steps_with_truth
 
-    print("estimating sensors and motion from matched detections", file=sys.stderr)
+    say("calibrate", "estimating sensors and motion from matched detections")
     if not tuned:
         with stages("calibrate", 1) as stage:
             stage("estimating")
@@ -157,10 +158,10 @@ def _with_truth(recordings: list[tuple[Detections, GroundTruth]], base: Config, 
 def _without_truth(recordings: list[Detections], base: Config) -> Calibration:
     from jeat_graph.calibration.procedure import calibrate_without_truth
 
-    print(
+    say(
+        "calibrate",
         "no --gt: noise, reliability and motion cannot be known, and stay as in the base; what tracking "
         "teaches of the sensors is taken along",
-        file=sys.stderr,
     )
     with stages("calibrate", 1) as stage:
         stage("estimating")
@@ -184,7 +185,7 @@ def _say_lags(found: Calibration, beside: str) -> None:
         taken = [f"sensors.{name}.latency_s {late_s:g}" for name, late_s in latency.items()]
         lines.append(f"taken off the times from now on: {', '.join(taken)} (s)")
     for line in lines:
-        print(line, file=sys.stderr)
+        say("calibrate", line)
 
 
 def describe(args: argparse.Namespace, picture: str, found: Calibration) -> str:

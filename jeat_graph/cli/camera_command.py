@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 from jeat_graph.cli.progress import stages
+from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import picture_size
 from jeat_graph.data.errors import DataError
 
@@ -82,17 +83,16 @@ def _calibrate(args: argparse.Namespace) -> int:
         raise DataError("the size of the picture is not known: give --image WxH")
     width, height = size
     if not args.image and known is None:
-        print(
-            f"jeat-graph camera: picture of {width} x {height} px, as {args.tracks} says (--image WxH says "
-            "otherwise)",
-            file=sys.stderr,
+        say(
+            "camera",
+            f"picture of {width} x {height} px, as {args.tracks} says (--image WxH says otherwise)",
         )
     tracks = None
     if args.tracks is not None:
         table = contact_pixels(args.tracks)
         tracks = thin(table.t, table.track_id, table.pixels, config, size, box_sides(args.tracks))
         if not len(tracks):
-            print(f"jeat-graph camera: {args.tracks}: no track is long enough to help", file=sys.stderr)
+            say("camera", f"{args.tracks}: no track is long enough to help")
             tracks = None
     with stages("camera", 1) as stage:
         stage("fitting")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 from jeat_graph.cli.options import add_rate
 from jeat_graph.cli.progress import stages
+from jeat_graph.cli.terminal import warn
 from jeat_graph.config.argument_types import not_negative
 
 HELP = "compare filter and smoothers on a run: errors, error against lag, consistency; tables and pictures"
@@ -67,11 +67,7 @@ def run(args: argparse.Namespace) -> int:
         None if args.gt is None else read_truth(args.gt, rate_hz=rate_of_truth(folder, args.gt, args.rate))
     )
     if truth is not None and truth.motion is None:
-        print(
-            f"jeat-graph compare: warning: {args.gt} has no motion (x, y, vx, vy, ax, ay): "
-            "only consistency is judged",
-            file=sys.stderr,
-        )
+        warn("compare", f"{args.gt} has no motion (x, y, vx, vy, ax, ay): only consistency is judged")
     with stages("compare", 2) as stage:
         stage("reading, or tracking again")
         measured = measured_run(folder, args.detections)

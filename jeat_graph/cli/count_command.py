@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.cli.options import add_classes, add_rate
+from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import positive
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
@@ -84,12 +85,8 @@ def run(args: argparse.Namespace) -> int:
         ]
         print(Table.from_records(records).render() if records else "no track crosses a line")
         if any(np.isnan(c.expected) for c in counts):
-            _say("no interval: the table has no variances of position (`track` writes them)")
+            say("count", "no interval: the table has no variances of position (`track` writes them)")
     return 0
-
-
-def _say(text: str) -> None:
-    print(f"jeat-graph count: {text}", file=sys.stderr)
 
 
 def _line(text: str, number: int) -> Line:

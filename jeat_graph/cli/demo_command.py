@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from jeat_graph.cli.options import add_config
 from jeat_graph.cli.progress import stages
+from jeat_graph.cli.terminal import say
 
 if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from jeat_graph.simulation.simulate import SimulatedRecording
 
 HELP = "simulate a highway at night, track it with both sensors and with each alone, and show what comes out"
-COLUMNS = ("sensors", "MOTA", "IDF1", "HOTA", "FP", "FN", "IDSW")
+COLUMNS = ("sensors", "MOTA", "HOTA", "IDF1", "FP", "FN", "IDSW")
 SCENARIO = "night-nolight"
 DURATION_S = 24.0
 SEED = 7
@@ -99,7 +100,7 @@ def _show(args: argparse.Namespace, out: Path, duration_s: float, density: str |
     write_detections(recording.detections, source)
     write_truth(recording.truth, out / "gt.csv")
 
-    _say(f"{duration_s:g} s of {args.scenario} simulated; tracking with both sensors")
+    say("demo", f"{duration_s:g} s of {args.scenario} simulated; tracking with both sensors …")
     origin = {"config_name": args.config, "inputs": describe_inputs([source])}
     origin["reading"] = {"detections": [str(source)]}  # as `track` has it: `compare` reads the inputs again
     details = RunRecord(source=origin, warnings=warnings)
@@ -107,10 +108,10 @@ def _show(args: argparse.Namespace, out: Path, duration_s: float, density: str |
     with directory:
         write_run(recording.detections, config, directory, details, RunOptions(progress=sys.stderr.isatty()))
     table = read_trajectories(out / "run" / "causal.csv")
-    _say("tracking with each sensor alone, and judging")
+    say("demo", "tracking with each sensor alone, and judging …")
     scores = _compare(recording, config, table, out / "run" / "smoothed.csv")
     _write_text(scores.render("markdown"), out / "scores.md")
-    _say("drawing")
+    say("demo", "drawing …")
     with stages("demo", 1) as stage:
         stage("drawing")
         pictures = _draw(recording, table, out / "tracks", args.scenario)
@@ -206,7 +207,3 @@ def _write_text(text: str, path: Path) -> None:
 
     with open_atomic(path) as file:
         file.write(text)
-
-
-def _say(text: str) -> None:
-    print(f"demo: {text} …", file=sys.stderr)

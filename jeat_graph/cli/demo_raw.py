@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from jeat_graph.cli.terminal import say
 from jeat_graph.config.cache_names import save_under_own_names
 from jeat_graph.tracking.compiling import do_without
 from jeat_graph.tracking.helpers import end_with_pipe
@@ -99,7 +100,7 @@ def go_the_whole_way(out: Path) -> int:
 def _run(arguments: Sequence[str]) -> int:
     from jeat_graph.cli.main import main
 
-    print(f"demo: jeat-graph {' '.join(arguments)}", file=sys.stderr)
+    say("demo", f"jeat-graph {' '.join(arguments)}")
     return main(arguments)
 
 

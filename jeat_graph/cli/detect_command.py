@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,9 +13,9 @@ import numpy as np
 
 from jeat_graph.cli.detect_options import add_detecting, detect_request
 from jeat_graph.cli.options import add_rate
-from jeat_graph.cli.terminal import one_line
+from jeat_graph.cli.terminal import say
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.progress import progress_to, refreshing, write_line
+from jeat_graph.data.progress import progress_to, refreshing
 
 if TYPE_CHECKING:
     from jeat_graph.data.detections import Detections
@@ -46,6 +46,7 @@ def run(args: argparse.Namespace) -> int:
     """Detect, and write the file."""
     from jeat_graph.io.atomic import check_writable
     from jeat_graph.io.detections_io import write_detections
+    from jeat_graph.io.outputs import check_keeps
 
     request = detect_request(args)
     if args.out == STDOUT:
@@ -53,8 +54,7 @@ def run(args: argparse.Namespace) -> int:
     out = Path(args.out)
     if out.suffix.lower() not in (".csv", ".parquet"):
         raise DataError("must end in .csv or .parquet", out)
-    if any(Path(path).resolve() == out.resolve() for path in request.files):
-        raise DataError("would be replaced by the result; choose another --out", out)
+    check_keeps(request.files, out)
     check_writable(out)
     found = detect_with_bar(request, "detect")
     write_detections(found, out)
@@ -70,7 +70,7 @@ def _to_stdout(request: DetectRequest) -> int:
     """Write each scan as soon as it is known."""
     from jeat_graph.detection.detecting import detect_scans
 
-    for scan in detect_scans(request, _sayer("detect")):
+    for scan in detect_scans(request, partial(say, "detect")):
         boxes = np.round(scan.boxes, _PLACES).tolist()
         line = {"t": round(scan.t, _TIME_PLACES), "sensor": scan.sensor, "boxes": boxes}
         line["scores"] = np.round(scan.scores, _PLACES + 1).tolist()
@@ -79,20 +79,13 @@ def _to_stdout(request: DetectRequest) -> int:
     return 0
 
 
-def _sayer(command: str) -> Callable[[str], None]:
-    def say(text: str) -> None:
-        write_line(f"jeat-graph {command}: {one_line(text)}")
-
-    return say
-
-
 def detect_with_bar(request: DetectRequest, command: str) -> Detections:
     """Detect, and show on a terminal how far it has come."""
     from tqdm import tqdm
 
     from jeat_graph.detection.detecting import detect_files
 
-    say = _sayer(command)
+    tell = partial(say, command)
     hidden = not sys.stderr.isatty()
     if request.frames is not None:
         form = "{desc}: {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
@@ -101,7 +94,7 @@ def detect_with_bar(request: DetectRequest, command: str) -> Detections:
             refreshing(bar),
             progress_to(lambda share: bar.update(share - bar.n)),
         ):
-            return detect_files(request, say)
+            return detect_files(request, tell)
     # How long a file of events lasts is known at its end only.
     form = "{desc}: {n:.1f} s of the recording [{elapsed}]"
     with tqdm(desc="detect", bar_format=form, disable=hidden, leave=False) as bar, refreshing(bar):
@@ -109,4 +102,4 @@ def detect_with_bar(request: DetectRequest, command: str) -> Detections:
         def on_time(t: float) -> None:
             bar.update(max(t - bar.n, 0.0))
 
-        return detect_files(request, say, on_time)
+        return detect_files(request, tell, on_time)

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 from jeat_graph.cli.options import add_classes, add_rate, add_time_unit
 from jeat_graph.cli.progress import stages
+from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import positive, share
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.progress import with_progress, write_line
+from jeat_graph.data.progress import with_progress
 
 if TYPE_CHECKING:
     from jeat_graph.data.trajectories import GroundTruth
@@ -93,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
     behind = {kind: sum(getattr(one, kind) is not None for one in runs) for kind in judged}
     if len(set(behind.values())) > 1:
         counts = ", ".join(f"{kind} {count}" for kind, count in behind.items())
-        write_line(f"jeat-graph eval: the rows pool different RUNs, so compare them with care: {counts}")
+        say("eval", f"the rows pool different RUNs, so compare them with care: {counts}")
     if args.json is not None:
         _write(args.json, to_json(result))
     if args.json != "-":

@@ -8,9 +8,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from jeat_graph.cli.terminal import one_line
+from jeat_graph.cli.terminal import warn
 from jeat_graph.config.argument_types import picture_size
-from jeat_graph.data.errors import DataError
 from jeat_graph.io.events.converting import WRITTEN
 from jeat_graph.io.events.opening import FORMATS
 
@@ -40,6 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Read, and print or write."""
     from jeat_graph.io.events.opening import open_events
+    from jeat_graph.io.outputs import check_keeps
 
     with open_events(args.file, args.size) as reader:
         if args.todo == "info":
@@ -50,11 +50,10 @@ def run(args: argparse.Namespace) -> int:
             print(json.dumps(found._asdict(), indent=2) if args.json else "\n".join(found.lines()))
             return 0
         out = Path(args.out)
-        if out.resolve() == Path(args.file).resolve():
-            raise DataError("would be replaced by the result; choose another OUT", out)
+        check_keeps([args.file], out, "OUT")
         count = _convert(reader, out, args.format)
         for note in reader.damage.notes():
-            print(f"jeat-graph events: warning: {one_line(f'{args.file}: {note}')}", file=sys.stderr)
+            warn("events", f"{args.file}: {note}")
     print(f"wrote {out}: {count} events")
     return 0
 

@@ -11,7 +11,7 @@ from functools import partial
 from importlib import import_module
 
 from jeat_graph.cli.options import Parser
-from jeat_graph.cli.terminal import Terminated, describe, in_good_order, write_anything
+from jeat_graph.cli.terminal import Terminated, describe, in_good_order, say, write_anything
 from jeat_graph.config import kernel_cache
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.tracking import notice
@@ -107,13 +107,13 @@ def _run(args: argparse.Namespace) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except (JeatGraphError, OSError, MemoryError) as error:
-        print(f"jeat-graph {args.command}: {describe(error)}", file=sys.stderr)
+        say(args.command, describe(error))
         return 2
     except Terminated as end:
-        print(f"jeat-graph {args.command}: ended by {signal.Signals(end.number).name}", file=sys.stderr)
+        say(args.command, f"ended by {signal.Signals(end.number).name}")
         return 128 + end.number
     except KeyboardInterrupt:
-        print(f"jeat-graph {args.command}: interrupted", file=sys.stderr)
+        say(args.command, "interrupted")
         return 130
 
 

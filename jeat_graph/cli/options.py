@@ -17,9 +17,9 @@ from typing import Any
 
 from jeat_graph.config.argument_types import picture_size, positive
 from jeat_graph.config.smoothing import ENGINES
+from jeat_graph.io.formats import FORMATS
 from jeat_graph.io.time_units import TIME_UNITS
 
-INPUT_FORMATS = ("csv", "parquet", "motchallenge", "kitti", "prophesee", "coco")
 OUTPUT_FORMATS = ("csv", "parquet", "motchallenge", "kitti")
 SCORE_SCALES = ("unit", "percent", "logistic")
 
@@ -112,7 +112,7 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     """Declare how files of detections are read: `reading` takes them from the parsed arguments."""
     add = parser.add_argument
     add_rate(parser)
-    add("--input-format", choices=INPUT_FORMATS, help="format of the input, if it is not recognised")
+    add("--input-format", choices=FORMATS, help="format of the input, if it is not recognised")
     add(
         "--score-scale",
         choices=SCORE_SCALES,

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jeat_graph.cli.options import add_classes, add_old_name, add_output_rate, add_rate
-from jeat_graph.cli.terminal import one_line
+from jeat_graph.cli.terminal import warn
 from jeat_graph.config.argument_types import counting, drawn_size, not_negative, positive
 from jeat_graph.data.errors import DataError
 from jeat_graph.drawing.movie.film import CODECS
@@ -81,6 +81,7 @@ def run(args: argparse.Namespace) -> int:
     """Open what is to be drawn, and draw it."""
     from jeat_graph.drawing.movie.film import write_png
     from jeat_graph.drawing.movie.sources import Request, open_movie
+    from jeat_graph.io.outputs import check_keeps
 
     out = Path(args.out)
     one = args.at is not None or args.strip is not None
@@ -103,22 +104,21 @@ def run(args: argparse.Namespace) -> int:
         classes=args.classes,
     )
     inputs = [path for path in (request.frames, request.events, request.truth) if path is not None]
-    if any(path.resolve() == out.resolve() for path in inputs):
-        raise DataError("would be replaced by the result; choose another --out", out)
+    check_keeps(inputs, out)
     with ExitStack() as stack:
         movie, rate_hz, warnings = open_movie(request, stack)
         for warning in warnings:
-            print(f"jeat-graph render: warning: {one_line(warning)}", file=sys.stderr)
+            warn("render", warning)
         if one:
             write_png(out, movie.strip(args.strip or 1))
         else:
             _write_movie(movie, rate_hz, out)
     count, (width, height) = min(len(movie.times), args.strip or len(movie.times)), movie.size_px
     if args.rate is not None and not _counted(request):
-        print(
-            "jeat-graph render: warning: --rate was not needed: nothing here counts frames "
-            "(pictures per second of the film: --output-rate)",
-            file=sys.stderr,
+        warn(
+            "render",
+            "--rate was not needed: nothing here counts frames (pictures per second of the film: "
+            "--output-rate)",
         )
     print(f"wrote {out}: {count} picture{'s' * (count != 1)} of {width} x {height} px")
     return 0
@@ -126,8 +126,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _counted(request: Request) -> bool:
     """Whether anything that is read may count frames: pictures, or a result or truth without times."""
-    from jeat_graph.eval.load import BY_FRAME
-    from jeat_graph.io.formats import recognise
+    from jeat_graph.io.formats import BY_FRAME, recognise
 
     files = [path for path in (request.run, request.truth) if path is not None and path.is_file()]
     return request.frames is not None or any(recognise(path) in BY_FRAME for path in files)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jeat_graph.cli.options import add_rate
 from jeat_graph.cli.progress import stages
-from jeat_graph.cli.terminal import one_line
+from jeat_graph.cli.terminal import say
 from jeat_graph.data.progress import progress_span
 
 if TYPE_CHECKING:
@@ -63,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
     with open_atomic(out) as file:
         file.write(page)
     for note in (*data.notes, *([] if reason is None else [reason])):
-        print(f"jeat-graph report: {one_line(note)}", file=sys.stderr)
+        say("report", note)
     print(f"wrote {out}: {len(data.track_ids())} tracks, {out.stat().st_size / 1e6:.1f} MB")
     return 0
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from jeat_graph.cli.terminal import one_line
+from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import positive
 from jeat_graph.data.errors import DataError
 
@@ -53,6 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fit the vehicles and write the tables."""
+    from jeat_graph.io.outputs import check_folder
     from jeat_graph.io.table_writer import write_columns
     from jeat_graph.road.box_rows import BoxConfig
     from jeat_graph.road.boxes_road import BOX_MOTION, follow_boxes
@@ -69,8 +71,7 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.road.traffic import SummaryConfig, count_columns, headway_columns
 
     out = Path(args.out)
-    if out.exists() and not out.is_dir():
-        raise DataError("is a file; --out must be a folder", out)
+    check_folder(out)
     camera = read_camera(args.camera)
     marks = RoadMarks({}, {}) if args.lines is None else read_marks(args.lines)
     contact = ContactConfig()
@@ -80,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
     if args.contact == "cuboid" or (args.contact is None and not only_points(table)):
         if only_points(table):
             raise DataError("has points only, no boxes: --contact cuboid needs boxes, use center", table)
-        seen = boxes_of(args.source, camera, BoxConfig(), _say, sys.stderr.isatty())
+        seen = boxes_of(args.source, camera, BoxConfig(), partial(say, "road"), sys.stderr.isatty())
         total = len(seen)
         with _bar(total) as bar:
             sized = follow_boxes(
@@ -103,17 +104,10 @@ def run(args: argparse.Namespace) -> int:
     write_columns(headway_columns(result, traffic), out / "headways.csv")
     write_road_page(result, camera, traffic, Path(args.source).name or str(args.source), out / "road.html")
     if total > len(vehicles):
-        print(
-            f"jeat-graph road: {total - len(vehicles)} tracks too short, or not on the road, are left out",
-            file=sys.stderr,
-        )
+        say("road", f"{total - len(vehicles)} tracks too short, or not on the road, are left out")
     lanes, crossings = len(result.lanes.names), len(result.crossings)
     print(f"{len(vehicles)} vehicles, {lanes} lanes, {crossings} crossings: {out}")
     return 0
-
-
-def _say(text: str) -> None:
-    print(f"jeat-graph road: {one_line(text)}", file=sys.stderr)
 
 
 def _bar(total: int) -> Any:

@@ -50,6 +50,16 @@ def describe(error: BaseException) -> str:
     return one_line(error)
 
 
+def say(command: str, text: object) -> None:
+    """Tell on stderr, in one line with the command's name; a progress bar that stands there moves."""
+    write_line(f"jeat-graph {command}: {one_line(text)}")
+
+
+def warn(command: str, text: object) -> None:
+    """Tell as `say` does of what may not be as it was meant."""
+    say(command, f"warning: {text}")
+
+
 def write_anything() -> None:
     """Let stdout and stderr take every text: what their encoding lacks is escaped instead of an error."""
     for stream in (sys.stdout, sys.stderr):
@@ -83,7 +93,7 @@ def in_good_order(command: str) -> Iterator[None]:
             before(unraisable)
 
     def show(message: Any, *_: Any, **__: Any) -> None:
-        write_line(f"jeat-graph {command}: warning: {one_line(message)}")
+        warn(command, message)
 
     with warnings.catch_warnings(), contextlib.ExitStack() as stack:
         warnings.showwarning = show

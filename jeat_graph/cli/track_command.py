@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,7 @@ from jeat_graph.cli.options import (
     extra_formats,
     overrides,
 )
-from jeat_graph.cli.terminal import one_line
+from jeat_graph.cli.terminal import say, warn
 from jeat_graph.data.errors import DataError
 
 if TYPE_CHECKING:
@@ -129,6 +130,7 @@ def _detected(args: argparse.Namespace) -> tuple[tuple[str, ...], tuple[str, ...
     from jeat_graph.detection.detecting import picture_of
     from jeat_graph.io.atomic import check_writable
     from jeat_graph.io.detections_io import write_detections
+    from jeat_graph.io.outputs import check_folder
 
     if args.frames is None and args.events is None:
         raise DataError("nothing to track: give files of detections, or --frames, --events or both")
@@ -136,8 +138,7 @@ def _detected(args: argparse.Namespace) -> tuple[tuple[str, ...], tuple[str, ...
         if getattr(args, name) is not None:
             raise DataError(f"--{name.replace('_', '-')} is for files of detections; there is none")
     out = Path(args.out)
-    if out.exists() and not out.is_dir():
-        raise DataError("is a file; --out must be a folder", out)
+    check_folder(out)
     found = out / DETECTIONS
     check_writable(found)
     request = detect_request(args)
@@ -162,9 +163,4 @@ def _road_tables(camera_file: str) -> Callable[[Path, Config], None]:
     return write
 
 
-def _say(text: str) -> None:
-    print(f"jeat-graph track: {text}", file=sys.stderr)
-
-
-def _warn(text: str) -> None:
-    print(f"jeat-graph track: warning: {one_line(text)}", file=sys.stderr)
+_say, _warn = partial(say, "track"), partial(warn, "track")

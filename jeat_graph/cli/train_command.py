@@ -5,14 +5,14 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jeat_graph.cli.options import add_settings
-from jeat_graph.cli.terminal import one_line
+from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import counting, natural, picture_size, positive
 from jeat_graph.data.errors import ConfigError
-from jeat_graph.data.progress import write_line
 
 if TYPE_CHECKING:
     from jeat_graph.training.procedure import TrainRequest
@@ -123,9 +123,6 @@ def run(args: argparse.Namespace) -> int:
     if args.threads:
         torch.set_num_threads(args.threads)
 
-    def say(text: str) -> None:
-        write_line(f"jeat-graph train: {one_line(text)}")
-
     form = "{desc} {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}] {postfix}"
     hidden = not sys.stderr.isatty()
     with tqdm(total=1.0, desc="train", bar_format=form, disable=hidden, leave=False) as bar:
@@ -134,7 +131,7 @@ def run(args: argparse.Namespace) -> int:
             bar.set_postfix_str(words, refresh=False)
             bar.update(share - bar.n)
 
-        done = train(request, say, on_progress)
+        done = train(request, partial(say, "train"), on_progress)
     for name in ("judged", "tested"):
         for source, found in done.card.get(name, {}).items():
             if found["boxes"]:

@@ -13,11 +13,10 @@ from jeat_graph.data.boxes import find_bad_row
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.embeddings import EmbeddingArray, find_bad_embedding, unit_embeddings
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.views import BOX
 from jeat_graph.io.column_names import standing_in
 from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.frames import score_hint
-
-BOX = ("left", "top", "width", "height")
 
 
 def read_embeddings(table: FileTable) -> EmbeddingArray | None:

@@ -12,6 +12,8 @@ from jeat_graph.io.headers import is_number
 from jeat_graph.io.limits import check_file
 
 FORMATS = ("csv", "parquet", "motchallenge", "kitti", "prophesee", "coco")
+#: Those whose tables count frames and say no times.
+BY_FRAME = ("motchallenge", "kitti")
 _MAGIC = {b"PAR1": "parquet", b"\x93NUMPY": "prophesee"}
 _SUFFIX = {
     ".csv": "csv",

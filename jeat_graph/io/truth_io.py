@@ -10,6 +10,7 @@ import numpy as np
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
+from jeat_graph.data.views import BOX
 from jeat_graph.io import kitti, motchallenge, prophesee
 from jeat_graph.io.column_names import boxes_of, standing_in, times_of
 from jeat_graph.io.file_table import FileTable
@@ -19,8 +20,7 @@ from jeat_graph.io.plain_text import check_sizes, frames_of
 from jeat_graph.io.table_writer import write_columns
 from jeat_graph.io.tables import read_table
 
-_BOX = ("left", "top", "width", "height")
-_REQUIRED = ("t", "object_id", *_BOX)
+_REQUIRED = ("t", "object_id", *BOX)
 _MOTION = ("x", "y", "vx", "vy", "ax", "ay")
 _OPTIONAL = (*_MOTION, "class", "ignore", "distance")
 _TRUTH_WORDS = {"": False, "0": False, "1": True, "false": False, "true": True}
@@ -113,7 +113,7 @@ def write_truth(truth: GroundTruth, path: str | Path) -> None:
         return np.ma.masked_array(padded[order], mask=order >= len(truth))
 
     columns: dict[str, Any] = {"t": t[order], "object_id": whole(truth.object_id)}
-    columns |= {name: numbers(truth.boxes[:, k]) for k, name in enumerate(_BOX)}
+    columns |= {name: numbers(truth.boxes[:, k]) for k, name in enumerate(BOX)}
     if truth.motion is not None:
         columns |= {name: numbers(truth.motion[:, k]) for k, name in enumerate(_MOTION)}
     if truth.classes is not None:

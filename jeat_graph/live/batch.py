@@ -6,10 +6,12 @@ import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.data.processes import available_cores
+from jeat_graph.io.locking import try_lock
+from jeat_graph.io.outputs import check_folder
 from jeat_graph.live.engines import ENGINES, run_local, run_on_ray
 from jeat_graph.live.manifest import ManifestRow
 from jeat_graph.live.recording_job import FAILED, Job, Outcome, run_job
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
     from jeat_graph.eval.load import JudgedRun
 
 RUNS, TABLE, SCORES, TRACES, LOCK = "runs", "recordings.csv", "scores.json", "errors.txt", ".batch.lock"
-_SHARES = ("HOTA", "MOTA", "IDF1")
+_SHARES = ("MOTA", "HOTA", "IDF1")
 
 
 @dataclass(frozen=True)
@@ -85,8 +87,7 @@ def run_batch(recordings: Sequence[ManifestRow], out: str | Path, options: Batch
     folder = Path(out)
     if options.engine not in ENGINES:
         raise JeatGraphError(f"unknown engine {options.engine!r}; known: {', '.join(ENGINES)}")
-    if folder.exists() and not folder.is_dir():
-        raise JeatGraphError(f"{folder}: is a file; --out must be a folder")
+    check_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
     with _alone_in(folder):
         found = _work([_job(one, folder, options) for one in recordings], options)
@@ -224,17 +225,8 @@ def _alone_in(folder: Path) -> Iterator[None]:
     Raises:
         JeatGraphError: another one is at work there.
     """
-    file: Any
     with (folder / LOCK).open("w") as file:
-        try:
-            import fcntl
-        except (
-            ImportError
-        ):  # no such locks on this system: the run directories are whole or absent all the same
-            yield
-            return
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise JeatGraphError(f"{folder}: another batch is at work here") from None
+        # Where there are no locks nothing is held: the run directories are whole or absent all the same.
+        if try_lock(file.fileno()) is False:
+            raise JeatGraphError(f"{folder}: another batch is at work here")
         yield

@@ -13,6 +13,7 @@ from typing import Any, Self
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.locking import hold_folder, remove_folders
+from jeat_graph.io.outputs import check_folder
 from jeat_graph.io.scans_io import SCANS
 
 RUN_JSON = "run.json"
@@ -68,8 +69,7 @@ class RunDirectory:
 
     def __init__(self, folder: str | Path, inputs: Iterable[str | Path] = ()) -> None:
         self.folder = Path(folder)
-        if self.folder.exists() and not self.folder.is_dir():
-            raise DataError("is a file; --out must be a folder", folder)
+        check_folder(folder)
         own = {(self.folder / name).resolve() for name in RUN_FILES}
         for path in inputs:
             if Path(path).resolve() in own:

@@ -151,6 +151,13 @@ def _missing(data: RunData) -> list[str]:
     return notes
 
 
+def parts_of_tracks(table: Trajectories | None) -> dict[int, Trajectories]:
+    """A table's rows of each track in order of time, by identity, ascending; empty without a table."""
+    if table is None:
+        return {}
+    return {track_id: table.take(rows) for track_id, rows in rows_of_tracks(table.track_id, table.t).items()}
+
+
 def rows_of_tracks(track_id: IntArray, t: FloatArray) -> dict[int, IntArray]:
     """Row numbers of each track in order of time, by identity, ascending."""
     if not len(track_id):

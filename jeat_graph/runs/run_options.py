@@ -9,9 +9,9 @@ from typing import Any
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import ConfigError
+from jeat_graph.io.formats import BY_FRAME
 
-FRAME_FORMATS = ("motchallenge", "kitti")
-EXTRA_FORMATS = ("parquet", *FRAME_FORMATS)
+EXTRA_FORMATS = ("parquet", *BY_FRAME)
 
 
 @dataclass(frozen=True)

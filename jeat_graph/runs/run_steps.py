@@ -17,10 +17,11 @@ from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError, InputWarning
 from jeat_graph.data.progress import progress_to, refreshing
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.io.formats import BY_FRAME
 from jeat_graph.io.piecewise import PiecewiseWriter
 from jeat_graph.runs.directory import DIAGNOSTICS, MEASUREMENTS, RESUME, SUFFIXES, RunDirectory
 from jeat_graph.runs.latency import late_clocks
-from jeat_graph.runs.run_options import FRAME_FORMATS, RunOptions, RunRecord
+from jeat_graph.runs.run_options import RunOptions, RunRecord
 from jeat_graph.runs.unfinished import UnfinishedRun
 from jeat_graph.tracking.measured import ConfirmedMeasurements
 from jeat_graph.tracking.tracker import Tracker
@@ -212,7 +213,7 @@ class _Files(ExitStack):
         from jeat_graph.io.trajectories_io import TrajectoryWriter
 
         super().__init__()
-        suffixes = [SUFFIXES[name] for name in ("csv", *options.formats) if name not in FRAME_FORMATS]
+        suffixes = [SUFFIXES[name] for name in ("csv", *options.formats) if name not in BY_FRAME]
         kinds = ("causal", "smoothed") if config.smoother.engine != "none" else ("causal",)
         writers: dict[str, list[PiecewiseWriter | MeasurementWriter]] = {
             kind: [TrajectoryWriter(run.path(kind + suffix), classes=named) for suffix in suffixes]

@@ -11,9 +11,10 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.eval.frames import Kind
+from jeat_graph.io.formats import BY_FRAME
 from jeat_graph.io.scans_io import SCANS, write_scans
 from jeat_graph.runs.directory import RUN_JSON, SUFFIXES, RunDirectory
-from jeat_graph.runs.run_options import FRAME_FORMATS, RunOptions, RunRecord
+from jeat_graph.runs.run_options import RunOptions, RunRecord
 from jeat_graph.runs.run_steps import RunSteps
 from jeat_graph.version import __version__
 
@@ -56,7 +57,7 @@ def _write_at_frames(
     from jeat_graph.io.trajectories_io import read_trajectories
     from jeat_graph.runs.frame_export import at_frames
 
-    wanted = [name for name in formats if name in FRAME_FORMATS]
+    wanted = [name for name in formats if name in BY_FRAME]
     if not wanted:
         return
     table = at_frames(read_trajectories(run.path(kind + SUFFIXES["csv"])), kind, instants, rate_hz)

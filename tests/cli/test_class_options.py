@@ -52,7 +52,9 @@ def test_track_writes_the_class_of_each_track_in_every_format_that_has_one(run):
     assert {line.split()[2] for line in kitti.read_text().splitlines()} == {"car", "truck"}
     assert set(read_trajectories(kitti, fmt="kitti").classes) == {"car", "truck"}
     mot = next((run / "run").glob("smoothed.mot*"))
-    assert all(line.endswith(",-1,-1,-1") for line in mot.read_text().splitlines())
+    rows = mot.read_text().splitlines()
+    assert rows
+    assert all(line.endswith(",-1,-1,-1") for line in rows)
 
 
 def test_track_takes_only_detections_of_a_class_and_compare_takes_the_same_again(run, tmp_path, capsys):

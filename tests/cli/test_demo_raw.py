@@ -15,11 +15,14 @@ from jeat_graph.cli.main import build_parser, main
 def test_each_command_is_one_that_anybody_can_repeat_and_begins_with_what_is_there():
     out = Path("somewhere")
     there = set()
+    met = 0
     for command in demo_raw.commands(out):
         build_parser(command[0]).parse_args(command)
         given = [part for part in command if part.startswith("somewhere") and part != command[-1]]
         assert all(any(part.startswith(made) for made in there) for part in given), command
+        met += len(given)
         there.add(command[-1] if "--gt" not in command else "somewhere")
+    assert met > 3
 
 
 @pytest.mark.skipif(not os.environ.get("JEAT_GRAPH_FULL"), reason="renders a clip: JEAT_GRAPH_FULL=1")

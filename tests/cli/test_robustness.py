@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from jeat_graph.cli import main as entry
-from jeat_graph.cli.terminal import Terminated, describe, in_good_order, one_line
+from jeat_graph.cli.terminal import Terminated, describe, in_good_order, one_line, say, warn
 from jeat_graph.data.errors import DataError
 
 from .conftest import HEADER, as_user
@@ -53,6 +53,14 @@ def test_too_little_memory_is_one_line(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr("jeat_graph.cli.track_command.run", out_of_memory)
     assert entry.main(["track", "d.csv", "--out", str(tmp_path)]) == 2
     assert capsys.readouterr().err == "jeat-graph track: not enough memory: Unable to allocate 7 TiB\n"
+
+
+def test_what_a_command_tells_is_one_line_that_no_terminal_obeys(capsys):
+    say("track", "run\x1b[2J\nnight: odd")
+    warn("track", "night\nodd")
+    assert capsys.readouterr().err == (
+        "jeat-graph track: run\\x1b[2J night: odd\njeat-graph track: warning: night odd\n"
+    )
 
 
 def test_a_warning_is_one_line_with_the_command_s_name(capsys):

@@ -9,6 +9,7 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.events import EventArray
 from jeat_graph.drawing.palette import BRIGHTER, DARK, DARKER
+from jeat_graph.io.events.dsec import DSEC_SIZE
 from jeat_graph.io.events.stretches import Stretches
 from jeat_graph.io.video import FrameSource, RgbImage
 
@@ -16,7 +17,6 @@ from jeat_graph.io.video import FrameSource, RgbImage
 _SATURATION = 1.0
 _US_PER_S = 1e6
 _TOLERANCE_S = 1e-6
-_DSEC_SIZE = (640, 480)  # of event files that do not say
 
 
 class FilmBackground(Protocol):
@@ -79,7 +79,7 @@ class EventBackground:
     name = "events"
 
     def __init__(self, source: Stretches, window_s: float) -> None:
-        self.size_px = source.size_px or _DSEC_SIZE
+        self.size_px = source.size_px or DSEC_SIZE
         self._source = source
         self._window_us = max(round(window_s * _US_PER_S), 1)
         offset = source.t_offset_us

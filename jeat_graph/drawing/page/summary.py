@@ -13,7 +13,7 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.eval.consistency import chi2_bounds
 from jeat_graph.eval.judge import ERRORS, breakdown_tables, summary_table
 from jeat_graph.eval.tables import Cell, Table
-from jeat_graph.runs.recorded import RunData, rows_of_tracks
+from jeat_graph.runs.recorded import RunData, parts_of_tracks, rows_of_tracks
 
 ERRORS_TITLE = "Errors of matched tracks"
 
@@ -125,8 +125,8 @@ def sensor_table(data: RunData) -> Table | None:
 
 def track_table(data: RunData) -> Table:
     """One row a track: when it lived, what saw it, how well that fitted."""
-    causal = _table_parts(data.causal)
-    smoothed = _table_parts(data.smoothed)
+    causal = parts_of_tracks(data.causal)
+    smoothed = parts_of_tracks(data.smoothed)
     noted = {}
     if data.diagnostics is not None:
         noted = rows_of_tracks(data.diagnostics.track_id, data.diagnostics.t)
@@ -153,9 +153,3 @@ def track_table(data: RunData) -> Table:
                 record[f"{name} last s"] = float(scale[-1]) if len(scale) else None
         records.append(record)
     return Table.from_records(records, title="All tracks", digits={"coasting (%)": 1})
-
-
-def _table_parts(table: Trajectories | None) -> dict[int, Trajectories]:
-    if table is None:
-        return {}
-    return {track_id: table.take(rows) for track_id, rows in rows_of_tracks(table.track_id, table.t).items()}

@@ -12,7 +12,7 @@ from jeat_graph.data.progress import with_progress
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.drawing.page.thinning import extremes, milliseconds, occupied, sample, short, spread
 from jeat_graph.eval.resampling import interpolate_to
-from jeat_graph.runs.recorded import RunData, rows_of_tracks
+from jeat_graph.runs.recorded import RunData, parts_of_tracks, rows_of_tracks
 
 # Points of a curve: all tracks share a budget, so that the page stays small however many there are.
 _BUDGET = 16_000
@@ -32,8 +32,8 @@ def timelines(data: RunData) -> list[dict[str, Any]]:
     since the run's first time.
     """
     ids, start = data.track_ids(), data.span_s()[0]
-    causal = _parts(data.causal)
-    smoothed = _parts(data.smoothed)
+    causal = parts_of_tracks(data.causal)
+    smoothed = parts_of_tracks(data.smoothed)
     paired = None
     if data.causal is not None and data.smoothed is not None:
         paired = _Paired(data.causal, data.smoothed)
@@ -69,12 +69,6 @@ def timelines(data: RunData) -> list[dict[str, Any]]:
             one["nis"] = [_curve(noted, name, "nis", start, points) for name in data.sensors]
         out.append(one)
     return out
-
-
-def _parts(table: Trajectories | None) -> dict[int, Trajectories]:
-    if table is None:
-        return {}
-    return {track_id: table.take(rows) for track_id, rows in rows_of_tracks(table.track_id, table.t).items()}
 
 
 def _longest(ids: IntArray, causal: dict[int, Trajectories], smoothed: dict[int, Trajectories]) -> list[int]:

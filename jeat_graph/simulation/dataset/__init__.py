@@ -1,1 +1,1 @@
-"""The SEHN data set: protocol, files and their verification."""
+"""Sets of rendered recordings: how segments are drawn and split, their files, and the check of a set."""

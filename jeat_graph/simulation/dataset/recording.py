@@ -14,6 +14,7 @@ from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.io.atomic import open_atomic
 from jeat_graph.io.locking import hold_folder
+from jeat_graph.io.outputs import check_folder
 from jeat_graph.simulation.dataset.disk import check_room, segment_bound
 from jeat_graph.simulation.dataset.layout import (
     ANNOTATIONS,
@@ -64,8 +65,8 @@ def record_dataset(
 
     Raises:
         ConfigError: the folder holds something else, or a set with other settings or more segments.
-        DataError: not enough room on the disk, another process is writing into the folder, or the source
-            gave something that cannot be stored.
+        DataError: the folder is a file, not enough room on the disk, another process is writing into the
+            folder, or the source gave something that cannot be stored.
     """
     root = Path(out)
     source = factory()
@@ -140,8 +141,7 @@ def _write_text(path: Path, text: str) -> None:
 
 
 def _check_folder(root: Path, settings: dict[str, Any], segments: int) -> None:
-    if root.exists() and not root.is_dir():
-        raise ConfigError(f"{root}: is a file; --out must be a folder")
+    check_folder(root)
     strange = sorted(p.name for p in root.iterdir() if p.name not in _OWN) if root.is_dir() else []
     strange = [name for name in strange if not name.startswith(".")]
     path = root / SETTINGS

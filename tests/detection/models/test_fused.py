@@ -77,9 +77,11 @@ def test_a_window_goes_with_the_newest_picture_and_its_age(net):
 @pytest.mark.parametrize(("late_s", "age_s"), [(0.0024, 0.0), (0.0026, 0.0974), (-0.001, 0.001)])
 def test_a_picture_half_a_bin_from_a_windows_end_is_of_its_time(net, late_s, age_s):
     pictures = [(float(t) + late_s, frame()) for t in (0.1, 0.2, 0.3)]
-    for scan in FusedDetector(net, SIDE, times=FAST, pictures=pictures).push(few_events()):
-        if any(abs(scan.t - t) < 1e-6 for t in (0.2, 0.3)):
-            assert scan.boxes[0, 1] == pytest.approx(TOP + PER_S * age_s, abs=1e-3)
+    scans = FusedDetector(net, SIDE, times=FAST, pictures=pictures).push(few_events())
+    met = [scan for scan in scans if any(abs(scan.t - t) < 1e-6 for t in (0.2, 0.3))]
+    assert len(met) == 2
+    for scan in met:
+        assert scan.boxes[0, 1] == pytest.approx(TOP + PER_S * age_s, abs=1e-3)
 
 
 def test_pictures_are_read_no_further_than_the_events_have_come(net):
@@ -109,9 +111,13 @@ def test_what_is_seen_live_counts_from_its_time_on(net):
     detector = FusedDetector(net, SIDE, times=FAST)
     events = few_events()
     early = events.between(0, 120_000)
-    assert all(scan.boxes[0, 0] == LEFT + OF_EVENTS for scan in detector.push(early))
+    before = detector.push(early)
+    assert before
+    assert all(scan.boxes[0, 0] == LEFT + OF_EVENTS for scan in before)
     detector.see(frame(255), 0.16)
-    for scan in detector.push(events.between(120_000, 400_000)):
+    after = detector.push(events.between(120_000, 400_000))
+    assert {bool(scan.t >= 0.16 - 1e-4) for scan in after} == {False, True}
+    for scan in after:
         shown = scan.t >= 0.16 - 1e-4
         top = TOP + (PER_S * (scan.t - 0.16) + 1.0 if shown else 0.0)
         expected = [LEFT + OF_EVENTS + OF_PICTURE * shown, top]
