@@ -11,6 +11,7 @@ from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.smoothing.access import SmoothedTracks
 from jeat_graph.tracking.snapshot import Snapshot
 
+from jeat_graph.tracking.update_log import UpdateLog, allocate_log
 
 class SavedTracks(SmoothedTracks):
     """A tracker's state to and from files; see `Tracker`."""
@@ -19,6 +20,7 @@ class SavedTracks(SmoothedTracks):
         config: Config
         _diagnostics: bool
         _watch: InputWatch
+        _log: UpdateLog
 
         def __init__(self, config: Config, *, diagnostics: bool = False) -> None:
             """Make a tracker."""
@@ -60,7 +62,15 @@ class SavedTracks(SmoothedTracks):
     def state(self, snapshot: Snapshot | None = None) -> dict[str, Any]:
         """Return what `from_state` takes: the state now, or at a snapshot; the smoothers' is not copied."""
         now = self.snapshot() if snapshot is None else snapshot
-        return {"diagnostics": self._diagnostics, "now": now, "smoothing": self._smoothers}
+        # What the last step gave to the tracks is asked for after it, and so may it be after a restart.
+        log = self._log.rows[: int(self._log.count[0])].copy() if self._diagnostics else None
+        return {
+            "diagnostics": self._diagnostics,
+            "finished": self._finished,
+            "now": now,
+            "log": log,
+            "smoothing": self._smoothers,
+        }
 
     @classmethod
     def from_state(cls, config: Config, state: dict[str, Any]) -> Self:
@@ -72,3 +82,7 @@ class SavedTracks(SmoothedTracks):
         if state["now"].t is not None:
             tracker._watch.end()
         return tracker
+        tracker._finished = state["finished"]
+        if state["log"] is not None:
+            tracker._log = allocate_log(len(state["log"]))
+            tracker._log.rows[:], tracker._log.count[0] = state["log"], len(state["log"])
