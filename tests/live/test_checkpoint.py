@@ -170,6 +170,21 @@ def test_what_the_last_step_gave_to_the_tracks_is_there_after_loading(late, batc
     assert loaded.last_measurements()[0].tobytes() == tracker.last_measurements()[0].tobytes()
 
 
+def test_a_live_trackers_file_is_none_for_a_plain_tracker_nor_the_other_way_round(batches, tmp_path):
+    """The newest scans are apart in it, and would be missing."""
+    path = tmp_path / "state.npz"
+    live = LiveTracker(Tracker("highway"))
+    for batch in batches[:20]:
+        live.step(batch)
+    live.save(path)
+    with pytest.raises(DataError, match=r"takes late scans.*LiveTracker\.load"):
+        Tracker.load(path)
+    live.tracker.save(path)
+    with pytest.raises(DataError, match="not one that takes late scans"):
+        LiveTracker.load(path)
+    assert Tracker.load(path).time == live.time
+
+
 def test_a_file_of_other_settings_or_of_another_version_is_refused_with_a_sentence(tmp_path, monkeypatch):
     path = tmp_path / "state.npz"
     Tracker("highway").save(path)
