@@ -89,11 +89,12 @@ class Session:
         self.bad: int = kept.get("bad", 0)
         self.duplicates: int = kept.get("duplicates", 0)
         self._seen = Duplicates()
-        self._seen.seen = {k: (top, set(recent)) for k, (top, recent) in kept.get("seen", {}).items()}
+        if "seen" in kept:
+            self._seen.set_state(kept["seen"])
         self._health = SensorHealth(live.tracker.config)
         self._health.last = kept.get("last", {})
         self._health.silent, self._health.rubbish = kept.get("silent", []), kept.get("rubbish", [])
-        self._told = 0
+        self._told = self._told_restarts = 0
         self._interval = None if live.time is None else live.time // every_s
 
     def accept(self, message: ScanMessage, place: str = "") -> None:
@@ -106,9 +107,12 @@ class Session:
         Raises:
             JeatGraphError: scans that are not valid, or late ones where those are refused.
         """
+        restarts = self._seen.restarts.get(message.source, 0)
         if not self._seen.is_new(message):
             self.duplicates += 1
             return
+        if self._seen.restarts.get(message.source, 0) > restarts:
+            self._tell_restart(message, place)
         before = self.live.time
         arrival = self.live.step(message.batch.scans)
         passed_over = len(arrival.dropped) + len(arrival.repeated)
@@ -144,7 +148,7 @@ class Session:
                 "count": self.count,
                 "bad": self.bad,
                 "duplicates": self.duplicates,
-                "seen": {k: (top, sorted(recent)) for k, (top, recent) in self._seen.seen.items()},
+                "seen": self._seen.state(),
                 "last": self._health.last,
                 "silent": self._health.silent,
                 "rubbish": self._health.rubbish,
@@ -172,6 +176,7 @@ class Session:
             "messages": self.count,
             "unreadable": self.bad,
             "duplicates": self.duplicates,
+            "restarts": dict(self._seen.restarts),
             "steps_taken_again": self.live.replayed,
             "lateness": lateness,
             "learnt": {name: one._asdict() for name, one in self.live.tracker.sensor_states().items()},
@@ -188,7 +193,22 @@ class Session:
         ]
         if self.bad:
             lines.append(f"{self.bad} messages could not be read and were passed over")
+        if self.duplicates:
+            lines.append(f"{self.duplicates} messages had been taken before and were passed over")
+        for source, count in self._seen.restarts.items():
+            often = "once" if count == 1 else f"{count} times"
+            lines.append(f"source {source!r} began to count its messages anew {often}")
         return lines
+
+    def _tell_restart(self, message: ScanMessage, place: str) -> None:
+        """Tell of the first sources that began to count anew."""
+        self._told_restarts += 1
+        if self._told_restarts <= MOST_TOLD:
+            more = "; further ones are only counted" if self._told_restarts == MOST_TOLD else ""
+            self.ends.warn(
+                f"warning: {place}source {message.source!r} counts anew from seq {message.seq}, with a newer "
+                f"scan: it was started again, and its messages are taken{more}"
+            )
 
     def _tell(self, event: Event) -> None:
         self.ends.warn(f"warning: {event.text}")
