@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
     from jeat_graph.data.errors import DataError
     from jeat_graph.data.trajectories import Trajectories
-    from jeat_graph.live.inputs import Interrupts
+    from jeat_graph.live.interrupts import Interrupts
     from jeat_graph.live.late import LiveTracker
     from jeat_graph.live.messages import ScanMessage
     from jeat_graph.live.session import Session
@@ -92,7 +92,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Track until the input ends, the reader of the output goes away, or a signal comes."""
     from jeat_graph.cli.stream_output import StreamOutput
-    from jeat_graph.live.inputs import Interrupts
+    from jeat_graph.live.interrupts import Interrupts
     from jeat_graph.live.session import Ends, Session
     from jeat_graph.live.smoothed_file import SmoothedFile
 
@@ -215,12 +215,11 @@ def _warm_up(config: Config) -> None:
 def _take_all(
     session: Session, args: argparse.Namespace, interrupts: Interrupts, source: Source | None
 ) -> None:
-    from jeat_graph.io.stream_text import line_reader
     from jeat_graph.live.inputs import from_lines, from_source
 
     bad = _skip(session) if args.on_error == "skip" else None
     if source is None:
-        lines = interrupts.lines(line_reader(sys.stdin.buffer.readline))
+        lines = interrupts.lines(sys.stdin.buffer)
         for message, place in from_lines(lines, STDIN, args.joint, bad):
             _take(session, message, place, bad, args.time_unit)
         return
