@@ -156,9 +156,16 @@ def _tracker(args: argparse.Namespace, config: Config) -> tuple[LiveTracker, dic
     """The tracker, new or from the checkpoint, and what was kept with it."""
     from jeat_graph.live.late import LiveTracker
     from jeat_graph.tracking.tracker import Tracker
+    from jeat_graph.data.errors import ConfigError
 
     if args.checkpoint is not None and Path(args.checkpoint).is_file():
-        return LiveTracker.load(args.checkpoint, config)
+        live, more = LiveTracker.load(args.checkpoint, config)
+        if live.policy != args.late:
+            raise ConfigError(
+                f"{args.checkpoint}: was saved with --late {live.policy}, not {args.late}; give the same, or "
+                "begin anew without the file"
+            )
+        return live, more
     return LiveTracker(Tracker(config, diagnostics=args.road is not None), args.late), {}
 
 
