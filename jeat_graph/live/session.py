@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -14,6 +15,7 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.live.health import Event, SensorHealth
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.live.messages import Duplicates, ScanMessage
+from jeat_graph.live.transport.patience import UnconfirmedError
 from jeat_graph.version import __version__
 
 #: Smoothed rows are fetched, and the sensors judged, at one arrival in so many.
@@ -95,6 +97,8 @@ class Session:
         self._health.last = kept.get("last", {})
         self._health.silent, self._health.rubbish = kept.get("silent", []), kept.get("rubbish", [])
         self._told = self._told_restarts = 0
+        self._owed = False  # the tracker has taken a scan whose answer has not gone out
+        self._unconfirmed = ""  # or why the last answers may not have arrived
         self._interval = None if live.time is None else live.time // every_s
 
     def accept(self, message: ScanMessage, place: str = "") -> None:
@@ -105,6 +109,7 @@ class Session:
             place: where it came from, for warnings.
 
         Raises:
+            UnconfirmedError: the program is to end, and the answer cannot be given out.
             JeatGraphError: scans that are not valid, or late ones where those are refused.
         """
         restarts = self._seen.restarts.get(message.source, 0)
@@ -123,15 +128,16 @@ class Session:
         self._tell_dropped(arrival.dropped, arrival.late_s, place)
         if self.ends.smoothed is not None:
             self.ends.smoothed.begin(arrival.table.classes is not None)
-        if passed_over < len(message.batch.scans):
-            self.ends.tracks(arrival.t, arrival.table, message, arrival.late_s)
-            for event in self._health.saw(message.batch.scans, arrival.t):
-                self._tell(event)
-        if self.count % ARRIVALS_PER_DRAIN == 0:
-            self.drain()
-            if before is not None:
-                for event in self._health.judge(self.live.tracker.sensor_states(), arrival.t):
+        with self._owing():
+            if passed_over < len(message.batch.scans):
+                self.ends.tracks(arrival.t, arrival.table, message, arrival.late_s)
+                for event in self._health.saw(message.batch.scans, arrival.t):
                     self._tell(event)
+            if self.count % ARRIVALS_PER_DRAIN == 0:
+                self.drain()
+                if before is not None:
+                    for event in self._health.judge(self.live.tracker.sensor_states(), arrival.t):
+                        self._tell(event)
         self._save_in_time(arrival.t)
 
     def drain(self) -> None:
@@ -140,8 +146,12 @@ class Session:
             self.ends.smoothed.append(self.live.drain_smoothed())
 
     def save(self) -> None:
-        """Write the checkpoint, if one is wanted, and tell the source."""
-        self.ends.flush()
+        """Write the checkpoint, if one is wanted, and tell the source.
+
+        Neither is done where an answer has not got out, or not to its end: so its scan comes again.
+        """
+        if not self._all_out():
+            return
         if self._checkpoint is not None:
             self.drain()
             more: dict[str, Any] = {
@@ -163,7 +173,9 @@ class Session:
         last = self.live.finish()
         if self.ends.smoothed is not None:
             self.ends.smoothed.append(last)
-        self.ends.flush()
+        self._all_out()
+        if self._unconfirmed:
+            self.ends.warn(f"warning: {self._unconfirmed}; their scans are not acknowledged or saved")
         for text in self.summary_lines():
             self.ends.warn(text)
 
@@ -209,6 +221,29 @@ class Session:
                 f"warning: {place}source {message.source!r} counts anew from seq {message.seq}, with a newer "
                 f"scan: it was started again, and its messages are taken{more}"
             )
+
+    @contextlib.contextmanager
+    def _owing(self) -> Iterator[None]:
+        """While an answer goes out: what breaks off in here leaves a state that is not to be saved."""
+        self._owed = True
+        try:
+            yield
+        except UnconfirmedError as error:
+            self._unconfirmed = str(error)
+            raise
+        self._owed = False
+
+    def _all_out(self) -> bool:
+        """Whether all answers have arrived; waits for those that are on their way."""
+        if self._owed:
+            return False
+        try:
+            self.ends.flush()
+        except UnconfirmedError as error:
+            self._unconfirmed = str(error)
+            return False
+        self._unconfirmed = ""
+        return True
 
     def _tell(self, event: Event) -> None:
         self.ends.warn(f"warning: {event.text}")

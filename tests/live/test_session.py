@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 
 import pytest
@@ -10,6 +11,7 @@ from jeat_graph.config.reading import load_config
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.live.messages import decode_scans
 from jeat_graph.live.session import MOST_TOLD, Ends, Session
+from jeat_graph.live.transport.patience import UnconfirmedError
 from jeat_graph.tracking.tracker import Tracker
 
 CONFIG = load_config("default", ["smoother.engine=none"])
@@ -77,3 +79,69 @@ def test_after_a_restart_of_both_what_a_broker_brings_again_is_recognised(taken,
     assert again.duplicates == taken
     assert said == []
     assert again.summary()["restarts"] == {"g7": 1}
+
+
+class Broker:
+    """Takes answers until it is gone, and says whether they have arrived; what was committed is in `at`."""
+
+    def __init__(self) -> None:
+        self.gone_at, self.at, self.answered = ("", 10**9), 0, []
+
+    def tracks(self, t, *_) -> None:
+        self._look("send")
+        self.answered.append(t)
+
+    def flush(self) -> None:
+        self._look("flush")
+
+    def commit(self) -> None:
+        self.at = len(self.answered)
+
+    def _look(self, what) -> None:
+        if what == self.gone_at[0] and len(self.answered) >= self.gone_at[1]:
+            raise UnconfirmedError("broker: the broker has not confirmed all tracks")
+
+
+@pytest.mark.parametrize("where", ["send", "flush"])
+def test_what_a_broker_has_not_confirmed_is_neither_saved_nor_acknowledged(where, tmp_path):
+    path, broker, said = tmp_path / "state.npz", Broker(), []
+    ends = Ends(tracks=broker.tracks, warn=said.append, flush=broker.flush, commit=broker.commit)
+    session = Session(LiveTracker(Tracker(CONFIG)), ends, path)
+    messages = [message(k, 0.05 * k) for k in range(40)]
+    for one in messages[:20]:
+        session.accept(one)
+    session.save()
+    broker.gone_at = (where, 25)
+    with contextlib.suppress(UnconfirmedError):
+        for one in messages[20:30]:
+            session.accept(one)
+    broker.gone_at = (where, 25) if where == "flush" else ("", 0)  # those before may arrive after all
+    session.save()
+    session.finish()
+    assert broker.at == 20
+    (warning,) = said
+    assert "has not confirmed all tracks; their scans are not acknowledged or saved" in warning
+    live, more = LiveTracker.load(path, CONFIG)
+    again, answered, _ = session_of(live, path, more)
+    for one in messages:
+        again.accept(one)
+    assert answered == [one.batch.t for one in messages[20:]]
+
+
+def test_an_answer_that_a_reader_who_has_gone_did_not_take_is_in_no_checkpoint(tmp_path):
+    path = tmp_path / "state.npz"
+    answered = []
+
+    def tracks(t, *_) -> None:
+        if len(answered) == 7:
+            raise BrokenPipeError
+        answered.append(t)
+
+    session = Session(LiveTracker(Tracker(CONFIG)), Ends(tracks=tracks, warn=print), path)
+    messages = [message(k, 0.05 * k) for k in range(8)]
+    for one in messages[:7]:
+        session.accept(one)
+    with pytest.raises(BrokenPipeError):
+        session.accept(messages[7])
+    session.save()
+    assert not path.exists()
