@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
     from jeat_graph.data.errors import DataError
     from jeat_graph.data.trajectories import Trajectories
-    from jeat_graph.live.inputs import Interrupts
+    from jeat_graph.live.interrupts import Interrupts
     from jeat_graph.live.late import LiveTracker
     from jeat_graph.live.messages import ScanMessage
     from jeat_graph.live.session import Session
@@ -92,16 +92,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Track until the input ends, the reader of the output goes away, or a signal comes."""
     from jeat_graph.cli.stream_output import StreamOutput
-    from jeat_graph.live.inputs import Interrupts
+    from jeat_graph.live.interrupts import Interrupts
     from jeat_graph.live.session import Ends, Session
     from jeat_graph.live.smoothed_file import SmoothedFile
+    from jeat_graph.live.transport.patience import UnconfirmedError
 
     config = _config(args)
     live, more = _tracker(args, config)
     _warm_up(config)
     with contextlib.ExitStack() as stack:
         interrupts = stack.enter_context(Interrupts())
-        source, sink = _ends(args, stack)
+        source, sink = _ends(args, stack, interrupts)
         smoothed = None
         if args.smoothed is not None:
             smoothed = stack.enter_context(SmoothedFile(args.smoothed, more.get("smoothed")))
@@ -116,12 +117,13 @@ def run(args: argparse.Namespace) -> int:
         )
         session = Session(live, ends, args.checkpoint, args.every, more)
         output.seq = more.get("count", 0)
-        try:
-            _take_all(session, args, interrupts, source)
-            output.begin()  # an input without scans gives a table without rows
-        finally:
-            # An error in a line, a signal or a reader that has gone: what is known is kept all the same.
-            _finish(session, args)
+        with contextlib.suppress(UnconfirmedError):  # after a signal; the session tells of it
+            try:
+                _take_all(session, args, interrupts, source)
+                output.begin()  # an input without scans gives a table without rows
+            finally:
+                # An error in a line, a signal or a reader that has gone: what is known is kept all the same.
+                _finish(session, args)
     if interrupts.seen is not None:
         print("jeat-graph stream: interrupted", file=sys.stderr)
         return 128 + interrupts.seen
@@ -154,11 +156,18 @@ def _config(args: argparse.Namespace) -> Config:
 
 def _tracker(args: argparse.Namespace, config: Config) -> tuple[LiveTracker, dict[str, Any]]:
     """The tracker, new or from the checkpoint, and what was kept with it."""
+    from jeat_graph.data.errors import ConfigError
     from jeat_graph.live.late import LiveTracker
     from jeat_graph.tracking.tracker import Tracker
 
     if args.checkpoint is not None and Path(args.checkpoint).is_file():
-        return LiveTracker.load(args.checkpoint, config)
+        live, more = LiveTracker.load(args.checkpoint, config)
+        if live.policy != args.late:
+            raise ConfigError(
+                f"{args.checkpoint}: was saved with --late {live.policy}, not {args.late}; give the same, or "
+                "begin anew without the file"
+            )
+        return live, more
     return LiveTracker(Tracker(config, diagnostics=args.road is not None), args.late), {}
 
 
@@ -185,13 +194,15 @@ def _with_road(
     return both
 
 
-def _ends(args: argparse.Namespace, stack: contextlib.ExitStack) -> tuple[Source | None, Sink | None]:
+def _ends(
+    args: argparse.Namespace, stack: contextlib.ExitStack, interrupts: Interrupts
+) -> tuple[Source | None, Sink | None]:
     from jeat_graph.live.transport.ends import open_sink, open_source
 
-    source = None if args.source is None else open_source(args.source)
+    source = None if args.source is None else open_source(args.source, interrupts.overdue)
     if source is not None:
         stack.callback(source.close)
-    sink = None if args.sink is None else open_sink(args.sink)
+    sink = None if args.sink is None else open_sink(args.sink, interrupts.overdue)
     if sink is not None:
         stack.callback(sink.close)
     return source, sink
@@ -215,12 +226,11 @@ def _warm_up(config: Config) -> None:
 def _take_all(
     session: Session, args: argparse.Namespace, interrupts: Interrupts, source: Source | None
 ) -> None:
-    from jeat_graph.io.stream_text import line_reader
     from jeat_graph.live.inputs import from_lines, from_source
 
     bad = _skip(session) if args.on_error == "skip" else None
     if source is None:
-        lines = interrupts.lines(line_reader(sys.stdin.buffer.readline))
+        lines = interrupts.lines(sys.stdin.buffer)
         for message, place in from_lines(lines, STDIN, args.joint, bad):
             _take(session, message, place, bad, args.time_unit)
         return

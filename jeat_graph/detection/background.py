@@ -42,7 +42,7 @@ class BackgroundSettings(Section):
         0.0,
     )
     around_px: int = number(5, "px", "side of the square in which events are counted", 1, 99)
-    adapt_s: float = number(2.0, "s", "what is usual follows in this time", open_low=True)
+    adapt_s: float = number(4.0, "s", "what is usual follows in this time", open_low=True)
 
 
 class UsualActivity:
@@ -101,8 +101,8 @@ def _mark(
 ) -> None:
     """Write the counts (H, W) that stand out, and let the means of the sums around them follow.
 
-    Of what does not stand out the means are at first those of all windows so far; what does is followed slowly
-    from the first on, or a slow vehicle would be usual before it has left its place.
+    Of what does not stand out the means are at first those of all windows so far; what does is followed
+    slowly from the first on, or a slow vehicle would be usual before it has left its place.
     """
     sigmas, quick, slow = np.float32(how[0]), np.float32(how[1]), np.float32(how[2])
     height, width = counts.shape

@@ -44,7 +44,7 @@ class SensorHealth:
         config: declared rates, clutter, and when a sensor counts as silent (`live`).
 
     Attributes:
-        last: time of the newest scan of each sensor (s).
+        last: time of the newest scan of each sensor (s), its latency taken off.
         silent: sensors that are silent now.
         rubbish: sensors that deliver rubbish now.
     """
@@ -56,6 +56,7 @@ class SensorHealth:
             name: max(live.silent_s, live.silent_periods / sensor.rate_hz)
             for name, sensor in config.sensors.items()
         }
+        self._latency_s = {name: sensor.latency_s for name, sensor in config.sensors.items()}
         self.last: dict[str, float] = {}
         self.silent: list[str] = []
         self.rubbish: list[str] = []
@@ -64,15 +65,17 @@ class SensorHealth:
         """Take note of scans.
 
         Args:
-            scans: what came.
-            now: time of the newest scan of all (s).
+            scans: what came, at the times that it came with; the sensor's `latency_s` is taken off them here.
+            now: time of the newest scan of all (s), its latency taken off.
 
         Returns:
             What has changed: a sensor is back, or another one has fallen silent meanwhile.
         """
         events = []
         for scan in scans:
-            self.last[scan.sensor] = max(scan.t, self.last.get(scan.sensor, scan.t))
+            # The clock of `now`: that of a sensor may be off by more than our patience.
+            t = scan.t - self._latency_s[scan.sensor]
+            self.last[scan.sensor] = max(t, self.last.get(scan.sensor, t))
         for name, t in self.last.items():
             quiet = now - t > self._patience_s[name]
             if quiet and name not in self.silent:

@@ -2,69 +2,19 @@
 
 from __future__ import annotations
 
-import contextlib
-import signal
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from types import FrameType
-from typing import Self
 
 import numpy as np
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.io import time_units
 from jeat_graph.io.scan_lines import read_batches
+from jeat_graph.live.interrupts import Interrupts
 from jeat_graph.live.messages import ScanMessage, decode_scans
 from jeat_graph.live.transport.ends import Source
 
 _WAIT_S = 0.2
-
-
-class Interrupts:
-    """Ctrl-C, SIGTERM and SIGHUP end the wait for a message at once, but never a step halfway.
-
-    Attributes:
-        seen: the signal that came, or None.
-    """
-
-    def __init__(self) -> None:
-        self.seen: int | None = None
-        self._waiting = False
-        self._before: dict[int, Callable[[int, FrameType | None], object] | int | None] = {}
-
-    def __enter__(self) -> Self:
-        # Only the main thread may set handlers; elsewhere interrupts stay what they are.
-        with contextlib.suppress(ValueError):
-            for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-                number = getattr(signal, name, None)
-                # What `nohup` has set stays.
-                if number is None or (name == "SIGHUP" and signal.getsignal(number) == signal.SIG_IGN):
-                    continue
-                self._before[number] = signal.signal(number, self._on_signal)
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        for number, handler in self._before.items():
-            signal.signal(number, handler)
-
-    def _on_signal(self, number: int, frame: FrameType | None) -> None:
-        self.seen = number
-        if self._waiting:
-            raise KeyboardInterrupt
-
-    def lines(self, read: Callable[[], bytes]) -> Iterator[bytes]:
-        """Yield lines until the input ends or an interrupt comes."""
-        while self.seen is None:
-            try:
-                self._waiting = True
-                line = read()
-            except KeyboardInterrupt:
-                return
-            finally:
-                self._waiting = False
-            if not line:
-                return
-            yield line
 
 
 def in_seconds(message: ScanMessage, unit: str) -> ScanMessage:

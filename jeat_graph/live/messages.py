@@ -11,6 +11,7 @@ as bytes: 64-bit floats, the lowest byte first.
 from __future__ import annotations
 
 import json
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -123,28 +124,73 @@ def _msgpack() -> Any:
     return msgpack
 
 
+class Numbering(NamedTuple):
+    """What has come of a source since it began to count.
+
+    Attributes:
+        top: the greatest number.
+        recent: which of the numbers below it have come, as far as they are kept.
+        newest: time of its newest scan (s).
+    """
+
+    top: int
+    recent: set[int]
+    newest: float
+
+
 class Duplicates:
     """Tells which messages have been taken already, in bounded memory.
 
     Of each source the greatest number is kept, and which of the `WINDOW` numbers below it have come: one that
-    is older still counts as a duplicate.
+    is older still counts as a duplicate. But a message that comes twice is as old as it was: where a number
+    that was used up comes with a scan newer than any of its source, the source has begun to count anew, as a
+    detector does that is started again. What came before stays known, for a broker may deliver it once more.
+
+    Attributes:
+        seen: by source its counts, the last one or the last two; the time of a scan says whose a number is.
+        restarts: by source, how often it began to count anew.
     """
 
     WINDOW = 1024
 
     def __init__(self) -> None:
-        self.seen: dict[str, tuple[int, set[int]]] = {}
+        self.seen: dict[str, list[Numbering]] = {}
+        self.restarts: dict[str, int] = {}
 
     def is_new(self, message: ScanMessage) -> bool:
         """Tell whether a message is new, and take note of it; one without a number always is."""
-        if message.seq is None:
+        seq, source, t = message.seq, message.source, message.batch.t
+        if seq is None:
             return True
-        top, recent = self.seen.get(message.source, (-1, set()))
-        if message.seq in recent or message.seq <= top - self.WINDOW:
+        counts = self.seen.setdefault(source, [Numbering(-1, set(), -math.inf)])
+        k = 0 if t <= counts[0].newest else len(counts) - 1
+        of = counts[k]
+        known = seq in of.recent or seq <= of.top - self.WINDOW
+        if t > of.newest and (known or (seq < of.top and seq < min(of.recent))):
+            self.restarts[source] = self.restarts.get(source, 0) + 1
+            self.seen[source] = [of, Numbering(seq, {seq}, t)]
+            return True
+        if known:
             return False
-        top = max(top, message.seq)
-        recent.add(message.seq)
+        of.recent.add(seq)
+        top, recent = max(of.top, seq), of.recent
         if len(recent) > 2 * self.WINDOW:
             recent = {seq for seq in recent if seq > top - self.WINDOW}
-        self.seen[message.source] = (top, recent)
+        counts[k] = Numbering(top, recent, max(of.newest, t))
         return True
+
+    def state(self) -> dict[str, Any]:
+        """Return what `set_state` takes: plain data."""
+        seen = {
+            source: [(top, sorted(recent), newest) for top, recent, newest in counts]
+            for source, counts in self.seen.items()
+        }
+        return {"seen": seen, "restarts": self.restarts}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go on from what `state` returned."""
+        self.seen = {
+            source: [Numbering(top, set(recent), newest) for top, recent, newest in counts]
+            for source, counts in state["seen"].items()
+        }
+        self.restarts = dict(state["restarts"])

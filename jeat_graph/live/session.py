@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -14,6 +15,7 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.live.health import Event, SensorHealth
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.live.messages import Duplicates, ScanMessage
+from jeat_graph.live.transport.patience import UnconfirmedError
 from jeat_graph.version import __version__
 
 #: Smoothed rows are fetched, and the sensors judged, at one arrival in so many.
@@ -89,11 +91,14 @@ class Session:
         self.bad: int = kept.get("bad", 0)
         self.duplicates: int = kept.get("duplicates", 0)
         self._seen = Duplicates()
-        self._seen.seen = {k: (top, set(recent)) for k, (top, recent) in kept.get("seen", {}).items()}
+        if "seen" in kept:
+            self._seen.set_state(kept["seen"])
         self._health = SensorHealth(live.tracker.config)
         self._health.last = kept.get("last", {})
         self._health.silent, self._health.rubbish = kept.get("silent", []), kept.get("rubbish", [])
-        self._told = 0
+        self._told = self._told_restarts = 0
+        self._owed = False  # the tracker has taken a scan whose answer has not gone out
+        self._unconfirmed = ""  # or why the last answers may not have arrived
         self._interval = None if live.time is None else live.time // every_s
 
     def accept(self, message: ScanMessage, place: str = "") -> None:
@@ -104,11 +109,15 @@ class Session:
             place: where it came from, for warnings.
 
         Raises:
+            UnconfirmedError: the program is to end, and the answer cannot be given out.
             JeatGraphError: scans that are not valid, or late ones where those are refused.
         """
+        restarts = self._seen.restarts.get(message.source, 0)
         if not self._seen.is_new(message):
             self.duplicates += 1
             return
+        if self._seen.restarts.get(message.source, 0) > restarts:
+            self._tell_restart(message, place)
         before = self.live.time
         arrival = self.live.step(message.batch.scans)
         passed_over = len(arrival.dropped) + len(arrival.repeated)
@@ -119,15 +128,16 @@ class Session:
         self._tell_dropped(arrival.dropped, arrival.late_s, place)
         if self.ends.smoothed is not None:
             self.ends.smoothed.begin(arrival.table.classes is not None)
-        if passed_over < len(message.batch.scans):
-            self.ends.tracks(arrival.t, arrival.table, message, arrival.late_s)
-            for event in self._health.saw(message.batch.scans, arrival.t):
-                self._tell(event)
-        if self.count % ARRIVALS_PER_DRAIN == 0:
-            self.drain()
-            if before is not None:
-                for event in self._health.judge(self.live.tracker.sensor_states(), arrival.t):
+        with self._owing():
+            if passed_over < len(message.batch.scans):
+                self.ends.tracks(arrival.t, arrival.table, message, arrival.late_s)
+                for event in self._health.saw(message.batch.scans, arrival.t):
                     self._tell(event)
+            if self.count % ARRIVALS_PER_DRAIN == 0:
+                self.drain()
+                if before is not None:
+                    for event in self._health.judge(self.live.tracker.sensor_states(), arrival.t):
+                        self._tell(event)
         self._save_in_time(arrival.t)
 
     def drain(self) -> None:
@@ -136,15 +146,19 @@ class Session:
             self.ends.smoothed.append(self.live.drain_smoothed())
 
     def save(self) -> None:
-        """Write the checkpoint, if one is wanted, and tell the source."""
-        self.ends.flush()
+        """Write the checkpoint, if one is wanted, and tell the source.
+
+        Neither is done where an answer has not got out, or not to its end: so its scan comes again.
+        """
+        if not self._all_out():
+            return
         if self._checkpoint is not None:
             self.drain()
             more: dict[str, Any] = {
                 "count": self.count,
                 "bad": self.bad,
                 "duplicates": self.duplicates,
-                "seen": {k: (top, sorted(recent)) for k, (top, recent) in self._seen.seen.items()},
+                "seen": self._seen.state(),
                 "last": self._health.last,
                 "silent": self._health.silent,
                 "rubbish": self._health.rubbish,
@@ -159,7 +173,9 @@ class Session:
         last = self.live.finish()
         if self.ends.smoothed is not None:
             self.ends.smoothed.append(last)
-        self.ends.flush()
+        self._all_out()
+        if self._unconfirmed:
+            self.ends.warn(f"warning: {self._unconfirmed}; their scans are not acknowledged or saved")
         for text in self.summary_lines():
             self.ends.warn(text)
 
@@ -172,6 +188,7 @@ class Session:
             "messages": self.count,
             "unreadable": self.bad,
             "duplicates": self.duplicates,
+            "restarts": dict(self._seen.restarts),
             "steps_taken_again": self.live.replayed,
             "lateness": lateness,
             "learnt": {name: one._asdict() for name, one in self.live.tracker.sensor_states().items()},
@@ -188,7 +205,45 @@ class Session:
         ]
         if self.bad:
             lines.append(f"{self.bad} messages could not be read and were passed over")
+        if self.duplicates:
+            lines.append(f"{self.duplicates} messages had been taken before and were passed over")
+        for source, count in self._seen.restarts.items():
+            often = "once" if count == 1 else f"{count} times"
+            lines.append(f"source {source!r} began to count its messages anew {often}")
         return lines
+
+    def _tell_restart(self, message: ScanMessage, place: str) -> None:
+        """Tell of the first sources that began to count anew."""
+        self._told_restarts += 1
+        if self._told_restarts <= MOST_TOLD:
+            more = "; further ones are only counted" if self._told_restarts == MOST_TOLD else ""
+            self.ends.warn(
+                f"warning: {place}source {message.source!r} counts anew from seq {message.seq}, with a newer "
+                f"scan: it was started again, and its messages are taken{more}"
+            )
+
+    @contextlib.contextmanager
+    def _owing(self) -> Iterator[None]:
+        """While an answer goes out: what breaks off in here leaves a state that is not to be saved."""
+        self._owed = True
+        try:
+            yield
+        except UnconfirmedError as error:
+            self._unconfirmed = str(error)
+            raise
+        self._owed = False
+
+    def _all_out(self) -> bool:
+        """Whether all answers have arrived; waits for those that are on their way."""
+        if self._owed:
+            return False
+        try:
+            self.ends.flush()
+        except UnconfirmedError as error:
+            self._unconfirmed = str(error)
+            return False
+        self._unconfirmed = ""
+        return True
 
     def _tell(self, event: Event) -> None:
         self.ends.warn(f"warning: {event.text}")

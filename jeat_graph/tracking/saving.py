@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from jeat_graph.config.schema import Config
+from jeat_graph.data.errors import DataError
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.smoothing.access import SmoothedTracks
 from jeat_graph.tracking.snapshot import Snapshot
+from jeat_graph.tracking.update_log import UpdateLog, allocate_log
 
 
 class SavedTracks(SmoothedTracks):
@@ -18,6 +20,7 @@ class SavedTracks(SmoothedTracks):
     if TYPE_CHECKING:
         config: Config
         _diagnostics: bool
+        _log: UpdateLog
         _watch: InputWatch
 
         def __init__(self, config: Config, *, diagnostics: bool = False) -> None:
@@ -50,17 +53,29 @@ class SavedTracks(SmoothedTracks):
             config: the configuration that it must have had; None takes the file's.
 
         Raises:
-            DataError: no such file, or one that holds no tracker.
+            DataError: no such file, or one that holds no tracker, or one that takes late scans.
             JeatGraphError: it was saved by another version, or with other settings.
         """
         from jeat_graph.tracking.checkpoint import load_state
 
-        return cls.from_state(*load_state(path, config))
+        kept, state = load_state(path, config)
+        if "policy" in state:
+            # The scans that may be taken again are apart there: without them the newest would be missing.
+            raise DataError("holds a tracker that takes late scans; LiveTracker.load goes on from it", path)
+        return cls.from_state(kept, state)
 
     def state(self, snapshot: Snapshot | None = None) -> dict[str, Any]:
         """Return what `from_state` takes: the state now, or at a snapshot; the smoothers' is not copied."""
         now = self.snapshot() if snapshot is None else snapshot
-        return {"diagnostics": self._diagnostics, "now": now, "smoothing": self._smoothers}
+        # What the last step gave to the tracks is asked for after it, and so may it be after a restart.
+        log = self._log.rows[: int(self._log.count[0])].copy() if self._diagnostics else None
+        return {
+            "diagnostics": self._diagnostics,
+            "finished": self._finished,
+            "now": now,
+            "log": log,
+            "smoothing": self._smoothers,
+        }
 
     @classmethod
     def from_state(cls, config: Config, state: dict[str, Any]) -> Self:
@@ -69,6 +84,10 @@ class SavedTracks(SmoothedTracks):
         tracker = cls(without, diagnostics=state["diagnostics"])
         tracker.config, tracker._smoothers = config, state["smoothing"]
         tracker.restore(state["now"])
+        tracker._finished = state["finished"]
+        if state["log"] is not None:
+            tracker._log = allocate_log(len(state["log"]))
+            tracker._log.rows[:], tracker._log.count[0] = state["log"], len(state["log"])
         if state["now"].t is not None:
             tracker._watch.end()
         return tracker

@@ -125,8 +125,6 @@ class Tracker(SavedTracks):
             TimeOrderError: a time before that of the last step. In all three cases the state is as before.
             JeatGraphError: after `finish`.
         """
-        if self._finished:
-            raise JeatGraphError("this tracker has been finished; make another one for another recording")
         self.hand_over(self.take_in(as_scans(scans)))
         return self.causal()
 
@@ -141,7 +139,10 @@ class Tracker(SavedTracks):
 
         Raises:
             DataError, UnknownSensorError, TimeOrderError: as `step`.
+            JeatGraphError: after `finish`.
         """
+        if self._finished:
+            raise JeatGraphError("this tracker has been finished; make another one for another recording")
         arrivals = arrivals_of(batch, self.sensor_names)
         t, count = arrivals.t, len(arrivals.scores)
         if self._t is not None and t < self._t:

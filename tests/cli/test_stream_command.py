@@ -326,6 +326,17 @@ def test_late_scans_are_passed_over_if_asked(monkeypatch, capsys):
     assert "<stdin>:2" in err
 
 
+def test_a_checkpoint_goes_on_with_the_same_answer_to_late_scans_or_not_at_all(monkeypatch, capsys, tmp_path):
+    options = ("--checkpoint", tmp_path / "state.npz", "--late")
+    code, out, _ = stream(line(1.0), monkeypatch, capsys, *options, "skip")
+    assert (code, len(out.splitlines())) == (0, 1)
+    code, out, err = stream(line(1.1), monkeypatch, capsys, *options, "refuse")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "was saved with --late skip, not refuse; give the same, or begin anew without the file" in err
+    code, out, _ = stream(line(1.0) + line(1.1), monkeypatch, capsys, *options, "skip")
+    assert (code, json.loads(out)["t"]) == (0, 1.1)
+
+
 def test_a_line_that_never_ends_is_passed_over_in_bounded_memory(monkeypatch, capsys):
     monkeypatch.setattr("jeat_graph.io.stream_text.LONGEST_LINE", 1000)
     monkeypatch.setattr("jeat_graph.io.stream_text._REST", 64)

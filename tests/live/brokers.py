@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import random
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -60,6 +61,13 @@ class Server:
     def stop(self) -> None:
         self._process.terminate()
         self._process.wait()
+
+    def freeze(self) -> None:
+        """Have it keep its connections and say nothing more, as behind a network that is gone."""
+        self._process.send_signal(signal.SIGSTOP)
+
+    def thaw(self) -> None:
+        self._process.send_signal(signal.SIGCONT)
 
 
 def mosquitto(folder: Path) -> Server | None:

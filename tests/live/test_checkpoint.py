@@ -123,6 +123,68 @@ def test_what_comes_again_after_a_restart_is_recognised_and_not_counted_twice(
     assert_equal(again.tracker.causal(), whole.tracker.causal())
 
 
+def test_a_tracker_that_was_finished_stays_so(batches, tmp_path):
+    tracker = Tracker(load_config("highway", OVERRIDES))
+    for batch in batches[:20]:
+        tracker.step(batch)
+    tracker.finish()
+    tracker.save(tmp_path / "state.npz")
+    loaded = Tracker.load(tmp_path / "state.npz")
+    with pytest.raises(JeatGraphError, match="has been finished"):
+        loaded.step(batches[20])
+    assert len(loaded.finish()) == 0
+
+
+@pytest.mark.parametrize("policy", ["rewind", "skip"])
+def test_a_live_tracker_that_was_finished_takes_no_scans_before_or_after_it_was_saved(
+    policy, batches, tmp_path
+):
+    live = LiveTracker(Tracker(load_config("highway", OVERRIDES)), policy)
+    for batch in batches[:20]:
+        live.step(batch)
+    live.finish()
+    live.save(tmp_path / "state.npz")
+    for one in (live, LiveTracker.load(tmp_path / "state.npz")[0]):
+        with pytest.raises(JeatGraphError, match="has been finished"):
+            one.step(batches[20])
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_what_the_last_step_gave_to_the_tracks_is_there_after_loading(late, batches, tmp_path):
+    config = load_config("highway", ["smoother.engine=none"])
+    tracker = Tracker(config, diagnostics=True)
+    live = LiveTracker(tracker) if late else tracker
+    for batch in batches[:40]:
+        live.step(batch)
+    live.save(tmp_path / "state.npz")
+    path = tmp_path / "state.npz"
+    loaded = LiveTracker.load(path)[0].tracker if late else Tracker.load(path)
+    rows, ids, confirmed = tracker.last_measurements()
+    again = loaded.last_measurements()
+    assert len(rows) > 0
+    assert again[0].tobytes() == rows.tobytes()
+    np.testing.assert_array_equal(again[1], ids)
+    np.testing.assert_array_equal(again[2], confirmed)
+    np.testing.assert_array_equal(loaded.last_updates().nis, tracker.last_updates().nis)
+    assert_equal(loaded.step(batches[40]), tracker.step(batches[40]))
+    assert loaded.last_measurements()[0].tobytes() == tracker.last_measurements()[0].tobytes()
+
+
+def test_a_live_trackers_file_is_none_for_a_plain_tracker_nor_the_other_way_round(batches, tmp_path):
+    """The newest scans are apart in it, and would be missing."""
+    path = tmp_path / "state.npz"
+    live = LiveTracker(Tracker("highway"))
+    for batch in batches[:20]:
+        live.step(batch)
+    live.save(path)
+    with pytest.raises(DataError, match=r"takes late scans.*LiveTracker\.load"):
+        Tracker.load(path)
+    live.tracker.save(path)
+    with pytest.raises(DataError, match="not one that takes late scans"):
+        LiveTracker.load(path)
+    assert Tracker.load(path).time == live.time
+
+
 def test_a_file_of_other_settings_or_of_another_version_is_refused_with_a_sentence(tmp_path, monkeypatch):
     path = tmp_path / "state.npz"
     Tracker("highway").save(path)

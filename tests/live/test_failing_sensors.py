@@ -53,6 +53,17 @@ def test_identities_survive_five_seconds_without_one_sensor(sensor):
     assert 9.0 <= events[1].t <= 9.1
 
 
+@pytest.mark.parametrize("latency", [-2.0, -0.5, 2.0])
+def test_a_clock_that_is_known_to_be_off_is_no_silence_and_hides_none(latency):
+    config = load_config("default", ["smoother.engine=none", f"sensors.rgb.latency_s={latency}"])
+    live, health, events = LiveTracker(Tracker(config)), SensorHealth(config), []
+    for scan in scans_of(8.0, silent=("rgb", 4.0, 9.0)):
+        shown = replace(scan, t=scan.t + latency) if scan.sensor == "rgb" else scan
+        events += health.saw([shown], live.step(shown).t)
+    assert [(event.what, event.sensor) for event in events] == [("silent", "rgb")]
+    assert 4.9 <= events[0].t <= 5.1
+
+
 def test_identities_survive_when_the_silent_sensor_was_the_only_one_for_a_moment():
     """Silence is no miss: without any scan existence only fades as vehicles leave."""
     tracker = Tracker(CONFIG)

@@ -88,5 +88,54 @@ def test_memory_of_numbers_is_bounded_and_old_ones_stay_duplicates():
     duplicates, batch = Duplicates(), decoded(SCAN).batch
     for seq in range(10_000):
         assert duplicates.is_new(ScanMessage(batch, "a", seq))
-    assert len(duplicates.seen["a"][1]) <= 2 * Duplicates.WINDOW
+    assert len(duplicates.seen["a"][-1].recent) <= 2 * Duplicates.WINDOW
     assert not any(duplicates.is_new(ScanMessage(batch, "a", seq)) for seq in range(0, 10_000, 7))
+
+
+def at(seq, t, source="cam"):
+    """A message with this number and a scan of this time."""
+    return decoded({"v": 1, "source": source, "seq": seq, "scans": [SCAN | {"t": t}]})
+
+
+@pytest.mark.parametrize("taken", [3, 500, 3000])
+@pytest.mark.parametrize("first", [0, 1])
+def test_a_source_that_counts_anew_with_newer_scans_was_started_again(taken, first):
+    duplicates = Duplicates()
+    assert all(duplicates.is_new(at(k, 0.05 * k)) for k in range(first, taken))
+    assert all(duplicates.is_new(at(k, 200.0 + 0.05 * k)) for k in range(taken + 5))
+    assert duplicates.restarts == {"cam": 1}
+    # What comes twice is as old as it was, before the restart and after it.
+    assert not any(duplicates.is_new(at(k, 0.05 * k)) for k in range(first, taken))
+    assert not any(duplicates.is_new(at(k, 200.0 + 0.05 * k)) for k in range(taken + 5))
+    assert duplicates.restarts == {"cam": 1}
+    assert duplicates.is_new(at(0, 400.0))
+    assert duplicates.restarts == {"cam": 2}
+
+
+def test_a_restart_of_one_source_says_nothing_of_another():
+    duplicates = Duplicates()
+    for source in "ab":
+        assert all(duplicates.is_new(at(k, 0.05 * k, source)) for k in range(2000))
+    assert duplicates.is_new(at(0, 200.0, "a"))
+    assert not duplicates.is_new(at(0, 0.0, "b"))
+    assert duplicates.restarts == {"a": 1}
+
+
+def test_messages_that_change_places_on_their_way_are_no_restart():
+    duplicates = Duplicates()
+    pairs = [(1, 0.10), (0, 0.05), (3, 0.15), (2, 0.20), (5, 0.22), (4, 0.30)]  # of two sensors, one late
+    assert all(duplicates.is_new(at(seq, t)) for seq, t in pairs)
+    assert not any(duplicates.is_new(at(seq, t)) for seq, t in pairs)
+    assert duplicates.restarts == {}
+
+
+def test_what_is_known_of_numbers_is_kept_as_plain_data():
+    known = Duplicates()
+    for t in (0.0, 200.0):
+        assert all(known.is_new(at(k, t + 0.05 * k)) for k in range(2000))
+    again = Duplicates()
+    again.set_state(json.loads(json.dumps(known.state())))
+    assert again.restarts == {"cam": 1}
+    assert not any(again.is_new(at(k, t + 0.05 * k)) for t in (0.0, 200.0) for k in range(2000))
+    assert again.is_new(at(2000, 300.0))
+    assert again.restarts == {"cam": 1}

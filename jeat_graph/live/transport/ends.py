@@ -6,6 +6,7 @@ from typing import Protocol
 
 from jeat_graph.data.errors import ConfigError, JeatGraphError
 from jeat_graph.live.transport.address import parse_address
+from jeat_graph.live.transport.patience import Overdue, never
 
 SOURCE_OPTIONS = {"mqtt": ("client", "most"), "nats": ("stream", "durable", "most"), "kafka": ("group",)}
 SINK_OPTIONS = {"mqtt": ("client", "most"), "nats": ("stream", "most"), "kafka": ("key", "most")}
@@ -41,6 +42,7 @@ class Sink(Protocol):
 
         Raises:
             JeatGraphError: the broker refuses messages for good.
+            UnconfirmedError: the program is to end; the message was not sent.
         """
 
     def flush(self) -> None:
@@ -48,14 +50,19 @@ class Sink(Protocol):
 
         Raises:
             JeatGraphError: the broker refused one of them.
+            UnconfirmedError: the program is to end, and the broker has not.
         """
 
     def close(self) -> None:
-        """Flush and leave."""
+        """Flush and leave; what the broker does not confirm before the program is to end is given up."""
 
 
-def open_source(url: str) -> Source:
+def open_source(url: str, overdue: Overdue = never) -> Source:
     """Open the source at an address.
+
+    Args:
+        url: the address.
+        overdue: tells when the program is to end; then nothing is waited for any longer.
 
     Raises:
         ConfigError: the address is not valid.
@@ -67,11 +74,11 @@ def open_source(url: str) -> Source:
         if address.scheme == "mqtt":
             from jeat_graph.live.transport.mqtt import MqttSource
 
-            return MqttSource(address)
+            return MqttSource(address, overdue)
         if address.scheme == "nats":
             from jeat_graph.live.transport.nats import NatsSource
 
-            return NatsSource(address)
+            return NatsSource(address, overdue)
         from jeat_graph.live.transport.kafka import KafkaSource
 
         return KafkaSource(address)
@@ -79,8 +86,12 @@ def open_source(url: str) -> Source:
         raise _missing(scheme, error) from None
 
 
-def open_sink(url: str) -> Sink:
+def open_sink(url: str, overdue: Overdue = never) -> Sink:
     """Open the sink at an address.
+
+    Args:
+        url: the address.
+        overdue: tells when the program is to end; then nothing is waited for any longer.
 
     Raises:
         ConfigError: the address is not valid.
@@ -94,14 +105,14 @@ def open_sink(url: str) -> Sink:
         if address.scheme == "mqtt":
             from jeat_graph.live.transport.mqtt import MqttSink
 
-            return MqttSink(address)
+            return MqttSink(address, overdue)
         if address.scheme == "nats":
             from jeat_graph.live.transport.nats import NatsSink
 
-            return NatsSink(address)
+            return NatsSink(address, overdue)
         from jeat_graph.live.transport.kafka import KafkaSink
 
-        return KafkaSink(address)
+        return KafkaSink(address, overdue)
     except ImportError as error:
         raise _missing(scheme, error) from None
 

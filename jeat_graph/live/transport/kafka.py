@@ -9,6 +9,7 @@ from confluent_kafka import Consumer, KafkaError, KafkaException, Producer, Topi
 
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.live.transport.address import Address
+from jeat_graph.live.transport.patience import SLICE_S, Overdue, UnconfirmedError, check, never
 
 #: Kafka itself sets no bound to what is received and not committed; the stream commits at least so often.
 MOST_OPEN = 4096
@@ -114,13 +115,14 @@ class KafkaSink:
 
     Args:
         address: options `key`, `most` (messages on their way at a time).
+        overdue: tells when the program is to end.
 
     Raises:
         JeatGraphError: nobody answers.
     """
 
-    def __init__(self, address: Address) -> None:
-        self._address = address
+    def __init__(self, address: Address, overdue: Overdue = never) -> None:
+        self._address, self._overdue = address, overdue
         self._most = address.number("most", MOST_OPEN, low=1)
         self._key = address.option("key", "tracks")
         self._refused = ""
@@ -130,16 +132,18 @@ class KafkaSink:
     def send(self, message: bytes) -> None:
         """Produce; waits while too many are on their way."""
         while len(self._producer) >= self._most:
-            self._producer.poll(0.1)
+            self._producer.poll(SLICE_S)
             self._check()
+            check(self._overdue, self._address)
         self._producer.produce(self._address.topic, message, self._key, on_delivery=self._delivered)
         self._producer.poll(0)
         self._check()
 
     def flush(self) -> None:
         """Wait until all are confirmed."""
-        while self._producer.flush(1.0):
+        while self._producer.flush(SLICE_S):
             self._check()
+            check(self._overdue, self._address)
         self._check()
 
     def _delivered(self, error: Any, _: Any) -> None:
@@ -152,4 +156,7 @@ class KafkaSink:
 
     def close(self) -> None:
         """Flush; the producer ends with this object."""
-        self.flush()
+        try:
+            self.flush()
+        except UnconfirmedError:
+            self._producer.purge()  # the producer's own end would wait for them

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import queue
 import socket
 import threading
@@ -15,6 +16,7 @@ from paho.mqtt.properties import Properties
 
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.live.transport.address import Address
+from jeat_graph.live.transport.patience import SLICE_S, Overdue, UnconfirmedError, check, never
 
 #: How long the broker keeps a session without a client (s): a day, for a machine that has to be mended.
 SESSION_S = 86_400
@@ -71,6 +73,14 @@ def _client(name: str, manual_ack: bool) -> Any:
     )
 
 
+def _leave(client: Any) -> None:
+    """Take leave of a broker that is there; one that is not, the client's thread may go on waiting for."""
+    there = client.is_connected()
+    client.disconnect()
+    if there:
+        client.loop_stop()
+
+
 class MqttSource:
     """Subscription of a topic, wild cards allowed (see `ends.Source`).
 
@@ -79,12 +89,14 @@ class MqttSource:
 
     Args:
         address: options `client`, `most` (messages open at a time).
+        overdue: tells when the program is to end.
 
     Raises:
         JeatGraphError: nobody answers, or the broker refuses.
     """
 
-    def __init__(self, address: Address) -> None:
+    def __init__(self, address: Address, overdue: Overdue = never) -> None:
+        self._overdue = overdue
         self.most_open = address.number("most", MOST_OPEN, low=1)
         self._topic = address.topic
         self._waiting: queue.Queue[tuple[int, Any]] = queue.Queue()
@@ -151,9 +163,11 @@ class MqttSource:
         # Closing a connection may lose what is still on its way. An answer says that all before has arrived.
         self._settled.clear()
         self._client.subscribe(self._topic, _QOS)
-        self._settled.wait(_CONNECT_S)
-        self._client.disconnect()
-        self._client.loop_stop()
+        end = time.monotonic() + _CONNECT_S
+        while self._client.is_connected() and time.monotonic() < end and not self._overdue():
+            if self._settled.wait(SLICE_S):
+                break
+        _leave(self._client)
 
 
 class MqttSink:
@@ -161,13 +175,15 @@ class MqttSink:
 
     Args:
         address: options `client`, `most` (messages on their way at a time).
+        overdue: tells when the program is to end.
 
     Raises:
         JeatGraphError: nobody answers, or the broker refuses.
     """
 
-    def __init__(self, address: Address) -> None:
+    def __init__(self, address: Address, overdue: Overdue = never) -> None:
         self._topic = address.topic
+        self._overdue = overdue
         self._most = address.number("most", MOST_OPEN, low=1)
         self._sent = self._confirmed = 0
         self._change = threading.Condition()
@@ -203,15 +219,17 @@ class MqttSink:
         self._wait(0)
 
     def _wait(self, most: int, in_order: bool = False) -> None:
+        def enough() -> bool:
+            return self._sent - self._confirmed <= (0 if in_order and self._lost else most)
+
         with self._change:
-            self._change.wait_for(
-                lambda: self._sent - self._confirmed <= (0 if in_order and self._lost else most)
-            )
+            while not self._change.wait_for(enough, SLICE_S):
+                check(self._overdue, self._topic)
             if self._refused:
                 raise JeatGraphError(f"{self._topic}: the broker refused tracks: {self._refused}")
 
     def close(self) -> None:
         """Flush and leave."""
-        self._wait(0)
-        self._client.disconnect()
-        self._client.loop_stop()
+        with contextlib.suppress(UnconfirmedError):
+            self._wait(0)
+        _leave(self._client)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import threading
+import time
 from collections import deque
 from collections.abc import Coroutine
+from concurrent.futures import wait
 from typing import Any, TypeVar
 
 import nats
@@ -16,6 +18,7 @@ from nats.js.errors import NotFoundError
 
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.live.transport.address import Address
+from jeat_graph.live.transport.patience import SLICE_S, Overdue, UnconfirmedError, check, never
 
 MOST_OPEN = 256
 #: A message that is not acknowledged in this time comes again (s); nothing is left open for as long.
@@ -27,8 +30,8 @@ _T = TypeVar("_T")
 class _Connection:
     """A connection kept up by an event loop in a thread of its own, since the client is asynchronous."""
 
-    def __init__(self, address: Address) -> None:
-        self.address = address
+    def __init__(self, address: Address, overdue: Overdue) -> None:
+        self.address, self.overdue = address, overdue
         self.reconnects = 0
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
@@ -78,16 +81,38 @@ class _Connection:
             self.call(self.jet.add_stream(name=name, subjects=[self.address.topic]))
             return name
 
-    def call(self, work: Coroutine[Any, Any, _T], timeout_s: float | None = _CALL_S) -> _T:
-        """Run a coroutine in the loop and wait for it."""
-        return asyncio.run_coroutine_threadsafe(work, self._loop).result(timeout_s)
+    def call(self, work: Coroutine[Any, Any, _T], timeout_s: float = _CALL_S) -> _T:
+        """Run a coroutine in the loop and wait for it.
+
+        Raises:
+            TimeoutError: it takes too long, or the program is to end.
+        """
+        future = asyncio.run_coroutine_threadsafe(work, self._loop)
+        end = time.monotonic() + timeout_s
+        while not wait([future], SLICE_S).done:
+            if time.monotonic() > end or self.overdue():
+                future.cancel()
+                raise TimeoutError
+        return future.result()
 
     def start(self, work: Coroutine[Any, Any, _T]) -> Any:
         """Begin a coroutine in the loop and return its future."""
         return asyncio.run_coroutine_threadsafe(work, self._loop)
 
+    def close(self) -> None:
+        """Leave; a server that is gone is not waited for."""
+        with contextlib.suppress(NatsError, OSError):
+            self.call(self.client.close())
+        self.stop()
+
     def stop(self) -> None:
-        self._loop.call_soon_threadsafe(self._loop.stop)
+        def end() -> None:
+            # What still waits for a server that is gone would complain of being left behind.
+            for task in asyncio.all_tasks(self._loop):
+                task.cancel()
+            self._loop.call_soon(self._loop.stop)
+
+        self._loop.call_soon_threadsafe(end)
         self._thread.join()
 
 
@@ -100,18 +125,19 @@ class NatsSource:
 
     Args:
         address: options `stream`, `durable`, `most` (messages open at a time).
+        overdue: tells when the program is to end.
 
     Raises:
         JeatGraphError: nobody answers, or the server has no JetStream.
     """
 
-    def __init__(self, address: Address) -> None:
+    def __init__(self, address: Address, overdue: Overdue = never) -> None:
         self.most_open = address.number("most", MOST_OPEN, low=1)
         self._durable = address.option("durable", "jeat-graph")
         self._last = 0  # number in the stream of the last message received
         self._open: Any = None
         self._waiting: deque[Any] = deque()
-        self._connection = _Connection(address)
+        self._connection = _Connection(address, overdue)
         self._reconnects = 0
         try:
             self._subscribe(self._committed())
@@ -173,9 +199,7 @@ class NatsSource:
 
     def close(self) -> None:
         """Leave; the server keeps the consumer."""
-        with contextlib.suppress(NatsError, TimeoutError):
-            self._connection.call(self._connection.client.close())
-        self._connection.stop()
+        self._connection.close()
 
 
 class NatsSink:
@@ -183,14 +207,15 @@ class NatsSink:
 
     Args:
         address: options `stream`, `most` (messages on their way at a time).
+        overdue: tells when the program is to end.
 
     Raises:
         JeatGraphError: nobody answers, or the server has no JetStream.
     """
 
-    def __init__(self, address: Address) -> None:
+    def __init__(self, address: Address, overdue: Overdue = never) -> None:
         self._most = address.number("most", MOST_OPEN, low=1)
-        self._connection = _Connection(address)
+        self._connection = _Connection(address, overdue)
         self._open: deque[tuple[bytes, Any]] = deque()
         self._reconnects = 0
 
@@ -214,18 +239,25 @@ class NatsSink:
 
     def _wait(self, most: int) -> None:
         """Wait for the oldest until so many are open; what the server did not confirm is sent again."""
+        link = self._connection
         while len(self._open) > most:
             message, future = self._open[0]
+            if not wait([future], SLICE_S).done:
+                check(link.overdue, link.address)
+                continue
             try:
                 future.result()
                 self._open.popleft()
             except (NatsError, TimeoutError):
-                if self._connection.client.is_closed:
-                    raise JeatGraphError(f"{self._connection.address}: the server refuses") from None
+                if link.client.is_closed:
+                    raise JeatGraphError(f"{link.address}: the server refuses") from None
+                check(link.overdue, link.address)
                 self._open[0] = (message, self._publish(message))
 
     def close(self) -> None:
         """Flush and leave."""
-        self._wait(0)
-        self._connection.call(self._connection.client.close())
-        self._connection.stop()
+        with contextlib.suppress(UnconfirmedError):
+            self._wait(0)
+        for _, future in self._open:
+            future.cancel()
+        self._connection.close()
