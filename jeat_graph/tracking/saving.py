@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from jeat_graph.config.schema import Config
+from jeat_graph.data.errors import DataError
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.smoothing.access import SmoothedTracks
 from jeat_graph.tracking.snapshot import Snapshot
@@ -50,12 +51,15 @@ class SavedTracks(SmoothedTracks):
             config: the configuration that it must have had; None takes the file's.
 
         Raises:
-            DataError: no such file, or one that holds no tracker.
+            DataError: no such file, or one that holds no tracker, or a `LiveTracker`.
             JeatGraphError: it was saved by another version, or with other settings.
         """
         from jeat_graph.tracking.checkpoint import load_state
 
-        return cls.from_state(*load_state(path, config))
+        kept, state = load_state(path, config)
+        if "policy" in state:  # its identities are not those that were given out
+            raise DataError("holds a tracker that takes late scans: `LiveTracker.load` goes on with it", path)
+        return cls.from_state(kept, state)
 
     def state(self, snapshot: Snapshot | None = None) -> dict[str, Any]:
         """Return what `from_state` takes: the state now, or at a snapshot; the smoothers' is not copied."""
