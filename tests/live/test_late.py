@@ -387,3 +387,12 @@ def test_of_scans_that_are_refused_together_none_has_come(policy):
     one, other = asked.finish(), plain.finish()
     assert len(one)
     np.testing.assert_array_equal(one.mean, other.mean)
+
+
+@pytest.mark.parametrize("t", [np.nan, np.inf])
+def test_predict_refuses_a_time_that_is_none(t):
+    tracker = Tracker(CAUSAL)
+    for k in range(10):
+        tracker.step(scan(0.05 * k))
+    with pytest.raises(DataError, match="finite"):
+        tracker.predict(t)
