@@ -12,15 +12,17 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import RecordArray
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import ConfigError, DataError, TimeOrderError
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.live.arrival import Arrival, Taken, looked_last, most_late_s
 from jeat_graph.live.lateness import LatenessCounter
 from jeat_graph.live.rewinding import Rewinding, TakenStep
+from jeat_graph.live.time_base import TimeBase
 from jeat_graph.tracking.checkpoint import load_state, save_state
 from jeat_graph.tracking.prediction import Prediction
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
@@ -31,32 +33,6 @@ REWIND, SKIP, REFUSE = "rewind", "skip", "refuse"
 #: A difference of two times is only so exact (s).
 _ROUNDING_S = 1e-6
 POLICIES = (REWIND, SKIP, REFUSE)
-
-
-class Arrival(NamedTuple):
-    """What became of scans that arrived.
-
-    Attributes:
-        table: the tracks that are reported now.
-        t: time of the newest step (s): that of the table.
-        late_s: how much older the scans were than the newest before them (s), 0 for scans in order.
-        dropped: those that were passed over: too late, or of a sensor that has given one of that time.
-        repeated: those that had been taken before a checkpoint from which the tracker went on.
-    """
-
-    table: Trajectories
-    t: float
-    late_s: float
-    dropped: list[Scan]
-    repeated: list[Scan]
-
-
-class Taken(NamedTuple):
-    """What became of scans of one time: those that were taken, those passed over, and how late they were."""
-
-    good: list[Scan]
-    dropped: list[Scan]
-    late_s: float
 
 
 class LiveTracker:
@@ -84,15 +60,17 @@ class LiveTracker:
         self.lateness = LatenessCounter(tracker.sensor_names)
         self.measured: list[tuple[float, RecordArray]] = []
         self._again_until: float | None = None  # after a restart: time of the newest scan that was known then
+        self._base, self._kept = TimeBase(config.live.jump_s), 0
+        self._first: float | None = None  # time of the first scan, since time has begun anew
         self._rewinding = Rewinding(tracker)
         tracker.logs_takers = policy == REWIND
         # Where nothing is taken again: sensors of the newest scans, and what the smoothers are to know.
-        self._newest = _looked_last(tracker)
+        self._newest = looked_last(tracker)
         self._due: list[StepRecord | None] = []
         # Of a tracker that has taken scans: to before its time nobody can go back.
         self._begun = -math.inf if tracker.time is None else tracker.time, self._newest
         self._latency = {name: sensor.latency_s for name, sensor in config.sensors.items()}
-        self._late_s = {name: _late_s(config, name) for name in config.sensors}
+        self._late_s = {name: most_late_s(config, name) for name in config.sensors}
         self._keep_s = max(self._late_s.values()) + 2.0 * _ROUNDING_S if policy == REWIND else 0.0
 
     @property
@@ -128,29 +106,65 @@ class LiveTracker:
         for scan in batch:
             sensor_index(scan.sensor, self.tracker.sensor_names)  # refused before anything is done
         self.measured = []
+        before = self.tracker.time
         again = [self._comes_again(scan) for scan in batch]
         repeated = [scan for scan, known in zip(batch, again, strict=True) if known]
         batch = [scan for scan, known in zip(batch, again, strict=True) if not known]
-        times = sorted({scan.t for scan in batch})
-        mark = (self._rewinding.mark(), self._newest) if len(times) > 1 else None
-        try:
-            taken = [self._take([scan for scan in batch if scan.t == t]) for t in times]
-        except Exception:
-            if mark is not None:  # a later one was refused: the earlier ones have not come either
-                self._rewinding.go_back(mark[0])
-                self._newest, self._due, self.measured = mark[1], [], []
-            raise
+        held, refuted, anew = batch, [], False
+        if repeated:  # what was passed over before the restart is so again
+            self._base.held = self._base.held[: self._kept]
+        if batch:
+            batch, refuted, anew = self._believed(batch)
+            held = [] if batch else held
+        taken = self._take_all(batch)
+        for scan in refuted:
+            self.lateness.add(scan.sensor, max((before or 0.0) - scan.t, 0.0), True)
         for one in taken:  # what the tracker refuses has not come
-            for scans, passed_over in ((one.good, False), (one.dropped, True)):
-                for scan in scans:
+            for scans_, passed_over in ((one.good, False), (one.dropped, True)):
+                for scan in scans_:
                     self.lateness.add(scan.sensor, one.late_s, passed_over)
         self._hand_over()
+        self._base.passed(None if anew else before, self.tracker.time)
         late_s = max((one.late_s for one in taken), default=0.0)
         dropped = [scan for one in taken for scan in one.dropped]
         table = self.tracker.causal()
         if self.policy == REWIND:
             table = self._rewinding.identities.answer(table)
-        return Arrival(table, self.tracker.time or 0.0, late_s, dropped, repeated)
+        return Arrival(table, self.tracker.time or 0.0, late_s, dropped, repeated, held, refuted, anew)
+
+    def _take_all(self, batch: list[Scan]) -> list[Taken]:
+        """Take in scans of any times, all or none."""
+        times = sorted({scan.t for scan in batch})
+        mark = (self._rewinding.mark(), self._newest) if len(times) > 1 else None
+        try:
+            return [self._take([scan for scan in batch if scan.t == t]) for t in times]
+        except Exception:
+            if mark is not None:  # a later one was refused: the earlier ones have not come either
+                self._rewinding.go_back(mark[0])
+                self._newest, self._due, self.measured = mark[1], [], []
+            raise
+
+    def _believed(self, batch: list[Scan]) -> tuple[list[Scan], list[Scan], bool]:
+        """Return the scans to be taken, those proved wrong, and whether time begins anew with them."""
+        now, t = self.tracker.time, max(scan.t for scan in batch)
+        late = now is not None and t < now
+        if self._first is None:
+            self._first = t
+        if now is None or self._base.fits(t, now) or (late and self.policy == REFUSE):
+            return batch, self._base.clear(), False
+        looks = self.tracker.snapshot().scene.last_look.tolist()
+        last_look = dict(zip(self.tracker.sensor_names, looks, strict=True))
+        refuted, believed = self._base.hold(batch, now, last_look)
+        if not believed:
+            return [], refuted, False
+        self._again_until = None
+        batch = self._base.clear()
+        if late:
+            self._rewinding.settle(math.inf)
+            self._rewinding.settled, self._newest, self._begun = -math.inf, [], (-math.inf, [])
+            self._first = min(scan.t for scan in batch)
+            self.tracker.begin_anew(self._first)
+        return batch, refuted, late
 
     def save(self, path: str | Path, more: dict[str, Any] | None = None) -> None:
         """Write the whole state to a file, for `load` to go on from (see `Tracker.save`).
@@ -167,6 +181,7 @@ class LiveTracker:
         state |= {
             "policy": self.policy,
             "rewinding": self._rewinding.state(),
+            "base": self._base.state() | {"first": self._first},
             "newest": self._newest,
             "lateness": self.lateness.state(),
             "more": more or {},
@@ -192,6 +207,8 @@ class LiveTracker:
         live._newest = state["newest"]
         live.lateness.set_state(state["lateness"])
         live._rewinding.set_state(state["rewinding"])
+        live._base.set_state(state["base"])
+        live._kept, live._first = len(live._base.held), state["base"]["first"]
         live._again_until = live.tracker.time
         return live, state["more"]
 
@@ -204,7 +221,14 @@ class LiveTracker:
         return self.tracker.drain_smoothed()
 
     def finish(self) -> Trajectories:
-        """End all tracks and return the smoothed rows not drained yet (see `Tracker.finish`)."""
+        """End all tracks and return the smoothed rows not drained yet (see `Tracker.finish`).
+
+        Scans ahead of time that wait are taken: nothing comes any more that could prove them wrong.
+        """
+        held = self._base.clear()
+        if held and self.tracker.time is not None and held[0].t > self.tracker.time:
+            self._take_all(held)
+            self._hand_over()
         self._rewinding.settle(math.inf)
         return self.tracker.finish()
 
@@ -236,8 +260,11 @@ class LiveTracker:
         if self._again_until is None:
             return False
         if scan.t > self._again_until:
-            self._again_until = None  # the first new one: no other of those before can follow
-            return False
+            if self._base.fits(scan.t, self._again_until):
+                self._again_until = None  # the first new one: no other of those before can follow
+            return self._base.holds(scan)
+        if self._first is not None and not self._base.fits(min(scan.t, self._first), self._first):
+            return self._base.holds(scan)  # from before all that had come: a clock has been set back
         if self.policy != REWIND:
             return scan.t < self._again_until or scan.sensor in self._newest
         return scan.t <= self._rewinding.settled or self._rewinding.knows(scan)
@@ -271,14 +298,3 @@ class LiveTracker:
         self._due = []
         if self.policy == REWIND and self.tracker.time is not None:
             self._rewinding.settle(self.tracker.time - self._keep_s)
-
-
-def _late_s(config: Config, sensor: str) -> float:
-    own = config.sensors[sensor].late_s
-    return config.live.late_s if own is None else own
-
-
-def _looked_last(tracker: Tracker) -> list[str]:
-    """Names of the sensors that gave the scans of a tracker's last step."""
-    last_look = tracker.snapshot().scene.last_look
-    return [name for name, t in zip(tracker.sensor_names, last_look, strict=True) if t == tracker.time]
