@@ -83,7 +83,7 @@ class Identities:
         """
         taker = takers[0] if len(takers) == 1 else np.concatenate(takers)
         before = known[0] if len(known) == 1 else np.concatenate(known)
-        if not first == next_own == self._next_own:
+        if not first == next_own == self._next_own and not self._stays(first, next_own, taker, before):
             self._give(first, next_own, taker, before, unsettled)
         after = before.copy()
         taken = taker > 0
@@ -91,6 +91,20 @@ class Identities:
         if len(takers) == 1:
             return [after]
         return np.split(after, np.cumsum([len(one) for one in takers[:-1]]))
+
+    def _stays(self, first: int, next_own: int, taker: IntArray, before: IntArray) -> bool:
+        """Whether each track has been born again by its own number: mostly so, and soon seen."""
+        if next_own != self._next_own:
+            return False
+        known = before > 0
+        tracks, names = taker[known], before[known]
+        # With 0 for nobody the first place is found, whose number is not 0.
+        rows = np.searchsorted(self._own, tracks)
+        if not ((self._own[rows] == tracks) & (self._given[rows] == names)).all():
+            return False
+        born = np.zeros(next_own - first, dtype=np.bool_)
+        born[tracks[tracks >= first] - first] = True
+        return bool(born.all())
 
     def _give(self, first: int, next_own: int, taker: IntArray, before: IntArray, unsettled: int) -> None:
         """Match the tracks since `first` one to one with those from before; the rest get new identities."""
