@@ -14,6 +14,12 @@ class LiveConfig(Section):
     late_s: float = number(
         0.3, "s", "a scan may come so late and still be put where it belongs; sensors may have their own"
     )
+    jump_s: float = number(
+        5.0,
+        "s",
+        "a scan whose time is so far from the newest, and four times as far as the longest of the latest "
+        "pauses, is held until others confirm it",
+    )
     silent_s: float = number(
         1.0, "s", "a sensor that declares a rate and gives no scan for so long counts as silent"
     )

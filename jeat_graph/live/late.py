@@ -9,23 +9,23 @@ bit, and so are the smoothed trajectories: the smoothers are told of a step only
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
 from collections.abc import Sequence
-from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import RecordArray
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import ConfigError, DataError, TimeOrderError
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.live.arrival import Arrival, Taken, looked_last, most_late_s
 from jeat_graph.live.lateness import LatenessCounter
+from jeat_graph.live.rewinding import Rewinding, TakenStep
+from jeat_graph.live.time_base import TimeBase
 from jeat_graph.tracking.checkpoint import load_state, save_state
 from jeat_graph.tracking.prediction import Prediction
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
-from jeat_graph.tracking.snapshot import Snapshot
 from jeat_graph.tracking.step_record import StepRecord
 from jeat_graph.tracking.tracker import Tracker
 
@@ -33,41 +33,6 @@ REWIND, SKIP, REFUSE = "rewind", "skip", "refuse"
 #: A difference of two times is only so exact (s).
 _ROUNDING_S = 1e-6
 POLICIES = (REWIND, SKIP, REFUSE)
-
-
-@dataclass
-class TakenStep:
-    """A step that may still be taken again.
-
-    Attributes:
-        t: its time (s).
-        scans: its scans, sensors in alphabetical order.
-        before: the tracker's state before it.
-        taken: what the smoothers are to be told of it.
-    """
-
-    t: float
-    scans: list[Scan]
-    before: Snapshot
-    taken: StepRecord | None
-
-
-class Arrival(NamedTuple):
-    """What became of scans that arrived.
-
-    Attributes:
-        table: the tracks that are reported now.
-        t: time of the newest step (s): that of the table.
-        late_s: how much older the scans were than the newest before them (s), 0 for scans in order.
-        dropped: those that were passed over: too late, or of a sensor that has given one of that time.
-        repeated: those that had been taken before a checkpoint from which the tracker went on.
-    """
-
-    table: Trajectories
-    t: float
-    late_s: float
-    dropped: list[Scan]
-    repeated: list[Scan]
 
 
 class LiveTracker:
@@ -82,8 +47,6 @@ class LiveTracker:
     Attributes:
         tracker: the tracker.
         lateness: how late scans came, by sensor.
-        steps: the steps that may still be taken again, by time.
-        replayed: how many steps have been taken again so far.
         measured: times of the steps of the last arrival and what they gave to the tracks, if the tracker has
             diagnostics and no step can be taken again.
     """
@@ -95,20 +58,39 @@ class LiveTracker:
         self.tracker = tracker
         self.policy = policy
         self.lateness = LatenessCounter(tracker.sensor_names)
-        self.steps: list[TakenStep] = []
-        self.replayed = 0
         self.measured: list[tuple[float, RecordArray]] = []
         self._again_until: float | None = None  # after a restart: time of the newest scan that was known then
-        self._newest: list[str] = []  # where nothing is taken again: sensors of the scans at the newest time
-        self._settled = -math.inf  # time of the last step that the smoothers have been told of
+        self._base, self._kept = TimeBase(config.live.jump_s), 0
+        self._first: float | None = None  # time of the first scan, since time has begun anew
+        self._rewinding = Rewinding(tracker)
+        tracker.logs_takers = policy == REWIND
+        # Where nothing is taken again: sensors of the newest scans, and what the smoothers are to know.
+        self._newest = looked_last(tracker)
+        self._due: list[StepRecord | None] = []
+        # Of a tracker that has taken scans: to before its time nobody can go back.
+        self._begun = -math.inf if tracker.time is None else tracker.time, self._newest
         self._latency = {name: sensor.latency_s for name, sensor in config.sensors.items()}
-        self._late_s = {name: _late_s(config, name) for name in config.sensors}
+        self._late_s = {name: most_late_s(config, name) for name in config.sensors}
         self._keep_s = max(self._late_s.values()) + 2.0 * _ROUNDING_S if policy == REWIND else 0.0
 
     @property
     def time(self) -> float | None:
         """Time of the newest scan (s), or None before the first."""
         return self.tracker.time
+
+    @property
+    def steps(self) -> list[TakenStep]:
+        """The steps that may still be taken again, by time."""
+        return self._rewinding.steps
+
+    @property
+    def replayed(self) -> int:
+        """How many steps have been taken again so far."""
+        return self._rewinding.replayed
+
+    def causal(self) -> Trajectories:
+        """Return the tracks that are reported now, by the identities that were given out for them."""
+        return self._rewinding.identities.rename(self.tracker.causal())
 
     def step(self, scans: ScanLike | Sequence[ScanLike]) -> Arrival:
         """Take in one scan, or several of one time, which have just arrived.
@@ -124,16 +106,65 @@ class LiveTracker:
         for scan in batch:
             sensor_index(scan.sensor, self.tracker.sensor_names)  # refused before anything is done
         self.measured = []
-        now = self.tracker.time
-        late_s = 0.0
-        repeated = [scan for scan in batch if self._comes_again(scan)]
-        batch = [scan for scan in batch if scan not in repeated]
-        dropped: list[Scan] = []
-        for t in sorted({scan.t for scan in batch}):
-            here = [scan for scan in batch if scan.t == t]
-            late_s = max(late_s, 0.0 if now is None else now - t)
-            dropped += self._take(here)
-        return Arrival(self.tracker.causal(), self.tracker.time or 0.0, late_s, dropped, repeated)
+        before = self.tracker.time
+        again = [self._comes_again(scan) for scan in batch]
+        repeated = [scan for scan, known in zip(batch, again, strict=True) if known]
+        batch = [scan for scan, known in zip(batch, again, strict=True) if not known]
+        held, refuted, anew = batch, [], False
+        if repeated:  # what was passed over before the restart is so again
+            self._base.held = self._base.held[: self._kept]
+        if batch:
+            batch, refuted, anew = self._believed(batch)
+            held = [] if batch else held
+        taken = self._take_all(batch)
+        for scan in refuted:
+            self.lateness.add(scan.sensor, max((before or 0.0) - scan.t, 0.0), True)
+        for one in taken:  # what the tracker refuses has not come
+            for scans_, passed_over in ((one.good, False), (one.dropped, True)):
+                for scan in scans_:
+                    self.lateness.add(scan.sensor, one.late_s, passed_over)
+        self._hand_over()
+        self._base.passed(None if anew else before, self.tracker.time)
+        late_s = max((one.late_s for one in taken), default=0.0)
+        dropped = [scan for one in taken for scan in one.dropped]
+        table = self.tracker.causal()
+        if self.policy == REWIND:
+            table = self._rewinding.identities.answer(table)
+        return Arrival(table, self.tracker.time or 0.0, late_s, dropped, repeated, held, refuted, anew)
+
+    def _take_all(self, batch: list[Scan]) -> list[Taken]:
+        """Take in scans of any times, all or none."""
+        times = sorted({scan.t for scan in batch})
+        mark = (self._rewinding.mark(), self._newest) if len(times) > 1 else None
+        try:
+            return [self._take([scan for scan in batch if scan.t == t]) for t in times]
+        except Exception:
+            if mark is not None:  # a later one was refused: the earlier ones have not come either
+                self._rewinding.go_back(mark[0])
+                self._newest, self._due, self.measured = mark[1], [], []
+            raise
+
+    def _believed(self, batch: list[Scan]) -> tuple[list[Scan], list[Scan], bool]:
+        """Return the scans to be taken, those proved wrong, and whether time begins anew with them."""
+        now, t = self.tracker.time, max(scan.t for scan in batch)
+        late = now is not None and t < now
+        if self._first is None:
+            self._first = t
+        if now is None or self._base.fits(t, now) or (late and self.policy == REFUSE):
+            return batch, self._base.clear(), False
+        looks = self.tracker.snapshot().scene.last_look.tolist()
+        last_look = dict(zip(self.tracker.sensor_names, looks, strict=True))
+        refuted, believed = self._base.hold(batch, now, last_look)
+        if not believed:
+            return [], refuted, False
+        self._again_until = None
+        batch = self._base.clear()
+        if late:
+            self._rewinding.settle(math.inf)
+            self._rewinding.settled, self._newest, self._begun = -math.inf, [], (-math.inf, [])
+            self._first = min(scan.t for scan in batch)
+            self.tracker.begin_anew(self._first)
+        return batch, refuted, late
 
     def save(self, path: str | Path, more: dict[str, Any] | None = None) -> None:
         """Write the whole state to a file, for `load` to go on from (see `Tracker.save`).
@@ -149,9 +180,8 @@ class LiveTracker:
         state = self.tracker.state(self.steps[0].before if self.steps else None)
         state |= {
             "policy": self.policy,
-            "steps": [step.scans for step in self.steps],
-            "settled": self._settled,
-            "replayed": self.replayed,
+            "rewinding": self._rewinding.state(),
+            "base": self._base.state() | {"first": self._first},
             "newest": self._newest,
             "lateness": self.lateness.state(),
             "more": more or {},
@@ -174,119 +204,97 @@ class LiveTracker:
         if "policy" not in state:
             raise DataError("holds a tracker, but not one that takes late scans", path)
         live = LiveTracker(Tracker.from_state(kept, state), state["policy"])
-        live._settled, live.replayed = state["settled"], state["replayed"]
         live._newest = state["newest"]
         live.lateness.set_state(state["lateness"])
-        for scans in state["steps"]:
-            before = live.tracker.snapshot()
-            taken = live.tracker.take_in(scans)
-            live.steps.append(TakenStep(scans[0].t, scans, before, taken))
+        live._rewinding.set_state(state["rewinding"])
+        live._base.set_state(state["base"])
+        live._kept, live._first = len(live._base.held), state["base"]["first"]
         live._again_until = live.tracker.time
         return live, state["more"]
 
     def predict(self, t: float) -> Prediction:
         """Say where the tracks will be at a time not before the newest scan's (see `Tracker.predict`)."""
-        return self.tracker.predict(t)
+        return self._rewinding.identities.rename(self.tracker.predict(t))
 
     def drain_smoothed(self) -> Trajectories:
         """Return the smoothed rows that are final and forget them (see `Tracker.drain_smoothed`)."""
         return self.tracker.drain_smoothed()
 
     def finish(self) -> Trajectories:
-        """End all tracks and return the smoothed rows not drained yet (see `Tracker.finish`)."""
-        self._settle(float("inf"))
+        """End all tracks and return the smoothed rows not drained yet (see `Tracker.finish`).
+
+        Scans ahead of time that wait are taken: nothing comes any more that could prove them wrong.
+        """
+        held = self._base.clear()
+        if held and self.tracker.time is not None and held[0].t > self.tracker.time:
+            self._take_all(held)
+            self._hand_over()
+        self._rewinding.settle(math.inf)
         return self.tracker.finish()
 
     def _corrected(self, scan: Scan) -> Scan:
         latency = self._latency.get(scan.sensor, 0.0)
         return replace(scan, t=scan.t - latency) if latency else scan
 
-    def _take(self, batch: list[Scan]) -> list[Scan]:
-        """Take in scans of one time; return those that were passed over."""
+    def _take(self, batch: list[Scan]) -> Taken:
+        """Take in scans of one time, but those that are to be passed over."""
         t, now = batch[0].t, self.tracker.time
         late_s = 0.0 if now is None else max(now - t, 0.0)
         if late_s > 0.0 and self.policy == REFUSE:
             raise TimeOrderError(
                 f"scan at t = {t} s is older than the last one at {now} s, and late scans are refused"
             )
-        good = [scan for scan in batch if self._may_come(scan, late_s)]
+        good: dict[str, Scan] = {}
+        dropped = []
+        for scan in batch:
+            if scan.sensor not in good and self._may_come(scan, late_s):
+                good[scan.sensor] = scan
+            else:
+                dropped.append(scan)
         if good:
-            self._insert(good)
-        for scan in batch:  # what the tracker refuses has not come
-            self.lateness.add(scan.sensor, late_s, scan not in good)
-        return [scan for scan in batch if scan not in good]
+            self._insert(list(good.values()))
+        return Taken(list(good.values()), dropped, late_s)
 
     def _comes_again(self, scan: Scan) -> bool:
         """Whether a scan was taken before the restart: the input may come again from anywhere before it."""
         if self._again_until is None:
             return False
         if scan.t > self._again_until:
-            self._again_until = None  # the first new one: no other of those before can follow
-            return False
+            if self._base.fits(scan.t, self._again_until):
+                self._again_until = None  # the first new one: no other of those before can follow
+            return self._base.holds(scan)
+        if self._first is not None and not self._base.fits(min(scan.t, self._first), self._first):
+            return self._base.holds(scan)  # from before all that had come: a clock has been set back
         if self.policy != REWIND:
             return scan.t < self._again_until or scan.sensor in self._newest
-        return scan.t <= self._settled or self._is_known(scan)
-
-    def _is_known(self, scan: Scan) -> bool:
-        """Whether the sensor has given a scan of that time which may still be taken again."""
-        k = self._place(scan.t)
-        known = self.steps[k].scans if k < len(self.steps) and self.steps[k].t == scan.t else []
-        return any(other.sensor == scan.sensor for other in known)
+        return scan.t <= self._rewinding.settled or self._rewinding.knows(scan)
 
     def _may_come(self, scan: Scan, late_s: float) -> bool:
+        now = self.tracker.time
         if self.policy != REWIND:
-            return late_s == 0.0
-        if late_s > self._late_s[scan.sensor] + _ROUNDING_S or scan.t <= self._settled:
+            return late_s == 0.0 and not (scan.t == now and scan.sensor in self._newest)
+        if late_s > self._late_s[scan.sensor] + _ROUNDING_S or scan.t <= self._rewinding.settled:
             return False
-        return not self._is_known(scan)
-
-    def _place(self, t: float) -> int:
-        return bisect_left(self.steps, t, key=lambda step: step.t)
+        begun, by = self._begun
+        if scan.t < begun or (scan.t == begun and scan.sensor in by):
+            return False
+        return not self._rewinding.knows(scan)
 
     def _insert(self, scans: list[Scan]) -> None:
-        """Put scans of one time where they belong, and take all steps from there on again."""
-        if self.policy != REWIND:
-            earlier = self._newest if scans[0].t == self.tracker.time else []
-            taken = self.tracker.take_in(scans)
-            self._newest = earlier + [scan.sensor for scan in scans]
-            self.tracker.hand_over(taken)
-            if self.tracker.has_diagnostics:
-                self.measured.append((scans[0].t, self.tracker.last_measurements()[0]))
+        """Take in scans of one time, each of another sensor."""
+        if self.policy == REWIND:
+            self._rewinding.insert(scans)
             return
-        t, now = scans[0].t, self.tracker.snapshot()
-        k = self._place(t)
-        later = [copy(step) for step in self.steps[k:]]
-        before = self.steps[k].before if later else now
-        if later:
-            self.tracker.restore(before)
-        if k < len(self.steps) and self.steps[k].t == t:
-            scans = self.steps[k].scans + scans
-            del self.steps[k]
-        # As files are read: the order of arrival must not show.
-        self.steps.insert(k, TakenStep(t, sorted(scans, key=lambda scan: scan.sensor), before, None))
-        try:
-            for step in self.steps[k:]:
-                if step is not self.steps[k]:
-                    step.before = self.tracker.snapshot()
-                step.taken = self.tracker.take_in(step.scans)
-        except Exception:
-            self.steps[k:] = later
-            self.tracker.restore(now)
-            raise
-        self.replayed += len(self.steps) - k - 1
-        newest = self.tracker.time
-        assert newest is not None
-        self._settle(newest - self._keep_s)
+        earlier = self._newest if scans[0].t == self.tracker.time else []
+        self._due.append(self.tracker.take_in(scans))
+        self._newest = earlier + [scan.sensor for scan in scans]
+        if self.tracker.has_diagnostics:
+            self.measured.append((scans[0].t, self.tracker.last_measurements()[0]))
 
-    def _settle(self, t: float) -> None:
-        """Tell the smoothers of the steps before a time: nothing can come before them any more."""
-        count = self._place(t)
-        for step in self.steps[:count]:
-            self.tracker.hand_over(step.taken)
-            self._settled = step.t
-        del self.steps[:count]
-
-
-def _late_s(config: Config, sensor: str) -> float:
-    own = config.sensors[sensor].late_s
-    return config.live.late_s if own is None else own
+    def _hand_over(self) -> None:
+        """Tell the smoothers of all that cannot be taken again."""
+        for taken in self._due:
+            self.tracker.hand_over(taken)
+        self._due = []
+        if self.policy == REWIND and self.tracker.time is not None:
+            self._rewinding.settle(self.tracker.time - self._keep_s)

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 from jeat_graph.config.reading import config_to_dict
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.live.arrival import Arrival
 from jeat_graph.live.health import Event, SensorHealth
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.live.messages import Duplicates, ScanMessage
@@ -126,12 +127,14 @@ class Session:
             return
         self.count += 1
         self._tell_dropped(arrival.dropped, arrival.late_s, place)
+        self._tell_times(arrival)
         if self.ends.smoothed is not None:
             self.ends.smoothed.begin(arrival.table.classes is not None)
         with self._owing():
             if passed_over < len(message.batch.scans):
                 self.ends.tracks(arrival.t, arrival.table, message, arrival.late_s)
-                for event in self._health.saw(message.batch.scans, arrival.t):
+                scans = [] if arrival.held else message.batch.scans
+                for event in self._health.saw(scans, arrival.t):
                     self._tell(event)
             if self.count % ARRIVALS_PER_DRAIN == 0:
                 self.drain()
@@ -259,8 +262,24 @@ class Session:
             more = "; further ones are only counted" if self._told == MOST_TOLD else ""
             self.ends.warn(f"warning: {place}passed over, {why}{more}")
 
+    def _tell_times(self, arrival: Arrival) -> None:
+        """Tell of scans whose time was proved wrong, and of a clock that was set back."""
+        if arrival.anew:
+            self._health.last.clear()
+            self.ends.warn(
+                "warning: scans have been far too late for long, so a clock was set back: all tracks end, "
+                f"and time goes on from t = {arrival.t:.6g} s"
+            )
+        for scan in arrival.refuted:
+            self._told += 1
+            if self._told <= MOST_TOLD:
+                self.ends.warn(
+                    f"warning: passed over, sensor {scan.sensor!r} gave the time {scan.t:.6g} s, which no "
+                    "other scan confirms"
+                )
+
     def _save_in_time(self, t: float) -> None:
         interval = t // self._every_s
-        if self._interval is not None and interval > self._interval and self._checkpoint is not None:
+        if self._interval is not None and interval != self._interval and self._checkpoint is not None:
             self.save()
-        self._interval = interval if self._interval is None else max(interval, self._interval)
+        self._interval = interval

@@ -11,6 +11,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.smoothing.access import SmoothedTracks
 from jeat_graph.tracking.snapshot import Snapshot
+from jeat_graph.tracking.state import TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog, allocate_log
 
 
@@ -60,9 +61,22 @@ class SavedTracks(SmoothedTracks):
 
         kept, state = load_state(path, config)
         if "policy" in state:
-            # The scans that may be taken again are apart there: without them the newest would be missing.
+            # Scans that may be taken again are apart there, and identities are not those that were given out.
             raise DataError("holds a tracker that takes late scans; LiveTracker.load goes on from it", path)
         return cls.from_state(kept, state)
+
+    def begin_anew(self, t: float) -> None:
+        """End all tracks and let time go on from another moment, an earlier one too (s).
+
+        Identities go on, and so does what was learnt of the scene: it is as if no time had passed.
+        """
+        now = self.snapshot()
+        if now.t is None:
+            return
+        shifted = {name: getattr(now.scene, name) + (t - now.t) for name in ("first_look", "last_look")}
+        none = TrackArrays._make(array[:0] for array in now.tracks)
+        self.smooth_anew()
+        self.restore(now._replace(t=None, tracks=none, scene=now.scene._replace(**shifted)))
 
     def state(self, snapshot: Snapshot | None = None) -> dict[str, Any]:
         """Return what `from_state` takes: the state now, or at a snapshot; the smoothers' is not copied."""
@@ -75,6 +89,7 @@ class SavedTracks(SmoothedTracks):
             "now": now,
             "log": log,
             "smoothing": self._smoothers,
+            "past": self._past,
         }
 
     @classmethod
@@ -82,7 +97,7 @@ class SavedTracks(SmoothedTracks):
         """Make a tracker of what `state` returned."""
         without = replace(config, smoother=replace(config.smoother, engine="none"))
         tracker = cls(without, diagnostics=state["diagnostics"])
-        tracker.config, tracker._smoothers = config, state["smoothing"]
+        tracker.config, tracker._smoothers, tracker._past = config, state["smoothing"], state["past"]
         tracker.restore(state["now"])
         tracker._finished = state["finished"]
         if state["log"] is not None:

@@ -31,6 +31,7 @@ class StepRecord(NamedTuple):
         fit: (N, 2) how likely its box fits, by the scores of its detections (`filters.fit`).
         updates: (M,) records of the update log.
         votes: what these detections say of classes, or None.
+        given: (N,) identities that the tables are to have in their place, or None for `ids` themselves.
     """
 
     t: float
@@ -44,6 +45,7 @@ class StepRecord(NamedTuple):
     fit: FloatArray
     updates: RecordArray
     votes: Votes | None = None
+    given: IntArray | None = None
 
 
 def record_step(
@@ -84,3 +86,11 @@ def record_step(
         log.rows[: int(log.count[0])].copy(),
         votes,
     )
+
+
+def takers_in(log: UpdateLog, count: int) -> IntArray:
+    """Return which track took each of the `count` detections (M,) of the last step, 0 where none did."""
+    taken = int(log.count[0])
+    out = np.zeros(count, dtype=np.int64)
+    out[log.detection[:taken]] = log.rows["track_id"][:taken]
+    return out

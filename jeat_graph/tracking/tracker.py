@@ -35,7 +35,7 @@ from jeat_graph.tracking.sensor_state import SensorState, sensor_states
 from jeat_graph.tracking.snapshot import Snapshot
 from jeat_graph.tracking.state import start_scene
 from jeat_graph.tracking.step import step
-from jeat_graph.tracking.step_record import StepRecord, record_step
+from jeat_graph.tracking.step_record import StepRecord, record_step, takers_in
 from jeat_graph.tracking.update_log import allocate_log
 
 _FIRST_CAPACITY = 64
@@ -81,6 +81,7 @@ class Tracker(SavedTracks):
         self._next_id = 1
         self._t: float | None = None
         self._log = allocate_log(0)
+        self.logs_takers = False  # whether `takers` will be asked
         # Of a step's arguments `arrivals_of` alone comes from outside, and it sees to their types.
         self._step, self._report = DirectCall(step), DirectCall(report)
         self._classes: ClassTally | None = None
@@ -156,7 +157,7 @@ class Tracker(SavedTracks):
             self._num_tracks = 0
         self._tracks = grow(self._tracks, self._num_tracks, self._num_tracks + count)
         told = embeddings is not None or any(s.classes is not None for s in batch)
-        logs = self._diagnostics or self._smoothers is not None or told
+        logs = self._diagnostics or self._smoothers is not None or told or self.logs_takers
         if logs and count > len(self._log.rows):
             self._log = allocate_log(2 * count)
         compared = None
@@ -185,6 +186,10 @@ class Tracker(SavedTracks):
         looks = self._looks or Looks.start(len(self.sensor_names), embeddings.shape[1])
         living = self._tracks.track_id[: self._num_tracks]
         return compare(looks.of(living), embeddings, sensor, self.config.association.most_alike)
+
+    def takers(self, count: int) -> IntArray:
+        """Return which track took each of the `count` detections (M,) of the last step, 0 where none did."""
+        return takers_in(self._log, count)
 
     def hand_over(self, taken: StepRecord | None) -> None:
         """Give the smoothers what a step took in; in order of time, and once."""
@@ -221,6 +226,7 @@ class Tracker(SavedTracks):
             t: time (s), not before that of the last step.
 
         Raises:
+            DataError: a time that is not finite.
             TimeOrderError: a time before that of the last step.
         """
         if self._t is not None and t < self._t:

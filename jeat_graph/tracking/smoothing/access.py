@@ -23,11 +23,13 @@ class SmoothedTracks:
     """
 
     def __init__(self, config: Config) -> None:
+        self.config = config
         self.sensor_names = config.sensor_names
         self._finished = False
         self._smoothers: Smoothing | None = None
         if config.smoother.engine != "none":
             self._smoothers = _smoothing(config)
+        self._past: list[Trajectories] = []  # rows of earlier bases of time that were not fetched
 
     def smoothed(self) -> Trajectories:
         """Return the smoothed trajectories of the confirmed tracks so far, without what was drained.
@@ -53,7 +55,16 @@ class SmoothedTracks:
         Raises:
             JeatGraphError: the configuration asks for no smoother.
         """
-        return self._wanted_smoothers().drain()
+        rows = self._wanted_smoothers().drain()
+        if self._past:
+            rows, self._past = Trajectories.concatenate([*self._past, rows]), []
+        return rows
+
+    def smooth_anew(self) -> None:
+        """End all tracks of the smoothers, which may then be told of earlier times; their rows wait."""
+        if self._smoothers is not None:
+            self._past.append(self._smoothers.finish())
+            self._smoothers = _smoothing(self.config)
 
     def finish(self) -> Trajectories:
         """End all tracks and return their smoothed trajectories, without what was drained before.
@@ -63,7 +74,9 @@ class SmoothedTracks:
         self._finished = True
         if self._smoothers is None:
             return Trajectories.empty(self.sensor_names)
-        return self._smoothers.finish()
+        rows, past = self._smoothers.finish(), self._past
+        self._past = []
+        return Trajectories.concatenate([*past, rows]) if past else rows
 
     def settle(self) -> None:
         """Let the smoothers take in all that they had set aside, and begin anew from what is known then.

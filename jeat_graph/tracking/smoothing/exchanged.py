@@ -97,7 +97,7 @@ def _of_different_classes(a: TrackHistory, b: TrackHistory) -> bool:
 
 def _continued(past: TrackHistory, future: TrackHistory, moment: float, config: Config) -> TrackHistory:
     """A history that is one until a moment and another from then on."""
-    whole = TrackHistory(past.track_id, config, ErrorStates.of(config), keep=True)
+    whole = TrackHistory(past.track_id, config, ErrorStates.of(config), True, past.given)
     before, after = past.whole(), future.whole()
     count, since = np.searchsorted(before["t"], moment), np.searchsorted(after["t"], moment)
     whole.add_measurements(concatenate_measurements([before[:count], after[since:]]))

@@ -42,9 +42,11 @@ class TrackHistory:
         config: settings of the smoother, the sizes and the output.
         errors: the error states of the sensors.
         keep: keep all measurements until the end, which stitching needs.
+        given: identity that its rows have, if not that.
 
     Attributes:
         track_id: identity.
+        given: identity that its rows have.
         confirmed: whether the track has ever been confirmed.
         measurements: measurements (M,) that wait, or all of them if `keep`, in pieces; the first
             row of the first piece is the birth.
@@ -52,8 +54,11 @@ class TrackHistory:
         votes: weight of the detections so far that speak for each class, by name.
     """
 
-    def __init__(self, track_id: int, config: Config, errors: ErrorStates, keep: bool) -> None:
+    def __init__(
+        self, track_id: int, config: Config, errors: ErrorStates, keep: bool, given: int | None = None
+    ) -> None:
         self.track_id = track_id
+        self.given = track_id if given is None else given
         self.confirmed = False
         self.measurements: list[RecordArray] = []
         self.votes: dict[str, float] = {}
@@ -207,7 +212,7 @@ class TrackHistory:
         if not chosen.any():
             return []
         kept = observed.select(chosen)
-        rows = rows_of(self.track_id, piece, self._sizes.smooth(), kept, existence[chosen], self._config)
+        rows = rows_of(self.given, piece, self._sizes.smooth(), kept, existence[chosen], self._config)
         return [self._classified(rows)]
 
     def _stays(self, piece: SmoothedTrack) -> bool:

@@ -78,7 +78,8 @@ class TrackSmoothers:
             self._scan_t.append(packet.t[packet.wanted])
         for track_id, share in split(packet, self._rate_hz):
             if track_id not in self._histories:
-                history = TrackHistory(track_id, self._config, self._errors, keep=self._stitch)
+                given = int(packet.given[np.argmax(packet.ids == track_id)])
+                history = TrackHistory(track_id, self._config, self._errors, self._stitch, given)
                 self._histories[track_id] = history
             self._shares.setdefault(track_id, deque()).append(share)
             self._to_do.append(track_id)

@@ -30,6 +30,7 @@ class Packet(NamedTuple):
         updates: (M,) records of the update log.
         ended: identities of the tracks that ended.
         votes: what the M detections say of classes, or None.
+        given: (L,) identities that the tables are to have in place of `ids`.
     """
 
     t: FloatArray
@@ -44,7 +45,8 @@ class Packet(NamedTuple):
     fit: FloatArray
     updates: RecordArray
     ended: list[int]
-    votes: Votes | None = None
+    votes: Votes | None
+    given: IntArray
 
 
 class StepRecorder:
@@ -96,6 +98,7 @@ class StepRecorder:
             concatenate_measurements([step.updates for step in steps if len(step.updates)]),
             self._ended,
             Votes.join([step.votes for step in steps], [len(step.updates) for step in steps]),
+            np.concatenate([step.ids if step.given is None else step.given for step in steps]),
         )
         self._recorded, self._ended = [], []
         return packet

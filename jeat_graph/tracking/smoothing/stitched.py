@@ -118,7 +118,7 @@ def _birth_log_density(wholes: Sequence[RecordArray], mean: FloatArray, config: 
 
 def _join(parts: Sequence[TrackHistory], scan_t: FloatArray, config: Config) -> TrackHistory:
     """One history of several in order of time, with rows at all steps in between."""
-    whole = TrackHistory(parts[0].track_id, config, ErrorStates.of(config), keep=True)
+    whole = TrackHistory(parts[0].track_id, config, ErrorStates.of(config), True, parts[0].given)
     observed: list[ObservationTimes] = []
     births = [float(part.measurements[0]["t"][0]) for part in parts]
     for k, part in enumerate(parts):

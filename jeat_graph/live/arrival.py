@@ -1,0 +1,54 @@
+"""What became of scans that arrived."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from jeat_graph.config.schema import Config
+from jeat_graph.data.detections import Scan
+from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.tracking.tracker import Tracker
+
+
+class Arrival(NamedTuple):
+    """What became of scans that arrived.
+
+    Attributes:
+        table: the tracks that are reported now.
+        t: time of the newest step (s): that of the table.
+        late_s: how much older the scans were than the newest before them (s), 0 for scans in order.
+        dropped: those that were passed over: too late, or of a sensor that has given one of that time.
+        repeated: those that had been taken before a checkpoint from which the tracker went on.
+        held: those that wait, because their time is far from all others (`live.jump_s`).
+        refuted: earlier ones that waited and are passed over now.
+        anew: whether time has begun anew, because scans were far too late for long: all tracks have ended.
+    """
+
+    table: Trajectories
+    t: float
+    late_s: float
+    dropped: list[Scan]
+    repeated: list[Scan]
+    held: list[Scan]
+    refuted: list[Scan]
+    anew: bool
+
+
+class Taken(NamedTuple):
+    """What became of scans of one time: those that were taken, those passed over, and how late they were."""
+
+    good: list[Scan]
+    dropped: list[Scan]
+    late_s: float
+
+
+def most_late_s(config: Config, sensor: str) -> float:
+    """Return how late a sensor's scans may come (s)."""
+    own = config.sensors[sensor].late_s
+    return config.live.late_s if own is None else own
+
+
+def looked_last(tracker: Tracker) -> list[str]:
+    """Names of the sensors that gave the scans of a tracker's last step."""
+    last_look = tracker.snapshot().scene.last_look
+    return [name for name, t in zip(tracker.sensor_names, last_look, strict=True) if t == tracker.time]
