@@ -121,7 +121,7 @@ class Session:
             self._tell_restart(message, place)
         before = self.live.time
         arrival = self.live.step(message.batch.scans)
-        passed_over = len(arrival.dropped) + len(arrival.repeated)
+        unanswered = len(arrival.dropped) + len(arrival.repeated) + len(arrival.held)
         if len(arrival.repeated) == len(message.batch.scans):
             self.duplicates += 1
             return
@@ -131,10 +131,9 @@ class Session:
         if self.ends.smoothed is not None:
             self.ends.smoothed.begin(arrival.table.classes is not None)
         with self._owing():
-            if passed_over < len(message.batch.scans):
+            if unanswered < len(message.batch.scans):
                 self.ends.tracks(arrival.t, arrival.table, message, arrival.late_s)
-                scans = [] if arrival.held else message.batch.scans
-                for event in self._health.saw(scans, arrival.t):
+                for event in self._health.saw(message.batch.scans, arrival.t):
                     self._tell(event)
             if self.count % ARRIVALS_PER_DRAIN == 0:
                 self.drain()

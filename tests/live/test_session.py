@@ -66,7 +66,7 @@ def test_messages_that_had_been_taken_are_in_the_summary():
 @pytest.mark.parametrize("taken", [50, 70])
 def test_after_a_restart_of_both_what_a_broker_brings_again_is_recognised(taken, tmp_path):
     """The detector was started again after its 40th message, the tracker somewhat later."""
-    messages = [message(k, 0.05 * k) for k in range(40)] + [message(k, 10.0 + 0.05 * k) for k in range(40)]
+    messages = [message(k, 0.05 * k) for k in range(40)] + [message(k, 5.0 + 0.05 * k) for k in range(40)]
     session, answered, _ = session_of(checkpoint=tmp_path / "state.npz")
     for one in messages[:taken]:
         session.accept(one)
