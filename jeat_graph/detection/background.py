@@ -12,6 +12,7 @@ the picture nearby have, for whatever moves there is not everywhere.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numba
@@ -75,7 +76,8 @@ class UsualActivity:
         if settings.sigmas <= 0.0:
             return counts
         side = (settings.around_px, settings.around_px)
-        around = cv2.boxFilter(counts, cv2.CV_32F, side, normalize=False, borderType=cv2.BORDER_REFLECT_101)
+        edge = cv2.BORDER_REFLECT_101
+        around: Any = cv2.boxFilter(counts, cv2.CV_32F, side, normalize=False, borderType=edge)
         if self._seen == 0:
             self._mean = _usual(around)
         self._seen += 1

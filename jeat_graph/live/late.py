@@ -110,7 +110,7 @@ class LiveTracker:
         again = [self._comes_again(scan) for scan in batch]
         repeated = [scan for scan, known in zip(batch, again, strict=True) if known]
         batch = [scan for scan, known in zip(batch, again, strict=True) if not known]
-        held, refuted, anew = batch, [], False
+        held, refuted, anew = batch, list[Scan](), False
         if repeated:  # what was passed over before the restart is so again
             self._base.held = self._base.held[: self._kept]
         if batch:
