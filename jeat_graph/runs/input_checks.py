@@ -11,6 +11,7 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError, UnknownSensorError
 from jeat_graph.io.time_units import unit_question
+from jeat_graph.runs.clocks import check_clocks, wrong_times
 from jeat_graph.runs.declaring import LEAST_SCANS, scan_rate_hz
 from jeat_graph.tracking.input_watch import CORNERS, SHARES, look_like_corners, look_like_shares
 
@@ -33,7 +34,7 @@ def check_detections(detections: Detections, config: Config, names: str = "the d
 
     Raises:
         DataError: there is no scan at all, the times are not in seconds, or the boxes do not belong to a
-            picture of this size.
+            picture of this size, or sensors have different clocks.
         UnknownSensorError: a sensor that the configuration does not declare.
     """
     if not detections.num_scans:
@@ -45,6 +46,7 @@ def check_detections(detections: Detections, config: Config, names: str = "the d
     warnings = [] if len(detections) else [f"{names}: all scans are empty, so there is nothing to track"]
     if detections.dropped:
         warnings.append(f"{names}: {detections.dropped} box(es) without area left out")
+    warnings += check_clocks(detections, config, names) + wrong_times(detections, names)
     return warnings + _check_picture(detections, config, names) + _check_rates(detections, config, names)
 
 
@@ -72,12 +74,12 @@ def _check_sensors(detections: Detections, config: Config, names: str) -> None:
 
 
 def check_units(detections: Detections, config: Config, names: str) -> None:
-    """Refuse boxes in shares of the picture, and times that cannot be seconds.
+    """Refuse boxes in shares of the picture, times that cannot be seconds, and sensors of different clocks.
 
     Times are believed where the sensor is declared to be as slow as that.
 
     Raises:
-        DataError: says what seems to be the unit.
+        DataError: says what seems to be the unit, or how far the clocks are apart.
     """
     if look_like_shares(detections.boxes):
         raise DataError(
@@ -94,6 +96,7 @@ def check_units(detections: Detections, config: Config, names: str) -> None:
                 f"--set sensors.{name}.rate_hz={1.0 / step:.3g}",
                 names,
             )
+    check_clocks(detections, config, names)
 
 
 def _check_picture(detections: Detections, config: Config, names: str) -> list[str]:

@@ -67,3 +67,44 @@ def test_a_recording_of_which_next_to_nothing_is_tracked_is_told_of(tmp_path, ca
     assert "from 150 detections" in capsys.readouterr().err
     record = json.loads((tmp_path / "run" / "run.json").read_text())
     assert any("from 150 detections" in text for text in record["warnings"])
+
+
+def two_sensors(rgb_from: float, evt_from: float, step: float = 0.05) -> list[str]:
+    """Ten scans of one box of each of two sensors."""
+    rgb = [f"{rgb_from + k * step},rgb,{100 + k},200,40,30,.9" for k in range(10)]
+    return rgb + [f"{evt_from + k * step},evt,{100 + k},200,40,30,.9" for k in range(10)]
+
+
+def written(folder, rows: list[str]) -> str:
+    path = folder / "two.csv"
+    path.write_text("t,sensor,left,top,width,height,score\n" + "\n".join(rows) + "\n")
+    return str(path)
+
+
+def test_sensors_of_different_clocks_are_refused_and_the_setting_that_is_named_mends_it(tmp_path, capsys):
+    path = written(tmp_path, two_sensors(1.7e9, 0.0))
+    assert main(["track", path, "--out", str(tmp_path / "run")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "sensor 'rgb' looks from 1700000000 to" in line
+    assert "'evt' from 0 to 0.45 s: they have different clocks" in line
+    setting = "sensors.rgb.latency_s=1700000000"
+    assert f"--set {setting}," in line
+    assert main(["track", path, "--out", str(tmp_path / "run"), "--set", setting]) == 0
+
+
+def test_sensors_that_took_turns_are_only_warned_of(tmp_path, capsys):
+    path = written(tmp_path, two_sensors(0.0, 3.0))
+    assert main(["track", path, "--out", str(tmp_path / "run")]) == 0
+    assert "they never look at one time" in capsys.readouterr().err
+    assert main(["track", written(tmp_path, two_sensors(0.0, 0.02)), "--out", str(tmp_path / "run")]) == 0
+    assert "one time" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("wrong", ["1e18", "1e9", "-1e9"])
+def test_a_wrong_time_is_warned_of_with_sensor_and_file(tmp_path, capsys, wrong):
+    rows = two_sensors(0.0, 0.0)
+    rows[9] = f"{wrong},rgb,109,200,40,30,.9"
+    assert main(["track", written(tmp_path, rows), "--out", str(tmp_path / "run")]) == 0
+    error = capsys.readouterr().err
+    assert "two.csv: nothing for" in error
+    assert f"is a time of sensor 'rgb' wrong (t = {float(wrong):.10g} s)?" in error
