@@ -11,6 +11,7 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.rates import median_rate_hz
+from jeat_graph.data.steps import check_steps
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.drawing.movie.backgrounds import (
     EventBackground,
@@ -196,6 +197,7 @@ def _times(
     if frames is not None and request.rate_hz is None:
         times = frames.times_s[(frames.times_s >= start - 1e-6) & (frames.times_s <= end + 1e-6)]
     else:
+        check_steps(start, end, rate_hz, "pictures", "choose a part: --start S --end S")
         times = start + np.arange(max(int((end - start) * rate_hz + 1e-6) + 1, 0)) / rate_hz
         times = times[(times >= span[0] - 1e-6) & (times <= span[1] + 1e-6)]
     if not len(times):
