@@ -73,11 +73,12 @@ def run(args: argparse.Namespace) -> int:
         write_columns(_columns(counts, counting.Count), args.out)
         print(f"wrote {args.out}: {len(found)} crossings ({kind} tracks)", file=sys.stderr)
     else:
+        classes = any(c.vehicle_class for c in counts)
         records: list[dict[str, Cell]] = [
             {
                 "line": c.line,
                 "direction": c.direction,
-                **({"class": c.vehicle_class} if any(c.vehicle_class for c in counts) else {}),
+                **({"class": c.vehicle_class} if classes else {}),
                 "from (s)": round(c.t_from, 3),
                 "to (s)": round(c.t_to, 3),
                 "vehicles": c.count,
