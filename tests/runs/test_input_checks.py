@@ -39,6 +39,17 @@ def test_boxes_in_shares_of_the_picture_are_refused_in_one_line(tmp_path, capsys
     assert "shares.csv: all boxes lie in [0, 1]: they must be in px" in line
 
 
+def test_times_that_were_divided_too_often_are_refused_unless_so_fast_a_sensor_is_declared(tmp_path, capsys):
+    path = written(tmp_path, two_sensors(0.0, 0.0, 0.02))
+    command = ["track", path, "--time-unit", "ms", "--out", str(tmp_path / "run")]
+    assert main(command) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "median step 2e-05 s, too short for a camera, and 1000 times as long a usual one" in line
+    assert "--set sensors.evt.rate_hz=5e+04" in line
+    settings = [word for name in ("rgb", "evt") for word in ("--set", f"sensors.{name}.rate_hz=5e4")]
+    assert main([*command, *settings]) == 0
+
+
 def test_a_sensor_that_is_declared_to_be_so_slow_is_believed():
     config = load_config("default", ["sensors.rgb.rate_hz=0.025"])
     assert check_detections(recording(40.0), config, "det") == []
