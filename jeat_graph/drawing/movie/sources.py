@@ -188,7 +188,10 @@ def _times(
     request: Request, span: tuple[float, float], frames: VideoBackground | None, rate_hz: float
 ) -> FloatArray:
     """Times of the pictures (T,), at least one (s)."""
+    lasts = f"; the recording lasts from {span[0]:.10g} s to {span[1]:.10g} s"
     if request.at_s is not None:
+        if not span[0] - _APART_S <= request.at_s <= span[1] + _APART_S:
+            raise DataError(f"there is nothing to draw at {request.at_s:.10g} s{lasts}")
         return np.array([request.at_s])
     start = span[0] if request.start_s is None else request.start_s
     end = span[1] if request.end_s is None else request.end_s
@@ -204,7 +207,7 @@ def _times(
         raise DataError(
             f"there is nothing to draw from {start:.10g} s"
             + ("" if request.end_s is None else f" to {end:.10g} s")
-            + f"; the recording lasts from {span[0]:.10g} s to {span[1]:.10g} s"
+            + lasts
         )
     return np.asarray(times, dtype=np.float64)
 
