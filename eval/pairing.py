@@ -63,15 +63,30 @@ def check_pair(truth: GroundTruth, table: Trajectories, *, max_age_s: float = MA
     instants = np.unique(table.t)
     if not np.isfinite(instants).all():
         raise DataError("the tracks have a time that is not finite")
-    _check_units(frames, instants)
-    if instants[0] > frames[-1] + max_age_s or instants[-1] < frames[0] - max_age_s:
-        raise DataError(
-            f"no common timestamps: the truth covers {frames[0]:.10g} to {frames[-1]:.10g} s, "
-            f"the tracks {instants[0]:.10g} to {instants[-1]:.10g} s; are they of the same recording?"
-        )
+    check_times(frames, instants, "tracks", max_age_s)
     if len(truth):
         _check_pixels("tracks", table.boxes, "truth", truth.boxes)
         _check_pixels("truth", truth.boxes, "tracks", table.boxes)
+
+
+def check_times(frames: FloatArray, instants: FloatArray, what: str, slack_s: float = 0.0) -> None:
+    """Refuse times that are of another clock, or in another unit, than those of the truth.
+
+    Args:
+        frames: (F,) times of the truth, ascending, at least one.
+        instants: (I,) the others, ascending and each once, at least one.
+        what: has these times, in the plural.
+        slack_s: so far apart may they be (s).
+
+    Raises:
+        DataError: different units of time, or no common times.
+    """
+    _check_units(frames, instants, what)
+    if instants[0] > frames[-1] + slack_s or instants[-1] < frames[0] - slack_s:
+        raise DataError(
+            f"no common timestamps: the truth covers {frames[0]:.10g} to {frames[-1]:.10g} s, "
+            f"the {what} {instants[0]:.10g} to {instants[-1]:.10g} s; are they of the same recording?"
+        )
 
 
 def check_lives(truth: GroundTruth, table: Trajectories, *, max_age_s: float = MAX_AGE_S) -> None:
@@ -122,7 +137,7 @@ def _check_pixels(small: str, boxes: FloatArray, large: str, others: FloatArray)
         )
 
 
-def _check_units(frames: FloatArray, instants: FloatArray) -> None:
+def _check_units(frames: FloatArray, instants: FloatArray, what: str) -> None:
     """Refuse clocks whose step and duration both differ by more than rates and lengths of recordings do."""
     if len(frames) < 3 or len(instants) < 3:
         return
@@ -133,9 +148,9 @@ def _check_units(frames: FloatArray, instants: FloatArray) -> None:
     both_large = min(step, span) > BOTH_LARGE or max(step, span) < 1.0 / BOTH_LARGE
     limit = UNIT_RATIO if one_factor else UNIT_RATIO_OTHER_RATE if both_large else np.inf
     if not 1.0 / limit < ratio < limit:
-        slow, fast = ("tracks", "truth") if ratio > 1.0 else ("truth", "tracks")
+        slow, fast = (what, "truth") if ratio > 1.0 else ("truth", what)
         raise DataError(
-            f"different units of time: the tracks last {span:.3g} times as long as the truth "
+            f"different units of time: the {what} last {span:.3g} times as long as the truth "
             f"({instants[0]:.10g} to {instants[-1]:.10g} against {frames[0]:.10g} to {frames[-1]:.10g}); "
             f"the times of the {slow} seem to be milliseconds or frames, those of the {fast} seconds"
         )

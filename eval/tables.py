@@ -92,11 +92,12 @@ class Table:
     def _text(self) -> str:
         cells = self.shown()
         widths = [max(len(n), *(len(r[k]) for r in cells), 0) for k, n in enumerate(self.columns)]
+        # Known once, not for each row: it looks at all of them.
+        right = [self.is_number(k) for k in range(len(self.columns))]
 
         def line(row: Sequence[str]) -> str:
             parts = [
-                c.rjust(w) if self.is_number(k) else c.ljust(w)
-                for k, (c, w) in enumerate(zip(row, widths, strict=True))
+                c.rjust(w) if number else c.ljust(w) for c, w, number in zip(row, widths, right, strict=True)
             ]
             return "  ".join(parts).rstrip()
 

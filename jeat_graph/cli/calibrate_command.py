@@ -68,7 +68,10 @@ def run(args: argparse.Namespace) -> int:
     base = with_image(base, recordings, args.image or (None if beside is None else beside.size_px))
     if args.gt:
         truths = [read_truth(path, rate_hz=args.rate, time_unit=args.time_unit) for path in args.gt]
-        found = _with_truth(list(zip(recordings, truths, strict=True)), base, not args.no_tune)
+        pairs = list(zip(recordings, truths, strict=True))
+        for path, pair in zip(args.gt, pairs, strict=True):
+            _check_pair(path, *pair)
+        found = _with_truth(pairs, base, not args.no_tune)
     else:
         found = _without_truth(recordings, base)
     _say_lags(found, "the truth" if args.gt else "the sensor that sees most")
@@ -77,6 +80,21 @@ def run(args: argparse.Namespace) -> int:
     sys.stdout.write("\n".join(table.render("text") for table in summary(config, found)))
     print(f"written: {args.out}", file=sys.stderr)
     return 0
+
+
+def _check_pair(path: str, recording: Detections, truth: GroundTruth) -> None:
+    """Refuse truth of another clock or unit of time, as `eval` does."""
+    import numpy as np
+
+    from jeat_graph.eval.pairing import check_times
+
+    frames, instants = truth.frame_times(), np.unique(recording.scan_t)
+    if not len(frames) or not len(instants):
+        return
+    try:
+        check_times(frames, instants, "detections")
+    except DataError as error:
+        raise DataError(error.message, path) from None
 
 
 def _size_beside(paths: list[str], shown: Facts | None) -> Facts | None:

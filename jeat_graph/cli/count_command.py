@@ -16,6 +16,7 @@ from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import positive
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.steps import check_steps
 from jeat_graph.eval.counting import Line
 
 HELP = "count vehicles over lines in the picture, by direction, with intervals"
@@ -61,6 +62,7 @@ def run(args: argparse.Namespace) -> int:
     known = table.final_classes()
     found = [c for line in lines for c in counting.crossings(table, line, known)]
     step = args.interval or max(last - first, 1e-9) * (1.0 + 1e-9)
+    check_steps(first, last, 1.0 / step, "intervals", "choose a longer --interval")
     number = int(np.ceil((last - first) / step + 1e-12))
     edges: FloatArray = np.asarray(first + step * np.arange(number + 1), dtype=np.float64)
     edges[-1] = max(edges[-1], np.nextafter(last, np.inf))
@@ -71,11 +73,12 @@ def run(args: argparse.Namespace) -> int:
         write_columns(_columns(counts, counting.Count), args.out)
         print(f"wrote {args.out}: {len(found)} crossings ({kind} tracks)", file=sys.stderr)
     else:
+        classes = any(c.vehicle_class for c in counts)
         records: list[dict[str, Cell]] = [
             {
                 "line": c.line,
                 "direction": c.direction,
-                **({"class": c.vehicle_class} if any(c.vehicle_class for c in counts) else {}),
+                **({"class": c.vehicle_class} if classes else {}),
                 "from (s)": round(c.t_from, 3),
                 "to (s)": round(c.t_to, 3),
                 "vehicles": c.count,

@@ -104,17 +104,39 @@ def made_by(args: argparse.Namespace, say: Callable[[str], object]) -> list[str]
     return settings
 
 
+def _without_input(args: argparse.Namespace) -> list[tuple[str, str]]:
+    """Options that were given for an input that was not, each with that input's option.
+
+    None where there is no input at all, which is the greater mistake, nor for a fused network, which takes
+    either input for both.
+    """
+    if args.detector_fused is not None or (args.frames is None and args.events is None):
+        return []
+    given = {
+        "--detector-frames": ("--frames", args.frames, args.detector_frames != "motion"),
+        "--detector-events": ("--events", args.events, args.detector_events != "motion"),
+        "--event-rate": ("--events", args.events, args.event_rate is not None),
+        "--event-size": ("--events", args.events, args.event_size is not None),
+        "--event-delay": ("--events", args.events, args.event_delay != 0.0),
+    }
+    return [(name, source) for name, (source, file, said) in given.items() if said and file is None]
+
+
 def detect_request(args: argparse.Namespace) -> DetectRequest:
     """Return what the arguments ask for.
 
     Raises:
-        ConfigError: settings that are not valid, or nothing to detect in.
+        ConfigError: settings that are not valid, nothing to detect in, or an option of an input that is not
+            there.
     """
     from dataclasses import replace
 
+    from jeat_graph.data.errors import ConfigError
     from jeat_graph.detection.detecting import DetectRequest
     from jeat_graph.detection.settings import load_settings
 
+    for option, source in _without_input(args):
+        raise ConfigError(f"{option} says nothing without {source}: give both, or leave it out")
     settings = load_settings(args.detection_config, args.detection_set)
     if args.event_rate is not None:
         settings = replace(settings, events=replace(settings.events, rate_hz=args.event_rate))

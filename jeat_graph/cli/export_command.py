@@ -23,6 +23,16 @@ SET_TARGETS = ("rvt", "rvt-input", "dsec-det")
 TARGETS = ("cvat", "coco", "ottrk", "tum", "rerun", *ROAD_TARGETS, *SET_TARGETS)
 
 _ROAD_RATE_HZ = 25.0
+# What only some targets can make use of.
+_BY_FRAME = ("cvat", "coco", "ottrk")
+_FOR = {
+    "only": (*_BY_FRAME, "tum", "rerun"),
+    "track": ("tum",),
+    "output_rate": (*_BY_FRAME, *ROAD_TARGETS),
+    "camera": ("sumo", "geojson"),
+    "video": ("ottrk",),
+    "start": ("ottrk",),
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -55,13 +65,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--camera", metavar="CAMERA.yaml", help="with its place on the map, for sumo and geojson"
     )
     parser.add_argument("--video", metavar="NAME", help="file name of the video, for ottrk")
-    parser.add_argument(
-        "--start", type=float, default=0.0, metavar="S", help="of the video, since 1970, for ottrk"
-    )
+    parser.add_argument("--start", type=float, metavar="S", help="of the video, since 1970, for ottrk")
 
 
 def run(args: argparse.Namespace) -> int:
     """Export."""
+    for name, targets in _FOR.items():
+        if getattr(args, name) is not None and args.to not in targets:
+            raise DataError(f"--{name.replace('_', '-')} is for --to {' or '.join(targets)}, not {args.to}")
     if args.to in SET_TARGETS:
         return _export_set(args)
     if args.to in ROAD_TARGETS:
@@ -97,7 +108,7 @@ def _write_ottrk(args: argparse.Namespace, frames: Trajectories, rate_hz: float)
 
     width, height = load_run_data(args.source, None, args.rate).size_px()
     name = args.video or f"{Path(args.source).resolve().name}.mp4"
-    video = OttrkVideo(name, int(width), int(height), rate_hz, args.start)
+    video = OttrkVideo(name, int(width), int(height), rate_hz, args.start or 0.0)
     write_ottrk(frames, args.out, video)
 
 

@@ -14,6 +14,7 @@ from jeat_graph.cli.options import Parser
 from jeat_graph.cli.terminal import Terminated, describe, in_good_order, say, write_anything
 from jeat_graph.config import kernel_cache
 from jeat_graph.data.errors import JeatGraphError
+from jeat_graph.io.outputs import check_named
 from jeat_graph.tracking import notice
 from jeat_graph.version import __version__
 
@@ -45,6 +46,8 @@ COMMANDS = (
 # These begin to track at once where the tracker is not compiled; the others track so much, or are so much
 # about time, that they wait for it.
 _AT_ONCE = ("demo", "track", "stream")
+# For these, `--out -` is standard output.
+_TO_STDOUT = ("detect",)
 
 
 def _compile_for(command: str) -> None:
@@ -98,6 +101,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(args: argparse.Namespace) -> int:
     try:
         with in_good_order(args.command):
+            if getattr(args, "out", None) is not None:
+                check_named(args.out, stdout=args.command in _TO_STDOUT)
             code = int(args.run(args) or 0)
             sys.stdout.flush()  # what cannot be written is noticed here, not at exit
             return code

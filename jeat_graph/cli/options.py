@@ -13,9 +13,10 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
 from typing import Any
 
-from jeat_graph.config.argument_types import picture_size, positive
+from jeat_graph.config.argument_types import output_rate, picture_size, positive
 from jeat_graph.config.smoothing import ENGINES
 from jeat_graph.io.formats import FORMATS
 from jeat_graph.io.time_units import TIME_UNITS
@@ -83,9 +84,9 @@ def add_output_rate(parser: argparse.ArgumentParser, text: str, *old_names: str)
         text: help.
         old_names: further names, understood but not shown.
     """
-    parser.add_argument("--output-rate", type=positive, metavar="HZ", help=text)
+    parser.add_argument("--output-rate", type=output_rate, metavar="HZ", help=text)
     for name in old_names:
-        add_old_name(parser, name, "--output-rate")
+        add_old_name(parser, name, "--output-rate", output_rate)
 
 
 class _OldName(argparse.Action):
@@ -102,10 +103,12 @@ class _OldName(argparse.Action):
         setattr(namespace, self.dest, value)
 
 
-def add_old_name(parser: argparse.ArgumentParser, old: str, new: str) -> None:
+def add_old_name(
+    parser: argparse.ArgumentParser, old: str, new: str, kind: Callable[[str], float] = positive
+) -> None:
     """Declare the name that an option with a number had before: understood, not shown, and warned of."""
     dest = new.removeprefix("--").replace("-", "_")
-    parser.add_argument(old, dest=dest, const=new, type=positive, action=_OldName, help=argparse.SUPPRESS)
+    parser.add_argument(old, dest=dest, const=new, type=kind, action=_OldName, help=argparse.SUPPRESS)
 
 
 def add_reading(parser: argparse.ArgumentParser) -> None:

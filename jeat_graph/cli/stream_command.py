@@ -29,6 +29,7 @@ STDIN = "<stdin>"
 _WARM_STEPS = 20  # enough for a track to be confirmed and smoothed
 #: A source is told what has been taken whenever it has nothing more, and after this part of what may be open.
 _COMMIT_PART = 0.5
+_EVERY_S = 10.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -85,7 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="keep the state there, and go on from it where it is; what was taken already may come again",
     )
-    add("--every", type=positive, default=10.0, metavar="S", help="time between checkpoints (default: 10)")
+    add("--every", type=positive, metavar="S", help=f"time between checkpoints (default: {_EVERY_S:g})")
     add("--record", metavar="FILE", help="at the end write counts, and how late scans came, as JSON")
 
 
@@ -115,7 +116,7 @@ def run(args: argparse.Namespace) -> int:
             flush=output.flush,
             commit=(lambda: None) if source is None else source.commit,
         )
-        session = Session(live, ends, args.checkpoint, args.every, more)
+        session = Session(live, ends, args.checkpoint, args.every or _EVERY_S, more)
         output.seq = more.get("count", 0)
         with contextlib.suppress(UnconfirmedError):  # after a signal; the session tells of it
             try:
@@ -139,6 +140,8 @@ def _config(args: argparse.Namespace) -> Config:
     config = load_config(args.config, [*made_by(args, _warn), *overrides(args)])
     if args.checkpoint is not None and config.smoother.worker:
         raise ConfigError("--checkpoint does not go with smoother.worker: its state is in another process")
+    if args.every is not None and args.checkpoint is None:
+        raise ConfigError("--every is the time between checkpoints: it needs --checkpoint FILE")
     if args.sink is not None and args.format == "csv":
         raise ConfigError("--format csv is for stdout; messages to --sink are JSON or MessagePack")
     if (args.road is None) != (args.camera is None):

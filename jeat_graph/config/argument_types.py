@@ -9,6 +9,8 @@ from argparse import ArgumentTypeError
 SMALLEST_PX, LARGEST_PX = 16, 65_536
 #: Largest width or height (px) of a picture that is drawn: that of most video decoders.
 LARGEST_DRAWN_PX = 8192
+#: Highest rate of what is written (Hz), as of a sensor's setting: no film or table is meant to be finer.
+HIGHEST_RATE_HZ = 1000.0
 
 
 def natural(text: str) -> int:
@@ -32,6 +34,14 @@ def positive(text: str) -> float:
     value = float(text)
     if not 0.0 < value < float("inf"):
         raise ArgumentTypeError("must be a positive number")
+    return value
+
+
+def output_rate(text: str) -> float:
+    """Read frames per second of what is written."""
+    value = positive(text)
+    if value > HIGHEST_RATE_HZ:
+        raise ArgumentTypeError(f"must be at most {HIGHEST_RATE_HZ:g} Hz")
     return value
 
 

@@ -8,6 +8,22 @@ from pathlib import Path
 from jeat_graph.data.errors import DataError
 
 
+def check_named(out: str | Path, stdout: bool = False) -> None:
+    """Check that `out` names a place: an empty name would be the current folder, as of a variable not set.
+
+    Args:
+        out: what was given as `--out`.
+        stdout: whether `-` stands for standard output.
+
+    Raises:
+        DataError: it is empty, or `-` where that would be the name of a file or folder.
+    """
+    if not str(out).strip():
+        raise DataError("--out is empty: name a file or folder (. is the current folder)")
+    if str(out) == "-" and not stdout:
+        raise DataError("--out -: does not write to standard output; name a file or folder (./- is one)")
+
+
 def check_folder(out: str | Path) -> None:
     """Check that a folder can stand at `out`.
 

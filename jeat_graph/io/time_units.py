@@ -11,6 +11,8 @@ from jeat_graph.data.errors import ConfigError
 TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 #: No sensor that vehicles are tracked with takes longer than this from scan to scan (s).
 LONGEST_STEP_S = 5.0
+#: Nor less than this: the fastest cameras give a tenth of so many boxes.
+SHORTEST_STEP_S = 1e-4
 # Steps of a camera, from 2 kHz to 1 Hz (s): the unit that brings a step here is the likely one.
 _USUAL_STEP_S = (0.0005, 1.0)
 
@@ -41,11 +43,16 @@ def likely_unit(step: float) -> str | None:
 
 
 def unit_question(step: float) -> str:
-    """Say that a step is too long, and which unit of time is likely; empty where it is not too long.
+    """Say that a step is too long or too short, and which unit of time is likely; else empty.
 
     Args:
-        step: as `likely_unit`.
+        step: as `likely_unit`; 0 where it is not known.
     """
+    if 0.0 < step < SHORTEST_STEP_S:
+        low, high = _USUAL_STEP_S
+        factors = [size for size in TIME_UNITS.values() if low <= step * size <= high]
+        guess = f", and {factors[0]:.0f} times as long a usual one" if factors else ""
+        return f"median step {step:.6g} s, too short for a camera{guess}: is --time-unit the right one?"
     if step < LONGEST_STEP_S:
         return ""
     unit = likely_unit(step)

@@ -10,7 +10,8 @@ from jeat_graph.config.reading import load_config, preset_names
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError, UnknownSensorError
-from jeat_graph.io.time_units import unit_question
+from jeat_graph.io.time_units import LONGEST_STEP_S, unit_question
+from jeat_graph.runs.clocks import check_clocks, wrong_times
 from jeat_graph.runs.declaring import LEAST_SCANS, scan_rate_hz
 from jeat_graph.tracking.input_watch import CORNERS, SHARES, look_like_corners, look_like_shares
 
@@ -33,7 +34,7 @@ def check_detections(detections: Detections, config: Config, names: str = "the d
 
     Raises:
         DataError: there is no scan at all, the times are not in seconds, or the boxes do not belong to a
-            picture of this size.
+            picture of this size, or sensors have different clocks.
         UnknownSensorError: a sensor that the configuration does not declare.
     """
     if not detections.num_scans:
@@ -45,6 +46,7 @@ def check_detections(detections: Detections, config: Config, names: str = "the d
     warnings = [] if len(detections) else [f"{names}: all scans are empty, so there is nothing to track"]
     if detections.dropped:
         warnings.append(f"{names}: {detections.dropped} box(es) without area left out")
+    warnings += check_clocks(detections, config, names) + wrong_times(detections, names)
     return warnings + _check_picture(detections, config, names) + _check_rates(detections, config, names)
 
 
@@ -72,12 +74,12 @@ def _check_sensors(detections: Detections, config: Config, names: str) -> None:
 
 
 def check_units(detections: Detections, config: Config, names: str) -> None:
-    """Refuse boxes in shares of the picture, and times that cannot be seconds.
+    """Refuse boxes in shares of the picture, times that cannot be seconds, and sensors of different clocks.
 
-    Times are believed where the sensor is declared to be as slow as that.
+    Times are believed where the sensor is declared to be as slow, or as fast, as that.
 
     Raises:
-        DataError: says what seems to be the unit.
+        DataError: says what seems to be the unit, or how far the clocks are apart.
     """
     if look_like_shares(detections.boxes):
         raise DataError(
@@ -87,13 +89,15 @@ def check_units(detections: Detections, config: Config, names: str) -> None:
         times = np.unique(detections.sensor_times(name))
         step = float(np.median(np.diff(times))) if len(times) >= LEAST_SCANS else 0.0
         question = unit_question(step)
-        slow = name in config.sensors and config.sensors[name].rate_hz * step < RATE_FACTOR
-        if question and not slow:
+        steps = config.sensors[name].rate_hz * step if name in config.sensors else float("nan")
+        long = step >= LONGEST_STEP_S
+        if question and not (steps < RATE_FACTOR if long else steps > 1.0 / RATE_FACTOR):
             raise DataError(
-                f"sensor {name!r} has a {question}; or, if it is so slow, "
+                f"sensor {name!r} has a {question}; or, if it is so {'slow' if long else 'fast'}, "
                 f"--set sensors.{name}.rate_hz={1.0 / step:.3g}",
                 names,
             )
+    check_clocks(detections, config, names)
 
 
 def _check_picture(detections: Detections, config: Config, names: str) -> list[str]:

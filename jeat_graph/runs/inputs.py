@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+from jeat_graph.data.errors import DataError
 
 # An input that was moved along is looked for so far up from the run, by so many last parts of its path.
 _MOST_UP, _MOST_PARTS = 4, 4
@@ -27,6 +30,39 @@ def describe_inputs(paths: Sequence[str | Path]) -> list[dict[str, Any]]:
         }
         for p in paths
     ]
+
+
+def check_distinct(items: Sequence[str | Path]) -> None:
+    """Refuse a file that is given twice: its boxes would be taken for two looks of one sensor.
+
+    Two sensors may have files of one content, such as empty ones, where `NAME=path` tells them apart.
+
+    Args:
+        items: paths, or `NAME=path`, as `read_many` takes them.
+
+    Raises:
+        DataError: names the file, and the other where it is a copy.
+    """
+    from jeat_graph.io.detections_io import split_name
+
+    named = [(name, Path(path)) for name, path in map(split_name, items)]
+    for (name, path), (other_name, other) in itertools.combinations(named, 2):
+        if path.resolve() == other.resolve():
+            raise DataError("is given twice: give each file of detections once", other)
+        if name == other_name and _same_content(path, other):
+            raise DataError(
+                f"holds the same as {path}: give each file of detections once, or, if two sensors saw just "
+                "the same, name them: NAME=path",
+                other,
+            )
+
+
+def _same_content(path: Path, other: Path) -> bool:
+    from jeat_graph.io.hashing import sha256_of
+
+    if not (path.is_file() and other.is_file()) or path.stat().st_size != other.stat().st_size:
+        return False
+    return path.stat().st_size > 0 and sha256_of(path) == sha256_of(other)
 
 
 def find_input(given: str | Path, record: Mapping[str, Any], folder: Path) -> Path | None:

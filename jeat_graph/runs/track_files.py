@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from jeat_graph.runs.beside import Facts, facts_beside, facts_of_frames, with_picture
-from jeat_graph.runs.inputs import describe_inputs
+from jeat_graph.runs.inputs import check_distinct, describe_inputs
 from jeat_graph.runs.run_options import RunOptions, RunRecord
 from jeat_graph.runs.tracking_run import write_run
 
@@ -140,6 +140,7 @@ def track_files(
 
     begin = time.perf_counter()
     config, notes = request.configured()
+    check_distinct(request.detections)
     directory = RunDirectory(request.out, inputs=request.files)
     request = request.with_facts()[0]
     for note in notes:

@@ -64,3 +64,11 @@ def test_an_empty_table_has_its_head():
 def test_an_unknown_form_is_refused():
     with pytest.raises(ConfigError, match="unknown table format 'html'"):
         table().render("html")
+
+
+def test_a_long_table_is_looked_at_once_for_its_columns(monkeypatch):
+    looks = []
+    look = Table.is_number
+    monkeypatch.setattr(Table, "is_number", lambda table, k: looks.append(k) or look(table, k))
+    Table.from_records([{"line": "gate", "vehicles": k} for k in range(500)]).render()
+    assert looks == [0, 1]

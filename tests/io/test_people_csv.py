@@ -133,9 +133,21 @@ def test_an_own_name_goes_before_an_alias_and_x_y_alone_mean_nothing():
 
 @pytest.mark.parametrize(
     ("step", "words"),
-    [(0.05, ""), (4.0, ""), (40.0, "in ms"), (33_333.0, "in us"), (4e7, "in ns"), (1e12, "in seconds")],
+    [
+        (0.05, ""),
+        (4.0, ""),
+        (0.0, ""),
+        (1e-4, ""),
+        (5e-5, "1000 times as long"),
+        (4e-8, "1000000 times as long"),
+        (1e-15, "too short"),
+        (40.0, "in ms"),
+        (33_333.0, "in us"),
+        (4e7, "in ns"),
+        (1e12, "in seconds"),
+    ],
 )
-def test_a_step_too_long_for_a_camera_asks_for_the_unit(step, words):
+def test_a_step_too_long_or_too_short_for_a_camera_asks_for_the_unit(step, words):
     question = unit_question(step)
     assert words in question
     assert (question == "") == (words == "")

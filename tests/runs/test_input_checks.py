@@ -39,6 +39,17 @@ def test_boxes_in_shares_of_the_picture_are_refused_in_one_line(tmp_path, capsys
     assert "shares.csv: all boxes lie in [0, 1]: they must be in px" in line
 
 
+def test_times_that_were_divided_too_often_are_refused_unless_so_fast_a_sensor_is_declared(tmp_path, capsys):
+    path = written(tmp_path, two_sensors(0.0, 0.0, 0.02))
+    command = ["track", path, "--time-unit", "ms", "--out", str(tmp_path / "run")]
+    assert main(command) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "median step 2e-05 s, too short for a camera, and 1000 times as long a usual one" in line
+    assert "--set sensors.evt.rate_hz=5e+04" in line
+    settings = [word for name in ("rgb", "evt") for word in ("--set", f"sensors.{name}.rate_hz=5e4")]
+    assert main([*command, *settings]) == 0
+
+
 def test_a_sensor_that_is_declared_to_be_so_slow_is_believed():
     config = load_config("default", ["sensors.rgb.rate_hz=0.025"])
     assert check_detections(recording(40.0), config, "det") == []
@@ -67,3 +78,44 @@ def test_a_recording_of_which_next_to_nothing_is_tracked_is_told_of(tmp_path, ca
     assert "from 150 detections" in capsys.readouterr().err
     record = json.loads((tmp_path / "run" / "run.json").read_text())
     assert any("from 150 detections" in text for text in record["warnings"])
+
+
+def two_sensors(rgb_from: float, evt_from: float, step: float = 0.05) -> list[str]:
+    """Ten scans of one box of each of two sensors."""
+    rgb = [f"{rgb_from + k * step},rgb,{100 + k},200,40,30,.9" for k in range(10)]
+    return rgb + [f"{evt_from + k * step},evt,{100 + k},200,40,30,.9" for k in range(10)]
+
+
+def written(folder, rows: list[str]) -> str:
+    path = folder / "two.csv"
+    path.write_text("t,sensor,left,top,width,height,score\n" + "\n".join(rows) + "\n")
+    return str(path)
+
+
+def test_sensors_of_different_clocks_are_refused_and_the_setting_that_is_named_mends_it(tmp_path, capsys):
+    path = written(tmp_path, two_sensors(1.7e9, 0.0))
+    assert main(["track", path, "--out", str(tmp_path / "run")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "sensor 'rgb' looks from 1700000000 to" in line
+    assert "'evt' from 0 to 0.45 s: they have different clocks" in line
+    setting = "sensors.rgb.latency_s=1700000000"
+    assert f"--set {setting}," in line
+    assert main(["track", path, "--out", str(tmp_path / "run"), "--set", setting]) == 0
+
+
+def test_sensors_that_took_turns_are_only_warned_of(tmp_path, capsys):
+    path = written(tmp_path, two_sensors(0.0, 3.0))
+    assert main(["track", path, "--out", str(tmp_path / "run")]) == 0
+    assert "they never look at one time" in capsys.readouterr().err
+    assert main(["track", written(tmp_path, two_sensors(0.0, 0.02)), "--out", str(tmp_path / "run")]) == 0
+    assert "one time" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("wrong", ["1e18", "1e9", "-1e9"])
+def test_a_wrong_time_is_warned_of_with_sensor_and_file(tmp_path, capsys, wrong):
+    rows = two_sensors(0.0, 0.0)
+    rows[9] = f"{wrong},rgb,109,200,40,30,.9"
+    assert main(["track", written(tmp_path, rows), "--out", str(tmp_path / "run")]) == 0
+    error = capsys.readouterr().err
+    assert "two.csv: nothing for" in error
+    assert f"is a time of sensor 'rgb' wrong (t = {float(wrong):.10g} s)?" in error

@@ -8,7 +8,7 @@ import shutil
 import pytest
 
 from jeat_graph.cli.main import main
-from jeat_graph.runs.inputs import describe_inputs, find_input
+from jeat_graph.runs.inputs import check_distinct, describe_inputs, find_input
 
 
 @pytest.fixture
@@ -72,3 +72,25 @@ def test_a_list_of_images_is_found_where_the_run_was_moved(tmp_path, monkeypatch
     capsys.readouterr()
     assert main(compare) == 2
     assert "list of images" in capsys.readouterr().err
+
+
+def test_a_file_that_is_given_twice_is_refused_and_so_is_its_copy(tmp_path, capsys):
+    rows = "".join(f"{k / 20},rgb,{100 + k},200,40,30,.9\n" for k in range(10))
+    (tmp_path / "a.csv").write_text("t,sensor,left,top,width,height,score\n" + rows)
+    (tmp_path / "b.csv").write_text((tmp_path / "a.csv").read_text())
+    a, b, again = str(tmp_path / "a.csv"), str(tmp_path / "b.csv"), str(tmp_path / "." / "a.csv")
+    for files, words in (
+        ((a, again), "a.csv: is given twice"),
+        ((f"rgb={a}", f"evt={a}"), "a.csv: is given twice"),
+        ((a, b), f"b.csv: holds the same as {a}"),
+    ):
+        assert main(["track", *files, "--out", str(tmp_path / "run")]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert words in line
+        assert not (tmp_path / "run").exists()
+
+
+def test_sensors_that_saw_nothing_have_files_of_one_content(tmp_path):
+    for name in ("a.csv", "b.csv"):
+        (tmp_path / name).write_text("t,left,top,width,height,score\n0,,,,,\n0.05,,,,,\n")
+    check_distinct([f"rgb={tmp_path / 'a.csv'}", f"evt={tmp_path / 'b.csv'}"])

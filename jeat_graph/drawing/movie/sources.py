@@ -11,6 +11,7 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.rates import median_rate_hz
+from jeat_graph.data.steps import check_steps
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.drawing.movie.backgrounds import (
     EventBackground,
@@ -187,7 +188,10 @@ def _times(
     request: Request, span: tuple[float, float], frames: VideoBackground | None, rate_hz: float
 ) -> FloatArray:
     """Times of the pictures (T,), at least one (s)."""
+    lasts = f"; the recording lasts from {span[0]:.10g} s to {span[1]:.10g} s"
     if request.at_s is not None:
+        if not span[0] - _APART_S <= request.at_s <= span[1] + _APART_S:
+            raise DataError(f"there is nothing to draw at {request.at_s:.10g} s{lasts}")
         return np.array([request.at_s])
     start = span[0] if request.start_s is None else request.start_s
     end = span[1] if request.end_s is None else request.end_s
@@ -196,13 +200,14 @@ def _times(
     if frames is not None and request.rate_hz is None:
         times = frames.times_s[(frames.times_s >= start - 1e-6) & (frames.times_s <= end + 1e-6)]
     else:
+        check_steps(start, end, rate_hz, "pictures", "choose a part: --start S --end S")
         times = start + np.arange(max(int((end - start) * rate_hz + 1e-6) + 1, 0)) / rate_hz
         times = times[(times >= span[0] - 1e-6) & (times <= span[1] + 1e-6)]
     if not len(times):
         raise DataError(
             f"there is nothing to draw from {start:.10g} s"
             + ("" if request.end_s is None else f" to {end:.10g} s")
-            + f"; the recording lasts from {span[0]:.10g} s to {span[1]:.10g} s"
+            + lasts
         )
     return np.asarray(times, dtype=np.float64)
 

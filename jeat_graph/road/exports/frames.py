@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.steps import check_steps
 from jeat_graph.io.tables import read_table
 
 _TABLES = ("road.csv", "road_smoothed.csv", "road_causal.csv")
@@ -79,6 +80,7 @@ def read_road_frames(source: str | Path, rate_hz: float) -> RoadFrames:
     cuts = np.flatnonzero(np.diff(ids[order])) + 1
     parts = []
     for rows in np.split(order, cuts) if len(order) else []:
+        check_steps(float(t[rows[0]]), float(t[rows[-1]]), rate_hz, "frames")
         first, last = np.ceil(t[rows[0]] * rate_hz - 1e-6), np.floor(t[rows[-1]] * rate_hz + 1e-6)
         frame = np.arange(first, last + 1)
         at = frame / rate_hz

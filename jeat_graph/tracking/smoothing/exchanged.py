@@ -7,8 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from jeat_graph.config.schema import Config
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray, RecordArray
+from jeat_graph.data.errors import DataError
 from jeat_graph.data.progress import with_progress
+from jeat_graph.data.steps import check_steps
 from jeat_graph.smoothers.exchanging import TwoSided, exchange_gains
 from jeat_graph.smoothers.measurements import concatenate_measurements
 from jeat_graph.tracking.smoothing.encounters import encounters
@@ -16,6 +18,9 @@ from jeat_graph.tracking.smoothing.history import TrackHistory
 from jeat_graph.tracking.smoothing.observation_times import ObservationTimes
 from jeat_graph.tracking.smoothing.priors import ErrorStates
 from jeat_graph.tracking.smoothing.two_sided import two_sided
+
+#: How often `encounters` looks at tracks, and how far from 0 it can count its looks (s).
+_LOOKS_HZ, _FARTHEST_S = 20.0, 2.0**62 / 20.0
 
 
 def exchange_histories(histories: Sequence[TrackHistory], config: Config) -> tuple[list[TrackHistory], int]:
@@ -27,6 +32,9 @@ def exchange_histories(histories: Sequence[TrackHistory], config: Config) -> tup
 
     Returns:
         The histories, each of the identity that it began with, and the number of exchanges.
+
+    Raises:
+        DataError: the tracks last so long that they cannot be gone through, as where a time is wrong.
     """
     found, count = list(histories), 0
     share = config.smoother.exchange_share
@@ -36,7 +44,9 @@ def exchange_histories(histories: Sequence[TrackHistory], config: Config) -> tup
     sides = _Sides(found, config)
     # Whose place each has taken: encounters are found once, and gone through in order of time.
     now = np.arange(len(found))
-    met = encounters([history.whole() for history in found])
+    rows = [history.whole() for history in found]
+    _check_times(rows)
+    met = encounters(rows)
     for first, second, start_t, end_t in with_progress(list(zip(*met, strict=True))):
         i, j = int(now[first]), int(now[second])
         if _of_different_classes(found[i], found[j]):
@@ -53,6 +63,16 @@ def exchange_histories(histories: Sequence[TrackHistory], config: Config) -> tup
             now[first], now[second] = j, i
             count += 1
     return found, count
+
+
+def _check_times(rows: Sequence[RecordArray]) -> None:
+    """Refuse tracks that cannot be gone through in the steps of `encounters`: a wrong time makes such."""
+    # One after the other, for days of many short tracks are no harm.
+    for one in rows:
+        start, end = float(one["t"][0]), float(one["t"][-1])
+        check_steps(start, end, _LOOKS_HZ, "looks at a track", "leave it out: smoother.exchange_share=0")
+        if max(abs(start), abs(end)) > _FARTHEST_S:
+            raise DataError(f"a track lasts from {start:.10g} to {end:.10g} s: is one of its times wrong?")
 
 
 class _Sides:
