@@ -93,6 +93,15 @@ def find_bad_row(boxes: FloatArray, scores: FloatArray) -> tuple[int, str] | Non
     return row, f"score must be in [0, 1], got {scores[row]}"
 
 
+def without_area(boxes: FloatArray) -> BoolArray:
+    """Which boxes (M, 4) a detector has clipped to nothing: no side is negative and one is zero."""
+    side = boxes[:, 2:]
+    if len(boxes) == 0 or side.min() > 0.0:
+        return np.zeros(len(boxes), dtype=bool)
+    finite = np.isfinite(boxes).all(axis=1)
+    return np.asarray(finite & (side >= 0.0).all(axis=1) & (side == 0.0).any(axis=1))
+
+
 def class_texts(classes: Any, count: int) -> TextArray:
     """Return class names (M,) as an array of text, None and NaN as empty ones.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -89,10 +90,12 @@ class DetectionViews:
             t: time of the picture (s).
             sensor: name of the sensor.
         """
-        boxes, scores, classes = boxes_of(source)
-        if not len(boxes):
-            return cls.from_rows([t], [sensor], np.full((1, 4), np.nan), [np.nan], [True])
-        return cls.from_rows(np.full(len(boxes), t), [sensor] * len(boxes), boxes, scores, None, classes)
+        boxes, scores, classes, kept = boxes_of(source)
+        if len(boxes):
+            out = cls.from_rows(np.full(len(boxes), t), [sensor] * len(boxes), boxes, scores, None, classes)
+        else:
+            out = cls.from_rows([t], [sensor], np.full((1, 4), np.nan), [np.nan], [True])
+        return replace(out, dropped=int(np.sum(~kept)))
 
     def to_supervision(self) -> Any:
         """Return all boxes as `supervision.Detections`; classes are numbered in the order of the alphabet.

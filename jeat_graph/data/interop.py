@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.data.arrays import FloatArray, TextArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, TextArray
+from jeat_graph.data.boxes import without_area
 from jeat_graph.data.errors import DataError
 
 if TYPE_CHECKING:
@@ -25,15 +26,17 @@ class Boxes(NamedTuple):
         boxes: (M, 4) left, top, width, height (px).
         scores: (M,) confidence in [0, 1].
         classes: (M,) class names, or None where the detector says none.
+        kept: (R,) which of the rows these are; the others have no area.
     """
 
     boxes: FloatArray
     scores: FloatArray
     classes: TextArray | None
+    kept: BoolArray
 
 
 def boxes_of(source: Any, scores: npt.ArrayLike | None = None) -> Boxes:
-    """Read boxes from whatever a detector returns.
+    """Read boxes from whatever a detector returns, but for those without area: a detector has clipped them.
 
     Args:
         source: `supervision.Detections`; a result of `ultralytics` (one picture, or a list of one); or an
@@ -62,7 +65,16 @@ def boxes_of(source: Any, scores: npt.ArrayLike | None = None) -> Boxes:
         raise DataError(f"boxes must have shape (M, 4), or (M, 5) with scores, not {table.shape}")
     if scores is None:
         scores = table[:, 4] if table.shape[1] == 5 else np.ones(len(table))
-    return Boxes(table[:, :4], np.asarray(scores, dtype=np.float64), None)
+    return _with_area(table[:, :4], np.asarray(scores, dtype=np.float64), None)
+
+
+def _with_area(boxes: FloatArray, scores: FloatArray, classes: TextArray | None) -> Boxes:
+    """Leave out the boxes (R, 4) without area; shapes that do not fit stay, for `check_boxes` to name."""
+    kept = ~without_area(boxes)
+    fits = scores.shape == kept.shape and (classes is None or classes.shape == kept.shape)
+    if kept.all() or not fits:
+        return Boxes(boxes, scores, classes, np.ones(len(boxes), dtype=np.bool_))
+    return Boxes(boxes[kept], scores[kept], None if classes is None else classes[kept], kept)
 
 
 def from_xyxy(corners: npt.ArrayLike) -> FloatArray:
@@ -118,7 +130,7 @@ def _from_supervision(source: Any, scores: npt.ArrayLike | None) -> Boxes:
     if names is None and source.class_id is not None:
         names = np.asarray(source.class_id)
     classes = None if names is None else np.asarray(names).astype(np.str_)
-    return Boxes(from_xyxy(source.xyxy), confidence, classes)
+    return _with_area(from_xyxy(source.xyxy), confidence, classes)
 
 
 def _from_ultralytics(result: Any) -> Boxes:
@@ -128,7 +140,7 @@ def _from_ultralytics(result: Any) -> Boxes:
         names = getattr(result, "names", None) or {}
         codes = _array(boxes.cls).astype(int).tolist()
         classes = np.array([str(names[c]) if c in _keys(names) else str(c) for c in codes], dtype=np.str_)
-    return Boxes(from_xyxy(_array(boxes.xyxy)), _array(boxes.conf).reshape(-1), classes)
+    return _with_area(from_xyxy(_array(boxes.xyxy)), _array(boxes.conf).reshape(-1), classes)
 
 
 def _keys(names: Any) -> Any:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.boxes import without_area
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.io import coco, kitti, motchallenge, prophesee
@@ -22,7 +23,6 @@ from jeat_graph.io.detection_rows import (
     check_rows,
     read_embeddings,
     rows_without_box,
-    without_area,
 )
 from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.formats import recognise

@@ -240,7 +240,8 @@ class Tracker(SavedTracks):
 
         Args:
             source: `supervision.Detections`, a result of `ultralytics`, or boxes (M, 4) left, top, width,
-                height in px; none (M = 0) if the sensor looked and found nothing.
+                height in px; none (M = 0) if the sensor looked and found nothing. Boxes without area, which
+                detectors clip, are left out.
             t: time (s).
             sensor: name of the sensor.
             scores: (M,) confidence in [0, 1], for boxes that come without; 1 where neither says it.
@@ -249,7 +250,7 @@ class Tracker(SavedTracks):
         Returns and raises as `step`; also a DataError where it cannot be told what `source` is.
         """
         found = boxes_of(source, scores)
-        looks = None if embeddings is None else unit_embeddings(embeddings, len(found.scores))
+        looks = None if embeddings is None else unit_embeddings(embeddings, len(found.kept))[found.kept]
         return self.step(Scan(t, sensor, found.boxes, found.scores, found.classes, looks))
 
     def causal(self) -> Trajectories:

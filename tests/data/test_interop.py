@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.interop import boxes_of, from_xyxy, to_xyxy
 
@@ -66,3 +67,28 @@ def test_results_of_ultralytics_are_known_by_their_attributes(names):
 def test_what_is_no_box_is_refused_with_what_would_be(source):
     with pytest.raises(DataError, match="boxes"):
         boxes_of(source)
+
+
+@pytest.mark.parametrize("side", [2, 3])
+def test_a_box_without_area_is_left_out_of_what_a_detector_gives(side):
+    boxes = BOXES.copy()
+    boxes[0, side] = 0.0
+    found = boxes_of(boxes, [0.3, 0.7])
+    assert found.boxes.tolist() == BOXES[1:].tolist()
+    assert found.scores.tolist() == [0.7]
+    assert found.kept.tolist() == [False, True]
+
+
+@pytest.mark.parametrize("bad", [-1.0, np.nan, np.inf])
+def test_a_box_that_is_worse_than_without_area_stays_to_be_refused(bad):
+    assert len(boxes_of([[10.0, 20.0, bad, 0.0]]).boxes) == 1
+
+
+def test_supervision_s_boxes_without_area_are_counted():
+    sv = pytest.importorskip("supervision")
+    corners = CORNERS.copy()
+    corners[0, 2] = corners[0, 0]
+    found = Detections.from_supervision(sv.Detections(xyxy=corners), t=0.5)
+    assert (len(found), found.num_scans, found.dropped) == (1, 1, 1)
+    found = Detections.from_supervision(sv.Detections(xyxy=corners[:1]), t=0.5)
+    assert (len(found), found.num_scans, found.dropped) == (0, 1, 1)
