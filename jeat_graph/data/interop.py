@@ -14,6 +14,7 @@ import numpy.typing as npt
 from jeat_graph.data.arrays import BoolArray, FloatArray, TextArray
 from jeat_graph.data.boxes import without_area
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.frame_columns import detector_columns, has_columns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,25 +40,31 @@ def boxes_of(source: Any, scores: npt.ArrayLike | None = None) -> Boxes:
     """Read boxes from whatever a detector returns, but for those without area: a detector has clipped them.
 
     Args:
-        source: `supervision.Detections`; a result of `ultralytics` (one picture, or a list of one); or an
-            array (M, 4) of left, top, width, height in px, or (M, 5) with the score behind.
+        source: `supervision.Detections`; a result of `ultralytics` (one picture, or a list of one); a data
+            frame, whose columns are found by name as in files, `score` and `class` too; or an array (M, 4)
+            of left, top, width, height in px, or (M, 5) with the score behind.
         scores: (M,) confidence in [0, 1] for boxes that come without; 1 where neither says it.
 
     Raises:
         DataError: nothing of the above, or shapes that do not fit.
     """
+    scores = None if scores is None else detached(scores)
     if isinstance(source, (list, tuple)) and len(source) == 1 and hasattr(source[0], "boxes"):
         source = source[0]
     if hasattr(source, "xyxy") and hasattr(source, "confidence"):
         return _from_supervision(source, scores)
     if hasattr(source, "boxes") and hasattr(source.boxes, "xyxy"):
         return _from_ultralytics(source)
+    if has_columns(source):
+        boxes, found, classes = detector_columns(source)
+        found = found if scores is None else np.asarray(scores, dtype=np.float64)
+        return _with_area(boxes, np.ones(len(boxes)) if found is None else found, classes)
     try:
-        table = np.asarray(source, dtype=np.float64)
+        table = _array(source)
     except (TypeError, ValueError):
         raise DataError(
-            "give boxes as an array (M, 4) of left, top, width, height, as supervision.Detections, or as a "
-            f"result with boxes.xyxy; not {type(source).__name__}"
+            "give boxes as an array (M, 4) of left, top, width, height, as a data frame, as "
+            f"supervision.Detections, or as a result with boxes.xyxy; not {type(source).__name__}"
         ) from None
     if table.size == 0:
         table = table.reshape(0, 4)
@@ -147,26 +154,15 @@ def _keys(names: Any) -> Any:
     return names if isinstance(names, dict) else range(len(names))
 
 
-def _array(values: Any) -> FloatArray:
-    """Array of a tensor, wherever it lies."""
+def detached(values: Any) -> Any:
+    """Return a tensor, wherever it lies and whatever learns from it, as an array can be made of it."""
     for step in ("detach", "cpu"):
         values = getattr(values, step)() if hasattr(values, step) else values
-    return np.asarray(values, dtype=np.float64)
+    return values
 
 
-def seconds_of(times: Any) -> npt.NDArray[Any]:
-    """Return a column of times in seconds: dates (those without a zone are UTC) since 1970, spans as such.
-
-    Args:
-        times: (N,) as a data frame has them; numbers stay as they are.
-    """
-    if hasattr(times, "dt") and getattr(times.dt, "tz", None) is not None:
-        times = times.dt.tz_convert("UTC").dt.tz_localize(None)
-    column = np.asarray(times)
-    if column.dtype.kind not in "mM":
-        return column
-    since = column - np.datetime64(0, "s") if column.dtype.kind == "M" else column
-    return np.where(np.isnat(since), np.nan, since / np.timedelta64(1, "s"))
+def _array(values: Any) -> FloatArray:
+    return np.asarray(detached(values), dtype=np.float64)
 
 
 def columns_of(table: pd.DataFrame, needed: tuple[str, ...], what: str) -> dict[str, npt.NDArray[Any]]:

@@ -10,11 +10,10 @@ import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.boxes import find_bad_row, without_area
+from jeat_graph.data.column_names import BOX, standing_in
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.embeddings import EmbeddingArray, find_bad_embedding, unit_embeddings
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.views import BOX
-from jeat_graph.io.column_names import standing_in
 from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.frames import score_hint
 

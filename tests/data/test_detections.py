@@ -231,6 +231,51 @@ def test_a_data_frame_may_have_corners_and_nothing_more_than_boxes():
         Detections.from_pandas(frame.drop(columns="t"))
 
 
+@pytest.mark.parametrize(
+    ("times", "options"),
+    [
+        ({"time": [0.5]}, {}),
+        ({"timestamp_ms": [500]}, {}),
+        ({"t": [500]}, {"time_unit": "ms"}),
+        ({"Frame": [10]}, {"rate_hz": 20.0}),
+    ],
+)
+def test_a_data_frame_has_the_names_that_files_have(times, options):
+    pd = pytest.importorskip("pandas")
+    corners = {"x1": [10.0], "y1": [20.0], "x2": [40.0], "y2": [60.0], "conf": [0.5], "camera": ["evt"]}
+    centre = {"cx": [25.0], "cy": [40.0], "w": [30.0], "h": [40.0], "prob": [0.5], "sensor": ["evt"]}
+    for boxes in (corners, centre):
+        found = Detections.from_pandas(pd.DataFrame({**times, **boxes}), **options)
+        assert (found.scan_t.tolist(), found.boxes.tolist()) == ([0.5], [BOX])
+        assert (found.scores.tolist(), found.sensors) == ([0.5], ("evt",))
+
+
+@pytest.mark.parametrize(
+    ("times", "options", "what"),
+    [
+        ({"t_ms": [500]}, {"time_unit": "us"}, "'t_ms' is in ms, but time_unit says us"),
+        ({"frame": [10]}, {}, "rate_hz"),
+        (
+            {"t": ["2024-05-01 10:00"]},
+            {},
+            "'t' must hold times in seconds, or dates .* not '2024-05-01",
+        ),
+    ],
+)
+def test_times_that_a_data_frame_leaves_open_are_refused(times, options, what):
+    pd = pytest.importorskip("pandas")
+    boxes = {"left": [1.0], "top": [2.0], "width": [3.0], "height": [4.0]}
+    with pytest.raises(DataError, match=what):
+        Detections.from_pandas(pd.DataFrame({**times, **boxes}), **options)
+
+
+def test_boxes_without_area_in_a_data_frame_are_left_out_and_counted():
+    pd = pytest.importorskip("pandas")
+    frame = pd.DataFrame({"t": [0.0, 1.0], "left": 1.0, "top": 2.0, "width": [3.0, 0.0], "height": 4.0})
+    found = Detections.from_pandas(frame)
+    assert (len(found), found.num_scans, found.dropped) == (1, 2, 1)
+
+
 @pytest.mark.parametrize("unit", ["s", "us", "ns"])
 def test_dates_and_spans_of_a_data_frame_are_seconds(unit):
     pd = pytest.importorskip("pandas")
