@@ -46,13 +46,20 @@ def check_boxes(boxes: npt.ArrayLike, scores: npt.ArrayLike) -> tuple[FloatArray
     return b, s
 
 
+def detached(values: Any) -> Any:
+    """Return a tensor, wherever it lies and whatever learns from it, as an array can be made of it."""
+    for step in ("detach", "cpu"):
+        values = getattr(values, step)() if hasattr(values, step) else values
+    return values
+
+
 def plain_floats(values: npt.ArrayLike) -> FloatArray:
     """Return numbers as compiled code takes them: C-contiguous, writable float64; copied if need be.
 
     Raises:
         TypeError, ValueError: not numbers.
     """
-    array = np.ascontiguousarray(values, dtype=np.float64)
+    array = np.ascontiguousarray(detached(values), dtype=np.float64)
     return array if array.flags.behaved else array.copy()
 
 

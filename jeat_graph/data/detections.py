@@ -70,10 +70,13 @@ class Detections(DetectionViews):
         Raises:
             DataError: a time, a box or an embedding that is not valid; the message names the row.
         """
-        time = np.array(t, dtype=np.float64).reshape(-1)
         names = np.asarray(sensor, dtype=np.str_).reshape(-1)
-        b = np.array(boxes, dtype=np.float64, order="C").reshape(-1, 4)
-        s = np.array(scores, dtype=np.float64).reshape(-1)
+        try:
+            time = np.array(t, dtype=np.float64).reshape(-1)
+            b = np.array(boxes, dtype=np.float64, order="C").reshape(-1, 4)
+            s = np.array(scores, dtype=np.float64).reshape(-1)
+        except (TypeError, ValueError):
+            raise DataError("t (R,) in seconds, boxes (R, 4) and scores (R,) must be numbers") from None
         gap = np.zeros(len(time), dtype=bool) if empty is None else np.asarray(empty, dtype=bool)
         if not len(time) == len(names) == len(b) == len(s) == len(gap):
             raise DataError("t, sensor, boxes, scores and empty must have one entry a row")

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, TextArray
-from jeat_graph.data.boxes import without_area
+from jeat_graph.data.boxes import detached, without_area
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_columns import detector_columns, has_columns
 
@@ -48,7 +48,7 @@ def boxes_of(source: Any, scores: npt.ArrayLike | None = None) -> Boxes:
     Raises:
         DataError: nothing of the above, or shapes that do not fit.
     """
-    scores = None if scores is None else detached(scores)
+    scores = None if scores is None else _scores(scores)
     if isinstance(source, (list, tuple)) and len(source) == 1 and hasattr(source[0], "boxes"):
         source = source[0]
     if hasattr(source, "xyxy") and hasattr(source, "confidence"):
@@ -57,7 +57,7 @@ def boxes_of(source: Any, scores: npt.ArrayLike | None = None) -> Boxes:
         return _from_ultralytics(source)
     if has_columns(source):
         boxes, found, classes = detector_columns(source)
-        found = found if scores is None else np.asarray(scores, dtype=np.float64)
+        found = found if scores is None else scores
         return _with_area(boxes, np.ones(len(boxes)) if found is None else found, classes)
     try:
         table = _array(source)
@@ -154,11 +154,11 @@ def _keys(names: Any) -> Any:
     return names if isinstance(names, dict) else range(len(names))
 
 
-def detached(values: Any) -> Any:
-    """Return a tensor, wherever it lies and whatever learns from it, as an array can be made of it."""
-    for step in ("detach", "cpu"):
-        values = getattr(values, step)() if hasattr(values, step) else values
-    return values
+def _scores(values: npt.ArrayLike) -> FloatArray:
+    try:
+        return _array(values)
+    except (TypeError, ValueError):
+        raise DataError(f"scores must be numbers, one a box, not {values!r:.40}") from None
 
 
 def _array(values: Any) -> FloatArray:

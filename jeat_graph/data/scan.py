@@ -46,9 +46,9 @@ class Scan:
     embeddings: EmbeddingArray | None = None
 
     def __post_init__(self) -> None:
-        t = float(self.t)
-        if not np.isfinite(t):
-            raise DataError(f"the time of a scan must be finite, got {self.t}")
+        t = time_of(self.t)
+        if not isinstance(self.sensor, str):
+            raise DataError(f"sensor is the name of the sensor (a text), got {self.sensor!r}")
         boxes, scores = check_boxes(self.boxes, self.scores)
         object.__setattr__(self, "t", t)
         object.__setattr__(self, "boxes", boxes)
@@ -71,6 +71,24 @@ class Scan:
     ) -> Scan:
         """Make a scan of boxes (M, 4) that are given as left, top, right, bottom (px)."""
         return Scan(t, sensor, from_xyxy(corners), np.asarray(scores, dtype=np.float64), classes)
+
+
+def time_of(t: Any) -> float:
+    """Return a time (s) as a number.
+
+    Raises:
+        DataError: it is none, or not finite.
+    """
+    dated = getattr(getattr(t, "dtype", None), "kind", "") in ("m", "M")  # of ns, it would pass for a number
+    try:
+        number = np.nan if dated else float(t)
+    except (TypeError, ValueError, OverflowError):
+        dated, number = True, np.nan
+    if dated:
+        raise DataError(f"t is a time in seconds (a number), got {t!r:.60}; dates have .timestamp()")
+    if not np.isfinite(number):
+        raise DataError(f"the time of a scan must be finite, got {t}")
+    return number
 
 
 def scan_with_area(

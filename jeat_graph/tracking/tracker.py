@@ -19,6 +19,7 @@ from jeat_graph.data.diagnostics import Diagnostics
 from jeat_graph.data.embeddings import EmbeddingArray, unit_embeddings
 from jeat_graph.data.errors import JeatGraphError, TimeOrderError
 from jeat_graph.data.interop import boxes_of
+from jeat_graph.data.scan import time_of
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.appearance import Compared, Looks, compare, embeddings_of, remember
 from jeat_graph.tracking.classes import ClassTally, check_names, count_votes
@@ -223,6 +224,7 @@ class Tracker(SavedTracks):
         Raises:
             TimeOrderError: a time before that of the last step.
         """
+        t = time_of(t)
         if self._t is not None and t < self._t:
             raise TimeOrderError(f"t = {t} s is before the last scan at {self._t} s: that is past")
         return predict_reported(self.snapshot(), t, self._model, self.sensor_names)
