@@ -93,8 +93,8 @@ def test_a_batch_is_all_the_scans_of_one_time(rows):
 @settings(max_examples=100, deadline=None)
 def test_the_sensors_taken_apart_and_put_together_are_the_whole(rows):
     detections = from_rows(rows)
-    parts = [detections.select([name]) for name in ("lidar", "rgb", "evt", "none of them")]
-    for part, name in zip(parts, ("lidar", "rgb", "evt", ""), strict=True):
+    parts = [detections.select(names) for names in ([], *detections.sensors)]
+    for part, name in zip(parts, ("", *detections.sensors), strict=True):
         assert scans_of(part) == {key: scan for key, scan in as_sets(rows).items() if key[1] == name}
     assert scans_of(Detections.concatenate(parts)) == scans_of(detections)
 
@@ -229,6 +229,15 @@ def test_a_data_frame_may_have_corners_and_nothing_more_than_boxes():
     assert found.scores.tolist() == [1.0]
     with pytest.raises(DataError, match="need the column t"):
         Detections.from_pandas(frame.drop(columns="t"))
+
+
+def test_sensors_are_selected_by_one_name_or_by_several():
+    both = Detections.from_scans([Scan(0.0, name, [BOX], [0.5]) for name in ("rgb", "evt", "b")])
+    assert both.select("rgb").sensors == ("rgb",)
+    assert both.select(["rgb", "evt"]).sensors == ("evt", "rgb")
+    assert both.select([]).num_scans == 0
+    with pytest.raises(DataError, match="no sensor 'lidar' in the recording; there are: b, evt, rgb"):
+        both.select(["rgb", "lidar"])
 
 
 @pytest.mark.parametrize(
