@@ -203,8 +203,7 @@ class Session:
         """What is worth a line at the end: late scans of any sensor, and messages passed over."""
         lateness = self.live.lateness.summary()
         lines = [
-            f"sensor {name!r}: {one.late} of {one.scans} scans late, median {1e3 * one.median_s:.0f} ms, "
-            f"99 % within {1e3 * one.p99_s:.0f} ms, {one.dropped} passed over"
+            f"sensor {name!r}: {one.text()}, {one.dropped} passed over"
             for name, one in lateness.items()
             if any(other.late for other in lateness.values())
         ]
