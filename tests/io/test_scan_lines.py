@@ -49,3 +49,22 @@ def test_a_row_of_csv_without_area_is_a_look_that_found_nothing():
 def test_boxes_that_are_worse_are_errors(box):
     with pytest.raises(DataError, match="x:7"):
         batch_of({"t": 0.5, "sensor": "rgb", "boxes": [box], "scores": [0.9]}, "x", 7)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Time\tcamera\tx1\ty1\tx2\ty2\tconf\n0.5\trgb\t1.5\t2\t4.5\t6\t.5\n",
+        "t;sensor;cx;cy;w;h;score;label\n0,5;rgb;3;4;3;4;0,5;car\n",
+        "t,sensor,left,top,right,bottom,score\n0.5,rgb,1.5,2,4.5,6,.5\n",
+    ],
+)
+def test_csv_is_read_by_the_names_that_files_have(text):
+    ((scan,), _, _) = batches(text)[0]
+    assert (scan.t, scan.sensor, scan.boxes.tolist()) == (0.5, "rgb", [[1.5, 2.0, 3.0, 4.0]])
+    assert scan.scores.tolist() == [0.5]
+
+
+def test_a_column_of_times_in_ms_is_refused_with_what_to_do():
+    with pytest.raises(DataError, match="name the column of times t, and give --time-unit ms"):
+        batches("time_ms,sensor,left,top,width,height,score\n")
