@@ -86,12 +86,49 @@ def track(
 def _recording(detections: Detections | pd.DataFrame | PathLike) -> Detections:
     if isinstance(detections, (str, Path)):
         return read_detections(detections)
-    return detections if isinstance(detections, Detections) else Detections.from_pandas(detections)
+    if isinstance(detections, Detections):
+        return detections
+    if hasattr(detections, "columns"):
+        return Detections.from_pandas(detections)
+    raise DataError(
+        "detections are Detections, a data frame, or the path of a file (make one of arrays with "
+        f"Detections.from_rows, of several with Detections.concatenate), not {type(detections).__name__}"
+    )
+
+
+def _truth(truth: GroundTruth | pd.DataFrame | PathLike) -> GroundTruth:
+    if isinstance(truth, (str, Path)):
+        return read_truth(truth)
+    if isinstance(truth, GroundTruth):
+        return truth
+    if hasattr(truth, "columns"):
+        from jeat_graph.data.truth_frames import truth_of_frame
+
+        return truth_of_frame(truth)
+    raise DataError(
+        f"truth is a GroundTruth, a data frame, or the path of a file, not {type(truth).__name__}"
+    )
+
+
+def _tables(tracks: Trajectories | Tracks | pd.DataFrame, kind: str) -> dict[str, Trajectories]:
+    if isinstance(tracks, (Tracks, Run)):
+        both = {"causal": tracks.causal, "smoothed": tracks.smoothed}
+        return {name: table for name, table in both.items() if table is not None}
+    if kind not in ("causal", "smoothed"):
+        raise DataError(f"kind {kind!r}: must be causal or smoothed")
+    if isinstance(tracks, Trajectories):
+        return {kind: tracks}
+    if hasattr(tracks, "columns"):
+        return {kind: Trajectories.from_pandas(tracks)}
+    raise DataError(
+        "tracks are what track or read_run gives, a table of it, a data frame of one, or a path, "
+        f"not {type(tracks).__name__}"
+    )
 
 
 def evaluate(
-    tracks: Trajectories | Tracks | PathLike,
-    truth: GroundTruth | PathLike,
+    tracks: Trajectories | Tracks | Run | pd.DataFrame | PathLike,
+    truth: GroundTruth | pd.DataFrame | PathLike,
     *,
     kind: str = "causal",
     classes: Sequence[str] | None = None,
@@ -99,8 +136,9 @@ def evaluate(
     """Judge tracks against truth.
 
     Args:
-        tracks: a table, both tables of `track`, or a path that `jeat-graph eval` takes.
-        truth: the truth, or a file that `read_truth` knows.
+        tracks: a table, also as a data frame, both tables of `track` or `read_run`, or a path that
+            `jeat-graph eval` takes.
+        truth: the truth, a data frame with its columns, or a file that `read_truth` knows.
         kind: what a table alone is: `causal` or `smoothed`.
         classes: classes of objects to be found; others are ignored, and so are tracks that have another
             class. All by default.
@@ -115,23 +153,16 @@ def evaluate(
     from jeat_graph.eval.load import JudgedRun, check_classes, load_run, restrict_classes, restrict_tracks
 
     if isinstance(tracks, (str, Path)):
-        if isinstance(truth, GroundTruth):
+        if not isinstance(truth, (str, Path)):
             raise DataError("a run that is given as a path needs its truth as a path too")
         run = load_run(tracks, truth, classes=classes)
         if classes is not None:
             check_classes([run.truth], classes)
     else:
-        objects = truth if isinstance(truth, GroundTruth) else read_truth(truth)
+        tables, objects = _tables(tracks, kind), _truth(truth)
         if classes is not None:
             objects = restrict_classes(objects, classes)
             check_classes([objects], classes)
-        if isinstance(tracks, Trajectories):
-            if kind not in ("causal", "smoothed"):
-                raise DataError(f"kind {kind!r}: must be causal or smoothed")
-            tables = {kind: tracks}
-        else:
-            tables = {name: table for name, table in tracks._asdict().items() if table is not None}
-        if classes is not None:
             tables = {name: restrict_tracks(table, classes) for name, table in tables.items()}
         run = JudgedRun("tracks", objects, tables.get("causal"), tables.get("smoothed"))
     return {name: one.as_dict() for name, one in judge_runs([run]).items()}
@@ -140,7 +171,7 @@ def evaluate(
 def compare(
     detections: Detections | pd.DataFrame | PathLike,
     config: Config | PathLike = "default",
-    truth: GroundTruth | PathLike | None = None,
+    truth: GroundTruth | pd.DataFrame | PathLike | None = None,
     *,
     lags_s: Sequence[float] | None = None,
 ) -> Comparison:
@@ -163,7 +194,7 @@ def compare(
     from jeat_graph.runs.measured import compare_run, track_measured
 
     recording = _recording(detections)
-    objects = truth if isinstance(truth, GroundTruth) or truth is None else read_truth(truth)
+    objects = None if truth is None else _truth(truth)
     settings = fit_input(as_config(config), recording)[0]
     return compare_run(track_measured(settings, at_measurement(recording, settings)), objects, lags_s)
 
@@ -197,13 +228,13 @@ def calibrate(
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.latency import at_measurement
 
-    recordings = [d if isinstance(d, Detections) else read_detections(d) for d in _as_list(detections)]
+    recordings = [_recording(one) for one in _as_list(detections)]
     start = fit_input(as_config(base, image), *recordings)[0]
     recordings = [at_measurement(one, start) for one in recordings]
     if truth is None:
         return calibrate_without_truth(recordings, start).config
 
-    truths = [t if isinstance(t, GroundTruth) else read_truth(t) for t in _as_list(truth)]
+    truths = [_truth(one) for one in _as_list(truth)]
     if len(truths) != len(recordings):
         raise DataError(f"{len(recordings)} recordings and {len(truths)} truths given; give one for each")
     pairs = list(zip(recordings, truths, strict=True))
@@ -245,4 +276,4 @@ def read_run(path: PathLike) -> Run:
 
 def _as_list(values: Any) -> list[Any]:
     one = isinstance(values, (str, Path, Detections, GroundTruth))
-    return [values] if one else list(values)
+    return [values] if one or hasattr(values, "columns") else list(values)

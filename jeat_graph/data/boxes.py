@@ -46,13 +46,20 @@ def check_boxes(boxes: npt.ArrayLike, scores: npt.ArrayLike) -> tuple[FloatArray
     return b, s
 
 
+def detached(values: Any) -> Any:
+    """Return a tensor, wherever it lies and whatever learns from it, as an array can be made of it."""
+    for step in ("detach", "cpu"):
+        values = getattr(values, step)() if hasattr(values, step) else values
+    return values
+
+
 def plain_floats(values: npt.ArrayLike) -> FloatArray:
     """Return numbers as compiled code takes them: C-contiguous, writable float64; copied if need be.
 
     Raises:
         TypeError, ValueError: not numbers.
     """
-    array = np.ascontiguousarray(values, dtype=np.float64)
+    array = np.ascontiguousarray(detached(values), dtype=np.float64)
     return array if array.flags.behaved else array.copy()
 
 
@@ -91,6 +98,15 @@ def find_bad_row(boxes: FloatArray, scores: FloatArray) -> tuple[int, str] | Non
         bounds = f"places to {LARGEST_PX:g}, sizes from {SMALLEST_PX:g} to {LARGEST_PX:g}"
         return row, f"no picture holds a box at {left:g}, {top:g} of {width:g} x {height:g} px ({bounds})"
     return row, f"score must be in [0, 1], got {scores[row]}"
+
+
+def without_area(boxes: FloatArray) -> BoolArray:
+    """Which boxes (M, 4) a detector has clipped to nothing: no side is negative and one is zero."""
+    side = boxes[:, 2:]
+    if len(boxes) == 0 or side.min() > 0.0:
+        return np.zeros(len(boxes), dtype=bool)
+    finite = np.isfinite(boxes).all(axis=1)
+    return np.asarray(finite & (side >= 0.0).all(axis=1) & (side == 0.0).any(axis=1))
 
 
 def class_texts(classes: Any, count: int) -> TextArray:

@@ -70,10 +70,13 @@ class Detections(DetectionViews):
         Raises:
             DataError: a time, a box or an embedding that is not valid; the message names the row.
         """
-        time = np.array(t, dtype=np.float64).reshape(-1)
         names = np.asarray(sensor, dtype=np.str_).reshape(-1)
-        b = np.array(boxes, dtype=np.float64, order="C").reshape(-1, 4)
-        s = np.array(scores, dtype=np.float64).reshape(-1)
+        try:
+            time = np.array(t, dtype=np.float64).reshape(-1)
+            b = np.array(boxes, dtype=np.float64, order="C").reshape(-1, 4)
+            s = np.array(scores, dtype=np.float64).reshape(-1)
+        except (TypeError, ValueError):
+            raise DataError("t (R,) in seconds, boxes (R, 4) and scores (R,) must be numbers") from None
         gap = np.zeros(len(time), dtype=bool) if empty is None else np.asarray(empty, dtype=bool)
         if not len(time) == len(names) == len(b) == len(s) == len(gap):
             raise DataError("t, sensor, boxes, scores and empty must have one entry a row")
@@ -221,9 +224,17 @@ class Detections(DetectionViews):
         for start, end in zip(starts, ends, strict=True):
             yield [self.scan(k) for k in range(start, end)]
 
-    def select(self, sensors: Iterable[str]) -> Detections:
-        """Keep the scans of some sensors only; names that do not occur are passed over."""
-        wanted = set(sensors)
+    def select(self, sensors: str | Iterable[str]) -> Detections:
+        """Keep the scans of one sensor, or of some.
+
+        Raises:
+            DataError: there is no sensor of such a name; the message names those there are.
+        """
+        wanted = {sensors} if isinstance(sensors, str) else set(sensors)
+        strange = sorted(str(name) for name in wanted - set(self.sensors))
+        if strange:
+            there = ", ".join(self.sensors) or "none"
+            raise DataError(f"there is no sensor {strange[0]!r} in the recording; there are: {there}")
         keep = np.array([name in wanted for name in self.sensors], dtype=bool)
         return Detections.from_scans(self.scan(k) for k in range(self.num_scans) if keep[self.scan_sensor[k]])
 

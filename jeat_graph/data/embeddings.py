@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import BoolArray, FloatArray
+from jeat_graph.data.boxes import detached
 from jeat_graph.data.errors import DataError
 
 EmbeddingArray: TypeAlias = npt.NDArray[np.float32]
@@ -32,7 +33,7 @@ def unit_embeddings(values: npt.ArrayLike, count: int) -> EmbeddingArray:
         DataError: another shape, more than `MOST_NUMBERS`, or a row that has no direction.
     """
     try:
-        found = np.array(values, dtype=np.float64)
+        found = np.array(detached(values), dtype=np.float64)
     except (TypeError, ValueError):
         raise DataError("embeddings must have shape (M, E), all of them numbers") from None
     if found.size == 0 and count == 0:

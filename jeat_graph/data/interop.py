@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.data.arrays import FloatArray, TextArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, TextArray
+from jeat_graph.data.boxes import detached, without_area
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.frame_columns import detector_columns, has_columns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,36 +27,44 @@ class Boxes(NamedTuple):
         boxes: (M, 4) left, top, width, height (px).
         scores: (M,) confidence in [0, 1].
         classes: (M,) class names, or None where the detector says none.
+        kept: (R,) which of the rows these are; the others have no area.
     """
 
     boxes: FloatArray
     scores: FloatArray
     classes: TextArray | None
+    kept: BoolArray
 
 
 def boxes_of(source: Any, scores: npt.ArrayLike | None = None) -> Boxes:
-    """Read boxes from whatever a detector returns.
+    """Read boxes from whatever a detector returns, but for those without area: a detector has clipped them.
 
     Args:
-        source: `supervision.Detections`; a result of `ultralytics` (one picture, or a list of one); or an
-            array (M, 4) of left, top, width, height in px, or (M, 5) with the score behind.
+        source: `supervision.Detections`; a result of `ultralytics` (one picture, or a list of one); a data
+            frame, whose columns are found by name as in files, `score` and `class` too; or an array (M, 4)
+            of left, top, width, height in px, or (M, 5) with the score behind.
         scores: (M,) confidence in [0, 1] for boxes that come without; 1 where neither says it.
 
     Raises:
         DataError: nothing of the above, or shapes that do not fit.
     """
+    scores = None if scores is None else _scores(scores)
     if isinstance(source, (list, tuple)) and len(source) == 1 and hasattr(source[0], "boxes"):
         source = source[0]
     if hasattr(source, "xyxy") and hasattr(source, "confidence"):
         return _from_supervision(source, scores)
     if hasattr(source, "boxes") and hasattr(source.boxes, "xyxy"):
         return _from_ultralytics(source)
+    if has_columns(source):
+        boxes, found, classes = detector_columns(source)
+        found = found if scores is None else scores
+        return _with_area(boxes, np.ones(len(boxes)) if found is None else found, classes)
     try:
-        table = np.asarray(source, dtype=np.float64)
+        table = _array(source)
     except (TypeError, ValueError):
         raise DataError(
-            "give boxes as an array (M, 4) of left, top, width, height, as supervision.Detections, or as a "
-            f"result with boxes.xyxy; not {type(source).__name__}"
+            "give boxes as an array (M, 4) of left, top, width, height, as a data frame, as "
+            f"supervision.Detections, or as a result with boxes.xyxy; not {type(source).__name__}"
         ) from None
     if table.size == 0:
         table = table.reshape(0, 4)
@@ -62,7 +72,16 @@ def boxes_of(source: Any, scores: npt.ArrayLike | None = None) -> Boxes:
         raise DataError(f"boxes must have shape (M, 4), or (M, 5) with scores, not {table.shape}")
     if scores is None:
         scores = table[:, 4] if table.shape[1] == 5 else np.ones(len(table))
-    return Boxes(table[:, :4], np.asarray(scores, dtype=np.float64), None)
+    return _with_area(table[:, :4], np.asarray(scores, dtype=np.float64), None)
+
+
+def _with_area(boxes: FloatArray, scores: FloatArray, classes: TextArray | None) -> Boxes:
+    """Leave out the boxes (R, 4) without area; shapes that do not fit stay, for `check_boxes` to name."""
+    kept = ~without_area(boxes)
+    fits = scores.shape == kept.shape and (classes is None or classes.shape == kept.shape)
+    if kept.all() or not fits:
+        return Boxes(boxes, scores, classes, np.ones(len(boxes), dtype=np.bool_))
+    return Boxes(boxes[kept], scores[kept], None if classes is None else classes[kept], kept)
 
 
 def from_xyxy(corners: npt.ArrayLike) -> FloatArray:
@@ -118,7 +137,7 @@ def _from_supervision(source: Any, scores: npt.ArrayLike | None) -> Boxes:
     if names is None and source.class_id is not None:
         names = np.asarray(source.class_id)
     classes = None if names is None else np.asarray(names).astype(np.str_)
-    return Boxes(from_xyxy(source.xyxy), confidence, classes)
+    return _with_area(from_xyxy(source.xyxy), confidence, classes)
 
 
 def _from_ultralytics(result: Any) -> Boxes:
@@ -128,33 +147,22 @@ def _from_ultralytics(result: Any) -> Boxes:
         names = getattr(result, "names", None) or {}
         codes = _array(boxes.cls).astype(int).tolist()
         classes = np.array([str(names[c]) if c in _keys(names) else str(c) for c in codes], dtype=np.str_)
-    return Boxes(from_xyxy(_array(boxes.xyxy)), _array(boxes.conf).reshape(-1), classes)
+    return _with_area(from_xyxy(_array(boxes.xyxy)), _array(boxes.conf).reshape(-1), classes)
 
 
 def _keys(names: Any) -> Any:
     return names if isinstance(names, dict) else range(len(names))
 
 
+def _scores(values: npt.ArrayLike) -> FloatArray:
+    try:
+        return _array(values)
+    except (TypeError, ValueError):
+        raise DataError(f"scores must be numbers, one a box, not {values!r:.40}") from None
+
+
 def _array(values: Any) -> FloatArray:
-    """Array of a tensor, wherever it lies."""
-    for step in ("detach", "cpu"):
-        values = getattr(values, step)() if hasattr(values, step) else values
-    return np.asarray(values, dtype=np.float64)
-
-
-def seconds_of(times: Any) -> npt.NDArray[Any]:
-    """Return a column of times in seconds: dates (those without a zone are UTC) since 1970, spans as such.
-
-    Args:
-        times: (N,) as a data frame has them; numbers stay as they are.
-    """
-    if hasattr(times, "dt") and getattr(times.dt, "tz", None) is not None:
-        times = times.dt.tz_convert("UTC").dt.tz_localize(None)
-    column = np.asarray(times)
-    if column.dtype.kind not in "mM":
-        return column
-    since = column - np.datetime64(0, "s") if column.dtype.kind == "M" else column
-    return np.where(np.isnat(since), np.nan, since / np.timedelta64(1, "s"))
+    return np.asarray(detached(values), dtype=np.float64)
 
 
 def columns_of(table: pd.DataFrame, needed: tuple[str, ...], what: str) -> dict[str, npt.NDArray[Any]]:

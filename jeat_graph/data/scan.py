@@ -5,13 +5,15 @@ One without boxes is data too: it says that the sensor looked and found nothing.
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray, TextArray
-from jeat_graph.data.boxes import check_boxes, class_texts
+from jeat_graph.data.boxes import check_boxes, class_texts, without_area
 from jeat_graph.data.embeddings import EmbeddingArray, unit_embeddings
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.interop import from_xyxy
@@ -20,6 +22,9 @@ from jeat_graph.data.interop import from_xyxy
 @dataclass(frozen=True, eq=False)
 class Scan:
     """All detections of one sensor at one time.
+
+    A box without area is refused here; files, streams and `Tracker.update`, where a detector has clipped it,
+    leave it out.
 
     Attributes:
         t: time (s), finite.
@@ -41,9 +46,9 @@ class Scan:
     embeddings: EmbeddingArray | None = None
 
     def __post_init__(self) -> None:
-        t = float(self.t)
-        if not np.isfinite(t):
-            raise DataError(f"the time of a scan must be finite, got {self.t}")
+        t = time_of(self.t)
+        if not isinstance(self.sensor, str):
+            raise DataError(f"sensor is the name of the sensor (a text), got {self.sensor!r}")
         boxes, scores = check_boxes(self.boxes, self.scores)
         object.__setattr__(self, "t", t)
         object.__setattr__(self, "boxes", boxes)
@@ -66,6 +71,59 @@ class Scan:
     ) -> Scan:
         """Make a scan of boxes (M, 4) that are given as left, top, right, bottom (px)."""
         return Scan(t, sensor, from_xyxy(corners), np.asarray(scores, dtype=np.float64), classes)
+
+
+def time_of(t: Any) -> float:
+    """Return a time (s) as a number.
+
+    Raises:
+        DataError: it is none, or not finite.
+    """
+    dated = getattr(getattr(t, "dtype", None), "kind", "") in ("m", "M")  # of ns, it would pass for a number
+    try:
+        number = np.nan if dated else float(t)
+    except (TypeError, ValueError, OverflowError):
+        dated, number = True, np.nan
+    if dated:
+        raise DataError(f"t is a time in seconds (a number), got {t!r:.60}; dates have .timestamp()")
+    if not np.isfinite(number):
+        raise DataError(f"the time of a scan must be finite, got {t}")
+    return number
+
+
+def scan_with_area(
+    t: float,
+    sensor: str,
+    boxes: npt.ArrayLike,
+    scores: npt.ArrayLike,
+    classes: npt.ArrayLike | None = None,
+    embeddings: npt.ArrayLike | None = None,
+) -> tuple[Scan, int]:
+    """Make a scan of what a detector gave, which may have clipped boxes to nothing.
+
+    Args:
+        t: time (s).
+        sensor: name of the sensor.
+        boxes: (M, 4) left, top, width, height (px).
+        scores: (M,) confidence in [0, 1]; that of a box without area is not looked at.
+        classes: (M,) class names, or None.
+        embeddings: (M, E), or None.
+
+    Returns:
+        The scan without the boxes that have no area, and how many these were.
+
+    Raises:
+        DataError: as `Scan` does.
+    """
+    columns: list[Any] = [boxes, scores, classes, embeddings]
+    flat = np.zeros(0, dtype=bool)
+    with contextlib.suppress(TypeError, ValueError, OverflowError):  # what is no array is named by `Scan`
+        table = np.asarray(boxes, dtype=np.float64)
+        if table.ndim == 2 and table.shape[1] == 4:
+            columns[0], flat = table, without_area(table)
+        if flat.any() and all(one is None or len(one) == len(flat) for one in columns):
+            columns = [None if one is None else np.asarray(one)[~flat] for one in columns]
+    return Scan(t, sensor, *columns), int(flat.sum())
 
 
 def trusted_scan(

@@ -10,13 +10,13 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray, IntArray, TextArray
 from jeat_graph.data.class_columns import class_column, rows_of_class
+from jeat_graph.data.column_names import BOX
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.interop import columns_of, supervision_of, to_xyxy
 
 if TYPE_CHECKING:
     import pandas as pd
 
-BOX = ("left", "top", "width", "height")
 MEAN = ("x", "y", "vx", "vy", "ax", "ay")
 VAR = tuple(f"var_{name}" for name in MEAN)
 SIZE_VAR = ("var_width", "var_height")

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray
-from jeat_graph.data.boxes import find_bad_row
+from jeat_graph.data.boxes import find_bad_row, without_area
+from jeat_graph.data.column_names import BOX, standing_in
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.embeddings import EmbeddingArray, find_bad_embedding, unit_embeddings
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.views import BOX
-from jeat_graph.io.column_names import standing_in
 from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.frames import score_hint
 
@@ -33,15 +32,6 @@ def rows_without_box(table: FileTable) -> BoolArray:
     """Which rows (R,) only say that a scan took place; a row with part of a box is an error."""
     values = [*standing_in(table.names, BOX), "score"]
     return table.bare(values, "a scan that found nothing has only t and sensor")
-
-
-def without_area(boxes: FloatArray) -> BoolArray:
-    """Which boxes (M, 4) a detector has clipped to nothing: no side is negative and one is zero."""
-    side = boxes[:, 2:]
-    if len(boxes) == 0 or side.min() > 0.0:
-        return np.zeros(len(boxes), dtype=bool)
-    finite = np.isfinite(boxes).all(axis=1)
-    return np.asarray(finite & (side >= 0.0).all(axis=1) & (side == 0.0).any(axis=1))
 
 
 def check_rows(

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.data.arrays import IntArray, TextArray
+from jeat_graph.data.column_names import BOX
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.data.views import BOX
 from jeat_graph.io import kitti, motchallenge
 from jeat_graph.io.frames import check_rate
 from jeat_graph.io.rounding import round_decimals

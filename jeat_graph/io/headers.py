@@ -48,7 +48,7 @@ def split_header(data: bytes, path: Path) -> Header:
         line += 1
     try:
         text = head.decode("utf-8")
-        delimiter = _delimiter(text)
+        delimiter = delimiter_of(text)
         fields = next(csv.reader([text], strict=False, delimiter=delimiter))
     except UnicodeDecodeError:
         raise DataError("is not UTF-8; save the file as UTF-8", path, line) from None
@@ -59,7 +59,7 @@ def split_header(data: bytes, path: Path) -> Header:
     return Header([field.strip() for field in fields], start, line, delimiter)
 
 
-def _delimiter(header: str) -> str:
+def delimiter_of(header: str) -> str:
     """Tell what stands between names: the first of tab and semicolon that occurs where no comma does."""
     return "," if "," in header else next((mark for mark in "\t;" if mark in header), ",")
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from jeat_graph.data.column_names import standing_in, usual_names
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.column_names import standing_in, usual_names
 from jeat_graph.io.csv_text import read_bytes
 from jeat_graph.io.headers import check_names
 from jeat_graph.io.limits import check_room

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.data.arrays import IntArray
+from jeat_graph.data.column_names import standing_in, usual_names
 from jeat_graph.io.arrow_arrays import from_numpy, to_numpy
-from jeat_graph.io.column_names import standing_in, usual_names
 from jeat_graph.io.csv_text import TEXT, CsvBody, read_text
 from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.headers import check_names, split_header

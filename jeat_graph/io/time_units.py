@@ -1,32 +1,17 @@
-"""Units of time: recordings carry seconds, but loggers write ms, µs or ns."""
+"""Which unit of time a recording is most likely in: nobody scans once in 50 s, but many every 50 ms."""
 
 from __future__ import annotations
 
-import numpy as np
+from jeat_graph.data.time_units import TIME_UNITS, in_seconds
 
-from jeat_graph.data.arrays import FloatArray
-from jeat_graph.data.errors import ConfigError
+__all__ = ["LONGEST_STEP_S", "TIME_UNITS", "in_seconds", "likely_unit", "unit_question"]
 
-#: How many of each make a second.
-TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 #: No sensor that vehicles are tracked with takes longer than this from scan to scan (s).
 LONGEST_STEP_S = 5.0
 #: Nor less than this: the fastest cameras give a tenth of so many boxes.
 SHORTEST_STEP_S = 1e-4
 # Steps of a camera, from 2 kHz to 1 Hz (s): the unit that brings a step here is the likely one.
 _USUAL_STEP_S = (0.0005, 1.0)
-
-
-def in_seconds(times: FloatArray, unit: str) -> FloatArray:
-    """Return times (N,) of a unit in seconds; those in seconds as they are, to the last bit.
-
-    Raises:
-        ConfigError: a unit that is not known.
-    """
-    if unit not in TIME_UNITS:
-        raise ConfigError(f"unknown unit of time {unit!r}; known: {', '.join(TIME_UNITS)}")
-    # Divided, not multiplied: 1e-3 is no binary number, 1e3 is.
-    return times if unit == "s" else np.asarray(times / TIME_UNITS[unit])
 
 
 def likely_unit(step: float) -> str | None:
@@ -56,5 +41,8 @@ def unit_question(step: float) -> str:
     if step < LONGEST_STEP_S:
         return ""
     unit = likely_unit(step)
-    guess = f"are the times in {unit}? (--time-unit {unit})" if unit else "are the times in seconds?"
+    guess = "are the times in seconds?"
+    if unit:
+        python = f"in Python time_unit={unit!r} of read_detections or Detections.from_pandas"
+        guess = f"are the times in {unit}? (--time-unit {unit}; {python})"
     return f"median step {step:.6g} s: {guess}"

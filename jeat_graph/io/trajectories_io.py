@@ -16,9 +16,10 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.class_columns import class_column, unknown_classes
+from jeat_graph.data.column_names import BOX
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.data.views import BOX, MEAN, SIZE_VAR, VAR
+from jeat_graph.data.views import MEAN, SIZE_VAR, VAR
 from jeat_graph.io import kitti, motchallenge
 from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.formats import recognise

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.column_names import BOX, standing_in
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
-from jeat_graph.data.views import BOX
 from jeat_graph.io import kitti, motchallenge, prophesee
-from jeat_graph.io.column_names import boxes_of, standing_in, times_of
+from jeat_graph.io.column_names import boxes_of, times_of
 from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.formats import recognise
 from jeat_graph.io.frames import check_rate, fill_frames, gap_times

@@ -10,6 +10,8 @@ from jeat_graph.data.arrays import IntArray
 
 #: Width of a bin (s), and how many there are; what is later counts in the last one.
 BIN_S, BINS = 0.001, 10_000
+#: So late is what counts in the last bin, or later (s).
+COUNTED_S = (BINS - 1) * BIN_S
 
 
 class Lateness(NamedTuple):
@@ -20,7 +22,7 @@ class Lateness(NamedTuple):
         late: how many of them were older than one that had come before, of any sensor.
         dropped: how many of these came too late, or twice, and were passed over.
         median_s: median of how much older each was than the newest before (s), 0 for one that was newer.
-        p99_s: its 99th percentile (s).
+        p99_s: its 99th percentile (s); `COUNTED_S` stands for more, here and for the median.
         max_s: the most (s).
     """
 
@@ -30,6 +32,16 @@ class Lateness(NamedTuple):
     median_s: float
     p99_s: float
     max_s: float
+
+    def text(self) -> str:
+        """How late the scans were, in a few words."""
+        often = f"{self.late} of {self.scans} scans late"
+        if self.median_s >= COUNTED_S:
+            return f"{often}, most by more than {COUNTED_S:g} s"
+        within = f"99 % within {1e3 * self.p99_s:.0f} ms"
+        if self.p99_s >= COUNTED_S:
+            within = f"more than 1 % by more than {COUNTED_S:g} s"
+        return f"{often}, median {1e3 * self.median_s:.0f} ms, {within}"
 
 
 class LatenessCounter:

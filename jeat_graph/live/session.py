@@ -75,6 +75,7 @@ class Session:
         count: messages taken so far, of earlier sessions too.
         bad: messages that could not be read and were passed over.
         duplicates: messages that had been taken before.
+        flat: boxes without area that were left out of those taken.
     """
 
     def __init__(
@@ -91,6 +92,7 @@ class Session:
         self.count: int = kept.get("count", 0)
         self.bad: int = kept.get("bad", 0)
         self.duplicates: int = kept.get("duplicates", 0)
+        self.flat: int = kept.get("flat", 0)
         self._seen = Duplicates()
         if "seen" in kept:
             self._seen.set_state(kept["seen"])
@@ -126,6 +128,7 @@ class Session:
             self.duplicates += 1
             return
         self.count += 1
+        self.flat += message.batch.flat
         self._tell_dropped(arrival.dropped, arrival.late_s, place)
         self._tell_times(arrival)
         if self.ends.smoothed is not None:
@@ -160,6 +163,7 @@ class Session:
                 "count": self.count,
                 "bad": self.bad,
                 "duplicates": self.duplicates,
+                "flat": self.flat,
                 "seen": self._seen.state(),
                 "last": self._health.last,
                 "silent": self._health.silent,
@@ -190,6 +194,7 @@ class Session:
             "messages": self.count,
             "unreadable": self.bad,
             "duplicates": self.duplicates,
+            "boxes_without_area": self.flat,
             "restarts": dict(self._seen.restarts),
             "steps_taken_again": self.live.replayed,
             "lateness": lateness,
@@ -200,8 +205,7 @@ class Session:
         """What is worth a line at the end: late scans of any sensor, and messages passed over."""
         lateness = self.live.lateness.summary()
         lines = [
-            f"sensor {name!r}: {one.late} of {one.scans} scans late, median {1e3 * one.median_s:.0f} ms, "
-            f"99 % within {1e3 * one.p99_s:.0f} ms, {one.dropped} passed over"
+            f"sensor {name!r}: {one.text()}, {one.dropped} passed over"
             for name, one in lateness.items()
             if any(other.late for other in lateness.values())
         ]
@@ -209,6 +213,8 @@ class Session:
             lines.append(f"{self.bad} messages could not be read and were passed over")
         if self.duplicates:
             lines.append(f"{self.duplicates} messages had been taken before and were passed over")
+        if self.flat:
+            lines.append(f"{self.flat} box(es) without area left out")
         for source, count in self._seen.restarts.items():
             often = "once" if count == 1 else f"{count} times"
             lines.append(f"source {source!r} began to count its messages anew {often}")

@@ -22,12 +22,16 @@ ScanLike: TypeAlias = (
     | tuple[float, str, npt.ArrayLike, npt.ArrayLike, Any, Any]
 )
 
+#: Parts of a scan that is given as a tuple; classes and embeddings may be left out.
+_LEAST, _MOST = 4, 6
+_TAKEN = "step takes a Scan, a tuple (t, sensor, boxes, scores), or a sequence of these"
+
 
 def as_scans(scans: Any) -> list[Scan]:
     """Return one or more scans of one and the same time as a list.
 
     Raises:
-        DataError: boxes or scores that are not valid.
+        DataError: what is no scan, or boxes or scores that are not valid.
         TimeOrderError: scans of several times.
     """
     batch = _listed(scans)
@@ -39,13 +43,27 @@ def as_scans(scans: Any) -> list[Scan]:
 def _listed(scans: Any) -> list[Scan]:
     if isinstance(scans, Scan):
         return [scans]
-    if isinstance(scans, tuple) and 4 <= len(scans) <= 6 and isinstance(scans[1], str):
-        return [Scan(*scans)]
-    if isinstance(scans, Iterable):
-        out = [scan if isinstance(scan, Scan) else Scan(*scan) for scan in scans]
-        if out:
-            return out
-    raise TypeError("step takes a Scan, a tuple (t, sensor, boxes, scores), or a sequence of these")
+    if isinstance(scans, (tuple, list)) and len(scans) > 1 and isinstance(scans[1], str):
+        return [_scan_of(scans)]
+    if not isinstance(scans, Iterable) or isinstance(scans, (str, dict)):
+        raise _refusal(scans)
+    out = [_scan_of(scan) for scan in scans]
+    if not out:
+        raise DataError(f"a step has at least one scan, also where nothing was found; {_TAKEN}")
+    return out
+
+
+def _scan_of(scan: Any) -> Scan:
+    if isinstance(scan, Scan):
+        return scan
+    if isinstance(scan, (tuple, list)) and _LEAST <= len(scan) <= _MOST and isinstance(scan[1], str):
+        return Scan(*scan)
+    raise _refusal(scan)
+
+
+def _refusal(scan: Any) -> DataError:
+    count = f" of {len(scan)}" if isinstance(scan, (tuple, list)) else ""
+    return DataError(f"{_TAKEN}, not a {type(scan).__name__}{count}; boxes alone are for Tracker.update")
 
 
 def arrivals_of(batch: Sequence[Scan], sensor_names: Sequence[str]) -> Arrivals:

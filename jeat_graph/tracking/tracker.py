@@ -19,6 +19,7 @@ from jeat_graph.data.diagnostics import Diagnostics
 from jeat_graph.data.embeddings import EmbeddingArray, unit_embeddings
 from jeat_graph.data.errors import JeatGraphError, TimeOrderError
 from jeat_graph.data.interop import boxes_of
+from jeat_graph.data.scan import time_of
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.appearance import Compared, Looks, compare, embeddings_of, remember
 from jeat_graph.tracking.classes import ClassTally, check_names, count_votes
@@ -229,6 +230,7 @@ class Tracker(SavedTracks):
             DataError: a time that is not finite.
             TimeOrderError: a time before that of the last step.
         """
+        t = time_of(t)
         if self._t is not None and t < self._t:
             raise TimeOrderError(f"t = {t} s is before the last scan at {self._t} s: that is past")
         return predict_reported(self.snapshot(), t, self._model, self.sensor_names)
@@ -246,7 +248,8 @@ class Tracker(SavedTracks):
 
         Args:
             source: `supervision.Detections`, a result of `ultralytics`, or boxes (M, 4) left, top, width,
-                height in px; none (M = 0) if the sensor looked and found nothing.
+                height in px; none (M = 0) if the sensor looked and found nothing. Boxes without area, which
+                detectors clip, are left out.
             t: time (s).
             sensor: name of the sensor.
             scores: (M,) confidence in [0, 1], for boxes that come without; 1 where neither says it.
@@ -255,7 +258,7 @@ class Tracker(SavedTracks):
         Returns and raises as `step`; also a DataError where it cannot be told what `source` is.
         """
         found = boxes_of(source, scores)
-        looks = None if embeddings is None else unit_embeddings(embeddings, len(found.scores))
+        looks = None if embeddings is None else unit_embeddings(embeddings, len(found.kept))[found.kept]
         return self.step(Scan(t, sensor, found.boxes, found.scores, found.classes, looks))
 
     def causal(self) -> Trajectories:

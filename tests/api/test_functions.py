@@ -58,6 +58,15 @@ def test_results_of_detectors_and_corners_are_the_same_scan():
     assert a.num_tracks == b.num_tracks == 1
 
 
+def test_boxes_that_a_detector_has_clipped_to_nothing_are_left_out():
+    boxes, looks = [[100.0, 200.0, 0.0, 30.0], [100.0, 200.0, 40.0, 30.0]], [[1.0, 0.0], [0.0, 1.0]]
+    tracker = Tracker(image=(1920, 1080))
+    tracker.update(boxes, t=0.0, sensor="rgb", embeddings=looks)
+    assert tracker.num_tracks == 1
+    with pytest.raises(DataError, match="must be positive"):  # a scan made by hand is taken at its word
+        tracker.step((0.1, "rgb", boxes, [1.0, 1.0]))
+
+
 def test_tracking_and_judging_take_objects_or_files(night, tmp_path):
     from jeat_graph.io.detections_io import write_detections
     from jeat_graph.io.truth_io import write_truth

@@ -93,8 +93,8 @@ def test_a_batch_is_all_the_scans_of_one_time(rows):
 @settings(max_examples=100, deadline=None)
 def test_the_sensors_taken_apart_and_put_together_are_the_whole(rows):
     detections = from_rows(rows)
-    parts = [detections.select([name]) for name in ("lidar", "rgb", "evt", "none of them")]
-    for part, name in zip(parts, ("lidar", "rgb", "evt", ""), strict=True):
+    parts = [detections.select(names) for names in ([], *detections.sensors)]
+    for part, name in zip(parts, ("", *detections.sensors), strict=True):
         assert scans_of(part) == {key: scan for key, scan in as_sets(rows).items() if key[1] == name}
     assert scans_of(Detections.concatenate(parts)) == scans_of(detections)
 
@@ -229,6 +229,60 @@ def test_a_data_frame_may_have_corners_and_nothing_more_than_boxes():
     assert found.scores.tolist() == [1.0]
     with pytest.raises(DataError, match="need the column t"):
         Detections.from_pandas(frame.drop(columns="t"))
+
+
+def test_sensors_are_selected_by_one_name_or_by_several():
+    both = Detections.from_scans([Scan(0.0, name, [BOX], [0.5]) for name in ("rgb", "evt", "b")])
+    assert both.select("rgb").sensors == ("rgb",)
+    assert both.select(["rgb", "evt"]).sensors == ("evt", "rgb")
+    assert both.select([]).num_scans == 0
+    with pytest.raises(DataError, match="no sensor 'lidar' in the recording; there are: b, evt, rgb"):
+        both.select(["rgb", "lidar"])
+
+
+@pytest.mark.parametrize(
+    ("times", "options"),
+    [
+        ({"time": [0.5]}, {}),
+        ({"timestamp_ms": [500]}, {}),
+        ({"t": [500]}, {"time_unit": "ms"}),
+        ({"Frame": [10]}, {"rate_hz": 20.0}),
+    ],
+)
+def test_a_data_frame_has_the_names_that_files_have(times, options):
+    pd = pytest.importorskip("pandas")
+    corners = {"x1": [10.0], "y1": [20.0], "x2": [40.0], "y2": [60.0], "conf": [0.5], "camera": ["evt"]}
+    centre = {"cx": [25.0], "cy": [40.0], "w": [30.0], "h": [40.0], "prob": [0.5], "sensor": ["evt"]}
+    for boxes in (corners, centre):
+        found = Detections.from_pandas(pd.DataFrame({**times, **boxes}), **options)
+        assert (found.scan_t.tolist(), found.boxes.tolist()) == ([0.5], [BOX])
+        assert (found.scores.tolist(), found.sensors) == ([0.5], ("evt",))
+
+
+@pytest.mark.parametrize(
+    ("times", "options", "what"),
+    [
+        ({"t_ms": [500]}, {"time_unit": "us"}, "'t_ms' is in ms, but time_unit says us"),
+        ({"frame": [10]}, {}, "rate_hz"),
+        (
+            {"t": ["2024-05-01 10:00"]},
+            {},
+            "'t' must hold times in seconds, or dates .* not '2024-05-01",
+        ),
+    ],
+)
+def test_times_that_a_data_frame_leaves_open_are_refused(times, options, what):
+    pd = pytest.importorskip("pandas")
+    boxes = {"left": [1.0], "top": [2.0], "width": [3.0], "height": [4.0]}
+    with pytest.raises(DataError, match=what):
+        Detections.from_pandas(pd.DataFrame({**times, **boxes}), **options)
+
+
+def test_boxes_without_area_in_a_data_frame_are_left_out_and_counted():
+    pd = pytest.importorskip("pandas")
+    frame = pd.DataFrame({"t": [0.0, 1.0], "left": 1.0, "top": 2.0, "width": [3.0, 0.0], "height": 4.0})
+    found = Detections.from_pandas(frame)
+    assert (len(found), found.num_scans, found.dropped) == (1, 2, 1)
 
 
 @pytest.mark.parametrize("unit", ["s", "us", "ns"])

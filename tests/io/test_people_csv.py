@@ -9,8 +9,8 @@ import pyarrow as pa
 import pytest
 from pyarrow import parquet
 
+from jeat_graph.data.column_names import usual_names
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.column_names import usual_names
 from jeat_graph.io.detections_io import read_detections
 from jeat_graph.io.time_units import unit_question
 from jeat_graph.io.truth_io import read_truth

@@ -22,6 +22,12 @@ def message(seq, t, source="g7", sensor="rgb"):
     return decode_scans(json.dumps({"v": 1, "source": source, "seq": seq, "scans": [scan]}).encode(), "x", 1)
 
 
+def clipped(seq, t):
+    """A message of a scan whose only box has no area."""
+    scan = {"t": t, "sensor": "rgb", "boxes": [[100, 100, 0, 30]], "scores": [0.9]}
+    return decode_scans(json.dumps({"v": 1, "seq": seq, "scans": [scan]}).encode(), "x", 1)
+
+
 def session_of(live=None, checkpoint=None, more=None):
     """A session with lists of the times it answered and of what it said."""
     answered, said = [], []
@@ -61,6 +67,21 @@ def test_messages_that_had_been_taken_are_in_the_summary():
     assert len(answered) == 4
     assert session.summary_lines() == ["2 messages had been taken before and were passed over"]
     assert said == []
+
+
+def test_boxes_without_area_are_left_out_and_counted_across_a_checkpoint(tmp_path):
+    path = tmp_path / "state.npz"
+    session, answered, said = session_of(checkpoint=path)
+    for k in range(3):
+        session.accept(clipped(k, 0.05 * k))
+    session.save()
+    live, more = LiveTracker.load(path, CONFIG)
+    again, answered_again, _ = session_of(live, more=more)
+    again.accept(clipped(3, 0.15))
+    assert len(answered + answered_again) == 4
+    assert said == []
+    assert again.summary()["boxes_without_area"] == 4
+    assert again.summary_lines() == ["4 box(es) without area left out"]
 
 
 @pytest.mark.parametrize("taken", [50, 70])

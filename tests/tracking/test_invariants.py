@@ -218,8 +218,8 @@ def test_a_refused_scan_leaves_the_state_as_it_was(preset, what, state):
 
 
 @pytest.mark.parametrize("nonsense", [3, None, [], "scan"])
-def test_what_is_no_scan_at_all_is_a_type_error(nonsense):
-    with pytest.raises(TypeError):
+def test_what_is_no_scan_at_all_is_refused(nonsense):
+    with pytest.raises(DataError, match="step"):
         Tracker(CONFIGS["default"]).step(nonsense)
 
 

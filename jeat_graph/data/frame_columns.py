@@ -1,0 +1,133 @@
+"""Columns of data frames (pandas, polars, Arrow), by the names that files may have for them too."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.boxes import class_texts
+from jeat_graph.data.column_names import BOX, TIME_COLUMNS, sides_to_boxes, standing_in, usual_names
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.time_units import in_seconds
+
+#: What is said where a box is missing; `x` and `y` alone may be a corner or the centre.
+KNOWN_BOXES = (
+    "known are left, top, width, height, or x1, y1 and cx, cy for the place, w, h and right, bottom or "
+    "x2, y2 for the size (all names: docs/reference/formats.md)"
+)
+
+
+def has_columns(source: Any) -> bool:
+    """Whether this is a table whose columns have names; those that are only numbered do not."""
+    return hasattr(source, "columns") and any(isinstance(name, str) for name in _labels(source))
+
+
+def named_columns(table: Any, needed: Sequence[str], optional: Sequence[str], what: str) -> dict[str, Any]:
+    """Return the columns of a table by the names that the readers know (`column_names`).
+
+    Args:
+        table: a data frame.
+        needed: columns that must be there, or others that can stand for them.
+        optional: columns that may be there.
+        what: what the table is to be, for the message.
+
+    Raises:
+        DataError: a column is missing or there twice; the message says which names are known.
+    """
+    labels = _labels(table)
+    names = usual_names([str(label) for label in labels], [*needed, *optional])
+    twice = next((name for name, count in Counter(names).items() if count > 1), None)
+    if twice is not None:
+        raise DataError(f"the column {twice!r} is there twice")
+    missing = [name for name in standing_in(names, needed) if name not in names]
+    if missing:
+        known = f"; {KNOWN_BOXES}" if missing[0] in BOX else ""
+        there = ", ".join(str(label) for label in labels)
+        raise DataError(f"{what} need the column {missing[0]}; the table has {there}{known}")
+    return {name: table[label] for name, label in zip(names, labels, strict=True)}
+
+
+def boxes_of_columns(columns: Mapping[str, Any]) -> FloatArray:
+    """Return boxes (M, 4) left, top, width, height (px) of columns from `named_columns`.
+
+    Raises:
+        DataError: a column that does not hold numbers.
+    """
+    names = standing_in(list(columns), BOX)
+    return sides_to_boxes(names, np.column_stack([numbers_of(columns[name], name) for name in names]))
+
+
+def detector_columns(table: Any) -> tuple[FloatArray, FloatArray | None, Any]:
+    """Return boxes (M, 4), scores (M,) or None, and names of classes (M,) or None, of one picture's table.
+
+    Raises:
+        DataError: as `named_columns` and `boxes_of_columns`.
+    """
+    columns = named_columns(table, BOX, ("score", "class"), "boxes")
+    boxes = boxes_of_columns(columns)
+    scores = numbers_of(columns["score"], "score") if "score" in columns else None
+    return boxes, scores, class_texts(columns["class"], len(boxes)) if "class" in columns else None
+
+
+def times_of_columns(columns: Mapping[str, Any], unit: str, rate_hz: float | None) -> FloatArray:
+    """Return times (R,) in seconds of columns from `named_columns`.
+
+    Args:
+        columns: with `t` (numbers, dates or spans of time), one that names its unit, or frame numbers.
+        unit: of the column `t` where it holds numbers.
+        rate_hz: frames per second; frame k is at k / rate.
+
+    Raises:
+        DataError: a column that holds none of these, another unit than its own, or frames without a rate.
+        ConfigError: a unit that is not known.
+    """
+    name = standing_in(list(columns), ["t"])[0]
+    times = seconds_of(columns[name])
+    if times is not None:
+        return times
+    numbers = numbers_of(columns[name], name, "times in seconds, or dates (pandas.to_datetime makes them)")
+    if name == "frame":
+        if rate_hz is None or not (math.isfinite(rate_hz) and rate_hz > 0.0):
+            raise DataError("there are frame numbers only; give their rate (Hz) as rate_hz")
+        return np.asarray(numbers / rate_hz)
+    own = TIME_COLUMNS.get(name, unit)
+    if unit not in ("s", own):
+        raise DataError(f"column {name!r} is in {own}, but time_unit says {unit}; leave it out")
+    return in_seconds(numbers, own)
+
+
+def seconds_of(times: Any) -> FloatArray | None:
+    """Return a column (N,) of dates (those without a zone are UTC) since 1970, or of spans, in seconds.
+
+    None where the column holds neither.
+    """
+    if hasattr(times, "dt") and getattr(times.dt, "tz", None) is not None:
+        times = times.dt.tz_convert("UTC").dt.tz_localize(None)
+    column = np.asarray(times)
+    if column.dtype.kind not in "mM":
+        return None
+    since = column - np.datetime64(0, "s") if column.dtype.kind == "M" else column
+    return np.where(np.isnat(since), np.nan, since / np.timedelta64(1, "s"))
+
+
+def numbers_of(column: Any, name: str, what: str = "numbers") -> FloatArray:
+    """Return a column as numbers (N,), NaN where a table has nothing.
+
+    Raises:
+        DataError: it holds something else.
+    """
+    try:
+        return np.array(column, dtype=np.float64)
+    except (TypeError, ValueError):
+        first = next((one for one in column if not isinstance(one, int | float)), None)
+        raise DataError(f"column {name!r} must hold {what}, not {str(first)[:40]!r}") from None
+
+
+def _labels(table: Any) -> list[Any]:
+    arrow = type(table).__module__.partition(".")[0] == "pyarrow"  # its `columns` are the columns themselves
+    return list(table.column_names if arrow else table.columns)
