@@ -110,7 +110,7 @@ def _truth(truth: GroundTruth | pd.DataFrame | PathLike) -> GroundTruth:
     )
 
 
-def _tables(tracks: Trajectories | Tracks | pd.DataFrame, kind: str) -> dict[str, Trajectories]:
+def _tables(tracks: Trajectories | Tracks | Run | pd.DataFrame, kind: str) -> dict[str, Trajectories]:
     if isinstance(tracks, (Tracks, Run)):
         both = {"causal": tracks.causal, "smoothed": tracks.smoothed}
         return {name: table for name, table in both.items() if table is not None}

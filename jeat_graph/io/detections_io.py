@@ -12,10 +12,9 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.boxes import without_area
-from jeat_graph.data.column_names import NUMBER_COLUMNS
+from jeat_graph.data.column_names import BOX, NUMBER_COLUMNS
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.views import BOX
 from jeat_graph.io import coco, kitti, motchallenge, prophesee
 from jeat_graph.io.column_names import boxes_of, times_of
 from jeat_graph.io.csv_text import NUMBER, WORD

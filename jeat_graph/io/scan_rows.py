@@ -122,7 +122,7 @@ def _csv_row(text: str, form: CsvForm, name: str, number: int) -> _Row:
 
 def _scan_of_rows(rows: list[_Row], line: int) -> ScanBatch:
     found = [row for row in rows if row.box is not None]
-    boxes, scores = [row.box for row in found], [row.score for row in found]
+    boxes, scores = np.array([row.box for row in found]), [row.score for row in found]
     kinds = None if rows[0].kind is None else np.array([row.kind for row in found], dtype=np.str_)
     scan, flat = scan_with_area(rows[0].t, rows[0].sensor, boxes, scores, kinds)
     return ScanBatch([scan], [line], flat + sum(row.flat for row in rows))

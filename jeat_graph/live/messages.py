@@ -17,7 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jeat_graph.data.errors import DataError, JeatGraphError
-from jeat_graph.io.scan_lines import ScanBatch, batch_of
+from jeat_graph.io.scan_batch import ScanBatch
+from jeat_graph.io.scan_lines import batch_of
 
 VERSION = 1
 _KEYS = ("v", "source", "seq", "scans")
