@@ -31,10 +31,8 @@ def check_writable(path: str | Path) -> None:
     folder = Path(path).parent
     while not folder.exists():
         folder = folder.parent
-    try:
+    with _named(path):
         tempfile.TemporaryFile(dir=folder).close()
-    except OSError as error:
-        raise DataError(f"cannot be written: {error.strerror or error}", path) from None
 
 
 @contextmanager
@@ -42,27 +40,46 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     """Yield a temporary path beside `path`; on success it takes its place, on error it is removed.
 
     The folder of `path` is made if it is missing.
+
+    Raises:
+        DataError: no file can be made there, or what is there cannot be replaced by one.
     """
     target = Path(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
+    with _named(path):
+        target.parent.mkdir(parents=True, exist_ok=True)
     prefix = f".{target.stem}.unfinished-"
     # The name is known before there is a file, so that whatever comes in between takes it away.
     temporary = target.with_name(f"{prefix}{secrets.token_hex(4)}{target.suffix}")
     handle: int | None = None
     try:
-        handle = _make(temporary)
+        with _named(path):
+            handle = _make(temporary)
         yield temporary
         # The unfinished file is private (0600); a result file gets the permissions any other new file would.
         mask = os.umask(0)
         os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
-        temporary.replace(target)
+        with _named(path):
+            temporary.chmod(0o666 & ~mask)
+            temporary.replace(target)
         if handle is not None:
             remove_abandoned(target.parent, glob.escape(prefix) + "????????" + glob.escape(target.suffix))
     finally:
         temporary.unlink(missing_ok=True)
         if handle is not None:
             os.close(handle)
+
+
+@contextmanager
+def _named(path: str | Path) -> Iterator[None]:
+    """Let errors of the system name the file that was asked for, not the one that stands in for it.
+
+    Raises:
+        DataError: one occurred.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise DataError(f"cannot be written: {error.strerror or error}", path) from None
 
 
 def _make(temporary: Path) -> int | None:

@@ -6,6 +6,7 @@ import os
 
 import pytest
 
+from jeat_graph.data.errors import DataError
 from jeat_graph.io.atomic import atomic_path, open_atomic
 
 
@@ -24,6 +25,17 @@ def test_an_error_leaves_the_old_file_and_nothing_beside(tmp_path):
         file.writelines(["new", b"!"])
     assert path.read_text(encoding="utf-8") == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
+
+
+@pytest.mark.parametrize("place", ["folder", "file/a.txt"])
+def test_what_cannot_be_written_is_named_as_it_was_asked_for(tmp_path, place):
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file").write_text("here", encoding="utf-8")
+    with pytest.raises(DataError, match="cannot be written") as found, open_atomic(tmp_path / place) as file:
+        file.write("new")
+    assert str(tmp_path / place) in str(found.value)
+    assert "unfinished" not in str(found.value)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "folder"]
 
 
 def test_missing_folders_are_made(tmp_path):
