@@ -26,4 +26,5 @@ def save_under_own_names() -> None:
         return f"{stem}.{mark}.{ending}"
 
     data_name.own = True  # type: ignore[attr-defined]
+    data_name.__wrapped__ = named  # type: ignore[attr-defined]
     cache_file._data_name = data_name

@@ -89,7 +89,7 @@ def _log_track(rr: Any, stream: Any, kind: str, track: Trajectories) -> None:
     """Speed and existence of one track over time."""
     order = np.argsort(track.t, kind="stable")
     times = rr.TimeColumn(TIMELINE, duration=track.t[order])
-    name = f"plots/{kind}/track {track.track_id[0]}"
+    name = f"plots/{kind}/track_{track.track_id[0]}"
     speed = np.hypot(*track.velocity[order].T)
     stream.send_columns(f"{name}/speed", indexes=[times], columns=rr.Scalars.columns(scalars=speed))
     existence = track.existence[order]

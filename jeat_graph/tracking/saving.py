@@ -7,11 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from jeat_graph.config.schema import Config
+from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.smoothing.access import SmoothedTracks
 from jeat_graph.tracking.snapshot import Snapshot
 from jeat_graph.tracking.state import TrackArrays
+from jeat_graph.tracking.step_record import takers_in
 from jeat_graph.tracking.update_log import UpdateLog, allocate_log
 
 
@@ -77,6 +79,10 @@ class SavedTracks(SmoothedTracks):
         none = TrackArrays._make(array[:0] for array in now.tracks)
         self.smooth_anew()
         self.restore(now._replace(t=None, tracks=none, scene=now.scene._replace(**shifted)))
+
+    def takers(self, count: int) -> IntArray:
+        """Return which track took each of the `count` detections (M,) of the last step, 0 where none did."""
+        return takers_in(self._log, count)
 
     def state(self, snapshot: Snapshot | None = None) -> dict[str, Any]:
         """Return what `from_state` takes: the state now, or at a snapshot; the smoothers' is not copied."""

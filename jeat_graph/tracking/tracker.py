@@ -36,7 +36,7 @@ from jeat_graph.tracking.sensor_state import SensorState, sensor_states
 from jeat_graph.tracking.snapshot import Snapshot
 from jeat_graph.tracking.state import start_scene
 from jeat_graph.tracking.step import step
-from jeat_graph.tracking.step_record import StepRecord, record_step, takers_in
+from jeat_graph.tracking.step_record import StepRecord, record_step
 from jeat_graph.tracking.update_log import allocate_log
 
 _FIRST_CAPACITY = 64
@@ -187,10 +187,6 @@ class Tracker(SavedTracks):
         looks = self._looks or Looks.start(len(self.sensor_names), embeddings.shape[1])
         living = self._tracks.track_id[: self._num_tracks]
         return compare(looks.of(living), embeddings, sensor, self.config.association.most_alike)
-
-    def takers(self, count: int) -> IntArray:
-        """Return which track took each of the `count` detections (M,) of the last step, 0 where none did."""
-        return takers_in(self._log, count)
 
     def hand_over(self, taken: StepRecord | None) -> None:
         """Give the smoothers what a step took in; in order of time, and once."""

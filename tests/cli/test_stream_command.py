@@ -229,7 +229,7 @@ def test_a_bad_line_ends_it_with_one_line_that_names_it(bad, message, monkeypatc
         ("0,rgb,1,2,3,4,x\n", 2, "score must be a number"),
         ("0,rgb,1,2,3,4\n", 2, "score is missing"),
         ("0,,1,2,3,4,1\n", 2, "sensor is missing"),
-        ("0,rgb,1,2,0,4,1\n", 2, "must be positive"),
+        ("0,rgb,1,2,-2,4,1\n", 2, "must be positive"),
     ],
 )
 def test_a_bad_row_of_csv_is_named_too(rows, number, message, monkeypatch, capsys):

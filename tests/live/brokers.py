@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import random
 import shutil
 import signal
@@ -65,6 +66,7 @@ class Server:
     def freeze(self) -> None:
         """Have it keep its connections and say nothing more, as behind a network that is gone."""
         self._process.send_signal(signal.SIGSTOP)
+        os.waitid(os.P_PID, self._process.pid, os.WSTOPPED | os.WNOWAIT)  # it stops soon, not at once
 
     def thaw(self) -> None:
         self._process.send_signal(signal.SIGCONT)
