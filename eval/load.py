@@ -59,7 +59,7 @@ def load_run(
             causal), or a MOTChallenge or KITTI result.
         truth: the truth, in any format that `read_truth` knows.
         rate_hz: frame rate of files that count frames; by default that of the truth.
-        time_unit: unit of the truth's column `t`, of `io.time_units`; runs are in seconds.
+        time_unit: unit of the truth's column `t`, of `data.time_units`; runs are in seconds.
         classes: classes of objects to be found; others are ignored, and so are tracks that have another
             class. All by default.
 

@@ -18,8 +18,8 @@ from typing import Any
 
 from jeat_graph.config.argument_types import output_rate, picture_size, positive
 from jeat_graph.config.smoothing import ENGINES
+from jeat_graph.data.time_units import TIME_UNITS
 from jeat_graph.io.formats import FORMATS
-from jeat_graph.io.time_units import TIME_UNITS
 
 OUTPUT_FORMATS = ("csv", "parquet", "motchallenge", "kitti")
 SCORE_SCALES = ("unit", "percent", "logistic")

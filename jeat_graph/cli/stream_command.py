@@ -7,11 +7,13 @@ import contextlib
 import json
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jeat_graph.cli.detect_options import add_made_by, made_by
 from jeat_graph.cli.options import add_config, add_image, add_time_unit, overrides
+from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import positive
 
 if TYPE_CHECKING:
@@ -30,6 +32,7 @@ _WARM_STEPS = 20  # enough for a track to be confirmed and smoothed
 #: A source is told what has been taken whenever it has nothing more, and after this part of what may be open.
 _COMMIT_PART = 0.5
 _EVERY_S = 10.0
+_say = partial(say, "stream")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -111,7 +114,7 @@ def run(args: argparse.Namespace) -> int:
         ends = Ends(
             tracks=_with_road(output.tracks, live, args, stack),
             event=output.event,
-            warn=_warn,
+            warn=_say,
             smoothed=smoothed,
             flush=output.flush,
             commit=(lambda: None) if source is None else source.commit,
@@ -126,7 +129,7 @@ def run(args: argparse.Namespace) -> int:
                 # An error in a line, a signal or a reader that has gone: what is known is kept all the same.
                 _finish(session, args)
     if interrupts.seen is not None:
-        print("jeat-graph stream: interrupted", file=sys.stderr)
+        _say("interrupted")
         return 128 + interrupts.seen
     return 0
 
@@ -137,7 +140,7 @@ def _config(args: argparse.Namespace) -> Config:
     from jeat_graph.config.reading import load_config
     from jeat_graph.data.errors import ConfigError
 
-    config = load_config(args.config, [*made_by(args, _warn), *overrides(args)])
+    config = load_config(args.config, [*made_by(args, _say), *overrides(args)])
     if args.checkpoint is not None and config.smoother.worker:
         raise ConfigError("--checkpoint does not go with smoother.worker: its state is in another process")
     if args.every is not None and args.checkpoint is None:
@@ -276,7 +279,7 @@ def _skip(session: Session) -> Callable[[DataError], None]:
     def bad(error: DataError) -> None:
         session.bad += 1
         if session.bad <= MOST_TOLD:
-            _warn(f"warning: {' '.join(str(error).split())}; passed over")
+            _say(f"warning: {error}; passed over")
 
     return bad
 
@@ -291,7 +294,3 @@ def _finish(session: Session, args: argparse.Namespace) -> None:
         with open_atomic(args.record) as file:
             json.dump(session.summary(), file, indent=1)
             file.write("\n")
-
-
-def _warn(text: str) -> None:
-    print(f"jeat-graph stream: {text}", file=sys.stderr)

@@ -31,7 +31,7 @@ def check_writable(path: str | Path) -> None:
     folder = Path(path).parent
     while not folder.exists():
         folder = folder.parent
-    with _named(path):
+    with naming(path):
         tempfile.TemporaryFile(dir=folder).close()
 
 
@@ -45,20 +45,20 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         DataError: no file can be made there, or what is there cannot be replaced by one.
     """
     target = Path(path)
-    with _named(path):
+    with naming(path):
         target.parent.mkdir(parents=True, exist_ok=True)
     prefix = f".{target.stem}.unfinished-"
     # The name is known before there is a file, so that whatever comes in between takes it away.
     temporary = target.with_name(f"{prefix}{secrets.token_hex(4)}{target.suffix}")
     handle: int | None = None
     try:
-        with _named(path):
+        with naming(path):
             handle = _make(temporary)
         yield temporary
         # The unfinished file is private (0600); a result file gets the permissions any other new file would.
         mask = os.umask(0)
         os.umask(mask)
-        with _named(path):
+        with naming(path):
             temporary.chmod(0o666 & ~mask)
             temporary.replace(target)
         if handle is not None:
@@ -70,7 +70,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
 
 
 @contextmanager
-def _named(path: str | Path) -> Iterator[None]:
+def naming(path: str | Path) -> Iterator[None]:
     """Let errors of the system name the file that was asked for, not the one that stands in for it.
 
     Raises:

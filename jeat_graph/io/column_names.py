@@ -9,8 +9,8 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.column_names import BOX, TIME_COLUMNS, sides_to_boxes, standing_in
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.time_units import in_seconds
 from jeat_graph.io.frames import check_rate
-from jeat_graph.io.time_units import in_seconds
 
 if TYPE_CHECKING:
     from jeat_graph.io.file_table import FileTable

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from jeat_graph.data.time_units import TIME_UNITS, in_seconds
-
-__all__ = ["LONGEST_STEP_S", "TIME_UNITS", "in_seconds", "likely_unit", "unit_question"]
+from jeat_graph.data.time_units import TIME_UNITS
 
 #: No sensor that vehicles are tracked with takes longer than this from scan to scan (s).
 LONGEST_STEP_S = 5.0

@@ -38,9 +38,8 @@ class Identities:
         self._given = living.copy()
         self._next_own = self._next_given = next_own
         self._shown = np.zeros(len(living), dtype=np.bool_)  # which of them have been in an answer
-        self._lost: IntArray = np.zeros(
-            0, dtype=np.int64
-        )  # others that have been, of tracks that are no more
+        # Others that have been, of tracks that are no more.
+        self._lost: IntArray = np.zeros(0, dtype=np.int64)
         self._alike = True  # whether own numbers and those given out are the same, of all from now on
 
     def of(self, own: IntArray) -> IntArray:

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from jeat_graph.data import time_units
 from jeat_graph.data.errors import DataError
-from jeat_graph.io import time_units
 from jeat_graph.io.scan_lines import read_batches
 from jeat_graph.live.interrupts import Interrupts
 from jeat_graph.live.messages import ScanMessage, decode_scans
@@ -18,7 +18,7 @@ _WAIT_S = 0.2
 
 
 def in_seconds(message: ScanMessage, unit: str) -> ScanMessage:
-    """Return a message whose times are of a unit (`io.time_units`) with times in seconds."""
+    """Return a message whose times are of a unit (`data.time_units`) with times in seconds."""
     if unit == "s":
         return message
     scans = [

@@ -50,7 +50,7 @@ class Rewinding:
     """Puts scans where they belong in the order of time, by taking the steps behind them again.
 
     Args:
-        tracker: the tracker, new or loaded.
+        tracker: the tracker, new or loaded; it must log takers (`logs_takers`) when scans are inserted.
 
     Attributes:
         steps: the steps that may still be taken again, by time.
@@ -66,7 +66,6 @@ class Rewinding:
         self.replayed = 0
         self.settled = -math.inf
         self.identities = Identities(now.tracks.track_id, now.next_id)
-        tracker.logs_takers = True
 
     def place(self, t: float) -> int:
         """Return the place among the steps of the first that is not before a time (s)."""

@@ -223,12 +223,11 @@ class Session:
     def _tell_restart(self, message: ScanMessage, place: str) -> None:
         """Tell of the first sources that began to count anew."""
         self._told_restarts += 1
-        if self._told_restarts <= MOST_TOLD:
-            more = "; further ones are only counted" if self._told_restarts == MOST_TOLD else ""
-            self.ends.warn(
-                f"warning: {place}source {message.source!r} counts anew from seq {message.seq}, with a newer "
-                f"scan: it was started again, and its messages are taken{more}"
-            )
+        self._tell_first(
+            self._told_restarts,
+            f"{place}source {message.source!r} counts anew from seq {message.seq}, with a newer scan: it was "
+            "started again, and its messages are taken",
+        )
 
     @contextlib.contextmanager
     def _owing(self) -> Iterator[None]:
@@ -262,10 +261,14 @@ class Session:
         if not dropped:
             return
         self._told += 1
-        if self._told <= MOST_TOLD:
-            why = f"{late_s:.6g} s late" if late_s > 0.0 else "the sensor's scan of that time has come before"
-            more = "; further ones are only counted" if self._told == MOST_TOLD else ""
-            self.ends.warn(f"warning: {place}passed over, {why}{more}")
+        why = f"{late_s:.6g} s late" if late_s > 0.0 else "the sensor's scan of that time has come before"
+        self._tell_first(self._told, f"{place}passed over, {why}")
+
+    def _tell_first(self, number: int, text: str) -> None:
+        """Tell of something that may come often, the first times."""
+        if number <= MOST_TOLD:
+            more = "; further ones are only counted" if number == MOST_TOLD else ""
+            self.ends.warn(f"warning: {text}{more}")
 
     def _tell_times(self, arrival: Arrival) -> None:
         """Tell of scans whose time was proved wrong, and of a clock that was set back."""

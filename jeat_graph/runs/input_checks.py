@@ -41,12 +41,12 @@ def check_detections(detections: Detections, config: Config, names: str = "the d
         raise DataError(
             "no scans: a recording needs at least one row, with t and sensor if nothing was found", names
         )
-    check_units(detections, config, names)
+    clocks = check_units(detections, config, names)
     _check_sensors(detections, config, names)
     warnings = [] if len(detections) else [f"{names}: all scans are empty, so there is nothing to track"]
     if detections.dropped:
         warnings.append(f"{names}: {detections.dropped} box(es) without area left out")
-    warnings += check_clocks(detections, config, names) + wrong_times(detections, names)
+    warnings += clocks + wrong_times(detections, names)
     return warnings + _check_picture(detections, config, names) + _check_rates(detections, config, names)
 
 
@@ -73,10 +73,13 @@ def _check_sensors(detections: Detections, config: Config, names: str) -> None:
     )
 
 
-def check_units(detections: Detections, config: Config, names: str) -> None:
+def check_units(detections: Detections, config: Config, names: str) -> list[str]:
     """Refuse boxes in shares of the picture, times that cannot be seconds, and sensors of different clocks.
 
     Times are believed where the sensor is declared to be as slow, or as fast, as that.
+
+    Returns:
+        Warnings of sensors that never look at one time, each one line.
 
     Raises:
         DataError: says what seems to be the unit, or how far the clocks are apart.
@@ -97,7 +100,7 @@ def check_units(detections: Detections, config: Config, names: str) -> None:
                 f"--set sensors.{name}.rate_hz={1.0 / step:.3g}",
                 names,
             )
-    check_clocks(detections, config, names)
+    return check_clocks(detections, config, names)
 
 
 def _check_picture(detections: Detections, config: Config, names: str) -> list[str]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from jeat_graph.data.errors import DataError
 
@@ -44,12 +45,17 @@ def check_distinct(items: Sequence[str | Path]) -> None:
         DataError: names the file, and the other where it is a copy.
     """
     from jeat_graph.io.detections_io import split_name
+    from jeat_graph.io.hashing import sha256_of
 
-    named = [(name, Path(path)) for name, path in map(split_name, items)]
-    for (name, path), (other_name, other) in itertools.combinations(named, 2):
-        if path.resolve() == other.resolve():
+    found = [_Given.of(name, Path(path)) for name, path in map(split_name, items)]
+    # Each file is asked for its place and size once, and read only beside another of its size.
+    sha256 = functools.cache(sha256_of)
+    for one, two in itertools.combinations(found, 2):
+        path, other = one.path, two.path
+        if one.place == two.place:
             raise DataError("is given twice: give each file of detections once", other)
-        if name == other_name and _same_content(path, other):
+        same_size = one.size == two.size and one.size > 0
+        if one.name == two.name and same_size and sha256(path) == sha256(other):
             raise DataError(
                 f"holds the same as {path}: give each file of detections once, or, if two sensors saw just "
                 "the same, name them: NAME=path",
@@ -57,12 +63,17 @@ def check_distinct(items: Sequence[str | Path]) -> None:
             )
 
 
-def _same_content(path: Path, other: Path) -> bool:
-    from jeat_graph.io.hashing import sha256_of
+class _Given(NamedTuple):
+    """A file as it was given, where that is, and its size in bytes, 0 where there is no such file."""
 
-    if not (path.is_file() and other.is_file()) or path.stat().st_size != other.stat().st_size:
-        return False
-    return path.stat().st_size > 0 and sha256_of(path) == sha256_of(other)
+    name: str | None
+    path: Path
+    place: Path
+    size: int
+
+    @staticmethod
+    def of(name: str | None, path: Path) -> _Given:
+        return _Given(name, path, path.resolve(), path.stat().st_size if path.is_file() else 0)
 
 
 def find_input(given: str | Path, record: Mapping[str, Any], folder: Path) -> Path | None:

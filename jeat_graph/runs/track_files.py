@@ -29,7 +29,7 @@ class TrackRequest:
         input_format: format of the files if it shall not be recognised.
         score_scale: how their scores are to be read, see `read_detections`.
         images: COCO data set with the times of COCO results, or None.
-        time_unit: unit of the column `t`, of `io.time_units`.
+        time_unit: unit of the column `t`, of `data.time_units`.
         classes: classes of detections to be taken, and those without one; None takes all.
         frames: pictures that tell the picture's size and the frame rate, or None.
         options: how the run is written.

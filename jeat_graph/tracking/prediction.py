@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +9,6 @@ import numpy as np
 from jeat_graph.association.boxes import track_boxes
 from jeat_graph.config.kernel_form import Model
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.reporting import (
     as_table,
@@ -42,15 +40,10 @@ def predict_reported(now: Snapshot, t: float, model: Model, sensors: tuple[str, 
 
     Args:
         now: the state; it is used up.
-        t: time (s), not before that of the state.
+        t: time (s), finite and not before that of the state.
         model: sensors and settings.
         sensors: names of the sensors.
-
-    Raises:
-        DataError: the time is not finite.
     """
-    if not math.isfinite(t):
-        raise DataError(f"the time to predict to must be finite, got {t}")
     here = 0.0 if now.t is None else now.t
     settings, tracks = model.settings, now.tracks
     sections = (settings.image, settings.output)

@@ -48,6 +48,13 @@ class SeenPictures(NamedTuple):
     given: Tensor
 
 
+def silence(layer: nn.Conv2d) -> None:
+    """Let a layer say nothing until it has learned something."""
+    nn.init.zeros_(layer.weight)
+    assert layer.bias is not None
+    nn.init.zeros_(layer.bias)
+
+
 class GatedSum(nn.Module):
     """Sums the features of both sensors: each cell and channel weighs them anew.
 
@@ -64,10 +71,8 @@ class GatedSum(nn.Module):
         self.gate = nn.Conv2d(2 * channels, 2 * channels, 1)
         self.told = nn.Linear(TOLD, 2 * channels, bias=False)
         # At first everything counts alike.
-        nn.init.zeros_(self.gate.weight)
+        silence(self.gate)
         nn.init.zeros_(self.told.weight)
-        assert self.gate.bias is not None
-        nn.init.zeros_(self.gate.bias)
 
     def forward(self, picture: Tensor, events: Tensor, told: Tensor) -> Tensor:
         """Return the sum (B, C, H, W) of features of that shape; told: (B, 3)."""
@@ -90,9 +95,7 @@ class Recall(nn.Module):
         self.memory = ConvGru(channels)
         self.carry = nn.Conv2d(channels, channels, 1)
         # At first nothing is added: a network that starts from others is as good as they are.
-        nn.init.zeros_(self.carry.weight)
-        assert self.carry.bias is not None
-        nn.init.zeros_(self.carry.bias)
+        silence(self.carry)
 
     def forward(self, x: Tensor, state: Tensor, length: int, keep: float) -> tuple[Tensor, Tensor]:
         """Return the sum and the last state; arguments as `remembered`."""

@@ -18,7 +18,7 @@ from torch import Tensor, nn
 
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.detection.models.onnx_head import CARD, read_onnx_head
-from jeat_graph.training.fused_network import FusedNet, GatedSum
+from jeat_graph.training.fused_network import FusedNet, GatedSum, silence
 from jeat_graph.training.network import DetectionNet, VehicleNet
 from jeat_graph.training.settings import COARSEST, EVENTS, FRAMES, FUSED, NetSettings
 from jeat_graph.training.widening import widen
@@ -164,9 +164,7 @@ def _take_parts(net: FusedNet, given: dict[str, VehicleNet]) -> None:
         for join in net.join:
             assert isinstance(join, GatedSum)
             # It begins as good as the pictures are; what events add is learned.
-            nn.init.zeros_(join.carry.weight)
-            assert join.carry.bias is not None
-            nn.init.zeros_(join.carry.bias)
+            silence(join.carry)
 
 
 def _fits(found: NetSettings, wanted: NetSettings) -> bool:

@@ -282,6 +282,15 @@ def test_bad_rows_of_csv_are_passed_over_too(monkeypatch, capsys):
     assert "2 messages could not be read" in err
 
 
+def test_times_of_another_unit_are_read_as_seconds(monkeypatch, capsys):
+    times = [0.05 * k for k in range(6)]
+    code, expected, _ = stream("".join(map(line, times)), monkeypatch, capsys)
+    assert code == 0
+    assert expected
+    millis = "".join(line(1000.0 * t) for t in times)
+    assert stream(millis, monkeypatch, capsys, "--time-unit", "ms")[:2] == (0, expected)
+
+
 def test_late_scans_go_where_they_belong(monkeypatch, capsys, detections, tracked, tmp_path):
     """Pictures that come 80 ms late: the smoothed table is that of `track` but for the numbers of tracks."""
     delay = np.where(np.array(detections.sensors)[detections.scan_sensor] == "rgb", 0.08, 0.005)

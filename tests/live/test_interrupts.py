@@ -65,37 +65,37 @@ def test_a_signal_whose_handler_has_not_run_yet_when_the_wait_begins_ends_it_too
         assert interrupts.seen == signal.SIGTERM
 
 
+def first_of(stream, write, text, interrupts):
+    """The first line of a text and those behind it, which are asked for after a signal."""
+    os.write(write, text)
+    lines = interrupts.lines(stream)
+    first = next(lines)
+    terminate()
+    return first, lines
+
+
 def test_lines_that_were_read_before_the_signal_are_given_out_and_none_behind_them_is_taken():
     with a_pipe() as (stream, write), Interrupts() as interrupts:
-        os.write(write, b"a\nb\nc\n")
-        lines = interrupts.lines(stream)
-        got = [next(lines)]
-        terminate()
+        first, lines = first_of(stream, write, b"a\nb\nc\n", interrupts)
         os.write(write, b"d\n")
-        assert got + list(lines) == [b"a\n", b"b\n", b"c\n"]
+        assert [first, *lines] == [b"a\n", b"b\n", b"c\n"]
         assert os.read(stream.fileno(), 100) == b"d\n"
 
 
 def test_a_line_that_was_begun_is_read_to_its_end_and_no_further():
     with a_pipe() as (stream, write), Interrupts() as interrupts:
-        os.write(write, b"a\nbeg")
-        lines = interrupts.lines(stream)
-        got = [next(lines)]
-        terminate()
+        first, lines = first_of(stream, write, b"a\nbeg", interrupts)
         with after(0.2 * GRACE_S, lambda: os.write(write, b"un\nnext\n")):
-            got += list(lines)
+            got = [first, *lines]
         assert got == [b"a\n", b"begun\n"]
         assert os.read(stream.fileno(), 100) == b"next\n"
 
 
 def test_the_end_of_a_line_that_never_comes_is_waited_for_a_moment_only():
     with a_pipe() as (stream, write), Interrupts() as interrupts:
-        os.write(write, b"a\nbeg")
-        lines = interrupts.lines(stream)
-        got = [next(lines)]
-        terminate()
+        first, lines = first_of(stream, write, b"a\nbeg", interrupts)
         begin = time.monotonic()
-        assert got + list(lines) == [b"a\n"]
+        assert [first, *lines] == [b"a\n"]
         assert time.monotonic() - begin < GRACE_S + 1.0
 
 

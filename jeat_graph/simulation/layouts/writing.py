@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from jeat_graph.data.errors import ConfigError, DataError
+from jeat_graph.io.atomic import naming
 from jeat_graph.simulation.layouts.dsec_det import write_dsec_det, write_split
 from jeat_graph.simulation.layouts.rvt import write_rvt
 from jeat_graph.simulation.layouts.rvt_input import write_rvt_input
@@ -53,20 +54,19 @@ def write_layout(
     partial = target.with_name(f".{target.name}.unfinished")
     shutil.rmtree(partial, ignore_errors=True)  # what a killed run left
     try:
-        partial.mkdir()
-        for split in ("train", "test") if layout == "dsec-det" else ("train", "val", "test"):
-            (partial / split).mkdir()
-        written = 0
-        for segment in whole.segments:
-            written += LAYOUTS[layout](segment, whole.size_px, partial)
-            on_segment()
-        if layout == "dsec-det":
-            write_split(whole.segments, partial)
-        if target.exists():
-            target.rmdir()
-        os.rename(partial, target)
-    except OSError as error:
-        raise DataError(f"cannot be written: {error.strerror or error}", target) from None
+        with naming(target):
+            partial.mkdir()
+            for split in ("train", "test") if layout == "dsec-det" else ("train", "val", "test"):
+                (partial / split).mkdir()
+            written = 0
+            for segment in whole.segments:
+                written += LAYOUTS[layout](segment, whole.size_px, partial)
+                on_segment()
+            if layout == "dsec-det":
+                write_split(whole.segments, partial)
+            if target.exists():
+                target.rmdir()
+            os.rename(partial, target)
     finally:
         shutil.rmtree(partial, ignore_errors=True)
     return LayoutWritten(written, len(whole.segments) - written)
