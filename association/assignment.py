@@ -24,9 +24,9 @@ def assign(
 ) -> IntArray:
     """Assign columns to rows so that the total cost is least; each row and column is used at most once.
 
-    A row may stay without a column at `unassigned_cost`. With a value below which no cost lies, pairs are
-    taken only where they pay; with a value greater than any sum of costs, as many pairs as possible are taken
-    (what an assignment on a matrix with infinite entries does).
+    A row may stay without a column at `unassigned_cost`, so a pair is taken only where that lowers the total:
+    with a value that no cost is below, none is. With a value greater than any sum of costs, as many pairs as
+    possible are taken (what an assignment on a matrix with infinite entries does).
 
     Args:
         num_rows: number of rows.

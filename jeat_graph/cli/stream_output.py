@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from jeat_graph.data.trajectories import Trajectories
-    from jeat_graph.live.health import Event
+    from jeat_graph.live.health import HealthChange
     from jeat_graph.live.messages import ScanMessage
     from jeat_graph.live.transport.ends import Sink
 
@@ -48,7 +48,7 @@ class StreamOutput:
             self._classes = classes
             self._say(csv_header(classes))
 
-    def event(self, event: Event) -> None:
+    def event(self, event: HealthChange) -> None:
         """Say on the output, too, that a sensor fails or is well again."""
         line = json.dumps({"t": event.t, "event": f"sensor-{event.what}", "sensor": event.sensor}) + "\n"
         if self._sink is not None:

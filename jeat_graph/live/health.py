@@ -21,7 +21,7 @@ CLUTTER_FACTOR, NOISE_FACTOR, AGAIN = 10.0, 4.0, 0.5
 LEAST_TRUST = 0.05
 
 
-class Event(NamedTuple):
+class HealthChange(NamedTuple):
     """A change of a sensor's health.
 
     Attributes:
@@ -61,7 +61,7 @@ class SensorHealth:
         self.silent: list[str] = []
         self.rubbish: list[str] = []
 
-    def saw(self, scans: Iterable[Scan], now: float) -> list[Event]:
+    def saw(self, scans: Iterable[Scan], now: float) -> list[HealthChange]:
         """Take note of scans.
 
         Args:
@@ -81,13 +81,13 @@ class SensorHealth:
             if quiet and name not in self.silent:
                 self.silent.append(name)
                 text = f"sensor {name!r} has given no scan since t = {t:.6g} s"
-                events.append(Event(now, name, SILENT, text))
+                events.append(HealthChange(now, name, SILENT, text))
             elif not quiet and name in self.silent:
                 self.silent.remove(name)
-                events.append(Event(now, name, BACK, f"sensor {name!r} gives scans again"))
+                events.append(HealthChange(now, name, BACK, f"sensor {name!r} gives scans again"))
         return events
 
-    def judge(self, states: dict[str, SensorState], now: float) -> list[Event]:
+    def judge(self, states: dict[str, SensorState], now: float) -> list[HealthChange]:
         """Compare what the tracker has learnt of the sensors with what is declared of them.
 
         Args:
@@ -109,8 +109,8 @@ class SensorHealth:
                     f"declared), noise variance {state.noise_scale:.3g} times that declared, trust "
                     f"{state.trust:.2g}; it weighs less"
                 )
-                events.append(Event(now, name, RUBBISH, text))
+                events.append(HealthChange(now, name, RUBBISH, text))
             elif worst < AGAIN and name in self.rubbish:
                 self.rubbish.remove(name)
-                events.append(Event(now, name, WELL, f"sensor {name!r} is as good as declared again"))
+                events.append(HealthChange(now, name, WELL, f"sensor {name!r} is as good as declared again"))
         return events

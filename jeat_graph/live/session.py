@@ -13,7 +13,7 @@ from jeat_graph.config.reading import config_to_dict
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.live.arrival import Arrival
-from jeat_graph.live.health import Event, SensorHealth
+from jeat_graph.live.health import HealthChange, SensorHealth
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.live.messages import Duplicates, ScanMessage
 from jeat_graph.live.transport.patience import UnconfirmedError
@@ -53,7 +53,7 @@ class Ends:
     """
 
     tracks: Callable[[float, Trajectories, ScanMessage, float], object]
-    event: Callable[[Event], object] = lambda _: None
+    event: Callable[[HealthChange], object] = lambda _: None
     warn: Callable[[str], object] = field(default=lambda text: print(text, file=sys.stderr))
     smoothed: RowsEnd | None = None
     kept: Callable[[], dict[str, Any]] = dict
@@ -252,7 +252,7 @@ class Session:
         self._unconfirmed = ""
         return True
 
-    def _tell(self, event: Event) -> None:
+    def _tell(self, event: HealthChange) -> None:
         self.ends.warn(f"warning: {event.text}")
         self.ends.event(event)
 
