@@ -16,7 +16,7 @@ from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.progress import with_progress
 from jeat_graph.data.trajectories import GroundTruth
-from jeat_graph.runs.declaring import own_picture, scan_rate_hz, undeclared_sensor
+from jeat_graph.runs.declaring import own_picture, scan_rate_hz
 
 Recording = tuple[Detections, GroundTruth]
 
@@ -141,4 +141,4 @@ def _known(base: Config | None, name: str) -> SensorConfig:
     if name in base.sensors:
         return base.sensors[name]
     # Tempering cannot be read off single detections.
-    return replace(undeclared_sensor(base.input), tempering=min(s.tempering for s in base.sensors.values()))
+    return replace(base.input.undeclared_sensor(), tempering=min(s.tempering for s in base.sensors.values()))

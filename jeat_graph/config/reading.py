@@ -124,7 +124,8 @@ def _apply_override(tree: dict[str, Any], text: str) -> None:
             near = difflib.get_close_matches(step, [str(k) for k in node], 1)
             hint = f"; did you mean {near[0]}?" if near else ""
             if not hint and path[0] == "sensors":
-                hint = f"; declare it as a whole: --set 'sensors.{step}={{rate_hz: 20, {last}: {value}}}'"
+                rate = "" if last == "rate_hz" else "rate_hz: 20, "
+                hint = f"; declare it as a whole: --set 'sensors.{step}={{{rate}{last}: {value}}}'"
             raise ConfigError(f"--set {key}: {step!r} is not declared{hint}")
         if not isinstance(child, dict):
             raise ConfigError(f"--set {key}: {step!r} has no keys below it")

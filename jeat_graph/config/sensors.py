@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 from jeat_graph.config.fields import LARGEST, Section, choice, number
 from jeat_graph.config.learnt import LearntConfig
@@ -155,3 +155,13 @@ class InputConfig(Section):
         "the picture is as large as `image` says, or reaches as far as the boxes of the recording do; a size "
         "that is given beside the preset always counts",
     )
+
+    def of_any_sensor(self) -> dict[str, float]:
+        """Return what is assumed of a sensor of which nothing is known, by the name of its key."""
+        shared = {one.name for one in fields(self)} & {one.name for one in fields(SensorConfig)}
+        said = {name: getattr(self, name) for name in sorted(shared)}
+        return {name: value for name, value in said.items() if value is not None}
+
+    def undeclared_sensor(self) -> SensorConfig:
+        """Return a sensor of which nothing is known but that it is there."""
+        return SensorConfig(**self.of_any_sensor())  # type: ignore[arg-type]

@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 
 from jeat_graph.config.fields import Section, number
+from jeat_graph.config.reading import load_config
 from jeat_graph.config.section_tree import build, read_tree
 from jeat_graph.config.sensors import SensorConfig
 from jeat_graph.data.errors import ConfigError
@@ -109,6 +110,11 @@ def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lam
             for key, value in asdict(getattr(declared, section)).items():
                 name = f"{section}.{key}"
                 least[name] = min(least.get(name, 1.0), value)
-        found += [f"sensors.{sensor}.{key}={json.dumps(value)}" for key, value in facts.items()]
+        if sensor == FUSED_SENSOR:
+            # The preset has no such sensor that could be changed key by key; it says what any other is like.
+            any_other = load_config("default").input.of_any_sensor()
+            found.append(f"sensors.{sensor}={json.dumps({**any_other, **facts})}")
+        else:
+            found += [f"sensors.{sensor}.{key}={json.dumps(value)}" for key, value in facts.items()]
         say(f"sensor {sensor!r}: its boxes are taken for what {path.name} says (any other --config: not)")
     return found + [f"{key}={value}" for key, value in least.items() if value < 1.0]

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from jeat_graph.config.reading import as_config
-from jeat_graph.config.schema import Config, InputConfig, SensorConfig
+from jeat_graph.config.schema import Config, SensorConfig
 from jeat_graph.config.slow_scans import fastest_hz, for_slow_scans
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
@@ -105,7 +105,7 @@ def _declare_sensors(config: Config, recordings: Sequence[Detections]) -> tuple[
     sensors: dict[str, SensorConfig] = {}
     for name in sorted({name for d in recordings for name in d.sensors}):
         known = config.sensors.get(name)
-        sensor = undeclared_sensor(config.input) if known is None else known
+        sensor = config.input.undeclared_sensor() if known is None else known
         rate = scan_rate_hz(recordings, name)
         other = rate is not None and not 1.0 / _SAME_RATE < rate / sensor.rate_hz < _SAME_RATE
         if rate is not None and (known is None or other):
@@ -118,20 +118,6 @@ def _declare_sensors(config: Config, recordings: Sequence[Detections]) -> tuple[
     association = config.association
     priority = tuple(name for name in association.priority if name in sensors)
     return replace(config, sensors=sensors, association=replace(association, priority=priority)), notes
-
-
-def undeclared_sensor(assumed: InputConfig) -> SensorConfig:
-    """Return what is assumed of a sensor of which nothing is known but that it is there."""
-    return SensorConfig(
-        sigma_px=assumed.sigma_px,
-        rho_x=assumed.rho_x,
-        rho_y=assumed.rho_y,
-        rho_size=assumed.rho_size,
-        correlated_share=assumed.correlated_share,
-        memory_s=assumed.memory_s,
-        disagreement=assumed.disagreement,
-        bias_std=assumed.bias_std,
-    )
 
 
 def scan_rate_hz(recordings: Sequence[Detections], sensor: str) -> float | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from jeat_graph.config.reading import load_config
@@ -75,3 +77,18 @@ def test_a_network_of_ones_own(tmp_path):
         with pytest.raises(ConfigError) as error:
             declared_settings(request)
         assert "mine.tracking.yaml" in str(error.value), wrong
+
+
+def test_a_network_of_both_sensors_is_declared_beside_what_any_sensor_is_taken_for(tmp_path):
+    request = DetectRequest(frames="a", events="b", detector_fused=str(tmp_path / "mine.onnx"))
+    (tmp_path / "mine.tracking.yaml").write_text(
+        "sensor: {p_detect: 0.7, rho_size: 0.01}\noutput: {position_scale: 0.5}\n", encoding="utf-8"
+    )
+    config = load_config("default", declared_settings(request))
+    any_other = config.input.undeclared_sensor()
+    assert config.sensors["fused"] == replace(any_other, p_detect=0.7, rho_size=0.01)
+    assert any_other.rho_size != 0.01
+    assert config.output.position_scale == 0.5
+    # What the user says of it counts more.
+    settings = [*declared_settings(request), "sensors.fused.p_detect=0.6"]
+    assert load_config("default", settings).sensors["fused"].p_detect == 0.6
