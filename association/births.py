@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.association.overlap import overlap
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 
 
 @njit(cache=True)
@@ -16,16 +16,18 @@ def choose_births(
     sensor: IntArray,
     taken: IntArray,
     track_boxes: FloatArray,
+    denied: BoolArray,
     min_existence: float,
     max_overlap: float,
 ) -> tuple[IntArray, IntArray, IntArray]:
     """Choose the leftover detections that start tracks, the surest first.
 
-    A detection that coincides with a living track, or with a birth by the same sensor, is a duplicate and
-    starts none. One that coincides with a birth by another sensor is a second view of the new vehicle and
-    joins it, if it is the first of its sensor: a vehicle has one box of each. A further one of that sensor is
-    a duplicate if it coincides with the box that joined or with the birth as closely as with a living track,
-    or half as closely with both; else it may join another birth or start a track of its own.
+    A detection that coincides with a living track which its sensor does not deny, or with a birth by the same
+    sensor, is a duplicate and starts none. One that coincides with a birth by another sensor is a second view
+    of the new vehicle and joins it, if it is the first of its sensor: a vehicle has one box of each. A further
+    one of that sensor is a duplicate if it coincides with the box that joined or with the birth as closely as
+    with a living track, or half as closely with both; else it may join another birth or start a track of its
+    own.
 
     Args:
         boxes: (M, 4) left, top, width, height (px).
@@ -33,6 +35,7 @@ def choose_births(
         sensor: (M,) sensor of each detection.
         taken: (M,) not zero where a track took the detection.
         track_boxes: (N, 4) boxes of the living tracks.
+        denied: (N, S) tracks that a sensor has looked for in vain: its own box there is another thing.
         min_existence: least existence of a birth.
         max_overlap: IoU above which two boxes coincide; 1 refuses none.
 
@@ -60,9 +63,10 @@ def choose_births(
             right = boxes[j, 0] + boxes[j, 2]
             k = np.searchsorted(left, boxes[j, 0] - widest)
             while k < len(left) and left[k] < right and not refused:
-                refused = overlap(boxes[j], track_boxes[by_left[k]]) > max_overlap
+                i = by_left[k]
+                refused = overlap(boxes[j], track_boxes[i]) > max_overlap and not denied[i, sensor[j]]
                 if refused:
-                    double[j] = by_left[k]
+                    double[j] = i
                 k += 1
             if refused:
                 continue

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
     from jeat_graph.eval.tables import Cell, Table
 
+# Rows of a smoothed table are joined over so many periods of the slowest sensor: where the tracker leaves out
+# what is more likely wrong than right, nothing is put in.
+_JOINED_PERIODS = 1.5
 BYTETRACK, PAPER = "ByteTrack", "paper"
 CAUSAL, SMOOTHED = "causal", "smoothed"
 _ALL = "all"
@@ -231,11 +234,15 @@ def _config(row: Row, seen: Detections, size_px: tuple[int, int]) -> Config:
 
 def _scores(group: Sequence[JudgedRecording], found: Sequence[Any], row: Row, kind: Any) -> dict[str, Any]:
     from jeat_graph.eval.metrics import evaluate
+    from jeat_graph.runs.declaring import scan_rate_hz
 
     first = row.sensors[:1] if row.tracker == BYTETRACK else row.sensors
     instants = [one.instants(first) for one in group] if kind == CAUSAL else None
     pairs = [(one.truth, table) for one, table in zip(group, found, strict=True)]
-    return evaluate(pairs, kind=kind, instants=instants).as_dict()
+    rates = [scan_rate_hz([one.detections for one in group], sensor) for sensor in row.sensors]
+    slowest = min((rate for rate in rates if rate), default=None)
+    most_s = None if slowest is None else _JOINED_PERIODS / slowest
+    return evaluate(pairs, kind=kind, instants=instants, max_gap_s=most_s).as_dict()
 
 
 def _nees(

@@ -2,8 +2,9 @@
 
 Beside `NAME.onnx` it is `NAME.tracking.yaml`, with the section `sensor` (keys as of `sensors.NAME` in a
 configuration) and, if wanted, `birth: {max_overlap: …}`, `merge: {apart_overlap: …}`,
-`output: {position_scale: …, lasting_error: …}` and `beside: SENSOR`: without that sensor only what its scores
-say of boxes and of tracks counts, and what is said of the output.
+`output: {position_scale: …, lasting_error: …}`, `lifecycle: {least_move: …}`, `together: {SENSOR: {…}}`, keys
+of this sensor where that one looks too, and `beside: SENSOR`: without that sensor only what its scores say of
+boxes and of tracks counts, and what is said of the output.
 """
 
 from __future__ import annotations
@@ -45,9 +46,22 @@ class _Output(Section):
 
 
 @dataclass(frozen=True)
+class _Lifecycle(Section):
+    least_move: float = number(0.0, "1", "`lifecycle.least_move`", 0.0)
+
+
+@dataclass(frozen=True)
+class _Together(Section):
+    rgb: SensorConfig = field(default_factory=SensorConfig)
+    evt: SensorConfig = field(default_factory=SensorConfig)
+
+
+@dataclass(frozen=True)
 class _Declared:
     beside: str = ""
     sensor: SensorConfig = field(default_factory=SensorConfig)
+    together: _Together = field(default_factory=_Together)
+    lifecycle: _Lifecycle = field(default_factory=_Lifecycle)
     birth: _Birth = field(default_factory=_Birth)
     merge: _Merge = field(default_factory=_Merge)
     output: _Output = field(default_factory=_Output)
@@ -56,8 +70,9 @@ class _Declared:
 def declared_settings(request: DetectRequest, say: Callable[[str], object] = lambda _: None) -> list[str]:
     """Return what files beside the networks say of them, as `key=value` settings of the tracker.
 
-    Of several values outside of the sensors the smallest counts: tracks are as exact as the more exact of
-    their sensors. A network without such a file, and the detectors without weights, say nothing.
+    Of several values outside of the sensors the smallest counts, but of `least_move` the greatest: tracks are
+    as exact as the more exact of their sensors. A network without such a file, and the detectors without
+    weights, say nothing.
 
     Args:
         request: what detects.
@@ -87,6 +102,7 @@ def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lam
     """
     found: list[str] = []
     least: dict[str, float] = {}
+    least_move = 0.0
     for sensor, detector in detectors.items():
         if detector == MOTION:
             continue
@@ -106,6 +122,10 @@ def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lam
             if not facts:
                 continue
             sections.remove("birth")
+        else:
+            least_move = max(least_move, declared.lifecycle.least_move)
+        for other, more in tree.get("together", {}).items():
+            facts = {**facts, **more} if other in detectors else facts
         for section in sections:
             for key, value in asdict(getattr(declared, section)).items():
                 name = f"{section}.{key}"
@@ -117,4 +137,5 @@ def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lam
         else:
             found += [f"sensors.{sensor}.{key}={json.dumps(value)}" for key, value in facts.items()]
         say(f"sensor {sensor!r}: its boxes are taken for what {path.name} says (any other --config: not)")
+    found += [f"lifecycle.least_move={least_move}"] if least_move > 0.0 else []
     return found + [f"{key}={value}" for key, value in least.items() if value < 1.0]

@@ -15,14 +15,17 @@ def iou(a, b):
     return common / (a[2] * a[3] + b[2] * b[3] - common)
 
 
-def births(boxes, existence, sensor, taken=None, tracks=(), least=0.01, most=0.5):
+def births(boxes, existence, sensor, taken=None, tracks=(), least=0.01, most=0.5, denied=None):
     boxes = np.array(boxes, dtype=float).reshape(-1, 4)
+    tracks = np.array(tracks, dtype=float).reshape(-1, 4)
+    nobody = np.zeros((len(tracks), max(sensor, default=0) + 1), dtype=bool)
     parents, partner, double = choose_births(
         boxes,
         np.array(existence, dtype=float),
         np.array(sensor, dtype=np.int64),
         np.zeros(len(boxes), dtype=np.int64) if taken is None else np.array(taken, dtype=np.int64),
-        np.array(tracks, dtype=float).reshape(-1, 4),
+        tracks,
+        nobody if denied is None else denied,
         least,
         most,
     )
@@ -58,7 +61,8 @@ def test_every_detection_has_a_reason_for_what_became_of_it(dets, tracks, seed, 
     # Few distinct probabilities, so that ties occur: the earlier detection is first.
     existence = rng.integers(0, 5, len(dets)) / 4
     sensor, taken = rng.integers(0, 3, len(dets)), rng.integers(0, 2, len(dets))
-    parents, partner, double = births(dets, existence, sensor, taken, tracks, least, most)
+    denied = rng.random((len(tracks), 3)) < 0.3
+    parents, partner, double = births(dets, existence, sensor, taken, tracks, least, most, denied)
     free = [j for j in range(len(dets)) if not taken[j] and existence[j] >= least]
     surer = {j: {k for k in free if (-existence[k], k) < (-existence[j], j)} for j in free}
     assert parents == sorted(parents, key=lambda j: (-existence[j], j))
@@ -67,7 +71,8 @@ def test_every_detection_has_a_reason_for_what_became_of_it(dets, tracks, seed, 
         assert len({sensor[j] for j in view}) == len(view), "a vehicle has one box of each sensor"
         assert all(iou(dets[j], dets[view[0]]) > most / 2 and view[0] in surer[j] for j in view[1:])
     for j in range(len(dets)):
-        on_track = [i for i, track in enumerate(tracks) if most < 1.0 and iou(dets[j], track) > most]
+        coincident = [i for i, track in enumerate(tracks) if most < 1.0 and iou(dets[j], track) > most]
+        on_track = [i for i in coincident if not denied[i, sensor[j]]]
         if j not in free or on_track:
             assert j not in parents
             assert partner[j] == -1
@@ -101,6 +106,13 @@ def test_a_detection_on_a_track_starts_none_and_says_on_which():
         [-1, -1],
         [1, -1],
     )
+
+
+def test_a_track_that_its_sensor_denies_refuses_no_detection():
+    box, track = [[0, 0, 10, 10]], [[1, 0, 10, 10]]
+    for sensor, begins in ((0, []), (1, [0])):
+        found = births(box, [0.9], [sensor], tracks=track, denied=np.array([[False, True]]))
+        assert found[0] == begins
 
 
 def test_two_sensors_views_of_one_vehicle_are_one_birth():

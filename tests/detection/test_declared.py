@@ -17,7 +17,9 @@ def test_networks_of_the_package_are_declared_as_their_preset_declares_them(netw
     said: list[str] = []
     asked = DetectRequest(frames="a", events="b", detector_frames=network, detector_events=network)
     found, preset = load_config("default", declared_settings(asked, said.append)), load_config("sehn")
-    assert found.sensors == preset.sensors
+    rgb = replace(preset.sensors["rgb"], disagreement=0.0)  # beside events
+    assert found.sensors == {**preset.sensors, "rgb": rgb}
+    assert found.lifecycle.least_move == 0.2
     assert found.birth.max_overlap == preset.birth.max_overlap
     assert found.merge == preset.merge
     assert found.output.position_scale == preset.output.position_scale
@@ -45,6 +47,8 @@ def test_who_looks_at_nothing_or_has_no_weights_says_nothing():
     assert declared_settings(DetectRequest(frames="a", events="b")) == []
     only = declared_settings(DetectRequest(frames="a", events="b", detector_events="sehn"))
     assert {line.split(".")[1] for line in only if line.startswith("sensors")} == {"evt"}
+    pictures = declared_settings(DetectRequest(frames="a", detector_frames="sehn"))
+    assert not any("disagreement" in line or "least_move" in line for line in pictures)
     # What is known of the events' boxes was found, and pays, beside pictures.
     alone = declared_settings(DetectRequest(events="b", detector_events="sehn"))
     # But for what their scores say of boxes and tracks, which was measured of each sensor alone.
@@ -64,7 +68,14 @@ def test_a_network_of_ones_own(tmp_path):
     assert declared_settings(request) == ["sensors.rgb.score_fit=[[0.1, 0.2], [0.9, 1]]"]
     beside.write_text("sensor: {p_detect: 0.7}\nbeside: evt\n")
     assert declared_settings(request) == []
+    beside.write_text("together: {evt: {disagreement: 2}}\nlifecycle: {least_move: 0.5}\n")
+    assert declared_settings(request) == ["lifecycle.least_move=0.5"]
+    both = replace(request, events="b")
+    assert declared_settings(both) == ["sensors.rgb.disagreement=2", "lifecycle.least_move=0.5"]
     for wrong in (
+        "together: {lidar: {disagreement: 2}}",
+        "together: {evt: {disagrement: 2}}",
+        "lifecycle: {least_moves: 2}",
         "merge: {apart_overlap: 2}",
         "output: {position_scale: 0}",
         "sensor: {p_detekt: 0.7}",

@@ -23,7 +23,7 @@ from jeat_graph.tracking.stages.measuring import first_view, second_view
 from jeat_graph.tracking.stages.predicting import jerk_of, new_velocity_var
 from jeat_graph.tracking.stages.resizing import size_density_of, start_sizes
 from jeat_graph.tracking.stages.updating import take_in
-from jeat_graph.tracking.stages.worth import judge_worth
+from jeat_graph.tracking.stages.worth import denied_by, judge_worth
 from jeat_graph.tracking.state import SceneState, TrackArrays
 from jeat_graph.tracking.update_log import UpdateLog, log_birth, log_updates
 
@@ -48,6 +48,7 @@ def give_birth(
         batch.sensor,
         association.taken,
         shown_boxes(tracks, n, settings),
+        denied_by(tracks, n, scene, model),
         settings.birth.min_existence,
         settings.birth.max_overlap,
     )

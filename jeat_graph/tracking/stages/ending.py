@@ -11,12 +11,12 @@ from jeat_graph.association.boxes import clip_boxes, track_boxes, visible_fracti
 from jeat_graph.association.merging import find_duplicates, known_to_be_two, overlapping_pairs, stands_apart
 from jeat_graph.config.kernel_form import Model, Settings
 from jeat_graph.config.schema import ImageConfig
-from jeat_graph.data.arrays import BoolArray, FloatArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.tracking.compaction import keep_rows
 from jeat_graph.tracking.stages.gaps import learn_lost
 from jeat_graph.tracking.stages.inner import inner
 from jeat_graph.tracking.stages.learning import scan_weight
-from jeat_graph.tracking.stages.worth import learn_ended
+from jeat_graph.tracking.stages.worth import denied_by, learn_ended
 from jeat_graph.tracking.state import SceneState, TrackArrays
 
 
@@ -67,6 +67,9 @@ def remove_ended(tracks: TrackArrays, n: int, t: float, scene: SceneState, model
         )
         if merge.apart_overlap > 0.0:
             _note_apart(tracks, t, stands_apart(n, pairs, iou, merge.apart_overlap))
+        displaced = _displaced(
+            tracks, pairs, iou, denied_by(tracks, n, scene, model), settings.birth.max_overlap
+        )
         pairs = pairs[np.flatnonzero(iou >= merge.min_overlap)]
         if len(pairs) > 0:
             two = known_to_be_two(pairs, tracks.t_birth[:n], tracks.seen_apart[:n])
@@ -78,6 +81,7 @@ def remove_ended(tracks: TrackArrays, n: int, t: float, scene: SceneState, model
                     velocity[i, axis] = tracks.mean[i, axis, 1]
                     velocity_var[i, axis] = tracks.cov[i, axis, 1, 1]
             remove = find_duplicates(pairs, velocity, velocity_var, tracks.confirmed[:n], merge.gate_bound)
+        remove |= displaced
     rows = np.empty(n, dtype=np.int64)
     kept = 0
     for i in range(n):
@@ -103,6 +107,22 @@ def remove_ended(tracks: TrackArrays, n: int, t: float, scene: SceneState, model
         kept += 1
     keep_rows(tracks, rows[:kept])
     return kept
+
+
+@inner
+def _displaced(
+    tracks: TrackArrays, pairs: IntArray, iou: FloatArray, denied: BoolArray, max_overlap: float
+) -> BoolArray:
+    """Say which of the N tracks (N,) give way to one that a sensor has seen which denies them (N, S)."""
+    remove = np.zeros(len(denied), dtype=np.bool_)
+    for p in range(len(pairs)):
+        if iou[p] > max_overlap:
+            for side in range(2):
+                i, k = pairs[p, side], pairs[p, 1 - side]
+                for s in range(denied.shape[1]):
+                    seen = tracks.confirmed[k] and tracks.seen_by[k] >> s & 1 > 0
+                    remove[i] = remove[i] or (denied[i, s] and seen)
+    return remove
 
 
 @inner

@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from jeat_graph.config.kernel_form import Model, Settings
+from jeat_graph.data.arrays import BoolArray
 from jeat_graph.filters.running_mean import take_into_mean
 from jeat_graph.filters.sides import mean_side
 from jeat_graph.filters.worth import doubt_worth, learn_worth, worth_of
@@ -41,14 +42,50 @@ def has_moved(tracks: TrackArrays, i: int) -> bool:
     return has_gone(tracks, i, _MOVED)
 
 
+@inlined
+def seen_standing(tracks: TrackArrays, i: int, model: Model) -> bool:
+    """Whether a sensor that finds what stands has seen track `i`."""
+    for s in range(len(model.sensors.blind_speed)):
+        if tracks.seen_by[i] >> s & 1 and model.sensors.blind_speed[s] <= 0.0:
+            return True
+    return False
+
+
+@inner
+def sees_what_stands(s: int, scene: SceneState, model: Model) -> bool:
+    """Whether sensor `s` looks, and finds nearly all vehicles, those too that stand."""
+    if model.sensors.blind_speed[s] > 0.0 or scene.first_look[s] == np.inf:
+        return False
+    return bool(scene.p_detect[s] * scene.trust[s] * (1.0 - scene.blind[s]) >= _MOST)
+
+
+@inner
+def denied_by(tracks: TrackArrays, n: int, scene: SceneState, model: Model) -> BoolArray:
+    """Say which of the first `n` tracks a sensor has looked for in vain (N, S).
+
+    Only of a sensor that finds nearly all, and only against what sensors that are blind to what stands have
+    seen alone: these outline a vehicle badly that another sees well, and the other's box must not be refused
+    for it.
+    """
+    num_sensors, least = len(scene.first_look), model.settings.lifecycle.witness_odds
+    denied = np.zeros((n, num_sensors), dtype=np.bool_)
+    if least <= 0.0:
+        return denied
+    for s in range(num_sensors):
+        if sees_what_stands(s, scene, model):
+            for i in range(n):
+                denied[i, s] = tracks.witness[i, s] <= -least and not seen_standing(tracks, i, model)
+    return denied
+
+
 @inner
 def asks_for_motion(scene: SceneState, model: Model) -> bool:
     """Whether a sensor looks that finds what stands, so that others need not be believed of it."""
-    sharpest = 0.0
-    for s in range(len(scene.first_look)):
-        if model.sensors.blind_speed[s] <= 0.0 and scene.first_look[s] < np.inf:
-            sharpest = max(sharpest, scene.p_detect[s] * scene.trust[s] * (1.0 - scene.blind[s]))
-    return bool(model.settings.lifecycle.least_move > 0.0 and sharpest >= _MOST)
+    asks = False
+    if model.settings.lifecycle.least_move > 0.0:
+        for s in range(len(scene.first_look)):
+            asks = asks or sees_what_stands(s, scene, model)
+    return asks
 
 
 @inlined
@@ -59,10 +96,7 @@ def shows_motion(tracks: TrackArrays, i: int, model: Model) -> bool:
     what it alone finds there is a lamp that flickers, or leaves. So what only such sensors have seen has to
     leave the place where it began, by `lifecycle.least_move` of its size.
     """
-    for s in range(len(model.sensors.blind_speed)):
-        if tracks.seen_by[i] >> s & 1 and model.sensors.blind_speed[s] <= 0.0:
-            return True
-    return has_gone(tracks, i, model.settings.lifecycle.least_move)
+    return seen_standing(tracks, i, model) or has_gone(tracks, i, model.settings.lifecycle.least_move)
 
 
 @inner
