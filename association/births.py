@@ -24,10 +24,10 @@ def choose_births(
 
     A detection that coincides with a living track which its sensor does not deny, or with a birth by the same
     sensor, is a duplicate and starts none. One that coincides with a birth by another sensor is a second view
-    of the new vehicle and joins it, if it is the first of its sensor: a vehicle has one box of each. A further
-    one of that sensor is a duplicate if it coincides with the box that joined or with the birth as closely as
-    with a living track, or half as closely with both; else it may join another birth or start a track of its
-    own.
+    of the new vehicle and joins it, if it is the first of its sensor: a vehicle has one box of each. A
+    further one of that sensor is a duplicate if it coincides with the box that joined or with the birth as
+    closely as with a living track, or half as closely with both; else it may join another birth or start a
+    track of its own.
 
     Args:
         boxes: (M, 4) left, top, width, height (px).
