@@ -234,15 +234,21 @@ def _config(row: Row, seen: Detections, size_px: tuple[int, int]) -> Config:
 
 def _scores(group: Sequence[JudgedRecording], found: Sequence[Any], row: Row, kind: Any) -> dict[str, Any]:
     from jeat_graph.eval.metrics import evaluate
-    from jeat_graph.runs.declaring import scan_rate_hz
 
     first = row.sensors[:1] if row.tracker == BYTETRACK else row.sensors
     instants = [one.instants(first) for one in group] if kind == CAUSAL else None
     pairs = [(one.truth, table) for one, table in zip(group, found, strict=True)]
-    rates = [scan_rate_hz([one.detections for one in group], sensor) for sensor in row.sensors]
+    joined_s = _joined_s(group, row.sensors) if kind == SMOOTHED else None
+    return evaluate(pairs, kind=kind, instants=instants, max_gap_s=joined_s).as_dict()
+
+
+def _joined_s(group: Sequence[JudgedRecording], sensors: Sequence[str]) -> float | None:
+    """How far apart rows of smoothed tables may be that are joined (s); None where no rate is known."""
+    from jeat_graph.runs.declaring import scan_rate_hz
+
+    rates = [scan_rate_hz([one.detections for one in group], sensor) for sensor in sensors]
     slowest = min((rate for rate in rates if rate), default=None)
-    most_s = None if slowest is None else _JOINED_PERIODS / slowest
-    return evaluate(pairs, kind=kind, instants=instants, max_gap_s=most_s).as_dict()
+    return None if slowest is None else _JOINED_PERIODS / slowest
 
 
 def _nees(

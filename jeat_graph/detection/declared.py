@@ -24,6 +24,15 @@ from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION, network_fi
 _SUFFIX = ".tracking.yaml"
 # What scores say of how exact boxes are, and how tracks fit, was measured of each sensor alone.
 _ALWAYS = ("score_noise", "score_fit")
+# Which of two files' values counts outside of the sensors. Without the sensor that a file names under
+# `beside`, of these sections only `_ALONE` count.
+_CHOSEN: dict[str, Callable[[float, float], float]] = {
+    "lifecycle": max,
+    "birth": min,
+    "merge": min,
+    "output": min,
+}
+_ALONE = ("merge", "output")
 _KINDS = {FRAMES_SENSOR: FRAMES, EVENTS_SENSOR: EVENTS, FUSED_SENSOR: FUSED}
 
 
@@ -101,8 +110,7 @@ def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lam
         ConfigError: a detector that is not known, or a file that cannot be read or holds something else.
     """
     found: list[str] = []
-    least: dict[str, float] = {}
-    least_move = 0.0
+    said: dict[str, float] = {}
     for sensor, detector in detectors.items():
         if detector == MOTION:
             continue
@@ -116,20 +124,18 @@ def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lam
         except ConfigError as error:
             raise ConfigError(f"{path}: {error}") from None
         assert isinstance(declared, _Declared)
-        facts, sections = tree.get("sensor", {}), ["birth", "merge", "output"]
+        facts, sections = tree.get("sensor", {}), tuple(_CHOSEN)
         if declared.beside and declared.beside not in detectors:
             facts = {key: value for key, value in facts.items() if key in _ALWAYS}
             if not facts:
                 continue
-            sections.remove("birth")
-        else:
-            least_move = max(least_move, declared.lifecycle.least_move)
+            sections = _ALONE
         for other, more in tree.get("together", {}).items():
             facts = {**facts, **more} if other in detectors else facts
         for section in sections:
             for key, value in asdict(getattr(declared, section)).items():
                 name = f"{section}.{key}"
-                least[name] = min(least.get(name, 1.0), value)
+                said[name] = _CHOSEN[section](said.get(name, value), value)
         if sensor == FUSED_SENSOR:
             # The preset has no such sensor that could be changed key by key; it says what any other is like.
             any_other = load_config("default").input.of_any_sensor()
@@ -137,5 +143,9 @@ def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lam
         else:
             found += [f"sensors.{sensor}.{key}={json.dumps(value)}" for key, value in facts.items()]
         say(f"sensor {sensor!r}: its boxes are taken for what {path.name} says (any other --config: not)")
-    found += [f"lifecycle.least_move={least_move}"] if least_move > 0.0 else []
-    return found + [f"{key}={value}" for key, value in least.items() if value < 1.0]
+    silent = asdict(_Declared())
+    for name, value in said.items():
+        section, key = name.split(".")
+        if value != silent[section][key]:
+            found.append(f"{name}={value}")
+    return found

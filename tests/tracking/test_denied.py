@@ -23,10 +23,7 @@ def along(box, t):
 
 
 def watch(*overrides, car_from=2.0, seconds=4.0):
-    """Both sensors follow a lit car; from 1.5 s on events see an outline, and pictures the car, later.
-
-    Returns the last table, and the tracker.
-    """
+    """The last table: both follow a lit car; from 1.5 s on events see an outline, pictures the car later."""
     tracker = Tracker(load_config("default", [*NIGHT, *overrides]), image=(1280, 720))
     for k in range(int(seconds * 20)):
         t = 0.05 * k
@@ -34,7 +31,7 @@ def watch(*overrides, car_from=2.0, seconds=4.0):
         tracker.step((t, "rgb", seen, [0.9] * len(seen)))
         found = [along(LIT, t)] + ([along(OUTLINE, t)] if t > 1.5 else [])
         table = tracker.step((t + 0.01, "evt", found, [0.9] * len(found)))
-    return table, tracker
+    return table
 
 
 def shows(table, box):
@@ -42,7 +39,7 @@ def shows(table, box):
 
 
 def test_what_pictures_see_takes_the_place_of_an_outline_that_they_do_not():
-    table, _ = watch()
+    table = watch()
     assert shows(table, LIT)
     assert shows(table, CAR)
     assert not shows(table, OUTLINE)
@@ -50,7 +47,7 @@ def test_what_pictures_see_takes_the_place_of_an_outline_that_they_do_not():
 
 
 def test_what_pictures_never_see_stays():
-    table, _ = watch(car_from=np.inf)
+    table = watch(car_from=np.inf)
     assert shows(table, LIT)
     assert shows(table, OUTLINE)
 
@@ -67,6 +64,6 @@ def test_what_pictures_never_see_stays():
     ],
 )
 def test_unless_the_pictures_cannot_deny_it(otherwise):
-    table, _ = watch(otherwise, "lifecycle.scene_memory_s=0")
+    table = watch(otherwise, "lifecycle.scene_memory_s=0")
     assert shows(table, OUTLINE)
     assert not shows(table, CAR)

@@ -115,13 +115,14 @@ def _displaced(
 ) -> BoolArray:
     """Say which of the N tracks (N,) give way to one that a sensor has seen which denies them (N, S)."""
     remove = np.zeros(len(denied), dtype=np.bool_)
-    for p in range(len(pairs)):
-        if iou[p] > max_overlap:
-            for side in range(2):
-                i, k = pairs[p, side], pairs[p, 1 - side]
-                for s in range(denied.shape[1]):
-                    seen = tracks.confirmed[k] and tracks.seen_by[k] >> s & 1 > 0
-                    remove[i] = remove[i] or (denied[i, s] and seen)
+    if not np.any(denied):
+        return remove
+    for p in np.flatnonzero(iou > max_overlap):
+        for side in range(2):
+            i, k = pairs[p, side], pairs[p, 1 - side]
+            for s in range(denied.shape[1]):
+                seen = tracks.confirmed[k] and tracks.seen_by[k] >> s & 1 > 0
+                remove[i] = remove[i] or (denied[i, s] and seen)
     return remove
 
 

@@ -69,7 +69,7 @@ def denied_by(tracks: TrackArrays, n: int, scene: SceneState, model: Model) -> B
     """
     num_sensors, least = len(scene.first_look), model.settings.lifecycle.witness_odds
     denied = np.zeros((n, num_sensors), dtype=np.bool_)
-    if least <= 0.0:
+    if least <= 0.0 or np.max(model.sensors.blind_speed) <= 0.0:
         return denied
     for s in range(num_sensors):
         if sees_what_stands(s, scene, model):
