@@ -38,6 +38,12 @@ class SmootherConfig(Section):
     min_existence: float = number(
         0.7, "1", "rows are written where the smoothed probability of existence is at least this", 0.0, 1.0
     )
+    max_gap_s: float = number(
+        0.0,
+        "s",
+        "where nobody sees a vehicle for longer, it has no rows meanwhile, unless it is known to stand; 0: "
+        "it has, however long",
+    )
     output_rate_hz: float = number(0.0, "Hz", "rows per second of the smoothed table; 0: one at each scan")
     worker: bool = flag(False, "smooth in a process of its own, so that no step of the tracker waits for it")
     exchange_share: float = number(

@@ -2,9 +2,9 @@
 
 Beside `NAME.onnx` it is `NAME.tracking.yaml`, with the section `sensor` (keys as of `sensors.NAME` in a
 configuration) and, if wanted, `birth: {max_overlap: …}`, `merge: {apart_overlap: …}`,
-`output: {position_scale: …, lasting_error: …}`, `lifecycle: {least_move: …}`, `together: {SENSOR: {…}}`, keys
-of this sensor where that one looks too, and `beside: SENSOR`: without that sensor only what its scores say of
-boxes and of tracks counts, and what is said of the output.
+`output: {position_scale: …, lasting_error: …}`, `smoother: {max_gap_s: …}`, `lifecycle: {least_move: …}`,
+`together: {SENSOR: {…}}`, keys of this sensor where that one looks too, and `beside: SENSOR`: without that
+sensor only what its scores say of boxes and of tracks counts, and what is said of tables.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 
-from jeat_graph.config.fields import Section, number
+from jeat_graph.config.fields import LARGEST, Section, number
 from jeat_graph.config.reading import load_config
 from jeat_graph.config.section_tree import build, read_tree
 from jeat_graph.config.sensors import SensorConfig
@@ -31,8 +31,9 @@ _CHOSEN: dict[str, Callable[[float, float], float]] = {
     "birth": min,
     "merge": min,
     "output": min,
+    "smoother": min,
 }
-_ALONE = ("merge", "output")
+_ALONE = ("merge", "output", "smoother")
 _KINDS = {FRAMES_SENSOR: FRAMES, EVENTS_SENSOR: EVENTS, FUSED_SENSOR: FUSED}
 
 
@@ -55,6 +56,11 @@ class _Output(Section):
 
 
 @dataclass(frozen=True)
+class _Smoother(Section):
+    max_gap_s: float = number(LARGEST, "s", "`smoother.max_gap_s`", open_low=True)
+
+
+@dataclass(frozen=True)
 class _Lifecycle(Section):
     least_move: float = number(0.0, "1", "`lifecycle.least_move`", 0.0)
 
@@ -74,6 +80,7 @@ class _Declared:
     birth: _Birth = field(default_factory=_Birth)
     merge: _Merge = field(default_factory=_Merge)
     output: _Output = field(default_factory=_Output)
+    smoother: _Smoother = field(default_factory=_Smoother)
 
 
 def declared_settings(request: DetectRequest, say: Callable[[str], object] = lambda _: None) -> list[str]:

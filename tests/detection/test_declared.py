@@ -20,6 +20,7 @@ def test_networks_of_the_package_are_declared_as_their_preset_declares_them(netw
     rgb = replace(preset.sensors["rgb"], disagreement=0.0)  # beside events
     assert found.sensors == {**preset.sensors, "rgb": rgb}
     assert found.lifecycle.least_move == 0.2
+    assert found.smoother.max_gap_s == 0.3
     assert found.birth.max_overlap == preset.birth.max_overlap
     assert found.merge == preset.merge
     assert found.output.position_scale == preset.output.position_scale
@@ -49,6 +50,9 @@ def test_who_looks_at_nothing_or_has_no_weights_says_nothing():
     assert {line.split(".")[1] for line in only if line.startswith("sensors")} == {"evt"}
     pictures = declared_settings(DetectRequest(frames="a", detector_frames="sehn"))
     assert not any("disagreement" in line or "least_move" in line for line in pictures)
+    # Events do not see what stands: their gaps are bridged.
+    assert "smoother.max_gap_s=0.3" in pictures
+    assert not any("max_gap_s" in line for line in only)
     # What is known of the events' boxes was found, and pays, beside pictures.
     alone = declared_settings(DetectRequest(events="b", detector_events="sehn"))
     # But for what their scores say of boxes and tracks, which was measured of each sensor alone.

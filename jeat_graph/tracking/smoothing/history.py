@@ -206,6 +206,8 @@ class TrackHistory:
         if self._whole and self._stays(piece):
             existence = observed.in_place(existence)
         chosen &= existence >= self._config.smoother.min_existence
+        if self._config.smoother.max_gap_s > 0.0:
+            chosen &= (observed.unseen_for() <= self._config.smoother.max_gap_s) | observed.held
         output = self._config.output
         if output.min_fit > 0.0:
             chosen &= fit_in_hindsight(observed.t, observed.fit, output.fit_memory_s) >= output.min_fit

@@ -95,6 +95,19 @@ class ObservationTimes:
         seen = np.flatnonzero((self.used != 0) & np.isfinite(self.existence))
         return (float(self.existence[seen[-1]]), float(self.worth[seen[-1]])) if len(seen) else (1.0, 1.0)
 
+    def unseen_for(self) -> FloatArray:
+        """How long (K,) no detection was taken around each step (s): from the last before to the next after.
+
+        0 at steps with a detection; before the first one and after the last from there to the step.
+        """
+        seen = self.used != 0
+        if not seen.any():
+            return np.zeros(len(self))
+        times = self.t[seen]
+        before = times[np.maximum(np.searchsorted(times, self.t, side="right") - 1, 0)]
+        after = times[np.minimum(np.searchsorted(times, self.t), len(times) - 1)]
+        return np.maximum(after, self.t) - np.minimum(before, self.t)
+
     def in_place(self, existence: FloatArray) -> FloatArray:
         """Probability (K,) that what has never left its place is a vehicle at each step.
 
