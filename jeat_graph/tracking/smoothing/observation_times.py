@@ -106,7 +106,7 @@ class ObservationTimes:
         times = self.t[seen]
         before = times[np.maximum(np.searchsorted(times, self.t, side="right") - 1, 0)]
         after = times[np.minimum(np.searchsorted(times, self.t), len(times) - 1)]
-        return np.maximum(after, self.t) - np.minimum(before, self.t)
+        return np.asarray(np.maximum(after, self.t) - np.minimum(before, self.t))
 
     def in_place(self, existence: FloatArray) -> FloatArray:
         """Probability (K,) that what has never left its place is a vehicle at each step.
