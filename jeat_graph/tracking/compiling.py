@@ -12,6 +12,7 @@ import contextlib
 import math
 import subprocess
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -152,6 +153,7 @@ def help_out(k: int, number: int) -> None:
     given = stage_arguments(config)
     if k and k == number - 1:
         compile_smoothers(config)
+        compile_smoothers(of_one_sensor(config))
     for kernel in kernels[first:] + kernels[:first]:
         machine_code(kernel, tuple(given[name] for name in _parameters(kernel)))
     if k == 0:
@@ -161,14 +163,27 @@ def help_out(k: int, number: int) -> None:
         compile_all()
 
 
-def compile_all(presets: Sequence[str] = ("default", "highway", "paper")) -> None:
-    """Track a vehicle for a second with each preset, smoother included, which compiles all they need."""
-    for preset in presets:
-        tracker = Tracker(load_config(preset))
+def compile_all(configs: Sequence[Config] | None = None) -> None:
+    """Track a vehicle for a second, smoother included, which compiles all that is needed.
+
+    Args:
+        configs: with each of these; the presets, and `default` for a detector that is alone, if None: the
+            smoothers' states have a part for each sensor.
+    """
+    if configs is None:
+        both = load_config("default")
+        configs = [both, of_one_sensor(both), load_config("highway"), load_config("paper")]
+    for config in configs:
+        tracker = Tracker(config)
         for k in range(20):
             box = [100.0 + 5.0 * k, 100.0, 40.0, 30.0]
             tracker.step([(0.05 * k, name, [box], [0.9]) for name in tracker.sensor_names])
         tracker.finish()
+
+
+def of_one_sensor(config: Config) -> Config:
+    """Return the configuration of its first sensor alone."""
+    return replace(config, sensors=dict(list(config.sensors.items())[:1]))
 
 
 def stages() -> list[Any]:

@@ -20,6 +20,7 @@ COMPILED = hasattr(step, "overloads")
 SCRIPT = """
 import gc
 from numba.core.dispatcher import Dispatcher
+from jeat_graph.config.reading import load_config
 from jeat_graph.tracking import compiling
 
 def compiled():
@@ -33,7 +34,8 @@ compiling.help_out(1, 2)
 helped = compiled()
 names = [f"{kernel.py_func.__module__}.{kernel.py_func.__qualname__}" for kernel in compiling.stages()]
 assert len(names) > 20 and all(helped[name] == 1 for name in names), helped
-compiling.compile_all(("default",))
+both = load_config("default")
+compiling.compile_all([both, compiling.of_one_sensor(both)])
 after = compiled()
 new = {name: count for name, count in after.items() if count != helped.get(name, 0)}
 print(*(name for name in new if name in names or "smooth" in name), sep="\\n")
@@ -46,6 +48,22 @@ def test_what_helpers_compile_is_what_the_tracker_calls():
     done = subprocess.run([sys.executable, "-c", SCRIPT], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == []
+
+
+# What a run by one detector, by two and by the paper's filter calls of the smoothers is there.
+SMOOTHED = """
+from jeat_graph.smoothers.backward import smooth_covs
+from jeat_graph.tracking import compiling
+compiling.compile_all()
+print(*sorted(len(types[0]) for types in smooth_covs.signatures))
+"""
+
+
+@pytest.mark.skipif(not COMPILED, reason="nothing is compiled")
+def test_smoothers_are_compiled_for_one_sensor_too():
+    done = subprocess.run([sys.executable, "-c", SMOOTHED], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["3", "4", "5"]
 
 
 @pytest.mark.skipif(not COMPILED, reason="nothing is compiled")
@@ -67,7 +85,7 @@ def test_each_helper_begins_elsewhere(monkeypatch):
         (
             [*kernels[::-1], "begin", "all", "end", "all"],
             [*kernels[::-1][second:], *kernels[::-1][:second]],
-            ["smoothers", *kernels[::-1][last:], *kernels[::-1][:last]],
+            ["smoothers", "smoothers", *kernels[::-1][last:], *kernels[::-1][:last]],
         )
     ):
         ran.clear()
