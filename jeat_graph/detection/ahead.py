@@ -10,8 +10,8 @@ from __future__ import annotations
 import contextvars
 import queue
 import threading
-from collections.abc import Generator, Iterator
-from typing import TypeVar
+from collections.abc import Iterator
+from typing import Self, TypeVar
 
 _Item = TypeVar("_Item")
 
@@ -32,48 +32,59 @@ class _End:
         self.error = error
 
 
-def ahead(items: Iterator[_Item], most: int = _MOST_AHEAD) -> Generator[_Item, None, None]:
-    """Yield what a thread makes; whoever stops asking stops it, too.
+class Ahead(Iterator[_Item]):
+    """What a thread makes, which begins at once; whoever stops asking closes it, and stops the thread.
 
     Args:
         items: made in the thread, and closed there.
         most: how many it may be ahead.
-
-    Raises:
-        Exception: whatever `items` raises, at the same place.
     """
-    ready: queue.Queue[_Item | _End] = queue.Queue(most)
-    stopped = threading.Event()
 
-    def work() -> None:
+    def __init__(self, items: Iterator[_Item], most: int = _MOST_AHEAD) -> None:
+        self._items = items
+        self._ready: queue.Queue[_Item | _End] = queue.Queue(most)
+        self._stopped = threading.Event()
+        run = contextvars.copy_context().run
+        self._thread = threading.Thread(target=run, args=(self._work,), daemon=True)
+        self._thread.start()
+
+    def __iter__(self) -> Self:
+        return self
+
+    def __next__(self) -> _Item:
+        """Return the next item, when it has been made.
+
+        Raises:
+            Exception: whatever the items raise, at the same place.
+        """
+        if self._stopped.is_set():
+            raise StopIteration
+        item = self._ready.get()
+        if not isinstance(item, _End):
+            return item
+        self.close()
+        raise item.error if item.error is not None else StopIteration
+
+    def close(self) -> None:
+        """Stop the thread, and wait for its end."""
+        self._stopped.set()
+        while self._thread.is_alive():  # it may wait for room
+            try:
+                self._ready.get_nowait()
+            except queue.Empty:
+                self._thread.join(_POLL_S)
+
+    def _work(self) -> None:
         end = _End()
         try:
-            for made in items:
-                ready.put(made)
-                if stopped.is_set():
+            for made in self._items:
+                self._ready.put(made)
+                if self._stopped.is_set():
                     return
         except BaseException as error:
             end = _End(error)
         finally:
-            close = getattr(items, "close", None)  # a generator's: what it has open is closed here
+            close = getattr(self._items, "close", None)  # a generator's: what it has open is closed here
             if close is not None:
                 close()
-        ready.put(end)
-
-    thread = threading.Thread(target=contextvars.copy_context().run, args=(work,), daemon=True)
-    thread.start()
-    try:
-        while True:
-            item = ready.get()
-            if isinstance(item, _End):
-                if item.error is not None:
-                    raise item.error
-                return
-            yield item
-    finally:
-        stopped.set()
-        while thread.is_alive():  # it may wait for room
-            try:
-                ready.get_nowait()
-            except queue.Empty:
-                thread.join(_POLL_S)
+        self._ready.put(end)

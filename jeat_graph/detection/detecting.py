@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.data.progress import with_progress
-from jeat_graph.detection.ahead import ahead
+from jeat_graph.detection.ahead import Ahead
 from jeat_graph.detection.binned import BinnedDetector, Signal
 from jeat_graph.detection.event_detector import EventDetector
 from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION, network_file
@@ -95,11 +95,10 @@ def detect_scans(
             streams.append(_picture_scans(request, stack, say))
         if request.detector_fused is None and request.events is not None:
             streams.append(_event_scans(request, stack, say))
-        if len(streams) > 1:
-            streams = [ahead(stream) for stream in streams]
-        for stream in streams:
-            stack.enter_context(closing(stream))
-        for scan in heapq.merge(*streams, key=lambda scan: scan.t):
+        coming: list[Iterator[Scan]] = [
+            stack.enter_context(closing(Ahead(stream) if len(streams) > 1 else stream)) for stream in streams
+        ]
+        for scan in heapq.merge(*coming, key=lambda scan: scan.t):
             on_time(scan.t)
             yield scan
 
@@ -153,10 +152,20 @@ def _picture_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str]
         say(model.description)
         return (model(frame, t) for t, frame in with_progress(source, len(source)))
     stack.enter_context(_one_thread())
+    return _moving(source, request)
+
+
+def _moving(source: FrameSource, request: DetectRequest) -> _Scans:
+    """Yield what differs from the background, which is made when the first scan is asked for.
+
+    By whoever asks: a thread, while another already looks at the events.
+    """
     detector = PictureDetector(FRAMES_SENSOR, request.settings.frames)
     _prime(detector, source, request)
-    found = (detector(frame, t) for t, frame in with_progress(source, len(source)))
-    return (scan for scan in found if scan is not None)
+    for t, frame in with_progress(source, len(source)):
+        scan = detector(frame, t)
+        if scan is not None:
+            yield scan
 
 
 @contextmanager
@@ -176,7 +185,7 @@ def _one_thread() -> Iterator[None]:
         cv2.setNumThreads(before)
 
 
-def _prime(detector: PictureDetector, source: Any, request: DetectRequest) -> None:
+def _prime(detector: PictureDetector, source: FrameSource, request: DetectRequest) -> None:
     """Take the background from the first seconds before the first picture is looked at."""
     settings = request.settings.frames
     end_s = source.times_s[0] + settings.warm_up_s
@@ -260,7 +269,7 @@ def _pushed(
             yield detector.without_noise(moved)
 
     # Reading and unpacking take as long as looking where events are many.
-    with closing(ahead(signals(), _PIECES_AHEAD)) as coming:
+    with closing(Ahead(signals(), _PIECES_AHEAD)) as coming:
         for signal in coming:
             yield from detector.look(signal)
     yield from detector.finish()

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
 import threading
 
 import numpy as np
 import pytest
 
+import jeat_graph.detection
+import jeat_graph.io.events
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError
-from jeat_graph.detection.ahead import ahead
+from jeat_graph.detection.ahead import Ahead
 
 
 def scans(count: int, made: list[int] | None = None):
@@ -20,7 +24,7 @@ def scans(count: int, made: list[int] | None = None):
 
 
 def test_all_scans_come_in_their_order():
-    assert [scan.t for scan in ahead(scans(100))] == [float(k) for k in range(100)]
+    assert [scan.t for scan in Ahead(scans(100))] == [float(k) for k in range(100)]
 
 
 def test_what_goes_wrong_is_told_where_it_happened():
@@ -30,8 +34,8 @@ def test_what_goes_wrong_is_told_where_it_happened():
 
     found = []
     with pytest.raises(DataError, match="is damaged"):
-        found.extend(ahead(broken()))
-    stream = ahead(broken())
+        found.extend(Ahead(broken()))
+    stream = Ahead(broken())
     assert [next(stream).t for _ in range(3)] == [0.0, 1.0, 2.0]
     with pytest.raises(DataError, match="is damaged"):
         next(stream)
@@ -40,11 +44,33 @@ def test_what_goes_wrong_is_told_where_it_happened():
 def test_whoever_stops_asking_stops_the_work():
     made: list[int] = []
     before = threading.active_count()
-    stream = ahead(scans(100_000, made))
+    stream = Ahead(scans(100_000, made))
     assert next(stream).t == 0.0
     stream.close()
     assert threading.active_count() == before
     assert len(made) < 100
+
+
+def test_the_work_begins_before_anybody_asks():
+    begun = threading.Event()
+
+    def beginning():
+        begun.set()
+        yield from scans(1)
+
+    stream = Ahead(beginning())
+    assert begun.wait(10.0)
+    stream.close()
+    assert list(stream) == []
+    stream.close()
+
+
+def test_at_the_end_there_is_nothing_more_and_no_thread():
+    before = threading.active_count()
+    stream = Ahead(scans(3))
+    assert len(list(stream)) == 3
+    assert next(stream, None) is None
+    assert threading.active_count() == before
 
 
 def test_what_a_stream_has_open_is_closed_in_its_thread_before_anything_else_ends():
@@ -56,7 +82,21 @@ def test_what_a_stream_has_open_is_closed_in_its_thread_before_anything_else_end
         finally:
             closed.append(threading.current_thread() is not threading.main_thread())
 
-    stream = ahead(opened())
+    stream = Ahead(opened())
     next(stream)
     stream.close()
     assert closed == [True]
+
+
+def test_kernels_of_pictures_and_events_let_other_threads_run():
+    """One that does not stops the other camera's thread as long as it runs."""
+    kernels = {}
+    for package in (jeat_graph.detection, jeat_graph.io.events):
+        for module in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
+            for value in vars(importlib.import_module(module.name)).values():
+                if hasattr(value, "py_func"):
+                    kernels[f"{module.name}.{value.py_func.__name__}"] = value.targetoptions.get("nogil")
+    if not kernels:
+        pytest.skip("nothing is compiled")
+    assert len(kernels) > 30
+    assert [name for name, lets in kernels.items() if not lets] == []

@@ -97,14 +97,14 @@ def _header(file: BinaryIO) -> str:
     return b"".join(lines).decode("latin-1").lower()
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _swap(word: np.uint64) -> np.int64:
     """Turn a 32-bit word from big-endian."""
     w = np.int64(word)
     return ((w & 0xFF) << 24) | ((w & 0xFF00) << 8) | ((w >> 8) & 0xFF00) | (w >> 24)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _decode(
     words: npt.NDArray[np.uint64],
     state: IntArray,
@@ -150,7 +150,7 @@ def _decode(
 # Compiled with the camera as a constant: a fifth faster than with it as an argument.
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def decode_davis(
     words: npt.NDArray[np.uint64], state: IntArray, out: Columns, triggers: Triggers, limits: Limits
 ) -> int:
@@ -158,7 +158,7 @@ def decode_davis(
     return int(_decode(words, state, out, triggers, limits, True))
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def decode_dvs128(
     words: npt.NDArray[np.uint64], state: IntArray, out: Columns, triggers: Triggers, limits: Limits
 ) -> int:

@@ -72,7 +72,7 @@ class DatReader(WordReader):
         super().__init__(path, file, np.uint64, decode_first if version < 2 else decode, size_px)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _decode(
     words: npt.NDArray[np.uint64],
     state: IntArray,

@@ -22,7 +22,7 @@ def header(size_px: tuple[int, int]) -> bytes:
     return text.encode("ascii") + bytes((PIXELS_12, EVENT_BYTES))
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def encode(
     t: IntArray,
     x: npt.NDArray[np.uint16],

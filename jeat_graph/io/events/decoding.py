@@ -56,14 +56,14 @@ def empty_state() -> IntArray:
     return state
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def wraps(old: Any, new: Any, full: int) -> bool:
     """Tell a counter of `full` values that began again from one that stepped back by a fault."""
     quarter = full // 4
     return bool(old >= full - quarter and new < quarter)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def turns_of_counter(new: Any, old: Any, turns: Any, bits: tuple[int, int], state: IntArray) -> int:
     """Return how often a counter of the time's upper bits began again; a jump ahead is remarked on.
 
@@ -81,7 +81,7 @@ def turns_of_counter(new: Any, old: Any, turns: Any, bits: tuple[int, int], stat
     return int(turns)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def turns_of_clock(new: Any, old: Any, turns: Any, state: IntArray) -> int:
     """Return how often a clock of `CLOCK_BITS` began again; a jump and a step back are remarked on.
 
@@ -102,7 +102,7 @@ def turns_of_clock(new: Any, old: Any, turns: Any, state: IntArray) -> int:
     return int(turns)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def is_kept(x: Any, y: Any, timed: bool, limits: Limits, state: IntArray) -> bool:
     """Whether an event has a time and lies in the picture; if not, it is counted among those left out."""
     if not timed:
@@ -114,7 +114,7 @@ def is_kept(x: Any, y: Any, timed: bool, limits: Limits, state: IntArray) -> boo
     return True
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def put_event(out: Columns, row: Any, t: Any, x: Any, y: Any, polarity: Any) -> int:
     """Write an event into a row, and return the next row."""
     out.t[row] = t
@@ -124,7 +124,7 @@ def put_event(out: Columns, row: Any, t: Any, x: Any, y: Any, polarity: Any) -> 
     return int(row + 1)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def put_edge(triggers: Triggers, row: Any, t: Any, channel: Any, value: Any) -> int:
     """Write an edge of a signal into a row, and return the next row."""
     triggers.t_us[row] = t

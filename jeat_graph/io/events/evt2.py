@@ -56,19 +56,19 @@ class Evt2Reader(WordReader):
         super().__init__(path, file, np.uint32, decode, size_px)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def upper_time(state: IntArray) -> int:
     """Return the time (µs) without the low bits, which events and edges have; negative if none is known."""
     return int(((state[WRAPS] << HIGH_BITS) + state[HIGH]) << LOW_BITS)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def lower_time(word: Any) -> int:
     """Return the low bits of the time (µs) of an event or edge."""
     return int((word >> 22) & 0x3F)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def take_other(word: Any, triggers: Triggers, state: IntArray) -> bool:
     """Take a word that is no event into the state; False if it is an edge and there is no room for it."""
     kind = word >> 28
@@ -89,7 +89,7 @@ def take_other(word: Any, triggers: Triggers, state: IntArray) -> bool:
     return True
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def decode(
     words: npt.NDArray[np.uint32], state: IntArray, out: Columns, triggers: Triggers, limits: Limits
 ) -> int:

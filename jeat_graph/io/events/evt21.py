@@ -78,7 +78,7 @@ def _looks_swapped(data: bytes) -> bool:
     return bool(first > second)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _decode(
     words: npt.NDArray[np.uint64],
     state: IntArray,

@@ -17,7 +17,7 @@ from jeat_graph.io.events.word_writer import Layout, WordWriter
 _TIME_WORD = 8 << 28
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def encode(
     t: IntArray,
     x: npt.NDArray[np.uint16],

@@ -66,7 +66,7 @@ class Evt3Reader(WordReader):
         super().__init__(path, file, np.uint16, decode, size_px)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def decode(
     words: npt.NDArray[np.uint16], state: IntArray, out: Columns, triggers: Triggers, limits: Limits
 ) -> int:

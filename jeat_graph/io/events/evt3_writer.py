@@ -31,7 +31,7 @@ _SPAN_12, _SPAN_8 = 12, 8
 _HIGH, _LOW, _ROW = 0, 1, 2
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _run(
     t: IntArray, x: npt.NDArray[np.uint16], y: npt.NDArray[np.uint16], p: npt.NDArray[np.uint8], k: int
 ) -> int:
@@ -49,7 +49,7 @@ def _run(
     return end - k
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def encode(
     t: IntArray,
     x: npt.NDArray[np.uint16],
