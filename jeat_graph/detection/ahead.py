@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextvars
 import queue
 import threading
+import weakref
 from collections.abc import Iterator
 from typing import Self, TypeVar
 
@@ -41,12 +42,14 @@ class Ahead(Iterator[_Item]):
     """
 
     def __init__(self, items: Iterator[_Item], most: int = _MOST_AHEAD) -> None:
-        self._items = items
         self._ready: queue.Queue[_Item | _End] = queue.Queue(most)
         self._stopped = threading.Event()
-        run = contextvars.copy_context().run
-        self._thread = threading.Thread(target=run, args=(self._work,), daemon=True)
-        self._thread.start()
+        run, work = contextvars.copy_context().run, (_work, items, self._ready, self._stopped)
+        thread = threading.Thread(target=run, args=work, daemon=True)
+        # The thread does not know of this object: it ends with it, too, if nobody closes it.
+        self._end = weakref.finalize(self, _stop, thread, self._ready, self._stopped)
+        self._end.atexit = False
+        thread.start()
 
     def __iter__(self) -> Self:
         return self
@@ -67,24 +70,30 @@ class Ahead(Iterator[_Item]):
 
     def close(self) -> None:
         """Stop the thread, and wait for its end."""
-        self._stopped.set()
-        while self._thread.is_alive():  # it may wait for room
-            try:
-                self._ready.get_nowait()
-            except queue.Empty:
-                self._thread.join(_POLL_S)
+        self._end()
 
-    def _work(self) -> None:
-        end = _End()
+
+def _work(items: Iterator[_Item], ready: queue.Queue[_Item | _End], stopped: threading.Event) -> None:
+    end = _End()
+    try:
         try:
-            for made in self._items:
-                self._ready.put(made)
-                if self._stopped.is_set():
+            for made in items:
+                ready.put(made)
+                if stopped.is_set():
                     return
-        except BaseException as error:
-            end = _End(error)
         finally:
-            close = getattr(self._items, "close", None)  # a generator's: what it has open is closed here
+            close = getattr(items, "close", None)  # a generator's: what it has open is closed here
             if close is not None:
                 close()
-        self._ready.put(end)
+    except BaseException as error:
+        end = _End(error)
+    ready.put(end)
+
+
+def _stop(thread: threading.Thread, ready: queue.Queue[_Item | _End], stopped: threading.Event) -> None:
+    stopped.set()
+    while thread.is_alive():  # it may wait for room
+        try:
+            ready.get_nowait()
+        except queue.Empty:
+            thread.join(_POLL_S)

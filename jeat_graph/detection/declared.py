@@ -4,7 +4,8 @@ Beside `NAME.onnx` it is `NAME.tracking.yaml`, with the section `sensor` (keys a
 configuration) and, if wanted, `birth: {max_overlap: …}`, `merge: {apart_overlap: …}`,
 `output: {position_scale: …, lasting_error: …}`, `smoother: {max_gap_s: …}`, `lifecycle: {least_move: …}`,
 `together: {SENSOR: {…}}`, keys of this sensor where that one looks too, and `beside: SENSOR`: without that
-sensor only what its scores say of boxes and of tracks counts, and what is said of tables.
+sensor only what its scores say of boxes and of tracks counts, and the sections `merge`, `output` and
+`smoother`.
 """
 
 from __future__ import annotations
@@ -155,4 +156,9 @@ def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lam
         section, key = name.split(".")
         if value != silent[section][key]:
             found.append(f"{name}={value}")
+            if section == "smoother":
+                say(
+                    f"the smoothed table has no rows where nobody sees a vehicle for more than {value:g} s "
+                    f"(--set {name}=0: it has)"
+                )
     return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import importlib
 import pkgutil
 import threading
@@ -63,6 +64,42 @@ def test_the_work_begins_before_anybody_asks():
     stream.close()
     assert list(stream) == []
     stream.close()
+
+
+def test_what_nobody_closes_ends_with_whoever_had_it():
+    before = threading.active_count()
+    stream = Ahead(scans(100_000))
+    next(stream)
+    del stream
+    gc.collect()
+    assert threading.active_count() == before
+
+
+@pytest.mark.parametrize("asked", [1, 5])
+def test_what_goes_wrong_when_a_stream_is_closed_is_told_too(asked):
+    class Items:
+        left = 3
+
+        def __iter__(self):
+            return self
+
+        def __next__(self):
+            self.left -= 1
+            if self.left < 0:
+                raise StopIteration
+            return self.left
+
+        def close(self):
+            raise DataError("cannot be closed", "file")
+
+    stream = Ahead(Items(), most=1)
+    if asked > 3:
+        with pytest.raises(DataError, match="cannot be closed"):
+            list(stream)
+    else:
+        assert next(stream) == 2
+        stream.close()
+    assert list(stream) == []
 
 
 def test_at_the_end_there_is_nothing_more_and_no_thread():

@@ -20,14 +20,16 @@ def test_networks_of_the_package_are_declared_as_their_preset_declares_them(netw
     rgb = replace(preset.sensors["rgb"], disagreement=0.0)  # beside events
     assert found.sensors == {**preset.sensors, "rgb": rgb}
     assert found.lifecycle.least_move == 0.2
-    assert found.smoother.max_gap_s == 0.3
+    assert found.smoother.max_gap_s == preset.smoother.max_gap_s == 0.3
     assert found.birth.max_overlap == preset.birth.max_overlap
     assert found.merge == preset.merge
     assert found.output.position_scale == preset.output.position_scale
     # Of two the more exact one counts.
     assert found.output.lasting_error == preset.output.lasting_error
     assert found.motion == load_config("default").motion
-    assert [line.split(":")[0] for line in said] == ["sensor 'rgb'", "sensor 'evt'"]
+    assert [line.split(":")[0] for line in said[:2]] == ["sensor 'rgb'", "sensor 'evt'"]
+    assert "no rows" in said[2]
+    assert "--set smoother.max_gap_s=0" in said[2]
 
 
 def test_of_the_fast_networks_larger_errors_and_more_misses_are_declared():

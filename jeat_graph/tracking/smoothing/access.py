@@ -34,10 +34,11 @@ class SmoothedTracks:
     def smoothed(self) -> Trajectories:
         """Return the smoothed trajectories of the confirmed tracks so far, without what was drained.
 
-        Their whole life: the time before confirmation and gaps included, up to the last detection. With a
-        fixed lag the rows older than that are final; all others may still change. (The call makes the
-        smoothers take in what they had set aside: with a fixed lag some states become final a part of a chunk
-        earlier than in a run without it, and differ from there by what that part would have told.)
+        Their whole life: the time before confirmation and gaps included, but for those longer than
+        `smoother.max_gap_s` where that is set, up to the last detection. With a fixed lag the rows older than
+        that are final; all others may still change. (The call makes the smoothers take in what they had set
+        aside: with a fixed lag some states become final a part of a chunk earlier than in a run without it,
+        and differ from there by what that part would have told.)
 
         Raises:
             JeatGraphError: the configuration asks for no smoother.

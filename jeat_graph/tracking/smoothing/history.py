@@ -207,7 +207,7 @@ class TrackHistory:
             existence = observed.in_place(existence)
         chosen &= existence >= self._config.smoother.min_existence
         if self._config.smoother.max_gap_s > 0.0:
-            chosen &= (observed.unseen_for() <= self._config.smoother.max_gap_s) | observed.held
+            chosen &= ~observed.hidden(piece.t, self._config.smoother.max_gap_s)
         output = self._config.output
         if output.min_fit > 0.0:
             chosen &= fit_in_hindsight(observed.t, observed.fit, output.fit_memory_s) >= output.min_fit

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from numba import njit
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.smoothers.track_data import COINCIDENT_S
 
 #: A track has been taken for a vehicle once its existence was at least this.
 BELIEVED = 0.5
@@ -95,18 +96,21 @@ class ObservationTimes:
         seen = np.flatnonzero((self.used != 0) & np.isfinite(self.existence))
         return (float(self.existence[seen[-1]]), float(self.worth[seen[-1]])) if len(seen) else (1.0, 1.0)
 
-    def unseen_for(self) -> FloatArray:
-        """How long (K,) no detection was taken around each step (s): from the last before to the next after.
+    def hidden(self, seen: FloatArray, longest_s: float) -> BoolArray:
+        """Whether each step (K,) lies between two detections that are more than so long apart.
 
-        0 at steps with a detection; before the first one and after the last from there to the step.
+        A gap in which it was known to stand, at any of these steps, counts for none.
+
+        Args:
+            seen: (D,) times of its detections (s), ascending, from the last one before the steps on.
+            longest_s: how long (s) a vehicle may go unseen.
         """
-        seen = self.used != 0
-        if not seen.any():
-            return np.zeros(len(self))
-        times = self.t[seen]
-        before = times[np.maximum(np.searchsorted(times, self.t, side="right") - 1, 0)]
-        after = times[np.minimum(np.searchsorted(times, self.t), len(times) - 1)]
-        return np.asarray(np.maximum(after, self.t) - np.minimum(before, self.t))
+        edges = np.concatenate([[-np.inf], seen, [np.inf]])
+        gap = np.searchsorted(seen, self.t + COINCIDENT_S, side="right")
+        long = edges[gap + 1] - edges[gap] > longest_s + COINCIDENT_S
+        between = self.t > edges[gap] + COINCIDENT_S
+        stands = np.bincount(gap, self.held, len(seen) + 1) > 0
+        return np.asarray(long & between & ~stands[gap])
 
     def in_place(self, existence: FloatArray) -> FloatArray:
         """Probability (K,) that what has never left its place is a vehicle at each step.
