@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from jeat_graph.config.argument_types import picture_size, positive
+from jeat_graph.config.argument_types import finite, picture_size, positive
 
 if TYPE_CHECKING:
     from jeat_graph.detection.detecting import DetectRequest
@@ -54,7 +54,7 @@ def add_detecting(parser: argparse._ActionsContainer) -> None:
         "--event-rate",
         type=positive,
         metavar="HZ",
-        help="scans of the events per second (default: 50; of networks beside frames 20)",
+        help="scans of the events per second (default: 50; of networks beside frames, and of both, 20)",
     )
     add(
         "--event-size",
@@ -64,7 +64,7 @@ def add_detecting(parser: argparse._ActionsContainer) -> None:
     )
     add(
         "--event-delay",
-        type=float,
+        type=finite,
         default=0.0,
         metavar="S",
         help="what to add to the events' times for the clock of the frames (default: 0)",
@@ -139,7 +139,10 @@ def detect_request(args: argparse.Namespace) -> DetectRequest:
         raise ConfigError(f"{option} says nothing without {source}: give both, or leave it out")
     settings = load_settings(args.detection_config, args.detection_set)
     if args.event_rate is not None:
-        settings = replace(settings, events=replace(settings.events, rate_hz=args.event_rate))
+        try:
+            settings = replace(settings, events=replace(settings.events, rate_hz=args.event_rate))
+        except ConfigError as error:
+            raise ConfigError(f"--event-rate: {error}") from None
     return DetectRequest(
         frames=args.frames,
         events=args.events,

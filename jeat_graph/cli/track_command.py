@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -141,12 +142,23 @@ def _detected(args: argparse.Namespace) -> tuple[tuple[str, ...], tuple[str, ...
     check_folder(out)
     found = out / DETECTIONS
     check_writable(found)
-    request = detect_request(args)
+    request = replace(detect_request(args), one_picture=True)
+    if args.image is not None and args.frames is not None:
+        _check_image(args.image, args.frames)
     # Another configuration, a preset or the user's own, says itself what its sensors are.
     declared = declared_settings(request, _say) if args.config == DEFAULT else []
     args.image = args.image or picture_of(request)
     write_detections(detect_with_bar(request, "track"), found)
     return (str(found),), tuple(declared)
+
+
+def _check_image(image: tuple[int, int], frames: str) -> None:
+    """Refuse a size that is not that of the pictures to detect in: what is found there is in their pixels."""
+    from jeat_graph.io.video import peek
+
+    (width, height), _ = peek(frames)
+    if image != (width, height):
+        raise DataError(f"has {width} x {height} px, not the {image[0]} x {image[1]} of --image", frames)
 
 
 def _road_tables(camera_file: str) -> Callable[[Path, Config], None]:

@@ -53,6 +53,14 @@ def not_negative(text: str) -> float:
     return value
 
 
+def finite(text: str) -> float:
+    """Read a finite number."""
+    value = float(text)
+    if not abs(value) < float("inf"):
+        raise ArgumentTypeError("must be a finite number")
+    return value
+
+
 def share(text: str) -> float:
     """Read a number above 0 and at most 1."""
     value = float(text)

@@ -46,6 +46,10 @@ def read_tree(
     else:
         path = Path(source)
         if not path.is_file():
+            if path.exists():
+                raise ConfigError(f"{source}: is no file")
+            if not names:
+                raise ConfigError(f"{source}: no such {kind}")
             near = difflib.get_close_matches(source, names, 1)
             hint = f"; did you mean {near[0]}?" if near else f"; {kind}s: {', '.join(names)}"
             raise ConfigError(f"{source}: no such configuration file or {kind}{hint}")

@@ -52,9 +52,19 @@ def _count(node: yaml.Node, known: dict[int, int]) -> int:
     known[id(node)] = 0
     parts = node.value
     if isinstance(node, yaml.MappingNode):
+        _check_once(node)
         parts = [part for pair in node.value for part in pair]
     total = 1 + sum(_count(part, known) for part in parts)
     if total > MOST_VALUES:
         raise yaml.YAMLError(f"stands for more than {MOST_VALUES} values; its aliases repeat too much")
     known[id(node)] = total
     return total
+
+
+def _check_once(node: yaml.MappingNode) -> None:
+    """Refuse a key that comes twice: the last value would count, and nobody would know."""
+    seen: set[str] = set()
+    for key, _ in node.value:
+        if isinstance(key, yaml.ScalarNode) and key.value in seen:
+            raise yaml.MarkedYAMLError(problem=f"{key.value} comes twice", problem_mark=key.start_mark)
+        seen.add(str(key.value))

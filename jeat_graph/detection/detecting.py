@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Generator, Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,12 +19,15 @@ from jeat_graph.detection.ahead import Ahead
 from jeat_graph.detection.binned import BinnedDetector, Signal
 from jeat_graph.detection.event_detector import EventDetector
 from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION, network_file
+from jeat_graph.detection.opencv_threads import one_thread
 from jeat_graph.detection.picture_detector import PictureDetector
 from jeat_graph.detection.settings import BESIDE_RATE_HZ, DetectionSettings
 
 if TYPE_CHECKING:
     from jeat_graph.io.events.reader import EventReader
     from jeat_graph.io.video import FrameSource
+
+    _Recording = tuple[EventReader, tuple[int, int]]
 
 FRAMES_SENSOR, EVENTS_SENSOR, FUSED_SENSOR = "rgb", "evt", "fused"
 _US_PER_S = 1e6
@@ -46,6 +49,7 @@ class DetectRequest:
         rate_hz: frames per second where neither the video nor a table beside it says.
         event_size_px: width and height of the event camera's picture, where the file does not say.
         events_later_s: what to add to the times of the events for the clock of the frames (s).
+        one_picture: whether pictures and events must be of the same pixels, as who tracks them needs.
         settings: of the detectors.
     """
 
@@ -57,6 +61,7 @@ class DetectRequest:
     rate_hz: float | None = None
     event_size_px: tuple[int, int] | None = None
     events_later_s: float = 0.0
+    one_picture: bool = False
     settings: DetectionSettings = field(default_factory=DetectionSettings)
 
     def __post_init__(self) -> None:
@@ -88,13 +93,17 @@ def detect_scans(
         DataError: a file cannot be read, or does not say what is needed.
     """
     with ExitStack() as stack:
+        source = None if request.frames is None else _frames(request, stack, say)
+        recording = None if request.events is None else _events(request, stack, say)
+        _check_sizes(request, source, recording, say)
         streams: list[_Scans] = []
         if request.detector_fused is not None:
-            streams.append(_fused_scans(request, stack, say))
-        elif request.frames is not None:
-            streams.append(_picture_scans(request, stack, say))
-        if request.detector_fused is None and request.events is not None:
-            streams.append(_event_scans(request, stack, say))
+            streams.append(_fused_scans(request, source, recording, say))
+        else:
+            if source is not None:
+                streams.append(_picture_scans(request, source, stack, say))
+            if recording is not None:
+                streams.append(_event_scans(request, recording, say))
         coming: list[Iterator[Scan]] = [
             stack.enter_context(closing(Ahead(stream) if len(streams) > 1 else stream)) for stream in streams
         ]
@@ -142,8 +151,25 @@ def _frames(request: DetectRequest, stack: ExitStack, say: Callable[[str], objec
     return source
 
 
-def _picture_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str], object]) -> _Scans:
-    source = _frames(request, stack, say)
+def _check_sizes(
+    request: DetectRequest,
+    source: FrameSource | None,
+    recording: _Recording | None,
+    say: Callable[[str], object],
+) -> None:
+    """Refuse two cameras whose boxes would be in different pixels, where they must not be, or say so."""
+    if source is None or recording is None or source.size_px == recording[1]:
+        return
+    (width, height), (wide, high) = source.size_px, recording[1]
+    differ = f"has {width} x {height} px and the events {wide} x {high}"
+    if request.one_picture or request.detector_fused is not None:
+        raise DataError(f"{differ}: both must be of the same pixels", request.frames)
+    say(f"warning: {request.frames} {differ}: bring the boxes to one picture before they are tracked")
+
+
+def _picture_scans(
+    request: DetectRequest, source: FrameSource, stack: ExitStack, say: Callable[[str], object]
+) -> _Scans:
     if request.detector_frames != MOTION:
         from jeat_graph.detection.models.pictures import ModelPictureDetector
 
@@ -151,7 +177,7 @@ def _picture_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str]
         model = ModelPictureDetector(network, FRAMES_SENSOR, request.settings.model_frames)
         say(model.description)
         return (model(frame, t) for t, frame in with_progress(source, len(source)))
-    stack.enter_context(_one_thread())
+    stack.enter_context(one_thread())
     return _moving(source, request)
 
 
@@ -168,23 +194,6 @@ def _moving(source: FrameSource, request: DetectRequest) -> _Scans:
             yield scan
 
 
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Let OpenCV work in the thread that calls it.
-
-    Its work on a picture is short, and threads of its own wait busily for the next: twice the processor's
-    time, of which the other camera has a use.
-    """
-    import cv2
-
-    before = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    try:
-        yield
-    finally:
-        cv2.setNumThreads(before)
-
-
 def _prime(detector: PictureDetector, source: FrameSource, request: DetectRequest) -> None:
     """Take the background from the first seconds before the first picture is looked at."""
     settings = request.settings.frames
@@ -196,35 +205,30 @@ def _prime(detector: PictureDetector, source: FrameSource, request: DetectReques
     detector.prime([source.frame(int(k)) for k in chosen])
 
 
-def _fused_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str], object]) -> _Scans:
+def _fused_scans(
+    request: DetectRequest,
+    source: FrameSource | None,
+    recording: _Recording | None,
+    say: Callable[[str], object],
+) -> _Scans:
     from jeat_graph.detection.models.fused import FusedDetector
 
     assert request.detector_fused is not None
     network = network_file(request.detector_fused, FUSED)
     settings = request.settings.events, request.settings.model_fused
-    source = None if request.frames is None else _frames(request, stack, say)
-    if request.events is None:
+    if recording is None:
         assert source is not None
         detector = FusedDetector(network, source.size_px, FUSED_SENSOR, *settings)
         say(detector.description)
         return (detector.look_at(frame, t) for t, frame in with_progress(source, len(source)))
-    reader, size_px = _events(request, stack, say)
-    if source is not None and source.size_px != size_px:
-        (width, height), (wide, high) = source.size_px, size_px
-        raise DataError(
-            f"has {width} x {height} px and the events {wide} x {high}: a network of both needs pictures and "
-            "events of the same pixels",
-            request.frames,
-        )
+    reader, size_px = recording
     pictures = () if source is None else with_progress(source, len(source))
     detector = FusedDetector(network, size_px, FUSED_SENSOR, *settings, pictures)
     say(detector.description)
     return _pushed(detector, reader, request, say)
 
 
-def _events(
-    request: DetectRequest, stack: ExitStack, say: Callable[[str], object]
-) -> tuple[EventReader, tuple[int, int]]:
+def _events(request: DetectRequest, stack: ExitStack, say: Callable[[str], object]) -> _Recording:
     """Open the events; return them, and width and height of their picture (px)."""
     from jeat_graph.io.events.opening import open_events
 
@@ -238,8 +242,8 @@ def _events(
     return reader, reader.size_px
 
 
-def _event_scans(request: DetectRequest, stack: ExitStack, say: Callable[[str], object]) -> _Scans:
-    reader, size_px = _events(request, stack, say)
+def _event_scans(request: DetectRequest, recording: _Recording, say: Callable[[str], object]) -> _Scans:
+    reader, size_px = recording
     settings = request.settings
     detector: BinnedDetector
     if request.detector_events != MOTION:
@@ -268,10 +272,16 @@ def _pushed(
             moved = EventArray.trusted(piece.t_us + later_us, piece.x, piece.y, piece.polarity)
             yield detector.without_noise(moved)
 
+    count = 0
     # Reading and unpacking take as long as looking where events are many.
     with closing(Ahead(signals(), _PIECES_AHEAD)) as coming:
         for signal in coming:
-            yield from detector.look(signal)
-    yield from detector.finish()
+            scans = detector.look(signal)
+            count += len(scans)
+            yield from scans
+    scans = detector.finish()
+    yield from scans
+    if not count + len(scans) and request.frames is not None:
+        say(f"{request.events}: not one scan: no events, or shorter than a window")
     for note in reader.damage.notes():
         say(f"{request.events}: {note}")

@@ -37,8 +37,12 @@ _INSIDE = "a group is part of a heavier one if this share of its box lies in the
 USUAL_RATE_HZ, BESIDE_RATE_HZ = 50.0, 20.0
 _RATE = (
     f"scans per second; a step is a whole number of bins; null: {USUAL_RATE_HZ:g}, and {BESIDE_RATE_HZ:g} of "
-    "networks beside pictures"
+    "networks beside pictures, and of networks of both"
 )
+#: Bins that a window may have: one of two seconds takes 200 MB at 640 x 384 px.
+_MOST_BINS = 400
+#: Steps that are named where a rate has none that is a whole number of bins.
+_USUAL_BINS = (20, 10, 8, 5, 4, 2, 1)
 _APART = "two groups that run together stay two if they were there, and moved apart, for so long"
 _PIECES = (
     "a group that falls into pieces, as a dark body does that is seen at its ends only, is one for so long"
@@ -72,6 +76,11 @@ class EventSettings(Section):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._check("window_s", self.window_s, self.window_s)
+        if self.bins(self.window_s) > _MOST_BINS:
+            raise ConfigError(
+                f"window_s: {self.window_s:g} s are more than {_MOST_BINS} bins of {self.bin_s:g} s: each "
+                "takes two bytes a pixel"
+            )
         if self.rate_hz is not None:
             self.rate(self.rate_hz)
         if not self._whole(self.extent_s) or self.extent_s > self.window_s:
@@ -91,9 +100,10 @@ class EventSettings(Section):
 
     def _check(self, name: str, value: float, length_s: float) -> None:
         if not self._whole(length_s):
+            whole = ", ".join(f"{1.0 / (bins * self.bin_s):g}" for bins in _USUAL_BINS)
+            rates = f"; rates that do: {whole} Hz" if name == "rate_hz" else ""
             raise ConfigError(
-                f"{name}: {value:g} gives {length_s:g} s, no whole number of bins of {self.bin_s:g} s; with "
-                "5 ms 10, 20, 25, 40, 50, 100 and 200 Hz do"
+                f"{name}: {value:g} gives {length_s:g} s, no whole number of bins of {self.bin_s:g} s{rates}"
             )
 
     def _whole(self, length_s: float) -> bool:
@@ -167,7 +177,12 @@ def load_settings(path: str | Path | None = None, changes: Sequence[str] = ()) -
         ConfigError: no such file, unknown key (with the nearest known one) or bad value.
     """
     tree = {} if path is None else read_tree(str(path), (), str, "detection file")
-    tree = merge(tree, tree_of_changes(changes))
-    out = build(DetectionSettings, tree, "")
+    try:
+        out = build(DetectionSettings, merge(tree, tree_of_changes(changes)), "")
+    except ConfigError as error:
+        if path is None:
+            raise
+        more = ", and what was set over it" if changes else ""
+        raise ConfigError(f"{path}{more}: {error}") from None
     assert isinstance(out, DetectionSettings)
     return out

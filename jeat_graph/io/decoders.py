@@ -28,6 +28,10 @@ class Decoder:
         """Return the number of frames."""
         raise NotImplementedError
 
+    def name(self, index: int) -> str:
+        """Return what a frame is called in messages."""
+        return f"frame {index}"
+
     def announced(self) -> int:
         """Number of frames that the container says it holds; 0 where it does not say."""
         return 0
@@ -62,6 +66,10 @@ class PictureDecoder(Decoder):
     def count(self) -> int:
         """Return the number of frames."""
         return len(self._files)
+
+    def name(self, index: int) -> str:
+        """Return the name of a frame's file."""
+        return self._files[index].name
 
     def rate_hz(self) -> float | None:
         """Return the declared rate (Hz), None where there is none."""

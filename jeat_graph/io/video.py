@@ -87,9 +87,8 @@ class FrameSource:
 
             bgr = self._decode.bgr(index)
             if bgr.shape[1::-1] != self.size_px:
-                raise DataError(
-                    f"frame {index} is {bgr.shape[1]} x {bgr.shape[0]} px, not as the first", self.path
-                )
+                name, (height, width) = self._decode.name(index), bgr.shape[:2]
+                raise DataError(f"{name} is {width} x {height} px, not as the first", self.path)
             self._kept[index] = np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB), dtype=np.uint8)
             while len(self._kept) > _KEPT_FRAMES:
                 self._kept.popitem(last=False)

@@ -26,6 +26,12 @@ def test_plain_values_and_moderate_repetition_are_read():
     assert load_yaml("") is None
 
 
+@pytest.mark.parametrize("text", ["a: 1\nb: 2\na: 3", "c: {a: 1, a: 1}", "- {x: 1}\n- {x: 1, y: 2, x: 3}"])
+def test_a_key_that_comes_twice_is_refused(text):
+    with pytest.raises(yaml.YAMLError, match="comes twice"):
+        load_yaml(text)
+
+
 @pytest.mark.parametrize(
     "text", [BOMB, f"base: {{{BOMB.splitlines()[0][3:]}: 1}}\n", "a: &a [*a]", "[" * 50_000]
 )

@@ -234,8 +234,9 @@ def _queries(
     outputs: Mapping[str, Any], side: tuple[int, int], softmax: bool
 ) -> tuple[FloatArray, FloatArray]:
     low = {name.lower(): np.asarray(value, dtype=np.float64)[0] for name, value in outputs.items()}
-    logits = low["logits"] if "logits" in low else low["labels"]
-    boxes = low["pred_boxes"] if "pred_boxes" in low else low["dets"]
+    logits, boxes = low.get("logits", low.get("labels")), low.get("pred_boxes", low.get("dets"))
+    if logits is None or boxes is None:
+        raise ValueError("they must be called logits and pred_boxes, or labels and dets")
     if softmax:
         shares = np.exp(logits - logits.max(axis=1, keepdims=True))
         scores = (shares / shares.sum(axis=1, keepdims=True))[:, :-1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from jeat_graph.config.fields import Section, choice, flag, number
+from jeat_graph.data.errors import ConfigError
 
 #: Overlap (IoU) above which one of two boxes goes, and from which on boxes are averaged: of networks that
 #: `train` made (chosen on two of theirs, of pictures and of events, in seeds 1001 and 3001), and of others.
@@ -80,6 +81,12 @@ class ModelSettings(Section):
         "by time (both polarities of each bin); auto: by time for files of `train`, else by polarity (RVT)",
     )
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name, values in (("mean", self.mean), ("std", self.std)):
+            if len(values) not in (0, _COLOURS):
+                raise ConfigError(f"{name}: must be {_COLOURS} numbers, one a colour, or none")
+
     def overlaps(self, *, own: bool) -> tuple[float, float]:
         """Return `overlap` and `average` of a network that `train` made, or of another."""
         overlap, average = OWN_OVERLAPS if own else _OTHERS_OVERLAPS
@@ -95,3 +102,4 @@ class ModelSettings(Section):
 
 
 _OPEN_SIDE = 640
+_COLOURS = 3

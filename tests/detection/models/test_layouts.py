@@ -169,5 +169,7 @@ def test_published_shapes_are_recognised():
 
 
 def test_outputs_of_another_layout_are_refused_with_their_shapes():
-    with pytest.raises(DataError, match=r"outputs output0 \[1, 300, 6\] are not of the layout detr"):
+    with pytest.raises(
+        DataError, match=r"outputs output0 \[1, 300, 6\] are not of the layout detr: they must be called"
+    ):
         decode("detr", end_to_end(), SIDE)
