@@ -60,7 +60,7 @@ def add_detecting(parser: argparse._ActionsContainer) -> None:
         "--event-size",
         type=picture_size,
         metavar="WxH",
-        help="picture of the events, if their file does not say",
+        help="picture of the events, if their file does not say (if it does, no smaller)",
     )
     add(
         "--event-delay",

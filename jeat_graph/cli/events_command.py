@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,9 @@ from jeat_graph.io.events.converting import WRITTEN
 from jeat_graph.io.events.opening import FORMATS
 
 HELP = "say what is in a file of events, or convert it: RAW (EVT2, EVT3), DAT, AEDAT, HDF5, ROS bags"
+
+
+_SIZE_HELP = "size of the picture in px, if the file does not say; not smaller than it says"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,9 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--format", choices=tuple(WRITTEN), help="format of OUT, where its name leaves a choice (evt2)"
     )
     for sub in (info, change):
-        sub.add_argument(
-            "--size", type=picture_size, metavar="WxH", help="size of the picture in px, if IN does not say"
-        )
+        sub.add_argument("--size", type=picture_size, metavar="WxH", help=_SIZE_HELP)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -47,13 +49,18 @@ def run(args: argparse.Namespace) -> int:
 
             with _bar() as bar:
                 found = summarise(reader, bar.update)
-            print(json.dumps(found._asdict(), indent=2) if args.json else "\n".join(found.lines()))
+            # The text has the rate, which follows from two of the summary's numbers.
+            rate_hz = found.events / found.duration_s if found.duration_s else 0.0
+            numbers = {**found._asdict(), "rate_hz": rate_hz, "damage": asdict(reader.damage)}
+            print(json.dumps(numbers, indent=2) if args.json else "\n".join(found.lines()))
             return 0
         out = Path(args.out)
         check_keeps([args.file], out, "OUT")
         count = _convert(reader, out, args.format)
         for note in reader.damage.notes():
             warn("events", f"{args.file}: {note}")
+        if not count:
+            warn("events", f"{args.file}: holds no events")
     print(f"wrote {out}: {count} events")
     return 0
 

@@ -27,7 +27,7 @@ from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.io.hdf5_chunks import read_chunks
-from jeat_graph.io.hdf5_items import check_storage, find_item, single_item
+from jeat_graph.io.hdf5_items import check_storage, find_item, opening_error, reading_error, single_item
 
 US_PER_MS = 1000
 LABEL = "by_motion"
@@ -205,11 +205,7 @@ class EventFile:
                     return read
             return np.asarray(data[rows])
         except (OSError, RuntimeError, ValueError, MemoryError) as error:
-            reason = " ".join(str(error).split())[:200]
-            # HDF5 speaks of the filter, or only of the folder where it looked for a plugin.
-            lacking = "filter" in reason or "plugin" in reason
-            hint = "; pip install 'jeat-graph[hdf5]' has filters such as blosc" if lacking else ""
-            raise DataError(f"cannot be read: {reason}{hint}", self.path) from None
+            raise reading_error(data, error, self.path) from None
 
 
 def _open(path: Path) -> Any:
@@ -222,4 +218,4 @@ def _open(path: Path) -> Any:
     try:
         return h5py.File(path, "r")
     except OSError as error:
-        raise DataError(f"cannot be read as HDF5: {' '.join(str(error).split())[:200]}", path) from None
+        raise opening_error(error, path) from None

@@ -28,7 +28,7 @@ def read_chunks(data: Any, first: int, end: int) -> npt.NDArray[Any] | None:
         The values; None where they are not whole chunks, are stored otherwise, or `zlib-ng` is not there.
 
     Raises:
-        OSError: a chunk is damaged; as the library.
+        OSError: a chunk is damaged; unlike the library it does not speak of filters: gzip's is never missing.
     """
     if zlib_ng is None or not _whole_chunks(data, first, end):
         return None
@@ -44,10 +44,17 @@ def read_chunks(data: Any, first: int, end: int) -> npt.NDArray[Any] | None:
                 flat = zlib_ng.decompressobj().decompress(packed, rows * data.dtype.itemsize + 1)
                 values = _values(flat, rows, data.dtype, shuffled)
         if values is None:
-            values = np.asarray(data[begin : min(begin + rows, end)])
+            values = _by_the_library(data, begin, min(begin + rows, end))
         part = out[begin - first : begin - first + rows]
         part[:] = values[: len(part)]
     return out
+
+
+def _by_the_library(data: Any, begin: int, end: int) -> npt.NDArray[Any]:
+    try:
+        return np.asarray(data[begin:end])
+    except OSError:
+        raise OSError(f"{data.name} is damaged in rows {begin} to {end - 1}") from None
 
 
 def _whole_chunks(data: Any, first: int, end: int) -> bool:

@@ -7,6 +7,7 @@ bytes are those of any file named in it. A file from anybody must not make us re
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,48 @@ def find_item(file: Any, name: str, path: Path) -> Any:
         if item is None:
             return None
     return item
+
+
+def missing_filters(data: Any) -> dict[int, str]:
+    """Return the filters that a data set is packed by and that are not installed: number and name."""
+    import h5py
+
+    plan = data.id.get_create_plist()
+    used = [plan.get_filter(k) for k in range(plan.get_nfilters())]
+    return {
+        code: name.decode("latin-1") or f"filter {code}"
+        for code, _, _, name in used
+        if not h5py.h5z.filter_avail(code)
+    }
+
+
+def reading_error(data: Any, error: Exception, path: Path) -> DataError:
+    """Say why values of a data set could not be read: a filter is missing, or else the file is damaged.
+
+    Args:
+        data: the `h5py.Dataset`.
+        error: what the library raised; it speaks of the filter in both cases.
+        path: the file's name.
+    """
+    missing = " and ".join(missing_filters(data).values())
+    reason = " ".join(str(error).split())[:200]
+    if missing:
+        cure = "; pip install 'jeat-graph[hdf5]' has filters such as blosc"
+        return DataError(f"cannot be read: it is packed by {missing}, which is not installed{cure}", path)
+    return DataError(f"cannot be read, it is damaged: {reason}", path)
+
+
+def opening_error(error: Exception, path: Path) -> DataError:
+    """Say why a file could not be opened as HDF5; of one that is cut off, how much is left."""
+    reason = " ".join(str(error).split())[:200]
+    sizes = re.search(r"truncated file: eof = (\d+),.* stored_eof = (\d+)", reason)
+    if sizes is None:
+        return DataError(f"cannot be read as HDF5: {reason}", path)
+    return DataError(
+        f"is cut off: {sizes[1]} of its {sizes[2]} bytes are there, and HDF5 cannot be read in part; copy it "
+        "anew",
+        path,
+    )
 
 
 def check_storage(data: Any, name: str, path: Path) -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.events_dsec import EventFile
+from jeat_graph.io.hdf5_items import reading_error
 
 COLUMNS = {"x": np.uint16, "y": np.uint16, "p": np.uint8, "t": np.uint32}
 
@@ -111,6 +112,29 @@ def test_an_oddity_is_one_line(damaged, change, words):
     with pytest.raises(DataError, match=words) as caught:
         EventFile(damaged(change))
     assert "\n" not in str(caught.value)
+
+
+def test_damaged_gzip_is_not_called_a_missing_filter(damaged):
+    def change(file: h5py.File) -> None:
+        del file["events/x"]
+        data = file.create_dataset("events/x", (3,), np.uint16, chunks=(3,), compression="gzip")
+        data.id.write_direct_chunk((0,), b"nothing that gzip wrote")
+
+    pytest.importorskip("zlib_ng")
+    with EventFile(damaged(change)) as file, pytest.raises(DataError, match="damaged") as caught:
+        file.rows(0, 3)
+    assert "pip install" not in str(caught.value)
+
+
+def test_a_filter_that_is_missing_is_named(tmp_path):
+    path = tmp_path / "e.h5"
+    with h5py.File(path, "w") as file:
+        plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        plist.set_chunk((4,))
+        plist.set_filter(40_000, h5py.h5z.FLAG_OPTIONAL, ())
+        h5py.h5d.create(file.id, b"x", h5py.h5t.NATIVE_UINT16, h5py.h5s.create_simple((4,)), plist)
+        said = str(reading_error(file["x"], OSError("no"), path))
+    assert "packed by filter 40000, which is not installed; pip install 'jeat-graph[hdf5]'" in said
 
 
 def test_links_within_the_file_are_followed(damaged):

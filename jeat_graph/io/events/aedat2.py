@@ -33,12 +33,13 @@ from jeat_graph.io.events.decoding import (
     WRAPS,
     Columns,
     Limits,
+    hold,
     is_kept,
     put_edge,
     put_event,
     turns_of_clock,
 )
-from jeat_graph.io.events.reader import Triggers
+from jeat_graph.io.events.reader import Triggers, agreed_size
 from jeat_graph.io.events.words import WordReader
 
 #: Pictures of the cameras by what their names hold, in lower case.
@@ -72,14 +73,15 @@ class Aedat2Reader(WordReader):
     def __init__(self, path: Path, file: BinaryIO, size_px: tuple[int, int] | None) -> None:
         header = _header(file)
         named = next((size for name, size in CAMERAS.items() if name in header), None)
-        size = size_px or named
+        size = agreed_size(size_px, named, path)
         if size is None:
             raise DataError(
                 "does not say which camera recorded it, so its addresses cannot be read; give the size of "
                 f"its picture, one of {', '.join(f'{w}x{h}' for w, h in sorted(set(CAMERAS.values())))}",
                 path,
             )
-        super().__init__(path, file, np.uint64, decode_dvs128 if size == _DVS128 else decode_davis, size)
+        decode = decode_dvs128 if (named or size) == _DVS128 else decode_davis
+        super().__init__(path, file, np.uint64, decode, size)
 
 
 def _header(file: BinaryIO) -> str:
@@ -137,7 +139,10 @@ def _decode(
             turns = turns_of_clock(new, low, turns, state)
             time = turns << CLOCK_BITS
         low = new
-        last = max(time + new, last)
+        t = time + new
+        if t < last and not special:
+            hold(1, t, last, state)
+        last = max(t, last)
         if special:
             m = put_edge(triggers, m, last, 0, polarity)
         else:

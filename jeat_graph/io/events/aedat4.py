@@ -15,7 +15,8 @@ import numpy as np
 
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.events import EventArray
-from jeat_graph.io.events.reader import PIECE_ROWS, EventReader, Triggers
+from jeat_graph.io.events.ascending import Ascending
+from jeat_graph.io.events.reader import PIECE_ROWS, EventReader, Triggers, agreed_size
 
 MAGIC = b"#!AER-DAT4"
 #: Packets that are looked through for the first frame and the first event.
@@ -42,7 +43,7 @@ class Aedat4Reader(EventReader):
         streams = streams_of(path)
         if "events" not in streams:
             raise DataError(f"holds no events, only {', '.join(sorted(streams)) or 'nothing'}", path)
-        super().__init__(path, size_px or streams["events"])
+        super().__init__(path, agreed_size(size_px, streams["events"], path))
         self.origin_us = origin_us(path)
 
     def pieces(self) -> Iterator[EventArray]:
@@ -53,7 +54,7 @@ class Aedat4Reader(EventReader):
         """
         width, height = self.size_px or (_NO_LIMIT, _NO_LIMIT)
         edges: list[Triggers] = []
-        last = None
+        ascending = Ascending(self.damage)
         for packet in self._packets():
             if "triggers" in packet:
                 rows = packet["triggers"]
@@ -66,10 +67,8 @@ class Aedat4Reader(EventReader):
             t = rows["t"].astype(np.int64)[inside] - self.origin_us
             if not len(t):
                 continue
-            before = t[0] if last is None else last
-            self.damage.backwards += int((np.diff(t, prepend=before) < 0).sum())
-            t = np.maximum.accumulate(np.maximum(t, before))
-            last = t[-1]
+            t = ascending(t)
+            self.damage.events += len(t)
             self.triggers = (
                 Triggers(*(np.concatenate(column) for column in zip(*edges, strict=True)))
                 if edges

@@ -26,14 +26,20 @@ from jeat_graph.io.events.decoding import (
     CLOCK_BITS,
     FILLED,
     HIGH,
-    JUMP_US,
     LAST,
+    LEAP_US,
+    LONE,
+    NO_LEAP,
+    OPEN,
     UNKNOWN,
     WRAPS,
     Columns,
     Decode,
     Limits,
+    hold,
     is_kept,
+    kind_of_leap,
+    leaps,
     put_event,
     turns_of_clock,
 )
@@ -63,13 +69,25 @@ class DatReader(WordReader):
         kind = file.read(2)
         if len(kind) == 2 and kind[0] == EDGES:
             raise DataError("holds edges of signals (event type 14), no events of pixels", path)
-        if len(kind) < 2 or kind[0] not in (PIXELS, PIXELS_12) or kind[1] != EVENT_BYTES:
+        if len(kind) < 2:
+            raise DataError("ends in its header: the file is cut off", path)
+        if kind[0] not in (PIXELS, PIXELS_12) or kind[1] != EVENT_BYTES:
             raise DataError(
                 f"is not DAT: its header must be followed by the type of events, 0 or 12, and their size, 8, "
                 f"not by {list(kind)}",
                 path,
             )
         super().__init__(path, file, np.uint64, decode_first if version < 2 else decode, size_px)
+
+
+@numba.njit(cache=True, nogil=True)
+def _leap(words: npt.NDArray[np.uint64], k: int, old: int, state: IntArray) -> int:
+    """Return what leap from `old` the time of word `k` is, by the next one."""
+    new = np.int64(words[k] & np.uint64(0xFFFFFFFF))
+    if not leaps(new, old, 0):
+        return NO_LEAP
+    after = np.int64(words[k + 1] & np.uint64(0xFFFFFFFF)) if k + 1 < len(words) else np.int64(-1)
+    return kind_of_leap((old, new, after), 1 << CLOCK_BITS, len(words) - k, state)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -86,6 +104,7 @@ def _decode(
     n, turns = state[FILLED], state[WRAPS]
     last, low = state[LAST], state[HIGH]
     time = turns << CLOCK_BITS
+    latest = max(low, last - time)  # the latest time on this turn of the clock; after a step back not `low`
     used = len(words)
     for k in range(len(words)):
         if n == len(out.t):
@@ -101,11 +120,23 @@ def _decode(
             continue
         if not is_kept(x, y, True, limits, state):
             continue
-        if not low <= new <= low + JUMP_US:
-            turns = turns_of_clock(new, low, turns, state)
-            time = turns << CLOCK_BITS
+        if not latest <= new <= low + LEAP_US:
+            leap = _leap(words, k, low, state)
+            if leap == OPEN:
+                used = k
+                break
+            if leap == LONE:
+                new = low
+            elif not low <= new <= low + LEAP_US:
+                turns = turns_of_clock(new, low, turns, state)
+                time = turns << CLOCK_BITS
+            if time + new < last:
+                hold(1, time + new, last, state)
+            latest = max(new, last - time)
+        else:
+            latest = new
         low = new
-        last = max(time + new, last)
+        last = time + latest
         n = put_event(out, n, last, x, y, polarity)
     state[FILLED], state[WRAPS] = n, turns
     state[LAST], state[HIGH] = last, low

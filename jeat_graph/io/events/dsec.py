@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
-from jeat_graph.io.events.reader import PIECE_ROWS, EventReader
+from jeat_graph.io.events.reader import PIECE_ROWS, EventReader, agreed_size
 from jeat_graph.io.events_dsec import EventFile
 
 #: DSEC's own files do not say their size; its cameras have this one (px).
@@ -21,14 +22,19 @@ class DsecReader(EventReader):
         size_px: width and height of the picture; by default as the file says, else that of DSEC.
 
     Raises:
-        DataError: as `EventFile`.
+        DataError: as `EventFile`, or a size that is smaller than the file's.
     """
 
     format_name = "HDF5 (DSEC)"
 
     def __init__(self, path: Path, size_px: tuple[int, int] | None) -> None:
         file = EventFile(path)
-        super().__init__(path, size_px or file.size_px or DSEC_SIZE)
+        try:
+            size = agreed_size(size_px, file.size_px, path)
+        except DataError:
+            file.close()
+            raise
+        super().__init__(path, size or DSEC_SIZE)
         self._events = file
         self.t_offset_us = file.t_offset_us
 
@@ -47,4 +53,5 @@ class DsecReader(EventReader):
         for piece in self._events.pieces(PIECE_ROWS, self.labels):
             inside = (piece.x < width) & (piece.y < height)
             self.damage.outside += int((~inside).sum())
+            self.damage.events += int(inside.sum())
             yield piece if inside.all() else piece.take(inside)

@@ -27,6 +27,9 @@ from jeat_graph.io.events.decoding import (
     FILLED,
     HIGH,
     LAST,
+    LONE,
+    NO_LEAP,
+    OPEN,
     PREVIOUS,
     TRIGGERS,
     UNKNOWN,
@@ -34,7 +37,10 @@ from jeat_graph.io.events.decoding import (
     WRAPS,
     Columns,
     Limits,
+    hold,
     is_kept,
+    kind_of_leap,
+    leaps,
     put_edge,
     put_event,
     turns_of_counter,
@@ -43,6 +49,7 @@ from jeat_graph.io.events.reader import Triggers
 from jeat_graph.io.events.words import WordReader
 
 HIGH_BITS, LOW_BITS = 28, 6
+HIGH_MASK = (1 << HIGH_BITS) - 1
 SIDE = 0x7FF
 TIME, EDGE, OTHERS = 8, 10, 14
 
@@ -73,7 +80,7 @@ def take_other(word: Any, triggers: Triggers, state: IntArray) -> bool:
     """Take a word that is no event into the state; False if it is an edge and there is no room for it."""
     kind = word >> 28
     if kind == TIME:
-        new = word & 0xFFFFFFF
+        new = word & HIGH_MASK
         state[WRAPS] = turns_of_counter(new, state[HIGH], state[WRAPS], (HIGH_BITS, LOW_BITS), state)
         state[HIGH] = new
     elif kind == EDGE:
@@ -87,6 +94,20 @@ def take_other(word: Any, triggers: Triggers, state: IntArray) -> bool:
     elif kind < OTHERS:
         state[UNKNOWN] += 1
     return True
+
+
+@numba.njit(cache=True, nogil=True)
+def _leap(words: npt.NDArray[np.uint32], k: int, state: IntArray) -> int:
+    """Return what leap the time of word `k` is, by the next time."""
+    old, new, after = state[HIGH], np.int64(words[k]) & HIGH_MASK, np.int64(-1)
+    if not leaps(new, old, LOW_BITS):
+        return NO_LEAP
+    for j in range(k + 1, len(words)):
+        word = np.int64(words[j])
+        if word >> 28 == TIME:
+            after = word & HIGH_MASK
+            break
+    return kind_of_leap((old, new, after), 1 << HIGH_BITS, len(words) - k, state)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -109,15 +130,21 @@ def decode(
             y = word & SIDE
             if is_kept(x, y, time >= 0, limits, state):
                 t = time + lower_time(word)
-                if t < previous:
-                    state[BACKWARDS] += 1
+                if t < last:
+                    hold(1, t, last, state)
+                    if t < previous:
+                        state[BACKWARDS] += 1
+                else:
+                    last = t
                 previous = t
-                last = max(t, last)
                 n = put_event(out, n, last, x, y, kind)
-        elif take_other(word, triggers, state):
-            time = upper_time(state)
         else:
-            used = k
-            break
+            leap = _leap(words, k, state) if kind == TIME else NO_LEAP
+            if leap == LONE:
+                continue
+            if leap == OPEN or not take_other(word, triggers, state):
+                used = k
+                break
+            time = upper_time(state)
     state[FILLED], state[LAST], state[PREVIOUS] = n, last, previous
     return used

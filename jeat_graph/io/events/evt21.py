@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numba
 import numpy as np
@@ -29,16 +29,34 @@ from jeat_graph.data.arrays import IntArray
 from jeat_graph.io.events.decoding import (
     BACKWARDS,
     FILLED,
+    HIGH,
     LAST,
+    LONE,
     MOST_OF_A_WORD,
+    NO_LEAP,
+    OPEN,
     PREVIOUS,
     Columns,
     Decode,
     Limits,
+    hold,
     is_kept,
+    kind_of_leap,
+    leaps,
     put_event,
 )
-from jeat_graph.io.events.evt2 import EDGE, OTHERS, SIDE, TIME, lower_time, take_other, upper_time
+from jeat_graph.io.events.evt2 import (
+    EDGE,
+    HIGH_BITS,
+    HIGH_MASK,
+    LOW_BITS,
+    OTHERS,
+    SIDE,
+    TIME,
+    lower_time,
+    take_other,
+    upper_time,
+)
 from jeat_graph.io.events.reader import Triggers
 from jeat_graph.io.events.words import WordReader
 
@@ -79,6 +97,32 @@ def _looks_swapped(data: bytes) -> bool:
 
 
 @numba.njit(cache=True, nogil=True)
+def _leap(words: npt.NDArray[np.uint64], k: int, state: IntArray, swapped: bool) -> int:
+    """Return what leap the time of word `k` is, by the next time."""
+    shift = np.uint64(0 if swapped else _HALF)
+    old, after = state[HIGH], np.int64(-1)
+    new = np.int64(words[k] >> shift) & HIGH_MASK
+    if not leaps(new, old, LOW_BITS):
+        return NO_LEAP
+    for j in range(k + 1, len(words)):
+        word = np.int64((words[j] >> shift) & np.uint64(0xFFFFFFFF))
+        if word >> 28 == TIME:
+            after = word & HIGH_MASK
+            break
+    return kind_of_leap((old, new, after), 1 << HIGH_BITS, len(words) - k, state)
+
+
+@numba.njit(cache=True, nogil=True)
+def _hold_columns(columns: Any, most: Any, times: tuple[Any, Any], state: IntArray) -> None:
+    """Count the events of a word, bits of which the first `most` lie in the picture, as `decoding.hold`."""
+    count = 0
+    for k in range(min(most, _HALF)):
+        count += (columns >> k) & 1
+    if count:
+        hold(count, times[0], times[1], state)
+
+
+@numba.njit(cache=True, nogil=True)
 def _decode(
     words: npt.NDArray[np.uint64],
     state: IntArray,
@@ -110,16 +154,21 @@ def _decode(
                     state[BACKWARDS] += 1
                 previous = t
                 last = max(t, last)
+                if t < last:
+                    _hold_columns(low_half, limits.width - x, (t, last), state)
             while low_half:
                 if low_half & 1 and is_kept(x, y, time >= 0, limits, state):
                     n = put_event(out, n, last, x, y, kind)
                 low_half >>= 1
                 x += 1
-        elif take_other(word, triggers, state):
-            time = upper_time(state)
         else:
-            used = k
-            break
+            leap = _leap(words, k, state, swapped) if kind == TIME else NO_LEAP
+            if leap == LONE:
+                continue
+            if leap == OPEN or not take_other(word, triggers, state):
+                used = k
+                break
+            time = upper_time(state)
     state[FILLED], state[LAST], state[PREVIOUS] = n, last, previous
     return used
 

@@ -32,8 +32,11 @@ from jeat_graph.io.events.decoding import (
     FILLED,
     HIGH,
     LAST,
+    LONE,
     LOW,
     MOST_OF_A_WORD,
+    NO_LEAP,
+    OPEN,
     POLARITY,
     PREVIOUS,
     ROW,
@@ -43,7 +46,10 @@ from jeat_graph.io.events.decoding import (
     WRAPS,
     Columns,
     Limits,
+    hold,
     is_kept,
+    kind_of_leap,
+    leaps,
     put_edge,
     put_event,
     turns_of_counter,
@@ -67,6 +73,20 @@ class Evt3Reader(WordReader):
 
 
 @numba.njit(cache=True, nogil=True)
+def _leap(words: npt.NDArray[np.uint16], k: int, high: int, state: IntArray) -> int:
+    """Return what leap from `high` the time of word `k` is, by the next time."""
+    new, after = np.int64(words[k]) & _BITS, np.int64(-1)
+    if not leaps(new, high, LOW_BITS):
+        return NO_LEAP
+    for j in range(k + 1, len(words)):
+        word = np.int64(words[j])
+        if word >> 12 == TIME_HIGH:
+            after = word & _BITS
+            break
+    return kind_of_leap((high, new, after), 1 << HIGH_BITS, len(words) - k, state)
+
+
+@numba.njit(cache=True, nogil=True)
 def decode(
     words: npt.NDArray[np.uint16], state: IntArray, out: Columns, triggers: Triggers, limits: Limits
 ) -> int:
@@ -77,6 +97,7 @@ def decode(
     last, previous = state[LAST], state[PREVIOUS]
     time = (((turns << HIGH_BITS) + high) << LOW_BITS) + low
     ready = high >= 0 and row >= 0
+    timed = n  # first event of the own time `time`, where that is not the latest one
     used = len(words)
     for k in range(len(words)):
         word = np.int64(words[k])
@@ -92,13 +113,18 @@ def decode(
             row = word & _SIDE
             ready = high >= 0
         elif kind == TIME_LOW:
+            if time < last and n > timed:
+                hold(n - timed, time, last, state)
             low = word & _BITS
             time = (((turns << HIGH_BITS) + high) << LOW_BITS) + low
             if high >= 0:
-                if time < previous:
-                    state[BACKWARDS] += 1
+                if time < last:
+                    timed = n
+                    if time < previous:
+                        state[BACKWARDS] += 1
+                else:
+                    last = time
                 previous = time
-                last = max(time, last)
         elif kind == FIRST:
             base = word & _SIDE
             polarity = (word >> 11) & 1
@@ -118,14 +144,25 @@ def decode(
         elif kind == TIME_HIGH:
             new = word & _BITS
             if new != high:
+                leap = _leap(words, k, high, state)
+                if leap == LONE:
+                    continue
+                if leap == OPEN:
+                    used = k
+                    break
+                if time < last and n > timed:
+                    hold(n - timed, time, last, state)
                 turns = turns_of_counter(new, high, turns, (HIGH_BITS, LOW_BITS), state)
                 high = new
                 low = 0  # the low bits follow; events before them lie at the beginning of these 4 ms
                 time = ((turns << HIGH_BITS) + high) << LOW_BITS
-                if time < previous:
-                    state[BACKWARDS] += 1
+                if time < last:
+                    timed = n
+                    if time < previous:
+                        state[BACKWARDS] += 1
+                else:
+                    last = time
                 previous = time
-                last = max(time, last)
                 ready = row >= 0
         elif kind == _TRIGGER:
             if high < 0:
@@ -137,6 +174,8 @@ def decode(
             m = put_edge(triggers, m, time, (word >> 8) & 0xF, word & 1)
         elif kind < _OTHERS and kind != CONTINUED_4:
             state[UNKNOWN] += 1
+    if time < last and n > timed:
+        hold(n - timed, time, last, state)
     state[FILLED], state[TRIGGERS] = n, m
     state[HIGH], state[LOW], state[WRAPS] = high, low, turns
     state[ROW], state[BASE], state[POLARITY] = row, base, polarity

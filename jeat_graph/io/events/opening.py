@@ -35,7 +35,7 @@ def open_events(path: str | Path, size_px: tuple[int, int] | None = None) -> Eve
 
     Args:
         path: the file, or the folder of a ROS 2 bag.
-        size_px: width and height of the picture, where the file does not say, or says something else.
+        size_px: width and height of the picture, where the file does not say, or says a smaller one.
 
     Returns:
         A reader, to be closed.
@@ -43,8 +43,14 @@ def open_events(path: str | Path, size_px: tuple[int, int] | None = None) -> Eve
     Raises:
         ConfigError: an extra package is needed for this format.
         DataError: no such file, or none of the formats that are read; the message says what it is instead.
+            The file says a picture larger than the one given.
     """
-    place = Path(path)
+    reader = _opened(Path(path), size_px)
+    reader.size_given = size_px is not None
+    return reader
+
+
+def _opened(place: Path, size_px: tuple[int, int] | None) -> EventReader:
     if place.is_dir() and (place / "metadata.yaml").is_file():
         from jeat_graph.io.events.rosbag import RosbagReader
 
@@ -101,9 +107,10 @@ def _open_prophesee(place: Path, file: BinaryIO, size_px: tuple[int, int] | None
     from jeat_graph.io.events.evt3 import Evt3Reader
     from jeat_graph.io.events.evt21 import Evt21Reader
     from jeat_graph.io.events.raw_header import read_raw_header
+    from jeat_graph.io.events.reader import agreed_size
 
     header = read_raw_header(file, place)
-    size = size_px or header.size_px
+    size = agreed_size(size_px, header.size_px, place)
     if header.encoding == "EVT2":
         return Evt2Reader(place, file, size)
     if header.encoding == "EVT3":
@@ -128,14 +135,14 @@ def _open_hdf5(place: Path, size_px: tuple[int, int] | None) -> EventReader:
 
     from jeat_graph.io.events.dsec import DsecReader
     from jeat_graph.io.events.prophesee_hdf5 import TABLE, PropheseeHdf5Reader
-    from jeat_graph.io.hdf5_items import find_item
+    from jeat_graph.io.hdf5_items import find_item, opening_error
 
     with suppress(ImportError):  # filters that some files need
         import hdf5plugin  # noqa: F401
     try:
         file: Any = h5py.File(place, "r")
     except OSError as error:
-        raise DataError(f"cannot be read as HDF5: {' '.join(str(error).split())[:200]}", place) from None
+        raise opening_error(error, place) from None
     try:
         if find_item(file, TABLE, place) is not None:
             return PropheseeHdf5Reader(place, file, size_px)

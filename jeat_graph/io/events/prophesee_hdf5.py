@@ -23,8 +23,9 @@ import numpy.typing as npt
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
-from jeat_graph.io.events.reader import PIECE_ROWS, EventReader, Triggers
-from jeat_graph.io.hdf5_items import check_storage, find_item
+from jeat_graph.io.events.ascending import Ascending
+from jeat_graph.io.events.reader import PIECE_ROWS, EventReader, Triggers, agreed_size
+from jeat_graph.io.hdf5_items import check_storage, find_item, missing_filters, reading_error
 
 TABLE, EDGES = "CD/events", "EXT_TRIGGER/events"
 _ECF_FILTER = 36559
@@ -46,7 +47,7 @@ class PropheseeHdf5Reader(EventReader):
     format_name = "HDF5 (Prophesee)"
 
     def __init__(self, path: Path, file: Any, size_px: tuple[int, int] | None) -> None:
-        super().__init__(path, size_px or _geometry(file))
+        super().__init__(path, agreed_size(size_px, _geometry(file), path))
         self._file = file
         self._table = self._open(TABLE, ("x", "y", "p", "t"))
         self._edges = None if find_item(file, EDGES, path) is None else self._open(EDGES, ("p", "t", "id"))
@@ -63,17 +64,14 @@ class PropheseeHdf5Reader(EventReader):
         """
         self.triggers = self._triggers()
         width, height = self.size_px or (_NO_LIMIT, _NO_LIMIT)
-        last = np.int64(0)
+        ascending = Ascending(self.damage)
         for first in range(0, self._table.shape[0], PIECE_ROWS):
             rows = self._read(self._table, slice(first, first + PIECE_ROWS))
             x, y = rows["x"].astype(np.int64), rows["y"].astype(np.int64)
             inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
-            t = rows["t"].astype(np.int64)[inside]
+            t = ascending(rows["t"].astype(np.int64)[inside])
             self.damage.outside += int((~inside).sum())
-            self.damage.backwards += int((np.diff(t, prepend=last) < 0).sum()) if first else 0
-            if len(t):
-                t = np.maximum.accumulate(np.maximum(t, last) if first else t)
-                last = t[-1]
+            self.damage.events += len(t)
             yield EventArray(
                 t,
                 x[inside].astype(np.uint16),
@@ -101,11 +99,7 @@ class PropheseeHdf5Reader(EventReader):
         return data
 
     def _read(self, data: Any, rows: slice) -> npt.NDArray[Any]:
-        import h5py
-
-        filters = data.id.get_create_plist()
-        codes = [filters.get_filter(k)[0] for k in range(filters.get_nfilters())]
-        if _ECF_FILTER in codes and not h5py.h5z.filter_avail(_ECF_FILTER):
+        if _ECF_FILTER in missing_filters(data):
             raise DataError(
                 "is compressed by Prophesee's codec ECF (HDF5 filter 36559), which is not installed: install "
                 "its plugin and name its folder in HDF5_PLUGIN_PATH, or export the recording as RAW",
@@ -114,7 +108,7 @@ class PropheseeHdf5Reader(EventReader):
         try:
             return np.asarray(data[rows])
         except (OSError, RuntimeError, ValueError, MemoryError) as error:
-            raise DataError(f"cannot be read: {' '.join(str(error).split())[:200]}", self.path) from None
+            raise reading_error(data, error, self.path) from None
 
 
 def _geometry(file: Any) -> tuple[int, int] | None:

@@ -46,12 +46,14 @@ def read_raw_header(file: BinaryIO, path: Path) -> RawHeader:
     A header ends with `% end`, or before the first line that does not begin with `% `.
 
     Raises:
-        DataError: a size that is none.
+        DataError: a size that is none, or a file that ends in a line of its header.
     """
     lines: list[str] = []
     while len(lines) < _MOST_LINES:
         at = file.tell()
         line = file.readline(_MOST_LINE_BYTES)
+        if _is_cut(line):
+            raise DataError("ends in its header: the file is cut off", path)
         if not line.startswith(b"%") or not line.endswith(b"\n") or not _is_text(line):
             file.seek(at)
             break
@@ -73,6 +75,12 @@ def raw_header(version: str, size_px: tuple[int, int]) -> bytes:
     name = _VERSIONS[version]
     lines = (f"evt {version}", f"format {name};height={height};width={width}", f"geometry {width}x{height}")
     return "".join(f"% {line}\n" for line in (*lines, "end")).encode("ascii")
+
+
+def _is_cut(line: bytes) -> bool:
+    """Whether the file ends in a line of the header: only its last line has no end."""
+    whole = line.endswith(b"\n") or len(line) == _MOST_LINE_BYTES
+    return line.startswith(b"%") and not whole and _is_text(line)
 
 
 def _is_text(line: bytes) -> bool:

@@ -11,10 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import IntArray
+from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
 
 #: Events of one piece: a piece takes about 3.4 MB, whatever the length of the file.
 PIECE_ROWS = 1 << 18
+#: Beyond this share of events with times that are not theirs, steps back in time spoil the recording.
+_MOST_HELD = 0.01
+_US_PER_S = 1e6
 
 
 class Triggers(NamedTuple):
@@ -43,33 +47,78 @@ class Damage:
     Attributes:
         outside: events outside the picture, left out.
         backwards: steps back in time; events after one have the latest time before it.
+        held: events that got that latest time in place of their own.
+        held_from_us: own time of the first of them (µs).
+        late_us: by how much their time is later than their own at most (µs).
         unknown: words that the format does not have, left out.
         untimed: events before the first time, or before their row, is known, left out.
-        jumps: steps forward in time of more than `words.JUMP_US`.
+        jumps: steps forward in time of more than `decoding.JUMP_US`.
+        leaps: single times ahead by more than `decoding.LEAP_US` that the next one took back: passed over.
         tail_bytes: bytes behind the last whole word, left out: the file is cut off.
         unfinished: words at the end that others of a whole packet should follow.
+        events: events that were handed out.
     """
 
     outside: int = 0
     backwards: int = 0
+    held: int = 0
+    held_from_us: int = -1
+    late_us: int = 0
     unknown: int = 0
     untimed: int = 0
     jumps: int = 0
+    leaps: int = 0
     tail_bytes: int = 0
     unfinished: str = ""
+    events: int = 0
 
     def notes(self) -> list[str]:
         """Return one line for each kind of damage that was met."""
         found = (
             (self.outside, "events lie outside the picture and were left out"),
-            (self.backwards, "times the time runs backwards; events there got the latest time before"),
+            (self.backwards, f"times the time runs backwards: {self._steps_back()}"),
             (self.unknown, "words are none of this format and were left out"),
             (self.untimed, "events come before any time is known and were left out"),
             (self.jumps, "times the time jumps ahead by more than 10 s"),
+            (
+                self.leaps,
+                "times a single time leaps ahead by more than 1 s and the next takes it back; it was passed "
+                "over",
+            ),
             (self.tail_bytes, "bytes at the end are no whole event: the file is cut off"),
         )
-        lines = [f"{count} {text}" for count, text in found if count]
+        lines = [f"{count:,} {text}" for count, text in found if count]
         return lines + ([self.unfinished] if self.unfinished else [])
+
+    def _steps_back(self) -> str:
+        """What became of the events after steps back; many of them are damage of its own."""
+        said = f"{self.held:,} events got the latest time before them"
+        if self.held <= _MOST_HELD * self.events:
+            return said
+        percent = 100.0 * self.held / self.events
+        from_s, late_s = self.held_from_us / _US_PER_S, self.late_us / _US_PER_S
+        return (
+            f"{said}; this damage spoils the times of {percent:.1f} % of the events, from {from_s:.6g} s on: "
+            f"they are up to {late_s:.6g} s late"
+        )
+
+
+def agreed_size(
+    given: tuple[int, int] | None, own: tuple[int, int] | None, path: Path
+) -> tuple[int, int] | None:
+    """Return the size of the picture that is given, or else the file's own (px).
+
+    Raises:
+        DataError: the size given is smaller than the file's own, which would leave out part of its picture.
+    """
+    if given is None or own is None:
+        return given or own
+    if given[0] < own[0] or given[1] < own[1]:
+        said, asked = f"{own[0]} x {own[1]} px", f"{given[0]} x {given[1]} px"
+        raise DataError(
+            f"says a picture of {said}, but the size given is {asked}, which is smaller; leave it out", path
+        )
+    return given
 
 
 class EventReader:
@@ -79,6 +128,7 @@ class EventReader:
         format_name: what the file is, such as `EVT3`.
         path: the file.
         size_px: width and height of the picture; None if neither the file nor the caller says.
+        size_given: whether the caller says it.
         t_offset_us: what to add to the events' times for the clock of frames that belong to them (µs).
         origin_us: time 0 on the clock that the file gives times by (µs).
         labels: whether pieces say what caused the events, where the file does.
@@ -91,6 +141,7 @@ class EventReader:
     def __init__(self, path: str | Path, size_px: tuple[int, int] | None) -> None:
         self.path = Path(path)
         self.size_px = size_px
+        self.size_given = False
         self.t_offset_us = 0
         self.origin_us = 0
         self.labels = True

@@ -23,8 +23,10 @@ import numpy.typing as npt
 
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.events import EventArray
+from jeat_graph.io.events.ascending import Ascending
 from jeat_graph.io.events.evt3 import Evt3Reader
-from jeat_graph.io.events.reader import PIECE_ROWS, EventReader
+from jeat_graph.io.events.reader import PIECE_ROWS, EventReader, agreed_size
+from jeat_graph.io.events.words import COUNTED
 
 _ARRAYS = ("dvs_msgs", "prophesee_event_msgs")
 _PACKETS = "event_camera_msgs"
@@ -68,7 +70,10 @@ class RosbagReader(EventReader):
                 message = _Message(first, self._topic.second)
                 message.header()
                 height, width = message.whole("I"), message.whole("I")
-                self.size_px = size_px or ((width, height) if width and height else None)
+                self.size_px = agreed_size(size_px, (width, height) if width and height else None, path)
+        except DataError:
+            self.close()
+            raise
         except (struct.error, ValueError):
             self.close()
             raise DataError("has a message of events that cannot be read", path) from None
@@ -83,26 +88,24 @@ class RosbagReader(EventReader):
         Raises:
             DataError: a message cannot be read, or is of an encoding that is not.
         """
-        last = None
+        ascending = None
         width, height = self.size_px or (1 << 16, 1 << 16)
         for x, y, t_us, p in self._columns():
             if not len(t_us):
                 continue
-            if last is None:
+            if ascending is None:
                 self.origin_us = int(t_us[0]) // _US_PER_S * _US_PER_S
-                last = int(t_us[0]) - self.origin_us
-            t = t_us - self.origin_us
+                ascending = Ascending(self.damage)
             inside = (x < width) & (y < height)
             self.damage.outside += int((~inside).sum())
-            self.damage.backwards += int((np.diff(t, prepend=last) < 0).sum())
-            t = np.maximum.accumulate(np.maximum(t, last))
-            last = int(t[-1])
-            whole = EventArray(t[inside], x[inside], y[inside], p[inside])
+            t = ascending((t_us - self.origin_us)[inside])
+            self.damage.events += len(t)
+            whole = EventArray(t, x[inside], y[inside], p[inside])
             for first in range(0, len(whole), PIECE_ROWS):
                 yield whole.take(slice(first, first + PIECE_ROWS))
 
     def _columns(self) -> Iterator[tuple[Any, Any, Any, Any]]:
-        reader = None
+        reader: Evt3Reader | None = None
         for raw in self._messages():
             message = _Message(raw, self._topic.second)
             try:
@@ -117,10 +120,14 @@ class RosbagReader(EventReader):
                 raise DataError("has a message of events that cannot be read", self.path) from None
             if reader is None:
                 reader = Evt3Reader(self.path, io.BytesIO(), self.size_px)
+                reader.size_given = self.size_given
             reader._file = io.BytesIO(words)
             for piece in reader.pieces():
                 yield piece.x, piece.y, piece.t_us, piece.polarity
-            self.damage.unknown = reader.damage.unknown
+            for name in COUNTED:
+                setattr(self.damage, name, getattr(reader.damage, name))
+            if self.damage.held:
+                self.damage.held_from_us -= self.origin_us
 
     def _messages(self) -> Iterator[bytes]:
         try:

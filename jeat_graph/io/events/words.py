@@ -17,13 +17,19 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.io.events.decoding import (
     BACKWARDS,
+    ENDED,
     FILLED,
+    HELD,
+    HELD_FROM,
     JUMPS,
+    LATE,
+    LEAPS,
     MOST_OF_A_WORD,
     OUTSIDE,
     TRIGGERS,
     UNKNOWN,
     UNTIMED,
+    WAITS,
     Columns,
     Decode,
     Limits,
@@ -37,6 +43,18 @@ BLOCK_BYTES = 1 << 20
 _MOST_WRONG = 0.05
 _TRIGGER_ROWS = 1 << 12
 _NO_LIMIT = 1 << 16
+#: Fields of `Damage` that the loops count, and where.
+COUNTED = {
+    "outside": OUTSIDE,
+    "backwards": BACKWARDS,
+    "held": HELD,
+    "held_from_us": HELD_FROM,
+    "late_us": LATE,
+    "unknown": UNKNOWN,
+    "untimed": UNTIMED,
+    "jumps": JUMPS,
+    "leaps": LEAPS,
+}
 
 
 class WordReader(EventReader):
@@ -76,7 +94,11 @@ class WordReader(EventReader):
         triggers = _trigger_room()
         out = _room()
         state = self._state
-        for words in self._blocks():
+        rest = np.empty(0, self._word)
+        for block, ended in self._blocks():
+            words = np.concatenate((rest, block)) if len(rest) else block
+            rest = rest[:0]
+            state[ENDED] = ended
             used = 0
             while used < len(words):
                 got = self._decode(words[used:], state, out, triggers, limits)
@@ -85,11 +107,16 @@ class WordReader(EventReader):
                 if state[FILLED] + MOST_OF_A_WORD > PIECE_ROWS or state[TRIGGERS] == _TRIGGER_ROWS:
                     yield self._take(out, triggers)
                     out = _room()
+                if state[WAITS]:
+                    state[WAITS] = 0
+                    rest = words[used:].copy()  # the block's memory is filled anew
+                    break
         self._judge()
         if state[FILLED] or state[TRIGGERS]:
             yield self._take(out, triggers)
 
-    def _blocks(self) -> Iterator[npt.NDArray[Any]]:
+    def _blocks(self) -> Iterator[tuple[npt.NDArray[Any], bool]]:
+        """Yield words, and whether the file ends: after the last block comes an empty one."""
         width = self._word.itemsize
         buffer = bytearray(BLOCK_BYTES)
         view = memoryview(buffer)
@@ -100,13 +127,14 @@ class WordReader(EventReader):
             except OSError as error:
                 raise DataError(f"cannot be read: {error.strerror or error}", self.path) from None
             if not got:
-                break
+                self.damage.tail_bytes = kept
+                yield np.empty(0, self._word), True
+                return
             whole = (kept + got) // width * width
-            yield np.frombuffer(buffer, self._word, whole // width)
+            yield np.frombuffer(buffer, self._word, whole // width), False
             rest = kept + got - whole
             buffer[:rest] = buffer[whole : whole + rest]
             kept = rest
-        self.damage.tail_bytes = kept
 
     def _take(self, out: Columns, triggers: Triggers) -> EventArray:
         """Hand out what was decoded, and empty the room for triggers."""
@@ -114,6 +142,7 @@ class WordReader(EventReader):
         state = self._state
         n, m = int(state[FILLED]), int(state[TRIGGERS])
         state[FILLED] = state[TRIGGERS] = 0
+        self.damage.events += n
         self.triggers = Triggers(
             triggers.t_us[:m].copy(), triggers.channel[:m].copy(), triggers.value[:m].copy()
         )
@@ -121,10 +150,8 @@ class WordReader(EventReader):
         return EventArray.trusted(out.t[:n], out.x[:n], out.y[:n], out.p[:n])
 
     def _count(self) -> None:
-        counts = {"outside": OUTSIDE, "backwards": BACKWARDS, "unknown": UNKNOWN, "untimed": UNTIMED}
-        for name, place in counts.items():
+        for name, place in COUNTED.items():
             setattr(self.damage, name, int(self._state[place]))
-        self.damage.jumps = int(self._state[JUMPS])
 
     def _judge(self) -> None:
         """Refuse a file that is not what it says, before anything of it is handed out."""
@@ -133,7 +160,16 @@ class WordReader(EventReader):
             return
         self._judged = True
         damage = self.damage
-        if damage.outside + damage.unknown + damage.backwards > _MOST_WRONG * self._words:
+        most = _MOST_WRONG * self._words
+        wrong = damage.unknown + damage.backwards
+        if self.size_given and self.size_px is not None and wrong <= most < damage.outside + wrong:
+            width, height = self.size_px
+            raise DataError(
+                f"has {damage.outside} of its first {self._state[FILLED] + damage.outside} events outside "
+                f"the picture of {width} x {height} px that was given; give that of the camera",
+                self.path,
+            )
+        if damage.outside + wrong > most:
             raise DataError(
                 f"is not {self.format_name}, or damaged: of {self._words} words {damage.unknown} are not of "
                 f"that format, {damage.outside} events lie outside the picture, {damage.backwards} steps go "

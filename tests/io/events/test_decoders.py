@@ -110,24 +110,6 @@ def test_the_size_is_that_of_the_header_unless_it_is_said(tmp_path):
     assert read(path)[2].size_px == (1280, 720)
 
 
-def test_events_outside_the_picture_are_left_out_and_counted(tmp_path):
-    path, data = written(tmp_path, "evt2")
-    events, _, reader = read(path, (WIDTH - 10, HEIGHT))
-    expected = [row for row in READ["evt2"](data).events if row[1] < WIDTH - 10]
-    assert rows(events) == expected
-    assert reader.damage.outside == len(READ["evt2"](data).events) - len(expected)
-
-
-def test_times_never_run_backwards(tmp_path):
-    time, event = 8 << 28, 1 << 28
-    parts = [time | 100, *[event | 5] * 30, time | 99, *[event | 5] * 30, time | 101, *[event | 5] * 30]
-    path = tmp_path / "back.raw"
-    path.write_bytes(HEADERS["evt2"] + np.array(parts, dtype="<u4").tobytes())
-    events, _, reader = read(path)
-    assert events.t_us.tolist() == [6400] * 60 + [6464] * 30
-    assert reader.damage.backwards == 1
-
-
 def test_a_leap_of_the_clock_is_remarked(tmp_path):
     path = tmp_path / "leap.raw"
     parts = [8 << 28 | 100, 1 << 28, 8 << 28 | 1_000_000, 1 << 28]

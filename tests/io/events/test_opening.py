@@ -23,6 +23,11 @@ OTHERS = {
     b"% format HISTO3D;width=320;height=320\n% end\n": "is raw data of the encoding 'HISTO3D'",
     b"% Version 2\n\x0e\x08": "holds edges of signals",
     b"% Version 2\n\x0c\x10": "is not DAT",
+    b"% e": "ends in its header: the file is cut off",
+    b"% evt 3.0\n% geometry 640x4": "ends in its header: the file is cut off",
+    b"% Data file containing CD events.\n% Vers": "ends in its header: the file is cut off",
+    b"% Version 2\n": "ends in its header: the file is cut off",
+    b"% Version 2\n\x0c": "ends in its header: the file is cut off",
     b"% Version 3\n\x0c\x08": "is DAT of version '3'",
     b"% evt 3.0\n% geometry 0x720\n% end\n": "its header says a picture of 0 x 720 px",
     b"t,x,y,p\n1,2,3,1\n": "is none of the files of events that are read",
@@ -94,6 +99,30 @@ def test_a_codec_that_is_missing_is_named(tmp_path):
         list(reader.pieces())
 
 
+@pytest.mark.parametrize("table", ["dsec", "prophesee"])
+def test_hdf5_that_is_cut_off_is_refused_as_a_whole(tmp_path, table):
+    path = tmp_path / "cut.h5"
+    if table == "dsec":
+        dsec_file(path)
+    else:
+        prophesee_file(path)
+    whole = path.read_bytes()
+    path.write_bytes(whole[:2000])
+    said = f"is cut off: 2000 of its {len(whole)} bytes are there, and HDF5 cannot be read in part"
+    with pytest.raises(DataError, match=said):
+        open_events(path)
+
+
+def test_damaged_gzip_is_not_called_a_missing_filter(tmp_path):
+    path = tmp_path / "p.hdf5"
+    prophesee_file(path, chunks=(3,), compression="gzip")
+    with h5py.File(path, "a") as file:
+        file["CD/events"].id.write_direct_chunk((0,), b"nothing that gzip wrote")
+    with open_events(path) as reader, pytest.raises(DataError, match="it is damaged") as failed:
+        list(reader.pieces())
+    assert "pip install" not in str(failed.value)
+
+
 def test_other_hdf5_is_named(tmp_path):
     with h5py.File(tmp_path / "o.h5", "w") as file:
         file["pictures"] = np.zeros(3)
@@ -101,12 +130,16 @@ def test_other_hdf5_is_named(tmp_path):
         open_events(tmp_path / "o.h5")
 
 
-def test_hdf5_of_dsec_is_read(tmp_path):
-    with h5py.File(tmp_path / "d.h5", "w") as file:
+def dsec_file(path):
+    with h5py.File(path, "w") as file:
         for name, kind in (("x", "u2"), ("y", "u2"), ("p", "u1"), ("t", "u4")):
             file[f"events/{name}"] = np.arange(4).astype(kind)
         file["ms_to_idx"] = np.array([0, 4], dtype=np.uint64)
         file["t_offset"] = np.int64(77)
+
+
+def test_hdf5_of_dsec_is_read(tmp_path):
+    dsec_file(tmp_path / "d.h5")
     with open_events(tmp_path / "d.h5") as reader:
         assert (reader.size_px, reader.t_offset_us) == ((640, 480), 77)
         assert [piece.t_us.tolist() for piece in reader.pieces()] == [[0, 1, 2, 3]]

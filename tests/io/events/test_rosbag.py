@@ -89,12 +89,9 @@ def test_lists_of_events_are_read(tmp_path, version):
         np.testing.assert_array_equal(getattr(found, name), expected)
 
 
-@pytest.mark.parametrize("version", [1, 2])
-def test_packets_of_evt3_are_read(tmp_path, version):
-    store = store_of(version)
-    data = random_evt3(random.Random(0), 4000)
+def packets_of(store, version, data):
     packet = store.types["event_camera_msgs/msg/EventPacket"]
-    messages = [
+    return [
         packet(
             header=header(store, version),
             height=480,
@@ -107,12 +104,33 @@ def test_packets_of_evt3_are_read(tmp_path, version):
         )
         for k in range(0, len(data), 1000)
     ]
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_packets_of_evt3_are_read(tmp_path, version):
+    store = store_of(version)
+    data = random_evt3(random.Random(0), 4000)
+    messages = packets_of(store, version, data)
     found, reader = read(write(tmp_path, version, messages, "event_camera_msgs/msg/EventPacket", store))
     assert reader.size_px == (640, 480)
     expected = read_evt3(data).events
     assert list(
         zip(found.t_us.tolist(), found.x.tolist(), found.y.tolist(), found.polarity.tolist(), strict=True)
     ) == (expected)
+
+
+def test_steps_back_within_packets_are_counted(tmp_path):
+    store = store_of(1)
+    early = random_evt3(random.Random(1), 500)
+    data = random_evt3(random.Random(0), 4000, start=1000) + early
+    _, reader = read(
+        write(tmp_path, 1, packets_of(store, 1, data), "event_camera_msgs/msg/EventPacket", store)
+    )
+    own = read_evt3(early).events
+    damage = reader.damage
+    assert (damage.backwards, damage.held) == (1, len(own))
+    assert damage.held_from_us == own[0][0] - reader.origin_us
+    assert damage.events == len(read_evt3(data).events)
 
 
 def test_a_bag_without_events_says_what_it_holds(tmp_path):
