@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from functools import partial
 from importlib import import_module
 
-from jeat_graph.cli.options import Parser
 from jeat_graph.cli.terminal import Terminated, describe, in_good_order, say, write_anything
 from jeat_graph.config import kernel_cache
 from jeat_graph.data.errors import JeatGraphError
@@ -61,6 +60,9 @@ def _compile_for(command: str) -> None:
 
 def build_parser(command: str | None = None) -> argparse.ArgumentParser:
     """Build the parser; only `command`, if given, gets its full set of arguments."""
+    # What takes long to load is loaded where an interrupt is dealt with.
+    from jeat_graph.cli.options import Parser
+
     parser = Parser(
         prog="jeat-graph",
         description="Track vehicles from asynchronous event and RGB detections, causally and smoothed.",
@@ -88,38 +90,35 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     write_anything()
     command = next((a for a in arguments if a in COMMANDS), None)
-    args = build_parser(command).parse_args(arguments)
-    if kernel_cache.notice:
-        print(f"jeat-graph: {kernel_cache.notice}", file=sys.stderr)
-    notice.when_cold = partial(_compile_for, args.command)
     try:
-        return _run(args)
-    finally:
-        notice.forget()
-
-
-def _run(args: argparse.Namespace) -> int:
-    try:
-        with in_good_order(args.command):
-            if getattr(args, "out", None) is not None:
-                check_named(args.out, stdout=args.command in _TO_STDOUT)
-            code = int(args.run(args) or 0)
-            sys.stdout.flush()  # what cannot be written is noticed here, not at exit
-            return code
+        with in_good_order(command):
+            return _run(build_parser(command).parse_args(arguments))
     except BrokenPipeError:
         # The reader of our output went away (`| head`): not an error. Python would complain once more
         # when it flushes at exit, so its stdout is pointed elsewhere.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except (JeatGraphError, OSError, MemoryError) as error:
-        say(args.command, describe(error))
+        say(command, describe(error))
         return 2
-    except Terminated as end:
-        say(args.command, f"ended by {signal.Signals(end.number).name}")
-        return 128 + end.number
-    except KeyboardInterrupt:
-        say(args.command, "interrupted")
-        return 130
+    except KeyboardInterrupt as end:
+        number = end.number if isinstance(end, Terminated) else signal.SIGINT
+        say(command, "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}")
+        return 128 + number
+
+
+def _run(args: argparse.Namespace) -> int:
+    if kernel_cache.notice:
+        print(f"jeat-graph: {kernel_cache.notice}", file=sys.stderr)
+    notice.when_cold = partial(_compile_for, args.command)
+    try:
+        if getattr(args, "out", None) is not None:
+            check_named(args.out, stdout=args.command in _TO_STDOUT)
+        code = int(args.run(args) or 0)
+        sys.stdout.flush()  # what cannot be written is noticed here, not at exit
+        return code
+    finally:
+        notice.forget()
 
 
 if __name__ == "__main__":

@@ -13,23 +13,13 @@ from pathlib import Path
 import pytest
 
 from jeat_graph.cli import main as entry
-from jeat_graph.cli.terminal import Terminated, describe, in_good_order, one_line, say, warn
+from jeat_graph.cli.terminal import describe, in_good_order, one_line, say, warn
 from jeat_graph.data.errors import DataError
 
 from .conftest import HEADER, as_user
 
 ROWS = "".join(f"{k * 0.05:.2f},rgb,{100 + 2 * k},200,40,30,0.95\n" for k in range(10))
 posix = pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
-
-
-@pytest.fixture(autouse=True)
-def _as_python_starts():
-    """Signals end the process, as when it began: a library that another test tried may have set its own."""
-    names = [name for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    before = {number: signal.signal(number, signal.SIG_DFL) for number in (getattr(signal, n) for n in names)}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
 
 
 def start(*arguments: object, **options) -> subprocess.Popen[str]:
@@ -69,42 +59,6 @@ def test_a_warning_is_one_line_with_the_command_s_name(capsys):
     with in_good_order("report"):
         warnings.warn("this\nand that", stacklevel=1)
     assert capsys.readouterr().err == "jeat-graph report: warning: this and that\n"
-
-
-@posix
-def test_a_signal_to_end_ends_in_good_order_and_the_handlers_are_as_before():
-    before = signal.getsignal(signal.SIGTERM)
-    with pytest.raises(Terminated), in_good_order("track"):
-        signal.raise_signal(signal.SIGTERM)
-    assert signal.getsignal(signal.SIGTERM) == before
-
-
-@posix
-def test_a_signal_that_a_library_turns_into_an_error_of_its_own_still_ends_in_good_order():
-    def a_library_s_import():
-        try:
-            signal.raise_signal(signal.SIGTERM)
-        except BaseException:
-            raise AttributeError("partially initialized module") from None
-
-    with pytest.raises(Terminated) as end, in_good_order("track"):
-        a_library_s_import()
-    assert end.value.number == signal.SIGTERM
-
-
-@posix
-def test_a_signal_that_comes_within_a_callback_ends_what_follows_it(capsys):
-    class Callback:
-        def __del__(self):
-            signal.raise_signal(signal.SIGTERM)
-
-    def command():
-        Callback()
-        time.sleep(60)  # it never takes as long
-
-    with pytest.raises(Terminated), in_good_order("track"):
-        command()
-    assert capsys.readouterr().err == ""
 
 
 def test_an_error_without_a_signal_stays_what_it_is():
