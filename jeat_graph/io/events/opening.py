@@ -85,7 +85,9 @@ def _open(place: Path, file: BinaryIO, start: bytes, size_px: tuple[int, int] | 
 
         return Aedat2Reader(place, file, size_px)
     if start.startswith(b"#!AER-DAT"):
-        raise DataError(f"is AEDAT {start[9:12].decode('latin-1')}, which is not read; 2 and 4 are", place)
+        version = start[9:12].decode("latin-1")
+        shown = version.strip() if version.isprintable() else repr(version)
+        raise DataError(f"is AEDAT {shown}, which is not read; 2 and 4 are", place)
     if start.startswith(b"%"):
         return _open_prophesee(place, file, size_px)
     if start[4:8] == b"ftyp":
@@ -147,6 +149,9 @@ def _open_hdf5(place: Path, size_px: tuple[int, int] | None) -> EventReader:
         if find_item(file, TABLE, place) is not None:
             return PropheseeHdf5Reader(place, file, size_px)
         names = sorted(str(name) for name in file)
+    except (OSError, RuntimeError, KeyError, ValueError) as error:  # what h5py raises of a damaged list
+        file.close()
+        raise opening_error(error, place) from None
     except BaseException:
         file.close()
         raise

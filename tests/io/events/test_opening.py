@@ -143,3 +143,26 @@ def test_hdf5_of_dsec_is_read(tmp_path):
     with open_events(tmp_path / "d.h5") as reader:
         assert (reader.size_px, reader.t_offset_us) == ((640, 480), 77)
         assert [piece.t_us.tolist() for piece in reader.pieces()] == [[0, 1, 2, 3]]
+
+
+def test_a_version_that_is_no_text_stays_within_one_line(tmp_path):
+    path = tmp_path / "e.aedat"
+    path.write_bytes(b"#!AER-DAT\n#\x01 more")
+    with pytest.raises(DataError, match=r"is AEDAT .*which is not read") as caught:
+        open_events(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_hdf5_whose_list_of_items_is_damaged_is_refused(tmp_path, monkeypatch):
+    """What the library raises there is no `OSError`."""
+    import h5py
+
+    def broken(_):
+        raise RuntimeError("Link iteration failed (invalid link name)")
+
+    path = tmp_path / "e.h5"
+    with h5py.File(path, "w") as file:
+        file["x"] = 1
+    monkeypatch.setattr(h5py.Group, "__iter__", broken)
+    with pytest.raises(DataError, match="cannot be read as HDF5: Link iteration failed"):
+        open_events(path)
