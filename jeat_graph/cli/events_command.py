@@ -49,9 +49,7 @@ def run(args: argparse.Namespace) -> int:
 
             with _bar() as bar:
                 found = summarise(reader, bar.update)
-            # The text has the rate, which follows from two of the summary's numbers.
-            rate_hz = found.events / found.duration_s if found.duration_s else 0.0
-            numbers = {**found._asdict(), "rate_hz": rate_hz, "damage": asdict(reader.damage)}
+            numbers = {**found._asdict(), "rate_hz": found.rate_hz, "damage": asdict(reader.damage)}
             print(json.dumps(numbers, indent=2) if args.json else "\n".join(found.lines()))
             return 0
         out = Path(args.out)

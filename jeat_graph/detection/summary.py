@@ -46,17 +46,21 @@ class EventSummary(NamedTuple):
     hottest_hz: float
     notes: list[str]
 
+    @property
+    def rate_hz(self) -> float:
+        """Events per second."""
+        return self.events / self.duration_s if self.duration_s else 0.0
+
     def lines(self) -> list[str]:
         """Return the summary as text."""
         width, height = self.size_px
-        rate = self.events / self.duration_s if self.duration_s else 0.0
         known = "" if self.size_known else " (not said; so far the events reach)"
         return [
             f"format: {self.format_name}",
             f"picture: {width} x {height} px{known}",
             f"events: {self.events}, {100.0 * self.share_on:.1f} % of them ON",
             f"time: from {self.first_s:.6f} s, {self.duration_s:.6f} s long",
-            f"rate: {rate / _US_PER_S:.4g} million events/s",
+            f"rate: {self.rate_hz / _US_PER_S:.4g} million events/s",
             f"noise: {self.noise_hz_px:.3g} Hz/px stand alone",
             f"hot pixels: {self.hot_pixels}; the most active one fires at {self.hottest_hz:.4g} Hz",
             f"triggers: {self.triggers}",

@@ -14,14 +14,14 @@ from jeat_graph.tracking import helpers as processes
 # In a process of its own: other tests call kernels with other types.
 SCRIPT = """
 from jeat_graph.simulation import compiling
-from jeat_graph.simulation.imaging.event_camera import _physical
+from jeat_graph.simulation.imaging.event_run import run_physical
 from jeat_graph.simulation.imaging.renderer import paint_all
 from jeat_graph.simulation.imaging.rgb_camera import _expose
 from jeat_graph.simulation.imaging.trace import trace
 from jeat_graph.tracking import interim
 
 compiling.help_out()
-kernels = _physical, _expose, paint_all, trace
+kernels = run_physical, _expose, paint_all, trace
 print(*(len(kernel.overloads) for kernel in kernels))
 interim.end()
 from jeat_graph.cli.main import main

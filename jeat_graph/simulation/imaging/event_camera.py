@@ -6,10 +6,9 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
-from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.events import EventArray
 from jeat_graph.simulation.imaging.carla_pixel import (
     CarlaModel,
@@ -19,7 +18,7 @@ from jeat_graph.simulation.imaging.carla_pixel import (
     make_carla_state,
 )
 from jeat_graph.simulation.imaging.config import ImagingConfig
-from jeat_graph.simulation.imaging.event_pixel import PixelModel, PixelState, make_model, make_state
+from jeat_graph.simulation.imaging.event_pixel import make_model, make_state
 from jeat_graph.simulation.imaging.event_run import (
     Interval,
     coarse_steps,
@@ -28,7 +27,7 @@ from jeat_graph.simulation.imaging.event_run import (
     read_luminance,
     run_physical,
 )
-from jeat_graph.simulation.imaging.event_sink import EventSink, make_sink, to_events, with_room
+from jeat_graph.simulation.imaging.event_sink import EventSink, SinkColumns, make_sink, to_events, with_room
 from jeat_graph.simulation.imaging.lamp_flicker import LampFlicker
 from jeat_graph.simulation.imaging.layers import GLOW
 from jeat_graph.simulation.imaging.lighting import LUMINANCE
@@ -39,7 +38,6 @@ from jeat_graph.simulation.imaging.stage import Stage
 from jeat_graph.simulation.imaging.tiles import TILE
 from jeat_graph.simulation.streams import stream
 
-_Columns = tuple[IntArray, IntArray, IntArray, npt.NDArray[np.uint8], BoolArray, int]
 _LARGEST_CHANGE = 45.0  # ln of the largest ratio of luminances, with room to spare
 
 
@@ -121,7 +119,7 @@ class EventCamera:
         every = None if self._carla else plan.every
         moments = r.moments(1e-6 * times_us[1:], plan.look, every, for_events=True)
         steps = np.where(plan.steps > 0, len(times_us) - 1, 0) if self._carla else plan.steps
-        run = _run_carla if self._carla else _physical
+        run = _run_carla if self._carla else run_physical
         work = Interval(
             *(r.tiles, plan.boxes, steps, plan.lit, times_us, self._static),
             *(
@@ -139,22 +137,11 @@ class EventCamera:
         return to_events(EventSink(*made[:-1]), self._width)
 
 
-# Python is given a plain tuple. To put a named one into it, compiled code calls Python; an interrupt that
-# comes there leaves a hole in the outer tuple, and the process crashes.
-@njit(cache=True, error_model="numpy")
-def _physical(
-    work: Interval, stage: Stage, model: PixelModel, state: PixelState, sink: EventSink, room: int
-) -> _Columns:
-    """As `run_physical`; returns the sink's columns and how many tiles were painted."""
-    sink, rendered = run_physical(work, stage, model, state, sink, room)
-    return sink.used, sink.t_us, sink.pixel, sink.polarity, sink.by_motion, rendered
-
-
 @njit(cache=True, error_model="numpy")
 def _run_carla(
     work: Interval, stage: Stage, model: CarlaModel, state: CarlaState, sink: EventSink, room: int
-) -> _Columns:
-    """Take all pixels from tick to tick, tile by tile; as `_physical`."""
+) -> SinkColumns:
+    """Take all pixels from tick to tick, tile by tile; as `run_physical`."""
     tiles, boxes, steps, lit, times_us, static, _, _, _, _, _ = work
     who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)
     counts = np.zeros(3, dtype=np.int64)

@@ -11,7 +11,7 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.simulation.imaging.background import PACKED
 from jeat_graph.simulation.imaging.event_pixel import LUMINANCE as SEEN
 from jeat_graph.simulation.imaging.event_pixel import PixelModel, PixelState, advance, unsettled
-from jeat_graph.simulation.imaging.event_sink import EventSink, with_room
+from jeat_graph.simulation.imaging.event_sink import EventSink, SinkColumns, with_room
 from jeat_graph.simulation.imaging.layers import GLOW, ON_GROUND, ON_WALL
 from jeat_graph.simulation.imaging.painter import any_touch, light_tile, paint_light, paint_tile, take_ground
 from jeat_graph.simulation.imaging.plan import who_touches
@@ -191,8 +191,8 @@ def coarse_steps(quick: bool) -> int:
 @njit(cache=True, error_model="numpy")
 def run_physical(
     work: Interval, stage: Stage, model: PixelModel, state: PixelState, sink: EventSink, room: int
-) -> tuple[EventSink, int]:
-    """Take all pixels through an interval, tile by tile; returns the sink and how many tiles were painted."""
+) -> SinkColumns:
+    """Take all pixels through an interval, tile by tile; returns what `SinkColumns` says."""
     tiles, boxes, steps, lit, times_us, static, quiet, glowing, light_now, flicker, most = work
     who = np.zeros((3, max(1, len(boxes))), dtype=np.int64)
     counts = np.zeros(3, dtype=np.int64)
@@ -277,7 +277,7 @@ def run_physical(
                 painted[top] = False
                 done = here
                 top -= 1
-    return sink, rendered
+    return sink.used, sink.t_us, sink.pixel, sink.polarity, sink.by_motion, rendered
 
 
 @njit(cache=True, error_model="numpy")

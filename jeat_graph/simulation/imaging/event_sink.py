@@ -30,6 +30,11 @@ class EventSink(NamedTuple):
     by_motion: BoolArray
 
 
+#: The columns of a sink, and how many tiles were painted: what Python is given. To put a named tuple into the
+#: outer one, compiled code calls Python; an interrupt that comes there leaves a hole, and Python crashes.
+SinkColumns = tuple[IntArray, IntArray, IntArray, npt.NDArray[np.uint8], BoolArray, int]
+
+
 @njit(cache=True, error_model="numpy")
 def make_sink(capacity: int) -> EventSink:
     """Make room for `capacity` events."""
