@@ -64,11 +64,12 @@ def loaded():
         pytest.skip("processes cannot be forked here")
     from multiprocessing import forkserver
 
-    folder = str(Path(__file__).parent / "loaded")
+    folder, root = str(Path(__file__).parent / "loaded"), str(Path(__file__).parents[1])
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["loaded_process"])
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTHONPATH", os.pathsep.join(filter(None, [folder, os.environ.get("PYTHONPATH", "")])))
+        given = os.environ.get("PYTHONPATH", "")
+        patch.setenv("PYTHONPATH", os.pathsep.join(filter(None, [folder, root, given])))
         patch.setenv("JEAT_GRAPH_LOAD", "1")
         forkserver.ensure_running()
     sys.path.append(folder)

@@ -27,10 +27,9 @@ LAYERS = (
     ("tracking",),
     ("eval",),
     ("runs",),
-    ("calibration", "drawing", "simulation", "road", "detection", "training", "live"),
+    ("calibration", "drawing", "road", "detection", "live"),
     ("api",),
     ("",),
-    ("benchmark",),
     ("cli",),
     ("__main__",),
 )
@@ -276,7 +275,7 @@ def test_parameters_are_counted(source, number):
 
 def test_layers_ascend():
     low = "data.errors filters.motion smoothers.rts data.detections config.schema io.csv_text tracking.step"
-    high = "eval.metrics runs.directory drawing.palette benchmark.speed cli.main __main__"
+    high = "eval.metrics runs.directory drawing.palette api.functions cli.main __main__"
     assert all(layer(one) < layer(next_one) for one, next_one in pairwise(f"{low} {high}".split()))
 
 

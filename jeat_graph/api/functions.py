@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
+from jeat_graph.api.beside import FUNCTION_GROUP, find
 from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
@@ -252,12 +253,12 @@ def simulate(
         seed: another seed, other traffic.
 
     Raises:
-        ConfigError: no such scenario, or values that are not valid.
+        ConfigError: no such scenario, values that are not valid, or jeat-graph-sehn, which simulates, is not
+            installed.
     """
-    from jeat_graph.simulation.scenario import load_scenario
-    from jeat_graph.simulation.simulate import simulate as simulated
-
-    return simulated(load_scenario(scenario), seed, duration_s)
+    simulated = find(FUNCTION_GROUP, "simulate", "simulate")
+    recording: tuple[Detections, GroundTruth] = simulated(scenario, duration_s=duration_s, seed=seed)
+    return recording
 
 
 def read_run(path: PathLike) -> Run:

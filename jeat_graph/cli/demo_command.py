@@ -1,4 +1,8 @@
-"""`jeat-graph demo`: the whole way on the built-in highway, from detections to scores and a picture."""
+"""`jeat-graph demo`: the whole way on a simulated highway, from detections to scores and a picture.
+
+What is tracked comes with the package; other scenarios, lengths and seeds, and raw pictures and events, are
+simulated by jeat-graph-sehn.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +11,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from jeat_graph.api.beside import FUNCTION_GROUP, find
 from jeat_graph.cli.options import add_config
 from jeat_graph.cli.progress import stages
 from jeat_graph.cli.terminal import say
@@ -18,30 +23,24 @@ if TYPE_CHECKING:
     from jeat_graph.data.trajectories import Trajectories
     from jeat_graph.eval.metrics import Scores
     from jeat_graph.eval.tables import Table
-    from jeat_graph.simulation.simulate import SimulatedRecording
+    from jeat_graph.runs.demo_recording import DemoRecording
 
-HELP = "simulate a highway at night, track it with both sensors and with each alone, and show what comes out"
+HELP = "track a highway at night with both sensors and with each alone, and show what comes out"
 COLUMNS = ("sensors", "MOTA", "HOTA", "IDF1", "FP", "FN", "IDSW")
 SCENARIO = "night-nolight"
 DURATION_S = 24.0
 SEED = 7
-#: Beside the clip from raw recordings, where the tracker may have to be interpreted.
-SHORT_S, SHORT_DENSITY = 8.0, "sparse"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    add = parser.add_argument
-    add("--scenario", default=SCENARIO, metavar="NAME", help=f"a scenario of `simulate` (default {SCENARIO})")
-    add("--out", default="demo", metavar="DIR", help="folder to write into (default demo)")
-    add(
-        "--duration",
-        type=float,
-        metavar="S",
-        help=f"length (default {DURATION_S:g}, or {SHORT_S:g} of sparse traffic with --from-raw)",
-    )
-    add("--seed", type=int, default=SEED, metavar="N", help=f"seed of the simulation (default {SEED})")
+    parser.add_argument("--out", default="demo", metavar="DIR", help="folder to write into (default demo)")
     add_config(parser, "highway", settings=False)
+    simulated = parser.add_argument_group("beyond the recording that comes along (needs jeat-graph-sehn)")
+    add = simulated.add_argument
+    add("--scenario", metavar="NAME", help=f"a scenario of `simulate` (default {SCENARIO})")
+    add("--duration", type=float, metavar="S", help=f"length (default {DURATION_S:g})")
+    add("--seed", type=int, metavar="N", help=f"seed of the simulation (default {SEED})")
     add(
         "--from-raw",
         action="store_true",
@@ -51,10 +50,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Simulate, track, judge, draw, and say where everything is."""
+    """Track, judge, draw, and say where everything is."""
     out = Path(args.out)
     if not args.from_raw:
-        _show(args, out, DURATION_S if args.duration is None else args.duration, None)
+        _show(args, out)
         _say_next()
         return 0
     from jeat_graph.cli.demo_raw import raw_meanwhile, render_clip, tell
@@ -63,19 +62,40 @@ def run(args: argparse.Namespace) -> int:
     if code := render_clip(out):
         return code
     with raw_meanwhile(out) as process:
-        if args.duration is None:
-            do_without()
-            _show(args, out, SHORT_S, SHORT_DENSITY)
-        else:
-            _show(args, out, args.duration, None)
+        if not _is_simulated(args):
+            do_without()  # so short a recording is tracked before the tracker would be compiled
+        _show(args, out)
         if code := tell(process, out):
             return code
     _say_next()
     return 0
 
 
-def _show(args: argparse.Namespace, out: Path, duration_s: float, density: str | None) -> None:
-    """Track simulated detections and judge the tracks, and draw them."""
+def _is_simulated(args: argparse.Namespace) -> bool:
+    return any(getattr(args, name) is not None for name in ("scenario", "duration", "seed"))
+
+
+def _recording(args: argparse.Namespace) -> DemoRecording:
+    """The recording that comes along, or the one that is asked for."""
+    if not _is_simulated(args):
+        from jeat_graph.runs.demo_recording import read_demo_recording
+
+        return read_demo_recording()
+    record = find(FUNCTION_GROUP, "record_demo", "another highway")
+    duration_s = DURATION_S if args.duration is None else args.duration
+    with stages("demo", 1) as stage:
+        stage(f"simulating {duration_s:g} s")
+        made: DemoRecording = record(
+            SCENARIO if args.scenario is None else args.scenario,
+            None,
+            duration_s,
+            SEED if args.seed is None else args.seed,
+        )
+    return made
+
+
+def _show(args: argparse.Namespace, out: Path) -> None:
+    """Track a recording and judge the tracks, and draw them."""
     from jeat_graph.config.reading import load_config
     from jeat_graph.io.detections_io import write_detections
     from jeat_graph.io.trajectories_io import read_trajectories
@@ -85,22 +105,18 @@ def _show(args: argparse.Namespace, out: Path, duration_s: float, density: str |
     from jeat_graph.runs.inputs import describe_inputs
     from jeat_graph.runs.run_options import RunOptions, RunRecord
     from jeat_graph.runs.tracking_run import write_run
-    from jeat_graph.simulation.scenario import load_scenario
-    from jeat_graph.simulation.simulate import record
     from jeat_graph.tracking.notice import notice_if_cold
 
     config = load_config(args.config)
-    scenario = load_scenario(args.scenario, density)
-    with stages("demo", 1) as stage:
-        stage(f"simulating {duration_s:g} s")
-        recording = record(scenario, args.seed, duration_s)
+    recording = _recording(args)
     directory = RunDirectory(out / "run")
-    warnings = check_detections(recording.detections, config, args.scenario)
+    warnings = check_detections(recording.detections, config, recording.name)
     source = out / "detections.csv"
     write_detections(recording.detections, source)
     write_truth(recording.truth, out / "gt.csv")
 
-    say("demo", f"{duration_s:g} s of {args.scenario} simulated; tracking with both sensors …")
+    length_s = float(recording.detections.scan_t[-1] - recording.detections.scan_t[0])
+    say("demo", f"{length_s:.0f} s of {recording.name}, simulated; tracking with both sensors …")
     origin = {"config_name": args.config, "inputs": describe_inputs([source])}
     origin["reading"] = {"detections": [str(source)]}  # as `track` has it: `compare` reads the inputs again
     details = RunRecord(source=origin, warnings=warnings)
@@ -114,7 +130,7 @@ def _show(args: argparse.Namespace, out: Path, duration_s: float, density: str |
     say("demo", "drawing …")
     with stages("demo", 1) as stage:
         stage("drawing")
-        pictures = _draw(recording, table, out / "tracks", args.scenario)
+        pictures = _draw(recording, table, out / "tracks")
 
     print(scores.render())
     print(f"picture   {pictures[0]} (and {pictures[1].name})")
@@ -130,7 +146,7 @@ def _say_next() -> None:
     print("top, width, height, score), and judge them with `jeat-graph eval run --gt gt.csv`.")
 
 
-def _compare(recording: SimulatedRecording, config: Config, causal: Trajectories, smoothed: Path) -> Table:
+def _compare(recording: DemoRecording, config: Config, causal: Trajectories, smoothed: Path) -> Table:
     """Scores of all sensors together (tracked already) and of each alone, at the truth's times."""
     from jeat_graph.eval.metrics import evaluate
     from jeat_graph.eval.tables import Cell, Table
@@ -151,7 +167,7 @@ def _compare(recording: SimulatedRecording, config: Config, causal: Trajectories
     return Table.from_records(records, COLUMNS)
 
 
-def _causal_scores(recording: SimulatedRecording, detections: Detections, table: Trajectories) -> Scores:
+def _causal_scores(recording: DemoRecording, detections: Detections, table: Trajectories) -> Scores:
     import numpy as np
 
     from jeat_graph.eval.metrics import evaluate
@@ -159,34 +175,30 @@ def _causal_scores(recording: SimulatedRecording, detections: Detections, table:
     return evaluate([(recording.truth, table)], instants=[np.unique(detections.scan_t)])
 
 
-def _draw(recording: SimulatedRecording, table: Trajectories, stem: Path, scenario: str) -> list[Path]:
+def _draw(recording: DemoRecording, table: Trajectories, stem: Path) -> list[Path]:
     import numpy as np
 
     from jeat_graph.drawing.palette import DAY, NIGHT
     from jeat_graph.drawing.picture.figure import save_pictures
     from jeat_graph.drawing.picture.plane import Backdrop
-    from jeat_graph.simulation.world.markings import marking_lines
 
-    camera, truth = recording.scene.camera, recording.truth
-    end = float(truth.frame_times()[-1])
+    end = float(recording.truth.frame_times()[-1])
     table = table.take(table.t <= end)
     missed, false = _errors(recording, table, end)
     count = len(np.unique(table.track_id))
     backdrop = Backdrop(
-        width=camera.width,
-        height=camera.height,
-        lines=marking_lines(recording.scene),
+        width=recording.width,
+        height=recording.height,
+        lines=recording.lines,
         missed=missed,
         false=false,
-        title=f"{scenario}: {count} tracks in {end:.0f} s",
+        title=f"{recording.name}: {count} tracks in {end:.0f} s",
         subtitle=" + ".join(table.sensors) + f" · the picture at t = {end:.1f} s, trails of the last 3 s",
     )
-    return save_pictures(table, backdrop, stem, DAY if scenario.startswith("day") else NIGHT)
+    return save_pictures(table, backdrop, stem, DAY if recording.name.startswith("day") else NIGHT)
 
 
-def _errors(
-    recording: SimulatedRecording, table: Trajectories, t: float
-) -> tuple[FloatArray, frozenset[int]]:
+def _errors(recording: DemoRecording, table: Trajectories, t: float) -> tuple[FloatArray, frozenset[int]]:
     """True boxes (M, 4) at a time of the truth that no track lies on, and tracks that lie on no true box."""
     import numpy as np
 

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from jeat_graph.api.beside import FUNCTION_GROUP, find
 from jeat_graph.cli.options import add_output_rate, add_rate
 from jeat_graph.data.errors import DataError
 
@@ -136,8 +137,7 @@ def _export_road(args: argparse.Namespace) -> int:
 def _export_set(args: argparse.Namespace) -> int:
     from tqdm import tqdm
 
-    from jeat_graph.simulation.layouts.writing import write_layout
-
+    write_layout = find(FUNCTION_GROUP, "write_layout", f"--to {args.to}")
     with tqdm(desc="export", unit=" segments", disable=not sys.stderr.isatty(), leave=False) as bar:
         written = write_layout(args.source, args.to, args.out, bar.update)
     left = f"; {written.without_boxes} without boxes left out" if written.without_boxes else ""

@@ -6,13 +6,15 @@ import argparse
 import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import import_module
+from typing import Any
 
+from jeat_graph.api.beside import COMMAND_GROUP, HOW_TO_GET, find
 from jeat_graph.cli.terminal import Terminated, describe, in_good_order, say, write_anything
 from jeat_graph.config import kernel_cache
-from jeat_graph.data.errors import JeatGraphError
+from jeat_graph.data.errors import ConfigError, JeatGraphError
 from jeat_graph.io.outputs import check_named
 from jeat_graph.tracking import notice
 from jeat_graph.version import __version__
@@ -38,8 +40,9 @@ COMMANDS = (
     "calibrate",
     "camera",
     "road",
-    "benchmark",
 )
+# Those that a distribution of its own brings.
+_BESIDE = ("simulate", "train")
 
 
 # These begin to track at once where the tracker is not compiled; the others track so much, or are so much
@@ -73,11 +76,28 @@ def build_parser(command: str | None = None) -> argparse.ArgumentParser:
         if command is not None and name != command:
             commands.add_parser(name, add_help=False)
             continue
-        module = import_module(f"jeat_graph.cli.{name}_command")
+        try:
+            module = _module_of(name)
+        except ConfigError:
+            if command is not None:
+                raise
+            commands.add_parser(name, help=HOW_TO_GET, add_help=False)
+            continue
         sub = commands.add_parser(name, help=module.HELP, description=module.HELP)
         module.add_arguments(sub)
         sub.set_defaults(run=module.run)
     return parser
+
+
+def _module_of(command: str) -> Any:
+    """Import the module of a command.
+
+    Raises:
+        ConfigError: the command comes with a distribution that is not installed.
+    """
+    if command in _BESIDE:
+        return find(COMMAND_GROUP, command, "the command")
+    return import_module(f"jeat_graph.cli.{command}_command")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -88,11 +108,27 @@ def main(argv: Sequence[str] | None = None) -> int:
         when ended by signal N.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
-    write_anything()
+    if arguments[:1] == ["benchmark"]:
+        say(None, "benchmark is no command any more: run `python -m benchmarks` in a checkout of jeat-graph")
+        return 2
     command = next((a for a in arguments if a in COMMANDS), None)
+    return carry_out(command, lambda: build_parser(command).parse_args(arguments))
+
+
+def carry_out(command: str | None, parse: Callable[[], argparse.Namespace]) -> int:
+    """Run what was asked for, report errors in one line, and end in good order when asked to.
+
+    Args:
+        command: its name, in messages.
+        parse: reads the arguments, which name the command and have its function as `run`.
+
+    Returns:
+        An exit code, as `main` does.
+    """
+    write_anything()
     try:
         with in_good_order(command):
-            return _run(build_parser(command).parse_args(arguments))
+            return _run(parse())
     except BrokenPipeError:
         # The reader of our output went away (`| head`): not an error. Python would complain once more
         # when it flushes at exit, so its stdout is pointed elsewhere.

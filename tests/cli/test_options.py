@@ -121,32 +121,3 @@ def test_a_warning_of_the_library_is_one_line_that_names_the_command(capsys, mon
         warnings.simplefilter("always")
         assert main(["count", *NEEDED["count"]]) == 0
     assert capsys.readouterr().err == "jeat-graph count: warning: first second\n"
-
-
-@pytest.mark.parametrize("kind", ["accuracy", "speed", "smoothing", "events"])
-def test_a_quick_benchmark_never_replaces_published_tables(kind, capsys, tmp_path):
-    from jeat_graph.cli.main import main
-
-    page = tmp_path / "README.md"
-    page.write_text("<!-- table: speed -->\n1\n<!-- end -->\n")
-    if "--quick" not in _help_of_benchmark(kind, capsys):
-        pytest.skip("has no --quick")
-    assert main(["benchmark", kind, "--quick", "--readme", str(page)]) == 2
-    assert "leave out --readme" in capsys.readouterr().err
-
-
-def _help_of_benchmark(kind: str, capsys: pytest.CaptureFixture[str]) -> str:
-    with pytest.raises(SystemExit):
-        build_parser("benchmark").parse_args(["benchmark", kind, "--help"])
-    return capsys.readouterr().out
-
-
-def test_fewer_seeds_never_replace_published_tables():
-    from jeat_graph.benchmark.common import settings
-    from jeat_graph.data.errors import ConfigError
-
-    args = build_parser("benchmark").parse_args(
-        ["benchmark", "accuracy", "--seeds", "0", "--readme", "README.md"]
-    )
-    with pytest.raises(ConfigError, match="leave out --seeds"):
-        settings(args)

@@ -216,7 +216,7 @@ def test_the_page_of_settings_has_what_a_run_takes_without_being_told():
 def test_the_page_on_the_layout_names_every_folder_and_files_that_are_there():
     text = (ROOT / "docs" / "design.md").read_text(encoding="utf-8")
     named = set(re.findall(r"^\| `([\w/]+?)/` \|", text, flags=re.MULTILINE))
-    tops = {"filters", "association", "smoothers", "eval", "configs"}
+    tops = {"filters", "association", "smoothers", "eval", "configs", "sehn", "benchmarks"}
     parts = {f"jeat_graph/{p.parent.name}" for p in (ROOT / "jeat_graph").glob("*/__init__.py")}
     assert named == tops | parts
     places = re.findall(r"^\| [^|`]+ \| `([\w/]+\.py)` \|", text, flags=re.MULTILINE)

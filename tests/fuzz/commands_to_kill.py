@@ -20,7 +20,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "report": ("report", "{run}", *_TRUTH, "--out", "{out}/page.html"),
     "render": ("render", "{run}", "--out", "{out}/film.mp4"),
     "compare": ("compare", "{run}", *_TRUTH, "--out", "{out}/compared"),
-    "benchmark": ("benchmark", "events", "--quick", "--out", "{out}/events"),
+    "benchmarks": ("benchmarks", "events", "--quick", "--out", "{out}/events"),
     "stream": ("stream", "--smoothed", "{out}/s.csv", "--checkpoint", "{out}/c.npz", "--every", "0.5"),
     "detect": ("detect", "--frames", f"{_SEGMENT}/frames.mp4", "--out", "{out}/d.csv"),
     "events-convert": ("events", "convert", f"{_SEGMENT}/events.h5", "{out}/e.raw"),

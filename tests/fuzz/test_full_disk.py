@@ -21,7 +21,7 @@ COMMANDS = {
     "render": ("render", "{run}", "--out", "{disk}/film.mp4"),
     "compare": ("compare", "{run}", "--gt", "{sim}/gt.csv", "--out", "{disk}/compared"),
     "stream": ("stream", "--smoothed", "{disk}/smoothed.csv"),
-    "benchmark": ("benchmark", "events", "--out", "{disk}/events"),
+    "benchmarks": ("benchmarks", "events", "--out", "{disk}/events"),
 }
 QUICK = ("track", "render", "stream")
 
@@ -81,5 +81,5 @@ def test_a_full_disk_is_one_line_and_nothing_unfinished_is_there(work, small_dis
     assert all(path.stat().st_size for path in there)
     # Progress and warnings may stand before it, but the video library's own complaints may not.
     assert len(said) <= 4
-    if name not in ("simulate", "compare", "benchmark"):
+    if name not in ("simulate", "compare", "benchmarks"):
         assert {path.name for path in there} <= GROWS

@@ -12,9 +12,9 @@ from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.live.late import LiveTracker
-from jeat_graph.simulation.scenario import load_scenario
-from jeat_graph.simulation.simulate import record
 from jeat_graph.tracking.tracker import Tracker
+from jeat_graph_sehn.simulation.scenario import load_scenario
+from jeat_graph_sehn.simulation.simulate import record
 
 COLUMNS = ("t", "track_id", "boxes", "existence", "mean", "var", "used")
 OVERRIDES = ["smoother.lag_s=0.3", "smoother.chunk=8"]

@@ -15,9 +15,9 @@ from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError, TimeOrderError, UnknownSensorError
 from jeat_graph.io.trajectories_io import write_trajectories
 from jeat_graph.live.late import LiveTracker
-from jeat_graph.simulation.scenario import load_scenario
-from jeat_graph.simulation.simulate import record
 from jeat_graph.tracking.tracker import Tracker
+from jeat_graph_sehn.simulation.scenario import load_scenario
+from jeat_graph_sehn.simulation.simulate import record
 
 CONFIG = load_config("highway", ["smoother.lag_s=0.4", "smoother.chunk=8"])
 CAUSAL = load_config("highway", ["smoother.engine=none", "output.max_gap_scans=0"])

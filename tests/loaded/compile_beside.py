@@ -10,11 +10,11 @@ import contextlib
 import io
 import tempfile
 
-from jeat_graph.benchmark.road_cost import causal_cost, lag_cost
+from benchmarks.road_cost import causal_cost, lag_cost
 from jeat_graph.cli.main import main
-from jeat_graph.simulation.imaging.config import load_imaging
-from jeat_graph.simulation.imaging.source import RenderedSource
-from jeat_graph.simulation.scenario import load_scenario
+from jeat_graph_sehn.simulation.imaging.config import load_imaging
+from jeat_graph_sehn.simulation.imaging.source import RenderedSource
+from jeat_graph_sehn.simulation.scenario import load_scenario
 
 _SMALL = ("--sensors", "pictures", "--frames", "3", "--size", "64x48", "--workers", "1")
 

@@ -33,7 +33,10 @@ def load() -> None:
 
 
 def run_command(arguments: list[str], environment: dict[str, str], pipes: list) -> None:
-    """Run the command as a process of its own would; `pipes` become its stdin, stdout and stderr."""
+    """Run the command as a process of its own would; `pipes` become its stdin, stdout and stderr.
+
+    `benchmarks` stands for `python -m benchmarks`.
+    """
     for number, pipe in enumerate(pipes):
         given = pipe.detach()
         os.dup2(given, number)
@@ -43,11 +46,16 @@ def run_command(arguments: list[str], environment: dict[str, str], pipes: list) 
     sys.stdin = open(0, encoding="utf-8")  # noqa: SIM115
     sys.stdout = open(1, "w", encoding="utf-8")  # noqa: SIM115
     sys.stderr = open(2, "w", encoding="utf-8", buffering=1)  # noqa: SIM115
-    sys.argv = ["jeat-graph", *arguments]
+    program, given = main, arguments
+    if arguments[:1] == ["benchmarks"]:
+        from benchmarks.__main__ import main as program
+
+        given = arguments[1:]
+    sys.argv = ["jeat-graph", *given]
     for folder in environment.get("PYTHONPATH", "").split(os.pathsep):
         if folder and (Path(folder) / "sitecustomize.py").exists():
             runpy.run_path(str(Path(folder) / "sitecustomize.py"))
-    sys.exit(main(arguments))
+    sys.exit(program(given))
 
 
 if os.environ.get("JEAT_GRAPH_LOAD"):

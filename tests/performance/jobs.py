@@ -7,8 +7,8 @@ import time
 
 import numpy as np
 
+from benchmarks.speed_worker import resident_mib
 from jeat_graph import Tracker, load_config
-from jeat_graph.benchmark.speed_worker import resident_mib
 from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
 from jeat_graph.smoothers.measurements import measurements
 from jeat_graph.smoothers.track_data import Prior

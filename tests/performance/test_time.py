@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from jeat_graph.benchmark.speed_subjects import installed_peers
-from jeat_graph.benchmark.speed_timing import summarise, time_side_by_side
+from benchmarks.speed_subjects import installed_peers
+from benchmarks.speed_timing import summarise, time_side_by_side
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.metrics import evaluate
 from jeat_graph.io.detections_io import read_detections

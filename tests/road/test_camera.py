@@ -15,7 +15,7 @@ from road_scenes import camera, see
 from jeat_graph.data.errors import DataError
 from jeat_graph.road.camera import PARAMETERS, Georeference, mounted, turn
 from jeat_graph.road.camera_file import read_camera, write_camera
-from jeat_graph.simulation.world.camera import Camera, CameraConfig
+from jeat_graph_sehn.simulation.world.camera import Camera, CameraConfig
 
 
 def test_projection_is_opencvs() -> None:

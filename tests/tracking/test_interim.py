@@ -58,15 +58,15 @@ def test_kernels_of_the_tracker_are_interpreted_until_they_are_compiled(part, me
 
 def test_others_are_compiled_at_once(meanwhile):
     meanwhile()
-    for part in ("detection", "simulation", "road", "io"):
+    for part in ("detection", "drawing", "road", "io"):
         kernel = kernel_of(part)
         assert kernel(3.0) == 7.0
         assert kernel.overloads
 
 
 def test_other_parts_can_be_named(meanwhile):
-    interim.begin(interim.Interim(lambda: False, parts=("jeat_graph.simulation.",)))
-    one, other = kernel_of("simulation"), kernel_of("tracking")
+    interim.begin(interim.Interim(lambda: False, parts=("jeat_graph.detection.",)))
+    one, other = kernel_of("detection"), kernel_of("tracking")
     assert (one(3.0), other(3.0)) == (7.0, 7.0)
     assert (len(one.overloads), len(other.overloads)) == (0, 1)
 

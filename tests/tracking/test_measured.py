@@ -7,11 +7,11 @@ import pytest
 
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.errors import JeatGraphError
-from jeat_graph.simulation.scenario import load_scenario
-from jeat_graph.simulation.simulate import record
 from jeat_graph.tracking.measured import ConfirmedMeasurements, measured_tracks
 from jeat_graph.tracking.smoothing.priors import ErrorStates, track_data
 from jeat_graph.tracking.tracker import Tracker
+from jeat_graph_sehn.simulation.scenario import load_scenario
+from jeat_graph_sehn.simulation.simulate import record
 
 CONFIG = load_config("highway", ["smoother.engine=rts", "smoother.stitch=true"])
 

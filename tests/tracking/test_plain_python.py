@@ -133,8 +133,8 @@ import gc, hashlib, math, sys
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 from jeat_graph.config.reading import load_config
-from jeat_graph.simulation.scenario import load_scenario
-from jeat_graph.simulation.simulate import record
+from jeat_graph_sehn.simulation.scenario import load_scenario
+from jeat_graph_sehn.simulation.simulate import record
 from jeat_graph.tracking import interim, notice
 from jeat_graph.tracking.tracker import Tracker
 

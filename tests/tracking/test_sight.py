@@ -8,10 +8,10 @@ import pytest
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.eval.metrics import evaluate
-from jeat_graph.simulation.scenario import load_scenario
-from jeat_graph.simulation.simulate import simulate
 from jeat_graph.tracking.tracker import Tracker
 from jeat_graph.tracking.whole import track
+from jeat_graph_sehn.simulation.scenario import load_scenario
+from jeat_graph_sehn.simulation.simulate import simulate
 
 RATE_HZ = 20.0
 WITHOUT = "lifecycle.sight_scans=0"

@@ -22,8 +22,9 @@ from jeat_graph.drawing.movie.backgrounds import (
 from jeat_graph.drawing.movie.moments import TRAIL_S, TracksAt, TruthAt
 from jeat_graph.drawing.movie.panels import Movie
 from jeat_graph.runs.directory import RUN_JSON, read_record
-from jeat_graph.simulation.dataset.layout import EVENTS, SEGMENTS, TRUTH
 
+#: Names within a simulated data set, as jeat-graph-sehn writes it: its segments, and their files.
+SEGMENTS, EVENTS, TRUTH = "segments", "events.h5", "gt.csv"
 DEFAULT_RATE_HZ = 25.0
 _SAME_SHAPE = 0.01
 # A track is drawn that long after its last row, and a little before its first (s).

@@ -15,9 +15,9 @@ from jeat_graph.eval.lagged import states_at
 from jeat_graph.io.detections_io import write_detections
 from jeat_graph.io.diagnostics_io import COLUMNS, DiagnosticsWriter, read_diagnostics
 from jeat_graph.io.trajectories_io import read_trajectories
-from jeat_graph.simulation.scenario import load_scenario
-from jeat_graph.simulation.simulate import record
 from jeat_graph.tracking.records import record_tracks
+from jeat_graph_sehn.simulation.scenario import load_scenario
+from jeat_graph_sehn.simulation.simulate import record
 
 HEAD = ",".join(COLUMNS)
 

@@ -1,0 +1,38 @@
+"""What `jeat-graph-sehn`, a distribution of its own, adds: the simulator and training, found by entry points.
+
+Two groups of entry points hold it: in `jeat_graph.commands` modules of commands, in `jeat_graph.functions`
+functions that commands and `jeat_graph` itself call.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from jeat_graph.data.errors import ConfigError
+
+COMMAND_GROUP = "jeat_graph.commands"
+FUNCTION_GROUP = "jeat_graph.functions"
+HOW_TO_GET = (
+    "comes with jeat-graph-sehn, which is not installed: `pip install ./sehn` in a checkout of jeat-graph"
+)
+
+
+def find(group: str, name: str, asked: str) -> Any:
+    """Load what a distribution beside this one offers.
+
+    Args:
+        group: `COMMAND_GROUP` or `FUNCTION_GROUP`.
+        name: of the entry point.
+        asked: what needs it, in the user's words.
+
+    Raises:
+        ConfigError: it is not installed, or cannot be loaded.
+    """
+    from importlib.metadata import entry_points  # takes longer to load than most commands' own modules
+
+    for point in entry_points(group=group, name=name):
+        try:
+            return point.load()
+        except (ImportError, AttributeError) as error:
+            raise ConfigError(f"{asked} cannot be loaded from {point.value}: {error}") from None
+    raise ConfigError(f"{asked} {HOW_TO_GET}")

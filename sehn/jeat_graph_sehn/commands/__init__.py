@@ -1,0 +1,1 @@
+"""Commands that `jeat-graph` finds here: `simulate` and `train`."""

@@ -1,0 +1,284 @@
+"""`jeat-graph simulate`: detections, or pictures and events, of a highway, with truth; and their check."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from argparse import ArgumentTypeError
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jeat_graph.config.argument_types import counting, drawn_size
+from jeat_graph.data.errors import ConfigError
+from jeat_graph.data.progress import refreshing
+
+if TYPE_CHECKING:
+    from jeat_graph_sehn.simulation.dataset.workers import SourceFactory
+    from jeat_graph_sehn.simulation.scenario import Scenario
+
+HELP = "simulate a highway seen by an RGB and an event camera: detections or pictures, and truth"
+_DENSITIES = ("sparse", "normal", "dense")
+_DURATION_S = 30.0
+_SEGMENTS = 1
+_FRAMES = 100
+_SIZE = (640, 384)
+# Arguments that only mean something with pictures, by the name of the attribute.
+_PICTURE_ONLY = (
+    *("segments", "frames", "size", "workers", "video", "compression", "split", "imaging"),
+    *("world", "event_camera", "masks"),
+)
+_CARLA_ONLY = ("carla_host", "carla_port")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    parser.add_argument(
+        "scenario",
+        metavar="SCENARIO",
+        nargs="?",
+        help="a name (day, night, night-nolight, …) or a YAML file",
+    )
+    parser.add_argument("--out", metavar="DIR", help="folder to write into")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed (default 0)")
+    parser.add_argument("--density", choices=_DENSITIES, help="traffic density (default: the scenario's)")
+    parser.add_argument(
+        "--sensors",
+        choices=("detections", "pictures", "rgb", "events", "carla"),
+        default="detections",
+        help="detections (default); pictures: RGB frames and events of the built-in renderer; rgb, events: "
+        "one of them without the other's cost; carla: those of a running CARLA server (experimental)",
+    )
+    parser.add_argument(
+        "--verify",
+        metavar="DIR",
+        help="only check a simulated folder: missing, changed and extra files, and whether all fit together; "
+        "exit code 1 if not",
+    )
+    only = parser.add_argument_group("with --sensors detections")
+    only.add_argument("--duration", type=float, metavar="S", help=f"length (default {_DURATION_S:g})")
+    pictures = parser.add_argument_group(
+        "with --sensors pictures or carla",
+        "A run that was stopped goes on where it was when it is called again, and gives the same bytes.",
+    )
+    pictures.add_argument(
+        "--segments", type=counting, metavar="N", help=f"how many (default {_SEGMENTS}; the full set: 500)"
+    )
+    pictures.add_argument(
+        "--frames-per-segment",
+        "--frames",
+        dest="frames",
+        type=counting,
+        metavar="N",
+        help=f"RGB frames a segment (default {_FRAMES}; for training 20, and more segments)",
+    )
+    pictures.add_argument(
+        "--world",
+        choices=("fixed", "varied"),
+        help="fixed (default): the scenario's road and camera in all segments; varied: for each segment a "
+        "camera, road, surroundings, vehicles, light and traffic of its own",
+    )
+    pictures.add_argument(
+        "--event-camera",
+        choices=("v2e", "davis346", "imx636", "iebcs", "ideal"),
+        help="whose thresholds and noise the event camera has (default v2e)",
+    )
+    pictures.add_argument(
+        "--masks",
+        action="store_true",
+        default=None,
+        help="also write a mask a frame: which vehicle each pixel shows",
+    )
+    pictures.add_argument("--size", type=_size, metavar="WxH", help="of the pictures (default 640x384)")
+    pictures.add_argument("--workers", type=counting, metavar="K", help="processes (default: one a core)")
+    pictures.add_argument(
+        "--video",
+        choices=("mp4", "webm", "lossless", "png"),
+        help="how frames are stored: mp4 (default; quick, lossy, not for browsers), webm (browsers play it; "
+        "ten times slower to write), lossless, png (default with --world varied)",
+    )
+    pictures.add_argument(
+        "--compression",
+        choices=("gzip", "none", "blosc"),
+        help="of events (default gzip; blosc needs the extra `hdf5`)",
+    )
+    pictures.add_argument(
+        "--split", type=_shares, metavar="A:B:C", help="shares of train, val, test (default 70:15:15)"
+    )
+    pictures.add_argument(
+        "--imaging",
+        metavar="FILE",
+        help="YAML with settings of renderer and cameras (sections render, rgb, evt)",
+    )
+    carla = parser.add_argument_group("with --sensors carla (experimental)")
+    carla.add_argument("--carla-host", metavar="HOST", help="where the server runs (default localhost)")
+    carla.add_argument("--carla-port", type=counting, metavar="PORT", help="its port (default 2000)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Simulate or check, and print what was written or found."""
+    if args.verify is not None:
+        if args.scenario is not None or args.out is not None:
+            raise ConfigError("--verify DIR stands alone, without SCENARIO and --out")
+        return _verify(Path(args.verify))
+    if args.scenario is None or args.out is None:
+        raise ConfigError("SCENARIO and --out DIR are needed (or --verify DIR)")
+    unfit = [*(_PICTURE_ONLY if args.sensors == "detections" else ("duration",))]
+    unfit += [] if args.sensors == "carla" else _CARLA_ONLY
+    unfit += ["imaging", "workers", "world", "event_camera", "masks"] if args.sensors == "carla" else []
+    for name in unfit:
+        if getattr(args, name) is not None:
+            flag = "--" + name.replace("_", "-")
+            raise ConfigError(f"{flag} does not go with --sensors {args.sensors}")
+    from jeat_graph_sehn.simulation.scenario import load_scenario
+
+    scenario = load_scenario(args.scenario, args.density)
+    if args.sensors == "detections":
+        return _detections(args, scenario)
+    return _pictures(args, scenario)
+
+
+def _detections(args: argparse.Namespace, scenario: Scenario) -> int:
+    from tqdm import tqdm
+
+    from jeat_graph_sehn.simulation.dataset.detection_set import STEPS, write_detection_set
+
+    duration = _DURATION_S if args.duration is None else args.duration
+    with tqdm(total=STEPS, desc="simulate", disable=not sys.stderr.isatty(), leave=False) as bar:
+        manifest = write_detection_set(
+            scenario, str(args.scenario), Path(args.out), args.seed, duration, bar.update
+        )
+    for name, count in manifest["sensors"].items():
+        print(f"{name}: {count['detections']} boxes in {count['scans']} scans")
+    print(f"truth: {manifest['truth']['objects']} vehicles in {manifest['truth']['frames']} frames")
+    print(f"wrote {args.out}")
+    return 0
+
+
+def _pictures(args: argparse.Namespace, scenario: Scenario) -> int:
+    from tqdm import tqdm
+
+    from jeat_graph.data.processes import available_cores
+    from jeat_graph_sehn.simulation.compiling import prepare_renderer
+    from jeat_graph_sehn.simulation.dataset.protocol import Protocol
+    from jeat_graph_sehn.simulation.dataset.recording import record_dataset
+    from jeat_graph_sehn.simulation.scenario import scenario_to_yaml
+
+    given = {
+        "video": args.video or ("png" if args.world == "varied" else None),
+        "compression": args.compression,
+        "shares": args.split,
+    }
+    protocol = Protocol(
+        args.segments or _SEGMENTS,
+        args.seed,
+        **{key: value for key, value in given.items() if value is not None},
+    )
+    frames = args.frames or _FRAMES
+    carla = args.sensors == "carla"
+    factory = _carla_source(args, scenario, frames) if carla else _renderer(args, scenario, frames)
+    # One server renders for CARLA, so there is nothing to gain from several processes.
+    workers = 1 if carla else min(args.workers or available_cores(), protocol.segments)
+    total = protocol.segments * frames
+    quiet = not sys.stderr.isatty()
+    if not carla:
+        prepare_renderer(workers)
+    with (
+        tqdm(total=total, desc="simulate", unit=" frames", disable=quiet, leave=False) as bar,
+        refreshing(bar),
+    ):
+        manifest = record_dataset(
+            factory,
+            args.out,
+            protocol,
+            scenario_yaml=scenario_to_yaml(scenario),
+            workers=workers,
+            on_frames=bar.update,
+        )
+    totals = manifest["totals"]
+    splits = ", ".join(f"{len(names)} {name}" for name, names in manifest["splits"].items())
+    print(f"segments: {manifest['segments']} ({splits})")
+    print(f"frames: {totals['frames']}, events: {totals['events']}, {totals['bytes'] / 1e6:.1f} MB")
+    print(f"truth: {totals['boxes']} boxes, {totals['ignored']} of them hidden or far")
+    asked = max(1, totals["boxes"] - totals["ignored"])
+    print(
+        f"contrast-to-noise below 2 in the RGB pictures: {100 * totals['faint'] / asked:.1f} % of the others"
+    )
+    print(f"wrote {args.out}")
+    return 0
+
+
+def _renderer(args: argparse.Namespace, scenario: Scenario, frames: int) -> SourceFactory:
+    from jeat_graph_sehn.simulation.imaging.config import load_imaging
+    from jeat_graph_sehn.simulation.imaging.source import RenderedSource
+
+    tree: dict[str, Any] = {} if args.imaging is None else _read_yaml(Path(args.imaging))
+    if args.size is not None or "width" not in (tree.get("render") or {}):
+        width, height = args.size or _SIZE
+        tree["render"] = {**(tree.get("render") or {}), "width": width, "height": height}
+    if args.event_camera is not None:
+        tree["evt"] = {**(tree.get("evt") or {}), "sensor": args.event_camera}
+    world = args.world or "fixed"
+    return partial(
+        RenderedSource,
+        scenario,
+        load_imaging(tree),
+        args.seed,
+        frames,
+        world,
+        args.sensors,
+        masks=bool(args.masks),
+    )
+
+
+def _carla_source(args: argparse.Namespace, scenario: Scenario, frames: int) -> SourceFactory:
+    from jeat_graph_sehn.simulation.carla.config import CarlaConfig
+    from jeat_graph_sehn.simulation.carla.session import client_api
+    from jeat_graph_sehn.simulation.carla.source import CarlaSource
+
+    client_api()  # says so now if it is not installed
+    width, height = args.size or _SIZE
+    config = CarlaConfig(width=width, height=height)
+    host, port = args.carla_host or "localhost", args.carla_port or 2000
+    return partial(CarlaSource, scenario, config, args.seed, frames, host, port)
+
+
+def _verify(folder: Path) -> int:
+    from tqdm import tqdm
+
+    from jeat_graph_sehn.simulation.dataset.verify import file_count, verify
+
+    problems = 0
+    count = file_count(folder)
+    quiet = not sys.stderr.isatty()
+    with tqdm(total=count, desc="verify", unit=" files", disable=quiet, leave=False) as bar:
+        for problem in verify(folder, bar.update):
+            problems += 1
+            with bar.external_write_mode(file=sys.stdout):
+                print(problem)
+    if not problems:
+        print(f"{folder}: {count} files, all as they should be")
+    return 1 if problems else 0
+
+
+def _read_yaml(path: Path) -> dict[str, Any]:
+    from jeat_graph.config.section_tree import read_tree
+
+    if not path.is_file():
+        raise ConfigError(f"{path}: no such file")
+    return read_tree(str(path), (), str, "imaging file")
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, height = drawn_size(text)
+    if width % 2 or height % 2:
+        raise ArgumentTypeError(f"must be even numbers, not {text!r}")
+    return width, height
+
+
+def _shares(text: str) -> tuple[float, float, float]:
+    try:
+        train, val, test = (float(part) for part in text.split(":"))
+    except ValueError:
+        raise ArgumentTypeError(f"must read like 70:15:15, not {text!r}") from None
+    return train, val, test

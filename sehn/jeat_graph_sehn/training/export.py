@@ -1,0 +1,126 @@
+"""The trained network as an ONNX file, in a layout that `detect` and `track` recognise, with its card inside.
+
+Output `boxes` (1, 5, N): middle and size in px of the input, and a score. Input `picture` (1, 3, H, W), red
+first, 0 to 1; or `events` (1, 2 x bins, H, W) counts and one state a level of the memory, which come back as
+outputs of the same shapes. A network of both sensors takes `events`, `picture` and `given` (1, 3): whether
+there is a picture (1 or 0), how old it is (s), and whether there are events (1 or 0).
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import torch
+
+from jeat_graph.data.errors import ConfigError
+from jeat_graph.detection.models.onnx_head import CARD
+from jeat_graph.io.atomic import atomic_path
+from jeat_graph_sehn.training.making import SECOND_LOOK
+from jeat_graph_sehn.training.network import VehicleNet
+from jeat_graph_sehn.training.serving import ServedNet
+
+_OPSET = 17
+#: Smaller tensors are not worth a cast.
+_LEAST_HALVED = 64
+_CLASS = "vehicle"
+#: Name of the note in which detectors have their classes.
+NAMES = "names"
+
+
+def write_onnx(
+    net: VehicleNet, side: tuple[int, int], card: Mapping[str, Any], path: Path, *, second_look: bool = False
+) -> None:
+    """Write a network with its card.
+
+    Args:
+        net: trained.
+        side: width and height of its input (px), whole multiples of 16; of 32 with a second look.
+        card: what is to be known of it: data, settings, how good it is.
+        path: the file.
+        second_look: whether it looks at half the size, too (`serving`).
+
+    Raises:
+        ConfigError: the package `onnx` is not installed.
+    """
+    try:
+        import onnx
+    except ImportError:
+        raise ConfigError("writing ONNX needs pip install './sehn[train]' in a checkout") from None
+    served = ServedNet(net, side, second_look).to("cpu").eval()
+    inputs, state = net.to("cpu").inputs(side), served.empty_state()
+    states = range(len(state))
+    buffer = io.BytesIO()
+    with warnings.catch_warnings():
+        # This exporter needs nothing but PyTorch; the newer one, which it announces, needs more packages.
+        warnings.simplefilter("ignore")
+        torch.onnx.export(
+            served,
+            (*inputs.values(), *state),
+            cast(Any, buffer),  # takes open files, too
+            dynamo=False,
+            opset_version=_OPSET,
+            input_names=[*inputs, *(f"state_{k}" for k in states)],
+            output_names=["boxes", *(f"next_state_{k}" for k in states)],
+        )
+    model = onnx.load_from_string(buffer.getvalue())
+    share_weights(model)
+    halve_weights(model)
+    if second_look:
+        card = {**card, SECOND_LOOK: True}
+    onnx.helper.set_model_props(model, {NAMES: str({0: _CLASS}), CARD: json.dumps(card, sort_keys=True)})
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(model.SerializeToString(deterministic=True))
+
+
+def share_weights(model: Any) -> None:
+    """Keep equal weights once, and none that nobody takes: a second look takes those of the first."""
+    graph, kept, same = model.graph, dict[bytes, Any](), dict[str, str]()
+    for tensor in graph.initializer:
+        name = tensor.name
+        tensor.name = ""
+        first = kept.setdefault(tensor.SerializeToString(deterministic=True), tensor)
+        tensor.name = name
+        same[name] = first.name
+    for node in graph.node:
+        for k, name in enumerate(node.input):
+            node.input[k] = same.get(name, name)
+    taken = {name for node in graph.node for name in node.input}
+    used = [tensor for tensor in graph.initializer if tensor.name in taken]
+    del graph.initializer[:]
+    graph.initializer.extend(used)
+
+
+def halve_weights(model: Any, *, only_exact: bool = False) -> None:
+    """Store weights in half precision, each with a cast before its first use: half the file.
+
+    Whoever runs the network casts them once, when it is loaded; it calculates in single precision.
+
+    Args:
+        model: as ONNX has it; changed.
+        only_exact: leave those as they are that half precision would change.
+    """
+    from onnx import TensorProto, helper, numpy_helper
+
+    graph, kept, casts = model.graph, [], []
+    for tensor in graph.initializer:
+        if tensor.data_type != TensorProto.FLOAT or np.prod(tensor.dims) < _LEAST_HALVED:
+            kept.append(tensor)
+            continue
+        values = numpy_helper.to_array(tensor)
+        halved = values.astype(np.float16)
+        if only_exact and not np.array_equal(halved.astype(np.float32), values):
+            kept.append(tensor)
+            continue
+        name = f"{tensor.name}_half"
+        kept.append(numpy_helper.from_array(halved, name))
+        casts.append(helper.make_node("Cast", [name], [tensor.name], to=TensorProto.FLOAT))
+    nodes = list(graph.node)
+    del graph.initializer[:], graph.node[:]
+    graph.initializer.extend(kept)
+    graph.node.extend([*casts, *nodes])

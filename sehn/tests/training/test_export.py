@@ -1,0 +1,96 @@
+"""The ONNX file says what the network says, in both engines that run it, and is recognised without a word."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="training needs PyTorch, the extra `train`")
+
+from jeat_graph.data.events import EventArray  # noqa: E402
+from jeat_graph.detection.models.engine import open_engine  # noqa: E402
+from jeat_graph.detection.models.events import ModelEventDetector  # noqa: E402
+from jeat_graph.detection.models.model_settings import ModelSettings  # noqa: E402
+from jeat_graph.detection.models.onnx_head import read_onnx_head  # noqa: E402
+from jeat_graph.detection.models.pictures import ModelPictureDetector  # noqa: E402
+from jeat_graph.detection.settings import EventSettings  # noqa: E402
+from jeat_graph_sehn.training.export import write_onnx  # noqa: E402
+from jeat_graph_sehn.training.network import DetectionNet  # noqa: E402
+from jeat_graph_sehn.training.serving import ServedNet  # noqa: E402
+from jeat_graph_sehn.training.settings import NetSettings  # noqa: E402
+
+SIDE = (64, 32)
+ENGINES = ["opencv", "onnxruntime"]
+#: Weights in half precision: each of some twenty layers adds at most 2^-11 of what it says.
+RELATIVE, ABSOLUTE = 20 * 2.0**-11, 20 * 2.0**-11
+
+
+@pytest.fixture(scope="module", params=["frames", "events", "frames twice", "events twice"])
+def pair(request, tmp_path_factory):
+    """A network whose normalisations are not those of a fresh one, and its file."""
+    torch.manual_seed(4)
+    kind, twice = request.param.split()[0], request.param.endswith("twice")
+    net = DetectionNet(NetSettings(kind=kind, width=6))
+    state = net.empty_state(2, SIDE)
+    for _ in range(3):
+        _, state = net(3.0 * torch.rand(2, net.settings.channels, SIDE[1], SIDE[0]), state)
+        state = tuple(one.detach() for one in state)
+    net.eval()
+    path = tmp_path_factory.mktemp("onnx") / "net.onnx"
+    write_onnx(net, SIDE, {"seed": 4}, path, second_look=twice)
+    return ServedNet(net, SIDE, twice), path
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_both_engines_say_what_the_network_says(pair, engine):
+    served, path = pair
+    if engine == "onnxruntime":
+        pytest.importorskip("onnxruntime", reason="the extra `onnxruntime` is not installed")
+    head = read_onnx_head(path)
+    run = open_engine(path, head, engine, 1)
+    net, state = served.net, served.empty_state()
+    generator = torch.Generator().manual_seed(5)
+    for _ in range(3):  # the memory comes back and counts
+        shown = 3.0 * torch.rand(1, net.settings.channels, SIDE[1], SIDE[0], generator=generator)
+        given = [shown, *state]
+        names = [port.name for port in head.inputs]
+        found = run.run({name: value.numpy() for name, value in zip(names, given, strict=True)})
+        with torch.no_grad():
+            boxes, *state = served(shown, *state)
+        said = [boxes, *state]
+        for port, value in zip(head.outputs, said, strict=True):
+            np.testing.assert_allclose(found[port.name], value.numpy(), rtol=RELATIVE, atol=ABSOLUTE)
+
+
+def test_the_memory_matters():
+    torch.manual_seed(4)
+    net = DetectionNet(NetSettings(kind="events", width=6)).eval()
+    shown = torch.rand(1, 20, SIDE[1], SIDE[0])
+    with torch.no_grad():
+        first, state = net(shown, net.empty_state(1, SIDE))
+        second, _ = net(shown, state)
+    assert (first - second).abs().max() > 1e-4
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_file_is_recognised_and_runs(pair, engine):
+    served, path = pair
+    if engine == "onnxruntime":
+        pytest.importorskip("onnxruntime", reason="the extra `onnxruntime` is not installed")
+    settings = ModelSettings(backend=engine, score=0.0)
+    rng = np.random.default_rng(0)
+    if served.net.settings.kind == "frames":
+        detector = ModelPictureDetector(path, settings=settings)
+        scan = detector(rng.integers(0, 255, (SIDE[1], SIDE[0], 3)).astype(np.uint8), 1.0)
+        assert "layout yolov8" in detector.description
+    else:
+        detector = ModelEventDetector(path, SIDE, times=EventSettings(rate_hz=50.0), settings=settings)
+        t = np.sort(rng.integers(0, 100_000, 500))
+        x, y = (rng.integers(0, side, 500).astype(np.uint16) for side in SIDE)
+        scan = detector.push(EventArray(t, x, y, rng.integers(0, 2, 500).astype(np.uint8)))[0]
+        assert (
+            "layout yolov8, windows of 10 bins of 0.005 s by time in 64 x 32 px, "
+            f"{2 * len(served.looks)} states kept" in detector.description
+        )
+    assert "classes vehicle" in detector.description
+    assert len(scan.boxes) > 0

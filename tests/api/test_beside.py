@@ -1,0 +1,98 @@
+"""Without jeat-graph-sehn everything else works, and what it would do is refused in one line."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from importlib.metadata import EntryPoint
+
+import pytest
+
+import jeat_graph
+from jeat_graph.cli.main import main
+
+ALL = importlib.metadata.entry_points
+
+
+def without_ours(**asked):
+    return () if asked.get("group", "").startswith("jeat_graph.") else ALL(**asked)
+
+
+@pytest.fixture
+def alone(monkeypatch):
+    """An installation without jeat-graph-sehn."""
+    monkeypatch.setattr(importlib.metadata, "entry_points", without_ours)
+
+
+def one_line(capsys) -> str:
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.count("\n") == 1
+    return said.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "begins"),
+    [
+        (
+            ["simulate", "night", "--out", "sim"],
+            "jeat-graph simulate: the command comes with jeat-graph-sehn",
+        ),
+        (["simulate", "--help"], "jeat-graph simulate: the command comes with jeat-graph-sehn"),
+        (["train", "frames", "sim", "--out", "n.onnx"], "jeat-graph train: the command comes with"),
+        (["export", "sim", "--to", "rvt", "--out", "x"], "jeat-graph export: --to rvt comes with"),
+        (["demo", "--scenario", "day", "--out", "x"], "jeat-graph demo: another highway comes with"),
+        (["demo", "--seed", "3", "--out", "x"], "jeat-graph demo: another highway comes with"),
+    ],
+)
+def test_what_it_brings_says_how_to_get_it(alone, arguments, begins, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    line = one_line(capsys)
+    assert line.startswith(begins)
+    assert "`pip install ./sehn` in a checkout" in line
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_demo_from_raw_recordings_says_so_before_it_begins(alone, capsys, tmp_path):
+    assert main(["demo", "--from-raw", "--out", str(tmp_path / "demo")]) == 2
+    assert "pip install ./sehn" in capsys.readouterr().err
+    assert not (tmp_path / "demo").exists()
+
+
+def test_the_function_says_so_too(alone):
+    with pytest.raises(
+        jeat_graph.JeatGraphError, match=r"^simulate comes with jeat-graph-sehn.*install ./sehn"
+    ):
+        jeat_graph.simulate()
+
+
+def test_the_overview_lists_the_commands_and_how_to_get_them(alone, capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["--help"])
+    assert end.value.code == 0
+    words = " ".join(capsys.readouterr().out.split())
+    assert "simulate comes with jeat-graph-sehn" in words
+    assert "train comes with jeat-graph-sehn" in words
+
+
+def test_the_demo_tracks_the_recording_that_comes_along(alone, tmp_path, capsys):
+    assert main(["demo", "--out", str(tmp_path)]) == 0
+    rows = [line.split("|")[1:4] for line in (tmp_path / "scores.md").read_text().splitlines()[2:]]
+    mota = {name.strip(): float(value) for name, value, _ in rows}
+    assert mota["evt + rgb"] > max(mota["evt alone"], mota["rgb alone"])
+    assert mota["evt + rgb, smoothed"] > 95.0
+    assert (tmp_path / "tracks.png").read_bytes().startswith(b"\x89PNG")
+    assert "night-nolight" in capsys.readouterr().err
+
+
+def test_one_that_cannot_be_loaded_is_named(monkeypatch, capsys):
+    broken = EntryPoint("simulate", "jeat_graph_nowhere.commands", "jeat_graph.commands")
+    monkeypatch.setattr(importlib.metadata, "entry_points", lambda **asked: (broken,))
+    assert main(["simulate", "night", "--out", "sim"]) == 2
+    line = one_line(capsys)
+    assert "cannot be loaded from jeat_graph_nowhere.commands: No module named" in line
+
+
+def test_a_command_of_before_says_where_it_went(capsys):
+    assert main(["benchmark", "real"]) == 2
+    assert "python -m benchmarks" in one_line(capsys)
