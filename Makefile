@@ -1,6 +1,6 @@
 # Every target does its own set-up in .venv and needs only make and Python 3.11 or later.
 #
-#   make demo    track simulated detections, and go from raw pictures and events to tracks on a film (in demo/)
+#   make demo    track detections, and go from simulated pictures and events to tracks on a film (in demo/)
 #   make test    run the tests, those of time by themselves
 #   make test-slow   run those that make test leaves out: endurance, destruction, training
 #   make test-all    run both
@@ -9,9 +9,9 @@
 #   make fuzz    the long form of the tests that damage files, streams and processes (an hour)
 #   make live    the long form of the tests of live use: kills, brokers, late data (half an hour)
 #   make lint    style, format, docstrings, and known weaknesses of what is installed
-#   make types   type-check the built package
+#   make types   type-check the built packages and the benchmarks
 #   make bounds  run the numerical tests with the oldest versions allowed of what is needed
-#   make build   build the wheel (in dist/)
+#   make build   build the wheels (in dist/)
 #   make docs    build the documentation (in docs/_build/html)
 #   make clean   remove what was built and computed, .venv included
 
@@ -28,19 +28,24 @@ export PYTHONDONTWRITEBYTECODE :=
 # the address of PyTorch's index for processors.
 TORCH := torch==2.13.0+cpu
 SOURCES := $(shell find jeat_graph filters association smoothers eval -name '*.py')
+# What is no part of the tracker's distribution: the simulator and training, and the benchmarks.
+BESIDE := $(shell find sehn/jeat_graph_sehn benchmarks -name '*.py' -o -name '*.yaml')
 
 # Other kernels than this machine would choose: the oldest of OpenBLAS, none of NumPy's for newer processors, and
 # numba's for any processor of this kind, in a folder of their own.
-NUMERICAL := association calibration config eval filters simulation smoothers tracking
+NUMERICAL := tests/association tests/calibration tests/config tests/eval tests/filters sehn/tests/simulation \
+	tests/smoothers tests/tracking
 SEED ?= $(shell date +%s)
 OTHER_KERNELS = OPENBLAS_CORETYPE=$(if $(filter x86_64 AMD64,$(shell uname -m)),Prescott,ARMV8) \
 	NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python .ci/kernels.py names)" \
 	NUMBA_CPU_NAME=generic NUMBA_CACHE_DIR=$(CURDIR)/$(VENV)/numba-generic
 
+DOCUMENTED := jeat_graph filters association smoothers eval configs sehn/jeat_graph_sehn benchmarks
+
 .PHONY: demo test test-slow test-all compiled-for-tests test-portable licences live fuzz lint types bounds build docs clean
 .DELETE_ON_ERROR:
 
-demo: $(VENV)/.run
+demo: $(VENV)/.run $(VENV)/.sehn
 	@$(BIN)/jeat-graph demo --from-raw --out demo
 
 test: compiled-for-tests
@@ -65,7 +70,7 @@ test-portable: $(VENV)/.test $(VENV)/.compiled
 	@rm -rf $(VENV)/numba-generic
 	@echo "make: running the numerical tests with other kernels, SEED=$(SEED)"
 	@$(OTHER_KERNELS) $(BIN)/python .ci/kernels.py check
-	@$(OTHER_KERNELS) $(BIN)/python -m pytest -n 2 --randomly-seed=$(SEED) $(NUMERICAL:%=tests/%)
+	@$(OTHER_KERNELS) $(BIN)/python -m pytest -n 2 --randomly-seed=$(SEED) $(NUMERICAL)
 
 licences: $(VENV)/.test
 	@$(BIN)/python .ci/licences.py
@@ -76,16 +81,18 @@ live: $(VENV)/.test $(VENV)/.compiled
 fuzz: $(VENV)/.test $(VENV)/.compiled
 	@JEAT_GRAPH_FULL=1 $(BIN)/python -m pytest -n 2 tests/fuzz tests/tracking/test_invariants.py
 
-lint: $(VENV)/.lint $(VENV)/.run
+lint: $(VENV)/.lint $(VENV)/.run $(VENV)/.sehn
 	@$(BIN)/ruff check
 	@$(BIN)/ruff format --check
-	@$(BIN)/interrogate --quiet jeat_graph filters association smoothers eval configs || \
-		$(BIN)/interrogate -v jeat_graph filters association smoothers eval configs
+	@$(BIN)/interrogate --quiet $(DOCUMENTED) || $(BIN)/interrogate -v $(DOCUMENTED)
 	@$(BIN)/python .ci/audit.py
 
-# The folders at the top of the repository become one package only when it is built, so that is what is checked.
+# The folders at the top of the repository become one package only when it is built, so that is what is checked;
+# the benchmarks, which are not, are looked at through a link.
 types: build/.installed
-	@cd build && venv/bin/mypy --config-file ../pyproject.toml --cache-dir ../.mypy_cache -p jeat_graph
+	@ln -sfn ../benchmarks build/benchmarks
+	@cd build && venv/bin/mypy --config-file ../pyproject.toml --cache-dir ../.mypy_cache \
+		-p jeat_graph -p jeat_graph_sehn -p benchmarks
 
 bounds: | $(BIN)/python
 	@PYTHON=$(BIN)/python .ci/bounds
@@ -98,7 +105,7 @@ docs: $(VENV)/.docs
 	@echo "make: open docs/_build/html/index.html"
 
 clean:
-	rm -rf $(VENV) build dist demo docs/_build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) build dist demo docs/_build *.egg-info sehn/build sehn/*.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:
@@ -111,15 +118,21 @@ $(VENV)/.run: pyproject.toml | $(BIN)/python
 	@$(PIP) --editable .
 	@touch $@
 
-$(VENV)/.test: pyproject.toml $(VENV)/.run
+# By its path: it is in no index.
+$(VENV)/.sehn: sehn/pyproject.toml $(VENV)/.run
+	@echo "make: installing jeat-graph-sehn, the simulator"
+	@$(PIP) --editable ./sehn
+	@touch $@
+
+$(VENV)/.test: pyproject.toml sehn/pyproject.toml $(VENV)/.run
 	@echo "make: installing what the tests need"
-	@$(PIP) --editable '.[test]'
+	@$(PIP) --editable '.[test]' --editable './sehn[test]'
 	@$(PIP) --no-deps 'trackers>=2.6,<3' norfair==2.3.0 'trackeval>=1.3,<2'
 	@$(PIP) $(TORCH) 2> /dev/null || \
 		echo "make: no PyTorch for processors to be had: the tests of training skip"
 	@touch $@
 
-$(VENV)/.docs: pyproject.toml $(VENV)/.run
+$(VENV)/.docs: pyproject.toml $(VENV)/.run $(VENV)/.sehn
 	@echo "make: installing what builds the documentation"
 	@$(PIP) --editable '.[docs]'
 	@touch $@
@@ -136,19 +149,20 @@ $(VENV)/.compiled: $(SOURCES) $(VENV)/.run
 	@$(BIN)/python -m jeat_graph.tracking.warm_up
 	@touch $@
 
-$(VENV)/.compiled-beside: $(SOURCES) $(VENV)/.test
+$(VENV)/.compiled-beside: $(SOURCES) $(BESIDE) $(VENV)/.test
 	@$(BIN)/python tests/loaded/compile_beside.py
 	@touch $@
 
-build/.wheel: $(SOURCES) $(shell find eval configs -name '*.py' -o -name '*.yaml') pyproject.toml | $(BIN)/python
-	@echo "make: building the wheel"
+build/.wheel: $(SOURCES) $(BESIDE) $(shell find configs -type f -not -name '*.pyc') pyproject.toml sehn/pyproject.toml | $(BIN)/python
+	@echo "make: building the wheels"
 	@$(PIP) build
-	@rm -rf build dist
+	@rm -rf build dist sehn/build
 	@$(BIN)/python -m build --wheel --outdir dist . > $(VENV)/build.log 2>&1 || { cat $(VENV)/build.log; exit 1; }
+	@$(BIN)/python -m build --wheel --outdir dist sehn > $(VENV)/build.log 2>&1 || { cat $(VENV)/build.log; exit 1; }
 	@mkdir -p build && touch $@
 
 build/.installed: build/.wheel
-	@echo "make: installing the wheel into build/venv"
+	@echo "make: installing the wheels into build/venv"
 	@$(PYTHON) -m venv --clear build/venv
-	@build/venv/bin/python -m pip install -qq --disable-pip-version-check --no-compile "$$(ls dist/*.whl)[lint]"
+	@build/venv/bin/python -m pip install -qq --disable-pip-version-check --no-compile "$$(ls dist/jeat_graph-*.whl)[lint]" dist/jeat_graph_sehn-*.whl
 	@touch $@

@@ -1,4 +1,4 @@
-"""Check that a wheel holds the one package jeat_graph, with its data, and nothing else."""
+"""Check that a wheel holds its one package, with its data, and nothing else."""
 
 from __future__ import annotations
 
@@ -6,26 +6,33 @@ import sys
 import zipfile
 from pathlib import Path
 
-NEEDED = ("jeat_graph/py.typed", "jeat_graph/configs/default.yaml", "jeat_graph/configs/paper.yaml")
+#: Folders that are parts of jeat_graph once it is built.
+PARTS = ("filters", "association", "smoothers", "eval", "configs")
+DATA = ("py", "js", "css", "yaml", "onnx", "gz", "json", "typed")
+
+
+def wanted(package: str) -> set[str]:
+    """Names of the files that the wheel of a package must hold."""
+    root = Path("sehn") if package == "jeat_graph_sehn" else Path()
+    found = [path.relative_to(root) for kind in DATA for path in (root / package).rglob(f"*.{kind}")]
+    if package == "jeat_graph":
+        found += [
+            Path(package) / path for part in PARTS for kind in DATA for path in Path(part).rglob(f"*.{kind}")
+        ]
+    return {path.as_posix() for path in found if "__pycache__" not in path.parts}
 
 
 def problems(wheel: Path) -> list[str]:
     """List what is wrong with a wheel, one line each."""
+    package = wheel.name.split("-")[0]
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
     found = [
         f"{name} does not belong in the wheel"
         for name in names
-        if not (name.startswith("jeat_graph/") or name.split("/")[0].endswith(".dist-info"))
+        if not (name.startswith(f"{package}/") or name.split("/")[0].endswith(".dist-info"))
     ]
-    wanted = set(NEEDED)
-    wanted |= {f"jeat_graph/{path.as_posix()}" for path in Path("configs").rglob("*.yaml")}
-    modules = [path for kind in ("py", "js", "css") for path in Path("jeat_graph").rglob(f"*.{kind}")]
-    for folder in ("filters", "association", "smoothers", "eval", "configs"):
-        modules += [Path("jeat_graph") / path for path in Path(folder).rglob("*.py")]
-    wanted |= {path.as_posix() for path in modules}
-    wanted |= {path.as_posix() for path in Path("jeat_graph").rglob("weights/*.onnx")}
-    return found + [f"{name} is missing from the wheel" for name in sorted(wanted - set(names))]
+    return found + [f"{name} is missing from the wheel" for name in sorted(wanted(package) - set(names))]
 
 
 if __name__ == "__main__":

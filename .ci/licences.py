@@ -13,7 +13,7 @@ from importlib.metadata import Distribution, PackageNotFoundError, distribution
 
 from packaging.requirements import Requirement
 
-PROJECT = "jeat-graph"
+PROJECTS = ("jeat-graph", "jeat-graph-sehn")
 #: Extras whose packages work on the project and are never part of a user's install.
 OURS_ONLY = ("test", "lint", "docs")
 #: GPL and AGPL, by short name or in words; the Lesser GPL binds the library alone.
@@ -50,12 +50,12 @@ def licence(package: Distribution) -> str:
     return said
 
 
-def needed(extras: frozenset[str]) -> tuple[dict[str, Distribution], set[str]]:
-    """Everything that an install with these extras pulls in here, and what of it is not installed."""
+def needed(project: str, extras: frozenset[str]) -> tuple[dict[str, Distribution], set[str]]:
+    """Everything that a project with these extras pulls in here, and what of it is not installed."""
     found: dict[str, Distribution] = {}
     missing: set[str] = set()
     seen: set[tuple[str, frozenset[str]]] = set()
-    waiting = [(PROJECT, extras)]
+    waiting = [(project, extras)]
     while waiting:
         name, wanted = waiting.pop()
         if (name, wanted) in seen:
@@ -71,18 +71,27 @@ def needed(extras: frozenset[str]) -> tuple[dict[str, Distribution], set[str]]:
             conditions = [{"extra": extra} for extra in ("", *wanted)]
             if requirement.marker is None or any(map(requirement.marker.evaluate, conditions)):
                 waiting.append((canonical(requirement.name), frozenset(requirement.extras)))
-    del found[PROJECT]
+    del found[project]
     return found, missing
+
+
+def asked_for() -> list[tuple[str, str]]:
+    """Each project with each extra that a user may ask for, "" for none."""
+    return [
+        (project, extra)
+        for project in PROJECTS
+        for extra in ("", *(distribution(project).metadata.get_all("Provides-Extra") or []))
+        if extra not in OURS_ONLY
+    ]
 
 
 def main() -> int:
     """Print one line a package; 1 where one is forbidden or says nothing of its licence."""
-    offered = distribution(PROJECT).metadata.get_all("Provides-Extra") or []
     bad = 0
     shown: set[str] = set()
-    for extra in ("", *(name for name in offered if name not in OURS_ONLY)):
-        packages, missing = needed(frozenset([extra] if extra else []))
-        print(f"\n{extra or 'base'}:")
+    for project, extra in asked_for():
+        packages, missing = needed(project, frozenset([extra] if extra else []))
+        print(f"\n{project}{f'[{extra}]' if extra else ''}:")
         for name in sorted(set(packages) - shown):
             said = licence(packages[name])
             reason = REASONS.get(name)

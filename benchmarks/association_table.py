@@ -41,7 +41,7 @@ def association_table(result: Mapping[str, Any]) -> Table | None:
     """Ways of association by scenario, with the real sequences pooled; None where they were not judged.
 
     Args:
-        result: of `benchmark accuracy`: `summary`, `association` (`names` by row, `records`), `kitti`.
+        result: of `benchmarks accuracy`: `summary`, `association` (`names` by row, `records`), `kitti`.
     """
     from jeat_graph.eval.tables import Table
 

@@ -22,27 +22,50 @@ from jeat_graph_sehn.version import __version__
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "jeat_graph_sehn"
 #: Modules of jeat-graph that are public for distributions beside it; docs/design.md lists them, too.
-PUBLIC = set(
-    """
-    jeat_graph
-    jeat_graph.cli.options jeat_graph.cli.terminal
-    jeat_graph.config.argument_types jeat_graph.config.fields jeat_graph.config.section_tree
-    jeat_graph.config.yaml_text
-    jeat_graph.data.arrays jeat_graph.data.detections jeat_graph.data.errors jeat_graph.data.events
-    jeat_graph.data.interop jeat_graph.data.processes jeat_graph.data.progress jeat_graph.data.trajectories
-    jeat_graph.detection.models.choosing jeat_graph.detection.models.event_places
-    jeat_graph.detection.models.feeding jeat_graph.detection.models.layouts
-    jeat_graph.detection.models.model_settings jeat_graph.detection.models.onnx_head
-    jeat_graph.detection.named jeat_graph.detection.windows
-    jeat_graph.eval.detection_ap
-    jeat_graph.io.atomic jeat_graph.io.coco_writer jeat_graph.io.decoders jeat_graph.io.detections_io
-    jeat_graph.io.events_dsec jeat_graph.io.events_dsec_writer jeat_graph.io.hashing jeat_graph.io.locking
-    jeat_graph.io.outputs jeat_graph.io.pictures jeat_graph.io.prophesee_writer jeat_graph.io.rounding
-    jeat_graph.io.table_writer jeat_graph.io.truth_io jeat_graph.io.video jeat_graph.io.video_writer
-    jeat_graph.runs.demo_recording
-    jeat_graph.version
-    """.split()
-)
+PUBLIC = {
+    "jeat_graph",
+    "jeat_graph.cli.options",
+    "jeat_graph.cli.terminal",
+    "jeat_graph.config.argument_types",
+    "jeat_graph.config.fields",
+    "jeat_graph.config.section_tree",
+    "jeat_graph.config.yaml_text",
+    "jeat_graph.data.arrays",
+    "jeat_graph.data.detections",
+    "jeat_graph.data.errors",
+    "jeat_graph.data.events",
+    "jeat_graph.data.interop",
+    "jeat_graph.data.processes",
+    "jeat_graph.data.progress",
+    "jeat_graph.data.trajectories",
+    "jeat_graph.detection.models.choosing",
+    "jeat_graph.detection.models.event_places",
+    "jeat_graph.detection.models.feeding",
+    "jeat_graph.detection.models.layouts",
+    "jeat_graph.detection.models.model_settings",
+    "jeat_graph.detection.models.onnx_head",
+    "jeat_graph.detection.named",
+    "jeat_graph.detection.windows",
+    "jeat_graph.eval.detection_ap",
+    "jeat_graph.io.atomic",
+    "jeat_graph.io.coco_writer",
+    "jeat_graph.io.decoders",
+    "jeat_graph.io.detections_io",
+    "jeat_graph.io.events_dsec",
+    "jeat_graph.io.events_dsec_writer",
+    "jeat_graph.io.hashing",
+    "jeat_graph.io.locking",
+    "jeat_graph.io.outputs",
+    "jeat_graph.io.pictures",
+    "jeat_graph.io.prophesee_writer",
+    "jeat_graph.io.rounding",
+    "jeat_graph.io.table_writer",
+    "jeat_graph.io.truth_io",
+    "jeat_graph.io.video",
+    "jeat_graph.io.video_writer",
+    "jeat_graph.runs.demo_recording",
+    "jeat_graph.version",
+}
 
 
 def used() -> dict[str, set[str]]:

@@ -7,10 +7,10 @@ import json
 import numpy as np
 import pytest
 
+from benchmarks.__main__ import main
 from benchmarks.endurance import PERIODS, Load, run_endurance
 from benchmarks.endurance_input import RATES_HZ, messages
 from benchmarks.latency_counts import LatencyCounts
-from benchmarks.__main__ import main
 
 
 def told(message):

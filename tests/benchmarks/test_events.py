@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.event_noise import ALL, BASELINE, matched, measures
 from benchmarks.__main__ import main
+from benchmarks.event_noise import ALL, BASELINE, matched, measures
 from jeat_graph.data.events import EventArray
 from jeat_graph_sehn.simulation.imaging.config import CarlaEventConfig
 

@@ -8,9 +8,9 @@ import shutil
 import numpy as np
 import pytest
 
+from benchmarks.__main__ import main
 from benchmarks.detection import only_moved
 from benchmarks.raw_segments import segments_in
-from benchmarks.__main__ import main
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.io.events_dsec_writer import EventWriter

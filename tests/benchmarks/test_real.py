@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from benchmarks import real
+from benchmarks.__main__ import main
 from benchmarks.peer_cache import PeerCache, cache_key
 from benchmarks.real_copies import LEFT_OUT, MOVED, altered
 from benchmarks.recordings import JudgedRecording, simulated
 from benchmarks.robustness import judge_variation, variations, varied
-from benchmarks.__main__ import main
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.detections_io import write_detections
 from jeat_graph.io.truth_io import write_truth

@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 
+from benchmarks.__main__ import main
 from benchmarks.drawn import EVT, RGB, from_model, from_paths
 from benchmarks.smoothing import drawn
-from benchmarks.__main__ import main
 
 
 def residuals(track, sensor):

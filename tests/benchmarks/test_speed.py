@@ -7,11 +7,11 @@ import sys
 import numpy as np
 import pytest
 
+from benchmarks.__main__ import main
 from benchmarks.speed import ENGINES
 from benchmarks.speed_subjects import installed_peers
 from benchmarks.speed_timing import summarise, time_side_by_side
 from benchmarks.speed_worker import _JOBS, ask
-from benchmarks.__main__ import main
 
 
 @pytest.fixture(autouse=True)

@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from benchmarks.worlds import tables
 from benchmarks.__main__ import main
+from benchmarks.worlds import tables
 from jeat_graph_sehn.simulation.imaging.config import load_imaging
 from jeat_graph_sehn.simulation.imaging.source import RenderedSource
 from jeat_graph_sehn.simulation.scenario import load_scenario

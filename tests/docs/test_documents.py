@@ -11,12 +11,17 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.__main__ import build_parser as benchmarks_parser
 from jeat_graph.cli.main import COMMANDS, build_parser, main
 from jeat_graph.config.reading import load_config
 from jeat_graph.tracking.tracker import Tracker
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", *sorted(p for p in (ROOT / "docs").rglob("*.md") if "_build" not in p.parts)]
+PAGES = [
+    ROOT / "README.md",
+    ROOT / "sehn" / "README.md",
+    *sorted(p for p in (ROOT / "docs").rglob("*.md") if "_build" not in p.parts),
+]
 GENERATED = {"commands.md", "configuration.md"}
 
 
@@ -38,6 +43,13 @@ def commands(page: Path, languages: tuple[str, ...] = ("sh", "text")) -> list[li
                 )
                 found += [words[1:]] if words else []
     return found
+
+
+def benchmarks_run(page: Path) -> list[list[str]]:
+    """Words after `python -m benchmarks` in a page's blocks."""
+    lines = "\n".join(blocks(page, "sh") + blocks(page, "text")).replace("\\\n", " ").splitlines()
+    start = "python -m benchmarks "
+    return [shlex.split(line.removeprefix(start), comments=True) for line in lines if line.startswith(start)]
 
 
 def name(page: Path) -> str:
@@ -77,6 +89,13 @@ def test_commands_are_understood(words):
     assert words[0] in COMMANDS
     args = build_parser(words[0]).parse_args([word for word in words if word != "…"])
     assert args.command == words[0]
+
+
+def test_benchmarks_are_understood():
+    run = [words for page in PAGES for words in benchmarks_run(page)]
+    assert len(run) > 5
+    for words in run:
+        assert benchmarks_parser().parse_args([word for word in words if word != "…"]).kind == words[0]
 
 
 @pytest.mark.slow
@@ -183,10 +202,13 @@ def test_the_search_puts_the_short_answers_first():
 
 
 def test_every_extra_is_in_the_guide_to_installing():
-    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    found = set()
+    for folder in (ROOT, ROOT / "sehn"):
+        project = tomllib.loads((folder / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+        found |= set(project["optional-dependencies"])
     text = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
     rows = " ".join(row.split("|")[1] for row in text.splitlines() if row.startswith("| `"))
-    assert set(extras["optional-dependencies"]) == set(re.findall(r"`(\w+)`", rows))
+    assert found == set(re.findall(r"`(\w+)`", rows))
 
 
 def test_the_page_of_settings_has_what_a_run_takes_without_being_told():
