@@ -150,7 +150,7 @@ $(VENV)/.compiled: $(SOURCES) $(VENV)/.run
 	@touch $@
 
 $(VENV)/.compiled-beside: $(SOURCES) $(BESIDE) $(VENV)/.test
-	@$(BIN)/python tests/loaded/compile_beside.py
+	@$(BIN)/python -m tests.loaded.compile_beside
 	@touch $@
 
 build/.wheel: $(SOURCES) $(BESIDE) $(shell find configs -type f -not -name '*.pyc') pyproject.toml sehn/pyproject.toml | $(BIN)/python

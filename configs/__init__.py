@@ -1,1 +1,1 @@
-"""Presets and scenarios, as YAML files."""
+"""Presets, as YAML files, and the recording that `demo` tracks."""

@@ -22,8 +22,9 @@ def measure():
     """A function: name of a job in `jobs.py` and its arguments -> what it found, in a process of its own."""
 
     def run(*arguments):
-        command = [sys.executable, Path(__file__).parent / "jobs.py", *arguments]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        command = [sys.executable, "-m", "tests.performance.jobs", *arguments]
+        root = Path(__file__).parents[2]
+        done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=root)
         assert done.returncode == 0, done.stderr
         return json.loads(done.stdout)
 
