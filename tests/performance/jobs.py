@@ -1,4 +1,7 @@
-"""What is measured in a process of its own: `python -m tests.performance.jobs NAME [ARGUMENT]` prints what it found as JSON."""
+"""What is measured in a process of its own.
+
+`python -m tests.performance.jobs NAME [ARGUMENT]` prints what it found as JSON.
+"""
 
 import gc
 import json
