@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jeat_graph.api.beside import FUNCTION_GROUP, find
+from jeat_graph.api.beside import COMMAND_GROUP, FUNCTION_GROUP, find
 from jeat_graph.cli.options import add_config
 from jeat_graph.cli.progress import stages
 from jeat_graph.cli.terminal import say
@@ -59,6 +59,7 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.cli.demo_raw import raw_meanwhile, render_clip, tell
     from jeat_graph.tracking.compiling import do_without
 
+    find(COMMAND_GROUP, "simulate", "--from-raw")  # says so now if it is not installed
     if code := render_clip(out):
         return code
     with raw_meanwhile(out) as process:

@@ -42,6 +42,7 @@ def one_line(capsys) -> str:
         (["export", "sim", "--to", "rvt", "--out", "x"], "jeat-graph export: --to rvt comes with"),
         (["demo", "--scenario", "day", "--out", "x"], "jeat-graph demo: another highway comes with"),
         (["demo", "--seed", "3", "--out", "x"], "jeat-graph demo: another highway comes with"),
+        (["demo", "--from-raw", "--out", "x"], "jeat-graph demo: --from-raw comes with"),
     ],
 )
 def test_what_it_brings_says_how_to_get_it(alone, arguments, begins, capsys, tmp_path, monkeypatch):
@@ -51,12 +52,6 @@ def test_what_it_brings_says_how_to_get_it(alone, arguments, begins, capsys, tmp
     assert line.startswith(begins)
     assert "`pip install ./sehn` in a checkout" in line
     assert list(tmp_path.iterdir()) == []
-
-
-def test_the_demo_from_raw_recordings_says_so_before_it_begins(alone, capsys, tmp_path):
-    assert main(["demo", "--from-raw", "--out", str(tmp_path / "demo")]) == 2
-    assert "pip install ./sehn" in capsys.readouterr().err
-    assert not (tmp_path / "demo").exists()
 
 
 def test_the_function_says_so_too(alone):
