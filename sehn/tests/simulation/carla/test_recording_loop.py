@@ -191,5 +191,5 @@ def test_no_server_is_one_line(make_source) -> None:
 
 def test_a_missing_client_package_is_one_line(monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "carla", None)
-    with pytest.raises(ConfigError, match=r"pip install 'jeat-graph\[carla\]'"):
+    with pytest.raises(ConfigError, match=r"pip install './sehn\[carla\]'"):
         client_api()

@@ -12,7 +12,7 @@ import yaml
 from jeat_graph.cli.main import main
 from jeat_graph.io.events_dsec import EventFile
 from jeat_graph.io.video import open_frames
-from jeat_graph.tracking import notice
+from jeat_graph_sehn.simulation import compiling
 from jeat_graph_sehn.simulation.dataset.manifest import read_json
 from jeat_graph_sehn.simulation.scenario import load_scenario
 
@@ -38,19 +38,17 @@ def test_the_set_has_the_segments_frames_and_size_asked_for(pictures: Path) -> N
 
 
 def test_who_waits_for_the_renderer_to_be_compiled_is_told(tmp_path: Path, capsys, monkeypatch) -> None:
-    monkeypatch.setattr(notice, "_said", set())
-    monkeypatch.setattr(notice, "is_compiled", lambda _: False)
+    monkeypatch.setattr(compiling, "is_compiled", lambda _: False)
     arguments = ["--segments", "1", "--seed", "3", *SMALL]
     assert main(["simulate", "night", "--out", str(tmp_path / "set"), *arguments]) == 0
-    assert "jeat-graph: compiling the renderer for this machine, once" in capsys.readouterr().err
+    assert "jeat-graph simulate: compiling the renderer for this machine, once" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("sensors", ["rgb", "events", "pictures"])
-def test_who_rendered_before_is_not_told_to_wait_again(tmp_path: Path, capsys, monkeypatch, sensors) -> None:
+def test_who_rendered_before_is_not_told_to_wait_again(tmp_path: Path, capsys, sensors) -> None:
     arguments = ["--segments", "1", "--seed", "3", *SMALL]
     arguments[arguments.index("--sensors") + 1] = sensors
     for again in ("first", "second"):
-        monkeypatch.setattr(notice, "_said", set())
         assert main(["simulate", "night", "--out", str(tmp_path / again), *arguments]) == 0
         told = capsys.readouterr().err
     assert "compiling the renderer" not in told

@@ -1,4 +1,4 @@
-"""What all tests share."""
+"""What all tests share: those of jeat-graph, of the benchmarks, and of jeat-graph-sehn."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+_TESTS = Path(__file__).parent / "tests"
 # The tests share the cores: the threads of one's linear algebra would only wait for those of the others.
 # This is before anything that loads it.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -46,7 +47,7 @@ def dying():
 
     def environment(below: Path, at: int = 0, by: int = 9, **more: object) -> dict[str, str]:
         """Where changes count, the number of the fatal one, and the signal; `once`, `log`, `name`."""
-        paths = [str(Path(__file__).parent / "dying"), os.environ.get("PYTHONPATH", "")]
+        paths = [str(_TESTS / "dying"), os.environ.get("PYTHONPATH", "")]
         fate = {"below": below, "at": at, "by": int(by), **more}
         return {
             **os.environ,
@@ -64,7 +65,7 @@ def loaded():
         pytest.skip("processes cannot be forked here")
     from multiprocessing import forkserver
 
-    folder, root = str(Path(__file__).parent / "loaded"), str(Path(__file__).parents[1])
+    folder, root = str(_TESTS / "loaded"), str(_TESTS.parent)
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["loaded_process"])
     with pytest.MonkeyPatch.context() as patch:
