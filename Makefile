@@ -5,6 +5,7 @@
 #   make test-slow   run those that make test leaves out: endurance, destruction, training
 #   make test-all    run both
 #   make test-portable   run the numerical tests with other kernels, in random order (SEED=... repeats one)
+#   make benchmark   run the benchmark KIND=real, speed, ... with ARGS='...'
 #   make licences   list the licences of everything installed with the package
 #   make fuzz    the long form of the tests that damage files, streams and processes (an hour)
 #   make live    the long form of the tests of live use: kills, brokers, late data (half an hour)
@@ -42,7 +43,7 @@ OTHER_KERNELS = OPENBLAS_CORETYPE=$(if $(filter x86_64 AMD64,$(shell uname -m)),
 
 DOCUMENTED := jeat_graph filters association smoothers eval configs sehn/jeat_graph_sehn benchmarks
 
-.PHONY: demo test test-slow test-all compiled-for-tests test-portable licences live fuzz lint types bounds build docs clean
+.PHONY: demo test test-slow test-all compiled-for-tests test-portable benchmark licences live fuzz lint types bounds build docs clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.run $(VENV)/.sehn
@@ -71,6 +72,9 @@ test-portable: $(VENV)/.test $(VENV)/.compiled
 	@echo "make: running the numerical tests with other kernels, SEED=$(SEED)"
 	@$(OTHER_KERNELS) $(BIN)/python .ci/kernels.py check
 	@$(OTHER_KERNELS) $(BIN)/python -m pytest -n 2 --randomly-seed=$(SEED) $(NUMERICAL)
+
+benchmark: $(VENV)/.run $(VENV)/.sehn
+	@$(BIN)/python -m benchmarks $(KIND) $(ARGS)
 
 licences: $(VENV)/.test
 	@$(BIN)/python .ci/licences.py
