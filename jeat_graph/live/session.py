@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -17,6 +18,7 @@ from jeat_graph.live.health import HealthChange, SensorHealth
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.live.messages import Duplicates, ScanMessage
 from jeat_graph.live.transport.patience import UnconfirmedError
+from jeat_graph.live.untaken import Untaken
 from jeat_graph.version import __version__
 
 #: Smoothed rows are fetched, and the sensors judged, at one arrival in so many.
@@ -100,6 +102,10 @@ class Session:
         self._health.last = kept.get("last", {})
         self._health.silent, self._health.rubbish = kept.get("silent", []), kept.get("rubbish", [])
         self._told = self._told_restarts = 0
+        jump_s = live.tracker.config.live.jump_s
+        self._untaken = Untaken(jump_s)  # by sensor
+        # By source: what is given again after a restart may be long, and is told of less and less often.
+        self._again = Untaken(2.0 * jump_s, most_s=math.inf)
         self._owed = False  # the tracker has taken a scan whose answer has not gone out
         self._unconfirmed = ""  # or why the last answers may not have arrived
         self._interval = None if live.time is None else live.time // every_s
@@ -117,7 +123,7 @@ class Session:
         """
         restarts = self._seen.restarts.get(message.source, 0)
         if not self._seen.is_new(message):
-            self.duplicates += 1
+            self._passed_again(message, place)
             return
         if self._seen.restarts.get(message.source, 0) > restarts:
             self._tell_restart(message, place)
@@ -125,18 +131,20 @@ class Session:
         arrival = self.live.step(message.batch.scans)
         unanswered = len(arrival.dropped) + len(arrival.repeated) + len(arrival.held)
         if len(arrival.repeated) == len(message.batch.scans):
-            self.duplicates += 1
+            self._passed_again(message, place)
             return
+        self._again.taken([message.source])
         self.count += 1
         self.flat += message.batch.flat
         self._tell_dropped(arrival.dropped, arrival.late_s, place)
-        self._tell_times(arrival)
+        self._tell_times(arrival, before)
+        self._tell_untaken(message, arrival, place)
         if self.ends.smoothed is not None:
             self.ends.smoothed.begin(arrival.table.classes is not None)
         with self._owing():
             if unanswered < len(message.batch.scans):
                 self.ends.tracks(arrival.t, arrival.table, message, arrival.late_s)
-                for event in self._health.saw(message.batch.scans, arrival.t):
+                for event in self._health.saw(arrival.taken, arrival.t):
                     self._tell(event)
             if self.count % ARRIVALS_PER_DRAIN == 0:
                 self.drain()
@@ -270,13 +278,45 @@ class Session:
             more = "; further ones are only counted" if number == MOST_TOLD else ""
             self.ends.warn(f"warning: {text}{more}")
 
-    def _tell_times(self, arrival: Arrival) -> None:
-        """Tell of scans whose time was proved wrong, and of a clock that was set back."""
-        if arrival.anew:
-            self._health.last.clear()
+    def _passed_again(self, message: ScanMessage, place: str) -> None:
+        """Count a message that had been taken before; tell where there are many in a row."""
+        self.duplicates += 1
+        run = self._again.untaken(message.source, message.batch.t)
+        if run is not None:
             self.ends.warn(
-                "warning: scans have been far too late for long, so a clock was set back: all tracks end, "
-                f"and time goes on from t = {arrival.t:.6g} s"
+                f"warning: {place}the last {run.count} messages had been taken before and are passed over, "
+                f"up to t = {message.batch.t:.6g} s"
+            )
+
+    def _tell_untaken(self, message: ScanMessage, arrival: Arrival, place: str) -> None:
+        """Tell, again and again, of sensors of which nothing is taken, and of the end of that."""
+        for name, run in self._untaken.taken(scan.sensor for scan in arrival.taken):
+            self.ends.warn(f"warning: {place}scans of sensor {name!r} are taken again, after {run.count}")
+        taken = {scan.sensor for scan in (*arrival.taken, *arrival.repeated)}
+        t, now = message.batch.t, arrival.t
+        for name in sorted({scan.sensor for scan in message.batch.scans} - taken):
+            run = self._untaken.untaken(name, t)
+            if run is not None:
+                where = "comes again and again" if t == now else f"is {abs(t - now):.6g} s "
+                where += "" if t == now else ("after" if t > now else "before") + f" the newest, {now:.6g} s"
+                self.ends.warn(
+                    f"warning: {place}none of the last {run.count} scans of sensor {name!r} has been taken: "
+                    f"the time {t:.6g} s {where}"
+                )
+
+    def _tell_times(self, arrival: Arrival, before: float | None) -> None:
+        """Tell of scans whose time was proved wrong, and of a time that goes on elsewhere."""
+        if arrival.anew or arrival.leapt:
+            self._health.jumped(arrival.t)
+        if arrival.anew:
+            self.ends.warn(
+                "warning: scans have been too late for long, so a clock was set back: all tracks end, and "
+                f"time goes on from t = {arrival.t:.6g} s"
+            )
+        if arrival.leapt and before is not None:
+            self.ends.warn(
+                f"warning: after a pause, or a leap of a clock, of {arrival.t - before:.6g} s time goes on "
+                f"from t = {arrival.t:.6g} s"
             )
         for scan in arrival.refuted:
             self._told += 1
