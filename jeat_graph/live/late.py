@@ -173,7 +173,7 @@ class LiveTracker:
             self._first = t
         if now is not None and t < now and self.policy == REFUSE:
             return Decision(batch, [])
-        late = now is not None and not any(self._in_time(scan) for scan in batch)
+        late = not any(self._may_come(scan) for scan in batch)
         last_look = {}
         if late or not self._base.near(t, now):
             looks = self.tracker.snapshot().scene.last_look.tolist()
@@ -306,26 +306,19 @@ class LiveTracker:
             return scan.t < self._again_until or scan.sensor in self._newest
         return scan.t <= self._rewinding.settled or self._rewinding.knows(scan)
 
-    def _in_time(self, scan: Scan) -> bool:
-        """Whether a scan is not too late to be taken."""
-        now = self.tracker.time
-        if now is None or self.policy != REWIND:
-            return now is None or scan.t >= now
-        late_s, begun = now - scan.t, self._begun[0]
-        return (
-            late_s <= self._late_s[scan.sensor] + _ROUNDING_S
-            and scan.t > self._rewinding.settled
-            and scan.t >= begun
-        )
-
     def _may_come(self, scan: Scan) -> bool:
         """Whether a scan can be taken: it is in time, and its sensor has given none of that time."""
-        if not self._in_time(scan):
-            return False
+        now = self.tracker.time
+        if now is None:
+            return True
         if self.policy != REWIND:
-            return not (scan.t == self.tracker.time and scan.sensor in self._newest)
+            return scan.t > now or (scan.t == now and scan.sensor not in self._newest)
+        if now - scan.t > self._late_s[scan.sensor] + _ROUNDING_S or scan.t <= self._rewinding.settled:
+            return False
         begun, by = self._begun
-        return not (scan.t == begun and scan.sensor in by) and not self._rewinding.knows(scan)
+        if scan.t < begun or (scan.t == begun and scan.sensor in by):
+            return False
+        return not self._rewinding.knows(scan)
 
     def _insert(self, scans: list[Scan]) -> None:
         """Take in scans of one time, each of another sensor."""

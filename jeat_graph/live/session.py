@@ -138,7 +138,7 @@ class Session:
         self.flat += message.batch.flat
         self._tell_dropped(arrival.dropped, arrival.late_s, place)
         self._tell_times(arrival, before)
-        self._tell_untaken(message, arrival, place)
+        self._tell_untaken(arrival, place)
         if self.ends.smoothed is not None:
             self.ends.smoothed.begin(arrival.table.classes is not None)
         with self._owing():
@@ -288,13 +288,14 @@ class Session:
                 f"up to t = {message.batch.t:.6g} s"
             )
 
-    def _tell_untaken(self, message: ScanMessage, arrival: Arrival, place: str) -> None:
+    def _tell_untaken(self, arrival: Arrival, place: str) -> None:
         """Tell, again and again, of sensors of which nothing is taken, and of the end of that."""
         for name, run in self._untaken.taken(scan.sensor for scan in arrival.taken):
             self.ends.warn(f"warning: {place}scans of sensor {name!r} are taken again, after {run.count}")
-        taken = {scan.sensor for scan in (*arrival.taken, *arrival.repeated)}
-        t, now = message.batch.t, arrival.t
-        for name in sorted({scan.sensor for scan in message.batch.scans} - taken):
+        taken = {scan.sensor for scan in arrival.taken}
+        missed = {s.sensor: s.t for s in (*arrival.held, *arrival.dropped) if s.sensor not in taken}
+        now = arrival.t
+        for name, t in sorted(missed.items()):
             run = self._untaken.untaken(name, t)
             if run is not None:
                 where = "comes again and again" if t == now else f"is {abs(t - now):.6g} s "

@@ -8,9 +8,9 @@ the tracker has reached, and one that *waits* to replace it. Each message does o
 the message     when                                     what is done
 ==============  =======================================  ===============================================
 follows         near the present time (`bound_s`), and   taken; those that wait are refuted
-                some scan of it is not too late
+                some scan of it can be taken
 comes too late  near the present time, but all of it is  passed over; it waits as a witness, without scans
-                too late
+                too late, or has come before
 is far away     farther than `bound_s`                   held; it waits as a witness
 comes again     it waits already                         the same; it is no further witness
 ==============  =======================================  ===============================================
@@ -119,7 +119,7 @@ class TimeBase:
         Args:
             scans: those of the message that have not come before.
             now: the newest time so far (s), None before the first scan.
-            late: whether all of them are too late to be taken.
+            late: whether none of them can be taken: they are too late, or have come before.
             last_look: time of each sensor's last scan that was taken (s).
         """
         t = max(scan.t for scan in scans)
