@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from functools import partial
 from importlib import import_module
 
+from jeat_graph.cli.held_outputs import holding
 from jeat_graph.cli.terminal import Terminated, describe, in_good_order, say, write_anything
 from jeat_graph.config import kernel_cache
 from jeat_graph.data.errors import JeatGraphError
@@ -17,7 +18,8 @@ from jeat_graph.io.outputs import check_named
 from jeat_graph.tracking import notice
 from jeat_graph.version import __version__
 
-# Each module has HELP (one line), add_arguments(parser) and run(args). Modules are imported only when their
+# Each module has HELP (one line), add_arguments(parser) and run(args); maybe WRITES and WRITES_INTO, the
+# arguments that name files and folders which it holds (`held_outputs`). Modules are imported only when their
 # command is asked for, so that one command does not pay for another's libraries.
 COMMANDS = (
     "demo",
@@ -114,7 +116,8 @@ def _run(args: argparse.Namespace) -> int:
     try:
         if getattr(args, "out", None) is not None:
             check_named(args.out, stdout=args.command in _TO_STDOUT)
-        code = int(args.run(args) or 0)
+        with holding(args, import_module(f"jeat_graph.cli.{args.command}_command")):
+            code = int(args.run(args) or 0)
         sys.stdout.flush()  # what cannot be written is noticed here, not at exit
         return code
     finally:

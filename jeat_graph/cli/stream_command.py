@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from jeat_graph.live.session import Session
     from jeat_graph.live.transport.ends import Sink, Source
 
+#: Written for hours: none of them is shared with another command.
+WRITES = ("checkpoint", "smoothed", "road", "record")
 HELP = "track scans that arrive on stdin or from a broker, and give out the tracks of each moment at once"
 STDIN = "<stdin>"
 _WARM_STEPS = 20  # enough for a track to be confirmed and smoothed
