@@ -296,12 +296,12 @@ class Session:
         missed = {s.sensor: s.t for s in (*arrival.held, *arrival.dropped) if s.sensor not in taken}
         now = arrival.t
         for name, t in sorted(missed.items()):
-            run = self._untaken.untaken(name, t)
-            if run is not None:
+            due = self._untaken.untaken(name, t)
+            if due is not None:
                 where = "comes again and again" if t == now else f"is {abs(t - now):.6g} s "
                 where += "" if t == now else ("after" if t > now else "before") + f" the newest, {now:.6g} s"
                 self.ends.warn(
-                    f"warning: {place}none of the last {run.count} scans of sensor {name!r} has been taken: "
+                    f"warning: {place}none of the last {due.count} scans of sensor {name!r} has been taken: "
                     f"the time {t:.6g} s {where}"
                 )
 

@@ -80,11 +80,14 @@ class SavedTracks(SmoothedTracks):
         now = self.snapshot()
         if now.t is None:
             return
-        looks = {name: getattr(now.scene, name) for name in ("first_look", "last_look")}
-        shifted = {name: _as_long_before(t, times, now.t) for name, times in looks.items()}
+        first, last = (
+            _as_long_before(t, looks, now.t) for looks in (now.scene.first_look, now.scene.last_look)
+        )
         none = TrackArrays._make(array[:0] for array in now.tracks)
         self.smooth_anew()
-        self.restore(now._replace(t=None, tracks=none, scene=now.scene._replace(**shifted)))
+        self.restore(
+            now._replace(t=None, tracks=none, scene=now.scene._replace(first_look=first, last_look=last))
+        )
 
     def takers(self, count: int) -> IntArray:
         """Return which track took each of the `count` detections (M,) of the last step, 0 where none did."""
