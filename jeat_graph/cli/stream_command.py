@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
-import math
 import sys
 from collections.abc import Callable
 from functools import partial
@@ -277,23 +276,13 @@ def _take(
 
 
 def _skip(session: Session) -> Callable[[DataError], None]:
-    """Return what counts bad lines, and tells of the first and, again and again, of many in a row."""
-    from jeat_graph.live.session import MOST_TOLD
-    from jeat_graph.live.untaken import Run
+    from jeat_graph.live.told import BadLines
 
-    run, good = Run(math.inf), session.count
+    lines = BadLines(_say)
 
     def bad(error: DataError) -> None:
-        nonlocal good
         session.bad += 1
-        if session.count > good:
-            good = session.count
-            run.taken()
-        again = run.untaken(0.0)
-        if session.bad <= MOST_TOLD:
-            _say(f"warning: {error}; passed over")
-        elif again:
-            _say(f"warning: the last {run.count} were all passed over; {error}")
+        lines.add(error, session.count)
 
     return bad
 

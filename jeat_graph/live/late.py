@@ -21,7 +21,7 @@ from jeat_graph.data.errors import ConfigError, DataError, TimeOrderError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.live.arrival import Arrival, Taken, looked_last, most_late_s
 from jeat_graph.live.lateness import LatenessCounter
-from jeat_graph.live.memory import Memory, fingerprint_of
+from jeat_graph.live.repetition import Repetition
 from jeat_graph.live.rewinding import Rewinding, TakenStep
 from jeat_graph.live.time_base import Decision, TimeBase
 from jeat_graph.tracking.checkpoint import load_state, save_state
@@ -34,8 +34,6 @@ REWIND, SKIP, REFUSE = "rewind", "skip", "refuse"
 #: A difference of two times is only so exact (s).
 _ROUNDING_S = 1e-6
 POLICIES = (REWIND, SKIP, REFUSE)
-#: After a restart so many scans in a row that never came before say that the input is not given once more.
-_NEVER = 3
 
 
 class LiveTracker:
@@ -62,11 +60,8 @@ class LiveTracker:
         self.policy = policy
         self.lateness = LatenessCounter(tracker.sensor_names)
         self.measured: list[tuple[float, RecordArray]] = []
-        self._again_until: float | None = None  # after a restart: time of the newest scan that was known then
-        self._never = 0  # scans in a row since then that never came before
-        self._memory = Memory(whole=tracker.time is None)
-        self._base, self._kept = TimeBase(config.live.jump_s), 0
-        self._first: float | None = None  # time of the first scan, since time has begun anew
+        self._base = TimeBase(config.live.jump_s)
+        self._repetition = Repetition(self._base, whole=tracker.time is None)
         self._rewinding = Rewinding(tracker)
         tracker.logs_takers = policy == REWIND
         # Where nothing is taken again: sensors of the newest scans, and what the smoothers are to know.
@@ -112,19 +107,13 @@ class LiveTracker:
             sensor_index(scan.sensor, self.tracker.sensor_names)  # refused before anything is done
         self.measured = []
         before = self.tracker.time
-        prints = [fingerprint_of(scan) for scan in batch]
-        again = [self._comes_again(scan, known) for scan, known in zip(batch, prints, strict=True)]
-        repeated = [scan for scan, known in zip(batch, again, strict=True) if known]
-        batch = [scan for scan, known in zip(batch, again, strict=True) if not known]
+        repeated, new = self._repetition.sort(batch, self._was_taken)
         decision = Decision([], [])
-        if repeated:  # what was passed over before the restart is so again
-            del self._base.row[self._kept :]
-        if batch:
-            decision = self._decide(batch)
+        if new:
+            decision = self._decide(new)
         taken = self._take_all(decision.take)
-        for known in prints:  # what the tracker refuses has not come
-            self._memory.note(known)
-        self._count(decision.refuted, taken, before)
+        self._repetition.note(batch)  # what the tracker refuses has not come
+        self.lateness.arrived(taken, decision.refuted, before)
         self._hand_over()
         good = [scan for one in taken for scan in one.good]
         if good and not (decision.leapt or decision.anew):
@@ -138,21 +127,12 @@ class LiveTracker:
             late_s=max((one.late_s for one in taken), default=0.0),
             dropped=[scan for one in taken for scan in one.dropped],
             repeated=repeated,
-            held=[] if decision.take else batch,
+            held=[] if decision.take else new,
             refuted=decision.refuted,
             anew=decision.anew,
             leapt=decision.leapt,
             taken=good,
         )
-
-    def _count(self, refuted: list[Scan], taken: list[Taken], before: float | None) -> None:
-        """Count how late scans came."""
-        for scan in refuted:
-            self.lateness.add(scan.sensor, max((before or 0.0) - scan.t, 0.0), True)
-        for one in taken:
-            for scans, passed_over in ((one.good, False), (one.dropped, True)):
-                for scan in scans:
-                    self.lateness.add(scan.sensor, one.late_s, passed_over)
 
     def _take_all(self, batch: list[Scan]) -> list[Taken]:
         """Take in scans of any times, all or none."""
@@ -169,8 +149,8 @@ class LiveTracker:
     def _decide(self, batch: list[Scan]) -> Decision:
         """Decide what becomes of scans that have not come before, and let time begin anew where it must."""
         now, t = self.tracker.time, max(scan.t for scan in batch)
-        if self._first is None:
-            self._first = t
+        if self._repetition.first is None:
+            self._repetition.first = t
         if now is not None and t < now and self.policy == REFUSE:
             return Decision(batch, [])
         late = not any(self._may_come(scan) for scan in batch)
@@ -180,12 +160,13 @@ class LiveTracker:
             last_look = dict(zip(self.tracker.sensor_names, looks, strict=True))
         decision = self._base.decide(batch, now, late, last_look)
         if decision.leapt or decision.anew:
-            self._again_until = None
+            self._repetition.begins()
         if decision.anew:
             self._rewinding.settle(math.inf)
             self._rewinding.settled, self._newest, self._begun = -math.inf, [], (-math.inf, [])
-            self._first = min(scan.t for scan in decision.take)
-            self.tracker.begin_anew(self._first)
+            first = min(scan.t for scan in decision.take)
+            self._repetition.begins(first)
+            self.tracker.begin_anew(first)
         return decision
 
     def save(self, path: str | Path, more: dict[str, Any] | None = None) -> None:
@@ -203,8 +184,7 @@ class LiveTracker:
         state |= {
             "policy": self.policy,
             "rewinding": self._rewinding.state(),
-            "base": self._base.state() | {"first": self._first},
-            "memory": self._memory.state(),
+            "base": self._base.state() | self._repetition.state(),
             "newest": self._newest,
             "lateness": self.lateness.state(),
             "more": more or {},
@@ -231,11 +211,7 @@ class LiveTracker:
         live.lateness.set_state(state["lateness"])
         live._rewinding.set_state(state["rewinding"])
         live._base.set_state(state["base"], live.tracker.time)
-        live._kept, live._first = len(live._base.row), state["base"]["first"]
-        live._memory = Memory(whole=False)
-        if "memory" in state:
-            live._memory.set_state(state["memory"])
-        live._again_until = live.tracker.time
+        live._repetition.set_state(state["base"], live.tracker.time)
         return live, state["more"]
 
     def predict(self, t: float) -> Prediction:
@@ -281,29 +257,10 @@ class LiveTracker:
             self._insert(list(good.values()))
         return Taken(list(good.values()), dropped, late_s)
 
-    def _comes_again(self, scan: Scan, fingerprint: int | None) -> bool:
-        """Whether a scan was taken before the restart: the input may come again from anywhere before it."""
-        if self._again_until is None:
-            return False
-        known = self._memory.knows(fingerprint)
-        if known is not None:
-            self._never = 0 if known else self._never + 1
-        if known:
-            return True
-        if self._never >= _NEVER:
-            self._again_until = None  # the input is another: a clock has been set back meanwhile
-            return False
-        if scan.t > self._again_until:
-            if self._base.near(scan.t, self._again_until):
-                self._again_until = None  # the first new one: no other of those before can follow
-            return self._base.holds(scan)
-        if self._first is not None and not self._base.near(min(scan.t, self._first), self._first):
-            return self._base.holds(scan)  # from before all that had come: a clock has been set back
-        leap = self._base.leap
-        if leap is not None and leap[0] < scan.t < leap[1]:
-            return self._base.holds(scan)
+    def _was_taken(self, scan: Scan) -> bool:
+        """Whether a scan of that sensor and of that time, which is not after the newest, has been taken."""
         if self.policy != REWIND:
-            return scan.t < self._again_until or scan.sensor in self._newest
+            return (self.time is not None and scan.t < self.time) or scan.sensor in self._newest
         return scan.t <= self._rewinding.settled or self._rewinding.knows(scan)
 
     def _may_come(self, scan: Scan) -> bool:

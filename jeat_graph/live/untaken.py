@@ -15,7 +15,7 @@ _COUNT, _MOST_COUNT = 100, 10_000
 _MOST_S = 60.0
 
 
-class Run:
+class UntakenRun:
     """Counts what was not taken in a row.
 
     Args:
@@ -65,16 +65,16 @@ class Untaken:
 
     def __init__(self, first_s: float, most_s: float = _MOST_S) -> None:
         self._first_s, self._most_s = first_s, most_s
-        self._runs: dict[str, Run] = {}
+        self._runs: dict[str, UntakenRun] = {}
 
-    def taken(self, names: Iterable[str]) -> list[tuple[str, Run]]:
+    def taken(self, names: Iterable[str]) -> list[tuple[str, UntakenRun]]:
         """Note whose were taken; returns the runs that had been told of and end now."""
         ended = [(name, self._runs.pop(name)) for name in set(names) if name in self._runs]
         return sorted((name, run) for name, run in ended if run.told)
 
-    def untaken(self, name: str, t: float) -> Run | None:
+    def untaken(self, name: str, t: float) -> UntakenRun | None:
         """Note that one was not taken (its time in s); returns its run if it is to be told of now."""
-        run = self._runs.pop(name, None) or Run(self._first_s, self._most_s)
+        run = self._runs.pop(name, None) or UntakenRun(self._first_s, self._most_s)
         self._runs[name] = run
         if len(self._runs) > self.MOST:
             del self._runs[next(iter(self._runs))]
