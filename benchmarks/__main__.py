@@ -14,6 +14,7 @@ from jeat_graph.cli.options import Parser
 from jeat_graph.cli.terminal import say
 from jeat_graph.data.errors import ConfigError
 
+WRITES = ("checkpoint",)
 HELP = "Reproduce the tables: accuracy, ablation, smoothing, real, detection, raw, speed or events."
 _KINDS = {
     "accuracy": "our tracker and others' on simulated and real data",

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from jeat_graph.eval.tables import Cell, Table
     from jeat_graph.runs.beside import Facts
 
+WRITES = ("out",)
 HELP = "Estimate sensors and motion from recordings, with or without truth, and write a configuration."
 
 

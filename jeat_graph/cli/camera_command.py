@@ -11,6 +11,7 @@ from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import picture_size
 from jeat_graph.data.errors import DataError
 
+WRITES = ("out",)
 HELP = "calibrate a camera over a road from lengths, points and the vehicles' tracks, or show one"
 
 

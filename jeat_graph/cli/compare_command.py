@@ -10,6 +10,7 @@ from jeat_graph.cli.progress import stages
 from jeat_graph.cli.terminal import warn
 from jeat_graph.config.argument_types import not_negative
 
+WRITES_INTO = ("out",)
 HELP = "compare filter and smoothers on a run: errors, error against lag, consistency; tables and pictures"
 
 

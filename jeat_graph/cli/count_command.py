@@ -19,6 +19,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.data.steps import check_steps
 from jeat_graph.eval.counting import Line
 
+WRITES = ("out",)
 HELP = "count vehicles over lines in the picture, by direction, with intervals"
 
 

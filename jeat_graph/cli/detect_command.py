@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 STDOUT = "-"
 #: Decimal places of boxes (px) and of times (s) on stdout.
 _PLACES, _TIME_PLACES = 3, 6
+WRITES = ("out",)
 HELP = "find vehicles in raw pictures and events and write a file of detections"
 
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from jeat_graph.data.trajectories import GroundTruth
     from jeat_graph.eval.tables import Table
 
+WRITES = ("json",)
 HELP = "Judge a run, a trajectory table, or a MOTChallenge or KITTI result against ground truth."
 FORMATS = ("text", "markdown", "csv", "latex")
 _MANY: dict[str, Any] = {"nargs": "+", "action": "extend"}

@@ -14,6 +14,7 @@ from jeat_graph.config.argument_types import picture_size
 from jeat_graph.io.events.converting import WRITTEN
 from jeat_graph.io.events.opening import FORMATS
 
+WRITES = ("out",)
 HELP = "say what is in a file of events, or convert it: RAW (EVT2, EVT3), DAT, AEDAT, HDF5, ROS bags"
 
 

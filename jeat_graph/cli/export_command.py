@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from jeat_graph.data.trajectories import Trajectories
     from jeat_graph.eval.frames import Kind
 
+WRITES = ("out",)
 HELP = (
     "write a run for other programs: CVAT, COCO, OTAnalytics, TUM, rerun; a road for SUMO, highD, maps; a "
     "simulated set for RVT and DSEC-Detection"

@@ -12,6 +12,7 @@ from importlib import import_module
 from typing import Any
 
 from jeat_graph.api.beside import COMMAND_GROUP, HOW_TO_GET, find
+from jeat_graph.cli.held_outputs import holding
 from jeat_graph.cli.terminal import Terminated, describe, in_good_order, say, write_anything
 from jeat_graph.config import kernel_cache
 from jeat_graph.data.errors import ConfigError, JeatGraphError
@@ -19,7 +20,8 @@ from jeat_graph.io.outputs import check_named
 from jeat_graph.tracking import notice
 from jeat_graph.version import __version__
 
-# Each module has HELP (one line), add_arguments(parser) and run(args). Modules are imported only when their
+# Each module has HELP (one line), add_arguments(parser) and run(args); maybe WRITES and WRITES_INTO, the
+# arguments that name files and folders which it holds (`held_outputs`). Modules are imported only when their
 # command is asked for, so that one command does not pay for another's libraries.
 COMMANDS = (
     "demo",
@@ -150,7 +152,8 @@ def _run(args: argparse.Namespace) -> int:
     try:
         if getattr(args, "out", None) is not None:
             check_named(args.out, stdout=args.command in _TO_STDOUT)
-        code = int(args.run(args) or 0)
+        with holding(args, import_module(f"jeat_graph.cli.{args.command}_command")):
+            code = int(args.run(args) or 0)
         sys.stdout.flush()  # what cannot be written is noticed here, not at exit
         return code
     finally:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from jeat_graph.drawing.movie.panels import Movie
     from jeat_graph.drawing.movie.sources import Request
 
+WRITES = ("out",)
 HELP = "draw a run over video, frames or events, or a simulated segment, as an MP4 video or one PNG picture"
 
 

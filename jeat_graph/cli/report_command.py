@@ -14,6 +14,7 @@ from jeat_graph.data.progress import progress_span
 if TYPE_CHECKING:
     from jeat_graph.drawing.page.figures import ComparedRun
 
+WRITES = ("out",)
 HELP = "write a run as one self-contained HTML page: scores, map, and the curves of every track"
 
 

@@ -12,6 +12,7 @@ from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import positive
 from jeat_graph.data.errors import DataError
 
+WRITES_INTO = ("out",)
 HELP = "metres, km/h and lanes on the road, each with its uncertainty"
 
 

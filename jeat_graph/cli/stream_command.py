@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from jeat_graph.live.session import Session
     from jeat_graph.live.transport.ends import Sink, Source
 
+#: Written for hours: none of them is shared with another command.
+WRITES = ("checkpoint", "smoothed", "road", "record")
 HELP = "track scans that arrive on stdin or from a broker, and give out the tracks of each moment at once"
 STDIN = "<stdin>"
 _WARM_STEPS = 20  # enough for a track to be confirmed and smoothed
@@ -274,12 +276,13 @@ def _take(
 
 
 def _skip(session: Session) -> Callable[[DataError], None]:
-    from jeat_graph.live.session import MOST_TOLD
+    from jeat_graph.live.told import BadLines
+
+    lines = BadLines(_say)
 
     def bad(error: DataError) -> None:
         session.bad += 1
-        if session.bad <= MOST_TOLD:
-            _say(f"warning: {error}; passed over")
+        lines.add(error, session.count)
 
     return bad
 

@@ -131,6 +131,7 @@ def _detected(args: argparse.Namespace) -> tuple[tuple[str, ...], tuple[str, ...
     from jeat_graph.detection.detecting import picture_of
     from jeat_graph.io.atomic import check_writable
     from jeat_graph.io.detections_io import write_detections
+    from jeat_graph.io.locking import hold_made_folder
     from jeat_graph.io.outputs import check_folder
 
     if args.frames is None and args.events is None:
@@ -148,7 +149,8 @@ def _detected(args: argparse.Namespace) -> tuple[tuple[str, ...], tuple[str, ...
     # Another configuration, a preset or the user's own, says itself what its sensors are.
     declared = declared_settings(request, _say) if args.config == DEFAULT else []
     args.image = args.image or picture_of(request)
-    write_detections(detect_with_bar(request, "track"), found)
+    with hold_made_folder(out):  # detecting takes long; the run directory is held by what tracks
+        write_detections(detect_with_bar(request, "track"), found)
     return (str(found),), tuple(declared)
 
 

@@ -17,8 +17,8 @@ class LiveConfig(Section):
     jump_s: float = number(
         5.0,
         "s",
-        "a scan whose time is so far from the newest, and four times as far as the longest of the latest "
-        "pauses, is held until others confirm it",
+        "a scan whose time is so far from the newest, and four times as far as usual pauses, is held until "
+        "others confirm it; times that all scans are behind for so long are given up",
     )
     silent_s: float = number(
         1.0, "s", "a sensor that declares a rate and gives no scan for so long counts as silent"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from jeat_graph.config.schema import Config
@@ -21,7 +22,9 @@ class Arrival(NamedTuple):
         repeated: those that had been taken before a checkpoint from which the tracker went on.
         held: those that wait, because their time is far from all others (`live.jump_s`).
         refuted: earlier ones that waited and are passed over now.
-        anew: whether time has begun anew, because scans were far too late for long: all tracks have ended.
+        anew: whether time has begun anew, because all scans were too late for long: all tracks have ended.
+        leapt: whether time goes on much later, because scans ahead of time confirmed each other.
+        taken: the scans that were taken, those that had waited too; times without the sensors' latency.
     """
 
     table: Trajectories
@@ -32,6 +35,8 @@ class Arrival(NamedTuple):
     held: list[Scan]
     refuted: list[Scan]
     anew: bool
+    leapt: bool = False
+    taken: Sequence[Scan] = ()
 
 
 class Taken(NamedTuple):

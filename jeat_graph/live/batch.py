@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.data.processes import available_cores
-from jeat_graph.io.locking import try_lock
+from jeat_graph.io.locking import hold_lock_file
 from jeat_graph.io.outputs import check_folder
 from jeat_graph.live.engines import ENGINES, run_local, run_on_ray
 from jeat_graph.live.manifest import ManifestRow
@@ -89,7 +88,10 @@ def run_batch(recordings: Sequence[ManifestRow], out: str | Path, options: Batch
         raise JeatGraphError(f"unknown engine {options.engine!r}; known: {', '.join(ENGINES)}")
     check_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    with _alone_in(folder):
+    with hold_lock_file(folder / LOCK) as held:
+        # Where there are no locks nothing is held: the run directories are whole or absent all the same.
+        if held is False:
+            raise JeatGraphError(f"{folder}: another batch is at work here")
         found = _work([_job(one, folder, options) for one in recordings], options)
         outcomes = [found[one.name] for one in recordings]
         runs, outcomes = _with_truth(recordings, outcomes, folder)
@@ -216,17 +218,3 @@ def _write_or_remove(path: Path, text: str) -> None:
             file.write(text)
     else:
         path.unlink(missing_ok=True)
-
-
-@contextlib.contextmanager
-def _alone_in(folder: Path) -> Iterator[None]:
-    """Keep a second batch out of the folder while one is at work there; the system frees the lock at a crash.
-
-    Raises:
-        JeatGraphError: another one is at work there.
-    """
-    with (folder / LOCK).open("w") as file:
-        # Where there are no locks nothing is held: the run directories are whole or absent all the same.
-        if try_lock(file.fileno()) is False:
-            raise JeatGraphError(f"{folder}: another batch is at work here")
-        yield

@@ -56,7 +56,6 @@ class SensorHealth:
             name: max(live.silent_s, live.silent_periods / sensor.rate_hz)
             for name, sensor in config.sensors.items()
         }
-        self._latency_s = {name: sensor.latency_s for name, sensor in config.sensors.items()}
         self.last: dict[str, float] = {}
         self.silent: list[str] = []
         self.rubbish: list[str] = []
@@ -65,7 +64,7 @@ class SensorHealth:
         """Take note of scans.
 
         Args:
-            scans: what came, at the times that it came with; the sensor's `latency_s` is taken off them here.
+            scans: what the tracker has taken (`Arrival.taken`), the sensors' latencies taken off.
             now: time of the newest scan of all (s), its latency taken off.
 
         Returns:
@@ -73,9 +72,7 @@ class SensorHealth:
         """
         events = []
         for scan in scans:
-            # The clock of `now`: that of a sensor may be off by more than our patience.
-            t = scan.t - self._latency_s[scan.sensor]
-            self.last[scan.sensor] = max(t, self.last.get(scan.sensor, t))
+            self.last[scan.sensor] = max(scan.t, self.last.get(scan.sensor, scan.t))
         for name, t in self.last.items():
             quiet = now - t > self._patience_s[name]
             if quiet and name not in self.silent:
@@ -86,6 +83,14 @@ class SensorHealth:
                 self.silent.remove(name)
                 events.append(HealthChange(now, name, BACK, f"sensor {name!r} gives scans again"))
         return events
+
+    def jumped(self, now: float) -> None:
+        """Note that time goes on elsewhere: no sensor has been silent meanwhile.
+
+        Args:
+            now: time of the newest scan of all (s), its latency taken off.
+        """
+        self.last = dict.fromkeys(self.last, now)
 
     def judge(self, states: dict[str, SensorState], now: float) -> list[HealthChange]:
         """Compare what the tracker has learnt of the sensors with what is declared of them.

@@ -21,8 +21,9 @@ from jeat_graph.data.errors import ConfigError, DataError, TimeOrderError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.live.arrival import Arrival, Taken, looked_last, most_late_s
 from jeat_graph.live.lateness import LatenessCounter
+from jeat_graph.live.repetition import Repetition
 from jeat_graph.live.rewinding import Rewinding, TakenStep
-from jeat_graph.live.time_base import TimeBase
+from jeat_graph.live.time_base import Decision, TimeBase
 from jeat_graph.tracking.checkpoint import load_state, save_state
 from jeat_graph.tracking.prediction import Prediction
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
@@ -59,9 +60,8 @@ class LiveTracker:
         self.policy = policy
         self.lateness = LatenessCounter(tracker.sensor_names)
         self.measured: list[tuple[float, RecordArray]] = []
-        self._again_until: float | None = None  # after a restart: time of the newest scan that was known then
-        self._base, self._kept = TimeBase(config.live.jump_s), 0
-        self._first: float | None = None  # time of the first scan, since time has begun anew
+        self._base = TimeBase(config.live.jump_s)
+        self._repetition = Repetition(self._base, whole=tracker.time is None)
         self._rewinding = Rewinding(tracker)
         tracker.logs_takers = policy == REWIND
         # Where nothing is taken again: sensors of the newest scans, and what the smoothers are to know.
@@ -107,30 +107,32 @@ class LiveTracker:
             sensor_index(scan.sensor, self.tracker.sensor_names)  # refused before anything is done
         self.measured = []
         before = self.tracker.time
-        again = [self._comes_again(scan) for scan in batch]
-        repeated = [scan for scan, known in zip(batch, again, strict=True) if known]
-        batch = [scan for scan, known in zip(batch, again, strict=True) if not known]
-        held, refuted, anew = batch, list[Scan](), False
-        if repeated:  # what was passed over before the restart is so again
-            self._base.held = self._base.held[: self._kept]
-        if batch:
-            batch, refuted, anew = self._believed(batch)
-            held = [] if batch else held
-        taken = self._take_all(batch)
-        for scan in refuted:
-            self.lateness.add(scan.sensor, max((before or 0.0) - scan.t, 0.0), True)
-        for one in taken:  # what the tracker refuses has not come
-            for scans_, passed_over in ((one.good, False), (one.dropped, True)):
-                for scan in scans_:
-                    self.lateness.add(scan.sensor, one.late_s, passed_over)
+        repeated, new = self._repetition.sort(batch, self._was_taken)
+        decision = Decision([], [])
+        if new:
+            decision = self._decide(new)
+        taken = self._take_all(decision.take)
+        self._repetition.note(batch)  # what the tracker refuses has not come
+        self.lateness.arrived(taken, decision.refuted, before)
         self._hand_over()
-        self._base.passed(None if anew else before, self.tracker.time)
-        late_s = max((one.late_s for one in taken), default=0.0)
-        dropped = [scan for one in taken for scan in one.dropped]
+        good = [scan for one in taken for scan in one.good]
+        if good and not (decision.leapt or decision.anew):
+            self._base.took(before, self.tracker.time)
         table = self.tracker.causal()
         if self.policy == REWIND:
             table = self._rewinding.identities.answer(table)
-        return Arrival(table, self.tracker.time or 0.0, late_s, dropped, repeated, held, refuted, anew)
+        return Arrival(
+            table,
+            self.tracker.time or 0.0,
+            late_s=max((one.late_s for one in taken), default=0.0),
+            dropped=[scan for one in taken for scan in one.dropped],
+            repeated=repeated,
+            held=[] if decision.take else new,
+            refuted=decision.refuted,
+            anew=decision.anew,
+            leapt=decision.leapt,
+            taken=good,
+        )
 
     def _take_all(self, batch: list[Scan]) -> list[Taken]:
         """Take in scans of any times, all or none."""
@@ -144,27 +146,28 @@ class LiveTracker:
                 self._newest, self._due, self.measured = mark[1], [], []
             raise
 
-    def _believed(self, batch: list[Scan]) -> tuple[list[Scan], list[Scan], bool]:
-        """Return the scans to be taken, those proved wrong, and whether time begins anew with them."""
+    def _decide(self, batch: list[Scan]) -> Decision:
+        """Decide what becomes of scans that have not come before, and let time begin anew where it must."""
         now, t = self.tracker.time, max(scan.t for scan in batch)
-        late = now is not None and t < now
-        if self._first is None:
-            self._first = t
-        if now is None or self._base.fits(t, now) or (late and self.policy == REFUSE):
-            return batch, self._base.clear(), False
-        looks = self.tracker.snapshot().scene.last_look.tolist()
-        last_look = dict(zip(self.tracker.sensor_names, looks, strict=True))
-        refuted, believed = self._base.hold(batch, now, last_look)
-        if not believed:
-            return [], refuted, False
-        self._again_until = None
-        batch = self._base.clear()
-        if late:
+        if self._repetition.first is None:
+            self._repetition.first = t
+        if now is not None and t < now and self.policy == REFUSE:
+            return Decision(batch, [])
+        late = not any(self._may_come(scan) for scan in batch)
+        last_look = {}
+        if late or not self._base.near(t, now):
+            looks = self.tracker.snapshot().scene.last_look.tolist()
+            last_look = dict(zip(self.tracker.sensor_names, looks, strict=True))
+        decision = self._base.decide(batch, now, late, last_look)
+        if decision.leapt or decision.anew:
+            self._repetition.begins()
+        if decision.anew:
             self._rewinding.settle(math.inf)
             self._rewinding.settled, self._newest, self._begun = -math.inf, [], (-math.inf, [])
-            self._first = min(scan.t for scan in batch)
-            self.tracker.begin_anew(self._first)
-        return batch, refuted, late
+            first = min(scan.t for scan in decision.take)
+            self._repetition.begins(first)
+            self.tracker.begin_anew(first)
+        return decision
 
     def save(self, path: str | Path, more: dict[str, Any] | None = None) -> None:
         """Write the whole state to a file, for `load` to go on from (see `Tracker.save`).
@@ -181,7 +184,7 @@ class LiveTracker:
         state |= {
             "policy": self.policy,
             "rewinding": self._rewinding.state(),
-            "base": self._base.state() | {"first": self._first},
+            "base": self._base.state() | self._repetition.state(),
             "newest": self._newest,
             "lateness": self.lateness.state(),
             "more": more or {},
@@ -207,9 +210,8 @@ class LiveTracker:
         live._newest = state["newest"]
         live.lateness.set_state(state["lateness"])
         live._rewinding.set_state(state["rewinding"])
-        live._base.set_state(state["base"])
-        live._kept, live._first = len(live._base.held), state["base"]["first"]
-        live._again_until = live.tracker.time
+        live._base.set_state(state["base"], live.tracker.time)
+        live._repetition.set_state(state["base"], live.tracker.time)
         return live, state["more"]
 
     def predict(self, t: float) -> Prediction:
@@ -226,7 +228,7 @@ class LiveTracker:
         Scans ahead of time that wait are taken: nothing comes any more that could prove them wrong.
         """
         held = self._base.clear()
-        if held and self.tracker.time is not None and held[0].t > self.tracker.time:
+        if held and self.tracker.time is not None and min(scan.t for scan in held) > self.tracker.time:
             self._take_all(held)
             self._hand_over()
         self._rewinding.settle(math.inf)
@@ -247,7 +249,7 @@ class LiveTracker:
         good: dict[str, Scan] = {}
         dropped = []
         for scan in batch:
-            if scan.sensor not in good and self._may_come(scan, late_s):
+            if scan.sensor not in good and self._may_come(scan):
                 good[scan.sensor] = scan
             else:
                 dropped.append(scan)
@@ -255,25 +257,20 @@ class LiveTracker:
             self._insert(list(good.values()))
         return Taken(list(good.values()), dropped, late_s)
 
-    def _comes_again(self, scan: Scan) -> bool:
-        """Whether a scan was taken before the restart: the input may come again from anywhere before it."""
-        if self._again_until is None:
-            return False
-        if scan.t > self._again_until:
-            if self._base.fits(scan.t, self._again_until):
-                self._again_until = None  # the first new one: no other of those before can follow
-            return self._base.holds(scan)
-        if self._first is not None and not self._base.fits(min(scan.t, self._first), self._first):
-            return self._base.holds(scan)  # from before all that had come: a clock has been set back
+    def _was_taken(self, scan: Scan) -> bool:
+        """Whether a scan of that sensor and of that time, which is not after the newest, has been taken."""
         if self.policy != REWIND:
-            return scan.t < self._again_until or scan.sensor in self._newest
+            return (self.time is not None and scan.t < self.time) or scan.sensor in self._newest
         return scan.t <= self._rewinding.settled or self._rewinding.knows(scan)
 
-    def _may_come(self, scan: Scan, late_s: float) -> bool:
+    def _may_come(self, scan: Scan) -> bool:
+        """Whether a scan can be taken: it is in time, and its sensor has given none of that time."""
         now = self.tracker.time
+        if now is None:
+            return True
         if self.policy != REWIND:
-            return late_s == 0.0 and not (scan.t == now and scan.sensor in self._newest)
-        if late_s > self._late_s[scan.sensor] + _ROUNDING_S or scan.t <= self._rewinding.settled:
+            return scan.t > now or (scan.t == now and scan.sensor not in self._newest)
+        if now - scan.t > self._late_s[scan.sensor] + _ROUNDING_S or scan.t <= self._rewinding.settled:
             return False
         begun, by = self._begun
         if scan.t < begun or (scan.t == begun and scan.sensor in by):

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from jeat_graph.data.arrays import IntArray
+from jeat_graph.data.detections import Scan
+from jeat_graph.live.arrival import Taken
 
 #: Width of a bin (s), and how many there are; what is later counts in the last one.
 BIN_S, BINS = 0.001, 10_000
@@ -67,10 +71,26 @@ class LatenessCounter:
     def add(self, sensor: str, late_s: float, dropped: bool) -> None:
         """Count a scan that is so much older than the newest (s); 0 if it is not."""
         s = self._names.index(sensor)
-        self.counts[s, min(round(late_s / BIN_S), BINS - 1)] += 1
+        late_s = min(late_s, sys.float_info.max)  # from one end of the numbers to the other it is infinite
+        self.counts[s, round(min(late_s / BIN_S, BINS - 1))] += 1
         self.late[s] += late_s > 0.0
         self.dropped[s] += dropped
         self.worst_s[s] = max(self.worst_s[s], late_s)
+
+    def arrived(self, taken: Sequence[Taken], refuted: Sequence[Scan], before: float | None) -> None:
+        """Count scans that have arrived.
+
+        Args:
+            taken: what became of those of each time.
+            refuted: those that had waited and are passed over.
+            before: the newest time before (s).
+        """
+        for scan in refuted:
+            self.add(scan.sensor, max((before or 0.0) - scan.t, 0.0), True)
+        for one in taken:
+            for scans, passed_over in ((one.good, False), (one.dropped, True)):
+                for scan in scans:
+                    self.add(scan.sensor, one.late_s, passed_over)
 
     def state(self) -> dict[str, Any]:
         """Return what `set_state` takes; of the counts only those that are not zero."""

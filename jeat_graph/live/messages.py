@@ -19,6 +19,7 @@ import numpy as np
 from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.io.scan_batch import ScanBatch
 from jeat_graph.io.scan_lines import batch_of
+from jeat_graph.live.memory import Memory, fingerprint
 
 VERSION = 1
 _KEYS = ("v", "source", "seq", "scans")
@@ -143,9 +144,10 @@ class Duplicates:
     """Tells which messages have been taken already, in bounded memory.
 
     Of each source the greatest number is kept, and which of the `WINDOW` numbers below it have come: one that
-    is older still counts as a duplicate. But a message that comes twice is as old as it was: where a number
-    that was used up comes with a scan newer than any of its source, the source has begun to count anew, as a
-    detector does that is started again. What came before stays known, for a broker may deliver it once more.
+    is older counts as a duplicate. But a message that comes twice is as old as it was: where a number that
+    was used up comes with a scan newer than any of its source, or with another time than it had, the source
+    has begun to count anew, as a detector does that is started again, maybe with its clock set back. What
+    came before stays known, for a broker may deliver it once more.
 
     Attributes:
         seen: by source its counts, the last one or the last two; the time of a scan says whose a number is.
@@ -153,25 +155,37 @@ class Duplicates:
     """
 
     WINDOW = 1024
+    #: So many sources are kept at most: those that have been heard of last.
+    MOST_SOURCES = 1024
 
     def __init__(self) -> None:
         self.seen: dict[str, list[Numbering]] = {}
         self.restarts: dict[str, int] = {}
+        self._memory = Memory()
 
     def is_new(self, message: ScanMessage) -> bool:
         """Tell whether a message is new, and take note of it; one without a number always is."""
         seq, source, t = message.seq, message.source, message.batch.t
         if seq is None:
             return True
-        counts = self.seen.setdefault(source, [Numbering(-1, set(), -math.inf)])
-        k = 0 if t <= counts[0].newest else len(counts) - 1
+        of_message = fingerprint(source.encode("utf-8", "replace"), str(seq).encode(), repr(t).encode())
+        came = self._memory.knows(of_message)
+        self._memory.note(of_message)
+        counts = self.seen.pop(source, [Numbering(-1, set(), -math.inf)])
+        self.seen[source] = counts
+        if len(self.seen) > self.MOST_SOURCES:
+            forgotten = next(iter(self.seen))
+            del self.seen[forgotten]
+            self.restarts.pop(forgotten, None)
+        k = _whose(counts, t)
         of = counts[k]
         known = seq in of.recent or seq <= of.top - self.WINDOW
-        if t > of.newest and (known or (seq < of.top and seq < min(of.recent))):
+        anew = t > of.newest and (known or (seq < of.top and seq < min(of.recent)))
+        if came is not True and (anew or (known and came is False)):
             self.restarts[source] = self.restarts.get(source, 0) + 1
             self.seen[source] = [of, Numbering(seq, {seq}, t)]
             return True
-        if known:
+        if known or came:
             return False
         of.recent.add(seq)
         top, recent = max(of.top, seq), of.recent
@@ -186,12 +200,23 @@ class Duplicates:
             source: [(top, sorted(recent), newest) for top, recent, newest in counts]
             for source, counts in self.seen.items()
         }
-        return {"seen": seen, "restarts": self.restarts}
+        return {"seen": seen, "restarts": self.restarts, "memory": self._memory.state()}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go on from what `state` returned."""
+        """Go on from what `state` returned; that of an earlier build has no memory."""
         self.seen = {
             source: [Numbering(top, set(recent), newest) for top, recent, newest in counts]
             for source, counts in state["seen"].items()
         }
         self.restarts = dict(state["restarts"])
+        self._memory = Memory(whole=False)
+        if "memory" in state:
+            self._memory.set_state(state["memory"])
+
+
+def _whose(counts: list[Numbering], t: float) -> int:
+    """Return which of a source's counts a message of a time (s) belongs to."""
+    if len(counts) == 1 or counts[1].newest > counts[0].newest:
+        return 0 if t <= counts[0].newest else len(counts) - 1
+    # Its clock was set back: the one whose newest scan is nearer.
+    return 1 if abs(t - counts[1].newest) <= abs(t - counts[0].newest) else 0

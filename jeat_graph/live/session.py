@@ -10,19 +10,16 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from jeat_graph.config.reading import config_to_dict
-from jeat_graph.data.detections import Scan
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.live.arrival import Arrival
 from jeat_graph.live.health import HealthChange, SensorHealth
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.live.messages import Duplicates, ScanMessage
+from jeat_graph.live.told import Told
 from jeat_graph.live.transport.patience import UnconfirmedError
 from jeat_graph.version import __version__
 
 #: Smoothed rows are fetched, and the sensors judged, at one arrival in so many.
 ARRIVALS_PER_DRAIN = 32
-#: So many scans passed over are told one by one; the rest is in the summary.
-MOST_TOLD = 5
 
 
 class RowsEnd(Protocol):
@@ -99,7 +96,7 @@ class Session:
         self._health = SensorHealth(live.tracker.config)
         self._health.last = kept.get("last", {})
         self._health.silent, self._health.rubbish = kept.get("silent", []), kept.get("rubbish", [])
-        self._told = self._told_restarts = 0
+        self._told = Told(ends.warn, live.tracker.config.live.jump_s)
         self._owed = False  # the tracker has taken a scan whose answer has not gone out
         self._unconfirmed = ""  # or why the last answers may not have arrived
         self._interval = None if live.time is None else live.time // every_s
@@ -117,26 +114,27 @@ class Session:
         """
         restarts = self._seen.restarts.get(message.source, 0)
         if not self._seen.is_new(message):
-            self.duplicates += 1
+            self._passed_again(message, place)
             return
         if self._seen.restarts.get(message.source, 0) > restarts:
-            self._tell_restart(message, place)
+            self._told.restart(message, place)
         before = self.live.time
         arrival = self.live.step(message.batch.scans)
         unanswered = len(arrival.dropped) + len(arrival.repeated) + len(arrival.held)
         if len(arrival.repeated) == len(message.batch.scans):
-            self.duplicates += 1
+            self._passed_again(message, place)
             return
         self.count += 1
         self.flat += message.batch.flat
-        self._tell_dropped(arrival.dropped, arrival.late_s, place)
-        self._tell_times(arrival)
+        self._told.arrived(arrival, message.source, before, place)
+        if arrival.anew or arrival.leapt:
+            self._health.jumped(arrival.t)
         if self.ends.smoothed is not None:
             self.ends.smoothed.begin(arrival.table.classes is not None)
         with self._owing():
             if unanswered < len(message.batch.scans):
                 self.ends.tracks(arrival.t, arrival.table, message, arrival.late_s)
-                for event in self._health.saw(message.batch.scans, arrival.t):
+                for event in self._health.saw(arrival.taken, arrival.t):
                     self._tell(event)
             if self.count % ARRIVALS_PER_DRAIN == 0:
                 self.drain()
@@ -144,6 +142,11 @@ class Session:
                     for event in self._health.judge(self.live.tracker.sensor_states(), arrival.t):
                         self._tell(event)
         self._save_in_time(arrival.t)
+
+    def _passed_again(self, message: ScanMessage, place: str) -> None:
+        """Count a message that had been taken before."""
+        self.duplicates += 1
+        self._told.again(message, place)
 
     def drain(self) -> None:
         """Write the smoothed rows that are final."""
@@ -220,15 +223,6 @@ class Session:
             lines.append(f"source {source!r} began to count its messages anew {often}")
         return lines
 
-    def _tell_restart(self, message: ScanMessage, place: str) -> None:
-        """Tell of the first sources that began to count anew."""
-        self._told_restarts += 1
-        self._tell_first(
-            self._told_restarts,
-            f"{place}source {message.source!r} counts anew from seq {message.seq}, with a newer scan: it was "
-            "started again, and its messages are taken",
-        )
-
     @contextlib.contextmanager
     def _owing(self) -> Iterator[None]:
         """While an answer goes out: what breaks off in here leaves a state that is not to be saved."""
@@ -255,36 +249,6 @@ class Session:
     def _tell(self, event: HealthChange) -> None:
         self.ends.warn(f"warning: {event.text}")
         self.ends.event(event)
-
-    def _tell_dropped(self, dropped: list[Scan], late_s: float, place: str) -> None:
-        """Tell of the first scans passed over."""
-        if not dropped:
-            return
-        self._told += 1
-        why = f"{late_s:.6g} s late" if late_s > 0.0 else "the sensor's scan of that time has come before"
-        self._tell_first(self._told, f"{place}passed over, {why}")
-
-    def _tell_first(self, number: int, text: str) -> None:
-        """Tell of something that may come often, the first times."""
-        if number <= MOST_TOLD:
-            more = "; further ones are only counted" if number == MOST_TOLD else ""
-            self.ends.warn(f"warning: {text}{more}")
-
-    def _tell_times(self, arrival: Arrival) -> None:
-        """Tell of scans whose time was proved wrong, and of a clock that was set back."""
-        if arrival.anew:
-            self._health.last.clear()
-            self.ends.warn(
-                "warning: scans have been far too late for long, so a clock was set back: all tracks end, "
-                f"and time goes on from t = {arrival.t:.6g} s"
-            )
-        for scan in arrival.refuted:
-            self._told += 1
-            if self._told <= MOST_TOLD:
-                self.ends.warn(
-                    f"warning: passed over, sensor {scan.sensor!r} gave the time {scan.t:.6g} s, which no "
-                    "other scan confirms"
-                )
 
     def _save_in_time(self, t: float) -> None:
         interval = t // self._every_s

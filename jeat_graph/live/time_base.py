@@ -1,95 +1,211 @@
-"""Scans whose time is far from all others: held until more of them say that it is now so late.
+"""Which time it is now: what becomes of scans whose times do not follow those before them.
 
 One scan with a time in the future would end all tracks and make all that comes after it too late, and a clock
-that was set back would make everything too late for good. So what is farther from the newest time than any
-pause between scans so far explains is held. A scan that fits the time as it was proves those wrong that are
-held. Ahead of time they are believed when two sensors agree, when a sensor that is alone gives three in a
-row, or when they go on for long enough; behind it, when they go on for long enough. Nothing of that asks for
-the clock on the wall: the same scans in the same order are always taken alike.
+that was set back would make everything too late for good. So there are two times: the *present* one, which
+the tracker has reached, and one that *waits* to replace it. Each message does one of four things:
+
+==============  =======================================  ===============================================
+the message     when                                     what is done
+==============  =======================================  ===============================================
+follows         near the present time (`bound_s`), and   taken; those that wait are refuted
+                some scan of it can be taken
+comes too late  near the present time, but all of it is  passed over; it waits as a witness, without scans
+                too late, or has come before
+is far away     farther than `bound_s`                   held; it waits as a witness
+comes again     it waits already                         the same; it is no further witness
+==============  =======================================  ===============================================
+
+Witnesses that wait form a row: one that is not near the last of them refutes the row and begins another. The
+row is believed, and its time becomes the present one, when it has at least three messages and
+
+- it has gone on for `jump_s` of its own time, or for a thousand messages (a clock that hardly moves); or
+- it is ahead, and of several sensors, or of one beside which no other has been heard of late; or
+- it is far behind, and longer than the messages that the present time has had since it replaced another, if
+  these are ten at most: some wrong messages in a row may be believed, and then the stream behind them is.
+
+A message is one witness, however many scans it has. The bound follows the usual pauses between scans. A jump
+to another time is none of them, so it never widens the bound; and however wide that is, nothing is passed
+over for longer than `jump_s` by a time that nobody confirms. Nothing of this asks for the clock on the wall:
+the same scans in the same order are always taken alike.
 """
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from typing import Any
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 from jeat_graph.data.detections import Scan
 
-#: Pauses between scans that are remembered, and how many times the longest of them is still a usual one.
+#: Pauses between scans that are remembered. The second longest counts, for one alone is not usual; so many
+#: times that is still near.
 _PAUSES, _USUAL = 8, 4.0
-#: So many in a row are believed of a sensor beside which there is no other.
-_ALONE = 3
+#: Nothing is near that is farther away than this, whatever the pauses are (s), unless `jump_s` is longer.
+_FARTHEST_S = 60.0
+#: A row of fewer messages is never believed, and one of so many always is.
+_LEAST, _MOST = 3, 1000
+#: A present time of no more messages since it replaced another is outvoted by a longer row.
+_YOUNG = 10
+
+
+class Witness(NamedTuple):
+    """A message that waits.
+
+    Attributes:
+        t: its newest time (s).
+        sensors: names of its sensors.
+        scans: what is taken when it is believed; none of a message that was passed over as too late.
+    """
+
+    t: float
+    sensors: list[str]
+    scans: list[Scan]
+
+
+class Decision(NamedTuple):
+    """What becomes of a message.
+
+    Attributes:
+        take: scans to be taken now, those that waited first.
+        refuted: scans that waited and are passed over.
+        leapt: whether a row ahead was believed: time goes on there.
+        anew: whether a row behind was believed: time begins anew there.
+    """
+
+    take: list[Scan]
+    refuted: list[Scan]
+    leapt: bool = False
+    anew: bool = False
 
 
 class TimeBase:
-    """Tells scans that fit the time so far from those that do not.
+    """Tells scans that follow those before them from those that do not.
 
     Args:
-        jump_s: a scan so far from the newest time is held, if the latest pauses were not as long (s).
+        jump_s: what is farther from the newest time is held, unless the usual pauses are as long (s).
 
     Attributes:
-        held: scans that wait, in order of arrival.
+        row: the messages that wait, in order of arrival.
+        leap: the newest time before and the oldest after the last leap ahead (s); nothing between was taken.
     """
 
     def __init__(self, jump_s: float) -> None:
         self._jump_s = jump_s
         self._pauses: deque[float] = deque(maxlen=_PAUSES)
-        self.held: list[Scan] = []
+        self._messages = 0  # taken since the present time last replaced another
+        self.row: list[Witness] = []
+        self.leap: tuple[float, float] | None = None
 
     @property
     def bound_s(self) -> float:
-        """How far from the newest time a scan may be (s)."""
-        return max(self._jump_s, _USUAL * max(self._pauses, default=0.0))
+        """How far from the newest time a scan may be to be near it (s)."""
+        usual = sorted(self._pauses)[-2] if len(self._pauses) > 1 else 0.0
+        return max(self._jump_s, min(_USUAL * usual, _FARTHEST_S))
 
-    def fits(self, t: float, now: float | None) -> bool:
+    def near(self, t: float, now: float | None) -> bool:
         """Whether a time is near the newest one (s)."""
         return now is None or abs(t - now) <= self.bound_s
 
     def holds(self, scan: Scan) -> bool:
         """Whether the sensor's scan of that time waits already."""
-        return any(other.t == scan.t and other.sensor == scan.sensor for other in self.held)
+        return any(other.t == scan.t and other.sensor == scan.sensor for w in self.row for other in w.scans)
 
-    def hold(self, scans: Sequence[Scan], now: float, last_look: dict[str, float]) -> tuple[list[Scan], bool]:
-        """Let scans that do not fit wait.
+    def decide(
+        self, scans: Sequence[Scan], now: float | None, late: bool, last_look: dict[str, float]
+    ) -> Decision:
+        """Decide what becomes of a message.
 
         Args:
-            scans: they.
-            now: the newest time so far (s).
+            scans: those of the message that have not come before.
+            now: the newest time so far (s), None before the first scan.
+            late: whether none of them can be taken: they are too late, or have come before.
             last_look: time of each sensor's last scan that was taken (s).
-
-        Returns:
-            Those that they prove wrong, which waited before; and whether those that wait now are believed.
         """
-        t, sensors = scans[0].t, {scan.sensor for scan in (*self.held, *scans)}
+        t = max(scan.t for scan in scans)
+        far = not self.near(t, now)
+        if now is None or not (far or late):
+            return Decision(list(scans), self.clear())
+        sensors = sorted({scan.sensor for scan in scans})
+        if any(t == w.t and sensors == w.sensors for w in self.row[-1:]) or all(map(self.holds, scans)):
+            return Decision([] if far else list(scans), [])
+        known = {name for w in self.row for name in w.sensors} | set(sensors)
         alone = t > now and all(
-            look < now - self.bound_s for name, look in last_look.items() if name not in sensors
+            look < now - self.bound_s for name, look in last_look.items() if name not in known
         )
-        # A sensor beside which there is no other may be a slow one, whose pauses are not known yet.
-        apart_s = max(self.bound_s, abs(self.held[0].t - now)) if self.held and alone else self.bound_s
-        refuted = self.clear() if self.held and abs(t - self.held[-1].t) > apart_s else []
-        self.held += [scan for scan in scans if not self.holds(scan)]
-        times, sensors = [scan.t for scan in self.held], {scan.sensor for scan in self.held}
-        in_a_row = len(self.held) >= _ALONE
-        if in_a_row and (alone or max(times) - min(times) >= self.bound_s):
-            return refuted, True
-        return refuted, t > now and len(sensors) > 1
+        refuted = self.clear() if self.row and abs(t - self.row[-1].t) > self._apart_s(now, alone) else []
+        self.row.append(Witness(t, sensors, list(scans) if far else []))
+        if not self._believed(now, far, alone):
+            return Decision([] if far else list(scans), refuted)
+        return self._replace(scans, now, refuted)
 
-    def clear(self) -> list[Scan]:
-        """Return the scans that wait, and hold none any more."""
-        held, self.held = self.held, []
-        return held
-
-    def passed(self, before: float | None, now: float | None) -> None:
-        """Note that the newest time has gone on (s)."""
+    def took(self, before: float | None, now: float | None) -> None:
+        """Note that a message was taken that followed, and that the newest time has gone on (s)."""
+        self._messages += 1
         if before is not None and now is not None and now > before:
             self._pauses.append(now - before)
 
+    def clear(self) -> list[Scan]:
+        """Return the scans that wait, and hold none any more."""
+        row, self.row = self.row, []
+        return [scan for witness in row for scan in witness.scans]
+
+    def _apart_s(self, now: float, alone: bool) -> float:
+        """How far from the last witness the next may be (s)."""
+        # A sensor beside which there is no other may be a slow one, with pauses that are not known yet.
+        return max(self.bound_s, abs(self.row[0].t - now)) if alone else self.bound_s
+
+    def _believed(self, now: float, far: bool, alone: bool) -> bool:
+        """Whether the row replaces the present time."""
+        count = len(self.row)
+        if count < _LEAST:
+            return False
+        lasted_s = sum(abs(second.t - first.t) for first, second in pairwise(self.row))
+        if lasted_s >= self._jump_s or count >= _MOST:
+            return True
+        if self.row[-1].t > now:
+            return alone or len({name for w in self.row for name in w.sensors}) > 1
+        return far and self._messages <= _YOUNG and count > self._messages
+
+    def _replace(self, scans: Sequence[Scan], now: float, refuted: list[Scan]) -> Decision:
+        """Let the row be the present time."""
+        row, ahead = self.row, self.row[-1].t > now
+        # Of a row behind, what was passed over is gone; its last message may still be taken.
+        take = self.clear() if row[-1].scans else [*self.clear(), *scans]
+        self._messages = len(row)
+        # Steps within the row are pauses that its messages confirm; the jump to it is none.
+        self._pauses.extend(min(b.t - a.t, _FARTHEST_S) for a, b in pairwise(row) if b.t > a.t)
+        self.leap = (now, min(scan.t for scan in take)) if ahead else None
+        return Decision(take, refuted, leapt=ahead, anew=not ahead)
+
     def state(self) -> dict[str, Any]:
         """Return plain data, for `set_state`."""
-        return {"held": self.held, "pauses": list(self._pauses)}
+        return {
+            "row": [tuple(witness) for witness in self.row],
+            "pauses": list(self._pauses),
+            "messages": self._messages,
+            "leap": self.leap,
+        }
 
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Go on from what `state` returned."""
-        self.held = state["held"]
-        self._pauses.extend(state["pauses"])
+    def set_state(self, state: dict[str, Any], now: float | None) -> None:
+        """Go on from what `state` returned.
+
+        A state of an earlier build has scans that wait (`held`) and pauses, believed jumps among them.
+
+        Args:
+            state: it.
+            now: the newest time then (s).
+        """
+        self._messages = state.get("messages", _MOST)
+        if "row" in state:
+            self.row = [Witness(t, list(sensors), list(scans)) for t, sensors, scans in state["row"]]
+            self._pauses.extend(state["pauses"])
+            self.leap = None if state["leap"] is None else tuple(state["leap"])
+            return
+        self.row = [Witness(scan.t, [scan.sensor], [scan]) for scan in state["held"]]
+        after = now
+        for pause in reversed(state["pauses"]):
+            if pause > _FARTHEST_S and after is not None and self.leap is None:
+                self.leap = (after - pause, after)
+            after = None if after is None else after - pause
+        self._pauses.extend(pause for pause in state["pauses"] if pause <= _FARTHEST_S)

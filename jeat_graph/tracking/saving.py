@@ -6,8 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
+import numpy as np
+
 from jeat_graph.config.schema import Config
-from jeat_graph.data.arrays import IntArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.smoothing.access import SmoothedTracks
@@ -15,6 +17,9 @@ from jeat_graph.tracking.snapshot import Snapshot
 from jeat_graph.tracking.state import TrackArrays
 from jeat_graph.tracking.step_record import takers_in
 from jeat_graph.tracking.update_log import UpdateLog, allocate_log
+
+#: Longer ago than this is no longer told apart (s).
+_LONGEST_AGO_S = 1e9
 
 
 class SavedTracks(SmoothedTracks):
@@ -75,10 +80,14 @@ class SavedTracks(SmoothedTracks):
         now = self.snapshot()
         if now.t is None:
             return
-        shifted = {name: getattr(now.scene, name) + (t - now.t) for name in ("first_look", "last_look")}
+        first, last = (
+            _as_long_before(t, looks, now.t) for looks in (now.scene.first_look, now.scene.last_look)
+        )
         none = TrackArrays._make(array[:0] for array in now.tracks)
         self.smooth_anew()
-        self.restore(now._replace(t=None, tracks=none, scene=now.scene._replace(**shifted)))
+        self.restore(
+            now._replace(t=None, tracks=none, scene=now.scene._replace(first_look=first, last_look=last))
+        )
 
     def takers(self, count: int) -> IntArray:
         """Return which track took each of the `count` detections (M,) of the last step, 0 where none did."""
@@ -112,3 +121,10 @@ class SavedTracks(SmoothedTracks):
         if state["now"].t is not None:
             tracker._watch.end()
         return tracker
+
+
+def _as_long_before(t: float, looks: FloatArray, now: float) -> FloatArray:
+    """Times (S,) that are as long before `t` as they were before `now` (s); infinite ones stay."""
+    with np.errstate(over="ignore"):  # a clock may have gone from one end of the numbers to the other
+        ago = np.minimum(now - looks, _LONGEST_AGO_S)
+    return np.where(np.isfinite(looks), t - ago, looks)

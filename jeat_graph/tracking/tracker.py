@@ -246,7 +246,8 @@ class Tracker(SavedTracks):
             source: `supervision.Detections`, a result of `ultralytics`, or boxes (M, 4) left, top, width,
                 height in px; none (M = 0) if the sensor looked and found nothing. Boxes without area, which
                 detectors clip, are left out.
-            t: time (s).
+            t: time (s), not before that of the last step. It is believed: a wrong one in the future ends all
+                tracks, and right ones after it are refused (`LiveTracker` waits for others to confirm it).
             sensor: name of the sensor.
             scores: (M,) confidence in [0, 1], for boxes that come without; 1 where neither says it.
             embeddings: (M, E) what each looks like, of a network for re-identification; NaN where unknown.

@@ -59,7 +59,8 @@ def test_a_clock_that_is_known_to_be_off_is_no_silence_and_hides_none(latency):
     live, health, events = LiveTracker(Tracker(config)), SensorHealth(config), []
     for scan in scans_of(8.0, silent=("rgb", 4.0, 9.0)):
         shown = replace(scan, t=scan.t + latency) if scan.sensor == "rgb" else scan
-        events += health.saw([shown], live.step(shown).t)
+        arrival = live.step(shown)
+        events += health.saw(arrival.taken, arrival.t)
     assert [(event.what, event.sensor) for event in events] == [("silent", "rgb")]
     assert 4.9 <= events[0].t <= 5.1
 

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.io.packing import pack, unpack
 from jeat_graph.live.messages import Duplicates, ScanMessage, decode_scans, encode_tracks
 
 SCAN = {"t": 0.5, "sensor": "rgb", "boxes": [[1.0, 2.0, 3.0, 4.0]], "scores": [0.5]}
@@ -134,7 +135,7 @@ def test_what_is_known_of_numbers_is_kept_as_plain_data():
     for t in (0.0, 200.0):
         assert all(known.is_new(at(k, t + 0.05 * k)) for k in range(2000))
     again = Duplicates()
-    again.set_state(json.loads(json.dumps(known.state())))
+    again.set_state(unpack(*pack(known.state(), {}), {}))
     assert again.restarts == {"cam": 1}
     assert not any(again.is_new(at(k, t + 0.05 * k)) for t in (0.0, 200.0) for k in range(2000))
     assert again.is_new(at(2000, 300.0))

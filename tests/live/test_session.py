@@ -10,7 +10,8 @@ import pytest
 from jeat_graph.config.reading import load_config
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.live.messages import decode_scans
-from jeat_graph.live.session import MOST_TOLD, Ends, Session
+from jeat_graph.live.session import Ends, Session
+from jeat_graph.live.told import MOST_TOLD
 from jeat_graph.live.transport.patience import UnconfirmedError
 from jeat_graph.tracking.tracker import Tracker
 

@@ -17,6 +17,7 @@ from jeat_graph.data.errors import ConfigError
 if TYPE_CHECKING:
     from jeat_graph_sehn.training.procedure import TrainRequest
 
+WRITES = ("out",)
 HELP = "train a network that finds vehicles in pictures, in events or in both, and write it as ONNX"
 _KINDS = ("frames", "events", "fused")
 _NETS = ("tiny", "small", "medium", "large")
