@@ -196,10 +196,10 @@ class MqttSink:
 
     def _suspicion(self) -> str:
         size = max(list(self._sizes.values()), default=0)
-        other = f"another client is called {self._name!r}, too; " if self._name else ""
+        other = f"another client is called {self._name!r}, too; or " if self._name else ""
         return (
-            f"{other}{'or ' if other else ''}it takes no answer of {size} bytes, which was sent again each time; "
-            "then raise its bound, or name it (?largest=BYTES) to have larger ones left out"
+            f"{other}it takes no answer of {size} bytes, which was sent again each time; raise its bound "
+            "or name it (?largest=BYTES) to have larger ones left out"
         )
 
     def send(self, message: bytes) -> None:

@@ -142,8 +142,8 @@ class MqttLink:
             self._quick = self._quick + 1 if time.monotonic() - since < QUICK_S else 0
             if self._quick >= MOST_QUICK:
                 self.trouble = (
-                    f"the broker ended the connection {MOST_QUICK} times, each time within {QUICK_S:g} s; most likely "
-                    + self.suspicion()
+                    f"the broker ended the connection {MOST_QUICK} times, each time within {QUICK_S:g} s; "
+                    f"most likely {self.suspicion()}"
                 )
         self.on_lost()
 
