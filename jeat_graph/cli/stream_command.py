@@ -52,7 +52,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="json",
         help="output: one line of JSON a step, or the rows of causal.csv (default: json)",
     )
-    add("--source", metavar="URL", help="take scans from mqtt://, nats:// or kafka://host/topic, not stdin")
+    add(
+        "--source",
+        metavar="URL",
+        help="take scans from mqtt://, nats:// or kafka://host/topic, not stdin; with a login as in "
+        "mqtt://user:${VARIABLE}@host/topic or mqtt://user@host/topic?password_file=FILE",
+    )
     add("--sink", metavar="URL", help="send tracks to mqtt://, nats:// or kafka://host/topic, not stdout")
     add("--encoding", choices=("json", "msgpack"), default="json", help="of messages to --sink")
     add_time_unit(parser)

@@ -6,6 +6,7 @@ import argparse
 import contextlib
 import io
 import json
+import os
 import sys
 from pathlib import Path
 
@@ -75,14 +76,25 @@ def test_what_is_said_of_wrong_arguments_has_no_password(command, tmp_path, monk
     assert not files_with(tmp_path, MARKS)
 
 
+def test_a_camera_s_address_in_a_manifest_is_shown_without_its_password(tmp_path, capfd):
+    manifest, out = tmp_path / "manifest.csv", tmp_path / "out"
+    manifest.write_text(f"name,detections\na,rtsp://{USER}:{PASSWORD}@camera/a.csv\nb,none.csv\n")
+    assert main(["batch", str(manifest), "--out", str(out)]) != 0
+    said = capfd.readouterr()
+    assert secret_free(said.out + said.err)
+    assert not files_with(out, MARKS)
+
+
 @pytest.mark.parametrize("place", ["inputs", "files", "reading"])
-def test_a_stranger_s_run_has_no_file_read_that_the_user_did_not_name(place, recording, tmp_path, capfd):
+def test_a_stranger_s_run_has_no_file_read_that_the_user_did_not_name(
+    place, recording, tmp_path, capfd, small_plots
+):
     """What `run.json` names may be anybody's: nothing of it is shown."""
     from jeat_graph.io.hashing import sha256_of
 
-    run, private = tmp_path / "work" / "run", tmp_path / "private" / "canary.csv"
+    run, private = tmp_path / "a/b/c/d/run", tmp_path / "private" / "canary.csv"  # nowhere near
     private.parent.mkdir()
-    run.parent.mkdir()
+    run.parent.mkdir(parents=True)
     private.write_text(f"{CONTENT}\n{CONTENT}: 1\n")
     assert main(["track", str(recording / "detections.csv"), "--out", str(run)]) == 0
     record = json.loads((run / "run.json").read_text())
@@ -94,7 +106,7 @@ def test_a_stranger_s_run_has_no_file_read_that_the_user_did_not_name(place, rec
         record["reading"]["images"] = str(private)
         record["images"] = described
     else:
-        record["files"] = {f"../../private/{private.name}": described, **record["files"]}
+        record["files"] = {os.path.relpath(private, run): described, **record["files"]}
     (run / "run.json").write_text(json.dumps(record))
     commands = [
         ("compare", run, "--gt", recording / "gt.csv", "--out", tmp_path / "out"),
@@ -108,7 +120,7 @@ def test_a_stranger_s_run_has_no_file_read_that_the_user_did_not_name(place, rec
     ]
     capfd.readouterr()
     for words in commands:
-        with contextlib.suppress(SystemExit):
+        with contextlib.suppress(SystemExit), small_plots():
             main([str(word) for word in words])
         said = capfd.readouterr()
         if private not in words:

@@ -246,6 +246,23 @@ class TestNats:
         )  # 0 may not have been done
         source.close()
 
+    def test_a_consumer_that_somebody_deletes_is_made_anew_and_told_of(self, gantries, nats_port):
+        """To ask for it at once again and again took a whole processor, in silence."""
+        url, name = gantries
+        told: list[str] = []
+        source = open_source(f"{url}.a?durable=mine", tell=told.append)
+        send(f"{url}.a", numbered(5))
+        assert receive(source, 5) == numbered(5)
+        jetstream(nats_port, lambda jet: jet.delete_consumer(name, "mine"))
+        begin = time.monotonic()
+        assert source.receive(0.2) is None
+        assert time.monotonic() - begin >= 0.2
+        send(f"{url}.a", numbered(5, start=5))
+        assert receive(source, 5) == numbered(5, start=5)
+        assert len(told) == 1
+        assert "the consumer 'mine' of stream" in told[0]
+        source.close()
+
     def test_a_wrong_password_is_said_at_once(self, tmp_path):
         server = brokers.nats_server(tmp_path, "--user", "me", "--pass", "right")
         begin = time.monotonic()

@@ -132,8 +132,10 @@ class NatsSource:
                 self._waiting.extend(
                     link.call(self._pull.fetch(self.most_open, timeout=timeout_s), timeout_s + CALL_S)
                 )
-        except (NatsError, TimeoutError):
+        except TimeoutError:
             pass
+        except NatsError:
+            self._gone(timeout_s)
         with contextlib.suppress(NatsError, TimeoutError):
             self._presence.check()
         if not self._waiting:
@@ -141,6 +143,23 @@ class NatsSource:
         message = self._waiting.popleft()
         self._last, self._open = message.metadata.sequence.stream, message
         return bytes(message.data)
+
+    def _gone(self, timeout_s: float) -> None:
+        """Make the consumer anew, which somebody deleted; not at once, since the server may just start."""
+        link = self._link
+        end = time.monotonic() + timeout_s
+        while time.monotonic() < end and not link.overdue():
+            time.sleep(min(SLICE_S, timeout_s))
+        if not link.client.is_connected:
+            return  # it is mended by itself
+        self._notices.once(
+            f"warning: {self.address}: the consumer {self._durable!r} of stream {link.stream!r} is gone; "
+            "it is made anew"
+        )
+        with contextlib.suppress(NatsError, TimeoutError):
+            self._subscribe(self._last)
+            self._open = None
+            self._notices.forget()
 
     def commit(self) -> None:
         """Acknowledge the last message, and with it all before."""
