@@ -90,9 +90,9 @@ class Presence:
         """
         if not self._asked_for:
             return
-        self._asked_for = False
         link = self._link
         known = link.call(link.jet.consumer_info(link.stream, self._durable))
+        self._asked_for = False
         if known.created != self._created:
             self._refuse("was taken over by another stream, which got no answer from this one")
 
