@@ -14,10 +14,11 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NoReturn
 
 from jeat_graph.config.argument_types import output_rate, picture_size, positive
 from jeat_graph.config.smoothing import ENGINES
+from jeat_graph.data.secrets import without_logins
 from jeat_graph.data.time_units import TIME_UNITS
 from jeat_graph.io.formats import FORMATS
 
@@ -26,11 +27,18 @@ SCORE_SCALES = ("unit", "percent", "logistic")
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that takes options by their whole names only: `--image` is never taken for `--images`."""
+    """A parser that takes options by their whole names only: `--image` is never taken for `--images`.
+
+    What it says of wrong arguments shows no password of a URL among them.
+    """
 
     def __init__(self, *args: Any, **options: Any) -> None:
         options.setdefault("allow_abbrev", False)
         super().__init__(*args, **options)
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong and end with code 2."""
+        super().error(without_logins(message))
 
 
 def add_config(parser: argparse.ArgumentParser, default: str = "default", *, settings: bool = True) -> None:

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 WRITES = ("checkpoint", "smoothed", "road", "record")
 HELP = "track scans that arrive on stdin or from a broker, and give out the tracks of each moment at once"
 STDIN = "<stdin>"
-_WARM_STEPS = 20  # enough for a track to be confirmed and smoothed
 #: A source is told what has been taken whenever it has nothing more, and after this part of what may be open.
 _COMMIT_PART = 0.5
 _EVERY_S = 10.0
@@ -55,7 +54,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="json",
         help="output: one line of JSON a step, or the rows of causal.csv (default: json)",
     )
-    add("--source", metavar="URL", help="take scans from mqtt://, nats:// or kafka://host/topic, not stdin")
+    add(
+        "--source",
+        metavar="URL",
+        help="take scans from mqtt://, nats:// or kafka://host/topic, not stdin; with a login as in "
+        "mqtt://user:${VARIABLE}@host/topic or mqtt://user@host/topic?password_file=FILE",
+    )
     add("--sink", metavar="URL", help="send tracks to mqtt://, nats:// or kafka://host/topic, not stdout")
     add("--encoding", choices=("json", "msgpack"), default="json", help="of messages to --sink")
     add_time_unit(parser)
@@ -102,10 +106,11 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.live.session import Ends, Session
     from jeat_graph.live.smoothed_file import SmoothedFile
     from jeat_graph.live.transport.patience import UnconfirmedError
+    from jeat_graph.live.warm_up import warm_up
 
     config = _config(args)
     live, more = _tracker(args, config)
-    _warm_up(config)
+    warm_up(config)
     with contextlib.ExitStack() as stack:
         interrupts = stack.enter_context(Interrupts())
         source, sink = _ends(args, stack, interrupts)
@@ -120,6 +125,7 @@ def run(args: argparse.Namespace) -> int:
             smoothed=smoothed,
             flush=output.flush,
             commit=(lambda: None) if source is None else source.commit,
+            too_large=(lambda: 0) if sink is None else lambda: sink.too_large,
         )
         session = Session(live, ends, args.checkpoint, args.every or _EVERY_S, more)
         output.seq = more.get("count", 0)
@@ -141,6 +147,7 @@ def _config(args: argparse.Namespace) -> Config:
 
     from jeat_graph.config.reading import load_config
     from jeat_graph.data.errors import ConfigError
+    from jeat_graph.live.transport.ends import check_addresses
 
     config = load_config(args.config, [*made_by(args, _say), *overrides(args)])
     if args.checkpoint is not None and config.smoother.worker:
@@ -149,6 +156,7 @@ def _config(args: argparse.Namespace) -> Config:
         raise ConfigError("--every is the time between checkpoints: it needs --checkpoint FILE")
     if args.sink is not None and args.format == "csv":
         raise ConfigError("--format csv is for stdout; messages to --sink are JSON or MessagePack")
+    check_addresses(args.source, args.sink)
     if (args.road is None) != (args.camera is None):
         raise ConfigError("--road and --camera go together: give both")
     if args.road is not None and args.late == "rewind":
@@ -207,28 +215,13 @@ def _ends(
 ) -> tuple[Source | None, Sink | None]:
     from jeat_graph.live.transport.ends import open_sink, open_source
 
-    source = None if args.source is None else open_source(args.source, interrupts.overdue)
+    source = None if args.source is None else open_source(args.source, interrupts.overdue, _say)
     if source is not None:
         stack.callback(source.close)
-    sink = None if args.sink is None else open_sink(args.sink, interrupts.overdue)
+    sink = None if args.sink is None else open_sink(args.sink, interrupts.overdue, _say)
     if sink is not None:
         stack.callback(sink.close)
     return source, sink
-
-
-def _warm_up(config: Config) -> None:
-    """Load the compiled code before the first scan arrives, which should not wait for it."""
-    from dataclasses import replace
-
-    from jeat_graph.tracking.notice import notice_if_cold
-    from jeat_graph.tracking.tracker import Tracker
-
-    notice_if_cold()
-    spare = Tracker(replace(config, smoother=replace(config.smoother, worker=False)))
-    box = [0.4 * config.image.width, 0.4 * config.image.height, 40.0, 30.0]
-    for k in range(_WARM_STEPS):
-        spare.step([(0.05 * k, name, [box], [0.9]) for name in spare.sensor_names])
-    spare.finish()
 
 
 def _take_all(
@@ -243,7 +236,7 @@ def _take_all(
             _take(session, message, place, bad, args.time_unit)
         return
     since = 0
-    for item in from_source(source, args.source, interrupts, bad):
+    for item in from_source(source, str(source.address), interrupts, bad):
         if item is not None:
             _take(session, *item, bad, args.time_unit)
             since += 1
@@ -290,9 +283,11 @@ def _skip(session: Session) -> Callable[[DataError], None]:
 def _finish(session: Session, args: argparse.Namespace) -> None:
     from jeat_graph.io.atomic import open_atomic
 
-    session.save()
-    with contextlib.suppress(BrokenPipeError):
-        session.finish()
+    try:
+        session.save()
+    finally:  # a broker that takes no more is no reason to lose what is smoothed
+        with contextlib.suppress(BrokenPipeError):
+            session.finish()
     if args.record is not None:
         with open_atomic(args.record) as file:
             json.dump(session.summary(), file, indent=1)

@@ -20,6 +20,7 @@ from types import FrameType
 from typing import Any
 
 from jeat_graph.data.progress import write_line
+from jeat_graph.data.secrets import without_logins
 
 #: Signals that ask a process to end, the first by Ctrl-C; each lets a command tidy up.
 _ENDS = ("SIGINT", "SIGTERM", "SIGHUP")
@@ -43,8 +44,11 @@ class Terminated(KeyboardInterrupt):
 
 
 def one_line(text: object) -> str:
-    """Return a text as one line that no terminal obeys: what cannot be printed is escaped."""
-    words = " ".join(str(text).split())
+    """Return a text as one line that no terminal obeys and that shows no password.
+
+    What cannot be printed is escaped; users and passwords in URLs are struck out.
+    """
+    words = " ".join(without_logins(str(text)).split())
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in words)
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from jeat_graph.data.errors import JeatGraphError, OtherRunError
+from jeat_graph.data.secrets import without_logins
 from jeat_graph.live.recording_road import drive_on_road, known_vehicles, run_tables
 from jeat_graph.runs.directory import read_record
 from jeat_graph.runs.track_files import TrackRequest
@@ -78,7 +79,7 @@ def run_job(job: Job) -> Outcome:
         return Outcome(job.name, FAILED, {}, error=_one_line(str(error)))
     except Exception as error:  # one recording's trouble must not be the others'
         what = _one_line(f"unexpected {type(error).__name__}: {error}")
-        return Outcome(job.name, FAILED, {}, error=what, trace=traceback.format_exc())
+        return Outcome(job.name, FAILED, {}, error=what, trace=without_logins(traceback.format_exc()))
 
 
 def _track(job: Job) -> None:
@@ -160,4 +161,5 @@ def _outcome(name: str, status: str, record: dict[str, Any], vehicles: int | Non
 
 
 def _one_line(text: str) -> str:
-    return " ".join(text.split())
+    # A manifest's cell may be a camera's address, with its password.
+    return " ".join(without_logins(text).split())

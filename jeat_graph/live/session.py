@@ -11,6 +11,7 @@ from typing import Any, Protocol
 
 from jeat_graph.config.reading import config_to_dict
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.live.counts import Counts, count_lines
 from jeat_graph.live.health import HealthChange, SensorHealth
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.live.messages import Duplicates, ScanMessage
@@ -47,6 +48,7 @@ class Ends:
         kept: what else a checkpoint is to hold; it is there again as `more["kept"]`.
         flush: sees to it that all that was given out has arrived.
         commit: tells the source of messages that all so far need not come again.
+        too_large: how many answers were not sent because the broker takes none that large.
     """
 
     tracks: Callable[[float, Trajectories, ScanMessage, float], object]
@@ -56,6 +58,7 @@ class Ends:
     kept: Callable[[], dict[str, Any]] = dict
     flush: Callable[[], object] = lambda: None
     commit: Callable[[], object] = lambda: None
+    too_large: Callable[[], int] = lambda: 0
 
 
 class Session:
@@ -90,6 +93,7 @@ class Session:
         self.bad: int = kept.get("bad", 0)
         self.duplicates: int = kept.get("duplicates", 0)
         self.flat: int = kept.get("flat", 0)
+        self._too_large_before: int = kept.get("too_large", 0)
         self._seen = Duplicates()
         if "seen" in kept:
             self._seen.set_state(kept["seen"])
@@ -148,6 +152,11 @@ class Session:
         self.duplicates += 1
         self._told.again(message, place)
 
+    @property
+    def too_large(self) -> int:
+        """Answers that a broker does not take because of their size, of earlier sessions too."""
+        return self._too_large_before + self.ends.too_large()
+
     def drain(self) -> None:
         """Write the smoothed rows that are final."""
         if self.ends.smoothed is not None:
@@ -167,6 +176,7 @@ class Session:
                 "bad": self.bad,
                 "duplicates": self.duplicates,
                 "flat": self.flat,
+                "too_large": self.too_large,
                 "seen": self._seen.state(),
                 "last": self._health.last,
                 "silent": self._health.silent,
@@ -198,6 +208,7 @@ class Session:
             "unreadable": self.bad,
             "duplicates": self.duplicates,
             "boxes_without_area": self.flat,
+            "answers_too_large": self.too_large,
             "restarts": dict(self._seen.restarts),
             "steps_taken_again": self.live.replayed,
             "lateness": lateness,
@@ -212,16 +223,8 @@ class Session:
             for name, one in lateness.items()
             if any(other.late for other in lateness.values())
         ]
-        if self.bad:
-            lines.append(f"{self.bad} messages could not be read and were passed over")
-        if self.duplicates:
-            lines.append(f"{self.duplicates} messages had been taken before and were passed over")
-        if self.flat:
-            lines.append(f"{self.flat} box(es) without area left out")
-        for source, count in self._seen.restarts.items():
-            often = "once" if count == 1 else f"{count} times"
-            lines.append(f"source {source!r} began to count its messages anew {often}")
-        return lines
+        counts = Counts(self.bad, self.duplicates, self.flat, self.too_large)
+        return lines + count_lines(counts, self._seen.restarts)
 
     @contextlib.contextmanager
     def _owing(self) -> Iterator[None]:

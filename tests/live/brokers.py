@@ -72,7 +72,8 @@ class Server:
         self._process.send_signal(signal.SIGCONT)
 
 
-def mosquitto(folder: Path) -> Server | None:
+def mosquitto(folder: Path, *settings: str) -> Server | None:
+    """Mosquitto, with further lines of its configuration; None if this machine has none."""
     path = program("mosquitto")
     if path is None:
         return None
@@ -80,16 +81,18 @@ def mosquitto(folder: Path) -> Server | None:
     (folder / "mosquitto.conf").write_text(
         f"listener {port} 127.0.0.1\nallow_anonymous true\npersistence true\n"
         f"persistence_location {folder}/\nmax_queued_messages 100000\nuser root\n"
+        + "".join(f"{line}\n" for line in settings)
     )
     return Server([path, "-c", str(folder / "mosquitto.conf")], port)
 
 
-def nats_server(folder: Path) -> Server | None:
+def nats_server(folder: Path, *options: str) -> Server | None:
+    """A nats-server with JetStream; None if this machine has none."""
     path = program("nats-server")
     if path is None:
         return None
     port = free_port()
-    return Server([path, "-a", "127.0.0.1", "-p", str(port), "-js", "-sd", str(folder)], port)
+    return Server([path, "-a", "127.0.0.1", "-p", str(port), "-js", "-sd", str(folder), *options], port)
 
 
 class MockKafka:

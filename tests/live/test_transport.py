@@ -9,8 +9,7 @@ import uuid
 import pytest
 from live_tests import brokers
 
-from jeat_graph.data.errors import ConfigError, JeatGraphError
-from jeat_graph.live.transport.address import parse_address
+from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.live.transport.ends import open_sink, open_source
 
 SCHEMES = {"mqtt": "paho.mqtt", "nats": "nats", "kafka": "confluent_kafka"}
@@ -161,33 +160,6 @@ def test_both_ends_survive_a_restart_of_the_broker(broker, url):
     sender.join(PATIENCE_S)
     sink.close()
     source.close()
-
-
-@pytest.mark.parametrize(
-    ("address", "message"),
-    [
-        ("amqp://host/topic", "is no address of a broker"),
-        ("mqtt://host", "names no topic"),
-        ("nats:///topic", "names no host"),
-        ("kafka://host:x/topic", "the port is no number"),
-        ("mqtt://host/topic?qos=2", "unknown option 'qos'"),
-    ],
-)
-def test_an_address_that_is_wrong_is_refused_with_what_is_right(address, message):
-    with pytest.raises(ConfigError, match=message):
-        open_source(address)
-
-
-def test_an_address_is_taken_apart_and_never_shows_its_password():
-    address = parse_address("mqtt://me:s%3Acret@host:99/a/+/#?client=c", ("client",))
-    assert (address.host, address.port, address.topic) == ("host", 99, "a/+/#")
-    assert (address.user, address.password, address.options) == ("me", "s:cret", {"client": "c"})
-    assert "cret" not in str(address)
-
-
-def test_tracks_go_to_no_wild_card():
-    with pytest.raises(ConfigError, match="wild cards"):
-        open_sink("mqtt://host/a/#")
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

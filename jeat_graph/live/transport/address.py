@@ -2,27 +2,46 @@
 
 from __future__ import annotations
 
+import ipaddress
+import os
+import re
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import TypeVar
-from urllib.parse import parse_qsl, unquote, urlsplit
+from pathlib import Path
+from typing import NoReturn, TypeVar
+from urllib.parse import SplitResult, parse_qsl, unquote, urlsplit
 
 from jeat_graph.data.errors import ConfigError
+from jeat_graph.data.secrets import Secret, shown_url
+from jeat_graph.live.transport.topics import wrong_name, wrong_topic
 
 PORTS = {"mqtt": 1883, "nats": 4222, "kafka": 9092}
+#: The option that every address has: a file with the password in its only line.
+PASSWORD_FILE = "password_file"
+#: More is no password (bytes).
+_PASSWORD_MOST = 4096
+#: Bound of how many messages may be open: what MQTT can say.
+NUMBER_MOST = 65_535
+_VARIABLE = re.compile(r"\$\{([A-Za-z_][A-Za-z0-9_]*)\}")
+#: Part of a machine's name between two dots.
+_LABEL = re.compile(r"(?!-)[A-Za-z0-9_-]{1,63}(?<!-)")
+_HOST_MOST = 253
+#: So much of an address is shown (characters).
+_SHOWN = 200
+_EXAMPLE = f"an address is {'|'.join(PORTS)}://[user@]host[:port]/topic"
 _Number = TypeVar("_Number", int, float)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Address:
-    """A topic of a broker.
+    """A topic of a broker; shown in any way it has neither user nor password.
 
     Attributes:
         scheme: `mqtt`, `nats` or `kafka`.
-        host: name or number of the broker's machine.
+        host: name or number of the broker's machine, that of IPv6 without brackets.
         port: its port.
         topic: topic (MQTT, Kafka) or subject (NATS).
-        user: name to log in with, or None.
+        user: name to log in with, or None; a token of NATS stands here.
         password: password, or None.
         options: what stands behind the question mark.
     """
@@ -31,20 +50,27 @@ class Address:
     host: str
     port: int
     topic: str
-    user: str | None
-    password: str | None
+    user: Secret | None
+    password: Secret | None
     options: dict[str, str]
 
+    @property
+    def server(self) -> str:
+        """`host:port`, with the brackets of IPv6."""
+        return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
+
     def __str__(self) -> str:
-        # For messages: without the password.
-        return f"{self.scheme}://{self.host}:{self.port}/{self.topic}"
+        return f"{self.scheme}://{self.server}/{self.topic}"
+
+    def __repr__(self) -> str:
+        return f"Address({str(self)!r})"
 
     def option(self, name: str, default: str) -> str:
         """Return an option as text."""
         return self.options.get(name, default)
 
-    def number(self, name: str, default: _Number, low: float = 0.0) -> _Number:
-        """Return an option as a number of the default's kind, at least `low`.
+    def number(self, name: str, default: _Number, low: float = 0.0, high: float = NUMBER_MOST) -> _Number:
+        """Return an option as a number of the default's kind, from `low` to `high`.
 
         Raises:
             ConfigError: it is no such number.
@@ -56,37 +82,141 @@ class Address:
             value = type(default)(text)
         except ValueError:
             value = None
-        if value is None or not low <= value < float("inf"):
-            raise ConfigError(f"{self}: {name} must be a number of at least {low:g}, not {text!r}")
+        if value is None or not low <= value <= high:
+            raise ConfigError(f"{self}: {name} must be a number from {low:g} to {high:.0f}, not {text!r}")
         return value
 
 
 def parse_address(url: str, known: Collection[str]) -> Address:
-    """Take an URL apart.
+    """Take a URL apart.
+
+    The password need not stand in it: `${NAME}` in user or password is taken from the environment, and the
+    option `password_file` names a file that holds the password.
 
     Args:
-        url: `SCHEME://[USER:PASSWORD@]HOST[:PORT]/TOPIC[?OPTION=VALUE&…]`. MQTT's `#` may stand as it is.
-        known: names of the options that make sense.
+        url: `SCHEME://[USER[:PASSWORD]@]HOST[:PORT]/TOPIC[?OPTION=VALUE&…]`. MQTT's `#` may stand as it is.
+        known: names of the options that make sense, beside `password_file`.
 
     Raises:
-        ConfigError: what is wrong, and what would be right.
+        ConfigError: what is wrong, and what would be right; never with what may be a password.
     """
-    example = f"an address is {'|'.join(PORTS)}://host[:port]/topic"
-    # MQTT's wild card is no fragment here.
-    parts = urlsplit(url.replace("#", "%23"))
-    if parts.scheme not in PORTS:
-        raise ConfigError(f"{url!r} is no address of a broker; {example}")
-    try:
-        port = parts.port or PORTS[parts.scheme]
-    except ValueError:
-        raise ConfigError(f"{url!r}: the port is no number; {example}") from None
+    parts = _split(url)
+    host, port = _host(parts, url), _port(parts, url)
     topic = unquote(parts.path.removeprefix("/"))
-    if not parts.hostname or not topic:
-        raise ConfigError(f"{url!r} names no {'topic' if parts.hostname else 'host'}; {example}")
-    options = dict(parse_qsl(parts.query, keep_blank_values=True))
-    strange = next((name for name in options if name not in known), None)
-    if strange is not None:
-        raise ConfigError(f"unknown option {strange!r} in the address; known: {', '.join(known) or 'none'}")
-    user = unquote(parts.username) if parts.username else None
-    password = unquote(parts.password) if parts.password else None
-    return Address(parts.scheme, parts.hostname, port, topic, user, password, options)
+    if not topic:
+        _refuse(url, f"names no topic; {_EXAMPLE}")
+    wrong = wrong_topic(parts.scheme, topic)
+    if wrong:
+        _refuse(url, f"the topic is not valid: {wrong}")
+    options = _options(parts, url, known)
+    user = _login(parts.username, url)
+    password = _login(parts.password, url)
+    file = options.pop(PASSWORD_FILE, None)
+    if file is not None:
+        if user is None or password is not None:
+            _refuse(url, f"{PASSWORD_FILE} goes with a user and without a password: user@host")
+        password = _password_from(file)
+    return Address(parts.scheme, host, port, topic, user, password, options)
+
+
+def _refuse(url: str, why: str) -> NoReturn:
+    raise ConfigError(f"{_shown(url)!r}: {why}") from None
+
+
+def _shown(url: str) -> str:
+    shown = shown_url(url)
+    return shown if len(shown) <= _SHOWN else f"{shown[:_SHOWN]}…"
+
+
+def _split(url: str) -> SplitResult:
+    if not url.isprintable():
+        _refuse(url, "an address has no line breaks and no control characters")
+    try:
+        # MQTT's wild card is no fragment here.
+        parts = urlsplit(url.replace("#", "%23"))
+    except ValueError:
+        _refuse(url, f"the host is no name and no number; {_EXAMPLE}")
+    if parts.scheme not in PORTS:
+        raise ConfigError(f"{_shown(url)!r} is no address of a broker; {_EXAMPLE}")
+    if "@" in parts.path or "@" in parts.query:
+        # Most likely the rest of a password; to go on would show it as a topic.
+        _refuse(url, "in a topic @ is written %40, and in a password / is %2F, ? is %3F, % is %25")
+    return parts
+
+
+def _host(parts: SplitResult, url: str) -> str:
+    host = parts.hostname
+    if not host:
+        _refuse(url, f"names no host; {_EXAMPLE}")
+    try:
+        if parts.netloc.rpartition("@")[2].startswith("["):
+            ipaddress.IPv6Address(host)
+            return host
+        name = host.removesuffix(".").encode("idna").decode()
+    except ValueError:  # UnicodeError is one
+        name = ""
+    if not name or len(name) > _HOST_MOST or not all(_LABEL.fullmatch(part) for part in name.split(".")):
+        _refuse(url, f"the host is no name and no number; {_EXAMPLE}")
+    return host
+
+
+def _port(parts: SplitResult, url: str) -> int:
+    try:
+        port = parts.port
+    except ValueError:
+        port = 0
+    if port is None:
+        return PORTS[parts.scheme]
+    if port == 0:
+        _refuse(url, f"the port is no number from 1 to 65535; {_EXAMPLE}")
+    return port
+
+
+def _options(parts: SplitResult, url: str, known: Collection[str]) -> dict[str, str]:
+    """Return the options; each is known, given once and not empty."""
+    options: dict[str, str] = {}
+    for name, value in parse_qsl(parts.query, keep_blank_values=True):
+        if name not in (*known, PASSWORD_FILE):
+            names = ", ".join((*known, PASSWORD_FILE))
+            raise ConfigError(f"unknown option {name!r} in the address; known: {names}")
+        if name in options:
+            _refuse(url, f"the option {name} is given twice")
+        if not value or (name != PASSWORD_FILE and wrong_name(parts.scheme, value)):
+            _refuse(url, f"the option {name} has no value that the broker takes")
+        options[name] = value
+    return options
+
+
+def _login(text: str | None, url: str) -> Secret | None:
+    """Return a user or a password as it is meant: `%` and two digits as a sign, `${NAME}` as a variable."""
+    if not text:
+        return None
+    found = []
+    for k, part in enumerate(_VARIABLE.split(text)):
+        if k % 2:  # the names of variables stand between what is around them
+            value = os.environ.get(part, "")
+            if not value:
+                _refuse(url, f"the environment variable {part} is not set")
+            found.append(value)
+        elif "${" in part:
+            _refuse(url, "a variable is written ${NAME}")
+        else:
+            found.append(unquote(part))
+    return Secret("".join(found))
+
+
+def _password_from(file: str) -> Secret:
+    """Read the only line of a file; its content is in no message."""
+    try:
+        with Path(file).open("rb") as stream:
+            content = stream.read(_PASSWORD_MOST + 1)
+    except (OSError, ValueError) as error:
+        why = error.strerror if isinstance(error, OSError) else "is no file"
+        raise ConfigError(f"{PASSWORD_FILE}: {file}: {why}") from None
+    try:
+        text = content.decode().removesuffix("\n").removesuffix("\r")
+    except UnicodeDecodeError:
+        text = ""
+    if not text or len(content) > _PASSWORD_MOST or not text.isprintable():
+        raise ConfigError(f"{PASSWORD_FILE}: {file}: must hold one line, the password, in UTF-8")
+    return Secret(text)

@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import Protocol
 
 from jeat_graph.data.errors import ConfigError, JeatGraphError
-from jeat_graph.live.transport.address import parse_address
+from jeat_graph.live.transport.address import Address, parse_address
+from jeat_graph.live.transport.notices import Notices, Tell, say_nothing
 from jeat_graph.live.transport.patience import Overdue, never
+from jeat_graph.live.transport.topics import covers, has_wild_cards
 
 SOURCE_OPTIONS = {"mqtt": ("client", "most"), "nats": ("stream", "durable", "most"), "kafka": ("group",)}
-SINK_OPTIONS = {"mqtt": ("client", "most"), "nats": ("stream", "most"), "kafka": ("key", "most")}
+SINK_OPTIONS = {"mqtt": ("client", "most", "largest"), "nats": ("stream", "most"), "kafka": ("key", "most")}
 
 
 class Source(Protocol):
@@ -19,13 +21,19 @@ class Source(Protocol):
     holds back what is beyond `most_open` messages, so a slow tracker is never flooded.
 
     Attributes:
+        address: where it reads.
         most_open: so many messages may be received and not committed; then none comes until `commit`.
     """
 
+    address: Address
     most_open: int
 
     def receive(self, timeout_s: float) -> bytes | None:
-        """Wait for the next message; None if none came in that time, or the connection is being mended."""
+        """Wait for the next message; None if none came in that time, or the connection is being mended.
+
+        Raises:
+            JeatGraphError: no more will come: another program reads in this one's place, or the like.
+        """
 
     def commit(self) -> None:
         """Tell the broker that all that was received need not come again."""
@@ -35,7 +43,20 @@ class Source(Protocol):
 
 
 class Sink(Protocol):
-    """Takes messages; waits where the broker is slower than they come."""
+    """Takes messages; waits where the broker is slower than they come.
+
+    One that is larger than the broker takes is not sent, told of and counted: to send it again is no help.
+
+    Attributes:
+        address: where it writes.
+        too_large: messages that were not sent because of their size.
+    """
+
+    address: Address
+
+    @property
+    def too_large(self) -> int:
+        """Messages that were not sent because of their size."""
 
     def send(self, message: bytes) -> None:
         """Hand over a message; waits while too many are on their way.
@@ -57,64 +78,111 @@ class Sink(Protocol):
         """Flush and leave; what the broker does not confirm before the program is to end is given up."""
 
 
-def open_source(url: str, overdue: Overdue = never) -> Source:
+def source_address(url: str) -> Address:
+    """Take the address of a source apart.
+
+    Raises:
+        ConfigError: it is not valid.
+    """
+    return parse_address(url, SOURCE_OPTIONS.get(_scheme(url), ()))
+
+
+def sink_address(url: str) -> Address:
+    """Take the address of a sink apart.
+
+    Raises:
+        ConfigError: it is not valid.
+    """
+    address = parse_address(url, SINK_OPTIONS.get(_scheme(url), ()))
+    if has_wild_cards(address.scheme, address.topic):
+        raise ConfigError(f"{address}: tracks go to one topic, without wild cards")
+    return address
+
+
+def check_addresses(source: str | None, sink: str | None) -> None:
+    """See that the ends of one stream are valid, and not in each other's way; connects to nobody.
+
+    Args:
+        source: address of the scans, if they come from a broker.
+        sink: address of the tracks, if they go to one.
+
+    Raises:
+        ConfigError: an address is not valid, the tracks would come back as scans, or both ends have one
+            name at a broker that throws out the older of two such clients.
+    """
+    one = None if source is None else source_address(source)
+    other = None if sink is None else sink_address(sink)
+    if one is None or other is None or (one.scheme, one.server) != (other.scheme, other.server):
+        return
+    if covers(one.scheme, one.topic, other.topic):
+        raise ConfigError(f"{one}: the tracks that go to {other.topic!r} would come back as scans")
+    client = one.options.get("client")
+    if client is not None and client == other.options.get("client"):
+        raise ConfigError(f"{one}: source and sink are both called client={client}; names must differ")
+
+
+def open_source(url: str, overdue: Overdue = never, tell: Tell = say_nothing) -> Source:
     """Open the source at an address.
 
     Args:
         url: the address.
         overdue: tells when the program is to end; then nothing is waited for any longer.
+        tell: takes each line for the user; called by whoever calls the source.
 
     Raises:
         ConfigError: the address is not valid.
         JeatGraphError: the client's package is missing, or nobody answers at the address.
     """
-    scheme = url.partition(":")[0]
-    address = parse_address(url, SOURCE_OPTIONS.get(scheme, ()))
+    address = source_address(url)
+    notices = Notices(tell)
     try:
         if address.scheme == "mqtt":
             from jeat_graph.live.transport.mqtt import MqttSource
 
-            return MqttSource(address, overdue)
+            return MqttSource(address, overdue, notices)
         if address.scheme == "nats":
             from jeat_graph.live.transport.nats import NatsSource
 
-            return NatsSource(address, overdue)
+            return NatsSource(address, overdue, notices)
         from jeat_graph.live.transport.kafka import KafkaSource
 
-        return KafkaSource(address)
+        return KafkaSource(address, overdue, notices)
     except ImportError as error:
-        raise _missing(scheme, error) from None
+        raise _missing(address.scheme, error) from None
 
 
-def open_sink(url: str, overdue: Overdue = never) -> Sink:
+def open_sink(url: str, overdue: Overdue = never, tell: Tell = say_nothing) -> Sink:
     """Open the sink at an address.
 
     Args:
         url: the address.
         overdue: tells when the program is to end; then nothing is waited for any longer.
+        tell: takes each line for the user; called by whoever calls the sink.
 
     Raises:
         ConfigError: the address is not valid.
         JeatGraphError: the client's package is missing, or nobody answers at the address.
     """
-    scheme = url.partition(":")[0]
-    address = parse_address(url, SINK_OPTIONS.get(scheme, ()))
-    if set(address.topic) & set("#+*>"):
-        raise ConfigError(f"{address}: tracks go to one topic, without wild cards")
+    address = sink_address(url)
+    notices = Notices(tell)
     try:
         if address.scheme == "mqtt":
             from jeat_graph.live.transport.mqtt import MqttSink
 
-            return MqttSink(address, overdue)
+            return MqttSink(address, overdue, notices)
         if address.scheme == "nats":
             from jeat_graph.live.transport.nats import NatsSink
 
-            return NatsSink(address, overdue)
+            return NatsSink(address, overdue, notices)
         from jeat_graph.live.transport.kafka import KafkaSink
 
-        return KafkaSink(address, overdue)
+        return KafkaSink(address, overdue, notices)
     except ImportError as error:
-        raise _missing(scheme, error) from None
+        raise _missing(address.scheme, error) from None
+
+
+def _scheme(url: str) -> str:
+    return url.partition(":")[0].lower()
 
 
 def _missing(scheme: str, error: ImportError) -> JeatGraphError:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from typing import Any
 
@@ -9,6 +10,7 @@ from confluent_kafka import Consumer, KafkaError, KafkaException, Producer, Topi
 
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.live.transport.address import Address
+from jeat_graph.live.transport.notices import Notices
 from jeat_graph.live.transport.patience import SLICE_S, Overdue, UnconfirmedError, check, never
 
 #: Kafka itself sets no bound to what is received and not committed; the stream commits at least so often.
@@ -20,11 +22,13 @@ _FOR_GOOD = (KafkaError.TOPIC_AUTHORIZATION_FAILED, KafkaError.GROUP_AUTHORIZATI
 _SESSION_MS = 6000
 #: How soon a topic that is made later is seen (ms).
 _REFRESH_MS = 2000
+#: The client's own bound of a message (bytes): what the broker takes is the broker's to say.
+_MESSAGE_MOST = 128 * 2**20
 
 
 def _settings(address: Address) -> dict[str, Any]:
     settings: dict[str, Any] = {
-        "bootstrap.servers": f"{address.host}:{address.port}",
+        "bootstrap.servers": address.server,
         "log_level": 0,
         "error_cb": lambda _: None,  # it mends connections by itself; what is for good stands in the messages
     }
@@ -32,8 +36,8 @@ def _settings(address: Address) -> dict[str, Any]:
         settings |= {
             "security.protocol": "sasl_plaintext",
             "sasl.mechanism": "PLAIN",
-            "sasl.username": address.user,
-            "sasl.password": address.password or "",
+            "sasl.username": address.user.reveal(),
+            "sasl.password": "" if address.password is None else address.password.reveal(),
         }
     return settings
 
@@ -48,21 +52,27 @@ def _reach(client: Any, address: Address) -> None:
 class KafkaSource:
     """Messages of a topic, as a member of a group (see `ends.Source`); order holds within a partition.
 
+    Members of one group share the topic's partitions; one for which none is left is told so.
+
     Args:
         address: option `group` (default `jeat-graph.TOPIC`).
+        overdue: tells when the program is to end; nothing is waited for that long here.
+        notices: takes what the user is to know.
 
     Raises:
         JeatGraphError: nobody answers.
     """
 
-    def __init__(self, address: Address) -> None:
+    def __init__(self, address: Address, overdue: Overdue = never, notices: Notices | None = None) -> None:
         self.most_open = MOST_OPEN
-        self._address = address
+        self.address = address
+        self._notices = notices or Notices()
         self._next: dict[tuple[str, int], int] = {}
+        self._group = address.option("group", f"jeat-graph.{address.topic}")
         self._consumer = Consumer(
             _settings(address)
             | {
-                "group.id": address.option("group", f"jeat-graph.{address.topic}"),
+                "group.id": self._group,
                 "enable.auto.commit": False,
                 "session.timeout.ms": _SESSION_MS,
                 "auto.offset.reset": "earliest",
@@ -71,7 +81,29 @@ class KafkaSource:
             }
         )
         _reach(self._consumer, address)
-        self._consumer.subscribe([address.topic])
+        self._consumer.subscribe(
+            [address.topic], on_assign=self._on_assign, on_revoke=self._on_revoke, on_lost=self._on_revoke
+        )
+
+    def _on_assign(self, consumer: Any, partitions: list[TopicPartition]) -> None:
+        if partitions:
+            self._notices.forget()
+            return
+        with contextlib.suppress(KafkaException):
+            if (
+                consumer.list_topics(self.address.topic, timeout=_CONNECT_S)
+                .topics[self.address.topic]
+                .partitions
+            ):
+                self._notices.once(
+                    f"warning: {self.address}: other members of the group {self._group!r} have all of the "
+                    "topic, so nothing comes here; a stream of its own needs ?group=NAME"
+                )
+
+    def _on_revoke(self, consumer: Any, partitions: list[TopicPartition]) -> None:
+        # What comes to another member now is not ours to acknowledge: to try would fail for the rest, too.
+        for gone in partitions:
+            self._next.pop((gone.topic, gone.partition), None)
 
     def receive(self, timeout_s: float) -> bytes | None:
         """Wait for the next message.
@@ -82,13 +114,14 @@ class KafkaSource:
         end = time.monotonic() + timeout_s
         while True:
             message: Any = self._consumer.poll(max(end - time.monotonic(), 0.0))
+            self._notices.tell()
             if message is None:
                 return None
             error = message.error()
             if error is None:
                 break
             if error.fatal() or error.code() in _FOR_GOOD:
-                raise JeatGraphError(f"{self._address}: {error.str()}")
+                raise JeatGraphError(f"{self.address}: {error.str()}")
         self._next[message.topic(), message.partition()] = message.offset() + 1
         return bytes(message.value() or b"")
 
@@ -116,26 +149,41 @@ class KafkaSink:
     Args:
         address: options `key`, `most` (messages on their way at a time).
         overdue: tells when the program is to end.
+        notices: takes what the user is to know.
 
     Raises:
         JeatGraphError: nobody answers.
     """
 
-    def __init__(self, address: Address, overdue: Overdue = never) -> None:
-        self._address, self._overdue = address, overdue
+    def __init__(self, address: Address, overdue: Overdue = never, notices: Notices | None = None) -> None:
+        self.address, self._overdue = address, overdue
+        self._notices = notices or Notices()
         self._most = address.number("most", MOST_OPEN, low=1)
         self._key = address.option("key", "tracks")
         self._refused = ""
-        self._producer = Producer(_settings(address) | {"enable.idempotence": True, "linger.ms": 2})
+        self._producer = Producer(
+            _settings(address)
+            | {"enable.idempotence": True, "linger.ms": 2, "message.max.bytes": _MESSAGE_MOST}
+        )
         _reach(self._producer, address)
+
+    @property
+    def too_large(self) -> int:
+        """Messages that were not sent because of their size."""
+        return self._notices.too_large
 
     def send(self, message: bytes) -> None:
         """Produce; waits while too many are on their way."""
         while len(self._producer) >= self._most:
             self._producer.poll(SLICE_S)
             self._check()
-            check(self._overdue, self._address)
-        self._producer.produce(self._address.topic, message, self._key, on_delivery=self._delivered)
+            check(self._overdue, self.address)
+        try:
+            self._producer.produce(self.address.topic, message, self._key, on_delivery=self._delivered)
+        except KafkaException as error:
+            if error.args[0].code() != KafkaError.MSG_SIZE_TOO_LARGE:
+                raise JeatGraphError(f"{self.address}: tracks were refused: {error.args[0].str()}") from None
+            self._notices.larger(self.address, len(message), _MESSAGE_MOST)
         self._producer.poll(0)
         self._check()
 
@@ -143,16 +191,21 @@ class KafkaSink:
         """Wait until all are confirmed."""
         while self._producer.flush(SLICE_S):
             self._check()
-            check(self._overdue, self._address)
+            check(self._overdue, self.address)
         self._check()
 
-    def _delivered(self, error: Any, _: Any) -> None:
-        if error is not None:
+    def _delivered(self, error: Any, message: Any) -> None:
+        if error is None:
+            return
+        if error.code() == KafkaError.MSG_SIZE_TOO_LARGE:
+            self._notices.larger(self.address, len(message.value() or b""), None)
+        else:
             self._refused = error.str()
 
     def _check(self) -> None:
+        self._notices.tell()
         if self._refused:
-            raise JeatGraphError(f"{self._address}: tracks were refused: {self._refused}")
+            raise JeatGraphError(f"{self.address}: tracks were refused: {self._refused}")
 
     def close(self) -> None:
         """Flush; the producer ends with this object."""

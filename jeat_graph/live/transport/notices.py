@@ -1,0 +1,68 @@
+"""What a broker's client notices in a thread of its own and the user is to be told."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+
+#: Takes one line for the user.
+Tell = Callable[[str], object]
+#: So many things of a kind are told one by one; the rest is counted.
+MOST_TOLD = 5
+
+
+def say_nothing(_: str) -> None:
+    """Tell nobody."""
+
+
+class Notices:
+    """Lines for the user from any thread, told in the thread that asks for them.
+
+    Args:
+        tell: takes each line.
+
+    Attributes:
+        too_large: messages that the broker does not take, and which were not sent.
+    """
+
+    def __init__(self, tell: Tell = say_nothing) -> None:
+        self.too_large = 0
+        self._tell = tell
+        self._lines: deque[str] = deque()
+        self._known: set[str] = set()
+
+    def add(self, line: str) -> None:
+        """Keep a line until `tell`."""
+        self._lines.append(line)
+
+    def once(self, line: str) -> None:
+        """Keep a line that is told once, until `forget`."""
+        if line not in self._known:
+            self._known.add(line)
+            self.add(line)
+
+    def forget(self) -> None:
+        """Let what was told once be told again: it was over meanwhile."""
+        self._known.clear()
+
+    def larger(self, where: object, size: int, most: int | None) -> None:
+        """Keep that a message was not sent because it is larger than the broker takes.
+
+        Args:
+            where: the address.
+            size: of the message (bytes).
+            most: what the broker takes (bytes), or None if it does not say.
+        """
+        self.too_large += 1
+        if self.too_large <= MOST_TOLD:
+            bound = "takes" if most is None else f"takes ({most})"
+            more = "; further ones are only counted" if self.too_large == MOST_TOLD else ""
+            self.add(
+                f"warning: {where}: an answer of {size} bytes is larger than the broker {bound} and was not "
+                f"sent; raise the broker's bound{more}"
+            )
+
+    def tell(self) -> None:
+        """Tell all that has been noticed."""
+        while self._lines:
+            self._tell(self._lines.popleft())
