@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from functools import partial
 from importlib import import_module
 
+from jeat_graph.cli import leave_current_folder
 from jeat_graph.cli.terminal import Terminated, describe, in_good_order, say, write_anything
 from jeat_graph.config import kernel_cache
 from jeat_graph.data.errors import JeatGraphError
@@ -122,4 +123,5 @@ def _run(args: argparse.Namespace) -> int:
 
 
 if __name__ == "__main__":
+    leave_current_folder()
     sys.exit(main())
