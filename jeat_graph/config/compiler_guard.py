@@ -1,9 +1,9 @@
 """Keeps the compiler from running what strangers left for it, and from stumbling over a damaged cache.
 
 The compiler (numba) reads settings from the current folder, where the user's data lie, and one of them says
-where machine code is kept; and it runs what it finds there, whoever wrote it. What is empty, cut off or garbage
-there would end the program. So settings come from the environment alone, a file that others could have written
-is as good as none, and what cannot be read is compiled anew.
+where machine code is kept; and it runs what it finds there, whoever wrote it. What is empty, cut off or
+garbage there would end the program. So settings come from the environment alone, a file that others could
+have written is as good as none, and what cannot be read is compiled anew.
 """
 
 from __future__ import annotations
