@@ -23,10 +23,9 @@ from jeat_graph.live.arrival import Arrival, Taken, looked_last, most_late_s
 from jeat_graph.live.lateness import LatenessCounter
 from jeat_graph.live.rewinding import Rewinding, TakenStep
 from jeat_graph.live.time_base import TimeBase
-from jeat_graph.tracking.checkpoint import load_state, save_state
+from jeat_graph.tracking.checkpoint import load_state, refusing_damage, save_state
 from jeat_graph.tracking.prediction import Prediction
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
-from jeat_graph.tracking.state_check import refusing_damage
 from jeat_graph.tracking.step_record import StepRecord
 from jeat_graph.tracking.tracker import Tracker
 
@@ -206,12 +205,11 @@ class LiveTracker:
             raise DataError("holds a tracker, but not one that takes late scans", path)
         with refusing_damage(path):
             live = LiveTracker(Tracker.from_state(kept, state), state["policy"])
-            live._newest = state["newest"]
             live.lateness.set_state(state["lateness"])
             live._rewinding.set_state(state["rewinding"])
             live._base.set_state(state["base"])
             live._kept, live._first = len(live._base.held), state["base"]["first"]
-            live._again_until = live.tracker.time
+            live._newest, live._again_until = state["newest"], live.tracker.time
             return live, state["more"]
 
     def predict(self, t: float) -> Prediction:
