@@ -16,6 +16,7 @@ from pyarrow import parquet
 
 from jeat_graph.cli.main import main
 from jeat_graph.data.errors import DataError
+from jeat_graph.io import unpacking
 from jeat_graph.io.detections_io import read_detections
 from jeat_graph.io.picture_file import MOST_PIXELS, read_picture
 from jeat_graph.io.unpacking import LEAST_ROOM, MOST_TIMES, check_unpacked, most_unpacked
@@ -40,7 +41,8 @@ def refused():
     return read
 
 
-def test_the_bound_follows_from_what_is_there():
+def test_the_bound_follows_from_what_is_there(monkeypatch):
+    monkeypatch.setattr(unpacking, "free_memory", lambda: None)
     assert most_unpacked(0) == LEAST_ROOM
     assert most_unpacked(LEAST_ROOM) == MOST_TIMES * LEAST_ROOM
     check_unpacked(LEAST_ROOM, 1, "a.zip")
