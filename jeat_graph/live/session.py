@@ -215,6 +215,9 @@ class Session:
             lines.append(f"{self.duplicates} messages had been taken before and were passed over")
         if self.flat:
             lines.append(f"{self.flat} box(es) without area left out")
+        if self._seen.forgotten:
+            known = f"only the last {self._seen.SOURCES} are known by their numbers"
+            lines.append(f"{self._seen.forgotten} sources were forgotten: {known}")
         for source, count in self._seen.restarts.items():
             often = "once" if count == 1 else f"{count} times"
             lines.append(f"source {source!r} began to count its messages anew {often}")
