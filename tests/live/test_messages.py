@@ -155,7 +155,7 @@ def test_memory_of_sources_is_bounded_and_who_is_heard_stays_known():
     again.set_state(duplicates.state())
     assert list(again.seen) == list(duplicates.seen)
     assert again.forgotten == duplicates.forgotten
-    assert not again.is_new(at(count, 0.05 * count, "steady"))
+    assert not again.is_new(at(count, 0.05 * (count - 1), "steady"))
 
 
 def test_what_a_source_is_called_and_how_far_it_counts_is_bounded():
