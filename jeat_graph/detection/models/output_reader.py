@@ -90,7 +90,7 @@ class OutputReader:
         return f"{self._path}: {self.no_numbers} boxes had no numbers (NaN or infinite), {where}: left out"
 
     def _with_numbers(self, found: DecodedBoxes) -> DecodedBoxes:
-        """Leave out and count the boxes that have no numbers; not counted is one of too low a score anyway."""
+        """Leave out the boxes that have no numbers, and count those of a score that is not too low."""
         numbers = np.isfinite(found.corners).all(axis=1) & np.isfinite(found.scores)
         without = int(np.count_nonzero(~numbers & ~(found.scores < self._settings.score)))
         self._looks += 1
