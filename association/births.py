@@ -55,6 +55,13 @@ def choose_births(
     by_left = np.argsort(track_boxes[:, 0], kind="mergesort")
     left = track_boxes[by_left, 0]
     widest = np.max(track_boxes[:, 2]) if len(left) > 0 else 0.0
+    sweep = np.argsort(boxes[:, 0], kind="mergesort")
+    # In the order of the sweep: the birth that a detection has started or joined, or -1.
+    birth = np.full(num, -1, dtype=np.int64)
+    place = np.empty(num, dtype=np.int64)
+    place[sweep] = np.arange(num)
+    swept = boxes[sweep]
+    broadest = np.max(boxes[:, 2]) if num > 0 else 0.0
     for j in order:
         if taken[j] or existence[j] < min_existence:
             continue
@@ -70,7 +77,7 @@ def choose_births(
                 k += 1
             if refused:
                 continue
-            for b in range(count):
+            for b in _births_near(boxes[j], swept, broadest, birth):
                 common = overlap(boxes[j], boxes[parents[b]])
                 earlier = view[b, sensor[j]]
                 if earlier < 0:
@@ -78,6 +85,7 @@ def choose_births(
                     if common > 0.5 * max_overlap:
                         refused = True
                         partner[j] = b
+                        birth[place[j]] = b
                         view[b, sensor[j]] = j
                         break
                 else:
@@ -91,5 +99,33 @@ def choose_births(
             view[count] = -1
             view[count, sensor[j]] = j
             parents[count] = j
+            birth[place[j]] = count
             count += 1
     return parents[:count], partner, double
+
+
+@njit(cache=True)
+def _births_near(box: FloatArray, swept: FloatArray, broadest: float, birth: IntArray) -> IntArray:
+    """Births, ascending, of which any box overlaps another one: no other can coincide with it.
+
+    Args:
+        box: (4,) left, top, width, height (px).
+        swept: (M, 4) all detections from left to right.
+        broadest: the greatest of their widths (px).
+        birth: (M,) the birth that each of these has started or joined, or -1.
+    """
+    left, top, right, bottom = box[0], box[1], box[0] + box[2], box[1] + box[3]
+    near = np.empty(8, dtype=np.int64)
+    count = 0
+    k = np.searchsorted(swept[:, 0], left - broadest)
+    while k < len(swept) and swept[k, 0] < right:
+        beside = (
+            swept[k, 1] >= bottom or swept[k, 1] + swept[k, 3] <= top or swept[k, 0] + swept[k, 2] <= left
+        )
+        if birth[k] >= 0 and not beside:
+            if count == len(near):
+                near = np.concatenate((near, np.empty_like(near)))
+            near[count] = birth[k]
+            count += 1
+        k += 1
+    return np.unique(near[:count])
