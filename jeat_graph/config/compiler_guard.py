@@ -123,7 +123,7 @@ class _Guarding(Loader):
 
 def _guard(caching: ModuleType) -> None:
     """Have the compiler's cache and its settings treated as is said above."""
-    file: Any = caching.IndexDataCacheFile  # type: ignore[attr-defined]
+    file: Any = caching.IndexDataCacheFile
     if getattr(file._load_index, "guarded", False):
         return
     _without_settings_of_folder()

@@ -35,7 +35,8 @@ from jeat_graph.tracking.smoothing.sizes import SizeWindow
 from jeat_graph.tracking.smoothing.waiting import WaitingRows
 from jeat_graph.tracking.snapshot import Snapshot
 from jeat_graph.tracking.state import SceneState, TrackArrays
-from jeat_graph.tracking.state_check import check_attributes, checked_snapshot, refusing_damage
+from jeat_graph.tracking.state_check import checked_snapshot, made_with
+from jeat_graph.tracking.state_check import refusing_damage as refusing_damage
 from jeat_graph.tracking.step_record import StepRecord
 from jeat_graph.version import __version__
 
@@ -101,10 +102,12 @@ def _codecs(config: Config, forget: bool = True) -> dict[str, Codec]:
 
 def _whole_codec(kind: type[Any]) -> Codec:
     """Codec of objects that are their attributes, all of which must be there."""
-    plain = plain_codec(kind)
+    plain, needed = plain_codec(kind), made_with(kind)
 
     def together(saved: dict[str, Any]) -> Any:
-        check_attributes(kind, set(saved))
+        missing = needed - saved.keys()
+        if missing:
+            raise DataError(f"is damaged: {kind.__name__} without {min(missing)}")
         return plain.together(saved)
 
     return Codec(kind, plain.apart, together)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -75,29 +74,16 @@ def checked_snapshot(snapshot: Snapshot, config: Config) -> Snapshot:
     return snapshot
 
 
-def check_attributes(kind: type[Any], names: set[str]) -> None:
-    """Refuse an object of a class from which attributes are missing that it has from the first.
-
-    Raises:
-        DataError: names the first.
-    """
-    missing = sorted(_made_with(kind) - names)
-    if missing:
-        raise DataError(f"is damaged: {kind.__name__} without {missing[0]}")
-
-
-@cache
-def _made_with(kind: type[Any]) -> frozenset[str]:
-    """Return the names of the attributes that a class's `__init__` sets."""
+def made_with(kind: type[Any]) -> frozenset[str]:
+    """Return the names of the attributes that a class's `__init__` sets, which each of its objects has."""
     import dis
 
-    made: set[str] = set()
     for one in kind.__mro__:
-        function = vars(one).get("__init__")
+        function: Any = vars(one).get("__init__")
         if hasattr(function, "__code__"):
-            made |= {step.argval for step in dis.get_instructions(function) if step.opname == "STORE_ATTR"}
-            break
-    return frozenset(made)
+            steps = dis.get_instructions(function)
+            return frozenset(str(step.argval) for step in steps if step.opname == "STORE_ATTR")
+    return frozenset()
 
 
 class _Template(NamedTuple):
