@@ -6,11 +6,16 @@ connected component at a time: on a highway most components are one track and on
 
 from __future__ import annotations
 
+import heapq
+
 import numpy as np
 import numpy.typing as npt
 from numba import njit
 
 from jeat_graph.data.arrays import FloatArray, IntArray
+
+# Cells of a matrix that is faster filled and searched than lists are.
+_MOST_DENSE = 4096
 
 
 @njit(cache=True)
@@ -66,10 +71,14 @@ def assign(
                 col_slot[cols[p]] = num_c
                 col_of[num_c] = cols[p]
                 num_c += 1
-        block = np.full((num_r, num_c), np.inf)
-        for p in pairs:
-            block[row_slot[rows[p]], col_slot[cols[p]]] = costs[p]
-        solution = solve_dense(block, unassigned_cost)
+        if num_r * num_c > _MOST_DENSE:
+            at, to, given = row_slot[rows[pairs]], col_slot[cols[pairs]], costs[pairs]
+            solution = solve_sparse(num_r, num_c, at, to, given, unassigned_cost)
+        else:
+            block = np.full((num_r, num_c), np.inf)
+            for p in pairs:
+                block[row_slot[rows[p]], col_slot[cols[p]]] = costs[p]
+            solution = solve_dense(block, unassigned_cost)
         for r in range(num_r):
             if solution[r] >= 0:
                 match[row_of[r]] = col_of[solution[r]]
@@ -155,6 +164,80 @@ def solve_dense(cost: FloatArray, unassigned_cost: float) -> IntArray:
             if r == start:
                 break
             sink = previous
+    return col_of
+
+
+@njit(cache=True)
+def solve_sparse(
+    num_rows: int, num_cols: int, rows: IntArray, cols: IntArray, costs: FloatArray, unassigned_cost: float
+) -> IntArray:
+    """Solve one assignment problem as `solve_dense` does, to the same bit, by its admissible pairs alone.
+
+    In a crowd everything hangs together, and a matrix of all rows and columns would take gigabytes. The
+    columns that a path can reach wait in a heap, the nearest first and of equally near ones the first.
+
+    Args:
+        num_rows: number of rows R.
+        num_cols: number of columns.
+        rows: (P,) row of each admissible pair.
+        cols: (P,) column of each; a pair is listed at most once.
+        costs: (P,) finite cost of each.
+        unassigned_cost: finite cost of leaving a row without column.
+
+    Returns:
+        (R,) column of each row, or -1.
+    """
+    order = np.argsort(rows, kind="mergesort")
+    begin = np.searchsorted(rows[order], np.arange(num_rows + 1))
+    u, v = np.zeros(num_rows), np.zeros(num_cols)
+    col_of, row_of = np.full(num_rows, -1, dtype=np.int64), np.full(num_cols, -1, dtype=np.int64)
+    distance, parent = np.full(num_cols, np.inf), np.full(num_cols, -1, dtype=np.int64)
+    done = np.zeros(num_cols, dtype=np.bool_)
+    for start in range(num_rows):
+        near = [(np.inf, np.int64(num_cols))]
+        seen = [np.int64(num_cols)][:0]
+        row, reached, exit_cost, exit_row, sink = start, 0.0, np.inf, -1, -1
+        while True:
+            leave = reached + unassigned_cost - u[row]
+            if leave < exit_cost:
+                exit_cost, exit_row = leave, row
+            for p in order[begin[row] : begin[row + 1]]:
+                c = cols[p]
+                d = reached + costs[p] - u[row] - v[c]
+                if not done[c] and d < distance[c]:
+                    if parent[c] < 0:
+                        seen.append(c)
+                    distance[c], parent[c] = d, row
+                    heapq.heappush(near, (d, c))
+            while near[0][1] < num_cols and (done[near[0][1]] or near[0][0] > distance[near[0][1]]):
+                heapq.heappop(near)
+            best, best_col = near[0]
+            if best_col == num_cols or exit_cost <= best:
+                reached = exit_cost
+                break
+            reached = best
+            done[best_col] = True
+            if row_of[best_col] < 0:
+                sink = best_col
+                break
+            row = row_of[best_col]
+        u[start] += reached
+        for c in seen:
+            if done[c] and row_of[c] >= 0:
+                u[row_of[c]] += reached - distance[c]
+            if done[c]:
+                v[c] -= reached - distance[c]
+        if sink < 0 and exit_row != start:
+            sink = col_of[exit_row]
+            col_of[exit_row] = -1
+        while sink >= 0:
+            r = parent[sink]
+            row_of[sink] = r
+            previous = col_of[r]
+            col_of[r] = sink
+            sink = -1 if r == start else previous
+        for c in seen:
+            distance[c], parent[c], done[c] = np.inf, -1, False
     return col_of
 
 

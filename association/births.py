@@ -55,6 +55,14 @@ def choose_births(
     by_left = np.argsort(track_boxes[:, 0], kind="mergesort")
     left = track_boxes[by_left, 0]
     widest = np.max(track_boxes[:, 2]) if len(left) > 0 else 0.0
+    # Births by upright strips of the picture, each as wide as the broadest box: lists that begin at `first`.
+    broadest = np.max(boxes[:, 2]) if num > 0 else 0.0
+    begin = np.min(boxes[:, 0]) if num > 0 else 0.0
+    reach = np.max(boxes[:, 0]) - begin if num > 0 else 0.0
+    strip_px = max(broadest, reach / max(num, 1), 1e-9)
+    first = np.full(int(reach / strip_px) + 1, -1, dtype=np.int64)
+    following = np.full(num, -1, dtype=np.int64)
+    birth = np.full(num, -1, dtype=np.int64)  # that a detection has started or joined, or -1
     for j in order:
         if taken[j] or existence[j] < min_existence:
             continue
@@ -70,7 +78,7 @@ def choose_births(
                 k += 1
             if refused:
                 continue
-            for b in range(count):
+            for b in _births_near(boxes[j], boxes, begin, strip_px, first, following, birth):
                 common = overlap(boxes[j], boxes[parents[b]])
                 earlier = view[b, sensor[j]]
                 if earlier < 0:
@@ -78,6 +86,7 @@ def choose_births(
                     if common > 0.5 * max_overlap:
                         refused = True
                         partner[j] = b
+                        birth[j] = b
                         view[b, sensor[j]] = j
                         break
                 else:
@@ -91,5 +100,48 @@ def choose_births(
             view[count] = -1
             view[count, sensor[j]] = j
             parents[count] = j
+            birth[j] = count
             count += 1
+        if birth[j] >= 0:
+            strip = int((boxes[j, 0] - begin) / strip_px)
+            following[j] = first[strip]
+            first[strip] = j
     return parents[:count], partner, double
+
+
+@njit(cache=True)
+def _births_near(
+    box: FloatArray,
+    boxes: FloatArray,
+    begin: float,
+    strip_px: float,
+    first: IntArray,
+    following: IntArray,
+    birth: IntArray,
+) -> IntArray:
+    """Births, ascending, of which any box overlaps another one: no other can coincide with it.
+
+    Args:
+        box: (4,) left, top, width, height (px).
+        boxes: (M, 4) all detections.
+        begin: where the first strip begins (px).
+        strip_px: how wide each is, no box being broader.
+        first: (P,) a detection whose left side lies in each strip, or -1.
+        following: (M,) the next one of the same strip, or -1.
+        birth: (M,) the birth that each of these has started or joined.
+    """
+    left, top, right, bottom = box[0], box[1], box[0] + box[2], box[1] + box[3]
+    near = np.empty(8, dtype=np.int64)
+    count = 0
+    own, last = int((left - begin) / strip_px), int((right - begin) / strip_px)
+    for strip in range(max(own - 1, 0), min(last, len(first) - 1) + 1):
+        k = first[strip]
+        while k >= 0:
+            beside = boxes[k, 0] >= right or boxes[k, 0] + boxes[k, 2] <= left
+            if not beside and boxes[k, 1] < bottom and boxes[k, 1] + boxes[k, 3] > top:
+                if count == len(near):
+                    near = np.concatenate((near, np.empty_like(near)))
+                near[count] = birth[k]
+                count += 1
+            k = following[k]
+    return np.unique(near[:count])

@@ -33,7 +33,7 @@ def ask(job: dict[str, Any]) -> Any:
         RuntimeError: the child failed; the message holds the end of what it said.
     """
     done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.speed_worker"],
+        [sys.executable, "-P", "-m", "benchmarks.speed_worker"],
         input=json.dumps(job),
         capture_output=True,
         text=True,

@@ -16,6 +16,7 @@ from jeat_graph.data.progress import with_progress
 from jeat_graph.data.rates import ANY_RATE_HZ, median_rate_hz
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.pairing import check_lives, check_pair, check_truth
+from jeat_graph.io.beside import check_beside
 from jeat_graph.io.formats import BY_FRAME
 from jeat_graph.io.scans_io import read_instants
 
@@ -129,7 +130,7 @@ def tables_of(path: Path) -> dict[str, Path]:
     """Find the tables of a run by kind, `causal` before `smoothed`; a file alone is taken by its name.
 
     Raises:
-        DataError: there is no such path, or it is a directory without either table.
+        DataError: there is no such path, or it is a directory without either table, or with a link elsewhere.
     """
     if not path.exists():
         raise DataError("there is no such run directory or table", path)
@@ -139,6 +140,7 @@ def tables_of(path: Path) -> dict[str, Path]:
     for kind in ("causal", "smoothed"):
         here = [path / (kind + suffix) for suffix in SUFFIXES if (path / (kind + suffix)).is_file()]
         if here:
+            check_beside(here[0], path)
             found[kind] = here[0]
     if not found:
         raise DataError("this directory has neither causal.csv nor smoothed.csv, so it is no run", path)

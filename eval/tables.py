@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from jeat_graph.data.errors import ConfigError
+from jeat_graph.io.spreadsheets import guarded
 
 Cell = str | float | int | None
 FORMATS = ("text", "markdown", "csv", "latex", "json")
@@ -120,7 +121,7 @@ class Table:
         writer.writerow(self.columns)
         # Full precision: a CSV is read by programs.
         writer.writerows(
-            ["" if v is None or (isinstance(v, float) and math.isnan(v)) else v for v in row]
+            ["" if v is None or (isinstance(v, float) and math.isnan(v)) else _as_field(v) for v in row]
             for row in self.rows
         )
         return out.getvalue()
@@ -160,3 +161,7 @@ def _plain(value: object) -> object:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
+
+
+def _as_field(value: Cell) -> Cell:
+    return guarded(value) if isinstance(value, str) else value

@@ -1,6 +1,9 @@
 """The command line as `python -m jeat_graph`."""
 
-from jeat_graph.cli.main import main
+from jeat_graph.cli import leave_current_folder
 
 if __name__ == "__main__":
+    leave_current_folder()
+    from jeat_graph.cli.main import main
+
     raise SystemExit(main())

@@ -12,6 +12,7 @@ from importlib import import_module
 from typing import Any
 
 from jeat_graph.api.beside import COMMAND_GROUP, HOW_TO_GET, find
+from jeat_graph.cli import leave_current_folder
 from jeat_graph.cli.held_outputs import holding
 from jeat_graph.cli.terminal import Terminated, describe, in_good_order, say, write_anything
 from jeat_graph.config import kernel_cache
@@ -161,4 +162,5 @@ def _run(args: argparse.Namespace) -> int:
 
 
 if __name__ == "__main__":
+    leave_current_folder()
     sys.exit(main())

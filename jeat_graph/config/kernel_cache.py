@@ -2,7 +2,8 @@
 
 The compiler keeps its machine code beside the sources, or in the user's cache. A container may have neither:
 an installation that cannot be written, and no home. Then the code is kept in a private folder for temporary
-files, and where there is none of those either, it is compiled anew in each run.
+files, and where there is none of those either, it is compiled anew in each run. A folder into which others
+could put machine code counts as none.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import stat
 import tempfile
 from pathlib import Path
 
+from jeat_graph.config.compiler_guard import guard_compiler, is_as_sources, is_private
 from jeat_graph.config.stale_kernels import drop_stale
 
 _VARIABLE = "NUMBA_CACHE_DIR"
@@ -26,29 +28,45 @@ def choose_cache() -> None:
     What the folder holds of an earlier state of the package is thrown away.
     """
     global notice
+    guard_compiler()
     if os.environ.get("NUMBA_CACHE_LOCATOR_CLASSES"):
         return
     if os.environ.get(_VARIABLE):
         drop_stale(_package(), Path(os.environ[_VARIABLE]))
         return
-    if _takes_files(Path(__file__).parent / "__pycache__"):
+    beside = Path(__file__).parent / "__pycache__"
+    open_beside = _takes_files(beside)
+    if open_beside and is_as_sources(beside, Path(__file__).parent):
         drop_stale(_package())
         return
     folder = _user_cache()
-    if _takes_files(folder):
+    if _takes_files(folder) and is_private(folder):
+        if open_beside:  # the compiler would take that first
+            _keep_in(folder)
         drop_stale(_package(), folder)
         return
     temporary = _temporary_folder()
     if temporary is not None:
-        from numba.core import config
-
-        os.environ[_VARIABLE] = str(temporary)  # for processes that this one starts
-        config.CACHE_DIR = str(temporary)  # type: ignore[attr-defined]
-        notice = f"neither the installation nor a home can be written: compiled code is kept in {temporary}"
+        _keep_in(temporary)
+        notice = (
+            "neither beside the installation nor in the home is a folder that this user, and nobody else, "
+            f"can write: compiled code is kept in {temporary}"
+        )
         drop_stale(_package(), temporary)
         return
-    notice = "no folder can be written: the tracker is compiled anew in each run; set NUMBA_CACHE_DIR"
+    notice = (
+        "no folder of this user's own can be written: the tracker is compiled anew in each run; "
+        "set NUMBA_CACHE_DIR"
+    )
     _compile_without_cache()
+
+
+def _keep_in(folder: Path) -> None:
+    """Have the compiler keep its code in a folder, here and in processes that this one starts."""
+    from numba.core import config
+
+    os.environ[_VARIABLE] = str(folder)
+    config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
 
 
 def _package() -> dict[str, Path]:

@@ -34,8 +34,8 @@ def load_yaml(text: str) -> Any:
         return loader.construct_document(node)
     except RecursionError:
         raise yaml.YAMLError("is nested too deeply") from None
-    except (ValueError, OverflowError) as error:
-        # A date such as 2026-99-99, or a number of too many digits.
+    except (ValueError, OverflowError, AttributeError) as error:
+        # A date such as 2026-99-99, a number of too many digits, or a tag of what it is not.
         raise yaml.YAMLError(str(error)) from None
     finally:
         loader.dispose()

@@ -1,4 +1,8 @@
-"""Processes that work for this one: begun anew, never outliving it, and not waited for after an error."""
+"""Processes that work for this one: begun anew, never outliving it, and not waited for after an error.
+
+A new interpreter looks for modules in the current folder first, before the one that starts it can tell it
+where else to look. There lie the user's data, and what came with them: a `signal.py` among them would be run.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +10,11 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
+
+_Result = TypeVar("_Result")
 
 
 def end_with_parent() -> None:
@@ -25,6 +31,43 @@ def end_with_parent() -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
+
+
+# What Python takes as "do not look for modules in the current folder"; new interpreters inherit it.
+_SAFE_PATH = "PYTHONSAFEPATH"
+_starting = threading.RLock()
+
+
+@contextmanager
+def safe_start() -> Iterator[None]:
+    """Keep interpreters that are started meanwhile from looking for modules in the current folder.
+
+    Whatever `multiprocessing` starts belongs in here: processes, and the first lock, queue or shared value,
+    with which it starts a process of its own that keeps count of them.
+    """
+    with _starting:
+        before = os.environ.get(_SAFE_PATH)
+        os.environ[_SAFE_PATH] = "1"
+        try:
+            yield
+        finally:
+            if before is None:
+                os.environ.pop(_SAFE_PATH, None)
+            else:
+                os.environ[_SAFE_PATH] = before
+
+
+class SafePool(ProcessPoolExecutor):
+    """A pool of processes that are started as `safe_start` says."""
+
+    def __init__(self, *arguments: Any, **named: Any) -> None:
+        with safe_start():
+            super().__init__(*arguments, **named)
+
+    def submit(self, fn: Callable[..., _Result], /, *args: Any, **kwargs: Any) -> Future[_Result]:
+        """Have a process do something; it is started here if need be."""
+        with safe_start():
+            return super().submit(fn, *args, **kwargs)
 
 
 def available_cores() -> int:
@@ -48,7 +91,7 @@ def worker_pool(
 
     before = set(active_children())
     context = get_context("spawn")  # fork would copy the threads' locks of other libraries
-    pool = ProcessPoolExecutor(workers, context, begin, given)
+    pool = SafePool(workers, context, begin, given)
     try:
         yield pool
         pool.shutdown()

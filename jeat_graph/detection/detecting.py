@@ -176,7 +176,8 @@ def _picture_scans(
         network = network_file(request.detector_frames, FRAMES)
         model = ModelPictureDetector(network, FRAMES_SENSOR, request.settings.model_frames)
         say(model.description)
-        return (model(frame, t) for t, frame in with_progress(source, len(source)))
+        found = (model(frame, t) for t, frame in with_progress(source, len(source)))
+        return _with_note(found, model.note, say)
     stack.enter_context(one_thread())
     return _moving(source, request)
 
@@ -220,12 +221,20 @@ def _fused_scans(
         assert source is not None
         detector = FusedDetector(network, source.size_px, FUSED_SENSOR, *settings)
         say(detector.description)
-        return (detector.look_at(frame, t) for t, frame in with_progress(source, len(source)))
+        found = (detector.look_at(frame, t) for t, frame in with_progress(source, len(source)))
+        return _with_note(found, detector.note, say)
     reader, size_px = recording
     pictures = () if source is None else with_progress(source, len(source))
     detector = FusedDetector(network, size_px, FUSED_SENSOR, *settings, pictures)
     say(detector.description)
-    return _pushed(detector, reader, request, say)
+    return _with_note(_pushed(detector, reader, request, say), detector.note, say)
+
+
+def _with_note(scans: _Scans, note: Callable[[], str], say: Callable[[str], object]) -> _Scans:
+    """Yield scans, and say at their end what was wrong with what the network gave."""
+    yield from scans
+    if note():
+        say(note())
 
 
 def _events(request: DetectRequest, stack: ExitStack, say: Callable[[str], object]) -> _Recording:
@@ -245,7 +254,6 @@ def _events(request: DetectRequest, stack: ExitStack, say: Callable[[str], objec
 def _event_scans(request: DetectRequest, recording: _Recording, say: Callable[[str], object]) -> _Scans:
     reader, size_px = recording
     settings = request.settings
-    detector: BinnedDetector
     if request.detector_events != MOTION:
         from jeat_graph.detection.models.events import ModelEventDetector
 
@@ -255,9 +263,8 @@ def _event_scans(request: DetectRequest, recording: _Recording, say: Callable[[s
             times = replace(times, rate_hz=times.rate(BESIDE_RATE_HZ))
         model = ModelEventDetector(network, size_px, EVENTS_SENSOR, times, settings.model_events)
         say(model.description)
-        detector = model
-    else:
-        detector = EventDetector(size_px, EVENTS_SENSOR, settings.events)
+        return _with_note(_pushed(model, reader, request, say), model.note, say)
+    detector = EventDetector(size_px, EVENTS_SENSOR, settings.events)
     return _pushed(detector, reader, request, say)
 
 

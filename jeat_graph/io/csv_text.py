@@ -17,8 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.limits import check_file, free_memory
+from jeat_graph.io.limits import check_file
 from jeat_graph.io.not_tables import what_it_is
+from jeat_graph.io.unpacking import check_unpacked, most_unpacked
 
 _BOM = b"\xef\xbb\xbf"
 _WIDE_BOMS = (b"\xff\xfe", b"\xfe\xff")
@@ -27,10 +28,6 @@ _SOMETHING = re.compile(rb"\S")
 _NO_LINE_END = re.compile(rb"[^\r\n]")
 #: How a column is read where all its fields allow it: as numbers, or as text of which there are few kinds.
 NUMBER, WORD, TEXT = "number", "word", "text"
-#: Bytes that a compressed file may unpack to: beyond, it is a mistake or an attack.
-LARGEST_UNPACKED = 2**33
-#: Share of the free memory that it may fill, for columns are made of it.
-_SHARE_UNPACKED = 0.3
 
 
 def read_bytes(path: str | Path) -> bytes:
@@ -71,9 +68,8 @@ def read_text(path: str | Path) -> bytes:
 def _unpacked(data: bytes, path: str | Path, most: int | None = None) -> bytes:
     """Unpack gzip, in one or several members; with `most`, only the first bytes."""
     out: list[bytes] = []
-    free = free_memory()
-    room = LARGEST_UNPACKED if free is None else min(LARGEST_UNPACKED, int(free * _SHARE_UNPACKED))
-    size, limit = 0, room if most is None else most
+    size, packed = 0, len(data)
+    limit = most_unpacked(packed) if most is None else most
     complete = False
     try:
         while not complete:
@@ -87,7 +83,8 @@ def _unpacked(data: bytes, path: str | Path, most: int | None = None) -> bytes:
     except zlib.error as error:
         raise DataError(f"cannot be unpacked: {error}", path) from None
     if most is None and not complete:
-        raise DataError(f"unpacks to more than {limit} bytes" if size >= limit else "is cut off (gzip)", path)
+        check_unpacked(size + (size >= limit), packed, path)
+        raise DataError("is cut off (gzip)", path)
     return b"".join(out)
 
 

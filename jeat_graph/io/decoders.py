@@ -12,7 +12,9 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.io.limits import check_file
 from jeat_graph.io.not_tables import HEAD_BYTES, what_it_is
+from jeat_graph.io.picture_file import read_picture
 
 RgbImage = npt.NDArray[np.uint8]
 
@@ -62,6 +64,9 @@ class PictureDecoder(Decoder):
         )
         if not self._files:
             raise DataError(f"no pictures ({', '.join(_PICTURES)}) in this folder", folder)
+        for file in self._files:
+            if not file.is_file():
+                check_file(file)  # says what it is: a folder, a pipe, a link to nothing
 
     def count(self) -> int:
         """Return the number of frames."""
@@ -77,17 +82,7 @@ class PictureDecoder(Decoder):
 
     def bgr(self, index: int) -> RgbImage:
         """Return a frame (H, W, 3): blue, green, red."""
-        import cv2
-
-        file = self._files[index]
-        try:
-            data = np.frombuffer(file.read_bytes(), dtype=np.uint8)
-        except OSError as error:
-            raise DataError(f"cannot be read: {error.strerror or error}", file) from None
-        picture = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
-        if picture is None:
-            raise DataError("is not a picture that can be read", file)
-        return np.asarray(picture, dtype=np.uint8)
+        return read_picture(self._files[index])
 
 
 def _hint(path: Path) -> str:

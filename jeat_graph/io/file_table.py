@@ -17,6 +17,7 @@ import numpy.typing as npt
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.arrow_arrays import first_refused, to_numpy
+from jeat_graph.io.spreadsheets import unguarded
 from jeat_graph.io.vector_columns import read_vectors
 
 _LARGEST_EXACT = 2.0**53  # beyond it a float cannot tell neighbouring whole numbers apart
@@ -167,6 +168,7 @@ class FileTable:
                 column = column.cast(pa.string()).dictionary_encode()
             coded = pa.chunked_array([column.unify_dictionaries().combine_chunks()]).combine_chunks()
             texts = [text or "" for text in compute.utf8_trim_whitespace(coded.dictionary).to_pylist()]
+            texts = texts if self._line_of is None else [unguarded(text) for text in texts]
         except (pa.ArrowException, UnicodeDecodeError):
             raise DataError(f"column {name} must hold text", self.path) from None
         index = to_numpy(coded.indices.cast(pa.int64()), missing=len(texts))

@@ -13,6 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 _ALIGN = 8
+#: What is repeated in all may take so much memory; a state of 10,000 tracks takes a hundredth.
+MOST_BYTES = 1 << 30
 #: Narrower kinds of whole numbers, with the least and the greatest that they hold.
 _NARROW = tuple((f"<i{size}", -(1 << 8 * size - 1), (1 << 8 * size - 1) - 1) for size in (1, 2, 4))
 
@@ -117,6 +119,7 @@ class NumberReader:
 
     def __init__(self, block: bytes, kinds: list[Any]) -> None:
         self._block = block
+        self._spent = 0
         self._kinds = [_dtype(kind) for kind in kinds]
 
     def arrays(self, content: list[Any]) -> list[npt.NDArray[Any]]:
@@ -146,8 +149,25 @@ class NumberReader:
         return out.view(kind).ravel()
 
     def _column(self, kind: np.dtype[Any], at: int, stored: str, held: int, count: int) -> npt.NDArray[Any]:
+        if held < 0 or at < 0:
+            raise ValueError("numbers are missing")
         found = np.frombuffer(self._block, np.dtype(stored), held, at).astype(kind)
-        return np.repeat(found, count) if held == 1 else found
+        return np.repeat(found, self.within(count, kind.itemsize)) if held == 1 else found
+
+    def within(self, count: int, size: int = _ALIGN) -> int:
+        """Return a number of things that one stands for, unless they take more memory than a state has.
+
+        Args:
+            count: how many.
+            size: of each (bytes).
+
+        Raises:
+            ValueError: they and those before take too much.
+        """
+        self._spent += count * size
+        if count < 0 or self._spent > MOST_BYTES:
+            raise ValueError(f"more than {MOST_BYTES} bytes are needed")
+        return count
 
 
 def _dtype(described: Any) -> np.dtype[Any]:

@@ -77,7 +77,9 @@ def unpack(text: str, block: bytes, codecs: Mapping[str, Codec]) -> Any:
     try:
         content = json.loads(text)
         (tree,) = _Unpacker(codecs, NumberReader(block, content["kinds"])).column(content["tree"])
-    except (ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:
+    except DataError:
+        raise
+    except Exception as error:  # whatever garbage may raise, too deep nesting and too little memory among it
         raise DataError(f"is damaged: {type(error).__name__}: {error}") from None
     return tree
 
@@ -174,7 +176,7 @@ class _Unpacker:
         if kind == "array":
             return self._numbers.arrays(content)
         if kind == "same":
-            return [content[1]] * content[0]
+            return [content[1]] * self._numbers.within(content[0])
         if kind == "slice":
             return [slice(*bounds) for bounds in content]
         if kind == "mixed":
@@ -183,7 +185,8 @@ class _Unpacker:
             return [next(groups[k]) for k in which]
         if kind == "row":
             count, nodes = content
-            rows = list(zip(*(self.column(part) for part in nodes), strict=True)) if nodes else [()] * count
+            columns = [self.column(part) for part in nodes]
+            rows = list(zip(*columns, strict=True)) if nodes else [()] * self._numbers.within(count)
             if len(rows) != count:
                 raise ValueError("rows are missing")
             return rows
@@ -199,7 +202,7 @@ class _Unpacker:
     def _objects(self, name: str, places: list[int], first: int, fresh: int, columns: list[Any]) -> list[Any]:
         if first != len(self._held):
             raise ValueError("objects are missing")
-        self._held += [None] * fresh
+        self._held += [None] * self._numbers.within(fresh)
         codec = self._codecs[name]
         filled = {key: self.column(node) for key, node in columns}
         for k in range(fresh):

@@ -13,6 +13,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.data.scan import scan_with_area
 from jeat_graph.io.headers import delimiter_of
 from jeat_graph.io.scan_batch import ScanBatch, Trying
+from jeat_graph.io.spreadsheets import unguarded
 from jeat_graph.io.stream_text import decode_line
 
 _COLUMNS = ("t", "sensor", "left", "top", "width", "height", "score")
@@ -96,7 +97,7 @@ def _fields(text: str, name: str, number: int, delimiter: str) -> list[str]:
 
 def _csv_row(text: str, form: CsvForm, name: str, number: int) -> _Row:
     fields, place = _fields(text, name, number, form.delimiter), form.place
-    value = {column: fields[k] if k < len(fields) else "" for column, k in place.items()}
+    value = {column: unguarded(fields[k]) if k < len(fields) else "" for column, k in place.items()}
     if not value["sensor"]:
         raise DataError("sensor is missing", name, number)
     numbers = ["t", *form.sides, "score"]

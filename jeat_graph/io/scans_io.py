@@ -34,11 +34,13 @@ def read_instants(folder: str | Path) -> FloatArray | None:
     """Times at which the tracker of a run gave output, ascending (I,), or None if the run does not say.
 
     Raises:
-        DataError: `scans.csv` is there but not valid.
+        DataError: `scans.csv` is there but not valid, or a link to a file elsewhere.
     """
+    from jeat_graph.io.beside import check_beside
     from jeat_graph.io.tables import read_table
 
     path = Path(folder) / SCANS
     if not path.is_file():
         return None
+    check_beside(path, folder)
     return np.unique(read_table(path, ("t", "sensor", "detections")).number("t"))

@@ -12,6 +12,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.io.arrow_arrays import from_numpy
 from jeat_graph.io.atomic import atomic_path
 from jeat_graph.io.piecewise import PiecewiseWriter
+from jeat_graph.io.spreadsheets import guarded_column
 from jeat_graph.io.tables import PARQUET_SUFFIXES
 from jeat_graph.io.vector_columns import lists_as_text
 
@@ -23,7 +24,8 @@ class TableWriter(PiecewiseWriter):
     """A context manager that writes rows and makes the file visible only when it is complete.
 
     NaN, masked entries and empty text become blank fields (CSV) or nulls (Parquet, but for the text). Numbers
-    are written with as few digits as give the same number back.
+    are written with as few digits as give the same number back. In CSV, what a spreadsheet would take for a
+    formula has an apostrophe before it (`spreadsheets`).
 
     Args:
         path: the file; `.parquet` and `.pq` are Parquet, all else is text.
@@ -118,6 +120,8 @@ def _csv_bytes(table: Any, delimiter: str) -> bytes:
     for k, field in enumerate(table.schema):
         if pa.types.is_list(field.type):
             table = table.set_column(k, field.name, lists_as_text(table.column(k)))
+        elif delimiter == "," and pa.types.is_string(field.type):
+            table = table.set_column(k, field.name, guarded_column(table.column(k)))
     # Arrow quotes either all text or none, and refuses "none" where a text holds a comma or a quote.
     for style in ("none", "needed"):
         buffer = pa.BufferOutputStream()

@@ -14,12 +14,14 @@ class Counts(NamedTuple):
         duplicates: messages that had been taken before.
         flat: boxes without area.
         too_large: answers that the broker does not take because of their size.
+        forgotten: sources of messages that are no longer known by their numbers.
     """
 
     bad: int
     duplicates: int
     flat: int
     too_large: int
+    forgotten: int = 0
 
 
 def count_lines(counts: Counts, restarts: Mapping[str, int]) -> list[str]:
@@ -38,6 +40,8 @@ def count_lines(counts: Counts, restarts: Mapping[str, int]) -> list[str]:
         lines.append(f"{counts.flat} box(es) without area left out")
     if counts.too_large:
         lines.append(f"{counts.too_large} answer(s) were larger than the broker takes and were not sent")
+    if counts.forgotten:
+        lines.append(f"{counts.forgotten} sources were forgotten: only the last are known by their numbers")
     for source, count in restarts.items():
         often = "once" if count == 1 else f"{count} times"
         lines.append(f"source {source!r} began to count its messages anew {often}")

@@ -10,7 +10,7 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
 from jeat_graph.data.errors import JeatGraphError
-from jeat_graph.data.processes import end_with_parent
+from jeat_graph.data.processes import SafePool, end_with_parent
 
 ENGINES = ("local", "ray")
 _Job = TypeVar("_Job")
@@ -47,7 +47,7 @@ def run_local(
     context = get_context("spawn")  # fork would copy the threads' locks of other libraries
 
     def pool() -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(1, context, end_with_parent)
+        return SafePool(1, context, end_with_parent)
 
     pools: dict[int, ProcessPoolExecutor] = {}
     at_work: dict[Future[_Result], tuple[int, int, int]] = {}  # job's index, tries before, the worker

@@ -24,7 +24,7 @@ from jeat_graph.live.lateness import LatenessCounter
 from jeat_graph.live.repetition import Repetition
 from jeat_graph.live.rewinding import Rewinding, TakenStep
 from jeat_graph.live.time_base import Decision, TimeBase
-from jeat_graph.tracking.checkpoint import load_state, save_state
+from jeat_graph.tracking.checkpoint import load_state, refusing_damage, save_state
 from jeat_graph.tracking.prediction import Prediction
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
 from jeat_graph.tracking.step_record import StepRecord
@@ -206,13 +206,14 @@ class LiveTracker:
         kept, state = load_state(path, config)
         if "policy" not in state:
             raise DataError("holds a tracker, but not one that takes late scans", path)
-        live = LiveTracker(Tracker.from_state(kept, state), state["policy"])
-        live._newest = state["newest"]
-        live.lateness.set_state(state["lateness"])
-        live._rewinding.set_state(state["rewinding"])
-        live._base.set_state(state["base"], live.tracker.time)
-        live._repetition.set_state(state["base"], live.tracker.time)
-        return live, state["more"]
+        with refusing_damage(path):
+            live = LiveTracker(Tracker.from_state(kept, state), state["policy"])
+            live._newest = state["newest"]
+            live.lateness.set_state(state["lateness"])
+            live._rewinding.set_state(state["rewinding"])
+            live._base.set_state(state["base"], live.tracker.time)
+            live._repetition.set_state(state["base"], live.tracker.time)
+            return live, state["more"]
 
     def predict(self, t: float) -> Prediction:
         """Say where the tracks will be at a time not before the newest scan's (see `Tracker.predict`)."""

@@ -22,6 +22,8 @@ from jeat_graph.io.scan_lines import batch_of
 from jeat_graph.live.memory import Memory, fingerprint
 
 VERSION = 1
+#: Of the name of a source; numbers of messages are below `MOST_SEQ`.
+MOST_CHARACTERS, MOST_SEQ = 256, 1 << 63
 _KEYS = ("v", "source", "seq", "scans")
 _FIRST_OF_TEXT = b" \t\r\n{[\xef"
 
@@ -61,10 +63,12 @@ def decode_scans(payload: bytes, name: str, number: int) -> ScanMessage:
         if version != VERSION:
             raise DataError(f"is a message of version {version!r}; known here: {VERSION}", name, number)
         source, seq = content.get("source", ""), content.get("seq")
-        if not isinstance(source, str):
-            raise DataError(f"source must be a text, got {source!r}", name, number)
-        if seq is not None and (isinstance(seq, bool) or not isinstance(seq, int) or seq < 0):
-            raise DataError(f"seq must be a whole number that is not negative, got {seq!r}", name, number)
+        if not isinstance(source, str) or len(source) > MOST_CHARACTERS:
+            what = f"a text of at most {MOST_CHARACTERS} characters"
+            raise DataError(f"source must be {what}, got {str(source)[:40]!r}", name, number)
+        if seq is not None and (isinstance(seq, bool) or not isinstance(seq, int) or not 0 <= seq < MOST_SEQ):
+            what = "a whole number that is not negative, below 2^63"
+            raise DataError(f"seq must be {what}, got {str(seq)[:40]}", name, number)
         content = content["scans"]
         if not isinstance(content, list):
             raise DataError("scans must be a list", name, number)
@@ -141,27 +145,29 @@ class Numbering(NamedTuple):
 
 
 class Duplicates:
-    """Tells which messages have been taken already, in bounded memory.
+    """Tells which messages have been taken already, in bounded memory, however many sources there are.
 
     Of each source the greatest number is kept, and which of the `WINDOW` numbers below it have come: one that
     is older counts as a duplicate. But a message that comes twice is as old as it was: where a number that
     was used up comes with a scan newer than any of its source, or with another time than it had, the source
     has begun to count anew, as a detector does that is started again, maybe with its clock set back. What
-    came before stays known, for a broker may deliver it once more.
+    came before stays known, for a broker may deliver it once more. Of more than `SOURCES` sources the one
+    that has been silent for longest is forgotten.
 
     Attributes:
         seen: by source its counts, the last one or the last two; the time of a scan says whose a number is.
+            The one heard last comes last.
         restarts: by source, how often it began to count anew.
+        forgotten: how many sources have been forgotten.
     """
 
-    WINDOW = 1024
-    #: So many sources are kept at most: those that have been heard of last.
-    MOST_SOURCES = 1024
+    WINDOW, SOURCES = 1024, 256
 
     def __init__(self) -> None:
         self.seen: dict[str, list[Numbering]] = {}
         self.restarts: dict[str, int] = {}
         self._memory = Memory()
+        self.forgotten = 0
 
     def is_new(self, message: ScanMessage) -> bool:
         """Tell whether a message is new, and take note of it; one without a number always is."""
@@ -171,12 +177,9 @@ class Duplicates:
         of_message = fingerprint(source.encode("utf-8", "replace"), str(seq).encode(), repr(t).encode())
         came = self._memory.knows(of_message)
         self._memory.note(of_message)
-        counts = self.seen.pop(source, [Numbering(-1, set(), -math.inf)])
+        counts = self.seen.pop(source, None) or [Numbering(-1, set(), -math.inf)]
         self.seen[source] = counts
-        if len(self.seen) > self.MOST_SOURCES:
-            forgotten = next(iter(self.seen))
-            del self.seen[forgotten]
-            self.restarts.pop(forgotten, None)
+        self._forget()
         k = _whose(counts, t)
         of = counts[k]
         known = seq in of.recent or seq <= of.top - self.WINDOW
@@ -194,13 +197,26 @@ class Duplicates:
         counts[k] = Numbering(top, recent, max(of.newest, t))
         return True
 
+    def _forget(self) -> None:
+        """Forget the sources that have been silent for longest, if there are too many."""
+        while len(self.seen) > self.SOURCES:
+            source = next(iter(self.seen))
+            del self.seen[source]
+            self.restarts.pop(source, None)
+            self.forgotten += 1
+
     def state(self) -> dict[str, Any]:
         """Return what `set_state` takes: plain data."""
         seen = {
             source: [(top, sorted(recent), newest) for top, recent, newest in counts]
             for source, counts in self.seen.items()
         }
-        return {"seen": seen, "restarts": self.restarts, "memory": self._memory.state()}
+        return {
+            "seen": seen,
+            "restarts": self.restarts,
+            "forgotten": self.forgotten,
+            "memory": self._memory.state(),
+        }
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go on from what `state` returned; that of an earlier build has no memory."""
@@ -208,10 +224,11 @@ class Duplicates:
             source: [Numbering(top, set(recent), newest) for top, recent, newest in counts]
             for source, counts in state["seen"].items()
         }
-        self.restarts = dict(state["restarts"])
+        self.restarts, self.forgotten = dict(state["restarts"]), state.get("forgotten", 0)
         self._memory = Memory(whole=False)
         if "memory" in state:
             self._memory.set_state(state["memory"])
+        self._forget()
 
 
 def _whose(counts: list[Numbering], t: float) -> int:

@@ -119,7 +119,8 @@ def _finished(request: TrackRequest) -> dict[str, Any] | None:
     if not same or not isinstance(files, dict):
         return None
     whole = all(
-        (out / name).is_file() and sha256_of(out / name) == entry["sha256"] for name, entry in files.items()
+        (out / name).is_file() and sha256_of(out / name) == entry.get("sha256")
+        for name, entry in files.items()
     )
     return record if whole else None
 
@@ -140,8 +141,8 @@ def _as_given(config: Any, request: TrackRequest) -> Any:
     return {key: value for key, value in config.items() if key not in left_out}
 
 
-def _hashes(inputs: Any) -> list[str]:
-    return [entry["sha256"] for entry in inputs] if isinstance(inputs, list) else []
+def _hashes(inputs: Any) -> list[Any]:
+    return [entry.get("sha256") for entry in inputs] if isinstance(inputs, list) else []
 
 
 def _settings(reading: Any) -> dict[str, Any]:

@@ -223,7 +223,7 @@ class Session:
             for name, one in lateness.items()
             if any(other.late for other in lateness.values())
         ]
-        counts = Counts(self.bad, self.duplicates, self.flat, self.too_large)
+        counts = Counts(self.bad, self.duplicates, self.flat, self.too_large, self._seen.forgotten)
         return lines + count_lines(counts, self._seen.restarts)
 
     @contextlib.contextmanager

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.atomic import open_atomic
@@ -17,6 +18,9 @@ from jeat_graph.io.csv_text import read_text
 from jeat_graph.road.camera import PARAMETERS, Georeference, RoadCamera
 
 _SIMPLE = ("fx", "fy", "cx", "cy")
+# No place on Earth, in metres or pixels, and no variance of one is larger; no camera has a longer side (px).
+_LARGEST, _LONGEST_SIDE = 1e15, 100_000
+_SHOWN = 80  # characters of a message
 
 
 def write_camera(camera: RoadCamera, path: str | Path, notes: Sequence[str] = ()) -> None:
@@ -58,11 +62,12 @@ def read_camera(path: str | Path) -> RoadCamera:
     text = read_text(path).decode("utf-8", errors="replace")
     text = re.sub(r"\A%YAML[: ]?1\.0\s*", "", text).replace("!!opencv-matrix", "")
     try:
-        tree = yaml.safe_load(text)
+        tree = load_yaml(text)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line = None if mark is None else mark.line + 1
-        raise DataError(f"is not valid YAML: {getattr(error, 'problem', error)}", path, line) from None
+        problem = getattr(error, "problem", None) or error
+        raise DataError(f"is not valid YAML: {problem}", path, line) from None
     if not isinstance(tree, Mapping):
         raise DataError("must hold keys and values, such as fx: 1100", path)
     try:
@@ -150,16 +155,15 @@ def _georeference(tree: Mapping[str, Any], path: str | Path) -> Georeference | N
 
 def _number(tree: Mapping[str, Any], name: str, path: str | Path, default: float | None = None) -> float:
     value = tree.get(name, default)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-        raise DataError(
-            f"{name} must be a finite number, got {value!r}" if name in tree else f"{name} is missing", path
-        )
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _LARGEST:
+        said = f"must be a finite number, got {value!r}"[:_SHOWN] if name in tree else "is missing"
+        raise DataError(f"{name} {said}", path)
     return float(value)
 
 
 def _size(tree: Mapping[str, Any], path: str | Path) -> tuple[int, int]:
     size = [_number(tree, name, path) for name in ("width", "height")]
-    if any(v < 1 or v != int(v) for v in size):
+    if any(v < 1 or v > _LONGEST_SIDE or v != int(v) for v in size):
         raise DataError(
             f"width and height must be whole numbers of pixels, got {size[0]:g} x {size[1]:g}", path
         )
@@ -171,9 +175,9 @@ def _array(tree: Mapping[str, Any], name: str, shape: tuple[int, ...], path: str
         raise DataError(f"{name} is missing", path)
     try:
         values = np.array(tree[name], dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         values = np.zeros(0)
-    if values.shape != shape or not np.isfinite(values).all():
+    if values.shape != shape or not (np.abs(values) <= _LARGEST).all():
         raise DataError(f"{name} must be {' x '.join(map(str, shape))} finite numbers", path)
     return values
 
@@ -183,10 +187,10 @@ def _matrix(tree: Mapping[str, Any], name: str, path: str | Path) -> FloatArray:
     data = given.get("data") if isinstance(given, Mapping) else given
     try:
         values = np.array(data, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         values = np.zeros(0)
     wanted = {"camera_matrix": (9,), "rvec": (3,), "tvec": (3,)}.get(name)
-    if not np.isfinite(values).all() or values.size == 0 or (wanted and values.size not in wanted):
+    if not (np.abs(values) <= _LARGEST).all() or values.size == 0 or (wanted and values.size not in wanted):
         raise DataError(f"{name} is missing or not numbers", path)
     return values
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.atomic import atomic_path
+from jeat_graph.io.picture_file import read_picture
 from jeat_graph.io.pictures import as_png
 from jeat_graph.road.camera import RoadCamera
 
@@ -29,18 +30,14 @@ def draw_grid(camera: RoadCamera, path: str | Path, frame: str | Path | None = N
     Raises:
         DataError: the frame cannot be read or is of another size.
     """
-    import cv2
-
     canvas = np.full((camera.height, camera.width, 3), 60, dtype=np.uint8)
     if frame is not None:
-        read = cv2.imread(str(frame), cv2.IMREAD_COLOR)
-        if read is None:
-            raise DataError("cannot be read as a picture", frame)
+        read = read_picture(frame)
         if read.shape[:2] != canvas.shape[:2]:
             raise DataError(
                 f"is {read.shape[1]}x{read.shape[0]}, the camera is {camera.width}x{camera.height}", frame
             )
-        canvas = np.ascontiguousarray(read, dtype=np.uint8)
+        canvas = np.ascontiguousarray(read)
     ahead = camera.position[1] + np.linspace(0.0, _FAR_M, _SAMPLES)
     middle = camera.position[0]
     for x in _ACROSS_M:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import yaml
 
+from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.csv_text import read_text
@@ -92,6 +92,10 @@ def read_surveyed_points(path: str | Path) -> Points:
     return Points(pixels, places)
 
 
+# No place in a picture or on a road is farther (px, m).
+_LARGEST = 1e15
+
+
 class RoadMarks(NamedTuple):
     """What somebody drew for the road.
 
@@ -111,11 +115,12 @@ def read_marks(path: str | Path) -> RoadMarks:
         DataError: names the key that is unknown or has other than finite numbers.
     """
     try:
-        tree = yaml.safe_load(read_text(path))
+        tree = load_yaml(read_text(path).decode("utf-8", errors="replace"))
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line = None if mark is None else mark.line + 1
-        raise DataError(f"is not valid YAML: {getattr(error, 'problem', error)}", path, line) from None
+        problem = getattr(error, "problem", None) or error
+        raise DataError(f"is not valid YAML: {problem}", path, line) from None
     if not isinstance(tree, Mapping) or not set(tree) <= {"lines", "lanes"} or not tree:
         raise DataError(
             "must hold lines: {name: [x1, y1, x2, y2]}, and may hold lanes: {name: [left, right]}", path
@@ -137,8 +142,8 @@ def _rows(given: Any, count: int, key: str, path: str | Path) -> dict[str, Any]:
     for name, values in given.items():
         good = isinstance(values, list) and len(values) == count
         if not good or not all(
-            isinstance(v, int | float) and not isinstance(v, bool) and math.isfinite(v) for v in values
+            isinstance(v, int | float) and not isinstance(v, bool) and abs(v) <= _LARGEST for v in values
         ):
-            raise DataError(f"{key}: {name}: must be {count} numbers, got {values!r}", path)
+            raise DataError(f"{key}: {name}: must be {count} numbers, got {str(values)[:80]}", path)
         rows[str(name)] = tuple(float(v) for v in values)
     return rows

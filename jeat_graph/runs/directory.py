@@ -12,6 +12,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.io.beside import check_beside
 from jeat_graph.io.locking import hold_folder, remove_folders
 from jeat_graph.io.outputs import check_folder
 from jeat_graph.io.scans_io import SCANS
@@ -20,6 +21,21 @@ RUN_JSON = "run.json"
 #: Folder with the state of a run that is not finished (`runs/unfinished.py`).
 RESUME = ".resume"
 _UNFINISHED = ".unfinished-"
+# A record of a thousand sensors has 1 MB; no count of a run and no side of a picture is larger than that.
+_MOST_BYTES, _LARGEST = 1 << 26, 1e15
+_KINDS: dict[str, type[Any]] = {
+    "config": dict,
+    "counts": dict,
+    "files": dict,
+    "images": dict,
+    "inputs": list,
+    "learnt": dict,
+    "overrides": list,
+    "reading": dict,
+    "timings": dict,
+    "warnings": list,
+}
+_NAMES: dict[type[Any], str] = {dict: "mapping", list: "list"}
 DIAGNOSTICS = "diagnostics.csv"
 MEASUREMENTS = "measurements.parquet"
 ROAD_CAUSAL, ROAD_SMOOTHED = "road_causal.csv", "road_smoothed.csv"
@@ -38,6 +54,9 @@ def read_record(folder: Path) -> dict[str, Any]:
     path = folder / RUN_JSON
     if not path.is_file():
         return {}
+    check_beside(path, folder)
+    if path.stat().st_size > _MOST_BYTES:
+        raise DataError("is too large for the record of a run", path)
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -47,7 +66,31 @@ def read_record(folder: Path) -> dict[str, Any]:
         raise DataError("is not JSON; it should be the record of a run", path, line) from None
     if not isinstance(content, dict):
         raise DataError("is not the record of a run", path)
+    for key, kind in _KINDS.items():
+        if not isinstance(content.get(key, kind()), kind):
+            raise DataError(f"is not the record of a run: {key!r} is no {_NAMES[kind]}", path)
+    _check_numbers(content, path)
     return content
+
+
+def _check_numbers(record: dict[str, Any], path: Path) -> None:
+    """Refuse a picture without a size, a rate that is none, and counts that are no numbers."""
+    image = record.get("config", {}).get("image", {})
+    wrong = [] if isinstance(image, dict) else ["config.image"]
+    sides = {} if wrong else {key: image[key] for key in ("width", "height") if key in image}
+    wrong += [f"config.image.{key}" for key, value in sides.items() if not _is_number(value, above=0.0)]
+    rate = record.get("reading", {}).get("rate_hz")
+    wrong += [] if rate is None or _is_number(rate, above=0.0) else ["reading.rate_hz"]
+    counts = {key: one for key, one in record.get("counts", {}).items() if not isinstance(one, dict)}
+    wrong += [f"counts.{key}" for key, value in counts.items() if not _is_number(value)]
+    wrong += [f"inputs[{k}]" for k, one in enumerate(record.get("inputs", [])) if not isinstance(one, dict)]
+    wrong += [f"files.{key}" for key, one in record.get("files", {}).items() if not isinstance(one, dict)]
+    if wrong:
+        raise DataError(f"is not the record of a run: {wrong[0]} cannot be that", path)
+
+
+def _is_number(value: Any, above: float = -1.0) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and above < value < _LARGEST
 
 
 class RunDirectory:

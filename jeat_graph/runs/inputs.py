@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.io.beside import lies_beside
 
 # An input that was moved along is looked for so far up from the run, by so many last parts of its path.
 _MOST_UP, _MOST_PARTS = 4, 4
@@ -77,7 +78,9 @@ class _Given(NamedTuple):
 
 
 def find_input(given: str | Path, record: Mapping[str, Any], folder: Path) -> Path | None:
-    """Find an input of a run where it was, or where it lies now beside the run, by its SHA-256.
+    """Find an input of a run where it was, or where it lies now, by its SHA-256, if that is beside the run.
+
+    The record may be a stranger's: what it names elsewhere is not even looked at.
 
     Args:
         given: the path as it was given.
@@ -86,13 +89,23 @@ def find_input(given: str | Path, record: Mapping[str, Any], folder: Path) -> Pa
 
     Returns:
         The first file that is the input; else one at its place that has changed since; None without either.
+
+    Raises:
+        DataError: there is such a file, but it does not lie beside the run.
     """
     from jeat_graph.io.hashing import sha256_of
 
-    there = [place for place in dict.fromkeys(_places(Path(given), record, folder)) if place.is_file()]
+    found = [place for place in dict.fromkeys(_places(Path(given), record, folder)) if place.is_file()]
+    there = [place for place in found if lies_beside(place, folder)]
+    if found and not there:
+        raise DataError(
+            "does not lie beside the run that names it: name it with --detections, or track with "
+            "--diagnostics, which keeps in the run what is needed",
+            given,
+        )
     same = (place for place in there if place.stat().st_size == record.get("bytes", place.stat().st_size))
     return next(
-        (place for place in same if sha256_of(place) == record["sha256"]), there[0] if there else None
+        (place for place in same if sha256_of(place) == record.get("sha256")), there[0] if there else None
     )
 
 

@@ -15,6 +15,7 @@ from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.measured_track import MeasuredTrack
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
+from jeat_graph.io.beside import check_beside
 from jeat_graph.io.hashing import sha256_of
 from jeat_graph.io.scans_io import read_instants
 from jeat_graph.runs.directory import MEASUREMENTS, RUN_JSON, read_record
@@ -118,8 +119,9 @@ def measurement_rows(folder: Path, *, progress: bool = False) -> tuple[RecordArr
 
 
 def _unchanged(path: Path, record: dict[str, Any]) -> None:
-    if not path.is_file():
+    if not path.is_file() or path.name not in record["files"]:
         raise DataError("is missing from the run; track it again", path)
+    check_beside(path, path.parent)
     if sha256_of(path) != record["files"][path.name]["sha256"]:
         raise DataError("has changed since the run; track it again", path)
 
@@ -145,10 +147,16 @@ def _complete_record(folder: Path) -> dict[str, Any]:
     if not record:
         raise DataError(f"is missing or empty; is {folder} a run?", path)
     try:
-        if not isinstance(record["inputs"], list) or not isinstance(record["config"], dict):
+        reading, images = record["reading"], record["reading"].get("images")
+        hashes = [one["sha256"] for one in record["inputs"]]
+        hashes += [one["sha256"] for one in record["files"].values()]
+        if images is not None:
+            hashes += [images, record["images"]["sha256"]]
+        names = reading["detections"]
+        if not isinstance(names, list) or not all(isinstance(text, str) for text in (*names, *hashes)):
             raise TypeError
-        _ = dict(record["reading"])["detections"], dict(record["files"])
-    except (ValueError, KeyError, TypeError):
+        _ = record["config"]["sensors"]
+    except (ValueError, KeyError, TypeError, AttributeError):
         raise DataError(_NO_RECORD, path) from None
     return record
 
@@ -180,8 +188,8 @@ def recorded_inputs(
 
     path = folder / RUN_JSON
     config = _config_of(folder, record)
-    inputs, reading = record["inputs"], dict(record["reading"])
-    names = list(reading.pop("detections"))
+    inputs, reading, names = record["inputs"], dict(record["reading"]), record["reading"]["detections"]
+    del reading["detections"]
     if moved is not None:
         if len(moved) != len(inputs):
             raise DataError(f"the run has {len(inputs)} inputs, --detections names {len(moved)}", path)
@@ -190,6 +198,8 @@ def recorded_inputs(
             file if prefix is None else f"{prefix}={file}"
             for prefix, file in zip(prefixes, moved, strict=True)
         ]
+    if len(names) != len(inputs):
+        raise DataError(_NO_RECORD, path)
     found = []
     for name, described in zip(names, inputs, strict=True):
         prefix, file = split_name(name)
@@ -199,9 +209,12 @@ def recorded_inputs(
         if sha256_of(place) != described["sha256"]:
             raise DataError("has changed since the run; track it again", file)
         found.append(str(place) if prefix is None else f"{prefix}={place}")
-    if "images" in record:
+    if reading.get("images") is not None:
         images = find_input(reading["images"], record["images"], folder)
         if images is None or sha256_of(images) != record["images"]["sha256"]:
             raise DataError("list of images is not there any more, or has changed", reading["images"])
         reading["images"] = str(images)
-    return config, at_measurement(read_many(found, **reading), config)
+    try:
+        return config, at_measurement(read_many(found, **reading), config)
+    except TypeError:  # settings that no reader has, or of another kind
+        raise DataError(_NO_RECORD, path) from None

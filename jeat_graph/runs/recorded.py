@@ -14,6 +14,7 @@ from jeat_graph.data.diagnostics import Diagnostics
 from jeat_graph.data.progress import progress_span
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.eval.judge import Judgement
+from jeat_graph.io.beside import check_beside
 from jeat_graph.runs.directory import DIAGNOSTICS, read_record
 
 
@@ -127,6 +128,7 @@ def _read_diagnostics(folder: Path) -> Diagnostics | None:
     from jeat_graph.io.diagnostics_io import read_diagnostics
 
     path = folder / DIAGNOSTICS
+    check_beside(path, folder)
     return read_diagnostics(path) if folder.is_dir() and path.is_file() else None
 
 

@@ -24,6 +24,7 @@ from jeat_graph.runs.latency import late_clocks
 from jeat_graph.runs.run_options import RunOptions, RunRecord
 from jeat_graph.runs.unfinished import UnfinishedRun
 from jeat_graph.tracking.measured import ConfirmedMeasurements
+from jeat_graph.tracking.state_check import refusing_damage
 from jeat_graph.tracking.tracker import Tracker
 
 #: So many steps go by before smoothed rows that have become final are written.
@@ -72,13 +73,16 @@ class RunSteps:
         if len(self._instants) > STEPS_PER_SAVE and not config.smoother.worker:
             self._unfinished = UnfinishedRun(run.folder / RESUME, self._identity())
             saved = self._unfinished.load() if options.resume else None
-        if saved is not None:
-            self._tracker = Tracker.from_state(config, saved["tracker"])
-            self._done, self._rows = saved["done"], saved["counts"]
-            self._reported = set(saved["reported"].tolist())
-        self._kept = ConfirmedMeasurements(self._tracker) if options.diagnostics else None
-        if saved is not None and self._kept is not None:
-            self._kept.set_state(saved["kept"])
+        self._kept: ConfirmedMeasurements | None = None
+        with refusing_damage(run.folder / RESUME):
+            if saved is not None:
+                self._tracker = Tracker.from_state(config, saved["tracker"])
+                self._done, self._rows = saved["done"], saved["counts"]
+                self._reported = set(saved["reported"].tolist())
+            if options.diagnostics:
+                self._kept = ConfirmedMeasurements(self._tracker)
+                if saved is not None:
+                    self._kept.set_state(saved["kept"])
 
     def take_all(self) -> FloatArray:
         """Take the steps, and write the tables; return the times of all steps (I,), in s."""

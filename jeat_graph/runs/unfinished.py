@@ -13,10 +13,11 @@ from typing import Any
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.diagnostics import Diagnostics
-from jeat_graph.data.errors import JeatGraphError, OtherRunError
+from jeat_graph.data.errors import DataError, JeatGraphError, OtherRunError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.packing import pack, plain_codec, unpack
 from jeat_graph.tracking.checkpoint import load_state, save_state
+from jeat_graph.tracking.state_check import refusing_damage
 
 _STATE, _ROWS = "state.npz", "rows.bin"
 _CODECS = {kind.__name__: plain_codec(kind) for kind in (Trajectories, Diagnostics)}
@@ -43,18 +44,21 @@ class UnfinishedRun:
         Raises:
             OtherRunError: it is of another run or version, or cannot be read.
         """
-        if not self._state.is_file():
+        if not self._state.exists():
             return None
         try:
             _, state = load_state(self._state)
         except JeatGraphError as error:
             raise OtherRunError(str(error)) from None
-        other = [key for key, value in self._identity.items() if state["identity"].get(key) != value]
+        identity, length = state.get("identity"), state.get("rows")
+        if not isinstance(identity, dict) or not isinstance(length, int):
+            raise OtherRunError(f"{self._state}: holds no run that is not finished")
+        other = [key for key, value in self._identity.items() if identity.get(key) != value]
         if other:
             raise OtherRunError(f"{self._state}: was left by a run with other {' and '.join(other)}")
-        if not self._rows.is_file() or self._rows.stat().st_size < state["rows"]:
+        if not self._rows.is_file() or self._rows.stat().st_size < length:
             raise OtherRunError(f"{self._rows}: is shorter than when the state was saved")
-        self._length = state["rows"]
+        self._length = length
         return state
 
     def begin(self) -> None:
@@ -66,12 +70,20 @@ class UnfinishedRun:
             file.truncate(self._length)
 
     def rows(self) -> Iterator[tuple[str, Any]]:
-        """Yield what had been written before the state was saved, in its order for each file."""
+        """Yield what had been written before the state was saved, in its order for each file.
+
+        Raises:
+            DataError: the rows are damaged.
+        """
         with self._rows.open("rb") as file:
             while file.tell() < self._length:
-                text, block = _HEAD.unpack(file.read(_HEAD.size))
-                parts = unpack(file.read(text).decode(), file.read(block), _CODECS)
-                yield from ((name, piece) for name, pieces in parts.items() for piece in pieces)
+                with refusing_damage(self._rows):
+                    text, block = _HEAD.unpack(file.read(_HEAD.size))
+                    if min(text, block) < 0 or file.tell() + text + block > self._length:
+                        raise DataError("is damaged: rows are missing")
+                    parts = unpack(file.read(text).decode(), file.read(block), _CODECS)
+                    pieces = [(name, piece) for name, pieces in parts.items() for piece in pieces]
+                yield from pieces
 
     def add(self, name: str, piece: Any) -> None:
         """Take down a piece of a table, or of records, that has been written to one of the run's files."""

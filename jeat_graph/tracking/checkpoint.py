@@ -8,19 +8,16 @@ was saved and in the one that is loaded alike, so that both give the same bytes 
 from __future__ import annotations
 
 import json
-import zipfile
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from jeat_graph.config.reading import config_from_dict, config_to_dict
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.io.atomic import atomic_path
 from jeat_graph.io.packing import Codec, pack, plain_codec, unpack
+from jeat_graph.io.state_file import read_state_file, write_state_file
 from jeat_graph.smoothers.engine import WholeTrackSmoother
 from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
 from jeat_graph.smoothers.track_data import Prior, SmoothedTrack
@@ -38,12 +35,14 @@ from jeat_graph.tracking.smoothing.sizes import SizeWindow
 from jeat_graph.tracking.smoothing.waiting import WaitingRows
 from jeat_graph.tracking.snapshot import Snapshot
 from jeat_graph.tracking.state import SceneState, TrackArrays
+from jeat_graph.tracking.state_check import checked_snapshot, made_with
+from jeat_graph.tracking.state_check import refusing_damage as refusing_damage
 from jeat_graph.tracking.step_record import StepRecord
 from jeat_graph.version import __version__
 
 #: Raised with every change of what is saved: a file of another format is refused, not guessed at.
-FORMAT = 25
-_MAGIC = "jeat-graph tracker"
+FORMAT = 26
+_MAGIC, _WHAT = "jeat-graph tracker", "saved tracker"
 _PLAIN = (
     ClassTally,
     InProcessSmoothing,
@@ -54,7 +53,6 @@ _PLAIN = (
     SceneState,
     SizeWindow,
     SmoothedTrack,
-    Snapshot,
     StepRecord,
     StepRecorder,
     TrackArrays,
@@ -79,7 +77,7 @@ def unpack_smoothers(config: Config, state: tuple[str, bytes]) -> TrackSmoothers
 
 def _codecs(config: Config, forget: bool = True) -> dict[str, Codec]:
     """All classes that a file may name; `forget` has the saved smoothers build GTSAM's windows anew too."""
-    plain = {kind.__name__: plain_codec(kind) for kind in _PLAIN}
+    plain = {kind.__name__: _whole_codec(kind) for kind in _PLAIN}
     lag = plain_codec(FixedLagSmoother)
 
     def lag_apart(one: FixedLagSmoother) -> dict[str, Any]:
@@ -88,6 +86,11 @@ def _codecs(config: Config, forget: bool = True) -> dict[str, Codec]:
         return one.saved()
 
     return plain | {
+        "Snapshot": Codec(
+            Snapshot,
+            lambda one: one._asdict(),
+            lambda saved: checked_snapshot(Snapshot(**saved), config),
+        ),
         "FixedLagSmoother": Codec(FixedLagSmoother, lag_apart, lag.together),
         "Window": Codec(Window, Window.saved, Window.from_saved),
         "WaitingRows": Codec(WaitingRows, _rows_apart, lambda saved: _rows_together(config, saved)),
@@ -95,6 +98,19 @@ def _codecs(config: Config, forget: bool = True) -> dict[str, Codec]:
         "Config": Codec(type(config), lambda _: {}, lambda _: config),
         "ErrorStates": Codec(ErrorStates, lambda _: {}, lambda _: ErrorStates.of(config)),
     }
+
+
+def _whole_codec(kind: type[Any]) -> Codec:
+    """Codec of objects that are their attributes, all of which must be there."""
+    plain, needed = plain_codec(kind), made_with(kind)
+
+    def together(saved: dict[str, Any]) -> Any:
+        missing = needed - saved.keys()
+        if missing:
+            raise DataError(f"is damaged: {kind.__name__} without {min(missing)}")
+        return plain.together(saved)
+
+    return Codec(kind, plain.apart, together)
 
 
 def _rows_apart(rows: WaitingRows) -> dict[str, Any]:
@@ -126,10 +142,7 @@ def save_state(path: str | Path, config: Config, state: dict[str, Any]) -> None:
         raise JeatGraphError("a smoothing worker's state cannot be saved: set smoother.worker to false")
     text, block = pack(state, _codecs(config))
     described = _head(config) + b"\n" + text.encode()
-    with atomic_path(path) as temporary, temporary.open("wb") as file:
-        np.savez(
-            file, text=np.frombuffer(described, np.uint8), block=np.frombuffer(block or bytes(1), np.uint8)
-        )
+    write_state_file(path, described, block)
 
 
 _heads: dict[int, tuple[Config, bytes]] = {}
@@ -160,16 +173,13 @@ def load_state(path: str | Path, config: Config | None = None) -> tuple[Config, 
         DataError: no such file, not a state of a tracker, or a damaged one.
         JeatGraphError: it is of another version, or was made with other settings.
     """
+    described, block = read_state_file(path, _WHAT)
     try:
-        with np.load(path, allow_pickle=False) as file:
-            described, block = file["text"].tobytes(), file["block"].tobytes()
         head_text, _, text = described.decode().partition("\n")
         head = json.loads(head_text)
         found = (head["kind"], head["format"], head["version"], head["config"])
-    except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror or error}", path) from None
-    except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
-        raise DataError(f"is no saved tracker ({type(error).__name__})", path) from None
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise DataError(f"is no {_WHAT} ({type(error).__name__})", path) from None
     kind, form, version, settings = found
     if kind != _MAGIC or form != FORMAT or version != __version__:
         raise JeatGraphError(
@@ -183,11 +193,11 @@ def load_state(path: str | Path, config: Config | None = None) -> tuple[Config, 
                 f"{path}: was saved with other settings: {_difference(settings, wanted)}; give the same, or "
                 "begin anew without the file"
             )
-    kept = config if config is not None else config_from_dict(settings)
-    try:
+    with refusing_damage(path):
+        kept = config if config is not None else config_from_dict(settings)
         state = unpack(text, block, _codecs(kept))
-    except DataError as error:
-        raise DataError(error.message, path) from None
+        if not isinstance(state, dict):
+            raise DataError("is damaged: it holds no state")
     return kept, state
 
 

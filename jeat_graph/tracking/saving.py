@@ -65,12 +65,14 @@ class SavedTracks(SmoothedTracks):
             JeatGraphError: it was saved by another version, or with other settings.
         """
         from jeat_graph.tracking.checkpoint import load_state
+        from jeat_graph.tracking.state_check import refusing_damage
 
         kept, state = load_state(path, config)
         if "policy" in state:
             # Scans that may be taken again are apart there, and identities are not those that were given out.
             raise DataError("holds a tracker that takes late scans; LiveTracker.load goes on from it", path)
-        return cls.from_state(kept, state)
+        with refusing_damage(path):
+            return cls.from_state(kept, state)
 
     def begin_anew(self, t: float) -> None:
         """End all tracks and let time go on from another moment, an earlier one too (s).

@@ -1,6 +1,7 @@
 """Assignment is optimal: against brute force over all matchings and against SciPy's solver."""
 
 import itertools
+import time
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
-from jeat_graph.association.assignment import assign, solve_dense
+from jeat_graph.association.assignment import assign, solve_dense, solve_sparse
 
 
 def least_total(cost, unassigned):
@@ -110,3 +111,33 @@ def test_nothing_to_assign():
     assert assign(0, 0, none, none, np.zeros(0), 0.0).shape == (0,)
     assert assign(3, 0, none, none, np.zeros(0), 0.0).tolist() == [-1, -1, -1]
     assert solve_dense(np.zeros((0, 3)), 0.0).shape == (0,)
+
+
+@given(
+    seed=st.integers(0, 10**6), unassigned=st.sampled_from([-1.0, 0.0, 1.0, 5.0, 1e6]), whole=st.booleans()
+)
+def test_by_pairs_it_is_solved_as_by_the_whole_matrix(seed, unassigned, whole):
+    rng = np.random.default_rng(seed)
+    num_rows, num_cols = rng.integers(1, 12, 2)
+    rows, cols = np.nonzero(rng.random((num_rows, num_cols)) < rng.uniform(0.1, 1.0))
+    order = rng.permutation(len(rows))
+    rows, cols, costs = rows[order], cols[order], rng.normal(0.0, 3.0, len(rows))
+    costs = np.round(costs) if whole else costs  # ties, which must be broken alike
+    matrix = np.full((num_rows, num_cols), np.inf)
+    matrix[rows, cols] = costs
+    expected = solve_dense(matrix, unassigned)
+    np.testing.assert_array_equal(solve_sparse(num_rows, num_cols, rows, cols, costs, unassigned), expected)
+
+
+def test_a_crowd_in_which_everything_hangs_together_takes_no_matrix():
+    rng, num = np.random.default_rng(1), 30_000
+    rows = np.repeat(np.arange(num), 5)
+    cols = (rows + rng.integers(0, 40, len(rows))) % num
+    rows, cols = np.unique(np.column_stack([rows, cols]), axis=0).T.copy()
+    costs = rng.normal(-1.0, 3.0, len(rows))
+    assign(1, 1, np.array([0, 0]), np.array([0, 0]), np.zeros(2), 0.0)  # compiled
+    begin = time.process_time()
+    match = assign(num, num, rows, cols, costs, 2.0)
+    assert time.process_time() - begin < 20.0
+    taken = match[match >= 0]
+    assert len(np.unique(taken)) == len(taken) > 0.8 * num

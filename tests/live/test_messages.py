@@ -140,3 +140,27 @@ def test_what_is_known_of_numbers_is_kept_as_plain_data():
     assert not any(again.is_new(at(k, t + 0.05 * k)) for t in (0.0, 200.0) for k in range(2000))
     assert again.is_new(at(2000, 300.0))
     assert again.restarts == {"cam": 1}
+
+
+def test_memory_of_sources_is_bounded_and_who_is_heard_stays_known():
+    duplicates, count = Duplicates(), 3 * Duplicates.SOURCES
+    assert duplicates.is_new(at(0, 0.0, "steady"))
+    for k in range(count):
+        assert duplicates.is_new(at(0, 0.05 * k, f"source {k}"))
+        assert duplicates.is_new(at(k + 1, 0.05 * k, "steady"))
+        assert not duplicates.is_new(at(k, 0.05 * k, "steady"))
+    assert len(duplicates.seen) == Duplicates.SOURCES
+    assert duplicates.forgotten == count + 1 - Duplicates.SOURCES
+    assert not duplicates.is_new(at(0, 0.05 * (count - 1), f"source {count - 1}"))
+    again = Duplicates()
+    again.set_state(duplicates.state())
+    assert list(again.seen) == list(duplicates.seen)
+    assert again.forgotten == duplicates.forgotten
+    assert not again.is_new(at(count, 0.05 * (count - 1), "steady"))
+
+
+def test_what_a_source_is_called_and_how_far_it_counts_is_bounded():
+    for wrong in ({"source": "x" * 257}, {"seq": 1 << 63}, {"seq": 10**400}):
+        with pytest.raises(DataError, match=r"source must be|seq must be") as error:
+            decoded({"v": 1, "source": "a", "seq": 1, "scans": [SCAN]} | wrong)
+        assert len(str(error.value)) < 200

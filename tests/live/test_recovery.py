@@ -332,9 +332,9 @@ def test_a_message_with_a_wrong_time_does_not_hide_that_its_source_is_started_ag
 
 def test_sources_are_forgotten_when_there_are_too_many():
     duplicates = Duplicates()
-    for k in range(3 * Duplicates.MOST_SOURCES):
+    for k in range(3 * Duplicates.SOURCES):
         assert duplicates.is_new(message(0, 0.01 * k, source=f"s{k}"))
-    assert len(duplicates.seen) == Duplicates.MOST_SOURCES
+    assert len(duplicates.seen) == Duplicates.SOURCES
 
 
 def session_of(live=None, file=None, more=None):

@@ -100,6 +100,10 @@ class ModelEventDetector(BinnedDetector):
         signal = super().without_noise(events)
         return None if signal is None else signal._replace(events=self._places.moved(signal.events))
 
+    def note(self) -> str:
+        """Say what was wrong with the network's outputs so far; empty if nothing was."""
+        return self._outputs.note()
+
     def _emptied(self) -> None:
         self._state = {}
 

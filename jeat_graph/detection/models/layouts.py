@@ -103,7 +103,8 @@ def decode(layout: str, outputs: Mapping[str, npt.NDArray[Any]], side: tuple[int
         DataError: the outputs are not of that layout.
     """
     try:
-        return _DECODERS[layout](outputs, side)
+        with np.errstate(invalid="ignore", over="ignore"):  # what is no number is counted by who asks
+            return _DECODERS[layout](outputs, side)
     except (ValueError, IndexError, KeyError, StopIteration) as error:
         shapes = ", ".join(f"{name} {list(value.shape)}" for name, value in outputs.items())
         raise DataError(f"the network's outputs {shapes} are not of the layout {layout}: {error}") from None
@@ -114,6 +115,10 @@ def is_raw(rows: npt.NDArray[Any], side: tuple[int, int]) -> bool:
     places, strides = cells(side, _STRIDES)
     if len(rows) != len(places):
         return False
+    good = np.isfinite(rows).all(axis=1)
+    if not good.any():
+        return False
+    rows, places, strides = rows[good], places[good], strides[good]
     decoded = np.median(np.abs(rows[:, :2] / strides[:, None] - places - 0.5))
     return bool(np.median(np.abs(rows[:, :2] - 0.5)) < decoded or (rows[:, 2:4] < 0).any())
 
@@ -150,7 +155,7 @@ def _yolov8(outputs: Mapping[str, Any], side: tuple[int, int]) -> DecodedBoxes:
 
 def _end_to_end(outputs: Mapping[str, Any], side: tuple[int, int]) -> DecodedBoxes:
     rows = _rows(outputs)
-    return DecodedBoxes(rows[:, :4], rows[:, 4], rows[:, 5].astype(np.int64), True)
+    return _labelled(rows[:, :4], rows[:, 4], rows[:, 5])
 
 
 def _detr(outputs: Mapping[str, Any], side: tuple[int, int]) -> DecodedBoxes:
@@ -164,10 +169,10 @@ def _detr_softmax(outputs: Mapping[str, Any], side: tuple[int, int]) -> DecodedB
 def _boxes(outputs: Mapping[str, Any], side: tuple[int, int]) -> DecodedBoxes:
     low = {name.lower(): np.asarray(value, dtype=np.float64) for name, value in outputs.items()}
     corners = low["boxes"].reshape(-1, 4)
-    if len(corners) and corners.max() <= 2.0:  # shares of the picture
+    if len(corners) and not (corners > 2.0).any():  # shares of the picture
         corners = corners * np.array([*side, *side], dtype=np.float64)
     labels = low["labels"].reshape(-1) if "labels" in low else np.zeros(len(corners))
-    return DecodedBoxes(corners, low["scores"].reshape(-1), labels.astype(np.int64), True)
+    return _labelled(corners, low["scores"].reshape(-1), labels)
 
 
 def _nanodet(outputs: Mapping[str, Any], side: tuple[int, int]) -> DecodedBoxes:
@@ -213,6 +218,14 @@ _DECODERS = {
 LAYOUT_NAMES = tuple(_DECODERS)
 
 
+def _labelled(corners: FloatArray, scores: FloatArray, labels: FloatArray) -> DecodedBoxes:
+    """Boxes of which the network says the class; the score of one whose class is no number is none either."""
+    known = np.isfinite(labels)
+    return DecodedBoxes(
+        corners, np.where(known, scores, np.nan), np.where(known, labels, -1.0).astype(np.int64), True
+    )
+
+
 def _rows(outputs: Mapping[str, Any]) -> FloatArray:
     """Return the one output without its batch."""
     (only,) = outputs.values()
@@ -252,7 +265,8 @@ def _from_centre(boxes: FloatArray) -> FloatArray:
 
 def _squashed(values: FloatArray) -> FloatArray:
     """Return probabilities: the values, or their logistic function where they cannot be any."""
-    if values.size and (values.min() < 0.0 or values.max() > 1.0 + 1e-3):
+    # Not by their least and greatest: one that is no number would hide all others.
+    if (values < 0.0).any() or (values > 1.0 + 1e-3).any():
         return np.asarray(1.0 / (1.0 + np.exp(-np.clip(values, -60.0, 60.0))))
     return values
 

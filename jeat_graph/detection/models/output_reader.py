@@ -13,11 +13,13 @@ from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError
 from jeat_graph.detection.models.choosing import choose, class_names, wanted_classes
-from jeat_graph.detection.models.layouts import LAYOUT_NAMES, decode, is_raw, recognise
+from jeat_graph.detection.models.layouts import LAYOUT_NAMES, DecodedBoxes, decode, is_raw, recognise
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.models.onnx_head import CARD, Port
 
 _COCO = 80
+# Of a picture's boxes so many may be without numbers; where more are, the others cannot be trusted either.
+_MOST_WITHOUT = 0.5
 
 
 class OutputReader:
@@ -34,6 +36,7 @@ class OutputReader:
     Attributes:
         layout: that of the outputs.
         words: says which classes are kept.
+        no_numbers: boxes so far that had no numbers (NaN or infinite) and were left out.
 
     Raises:
         ConfigError: a class that is not known.
@@ -58,21 +61,51 @@ class OutputReader:
         self._unsure = self.layout == "yolox" and settings.layout == "auto"
         names = class_names(notes)
         count = class_count(self.layout, outputs) or (len(names) or None)
+        self._path, self._looks, self._looks_without, self.no_numbers = path, 0, 0, 0
         self._wanted, self.words = wanted_classes(settings.classes, count if names or coco else None, names)
 
     def read(self, outputs: dict[str, npt.NDArray[Any]]) -> tuple[FloatArray, FloatArray]:
         """Return corners (M, 4) in the network's input (px) and scores (M,) of what is to be kept.
 
+        Boxes without numbers are left out and counted.
+
         Raises:
-            DataError: the outputs are not of the layout.
+            DataError: the outputs are not of the layout, or most of the boxes have no numbers.
         """
         if self._unsure:
             (only,) = outputs.values()
             self.layout = "yolox-raw" if is_raw(only[0], self._side) else "yolox"
             self._unsure = False
         found = decode(self.layout, outputs, self._side)
-        corners, scores, _ = choose(found, self._wanted, self._settings.score, *self._overlaps)
+        corners, scores, _ = choose(
+            self._with_numbers(found), self._wanted, self._settings.score, *self._overlaps
+        )
         return corners, scores
+
+    def note(self) -> str:
+        """Say how many boxes were left out because they had no numbers; empty if none were."""
+        if not self.no_numbers:
+            return ""
+        where = f"in {self._looks_without} of {self._looks} looks"
+        return f"{self._path}: {self.no_numbers} boxes had no numbers (NaN or infinite), {where}: left out"
+
+    def _with_numbers(self, found: DecodedBoxes) -> DecodedBoxes:
+        """Leave out the boxes that have no numbers, and count those of a score that is not too low."""
+        numbers = np.isfinite(found.corners).all(axis=1) & np.isfinite(found.scores)
+        without = int(np.count_nonzero(~numbers & ~(found.scores < self._settings.score)))
+        self._looks += 1
+        self._looks_without += without > 0
+        self.no_numbers += without
+        if without > _MOST_WITHOUT * len(numbers):
+            raise DataError(
+                f"the network gave no numbers (NaN or infinite) for {without} of {len(numbers)} boxes: it "
+                "does not work on this input, or not at this precision",
+                self._path,
+            )
+        if numbers.all():
+            return found
+        corners, scores, classes, distinct = found
+        return DecodedBoxes(corners[numbers], scores[numbers], classes[numbers], distinct)
 
 
 def scan_within(

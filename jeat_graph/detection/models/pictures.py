@@ -75,6 +75,10 @@ class ModelPictureDetector:
         corners = corners if self._sizes is not None else at.back(corners)
         return scan_within(t, self.sensor, corners, scores, (width, height))
 
+    def note(self) -> str:
+        """Say what was wrong with the network's outputs so far; empty if nothing was."""
+        return self._outputs.note()
+
 
 def _inputs(inputs: tuple[Port, ...], path: Path) -> tuple[Port, Port | None]:
     """Return the picture's input, and that of its size, where there is one."""

@@ -21,6 +21,7 @@ import numpy as np
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import JeatGraphError
+from jeat_graph.data.processes import safe_start
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.smoothing.behind import COUNTS
 from jeat_graph.tracking.smoothing.history import WHOLE
@@ -75,7 +76,8 @@ class SmoothingWorker:
         self._answers, theirs = context.Pipe(duplex=False)
         arguments = (self._config, orders, theirs, self._most_waiting)
         self._process = context.Process(target=_serve, args=arguments, daemon=True)
-        self._process.start()
+        with safe_start():
+            self._process.start()
         # Whoever holds an end open keeps the other side from seeing that there is nobody any more.
         orders.close()
         theirs.close()

@@ -11,6 +11,8 @@ import numpy as np
 from jeat_graph.data.errors import DataError
 from jeat_graph.detection.models.choosing import wanted_classes
 from jeat_graph.io.decoders import RgbImage
+from jeat_graph.io.limits import check_file
+from jeat_graph.io.picture_file import read_picture
 from jeat_graph_sehn.training.data_sets import Picture
 from jeat_graph_sehn.training.truth_at import TrueBoxes
 
@@ -89,15 +91,11 @@ class _File:
         self._path = path
 
     def __call__(self) -> RgbImage:
-        import cv2
-
-        bgr: Any = cv2.imread(str(self._path), cv2.IMREAD_COLOR)
-        if bgr is None:
-            raise DataError("is no picture that can be read", self._path)
-        return np.ascontiguousarray(bgr[..., ::-1])
+        return np.ascontiguousarray(read_picture(self._path)[..., ::-1])
 
 
 def _tree(path: Path) -> dict[str, Any]:
+    check_file(path)
     try:
         tree = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

@@ -13,6 +13,7 @@ from typing import Any
 import torch
 import yaml
 
+from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.io.hashing import sha256_of
 from jeat_graph.version import __version__
@@ -260,7 +261,7 @@ def _described(path: Path) -> dict[str, Any]:
             found[f"sha256 of {name}"] = sha256_of(path / name)
     if (path / _SETTINGS).is_file():
         try:
-            tree = yaml.safe_load((path / _SETTINGS).read_text(encoding="utf-8"))
+            tree = load_yaml((path / _SETTINGS).read_text(encoding="utf-8"))
             source = tree["source"]
             found |= {key: source[key] for key in ("source", "seed", "world", "frames") if key in source}
         except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError):

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from jeat_graph.data.errors import JeatGraphError
-from jeat_graph.data.processes import available_cores, end_with_parent, worker_pool
+from jeat_graph.data.processes import available_cores, end_with_parent, safe_start, worker_pool
 from jeat_graph_sehn.simulation.dataset.disk import check_disk
 from jeat_graph_sehn.simulation.dataset.protocol import Protocol
 from jeat_graph_sehn.simulation.dataset.segment_writer import write_segment
@@ -72,7 +72,8 @@ def _in_processes(
     workers: int,
     on_frames: Callable[[int], object],
 ) -> Generator[dict[str, Any], None, None]:
-    counter = multiprocessing.get_context("spawn").Value("q", 0)
+    with safe_start():
+        counter = multiprocessing.get_context("spawn").Value("q", 0)
     threads = max(1, available_cores() // workers)
     given = (factory, root, protocol, counter, threads)
     shown = 0
