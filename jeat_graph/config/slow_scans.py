@@ -4,8 +4,8 @@ The settings of motion say what a vehicle may do in a second, and with several s
 from one to the next. At one scan a second it is so much that anything may have become anything: a new track
 whose velocity has a standard deviation of four lengths a second could be any of the next boxes, none is
 worth believing, and all that is found counts as clutter. Among many vehicles nobody can tell apart what moves
-further between two scans than about its own length, so that bounds what is expected; but however seldom the
-scans, a vehicle at a usual speed stays possible up to twice that, for where there are few it can be told apart.
+further between two scans than about its own length, so that bounds what is expected. But however seldom the
+scans, a usual speed stays possible: where there are few vehicles, each can be told apart.
 Tracks are waited for over a scan and a half at first, and over five when they are confirmed.
 """
 

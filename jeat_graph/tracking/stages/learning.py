@@ -24,7 +24,7 @@ _LOOK_WEIGHT = 0.1
 _PRIOR_SCANS = 10.0
 # However many misses, a vehicle is never certain to be hidden: then no later one could say that it is gone.
 _MOST_HIDDEN = 0.999
-# Where a sensor's scans are further apart than this (s), each counts for less than the time that it stands for.
+# Of a sensor whose scans are further apart than this (s), each counts for less than the time it stands for.
 _CLOSE_S = 0.2
 
 
