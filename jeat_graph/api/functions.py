@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
-from jeat_graph.data.errors import DataError
+from jeat_graph.data.errors import DataError, InputWarning
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.io.detections_io import read_detections
 from jeat_graph.io.truth_io import read_truth
@@ -132,6 +134,7 @@ def evaluate(
     *,
     kind: str = "causal",
     classes: Sequence[str] | None = None,
+    outside: str = "false",
 ) -> dict[str, dict[str, float | int]]:
     """Judge tracks against truth.
 
@@ -142,6 +145,8 @@ def evaluate(
         kind: what a table alone is: `causal` or `smoothed`.
         classes: classes of objects to be found; others are ignored, and so are tracks that have another
             class. All by default.
+        outside: `false` if rows before the first and after the last time of the truth are false, which a
+            warning names; `ignored` if they are not to be looked at.
 
     Returns:
         By kind of table, MOTA, HOTA, IDF1 and so on by name, as `eval --json` writes them.
@@ -149,9 +154,11 @@ def evaluate(
     Raises:
         DataError: a file is not valid, or tracks and truth do not fit together.
     """
-    from jeat_graph.eval.judge import judge_runs
+    from jeat_graph.eval.judge import judge_runs, rows_beyond
     from jeat_graph.eval.load import JudgedRun, check_classes, load_run, restrict_classes, restrict_tracks
 
+    if outside not in ("false", "ignored"):
+        raise DataError(f"outside {outside!r}: must be false or ignored")
     if isinstance(tracks, (str, Path)):
         if not isinstance(truth, (str, Path)):
             raise DataError("a run that is given as a path needs its truth as a path too")
@@ -165,7 +172,10 @@ def evaluate(
             check_classes([objects], classes)
             tables = {name: restrict_tracks(table, classes) for name, table in tables.items()}
         run = JudgedRun("tracks", objects, tables.get("causal"), tables.get("smoothed"))
-    return {name: one.as_dict() for name, one in judge_runs([run]).items()}
+    judged = judge_runs([run], outside=outside == "false")
+    for line in rows_beyond(judged, [run.name]):
+        warnings.warn(f'{line} (outside="ignored" leaves them out)', InputWarning, stacklevel=2)
+    return {name: one.as_dict() for name, one in judged.items()}
 
 
 def compare(
@@ -267,10 +277,13 @@ def read_run(path: PathLike) -> Run:
         DataError: there is no run, or a file of it is not valid.
     """
     from jeat_graph.eval.load import read_tables
+    from jeat_graph.io.scans_io import read_instants
     from jeat_graph.runs.directory import read_record
 
     folder = Path(path)
     tables = read_tables(folder)
+    if "causal" in tables:
+        tables["causal"] = replace(tables["causal"], instants=read_instants(folder))
     return Run(tables.get("causal"), tables.get("smoothed"), read_record(folder))
 
 

@@ -36,6 +36,8 @@ class Trajectories(TrajectoryViews):
         class_probability: (N,) share of those scores that speak for it, NaN where it is unknown; or None.
         size_var: (N, 2) variances of width and height, those of the whole box, not of what the picture leaves
             of it (px²); NaN where they are unknown, as all are where nothing is given.
+        instants: (I,) all the times (s) at which the tracker gave output, ascending, those too at which it
+            reported nothing; or None where that is not known, as of a data frame.
 
     Raises:
         DataError: if the columns differ in length or shape.
@@ -52,6 +54,7 @@ class Trajectories(TrajectoryViews):
     classes: TextArray | None = None
     class_probability: FloatArray | None = None
     size_var: FloatArray = None  # type: ignore[assignment]  # filled in below
+    instants: FloatArray | None = None
 
     def __post_init__(self) -> None:
         n = len(self.t)
@@ -84,21 +87,31 @@ class Trajectories(TrajectoryViews):
 
     @staticmethod
     def concatenate(parts: Sequence[Trajectories]) -> Trajectories:
-        """Stack tables that name the same sensors, in the order given."""
+        """Stack tables that name the same sensors, in the order given.
+
+        Where one that has rows does not know its instants, the whole does not.
+        """
         if not parts:
             return Trajectories.empty()
         if any(part.sensors != parts[0].sensors for part in parts):
             raise DataError("tables of different sensors cannot be joined")
         stacked = {name: np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS}
         classes, probability = join_classes([(len(p), p.classes, p.class_probability) for p in parts])
+        known = [part.instants for part in parts if len(part) or part.instants is not None]
+        told = [at for at in known if at is not None]
         return Trajectories(
-            **stacked, sensors=parts[0].sensors, classes=classes, class_probability=probability
+            **stacked,
+            sensors=parts[0].sensors,
+            classes=classes,
+            class_probability=probability,
+            instants=np.unique(np.concatenate(told)) if told and len(told) == len(known) else None,
         )
 
     def take(self, rows: npt.ArrayLike) -> Self:
         """Return the rows chosen by an index or mask array."""
         index = np.asarray(rows)
         columns: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
+        del columns["instants"]  # no column: the tracker ran at these times, whatever rows are taken
         arrays = {name: c[index] for name, c in columns.items() if isinstance(c, np.ndarray)}
         return replace(self, **arrays)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -266,7 +267,8 @@ class Tracker(SavedTracks):
         columns = self._report(
             self._tracks, self._num_tracks, t, gaps, settings.image, settings.output, by_existence
         )
-        return as_table(columns, self.sensor_names, self._classes)
+        table = as_table(columns, self.sensor_names, self._classes)
+        return table if self._t is None else replace(table, instants=np.array([t]))
 
     def last_updates(self) -> Diagnostics:
         """Return what the last step gave to the tracks, those too that are not reported.
