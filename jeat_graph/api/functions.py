@@ -55,6 +55,7 @@ def track(
     config: Config | PathLike = "default",
     *,
     image: tuple[float, float] | None = None,
+    rate_hz: float | None = None,
 ) -> Tracks:
     """Track a recording from beginning to end.
 
@@ -63,6 +64,7 @@ def track(
             `read_detections` knows.
         config: a configuration, the name of a preset, or a YAML file.
         image: width and height of the picture (px), if not those of the configuration.
+        rate_hz: frames per second (Hz), for a data frame or a file that counts frames.
 
     Returns:
         The causal table, and the smoothed one unless the configuration asks for no smoother.
@@ -75,7 +77,7 @@ def track(
     from jeat_graph.runs.latency import at_measurement
     from jeat_graph.tracking.tracker import Tracker
 
-    recording = _recording(detections)
+    recording = _recording(detections, rate_hz)
     settings = as_config(config, image)
     check_units(recording, settings, "the detections")  # before rates are taken for what they seem
     tracker = Tracker(fit_input(settings, recording)[0])
@@ -85,28 +87,28 @@ def track(
     return Tracks(causal, tracker.finish() if wanted else None)
 
 
-def _recording(detections: Detections | pd.DataFrame | PathLike) -> Detections:
+def _recording(detections: Detections | pd.DataFrame | PathLike, rate_hz: float | None) -> Detections:
     if isinstance(detections, (str, Path)):
-        return read_detections(detections)
+        return read_detections(detections, rate_hz=rate_hz)
     if isinstance(detections, Detections):
         return detections
     if hasattr(detections, "columns"):
-        return Detections.from_pandas(detections)
+        return Detections.from_pandas(detections, rate_hz=rate_hz)
     raise DataError(
         "detections are Detections, a data frame, or the path of a file (make one of arrays with "
         f"Detections.from_rows, of several with Detections.concatenate), not {type(detections).__name__}"
     )
 
 
-def _truth(truth: GroundTruth | pd.DataFrame | PathLike) -> GroundTruth:
+def _truth(truth: GroundTruth | pd.DataFrame | PathLike, rate_hz: float | None) -> GroundTruth:
     if isinstance(truth, (str, Path)):
-        return read_truth(truth)
+        return read_truth(truth, rate_hz=rate_hz)
     if isinstance(truth, GroundTruth):
         return truth
     if hasattr(truth, "columns"):
         from jeat_graph.data.truth_frames import truth_of_frame
 
-        return truth_of_frame(truth)
+        return truth_of_frame(truth, rate_hz=rate_hz)
     raise DataError(
         f"truth is a GroundTruth, a data frame, or the path of a file, not {type(truth).__name__}"
     )
@@ -135,6 +137,7 @@ def evaluate(
     kind: str = "causal",
     classes: Sequence[str] | None = None,
     outside: str = "false",
+    rate_hz: float | None = None,
 ) -> dict[str, dict[str, float | int]]:
     """Judge tracks against truth.
 
@@ -147,6 +150,7 @@ def evaluate(
             class. All by default.
         outside: `false` if rows before the first and after the last time of the truth are false, which a
             warning names; `ignored` if they are not to be looked at.
+        rate_hz: frames per second (Hz), for data frames and files that count frames.
 
     Returns:
         By kind of table, MOTA, HOTA, IDF1 and so on by name, as `eval --json` writes them.
@@ -162,11 +166,11 @@ def evaluate(
     if isinstance(tracks, (str, Path)):
         if not isinstance(truth, (str, Path)):
             raise DataError("a run that is given as a path needs its truth as a path too")
-        run = load_run(tracks, truth, classes=classes)
+        run = load_run(tracks, truth, rate_hz=rate_hz, classes=classes)
         if classes is not None:
             check_classes([run.truth], classes)
     else:
-        tables, objects = _tables(tracks, kind), _truth(truth)
+        tables, objects = _tables(tracks, kind), _truth(truth, rate_hz)
         if classes is not None:
             objects = restrict_classes(objects, classes)
             check_classes([objects], classes)
@@ -184,14 +188,19 @@ def compare(
     truth: GroundTruth | pd.DataFrame | PathLike | None = None,
     *,
     lags_s: Sequence[float] | None = None,
+    image: tuple[float, float] | None = None,
+    rate_hz: float | None = None,
 ) -> Comparison:
     """Compare the filter with smoothers of several lags on one recording.
 
     Args:
         detections: as for `track`.
         config: a configuration, the name of a preset, or a YAML file.
-        truth: truth with motion, or its file; without it only consistency is judged.
+        truth: truth, a data frame or its file. Without motion in it positions alone are judged, by the
+            centres of its boxes; without truth only consistency.
         lags_s: lags (s); 0 is the filter.
+        image: width and height of the picture (px), if not those of the configuration.
+        rate_hz: frames per second (Hz), for data frames and files that count frames.
 
     Returns:
         Tables to read (`.tables`) and all figures by name (`.values`).
@@ -203,9 +212,9 @@ def compare(
     from jeat_graph.runs.latency import at_measurement
     from jeat_graph.runs.measured import compare_run, track_measured
 
-    recording = _recording(detections)
-    objects = None if truth is None else _truth(truth)
-    settings = fit_input(as_config(config), recording)[0]
+    recording = _recording(detections, rate_hz)
+    objects = None if truth is None else _truth(truth, rate_hz)
+    settings = fit_input(as_config(config, image), recording)[0]
     return compare_run(track_measured(settings, at_measurement(recording, settings)), objects, lags_s)
 
 
@@ -216,6 +225,7 @@ def calibrate(
     *,
     image: tuple[float, float] | None = None,
     tuned: bool = True,
+    rate_hz: float | None = None,
 ) -> Config:
     """Estimate a configuration from recordings.
 
@@ -227,6 +237,7 @@ def calibrate(
         image: width and height of the picture (px), if not those of `base`.
         tuned: with truth, also choose by tracking the recordings what matched detections cannot tell; takes
             minutes where all else takes seconds.
+        rate_hz: frames per second (Hz), for data frames and files that count frames.
 
     Returns:
         The configuration; `save_config` writes it.
@@ -238,13 +249,13 @@ def calibrate(
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.latency import at_measurement
 
-    recordings = [_recording(one) for one in _as_list(detections)]
+    recordings = [_recording(one, rate_hz) for one in _as_list(detections)]
     start = fit_input(as_config(base, image), *recordings)[0]
     recordings = [at_measurement(one, start) for one in recordings]
     if truth is None:
         return calibrate_without_truth(recordings, start).config
 
-    truths = [_truth(one) for one in _as_list(truth)]
+    truths = [_truth(one, rate_hz) for one in _as_list(truth)]
     if len(truths) != len(recordings):
         raise DataError(f"{len(recordings)} recordings and {len(truths)} truths given; give one for each")
     pairs = list(zip(recordings, truths, strict=True))
@@ -270,8 +281,12 @@ def simulate(
     return simulated(load_scenario(scenario), seed, duration_s)
 
 
-def read_run(path: PathLike) -> Run:
+def read_run(path: PathLike, *, rate_hz: float | None = None) -> Run:
     """Read a run directory, or a single table of one.
+
+    Args:
+        path: run directory, trajectory table, or a MOTChallenge or KITTI result.
+        rate_hz: frames per second (Hz), for a result that counts frames.
 
     Raises:
         DataError: there is no run, or a file of it is not valid.
@@ -281,7 +296,7 @@ def read_run(path: PathLike) -> Run:
     from jeat_graph.runs.directory import read_record
 
     folder = Path(path)
-    tables = read_tables(folder)
+    tables = read_tables(folder, rate_hz)
     if "causal" in tables:
         tables["causal"] = replace(tables["causal"], instants=read_instants(folder))
     return Run(tables.get("causal"), tables.get("smoothed"), read_record(folder))
