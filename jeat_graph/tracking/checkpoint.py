@@ -42,7 +42,7 @@ from jeat_graph.tracking.step_record import StepRecord
 from jeat_graph.version import __version__
 
 #: Raised with every change of what is saved: a file of another format is refused, not guessed at.
-FORMAT = 25
+FORMAT = 26
 _MAGIC = "jeat-graph tracker"
 _PLAIN = (
     ClassTally,

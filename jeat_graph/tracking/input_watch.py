@@ -30,7 +30,7 @@ _FOLLOWS = 0.5
 #: What is said of boxes that are no left, top, width, height.
 CORNERS = (
     "boxes look like x1, y1, x2, y2, taken for left, top, width, height: name the columns so, or convert "
-    "them (in Python Scan.from_xyxy)"
+    'them (in Python format="xyxy" of Tracker.update, or Scan.from_xyxy)'
 )
 
 

@@ -23,6 +23,7 @@ class SavedTracks(SmoothedTracks):
     if TYPE_CHECKING:
         config: Config
         _diagnostics: bool
+        _class_ids: dict[str, int]
         _log: UpdateLog
         _watch: InputWatch
 
@@ -96,6 +97,7 @@ class SavedTracks(SmoothedTracks):
             "log": log,
             "smoothing": self._smoothers,
             "past": self._past,
+            "class_ids": self._class_ids,
         }
 
     @classmethod
@@ -106,6 +108,7 @@ class SavedTracks(SmoothedTracks):
         tracker.config, tracker._smoothers, tracker._past = config, state["smoothing"], state["past"]
         tracker.restore(state["now"])
         tracker._finished = state["finished"]
+        tracker._class_ids = dict(state["class_ids"])
         if state["log"] is not None:
             tracker._log = allocate_log(len(state["log"]))
             tracker._log.rows[:], tracker._log.count[0] = state["log"], len(state["log"])

@@ -19,11 +19,12 @@ from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.diagnostics import Diagnostics
 from jeat_graph.data.embeddings import EmbeddingArray, unit_embeddings
 from jeat_graph.data.errors import JeatGraphError, TimeOrderError
-from jeat_graph.data.interop import boxes_of
+from jeat_graph.data.interop import boxes_of, is_supervision
 from jeat_graph.data.scan import time_of
+from jeat_graph.data.to_supervision import OwnDetections
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.appearance import Compared, Looks, compare, embeddings_of, remember
-from jeat_graph.tracking.classes import ClassTally, check_names, count_votes
+from jeat_graph.tracking.classes import ClassTally, check_names, count_votes, number_classes
 from jeat_graph.tracking.compaction import allocate, grow
 from jeat_graph.tracking.direct_call import DirectCall
 from jeat_graph.tracking.input_watch import InputWatch
@@ -87,6 +88,7 @@ class Tracker(SavedTracks):
         # Of a step's arguments `arrivals_of` alone comes from outside, and it sees to their types.
         self._step, self._report = DirectCall(step), DirectCall(report)
         self._classes: ClassTally | None = None
+        self._class_ids: dict[str, int] = {}
         self._looks: Looks | None = None
         self._watch = InputWatch(config)
         notice_if_cold()
@@ -173,6 +175,7 @@ class Tracker(SavedTracks):
         self._t = t
         living = self._tracks.track_id[: self._num_tracks]
         self._classes, votes = count_votes(self._classes, batch, self._log, living)
+        self._class_ids = number_classes(self._class_ids, batch)
         if compared is not None:
             self._looks = remember(compared, self._log, living)
         if self._smoothers is None:
@@ -239,24 +242,39 @@ class Tracker(SavedTracks):
         t: float,
         sensor: str,
         scores: npt.ArrayLike | None = None,
+        classes: npt.ArrayLike | None = None,
         embeddings: npt.ArrayLike | None = None,
+        format: str | None = None,  # what users of other libraries call it
     ) -> Trajectories:
         """Take in what a detector returned for one picture.
 
         Args:
-            source: `supervision.Detections`, a result of `ultralytics`, or boxes (M, 4) left, top, width,
-                height in px; none (M = 0) if the sensor looked and found nothing. Boxes without area, which
+            source: `supervision.Detections`, a result of `ultralytics`, a dict of `torchvision`, a data
+                frame, or boxes (M, 4) in px, (M, 5) with scores, (M, 6) with scores and numbers of classes;
+                None, or none (M = 0), if the sensor looked and found nothing. Boxes without area, which
                 detectors clip, are left out.
             t: time (s).
             sensor: name of the sensor.
             scores: (M,) confidence in [0, 1], for boxes that come without; 1 where neither says it.
+            classes: (M,) names or numbers of classes, for boxes that come without.
             embeddings: (M, E) what each looks like, of a network for re-identification; NaN where unknown.
+            format: what boxes of an array are: `ltwh` (left, top, width, height; so they are taken without
+                it), `xyxy` (left, top, right, bottom), or `xywh` (centre, width, height).
 
         Returns and raises as `step`; also a DataError where it cannot be told what `source` is.
         """
-        found = boxes_of(source, scores)
+        found = boxes_of(source, scores, classes, format)
         looks = None if embeddings is None else unit_embeddings(embeddings, len(found.kept))[found.kept]
-        return self.step(Scan(t, sensor, found.boxes, found.scores, found.classes, looks))
+        own = is_supervision(source)
+        self.logs_takers = self.logs_takers or own
+        scan = Scan(t, sensor, found.boxes, found.scores, found.classes, looks)
+        self._class_ids = {**self._class_ids, **found.class_ids}
+        table = self.step(scan)
+        if not own:
+            return table
+        taker = np.zeros(len(found.kept), dtype=np.int64)
+        taker[found.kept] = self.takers(len(scan))
+        return replace(table, own=OwnDetections(source, taker))
 
     def causal(self) -> Trajectories:
         """Return the tracks that are reported now, as the last step did."""
@@ -268,7 +286,8 @@ class Tracker(SavedTracks):
             self._tracks, self._num_tracks, t, gaps, settings.image, settings.output, by_existence
         )
         table = as_table(columns, self.sensor_names, self._classes)
-        return table if self._t is None else replace(table, instants=np.array([t]))
+        at = None if self._t is None else np.array([t])
+        return replace(table, instants=at, class_ids=self._class_ids or None)
 
     def last_updates(self) -> Diagnostics:
         """Return what the last step gave to the tracks, those too that are not reported.
