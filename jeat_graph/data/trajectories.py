@@ -92,14 +92,15 @@ class Trajectories(TrajectoryViews):
 
     @staticmethod
     def concatenate(parts: Sequence[Trajectories]) -> Trajectories:
-        """Stack tables that name the same sensors, in the order given.
+        """Stack tables, in the order given; the result names the sensors of all.
 
         Where one that has rows does not know its instants, the whole does not.
         """
         if not parts:
             return Trajectories.empty()
         if any(part.sensors != parts[0].sensors for part in parts):
-            raise DataError("tables of different sensors cannot be joined")
+            names = tuple(sorted({name for part in parts for name in part.sensors}))
+            parts = [_naming(part, names) for part in parts]
         stacked = {name: np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS}
         ids: dict[str, int] = {}
         for part in parts:
@@ -134,6 +135,22 @@ class Trajectories(TrajectoryViews):
         return [text[int(mask)] for mask in self.used]
 
 
+def _naming(table: Trajectories, sensors: tuple[str, ...]) -> Trajectories:
+    """Return a table that names more sensors, among them its own.
+
+    Raises:
+        DataError: more than a table can name.
+    """
+    if len(sensors) > MOST_SENSORS:
+        raise DataError(f"a table names at most {MOST_SENSORS} sensors, and these name {len(sensors)}")
+    used = np.zeros(len(table), dtype=np.int64)
+    for k, name in enumerate(table.sensors):
+        used |= (table.used >> k & 1) << sensors.index(name)
+    return replace(table, used=used, sensors=sensors)
+
+
+#: Bits of `used`.
+MOST_SENSORS = 63
 #: Names of the columns that every table has.
 COLUMNS = ("t", "track_id", "boxes", "existence", "mean", "var", "used", "size_var")
 

@@ -50,6 +50,13 @@ class SensorHealth:
     """
 
     def __init__(self, config: Config) -> None:
+        self.know(config)
+        self.last: dict[str, float] = {}
+        self.silent: list[str] = []
+        self.rubbish: list[str] = []
+
+    def know(self, config: Config) -> None:
+        """Go by a configuration from now on: that of a tracker which has met another sensor, say."""
         self._config = config
         live = config.live
         self._patience_s = {
@@ -57,9 +64,6 @@ class SensorHealth:
             for name, sensor in config.sensors.items()
         }
         self._latency_s = {name: sensor.latency_s for name, sensor in config.sensors.items()}
-        self.last: dict[str, float] = {}
-        self.silent: list[str] = []
-        self.rubbish: list[str] = []
 
     def saw(self, scans: Iterable[Scan], now: float) -> list[HealthChange]:
         """Take note of scans.

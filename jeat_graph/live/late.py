@@ -24,6 +24,7 @@ from jeat_graph.live.lateness import LatenessCounter
 from jeat_graph.live.rewinding import Rewinding, TakenStep
 from jeat_graph.live.time_base import TimeBase
 from jeat_graph.tracking.checkpoint import load_state, save_state
+from jeat_graph.tracking.first_sight import ToldSoFar, wider
 from jeat_graph.tracking.prediction import Prediction
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
 from jeat_graph.tracking.step_record import StepRecord
@@ -56,6 +57,7 @@ class LiveTracker:
             raise ConfigError(f"{policy!r} is not one of {', '.join(POLICIES)}")
         config = tracker.config
         self.tracker = tracker
+        self._told = ToldSoFar()
         self.policy = policy
         self.lateness = LatenessCounter(tracker.sensor_names)
         self.measured: list[tuple[float, RecordArray]] = []
@@ -102,7 +104,9 @@ class LiveTracker:
             DataError, UnknownSensorError: as `Tracker.step`; the state is as before.
             TimeOrderError: a scan comes late, and late scans are refused.
         """
-        batch = [self._corrected(scan) for scan in as_scans(scans)]
+        given = as_scans(scans)
+        self._meet(given)
+        batch = [self._corrected(scan) for scan in given]
         for scan in batch:
             sensor_index(scan.sensor, self.tracker.sensor_names)  # refused before anything is done
         self.measured = []
@@ -130,7 +134,28 @@ class LiveTracker:
         table = self.tracker.causal()
         if self.policy == REWIND:
             table = self._rewinding.identities.answer(table)
+        self._told.note("step", given, sum(map(len, given)))
         return Arrival(table, self.tracker.time or 0.0, late_s, dropped, repeated, held, refuted, anew)
+
+    def _meet(self, scans: Sequence[Scan]) -> None:
+        """Declare the sensors that are met for the first time, as `Tracker.meet` does."""
+        config = wider(self.tracker.config, (scan.sensor for scan in scans))
+        if config is None:
+            return
+        told = self._told
+        if told.is_known:
+            live = LiveTracker(Tracker(config, diagnostics=self.tracker.has_diagnostics), self.policy)
+            told.tell(live)
+        else:
+            self._rewinding.settle(math.inf)
+            self._hand_over()
+            self.tracker.meet(scans)
+            self.tracker.number_on_from(self._rewinding.identities.next_given)
+            live = LiveTracker(self.tracker, self.policy)
+            live._base, live._kept, live._first = self._base, self._kept, self._first
+            live.lateness = self.lateness.among(self.tracker.sensor_names)
+        live._told = told
+        vars(self).update(vars(live))
 
     def _take_all(self, batch: list[Scan]) -> list[Taken]:
         """Take in scans of any times, all or none."""
@@ -204,6 +229,7 @@ class LiveTracker:
         if "policy" not in state:
             raise DataError("holds a tracker, but not one that takes late scans", path)
         live = LiveTracker(Tracker.from_state(kept, state), state["policy"])
+        live._told.forget()
         live._newest = state["newest"]
         live.lateness.set_state(state["lateness"])
         live._rewinding.set_state(state["rewinding"])
@@ -218,6 +244,7 @@ class LiveTracker:
 
     def drain_smoothed(self) -> Trajectories:
         """Return the smoothed rows that are final and forget them (see `Tracker.drain_smoothed`)."""
+        self._told.note("drain_smoothed")
         return self.tracker.drain_smoothed()
 
     def finish(self) -> Trajectories:

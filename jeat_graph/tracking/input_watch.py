@@ -103,6 +103,10 @@ class InputWatch:
                 self._boxes = []
             self._opinion_at = LAST_BOXES
 
+    def know(self, config: Config) -> None:
+        """Go on by another configuration: of a tracker that has met another sensor."""
+        self._config = config
+
     def end(self) -> None:
         """Look at nothing any more: for a tracker that goes on, whose first scans were looked at."""
         self._ended = True

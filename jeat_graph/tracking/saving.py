@@ -107,6 +107,7 @@ class SavedTracks(SmoothedTracks):
         tracker = cls(without, diagnostics=state["diagnostics"])
         tracker.config, tracker._smoothers, tracker._past = config, state["smoothing"], state["past"]
         tracker.restore(state["now"])
+        tracker._told.forget()
         tracker._finished = state["finished"]
         tracker._class_ids = dict(state["class_ids"])
         if state["log"] is not None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.tracking.first_sight import ToldSoFar
 
 if TYPE_CHECKING:
     from jeat_graph.tracking.smoothing.behind import Smoothing
@@ -29,6 +30,7 @@ class SmoothedTracks:
         self._smoothers: Smoothing | None = None
         if config.smoother.engine != "none":
             self._smoothers = _smoothing(config)
+        self._told = ToldSoFar()
         self._past: list[Trajectories] = []  # rows of earlier bases of time that were not fetched
 
     def smoothed(self) -> Trajectories:
@@ -43,6 +45,7 @@ class SmoothedTracks:
         Raises:
             JeatGraphError: the configuration asks for no smoother.
         """
+        self._told.note("smoothed")
         return self._wanted_smoothers().smoothed()
 
     def drain_smoothed(self) -> Trajectories:
@@ -56,6 +59,7 @@ class SmoothedTracks:
         Raises:
             JeatGraphError: the configuration asks for no smoother.
         """
+        self._told.note("drain_smoothed")
         rows = self._wanted_smoothers().drain()
         if self._past:
             rows, self._past = Trajectories.concatenate([*self._past, rows]), []
@@ -63,6 +67,7 @@ class SmoothedTracks:
 
     def smooth_anew(self) -> None:
         """End all tracks of the smoothers, which may then be told of earlier times; their rows wait."""
+        self._told.forget()
         if self._smoothers is not None:
             self._past.append(self._smoothers.finish())
             self._smoothers = _smoothing(self.config)
@@ -85,6 +90,7 @@ class SmoothedTracks:
         Their state after it follows from the steps so far alone, so that a tracker which is saved here and
         loaded goes on with the same bytes as one that settles here and is not saved.
         """
+        self._told.note("settle")
         if self._smoothers is not None:
             self._smoothers.settle()
 
