@@ -6,48 +6,19 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING
 
+from jeat_graph.api.sources import PathLike, Run, Tracks, as_list, recording_of, tables_of, truth_of
 from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError, InputWarning
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
-from jeat_graph.io.detections_io import read_detections
-from jeat_graph.io.truth_io import read_truth
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from jeat_graph.eval.compare import Comparison
-
-PathLike: TypeAlias = str | Path
-
-
-class Tracks(NamedTuple):
-    """What tracking a recording gives.
-
-    Attributes:
-        causal: the online estimates, each from what had arrived by its time.
-        smoothed: the smoothed trajectories; None without a smoother.
-    """
-
-    causal: Trajectories
-    smoothed: Trajectories | None
-
-
-class Run(NamedTuple):
-    """A run directory, read.
-
-    Attributes:
-        causal: the causal table, or None.
-        smoothed: the smoothed table, or None.
-        record: content of `run.json`; empty where there is none.
-    """
-
-    causal: Trajectories | None
-    smoothed: Trajectories | None
-    record: dict[str, Any]
 
 
 def track(
@@ -77,7 +48,7 @@ def track(
     from jeat_graph.runs.latency import at_measurement
     from jeat_graph.tracking.tracker import Tracker
 
-    recording = _recording(detections, rate_hz)
+    recording = recording_of(detections, rate_hz)
     settings = as_config(config, image)
     check_units(recording, settings, "the detections")  # before rates are taken for what they seem
     tracker = Tracker(fit_input(settings, recording)[0])
@@ -85,49 +56,6 @@ def track(
     causal = Trajectories.concatenate(list(tracker.run(recording)) or [Trajectories.empty()])
     wanted = tracker.config.smoother.engine != "none"
     return Tracks(causal, tracker.finish() if wanted else None)
-
-
-def _recording(detections: Detections | pd.DataFrame | PathLike, rate_hz: float | None) -> Detections:
-    if isinstance(detections, (str, Path)):
-        return read_detections(detections, rate_hz=rate_hz)
-    if isinstance(detections, Detections):
-        return detections
-    if hasattr(detections, "columns"):
-        return Detections.from_pandas(detections, rate_hz=rate_hz)
-    raise DataError(
-        "detections are Detections, a data frame, or the path of a file (make one of arrays with "
-        f"Detections.from_rows, of several with Detections.concatenate), not {type(detections).__name__}"
-    )
-
-
-def _truth(truth: GroundTruth | pd.DataFrame | PathLike, rate_hz: float | None) -> GroundTruth:
-    if isinstance(truth, (str, Path)):
-        return read_truth(truth, rate_hz=rate_hz)
-    if isinstance(truth, GroundTruth):
-        return truth
-    if hasattr(truth, "columns"):
-        from jeat_graph.data.truth_frames import truth_of_frame
-
-        return truth_of_frame(truth, rate_hz=rate_hz)
-    raise DataError(
-        f"truth is a GroundTruth, a data frame, or the path of a file, not {type(truth).__name__}"
-    )
-
-
-def _tables(tracks: Trajectories | Tracks | Run | pd.DataFrame, kind: str) -> dict[str, Trajectories]:
-    if isinstance(tracks, (Tracks, Run)):
-        both = {"causal": tracks.causal, "smoothed": tracks.smoothed}
-        return {name: table for name, table in both.items() if table is not None}
-    if kind not in ("causal", "smoothed"):
-        raise DataError(f"kind {kind!r}: must be causal or smoothed")
-    if isinstance(tracks, Trajectories):
-        return {kind: tracks}
-    if hasattr(tracks, "columns"):
-        return {kind: Trajectories.from_pandas(tracks)}
-    raise DataError(
-        "tracks are what track or read_run gives, a table of it, a data frame of one, or a path, "
-        f"not {type(tracks).__name__}"
-    )
 
 
 def evaluate(
@@ -170,7 +98,7 @@ def evaluate(
         if classes is not None:
             check_classes([run.truth], classes)
     else:
-        tables, objects = _tables(tracks, kind), _truth(truth, rate_hz)
+        tables, objects = tables_of(tracks, kind), truth_of(truth, rate_hz)
         if classes is not None:
             objects = restrict_classes(objects, classes)
             check_classes([objects], classes)
@@ -212,8 +140,8 @@ def compare(
     from jeat_graph.runs.latency import at_measurement
     from jeat_graph.runs.measured import compare_run, track_measured
 
-    recording = _recording(detections, rate_hz)
-    objects = None if truth is None else _truth(truth, rate_hz)
+    recording = recording_of(detections, rate_hz)
+    objects = None if truth is None else truth_of(truth, rate_hz)
     settings = fit_input(as_config(config, image), recording)[0]
     return compare_run(track_measured(settings, at_measurement(recording, settings)), objects, lags_s)
 
@@ -245,17 +173,16 @@ def calibrate(
     Raises:
         JeatGraphError: what a file or the data have wrong.
     """
-    from jeat_graph.calibration.procedure import calibrate_with_truth, calibrate_without_truth
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.latency import at_measurement
 
-    recordings = [_recording(one, rate_hz) for one in _as_list(detections)]
+    recordings = [recording_of(one, rate_hz) for one in as_list(detections)]
     start = fit_input(as_config(base, image), *recordings)[0]
     recordings = [at_measurement(one, start) for one in recordings]
     if truth is None:
         return calibrate_without_truth(recordings, start).config
 
-    truths = [_truth(one, rate_hz) for one in _as_list(truth)]
+    truths = [truth_of(one, rate_hz) for one in as_list(truth)]
     if len(truths) != len(recordings):
         raise DataError(f"{len(recordings)} recordings and {len(truths)} truths given; give one for each")
     pairs = list(zip(recordings, truths, strict=True))
@@ -300,8 +227,3 @@ def read_run(path: PathLike, *, rate_hz: float | None = None) -> Run:
     if "causal" in tables:
         tables["causal"] = replace(tables["causal"], instants=read_instants(folder))
     return Run(tables.get("causal"), tables.get("smoothed"), read_record(folder))
-
-
-def _as_list(values: Any) -> list[Any]:
-    one = isinstance(values, (str, Path, Detections, GroundTruth))
-    return [values] if one or hasattr(values, "columns") else list(values)

@@ -50,20 +50,30 @@ class SensorHealth:
     """
 
     def __init__(self, config: Config) -> None:
+        self._config = config
         self.know(config)
         self.last: dict[str, float] = {}
         self.silent: list[str] = []
         self.rubbish: list[str] = []
 
-    def know(self, config: Config) -> None:
-        """Go by a configuration from now on: that of a tracker which has met another sensor, say."""
-        self._config = config
-        live = config.live
+    def know(self, config: Config) -> list[str]:
+        """Go by a configuration from now on: that of a tracker which has met another sensor.
+
+        Returns:
+            A line for each sensor that has not been known before.
+        """
+        fresh = sorted(config.sensors.keys() - self._config.sensors.keys())
+        self._config, live = config, config.live
         self._patience_s = {
             name: max(live.silent_s, live.silent_periods / sensor.rate_hz)
             for name, sensor in config.sensors.items()
         }
         self._latency_s = {name: sensor.latency_s for name, sensor in config.sensors.items()}
+        rates = {name: config.sensors[name].rate_hz for name in fresh}
+        return [
+            f"sensor {name!r} is not declared: taken for a detector at {hz:g} Hz"
+            for name, hz in rates.items()
+        ]
 
     def saw(self, scans: Iterable[Scan], now: float) -> list[HealthChange]:
         """Take note of scans.

@@ -21,11 +21,11 @@ from jeat_graph.data.errors import ConfigError, DataError, TimeOrderError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.live.arrival import Arrival, Taken, looked_last, most_late_s
 from jeat_graph.live.lateness import LatenessCounter
+from jeat_graph.live.met_sensors import MetSensors
 from jeat_graph.live.rewinding import Rewinding, TakenStep
 from jeat_graph.live.time_base import TimeBase
 from jeat_graph.tracking.checkpoint import load_state, save_state
-from jeat_graph.tracking.first_sight import ToldSoFar, wider
-from jeat_graph.tracking.prediction import Prediction
+from jeat_graph.tracking.first_sight import ToldSoFar
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
 from jeat_graph.tracking.step_record import StepRecord
 from jeat_graph.tracking.tracker import Tracker
@@ -36,7 +36,7 @@ _ROUNDING_S = 1e-6
 POLICIES = (REWIND, SKIP, REFUSE)
 
 
-class LiveTracker:
+class LiveTracker(MetSensors):
     """A tracker that takes scans in the order in which they arrive.
 
     Args:
@@ -105,7 +105,7 @@ class LiveTracker:
             TimeOrderError: a scan comes late, and late scans are refused.
         """
         given = as_scans(scans)
-        self._meet(given)
+        self.meet(given)
         batch = [self._corrected(scan) for scan in given]
         for scan in batch:
             sensor_index(scan.sensor, self.tracker.sensor_names)  # refused before anything is done
@@ -136,26 +136,6 @@ class LiveTracker:
             table = self._rewinding.identities.answer(table)
         self._told.note("step", given, sum(map(len, given)))
         return Arrival(table, self.tracker.time or 0.0, late_s, dropped, repeated, held, refuted, anew)
-
-    def _meet(self, scans: Sequence[Scan]) -> None:
-        """Declare the sensors that are met for the first time, as `Tracker.meet` does."""
-        config = wider(self.tracker.config, (scan.sensor for scan in scans))
-        if config is None:
-            return
-        told = self._told
-        if told.is_known:
-            live = LiveTracker(Tracker(config, diagnostics=self.tracker.has_diagnostics), self.policy)
-            told.tell(live)
-        else:
-            self._rewinding.settle(math.inf)
-            self._hand_over()
-            self.tracker.meet(scans)
-            self.tracker.number_on_from(self._rewinding.identities.next_given)
-            live = LiveTracker(self.tracker, self.policy)
-            live._base, live._kept, live._first = self._base, self._kept, self._first
-            live.lateness = self.lateness.among(self.tracker.sensor_names)
-        live._told = told
-        vars(self).update(vars(live))
 
     def _take_all(self, batch: list[Scan]) -> list[Taken]:
         """Take in scans of any times, all or none."""
@@ -237,15 +217,6 @@ class LiveTracker:
         live._kept, live._first = len(live._base.held), state["base"]["first"]
         live._again_until = live.tracker.time
         return live, state["more"]
-
-    def predict(self, t: float) -> Prediction:
-        """Say where the tracks will be at a time not before the newest scan's (see `Tracker.predict`)."""
-        return self._rewinding.identities.rename(self.tracker.predict(t))
-
-    def drain_smoothed(self) -> Trajectories:
-        """Return the smoothed rows that are final and forget them (see `Tracker.drain_smoothed`)."""
-        self._told.note("drain_smoothed")
-        return self.tracker.drain_smoothed()
 
     def finish(self) -> Trajectories:
         """End all tracks and return the smoothed rows not drained yet (see `Tracker.finish`).

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from jeat_graph.config.reading import config_to_dict
-from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.live.arrival import Arrival
@@ -126,7 +125,8 @@ class Session:
         config = self.live.tracker.config
         arrival = self.live.step(message.batch.scans)
         if self.live.tracker.config is not config:
-            self._meet(config)
+            for text in self._health.know(self.live.tracker.config):
+                self.ends.warn(text)
         unanswered = len(arrival.dropped) + len(arrival.repeated) + len(arrival.held)
         if len(arrival.repeated) == len(message.batch.scans):
             self.duplicates += 1
@@ -148,15 +148,6 @@ class Session:
                     for event in self._health.judge(self.live.tracker.sensor_states(), arrival.t):
                         self._tell(event)
         self._save_in_time(arrival.t)
-
-    def _meet(self, before: Config) -> None:
-        """Tell of sensors that the tracker has just declared."""
-        now = self.live.tracker.config
-        self._health.know(now)
-        for name in sorted(now.sensors.keys() - before.sensors.keys()):
-            self.ends.warn(
-                f"sensor {name!r} is not declared: taken for a detector at {now.sensors[name].rate_hz:g} Hz"
-            )
 
     def drain(self) -> None:
         """Write the smoothed rows that are final."""

@@ -23,7 +23,6 @@ class SavedTracks(SmoothedTracks):
     if TYPE_CHECKING:
         config: Config
         _diagnostics: bool
-        _class_ids: dict[str, int]
         _log: UpdateLog
         _watch: InputWatch
 

@@ -84,7 +84,6 @@ class Tracker(DetectorResults):
         # Of a step's arguments `arrivals_of` alone comes from outside, and it sees to their types.
         self._step, self._report = DirectCall(step), DirectCall(report)
         self._classes: ClassTally | None = None
-        self._class_ids: dict[str, int] = {}
         self._looks: Looks | None = None
         self._watch = InputWatch(config)
         notice_if_cold()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from jeat_graph.config.schema import Config
@@ -31,6 +32,7 @@ class SmoothedTracks:
         if config.smoother.engine != "none":
             self._smoothers = _smoothing(config)
         self._told = ToldSoFar()
+        self._class_ids: dict[str, int] = {}  # number of each class named so far
         self._past: list[Trajectories] = []  # rows of earlier bases of time that were not fetched
 
     def smoothed(self) -> Trajectories:
@@ -46,7 +48,7 @@ class SmoothedTracks:
             JeatGraphError: the configuration asks for no smoother.
         """
         self._told.note("smoothed")
-        return self._wanted_smoothers().smoothed()
+        return self._numbered(self._wanted_smoothers().smoothed())
 
     def drain_smoothed(self) -> Trajectories:
         """Return the smoothed rows that are final and forget them, in order of time over all calls.
@@ -63,7 +65,7 @@ class SmoothedTracks:
         rows = self._wanted_smoothers().drain()
         if self._past:
             rows, self._past = Trajectories.concatenate([*self._past, rows]), []
-        return rows
+        return self._numbered(rows)
 
     def smooth_anew(self) -> None:
         """End all tracks of the smoothers, which may then be told of earlier times; their rows wait."""
@@ -82,7 +84,11 @@ class SmoothedTracks:
             return Trajectories.empty(self.sensor_names)
         rows, past = self._smoothers.finish(), self._past
         self._past = []
-        return Trajectories.concatenate([*past, rows]) if past else rows
+        return self._numbered(Trajectories.concatenate([*past, rows]) if past else rows)
+
+    def _numbered(self, rows: Trajectories) -> Trajectories:
+        """Have rows know the numbers of their classes."""
+        return replace(rows, class_ids=self._class_ids) if self._class_ids else rows
 
     def settle(self) -> None:
         """Let the smoothers take in all that they had set aside, and begin anew from what is known then.
