@@ -173,6 +173,7 @@ def calibrate(
     Raises:
         JeatGraphError: what a file or the data have wrong.
     """
+    from jeat_graph.calibration.procedure import calibrate_with_truth, calibrate_without_truth
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.latency import at_measurement
 
