@@ -1,6 +1,7 @@
 """What holds whatever the detectors say: arbitrary scans, sane or not. `make fuzz` tries more of them."""
 
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
