@@ -90,7 +90,7 @@ class DetectorResults(SavedTracks):
         began (`first_sight`): then all tracks end, which a warning says, and identities go on.
 
         Raises:
-            ConfigError: a name that no sensor can have, or too many sensors.
+            UnknownSensorError: a name that no sensor can have, or too many sensors.
         """
         config = wider(self.config, (scan.sensor for scan in scans))
         if config is None:

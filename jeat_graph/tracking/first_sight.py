@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 from jeat_graph.config.schema import Config
+from jeat_graph.data.errors import ConfigError, UnknownSensorError
 
 #: What a tracker was told is remembered up to so many calls, and so many boxes.
 MOST_CALLS, MOST_BOXES = 1024, 20_000
@@ -66,10 +67,13 @@ def wider(config: Config, names: Iterable[str]) -> Config | None:
         own (`input.undeclared`).
 
     Raises:
-        ConfigError: a name that no sensor can have, or too many sensors.
+        UnknownSensorError: a name that no sensor can have, or too many sensors.
     """
     fresh = sorted(set(names) - set(config.sensors))
     if not fresh or config.input.undeclared != "declare":
         return None
     sensor = config.input.undeclared_sensor()
-    return replace(config, sensors={**config.sensors, **dict.fromkeys(fresh, sensor)})
+    try:
+        return replace(config, sensors={**config.sensors, **dict.fromkeys(fresh, sensor)})
+    except ConfigError as error:  # no fault of the configuration, but of a scan
+        raise UnknownSensorError(str(error)) from None

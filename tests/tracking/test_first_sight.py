@@ -11,7 +11,7 @@ import pytest
 
 from jeat_graph import Scan, Tracker, Trajectories, load_config
 from jeat_graph.cli.main import main
-from jeat_graph.data.errors import ConfigError, InputWarning, UnknownSensorError
+from jeat_graph.data.errors import InputWarning, UnknownSensorError
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.tracking import first_sight, notice
 
@@ -92,7 +92,7 @@ def test_a_configuration_that_declares_nobody_refuses_as_before():
     tracker = Tracker("highway", image=IMAGE)
     with pytest.raises(UnknownSensorError, match="cam1"):
         tracker.step(scan(0, "cam1"))
-    with pytest.raises(ConfigError, match="cannot be a name"):
+    with pytest.raises(UnknownSensorError, match="cannot be a name"):
         Tracker(image=IMAGE).step((0.0, "a|b", [], []))
 
 
