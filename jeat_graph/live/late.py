@@ -58,6 +58,8 @@ class LiveTracker(MetSensors):
         config = tracker.config
         self.tracker = tracker
         self._told = ToldSoFar()
+        if config.input.undeclared != "declare":
+            self._told.forget()
         self.policy = policy
         self.lateness = LatenessCounter(tracker.sensor_names)
         self.measured: list[tuple[float, RecordArray]] = []

@@ -32,6 +32,8 @@ class SmoothedTracks:
         if config.smoother.engine != "none":
             self._smoothers = _smoothing(config)
         self._told = ToldSoFar()
+        if config.input.undeclared != "declare":
+            self._told.forget()  # no sensor is ever met
         self._class_ids: dict[str, int] = {}  # number of each class named so far
         self._past: list[Trajectories] = []  # rows of earlier bases of time that were not fetched
 
