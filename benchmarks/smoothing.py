@@ -115,7 +115,8 @@ def judge(job: SmoothingJob) -> list[dict[str, Any]]:
     tracker = Tracker(replace(job.config, smoother=smoother))
     causal = Trajectories.concatenate(list(tracker.run(recording.detections)))
     judged = judge_runs(
-        [JudgedRun(recording.name, recording.truth, causal, tracker.finish(), recording.instants())]
+        [JudgedRun(recording.name, recording.truth, causal, tracker.finish(), recording.instants())],
+        outside=False,  # as the other tables of the docs are made
     )
     kinds = {CAUSAL: "causal"} if job.engine == next(iter(_ENGINES)) else {}
     return [

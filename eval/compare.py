@@ -18,6 +18,7 @@ from jeat_graph.eval.samples import (
     collect_samples,
     errors_of,
     lag_name,
+    with_centres,
 )
 from jeat_graph.eval.tables import Cell, Table
 
@@ -26,6 +27,8 @@ LAGS_S = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0)
 
 # Share of the work that judging without truth is, where there is truth too.
 _CONSISTENCY = 0.3
+# What can be said of an estimator by true places alone.
+_OF_PLACES = ("estimator", "position", "position/filter", "ANEES position")
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +57,7 @@ def compare(
     instants: FloatArray | None = None,
     lags_s: Sequence[float] = LAGS_S,
     iou: float = 0.5,
+    image: tuple[float, float] | None = None,
 ) -> Comparison:
     """Compare the filter, the smoother at several lags, and the smoother of whole tracks.
 
@@ -62,11 +66,13 @@ def compare(
     Args:
         tracks: confirmed tracks with their measurements.
         sensors: names of the sensors.
-        truth: true boxes with motion; without them only consistency is judged.
+        truth: true boxes; without them only consistency is judged. Where they have no motion, positions are
+            judged by their centres, and velocities and accelerations are not.
         causal: the causal table, which decides what track is matched to what object at what time.
         instants: all times at which the tracker gave output (s), if known.
         lags_s: lags (s); 0 is the filter.
         iou: smallest IoU of a match.
+        image: width and height of the picture (px): what its edges cut has no place of its own.
     """
     lags = tuple(sorted(set(lags_s)))
     values: dict[str, Any] = {"tracks": len(tracks), "sensors": list(sensors)}
@@ -74,7 +80,8 @@ def compare(
         values["consistency"], table = consistency(tracks)
     tables = [table]
     samples = None
-    if truth is not None and causal is not None and truth.motion is not None:
+    if truth is not None and causal is not None:
+        truth = with_centres(truth, image)
         with progress_span(_CONSISTENCY, 1.0):
             samples = collect_samples(tracks, truth, causal, lags, instants=instants, iou=iou)
         if len(samples):
@@ -82,11 +89,15 @@ def compare(
             values["errors"] = errors
             values["lag_curve"] = [{"lag_s": lag, **errors[lag_name(lag)]} for lag in lags]
             values["by_availability"] = _by_group(samples, by_availability(samples, sensors))
-            tables.insert(0, _error_table(errors))
-            tables.append(_group_table(values["by_availability"], "By sensors that saw the track lately"))
+            tables.insert(0, _error_table(errors, samples.has_motion))
+            tables.append(
+                _group_table(
+                    values["by_availability"], "By sensors that saw the track lately", samples.has_motion
+                )
+            )
             if samples.distance is not None:
                 values["by_distance"] = _by_group(samples, by_distance(samples.distance))
-                tables.append(_group_table(values["by_distance"], "By distance"))
+                tables.append(_group_table(values["by_distance"], "By distance", samples.has_motion))
     return Comparison(values, tables, samples, lags)
 
 
@@ -99,39 +110,39 @@ def _by_group(samples: Samples, groups: dict[str, BoolArray]) -> list[dict[str, 
     ]
 
 
-def _error_table(errors: dict[str, dict[str, float]]) -> Table:
+def _error_table(errors: dict[str, dict[str, float]], motion: bool) -> Table:
     base = errors["filter"]
     records: list[dict[str, Cell]] = []
     for name, one in errors.items():
         if name == lag_name(0.0):
             continue
-        records.append(
-            {
-                "estimator": name,
-                "position": one["position_rmse"],
-                "velocity": one["velocity_rmse"],
-                "acceleration": one["acceleration_rmse"],
-                "position/filter": one["position_rmse"] / base["position_rmse"],
-                "velocity/filter": one["velocity_rmse"] / base["velocity_rmse"],
-                "ANEES position": one["anees_position"],
-                "ANEES state": one["anees_state"],
-            }
-        )
+        record: dict[str, Cell] = {
+            "estimator": name,
+            "position": one["position_rmse"],
+            "velocity": one["velocity_rmse"],
+            "acceleration": one["acceleration_rmse"],
+            "position/filter": one["position_rmse"] / base["position_rmse"],
+            "velocity/filter": one["velocity_rmse"] / base["velocity_rmse"],
+            "ANEES position": one["anees_position"],
+            "ANEES state": one["anees_state"],
+        }
+        records.append(record if motion else {key: record[key] for key in _OF_PLACES})
     bounds = f"{base['anees_low']:.3f} to {base['anees_high']:.3f}"
+    units = "px, px/s, px/s²" if motion else "px"
     return Table.from_records(
         records,
-        title=f"RMSE (px, px/s, px/s²) at {int(base['count'])} instants; ANEES should be 1 (95 %: {bounds})",
+        title=f"RMSE ({units}) at {int(base['count'])} instants; ANEES should be 1 (95 %: {bounds})",
     )
 
 
-def _group_table(groups: Sequence[dict[str, Any]], title: str) -> Table:
+def _group_table(groups: Sequence[dict[str, Any]], title: str, motion: bool) -> Table:
     records: list[dict[str, Cell]] = []
     for one in groups:
         record: dict[str, Cell] = {"group": one["group"], "instants": int(one["filter"]["count"])}
-        for part in ("position", "velocity"):
+        for part in ("position", "velocity") if motion else ("position",):
             for name in ("filter", "full"):
                 record[f"{part} {name}"] = one[name][f"{part}_rmse"]
         record["ANEES filter"] = one["filter"]["anees_position"]
         record["ANEES full"] = one["full"]["anees_position"]
         records.append(record)
-    return Table.from_records(records, title=title + " (RMSE in px, px/s)")
+    return Table.from_records(records, title=f"{title} (RMSE in px{', px/s' if motion else ''})")

@@ -163,17 +163,37 @@ class Count:
     high: int
 
 
-def count(found: Sequence[LineCrossing], edges: FloatArray) -> list[Count]:
+def interval_edges(first: float, last: float, interval_s: float, found: Sequence[LineCrossing]) -> FloatArray:
+    """Bounds (K + 1,) of the intervals that a recording is counted in (s): multiples of their length.
+
+    So they are those of the clock where times are of a clock, those of `road`, and the same for all cameras.
+
+    Args:
+        first: begin of the recording (s).
+        last: its end (s).
+        interval_s: length of an interval (s).
+        found: crossings, all of which are to lie in an interval.
+    """
+    times = [first, *(c.t for c in found)]
+    begin = math.floor(min(times) / interval_s)
+    end = max(math.ceil(last / interval_s), math.floor(max(times) / interval_s) + 1)
+    return np.asarray(interval_s * np.arange(begin, end + 1), dtype=np.float64)
+
+
+def count(found: Sequence[LineCrossing], edges: FloatArray, lines: Sequence[str] = ()) -> list[Count]:
     """Count crossings by line, direction, class and interval.
 
     Args:
         found: the crossings.
         edges: (K + 1,) ascending bounds of K intervals (s); what lies outside is not counted.
+        lines: names of all lines; one that nobody crosses has counts of 0 in both directions.
 
     Returns:
         One entry for every combination that occurs and every interval, by line, direction, class and time.
     """
-    groups = sorted({(c.line, c.direction, c.vehicle_class) for c in found})
+    crossed = {c.line for c in found}
+    none = {(name, way, "") for name in lines if name not in crossed for way in ("left", "right")}
+    groups = sorted({(c.line, c.direction, c.vehicle_class) for c in found} | none)
     counts = []
     for line, direction, name in groups:
         mine = [c for c in found if (c.line, c.direction, c.vehicle_class) == (line, direction, name)]

@@ -11,7 +11,7 @@ here, before any metric:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -30,6 +30,8 @@ from jeat_graph.eval.resampling import (
     check_unique,
     interpolate_to,
     predict_to,
+    rows_outside,
+    with_rows,
 )
 
 Kind = Literal["causal", "smoothed"]
@@ -49,6 +51,7 @@ class Frames:
         track_start: (T + 1,) the same for the tracks.
         tracks: the tracks' entries (M), in the order of the frames.
         iou: T matrices (truth entries of the frame, track entries of the frame).
+        outside: number of rows of the table that lie before or after the truth, and are judged as false.
     """
 
     times: FloatArray
@@ -58,6 +61,7 @@ class Frames:
     track_start: IntArray
     tracks: Resampled
     iou: tuple[FloatArray, ...]
+    outside: int = 0
 
     @property
     def truth_id(self) -> IntArray:
@@ -81,8 +85,9 @@ def build_frames(
     max_age_s: float = MAX_AGE_S,
     max_gap_s: float | None = None,
     instants: FloatArray | None = None,
+    outside: bool = False,
 ) -> Frames:
-    """Put tracks beside truth at the truth's times.
+    """Put tracks beside truth at the truth's times, and perhaps beside nothing where the truth has ended.
 
     Args:
         truth: the truth of the sequence.
@@ -92,6 +97,8 @@ def build_frames(
         max_age_s: for `causal`, how far to predict.
         max_gap_s: for `smoothed`, how far apart joined rows may be.
         instants: for `causal`, all times at which the tracker gave output, if known.
+        outside: whether rows before the first and after the last frame of the truth make frames of their
+            own, in which nothing is to be found (`resampling.rows_outside`).
 
     Raises:
         DataError: truth and tracks do not fit together, or one of them is not valid.
@@ -104,11 +111,15 @@ def build_frames(
         tracks = predict_to(table, times, max_age_s=max_age_s, instants=instants)
     else:
         tracks = interpolate_to(table, times, max_gap_s=max_gap_s)
+    beyond = rows_outside(table, times, instants) if outside else np.zeros(0, dtype=np.int64)
+    if len(beyond):
+        times, tracks = with_rows(tracks, times, table, beyond)
     frame_of_truth = _frame_of(truth, times)
     truth_row = np.argsort(frame_of_truth, kind="stable")
     truth_start = _starts(frame_of_truth, len(times))
     track_start = _starts(tracks.frame, len(times))
-    return _without_ignored(truth, times, truth_row, truth_start, tracks, track_start)
+    frames = _without_ignored(truth, times, truth_row, truth_start, tracks, track_start)
+    return replace(frames, outside=len(beyond))
 
 
 def _frame_of(truth: GroundTruth, times: FloatArray) -> IntArray:

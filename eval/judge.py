@@ -46,6 +46,7 @@ def judge_runs(
     iou: float = 0.5,
     max_age_s: float = MAX_AGE_S,
     max_gap_s: float | None = None,
+    outside: bool = True,
 ) -> dict[str, Judgement]:
     """Judge runs against their truth, pooled.
 
@@ -56,6 +57,8 @@ def judge_runs(
         iou: smallest IoU of a match.
         max_age_s: how far causal estimates may be predicted (s).
         max_gap_s: how far apart rows of smoothed tables may be that are joined (s); no bound by default.
+        outside: whether rows before the first and after the last frame of the truth are false; otherwise
+            they are not looked at. Between two frames nothing is judged in any case.
 
     Returns:
         By kind, `causal` before `smoothed`.
@@ -74,7 +77,8 @@ def judge_runs(
                         kind=kind,
                         max_age_s=max_age_s,
                         max_gap_s=max_gap_s,
-                        instants=run.instants,
+                        instants=run.known_instants(),
+                        outside=outside,
                     )
                     sequences.append(frames)
         if sequences:
@@ -82,6 +86,26 @@ def judge_runs(
                 scores = score_frames(sequences, iou=iou)
             out[kind] = Judgement(kind, scores, kinematic_errors(sequences, iou=iou), tuple(sequences))
     return out
+
+
+def rows_beyond(judged: dict[str, Judgement], names: Sequence[str]) -> list[str]:
+    """One line for each run of which rows lie before or after its truth, and were judged as false.
+
+    Args:
+        judged: what `judge_runs` gave.
+        names: of the runs, in their order.
+    """
+    lines = []
+    for k, name in enumerate(names):
+        found = {
+            kind: one.sequences[k].outside
+            for kind, one in judged.items()
+            if len(one.sequences) == len(names) and one.sequences[k].outside
+        }
+        if found:
+            rows = " and ".join(f"{count} rows of the {kind} table" for kind, count in found.items())
+            lines.append(f"{name}: {rows} lie before or after the truth, and are counted as false")
+    return lines
 
 
 def summary_table(judged: dict[str, Judgement]) -> Table:

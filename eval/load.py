@@ -16,6 +16,7 @@ from jeat_graph.data.progress import with_progress
 from jeat_graph.data.rates import ANY_RATE_HZ, median_rate_hz
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.pairing import check_lives, check_pair, check_truth
+from jeat_graph.eval.resampling import on_the_clock_of
 from jeat_graph.io.beside import check_beside
 from jeat_graph.io.formats import BY_FRAME
 from jeat_graph.io.scans_io import read_instants
@@ -43,6 +44,17 @@ class JudgedRun:
     causal: Trajectories | None
     smoothed: Trajectories | None
     instants: FloatArray | None = None
+
+    def known_instants(self) -> FloatArray | None:
+        """Return `instants`, or what the causal table itself says of them.
+
+        A table that has rows at the truth's frames, and at no other times, ran at all of these.
+        """
+        table = self.causal
+        if self.instants is not None or table is None or table.instants is not None:
+            return self.instants if self.instants is not None or table is None else table.instants
+        frames = self.truth.frame_times()
+        return frames if on_the_clock_of(table, frames) else None
 
 
 def load_run(

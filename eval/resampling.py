@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -105,6 +105,72 @@ def predict_to(
     count = np.where(alive, (last - first)[latest], 0)
     frame, member = expand_ranges(first[latest], count)
     return _gather(table, order[member], frame, np.maximum(age, 0.0)[frame])
+
+
+def rows_outside(table: Trajectories, times: FloatArray, instants: FloatArray | None = None) -> IntArray:
+    """Rows of a table that lie before the first or after the last frame of the truth.
+
+    Of a tracker that runs at the truth's rate, or more seldom, those more than half a frame away. One that
+    runs more often is still within the truth's last frame until the next would come.
+
+    Args:
+        table: rows in any order.
+        times: (T,) frames of the truth, ascending, at least one (s).
+        instants: (I,) all the times at which the tracker gave output, if known.
+
+    Returns:
+        (R,) those rows, in order of time; none where the truth has fewer than two frames.
+    """
+    if len(times) < 2 or not len(table):
+        return np.zeros(0, dtype=np.int64)
+    frame_s = float(np.median(np.diff(times)))
+    ticks = np.unique(table.t if instants is None else np.concatenate((table.t, instants)))
+    tick_s = min(float(np.median(np.diff(ticks))), frame_s) if len(ticks) > 1 else frame_s
+    slack_s = frame_s - 0.5 * tick_s + TIME_TOLERANCE_S
+    rows = np.flatnonzero((table.t < times[0] - slack_s) | (table.t > times[-1] + slack_s))
+    return rows[np.argsort(table.t[rows], kind="stable")]
+
+
+def with_rows(
+    tracks: Resampled, times: FloatArray, table: Trajectories, rows: IntArray
+) -> tuple[FloatArray, Resampled]:
+    """Add rows of a table, as they are, to its tracks at given times: their times become frames too.
+
+    Args:
+        tracks: the table's tracks at `times`.
+        times: (T,) ascending (s).
+        table: the table.
+        rows: (R,) rows at other times than these.
+
+    Returns:
+        All times (T',), ascending, and the tracks at them.
+    """
+    every = np.unique(np.concatenate((times, table.t[rows])))
+    added = _gather(table, rows, np.searchsorted(every, table.t[rows]), np.zeros(len(rows)))
+    moved = replace(tracks, frame=np.searchsorted(every, times)[tracks.frame])
+    order = np.argsort(np.concatenate((moved.frame, added.frame)), kind="stable")
+    columns = {
+        name: np.concatenate((column, getattr(added, name)))[order] for name, column in vars(moved).items()
+    }
+    return every, Resampled(**columns)
+
+
+def on_the_clock_of(table: Trajectories, times: FloatArray) -> bool:
+    """Whether a table of which nothing else is known gives rows at the truth's frames, and at no other times.
+
+    Then a frame without rows of it is one at which its tracker found nothing.
+
+    Args:
+        table: rows in any order.
+        times: (T,) frames of the truth, ascending (s).
+    """
+    own = np.unique(table.t)
+    if len(times) < 2 or len(own) < 2:
+        return False
+    frame_s = float(np.median(np.diff(times)))
+    both = np.diff(np.unique(np.concatenate((times, own))))
+    apart = (both <= TIME_TOLERANCE_S) | (both >= 0.5 * frame_s)
+    return bool(apart.all() and np.median(np.diff(own)) < 1.5 * frame_s)
 
 
 def _gather(table: Trajectories, row: IntArray, frame: IntArray, age: FloatArray) -> Resampled:

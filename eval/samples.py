@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -20,6 +20,8 @@ from jeat_graph.eval.lagged import States, states_at
 
 #: A sensor counts as available to a track if it gave it a detection within this time before (s).
 RECENT_S = 0.1
+#: A true box this near to an edge of the picture (px) is taken to be cut by it.
+EDGE_PX = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +44,11 @@ class Samples:
     available: IntArray
     distance: FloatArray | None
 
+    @property
+    def has_motion(self) -> bool:
+        """Whether the truth knows velocities, and not places alone."""
+        return bool(np.isfinite(self.truth[:, :, 1]).any())
+
     def __len__(self) -> int:
         return len(self.t)
 
@@ -49,6 +56,26 @@ class Samples:
 def lag_name(lag_s: float) -> str:
     """Name of the estimator with that lag (s)."""
     return f"lag {lag_s:g} s"
+
+
+def with_centres(truth: GroundTruth, image: tuple[float, float] | None = None) -> GroundTruth:
+    """Return truth with the centres of its boxes for positions, where it does not say where an object is.
+
+    Velocities and accelerations stay unknown (NaN). So does the place of what an edge of the picture cuts:
+    the centre of what is left of a box is not that of the object.
+
+    Args:
+        truth: true boxes, with motion or without.
+        image: width and height of the picture (px), or None where nothing is known to be cut.
+    """
+    motion = np.full((len(truth), 6), np.nan) if truth.motion is None else truth.motion.copy()
+    centre = truth.boxes[:, :2] + 0.5 * truth.boxes[:, 2:]
+    if image is not None:
+        low, high = truth.boxes[:, :2], truth.boxes[:, :2] + truth.boxes[:, 2:]
+        cut = (low <= EDGE_PX).any(axis=1) | (high >= np.array(image) - EDGE_PX).any(axis=1)
+        centre[cut] = np.nan
+    motion[:, :2] = np.where(np.isnan(motion[:, :2]), centre, motion[:, :2])
+    return replace(truth, motion=motion)
 
 
 def collect_samples(
@@ -64,7 +91,7 @@ def collect_samples(
 
     Args:
         tracks: confirmed tracks with their measurements.
-        truth: true boxes with motion.
+        truth: true boxes with positions, and perhaps with motion (`with_centres`).
         causal: the causal table, with the same identities.
         lags_s: lags (s).
         instants: all times at which the tracker gave output (s), if known.
@@ -77,7 +104,8 @@ def collect_samples(
     assert matched is not None
     assert truth.motion is not None
     entry, row = matched.track_entry, frames.truth_row[matched.truth_entry]
-    whole = ~matched.truncated
+    known = np.isfinite(truth.motion[frames.truth_row[matched.truth_entry], :2]).all(axis=1)
+    whole = ~matched.truncated & known
     identity, row = frames.tracks.track_id[entry][whole], row[whole]
     t = truth.t[row]
     names = ["filter", *(lag_name(lag) for lag in lags_s), "full"]

@@ -2,51 +2,24 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING
 
 from jeat_graph.api.beside import FUNCTION_GROUP, find
+from jeat_graph.api.sources import PathLike, Run, Tracks, as_list, recording_of, tables_of, truth_of
 from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
-from jeat_graph.data.errors import DataError
+from jeat_graph.data.errors import DataError, InputWarning
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
-from jeat_graph.io.detections_io import read_detections
-from jeat_graph.io.truth_io import read_truth
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from jeat_graph.eval.compare import Comparison
-
-PathLike: TypeAlias = str | Path
-
-
-class Tracks(NamedTuple):
-    """What tracking a recording gives.
-
-    Attributes:
-        causal: the online estimates, each from what had arrived by its time.
-        smoothed: the smoothed trajectories; None without a smoother.
-    """
-
-    causal: Trajectories
-    smoothed: Trajectories | None
-
-
-class Run(NamedTuple):
-    """A run directory, read.
-
-    Attributes:
-        causal: the causal table, or None.
-        smoothed: the smoothed table, or None.
-        record: content of `run.json`; empty where there is none.
-    """
-
-    causal: Trajectories | None
-    smoothed: Trajectories | None
-    record: dict[str, Any]
 
 
 def track(
@@ -54,6 +27,7 @@ def track(
     config: Config | PathLike = "default",
     *,
     image: tuple[float, float] | None = None,
+    rate_hz: float | None = None,
 ) -> Tracks:
     """Track a recording from beginning to end.
 
@@ -62,6 +36,7 @@ def track(
             `read_detections` knows.
         config: a configuration, the name of a preset, or a YAML file.
         image: width and height of the picture (px), if not those of the configuration.
+        rate_hz: frames per second (Hz), for a data frame or a file that counts frames.
 
     Returns:
         The causal table, and the smoothed one unless the configuration asks for no smoother.
@@ -74,7 +49,7 @@ def track(
     from jeat_graph.runs.latency import at_measurement
     from jeat_graph.tracking.tracker import Tracker
 
-    recording = _recording(detections)
+    recording = recording_of(detections, rate_hz)
     settings = as_config(config, image)
     check_units(recording, settings, "the detections")  # before rates are taken for what they seem
     tracker = Tracker(fit_input(settings, recording)[0])
@@ -84,55 +59,14 @@ def track(
     return Tracks(causal, tracker.finish() if wanted else None)
 
 
-def _recording(detections: Detections | pd.DataFrame | PathLike) -> Detections:
-    if isinstance(detections, (str, Path)):
-        return read_detections(detections)
-    if isinstance(detections, Detections):
-        return detections
-    if hasattr(detections, "columns"):
-        return Detections.from_pandas(detections)
-    raise DataError(
-        "detections are Detections, a data frame, or the path of a file (make one of arrays with "
-        f"Detections.from_rows, of several with Detections.concatenate), not {type(detections).__name__}"
-    )
-
-
-def _truth(truth: GroundTruth | pd.DataFrame | PathLike) -> GroundTruth:
-    if isinstance(truth, (str, Path)):
-        return read_truth(truth)
-    if isinstance(truth, GroundTruth):
-        return truth
-    if hasattr(truth, "columns"):
-        from jeat_graph.data.truth_frames import truth_of_frame
-
-        return truth_of_frame(truth)
-    raise DataError(
-        f"truth is a GroundTruth, a data frame, or the path of a file, not {type(truth).__name__}"
-    )
-
-
-def _tables(tracks: Trajectories | Tracks | Run | pd.DataFrame, kind: str) -> dict[str, Trajectories]:
-    if isinstance(tracks, (Tracks, Run)):
-        both = {"causal": tracks.causal, "smoothed": tracks.smoothed}
-        return {name: table for name, table in both.items() if table is not None}
-    if kind not in ("causal", "smoothed"):
-        raise DataError(f"kind {kind!r}: must be causal or smoothed")
-    if isinstance(tracks, Trajectories):
-        return {kind: tracks}
-    if hasattr(tracks, "columns"):
-        return {kind: Trajectories.from_pandas(tracks)}
-    raise DataError(
-        "tracks are what track or read_run gives, a table of it, a data frame of one, or a path, "
-        f"not {type(tracks).__name__}"
-    )
-
-
 def evaluate(
     tracks: Trajectories | Tracks | Run | pd.DataFrame | PathLike,
     truth: GroundTruth | pd.DataFrame | PathLike,
     *,
     kind: str = "causal",
     classes: Sequence[str] | None = None,
+    outside: str = "false",
+    rate_hz: float | None = None,
 ) -> dict[str, dict[str, float | int]]:
     """Judge tracks against truth.
 
@@ -143,6 +77,9 @@ def evaluate(
         kind: what a table alone is: `causal` or `smoothed`.
         classes: classes of objects to be found; others are ignored, and so are tracks that have another
             class. All by default.
+        outside: `false` if rows before the first and after the last time of the truth are false, which a
+            warning names; `ignored` if they are not to be looked at.
+        rate_hz: frames per second (Hz), for data frames and files that count frames.
 
     Returns:
         By kind of table, MOTA, HOTA, IDF1 and so on by name, as `eval --json` writes them.
@@ -150,23 +87,28 @@ def evaluate(
     Raises:
         DataError: a file is not valid, or tracks and truth do not fit together.
     """
-    from jeat_graph.eval.judge import judge_runs
+    from jeat_graph.eval.judge import judge_runs, rows_beyond
     from jeat_graph.eval.load import JudgedRun, check_classes, load_run, restrict_classes, restrict_tracks
 
+    if outside not in ("false", "ignored"):
+        raise DataError(f"outside {outside!r}: must be false or ignored")
     if isinstance(tracks, (str, Path)):
         if not isinstance(truth, (str, Path)):
             raise DataError("a run that is given as a path needs its truth as a path too")
-        run = load_run(tracks, truth, classes=classes)
+        run = load_run(tracks, truth, rate_hz=rate_hz, classes=classes)
         if classes is not None:
             check_classes([run.truth], classes)
     else:
-        tables, objects = _tables(tracks, kind), _truth(truth)
+        tables, objects = tables_of(tracks, kind), truth_of(truth, rate_hz)
         if classes is not None:
             objects = restrict_classes(objects, classes)
             check_classes([objects], classes)
             tables = {name: restrict_tracks(table, classes) for name, table in tables.items()}
         run = JudgedRun("tracks", objects, tables.get("causal"), tables.get("smoothed"))
-    return {name: one.as_dict() for name, one in judge_runs([run]).items()}
+    judged = judge_runs([run], outside=outside == "false")
+    for line in rows_beyond(judged, [run.name]):
+        warnings.warn(f'{line} (outside="ignored" leaves them out)', InputWarning, stacklevel=2)
+    return {name: one.as_dict() for name, one in judged.items()}
 
 
 def compare(
@@ -175,14 +117,19 @@ def compare(
     truth: GroundTruth | pd.DataFrame | PathLike | None = None,
     *,
     lags_s: Sequence[float] | None = None,
+    image: tuple[float, float] | None = None,
+    rate_hz: float | None = None,
 ) -> Comparison:
     """Compare the filter with smoothers of several lags on one recording.
 
     Args:
         detections: as for `track`.
         config: a configuration, the name of a preset, or a YAML file.
-        truth: truth with motion, or its file; without it only consistency is judged.
+        truth: truth, a data frame or its file. Without motion in it positions alone are judged, by the
+            centres of its boxes; without truth only consistency.
         lags_s: lags (s); 0 is the filter.
+        image: width and height of the picture (px), if not those of the configuration.
+        rate_hz: frames per second (Hz), for data frames and files that count frames.
 
     Returns:
         Tables to read (`.tables`) and all figures by name (`.values`).
@@ -194,9 +141,9 @@ def compare(
     from jeat_graph.runs.latency import at_measurement
     from jeat_graph.runs.measured import compare_run, track_measured
 
-    recording = _recording(detections)
-    objects = None if truth is None else _truth(truth)
-    settings = fit_input(as_config(config), recording)[0]
+    recording = recording_of(detections, rate_hz)
+    objects = None if truth is None else truth_of(truth, rate_hz)
+    settings = fit_input(as_config(config, image), recording)[0]
     return compare_run(track_measured(settings, at_measurement(recording, settings)), objects, lags_s)
 
 
@@ -207,6 +154,7 @@ def calibrate(
     *,
     image: tuple[float, float] | None = None,
     tuned: bool = True,
+    rate_hz: float | None = None,
 ) -> Config:
     """Estimate a configuration from recordings.
 
@@ -218,6 +166,7 @@ def calibrate(
         image: width and height of the picture (px), if not those of `base`.
         tuned: with truth, also choose by tracking the recordings what matched detections cannot tell; takes
             minutes where all else takes seconds.
+        rate_hz: frames per second (Hz), for data frames and files that count frames.
 
     Returns:
         The configuration; `save_config` writes it.
@@ -229,13 +178,13 @@ def calibrate(
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.latency import at_measurement
 
-    recordings = [_recording(one) for one in _as_list(detections)]
+    recordings = [recording_of(one, rate_hz) for one in as_list(detections)]
     start = fit_input(as_config(base, image), *recordings)[0]
     recordings = [at_measurement(one, start) for one in recordings]
     if truth is None:
         return calibrate_without_truth(recordings, start).config
 
-    truths = [_truth(one) for one in _as_list(truth)]
+    truths = [truth_of(one, rate_hz) for one in as_list(truth)]
     if len(truths) != len(recordings):
         raise DataError(f"{len(recordings)} recordings and {len(truths)} truths given; give one for each")
     pairs = list(zip(recordings, truths, strict=True))
@@ -261,20 +210,22 @@ def simulate(
     return recording
 
 
-def read_run(path: PathLike) -> Run:
+def read_run(path: PathLike, *, rate_hz: float | None = None) -> Run:
     """Read a run directory, or a single table of one.
+
+    Args:
+        path: run directory, trajectory table, or a MOTChallenge or KITTI result.
+        rate_hz: frames per second (Hz), for a result that counts frames.
 
     Raises:
         DataError: there is no run, or a file of it is not valid.
     """
     from jeat_graph.eval.load import read_tables
+    from jeat_graph.io.scans_io import read_instants
     from jeat_graph.runs.directory import read_record
 
     folder = Path(path)
-    tables = read_tables(folder)
+    tables = read_tables(folder, rate_hz)
+    if "causal" in tables:
+        tables["causal"] = replace(tables["causal"], instants=read_instants(folder))
     return Run(tables.get("causal"), tables.get("smoothed"), read_record(folder))
-
-
-def _as_list(values: Any) -> list[Any]:
-    one = isinstance(values, (str, Path, Detections, GroundTruth))
-    return [values] if one or hasattr(values, "columns") else list(values)

@@ -23,7 +23,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "again from its inputs, which must not have changed",
     )
     parser.add_argument(
-        "--gt", metavar="FILE", help="truth with motion; without it only consistency is judged"
+        "--gt",
+        metavar="FILE",
+        help="truth; without motion in it positions are judged by its boxes, without truth consistency alone",
     )
     parser.add_argument(
         "--road",
@@ -68,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
         None if args.gt is None else read_truth(args.gt, rate_hz=rate_of_truth(folder, args.gt, args.rate))
     )
     if truth is not None and truth.motion is None:
-        warn("compare", f"{args.gt} has no motion (x, y, vx, vy, ax, ay): only consistency is judged")
+        warn("compare", f"{args.gt} has no motion (x, y, vx, vy, ax, ay): positions are judged, by its boxes")
     with stages("compare", 2) as stage:
         stage("reading, or tracking again")
         measured = measured_run(folder, args.detections)

@@ -6,7 +6,7 @@ import argparse
 import dataclasses
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,10 +14,12 @@ import numpy.typing as npt
 from jeat_graph.cli.options import add_classes, add_rate
 from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import positive
-from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.steps import check_steps
 from jeat_graph.eval.counting import Line
+
+if TYPE_CHECKING:
+    from jeat_graph.data.trajectories import Trajectories
 
 WRITES = ("out",)
 HELP = "count vehicles over lines in the picture, by direction, with intervals"
@@ -34,7 +36,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a line in px, crossed to its left or right as seen from its first point; may be repeated",
     )
     parser.add_argument(
-        "--interval", type=positive, metavar="S", help="length of one interval (default: all)"
+        "--interval",
+        type=positive,
+        metavar="S",
+        help="length of one interval, which begin at its multiples (default: one for all)",
     )
     add_classes(parser, "count vehicles of these classes only (a track's class is the one it ends with)")
     add_rate(parser)
@@ -57,17 +62,16 @@ def run(args: argparse.Namespace) -> int:
     tables = tables_of(Path(args.source))
     kind = "smoothed" if "smoothed" in tables else "causal"
     table = read_trajectories(tables[kind], rate_hz=args.rate)
-    first, last = (float(table.t.min()), float(table.t.max())) if len(table) else (0.0, 0.0)
+    first, last = _span(Path(args.source), tables[kind], table)
     if args.classes is not None:
         table = table.of_class(*args.classes, final=True)
     known = table.final_classes()
     found = [c for line in lines for c in counting.crossings(table, line, known)]
-    step = args.interval or max(last - first, 1e-9) * (1.0 + 1e-9)
-    check_steps(first, last, 1.0 / step, "intervals", "choose a longer --interval")
-    number = int(np.ceil((last - first) / step + 1e-12))
-    edges: FloatArray = np.asarray(first + step * np.arange(number + 1), dtype=np.float64)
-    edges[-1] = max(edges[-1], np.nextafter(last, np.inf))
-    counts = counting.count(found, edges)
+    edges = np.array([first, np.nextafter(last, np.inf)])
+    if args.interval is not None:
+        check_steps(first, last, 1.0 / args.interval, "intervals", "choose a longer --interval")
+        edges = counting.interval_edges(first, last, args.interval, found)
+    counts = counting.count(found, edges, names)
     if args.crossings:
         write_columns(_columns(found, counting.LineCrossing), args.crossings)
     if args.out:
@@ -87,10 +91,27 @@ def run(args: argparse.Namespace) -> int:
             }
             for c in counts
         ]
-        print(Table.from_records(records).render() if records else "no track crosses a line")
+        shown = found or args.interval is not None
+        print(Table.from_records(records).render() if shown else "no track crosses a line")
         if any(np.isnan(c.expected) for c in counts):
             say("count", "no interval: the table has no variances of position (`track` writes them)")
     return 0
+
+
+def _span(source: Path, file: Path, table: Trajectories) -> tuple[float, float]:
+    """Begin and end of a recording (s): of its scans, where the run says them, else of its tracks.
+
+    A result by frame number begins with its first frame, whatever is the first in which it has a track.
+    """
+    from jeat_graph.io.formats import BY_FRAME, recognise
+    from jeat_graph.io.scans_io import read_instants
+
+    scans = read_instants(source)
+    times = table.t if scans is None or not len(scans) else np.concatenate((table.t, scans))
+    if not len(times):
+        return 0.0, 0.0
+    by_frame = len(table) > 0 and recognise(file) in BY_FRAME
+    return 0.0 if by_frame else float(times.min()), float(times.max())
 
 
 def _line(text: str, number: int) -> Line:

@@ -38,6 +38,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_time_unit(parser, " of --gt and --detections; RUN is in seconds")
     add("--max-age", type=positive, metavar="S", help="how far to predict causal rows (0.15)")
     add("--max-gap", type=positive, metavar="S", help="join no smoothed rows further apart than this")
+    add(
+        "--outside",
+        choices=("false", "ignored"),
+        default="false",
+        help="what rows before the first and after the last time of the truth are (false)",
+    )
     add("--breakdown", action="store_true", help="also by motion and distance, and waiting times")
     add("--detections", **_MANY, metavar="FILE", help="also AP of the detections of each RUN")
     add(
@@ -50,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Judge, and print or write the result."""
-    from jeat_graph.eval.judge import breakdown_tables, judge_runs, summary_table
+    from jeat_graph.eval.judge import breakdown_tables, judge_runs, rows_beyond, summary_table
     from jeat_graph.eval.load import check_classes, load_run
     from jeat_graph.eval.resampling import MAX_AGE_S
     from jeat_graph.eval.tables import to_json
@@ -74,7 +80,13 @@ def run(args: argparse.Namespace) -> int:
             check_classes([one.truth for one in runs], args.classes)
         stage("judging")
         max_age_s = MAX_AGE_S if args.max_age is None else args.max_age
-        judged = judge_runs(runs, iou=args.iou, max_age_s=max_age_s, max_gap_s=args.max_gap)
+        judged = judge_runs(
+            runs,
+            iou=args.iou,
+            max_age_s=max_age_s,
+            max_gap_s=args.max_gap,
+            outside=args.outside == "false",
+        )
         result: dict[str, object] = {kind: one.as_dict() for kind, one in judged.items()}
         tables = [summary_table(judged)]
         if args.breakdown:
@@ -92,6 +104,8 @@ def run(args: argparse.Namespace) -> int:
             table, values = _detections(args, [one.truth for one in runs])
             tables.append(table)
             result["detections"] = values
+    for line in rows_beyond(judged, [one.name for one in runs]):
+        say("eval", f"{line} (--outside ignored leaves them out)")
     behind = {kind: sum(getattr(one, kind) is not None for one in runs) for kind in judged}
     if len(set(behind.values())) > 1:
         counts = ", ".join(f"{kind} {count}" for kind, count in behind.items())

@@ -13,7 +13,8 @@ from jeat_graph.data.column_names import BOX
 from jeat_graph.data.embeddings import EmbeddingArray, embeddings_of_objects
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_columns import boxes_of_columns, named_columns, numbers_of, times_of_columns
-from jeat_graph.data.interop import boxes_of, supervision_of
+from jeat_graph.data.interop import boxes_of
+from jeat_graph.data.to_supervision import supervision_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -98,7 +99,7 @@ class DetectionViews:
             t: time of the picture (s).
             sensor: name of the sensor.
         """
-        boxes, scores, classes, kept = boxes_of(source)
+        boxes, scores, classes, kept, _ = boxes_of(source)
         if len(boxes):
             out = cls.from_rows(np.full(len(boxes), t), [sensor] * len(boxes), boxes, scores, None, classes)
         else:

@@ -1,4 +1,4 @@
-"""To and from the objects of other libraries: pandas tables, `supervision.Detections`, results of detectors.
+"""From the objects of other libraries: pandas tables, `supervision.Detections`, results of detectors.
 
 None of these libraries is imported unless one of its objects is asked for; what comes in is recognised by the
 attributes it has.
@@ -6,18 +6,24 @@ attributes it has.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, TextArray
-from jeat_graph.data.boxes import detached, without_area
+from jeat_graph.data.boxes import class_texts, detached, without_area
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_columns import detector_columns, has_columns
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+#: How arrays of boxes may be given: corner and size, two corners, or centre and size (px).
+FORMATS = ("ltwh", "xyxy", "xywh")
 
 
 class Boxes(NamedTuple):
@@ -28,51 +34,166 @@ class Boxes(NamedTuple):
         scores: (M,) confidence in [0, 1].
         classes: (M,) class names, or None where the detector says none.
         kept: (R,) which of the rows these are; the others have no area.
+        class_ids: number of each class by its name, where the detector numbers them.
     """
 
     boxes: FloatArray
     scores: FloatArray
     classes: TextArray | None
     kept: BoolArray
+    class_ids: Mapping[str, int] = MappingProxyType({})
 
 
-def boxes_of(source: Any, scores: npt.ArrayLike | None = None) -> Boxes:
+class _Found(NamedTuple):
+    """What a source says: boxes (R, 4) with corner and size, scores and classes (R,) or None, class ids."""
+
+    boxes: FloatArray
+    scores: FloatArray | None = None
+    classes: TextArray | None = None
+    class_ids: Mapping[str, int] = MappingProxyType({})
+
+
+def boxes_of(
+    source: Any,
+    scores: npt.ArrayLike | None = None,
+    classes: npt.ArrayLike | None = None,
+    form: str | None = None,
+) -> Boxes:
     """Read boxes from whatever a detector returns, but for those without area: a detector has clipped them.
 
     Args:
-        source: `supervision.Detections`; a result of `ultralytics` (one picture, or a list of one); a data
-            frame, whose columns are found by name as in files, `score` and `class` too; or an array (M, 4)
-            of left, top, width, height in px, or (M, 5) with the score behind.
-        scores: (M,) confidence in [0, 1] for boxes that come without; 1 where neither says it.
+        source: `supervision.Detections`; a result of `ultralytics` (one picture, or a list of one), with
+            oriented boxes too; a dict with `boxes`, `scores` and `labels`, as `torchvision` and
+            `transformers` give it; a data frame, whose columns are found by name as in files, `score` and
+            `class` too; an array (M, 4) of boxes in px, (M, 5) with the score behind, or (M, 6) with the
+            number of the class behind that; or None: nothing was found.
+        scores: (M,) confidence in [0, 1], in place of the source's own; 1 where neither says it.
+        classes: (M,) names or numbers of classes, in place of the source's own.
+        form: what boxes of an array or a dict are, of `FORMATS`: left, top, width, height; left, top, right,
+            bottom; or the centre, width, height. By default `ltwh` of arrays and `xyxy` of dicts.
 
     Raises:
         DataError: nothing of the above, or shapes that do not fit.
     """
-    scores = None if scores is None else _scores(scores)
-    if isinstance(source, (list, tuple)) and len(source) == 1 and hasattr(source[0], "boxes"):
+    if form is not None and form not in FORMATS:
+        raise DataError(f"format {form!r}: there are {', '.join(FORMATS)}")
+    found = _found_in(source, form)
+    count = len(found.boxes)
+    confidence = _scores(scores) if scores is not None else found.scores
+    names, ids = found.classes, found.class_ids
+    if classes is not None:
+        names, ids = _named(detached(classes), count)
+    confidence = np.ones(count) if confidence is None else np.asarray(confidence, dtype=np.float64)
+    return _with_area(found.boxes, confidence, names)._replace(class_ids=ids)
+
+
+def _found_in(source: Any, form: str | None) -> _Found:
+    """Read what a source says of itself."""
+    if source is None:
+        return _Found(np.zeros((0, 4)))
+    if isinstance(source, (list, tuple)) and len(source) == 1 and _is_result(source[0]):
         source = source[0]
-    if hasattr(source, "xyxy") and hasattr(source, "confidence"):
-        return _from_supervision(source, scores)
-    if hasattr(source, "boxes") and hasattr(source.boxes, "xyxy"):
+    if isinstance(source, dict):
+        return _from_dict(source, form)
+    own = hasattr(source, "xyxy") or _is_result(source)
+    if (own or has_columns(source)) and form not in (None, "xyxy" if own else None):
+        raise DataError(f"format {form!r} is for arrays; a {type(source).__name__} says itself what it holds")
+    if is_supervision(source):
+        return _from_supervision(source)
+    if own:
         return _from_ultralytics(source)
     if has_columns(source):
-        boxes, found, classes = detector_columns(source)
-        found = found if scores is None else scores
-        return _with_area(boxes, np.ones(len(boxes)) if found is None else found, classes)
+        return _Found(*detector_columns(source))
+    return _from_array(source, form)
+
+
+def is_supervision(source: Any) -> bool:
+    """Whether these are `supervision.Detections`."""
+    return hasattr(source, "xyxy") and hasattr(source, "confidence")
+
+
+def _is_result(source: Any) -> bool:
+    """Whether this is what a detector's library returns for a picture."""
+    parts = (getattr(source, "boxes", None), getattr(source, "obb", None))
+    return any(hasattr(part, "xyxy") for part in parts) or (isinstance(source, dict) and "boxes" in source)
+
+
+def _from_array(source: Any, form: str | None) -> _Found:
     try:
         table = _array(source)
     except (TypeError, ValueError):
         raise DataError(
-            "give boxes as an array (M, 4) of left, top, width, height, as a data frame, as "
-            f"supervision.Detections, or as a result with boxes.xyxy; not {type(source).__name__}"
+            "give boxes as an array (M, 4) of left, top, width, height (format says what else), as a data "
+            "frame, as supervision.Detections, as a result with boxes.xyxy, or as a dict with boxes, scores "
+            f"and labels; not {type(source).__name__}"
         ) from None
     if table.size == 0:
         table = table.reshape(0, 4)
-    if table.ndim != 2 or table.shape[1] not in (4, 5):
-        raise DataError(f"boxes must have shape (M, 4), or (M, 5) with scores, not {table.shape}")
-    if scores is None:
-        scores = table[:, 4] if table.shape[1] == 5 else np.ones(len(table))
-    return _with_area(table[:, :4], np.asarray(scores, dtype=np.float64), None)
+    if table.ndim != 2 or table.shape[1] not in (4, 5, 6):
+        raise DataError(
+            "boxes must have shape (M, 4), (M, 5) with scores, or (M, 6) with scores and classes, not "
+            f"{table.shape}"
+        )
+    found = _Found(
+        _corner_and_size(table[:, :4], form or "ltwh"), table[:, 4] if table.shape[1] > 4 else None
+    )
+    if table.shape[1] < 6:
+        return found
+    names, ids = _named(table[:, 5], len(table))
+    return found._replace(classes=names, class_ids=ids)
+
+
+def _from_dict(source: dict[Any, Any], form: str | None) -> _Found:
+    """Read `boxes`, `scores` and `labels`, as `torchvision` and `transformers` give them."""
+    if "boxes" not in source:
+        raise DataError(f"a dict of boxes has boxes, scores and labels, not {', '.join(map(str, source))}")
+    found = _from_array(source["boxes"], form or "xyxy")
+    scores, labels = source.get("scores"), source.get("labels")
+    if scores is not None:
+        found = found._replace(scores=_scores(scores))
+    if labels is not None:
+        names, ids = _named(detached(labels), len(found.boxes))
+        found = found._replace(classes=names, class_ids=ids)
+    return found
+
+
+def _corner_and_size(boxes: FloatArray, form: str) -> FloatArray:
+    """Turn boxes (M, 4) of one of `FORMATS` into left, top, width, height."""
+    out = np.array(boxes, dtype=np.float64)
+    if form == "xyxy":
+        out[:, 2:] -= out[:, :2]
+    elif form == "xywh":
+        out[:, :2] -= 0.5 * out[:, 2:]
+    return out
+
+
+def _named(classes: Any, count: int, names: Any = None) -> tuple[TextArray, Mapping[str, int]]:
+    """Names (M,) of classes that are given by name or number, and the numbers, by name.
+
+    Args:
+        classes: (M,) names or numbers; NaN where a class is not known.
+        count: number of boxes M.
+        names: name of each number (a dict or a list); a number that it does not know is its own name.
+
+    Raises:
+        DataError: not as many as boxes.
+    """
+    column = np.asarray(classes)
+    if column.dtype.kind not in "biuf":
+        return class_texts(classes, count), {}
+    if column.shape != (count,):
+        raise DataError(f"classes must have shape ({count},), not {column.shape}")
+    known = names if isinstance(names, dict) else dict(enumerate(names or ()))
+    out: list[str] = []
+    ids: dict[str, int] = {}
+    for value in column.tolist():
+        if value != value:
+            out.append("")
+            continue
+        number = int(value)
+        out.append(str(known.get(number, number)))
+        ids[out[-1]] = number
+    return np.array(out, dtype=np.str_), ids
 
 
 def _with_area(boxes: FloatArray, scores: FloatArray, classes: TextArray | None) -> Boxes:
@@ -96,62 +217,41 @@ def to_xyxy(boxes: FloatArray) -> FloatArray:
     return np.hstack([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]])
 
 
-def supervision_of(
-    boxes: FloatArray,
-    confidence: FloatArray,
-    classes: TextArray | None,
-    tracker_id: npt.NDArray[np.int64] | None = None,
-) -> Any:
-    """Make `supervision.Detections`; with classes `class_id` counts them in the order of the alphabet.
-
-    Args:
-        boxes: (M, 4) left, top, width, height (px).
-        confidence: (M,) scores or probabilities.
-        classes: (M,) names, kept in `data["class_name"]`, or None: then all have `class_id` 0.
-        tracker_id: (M,) identities, or None.
-
-    Raises:
-        ImportError: the package `supervision` is not installed.
-    """
-    import supervision
-
-    class_id = np.zeros(len(boxes), dtype=int)
-    data: dict[str, Any] = {}
-    if classes is not None:
-        class_id = np.unique(classes, return_inverse=True)[1].reshape(-1).astype(int)
-        data = {"class_name": classes.copy()}
-    return supervision.Detections(
-        xyxy=to_xyxy(boxes),
-        confidence=confidence.copy(),
-        class_id=class_id,
-        tracker_id=None if tracker_id is None else tracker_id.astype(int),
-        data=data,
-    )
-
-
-def _from_supervision(source: Any, scores: npt.ArrayLike | None) -> Boxes:
-    found = source.confidence if scores is None else scores
-    count = len(source.xyxy)
-    confidence = np.ones(count) if found is None else np.asarray(found, dtype=np.float64)
+def _from_supervision(source: Any) -> _Found:
+    boxes = from_xyxy(source.xyxy)
+    scores = None if source.confidence is None else np.asarray(source.confidence, dtype=np.float64)
     names = source.data.get("class_name") if hasattr(source, "data") else None
-    if names is None and source.class_id is not None:
-        names = np.asarray(source.class_id)
-    classes = None if names is None else np.asarray(names).astype(np.str_)
-    return _with_area(from_xyxy(source.xyxy), confidence, classes)
+    codes = None if source.class_id is None else np.asarray(source.class_id)
+    if names is None:
+        return _Found(boxes, scores) if codes is None else _Found(boxes, scores, *_named(codes, len(boxes)))
+    texts = class_texts(names, len(boxes))
+    ids = {} if codes is None else dict(zip(texts.tolist(), codes.astype(int).tolist(), strict=True))
+    return _Found(boxes, scores, texts, ids)
 
 
-def _from_ultralytics(result: Any) -> Boxes:
-    boxes = result.boxes
-    classes = None
-    if getattr(boxes, "cls", None) is not None:
-        names = getattr(result, "names", None) or {}
-        codes = _array(boxes.cls).astype(int).tolist()
-        classes = np.array([str(names[c]) if c in _keys(names) else str(c) for c in codes], dtype=np.str_)
-    return _with_area(from_xyxy(_array(boxes.xyxy)), _array(boxes.conf).reshape(-1), classes)
-
-
-def _keys(names: Any) -> Any:
-    return names if isinstance(names, dict) else range(len(names))
+def _from_ultralytics(result: Any) -> _Found:
+    """Read a result, its boxes (oriented ones by the upright boxes around them), or boxes alone."""
+    parts = [
+        part for part in (getattr(result, "boxes", None), getattr(result, "obb", None)) if part is not None
+    ]
+    boxes = parts[0] if parts else result
+    corners = boxes.xyxy[0] if isinstance(boxes.xyxy, (list, tuple)) else boxes.xyxy
+    table = _array(corners)
+    names = getattr(result, "names", None)
+    if isinstance(boxes.xyxy, (list, tuple)):  # YOLOv5: six columns a picture, of which there is one
+        found = _from_array(table, "xyxy")
+        named = (
+            (found.classes, found.class_ids)
+            if table.shape[-1] < 6
+            else _named(table[:, 5], len(table), names)
+        )
+        return found._replace(classes=named[0], class_ids=named[1])
+    conf, cls = getattr(boxes, "conf", None), getattr(boxes, "cls", None)
+    found = _Found(from_xyxy(table), None if conf is None else _array(conf).reshape(-1))
+    if cls is None:
+        return found
+    classes, ids = _named(_array(cls).reshape(-1), len(found.boxes), names)
+    return found._replace(classes=classes, class_ids=ids)
 
 
 def _scores(values: npt.ArrayLike) -> FloatArray:

@@ -5,7 +5,7 @@ The causal table of a run, its smoothed table and the tracks of one moment are a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, Self
 
@@ -15,6 +15,7 @@ import numpy.typing as npt
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, TextArray
 from jeat_graph.data.class_columns import check_classes, join_classes
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.to_supervision import OwnDetections
 from jeat_graph.data.views import TrajectoryViews
 
 
@@ -36,6 +37,10 @@ class Trajectories(TrajectoryViews):
         class_probability: (N,) share of those scores that speak for it, NaN where it is unknown; or None.
         size_var: (N, 2) variances of width and height, those of the whole box, not of what the picture leaves
             of it (px²); NaN where they are unknown, as all are where nothing is given.
+        instants: (I,) all the times (s) at which the tracker gave output, ascending, those too at which it
+            reported nothing; or None where that is not known, as of a data frame.
+        class_ids: number of each class, as detectors gave it, by its name; or None where they gave none.
+        own: after `Tracker.update`, the user's detections with the tracks that took them; or None.
 
     Raises:
         DataError: if the columns differ in length or shape.
@@ -52,6 +57,9 @@ class Trajectories(TrajectoryViews):
     classes: TextArray | None = None
     class_probability: FloatArray | None = None
     size_var: FloatArray = None  # type: ignore[assignment]  # filled in below
+    instants: FloatArray | None = None
+    class_ids: Mapping[str, int] | None = None
+    own: OwnDetections | None = None
 
     def __post_init__(self) -> None:
         n = len(self.t)
@@ -84,23 +92,39 @@ class Trajectories(TrajectoryViews):
 
     @staticmethod
     def concatenate(parts: Sequence[Trajectories]) -> Trajectories:
-        """Stack tables that name the same sensors, in the order given."""
+        """Stack tables, in the order given; the result names the sensors of all.
+
+        Where one that has rows does not know its instants, the whole does not.
+        """
         if not parts:
             return Trajectories.empty()
         if any(part.sensors != parts[0].sensors for part in parts):
-            raise DataError("tables of different sensors cannot be joined")
+            names = tuple(sorted({name for part in parts for name in part.sensors}))
+            parts = [_naming(part, names) for part in parts]
         stacked = {name: np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS}
+        ids: dict[str, int] = {}
+        for part in parts:
+            ids |= part.class_ids or {}
         classes, probability = join_classes([(len(p), p.classes, p.class_probability) for p in parts])
+        known = [part.instants for part in parts if len(part) or part.instants is not None]
+        told = [at for at in known if at is not None]
         return Trajectories(
-            **stacked, sensors=parts[0].sensors, classes=classes, class_probability=probability
+            **stacked,
+            sensors=parts[0].sensors,
+            classes=classes,
+            class_probability=probability,
+            instants=np.unique(np.concatenate(told)) if told and len(told) == len(known) else None,
+            class_ids=ids or None,
         )
 
     def take(self, rows: npt.ArrayLike) -> Self:
         """Return the rows chosen by an index or mask array."""
         index = np.asarray(rows)
         columns: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
+        del columns["instants"]  # no column: the tracker ran at these times, whatever rows are taken
         arrays = {name: c[index] for name, c in columns.items() if isinstance(c, np.ndarray)}
-        return replace(self, **arrays)
+        taken = replace(self, **arrays)
+        return taken if self.own is None else replace(taken, own=self.own.of(taken.track_id))
 
     def sensor_text(self) -> list[str]:
         """Names of the sensors used in each row, joined by `|`; empty where the track coasted."""
@@ -111,6 +135,22 @@ class Trajectories(TrajectoryViews):
         return [text[int(mask)] for mask in self.used]
 
 
+def _naming(table: Trajectories, sensors: tuple[str, ...]) -> Trajectories:
+    """Return a table that names more sensors, among them its own.
+
+    Raises:
+        DataError: more than a table can name.
+    """
+    if len(sensors) > MOST_SENSORS:
+        raise DataError(f"a table names at most {MOST_SENSORS} sensors, and these name {len(sensors)}")
+    used = np.zeros(len(table), dtype=np.int64)
+    for k, name in enumerate(table.sensors):
+        used |= (table.used >> k & 1) << sensors.index(name)
+    return replace(table, used=used, sensors=sensors)
+
+
+#: Bits of `used`.
+MOST_SENSORS = 63
 #: Names of the columns that every table has.
 COLUMNS = ("t", "track_id", "boxes", "existence", "mean", "var", "used", "size_var")
 

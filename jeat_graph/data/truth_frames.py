@@ -17,20 +17,21 @@ _MOTION = ("x", "y", "vx", "vy", "ax", "ay")
 _OPTIONAL = (*_MOTION, "class", "ignore", "distance")
 
 
-def truth_of_frame(frame: Any) -> GroundTruth:
+def truth_of_frame(frame: Any, *, rate_hz: float | None = None) -> GroundTruth:
     """Read truth from a data frame, one row an object and time.
 
     Args:
         frame: `t` (s, or dates), `object_id` (whole numbers), a box as in detections; where there are such
             `x, y, vx, vy, ax, ay`, `class`, `ignore` and `distance`. A row with only `t` is a time without
             objects.
+        rate_hz: frames per second (Hz), for a frame with frame numbers in place of times.
 
     Raises:
         DataError: a column is missing, or a row is no object; the message names it.
     """
     c = named_columns(frame, ("t", "object_id", *BOX), _OPTIONAL, "true boxes")
     t, boxes, number = (
-        times_of_columns(c, "s", None),
+        times_of_columns(c, "s", rate_hz),
         boxes_of_columns(c),
         numbers_of(c["object_id"], "object_id"),
     )

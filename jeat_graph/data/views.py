@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -12,7 +13,8 @@ from jeat_graph.data.arrays import FloatArray, IntArray, TextArray
 from jeat_graph.data.class_columns import class_column, rows_of_class
 from jeat_graph.data.column_names import BOX
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.interop import columns_of, supervision_of, to_xyxy
+from jeat_graph.data.interop import columns_of, to_xyxy
+from jeat_graph.data.to_supervision import OwnDetections, supervision_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,6 +40,8 @@ class TrajectoryViews:
         sensors: tuple[str, ...]
         classes: TextArray | None
         class_probability: FloatArray | None
+        class_ids: Mapping[str, int] | None
+        own: OwnDetections | None
 
         def take(self, rows: npt.ArrayLike) -> Self:
             """Return some rows."""
@@ -145,16 +149,24 @@ class TrajectoryViews:
             **class_column(c.get("class"), c.get("class_probability")),
         )
 
-    def to_supervision(self) -> Any:
-        """Return the rows as `supervision.Detections` with `tracker_id`, for its annotators.
+    def to_supervision(self, *, own: bool = True) -> Any:
+        """Return `supervision.Detections` with `tracker_id`, for its annotators.
 
-        The existence probability stands in `confidence`, the class in `data["class_name"]`. Take the rows of
-        one moment: a step's table, or `between(t, t)`.
+        After `Tracker.update` with `supervision.Detections` these come back, all of them, with their masks,
+        data and other fields; of what no reported track took `tracker_id` is -1. Else, and with `own` false,
+        the tracks themselves are the rows, those too that nobody saw in this picture: the existence
+        probability stands in `confidence`, the class in `data["class_name"]`, its number as it came in
+        `class_id` (-1 where it is unknown). Take the rows of one moment: a step's table, or `between(t, t)`.
+
+        Args:
+            own: whether the user's detections come back where there are such.
 
         Raises:
             ImportError: the package `supervision` is not installed.
         """
-        return supervision_of(self.boxes, self.existence, self.classes, self.track_id)
+        if own and self.own is not None:
+            return self.own.with_tracks(self.track_id)
+        return supervision_of(self.boxes, self.existence, self.classes, self.track_id, self.class_ids)
 
     def plot(self, kind: str = "picture", ax: Any = None, picture: npt.ArrayLike | None = None) -> Any:
         """Draw the tracks with matplotlib.

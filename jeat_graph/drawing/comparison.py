@@ -92,15 +92,14 @@ def write_plots(
 def _trajectories(plt: Any, samples: Samples) -> Figure:
     """Position error and velocity of well-observed tracks that go far, with 2σ bands."""
     chosen = telling_tracks(samples)
+    parts = ((0, "error of x", "px"), (1, "velocity in x", "px/s"))[: 1 + samples.has_motion]
     figure, axes = plt.subplots(
-        len(chosen), 2, figsize=(11.0, 2.7 * len(chosen) + 0.8), squeeze=False, layout="constrained"
+        len(chosen), len(parts), figsize=(11.0, 2.7 * len(chosen) + 0.8), squeeze=False, layout="constrained"
     )
     for row, identity in enumerate(chosen.tolist()):
         mine = np.flatnonzero(samples.track_id == identity)
         mine = mine[np.argsort(samples.t[mine])]
-        for column, (order, title, unit) in enumerate(
-            ((0, "error of x", "px"), (1, "velocity in x", "px/s"))
-        ):
+        for column, (order, title, unit) in enumerate(parts):
             axis = axes[row, column]
             # Where the track was not matched for a while, a line would claim what nobody measured.
             t = np.where(np.diff(samples.t[mine], append=np.inf) > LONGEST_LINE_S, np.nan, samples.t[mine])
@@ -158,17 +157,18 @@ def _error_over_time(plt: Any, samples: Samples, lags_s: Sequence[float]) -> Fig
     start = samples.t.min()
     bin_ = ((samples.t - start) / BIN_S).astype(int)
     centre = start + (np.arange(bin_.max() + 1) + 0.5) * BIN_S
-    figure, axes = plt.subplots(2, 1, figsize=(9.0, 5.6), sharex=True, layout="constrained")
-    for axis, order, title, unit in (
-        (axes[0], 0, "Position", "px"),
-        (axes[1], 1, "Velocity", "px/s"),
-    ):
+    parts = ((0, "Position", "px"), (1, "Velocity", "px/s"))[: 1 + samples.has_motion]
+    figure, grid = plt.subplots(
+        len(parts), 1, figsize=(9.0, 2.8 * len(parts)), sharex=True, squeeze=False, layout="constrained"
+    )
+    axes = grid[:, 0]
+    for axis, (order, title, unit) in zip(axes, parts, strict=True):
         for name, label, colour in shown:
             error = samples.states[name].mean[:, :, order] - samples.truth[:, :, order]
             axis.plot(centre, _binned_rmse(error, bin_), color=colour, lw=1.8, label=label)
         axis.set_ylim(bottom=0.0)
         axis.set_title(f"{title}: RMSE of all tracks ({unit}), in bins of {BIN_S:g} s")
-    axes[1].set_xlabel("time (s)")
+    axes[-1].set_xlabel("time (s)")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure  # type: ignore[no-any-return]
 
@@ -184,10 +184,13 @@ def _rmse_against_lag(plt: Any, comparison: Comparison) -> Figure:
     """How much accuracy how much delay buys."""
     curve, errors = comparison.values["lag_curve"], comparison.values["errors"]
     lags = np.array([one["lag_s"] for one in curve])
-    figure, axes = plt.subplots(1, 3, figsize=(12.0, 3.8), layout="constrained")
-    for axis, part, unit in zip(
-        axes, ("position", "velocity", "acceleration"), ("px", "px/s", "px/s²"), strict=True
-    ):
+    units = {"position": "px", "velocity": "px/s", "acceleration": "px/s²"}
+    parts = [part for part in units if np.isfinite(errors["filter"][f"{part}_rmse"])]
+    figure, axes = plt.subplots(
+        1, len(parts), figsize=(4.0 * max(len(parts), 2), 3.8), squeeze=False, layout="constrained"
+    )
+    for axis, part in zip(axes[0], parts, strict=True):
+        unit = units[part]
         value = np.array([one[f"{part}_rmse"] for one in curve])
         full, base = errors["full"][f"{part}_rmse"], errors["filter"][f"{part}_rmse"]
         axis.plot(lags, value, color=FULL, lw=2.0, marker="o", ms=4)

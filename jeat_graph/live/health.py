@@ -51,14 +51,28 @@ class SensorHealth:
 
     def __init__(self, config: Config) -> None:
         self._config = config
-        live = config.live
+        self.know(config)
+        self.last: dict[str, float] = {}
+        self.silent: list[str] = []
+        self.rubbish: list[str] = []
+
+    def know(self, config: Config) -> list[str]:
+        """Go by a configuration from now on: that of a tracker which has met another sensor.
+
+        Returns:
+            A line for each sensor that has not been known before.
+        """
+        fresh = sorted(config.sensors.keys() - self._config.sensors.keys())
+        self._config, live = config, config.live
         self._patience_s = {
             name: max(live.silent_s, live.silent_periods / sensor.rate_hz)
             for name, sensor in config.sensors.items()
         }
-        self.last: dict[str, float] = {}
-        self.silent: list[str] = []
-        self.rubbish: list[str] = []
+        rates = {name: config.sensors[name].rate_hz for name in fresh}
+        return [
+            f"sensor {name!r} is not declared: taken for a detector at {hz:g} Hz"
+            for name, hz in rates.items()
+        ]
 
     def saw(self, scans: Iterable[Scan], now: float) -> list[HealthChange]:
         """Take note of scans.

@@ -21,11 +21,12 @@ from jeat_graph.data.errors import ConfigError, DataError, TimeOrderError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.live.arrival import Arrival, Taken, looked_last, most_late_s
 from jeat_graph.live.lateness import LatenessCounter
+from jeat_graph.live.met_sensors import MetSensors
 from jeat_graph.live.repetition import Repetition
 from jeat_graph.live.rewinding import Rewinding, TakenStep
 from jeat_graph.live.time_base import Decision, TimeBase
 from jeat_graph.tracking.checkpoint import load_state, refusing_damage, save_state
-from jeat_graph.tracking.prediction import Prediction
+from jeat_graph.tracking.first_sight import ToldSoFar
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
 from jeat_graph.tracking.step_record import StepRecord
 from jeat_graph.tracking.tracker import Tracker
@@ -36,7 +37,7 @@ _ROUNDING_S = 1e-6
 POLICIES = (REWIND, SKIP, REFUSE)
 
 
-class LiveTracker:
+class LiveTracker(MetSensors):
     """A tracker that takes scans in the order in which they arrive.
 
     Args:
@@ -57,6 +58,9 @@ class LiveTracker:
             raise ConfigError(f"{policy!r} is not one of {', '.join(POLICIES)}")
         config = tracker.config
         self.tracker = tracker
+        self._told = ToldSoFar()
+        if config.input.undeclared != "declare":
+            self._told.forget()
         self.policy = policy
         self.lateness = LatenessCounter(tracker.sensor_names)
         self.measured: list[tuple[float, RecordArray]] = []
@@ -102,7 +106,9 @@ class LiveTracker:
             DataError, UnknownSensorError: as `Tracker.step`; the state is as before.
             TimeOrderError: a scan comes late, and late scans are refused.
         """
-        batch = [self._corrected(scan) for scan in as_scans(scans)]
+        given = as_scans(scans)
+        self.meet(given)
+        batch = [self._corrected(scan) for scan in given]
         for scan in batch:
             sensor_index(scan.sensor, self.tracker.sensor_names)  # refused before anything is done
         self.measured = []
@@ -121,6 +127,7 @@ class LiveTracker:
         table = self.tracker.causal()
         if self.policy == REWIND:
             table = self._rewinding.identities.answer(table)
+        self._told.note("step", given, sum(map(len, given)))
         return Arrival(
             table,
             self.tracker.time or 0.0,
@@ -208,20 +215,13 @@ class LiveTracker:
             raise DataError("holds a tracker, but not one that takes late scans", path)
         with refusing_damage(path):
             live = LiveTracker(Tracker.from_state(kept, state), state["policy"])
+            live._told.forget()
             live._newest = state["newest"]
             live.lateness.set_state(state["lateness"])
             live._rewinding.set_state(state["rewinding"])
             live._base.set_state(state["base"], live.tracker.time)
             live._repetition.set_state(state["base"], live.tracker.time)
             return live, state["more"]
-
-    def predict(self, t: float) -> Prediction:
-        """Say where the tracks will be at a time not before the newest scan's (see `Tracker.predict`)."""
-        return self._rewinding.identities.rename(self.tracker.predict(t))
-
-    def drain_smoothed(self) -> Trajectories:
-        """Return the smoothed rows that are final and forget them (see `Tracker.drain_smoothed`)."""
-        return self.tracker.drain_smoothed()
 
     def finish(self) -> Trajectories:
         """End all tracks and return the smoothed rows not drained yet (see `Tracker.finish`).

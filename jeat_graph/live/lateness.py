@@ -68,6 +68,14 @@ class LatenessCounter:
         self.dropped: IntArray = np.zeros(len(sensor_names), dtype=np.int64)
         self.worst_s = np.zeros(len(sensor_names))
 
+    def among(self, sensor_names: tuple[str, ...]) -> LatenessCounter:
+        """Return the same counts of a tracker that has more sensors, among them these."""
+        out = LatenessCounter(sensor_names)
+        rows = [sensor_names.index(name) for name in self._names]
+        for name in ("counts", "late", "dropped", "worst_s"):
+            getattr(out, name)[rows] = getattr(self, name)
+        return out
+
     def add(self, sensor: str, late_s: float, dropped: bool) -> None:
         """Count a scan that is so much older than the newest (s); 0 if it is not."""
         s = self._names.index(sensor)

@@ -123,7 +123,11 @@ class Session:
         if self._seen.restarts.get(message.source, 0) > restarts:
             self._told.restart(message, place)
         before = self.live.time
+        config = self.live.tracker.config
         arrival = self.live.step(message.batch.scans)
+        if self.live.tracker.config is not config:
+            for text in self._health.know(self.live.tracker.config):
+                self.ends.warn(text)
         unanswered = len(arrival.dropped) + len(arrival.repeated) + len(arrival.held)
         if len(arrival.repeated) == len(message.batch.scans):
             self._passed_again(message, place)

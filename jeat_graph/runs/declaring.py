@@ -48,8 +48,8 @@ def fit_input(config: Config, *recordings: Detections) -> tuple[Config, list[str
         slow = for_slow_scans(config)
         if slow != config:
             notes.append(
-                f"scans come at {fastest_hz(config):.3g} Hz: what moves further than about its own length "
-                "between two of them is not followed"
+                f"scans come at {fastest_hz(config):.3g} Hz: among others, what moves further than about its "
+                "own length between two of them may be lost"
             )
         config = slow
     if config.input.picture == "seen" and any(len(d) for d in recordings):

@@ -34,12 +34,14 @@ class MeasuredRun(NamedTuple):
         causal: the causal table, with the same identities.
         instants: (I,) times at which the tracker gave output (s), or None if that is not known.
         sensors: names of the sensors.
+        image: width and height of the picture (px), or None if that is not known.
     """
 
     tracks: list[MeasuredTrack]
     causal: Trajectories
     instants: FloatArray | None
     sensors: tuple[str, ...]
+    image: tuple[float, float] | None = None
 
 
 def measured_run(folder: Path, moved: list[str] | None = None, *, progress: bool = False) -> MeasuredRun:
@@ -71,7 +73,8 @@ def track_measured(config: Config, detections: Detections, *, progress: bool = F
     from jeat_graph.tracking.records import record_tracks
 
     tracks, causal = record_tracks(config, detections, progress=progress)
-    return MeasuredRun(tracks, causal, np.unique(detections.scan_t), config.sensor_names)
+    instants = np.unique(detections.scan_t)
+    return MeasuredRun(tracks, causal, instants, config.sensor_names, _image(config))
 
 
 def compare_run(
@@ -81,7 +84,7 @@ def compare_run(
 
     Args:
         run: with its measurements.
-        truth: true boxes with motion; without them only consistency is judged.
+        truth: true boxes, with motion or without; without truth only consistency is judged.
         lags_s: lags (s), 0 is the filter; those of `eval.compare` if not given.
     """
     from jeat_graph.eval.compare import LAGS_S, compare
@@ -93,6 +96,7 @@ def compare_run(
         causal=run.causal,
         instants=run.instants,
         lags_s=lags_s or LAGS_S,
+        image=run.image,
     )
 
 
@@ -137,7 +141,12 @@ def _kept(folder: Path, record: dict[str, Any]) -> MeasuredRun:
         _unchanged(path, record)
     rows = read_measurements(folder / MEASUREMENTS, config.sensor_names)
     tracks = measured_tracks(rows, config)
-    return MeasuredRun(tracks, read_trajectories(table), read_instants(folder), config.sensor_names)
+    causal, instants = read_trajectories(table), read_instants(folder)
+    return MeasuredRun(tracks, causal, instants, config.sensor_names, _image(config))
+
+
+def _image(config: Config) -> tuple[float, float]:
+    return config.image.width, config.image.height
 
 
 def _complete_record(folder: Path) -> dict[str, Any]:

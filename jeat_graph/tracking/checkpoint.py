@@ -24,6 +24,7 @@ from jeat_graph.smoothers.track_data import Prior, SmoothedTrack
 from jeat_graph.smoothers.window import Window
 from jeat_graph.tracking.appearance import Looks
 from jeat_graph.tracking.classes import ClassTally, Votes
+from jeat_graph.tracking.first_sight import wider
 from jeat_graph.tracking.smoothing.behind import InProcessSmoothing
 from jeat_graph.tracking.smoothing.history import TrackHistory
 from jeat_graph.tracking.smoothing.observation_times import ObservationTimes
@@ -186,15 +187,21 @@ def load_state(path: str | Path, config: Config | None = None) -> tuple[Config, 
             f"{path}: was saved by version {version} (format {form}), and this is {__version__} (format "
             f"{FORMAT}): finish with that version, or begin anew without the file"
         )
+    if not isinstance(settings, dict):
+        raise DataError(f"is no {_WHAT}: its settings are none", path)
     if config is not None:
-        wanted = json.loads(json.dumps(config_to_dict(config)))
+        # Sensors that were met are declared there.
+        met = wider(config, settings.get("sensors", ())) or config
+        wanted = json.loads(json.dumps(config_to_dict(met)))
         if wanted != settings:
             raise JeatGraphError(
                 f"{path}: was saved with other settings: {_difference(settings, wanted)}; give the same, or "
                 "begin anew without the file"
             )
     with refusing_damage(path):
-        kept = config if config is not None else config_from_dict(settings)
+        kept = config_from_dict(settings)
+        if config is not None and config.sensors.keys() == kept.sensors.keys():
+            kept = config
         state = unpack(text, block, _codecs(kept))
         if not isinstance(state, dict):
             raise DataError("is damaged: it holds no state")

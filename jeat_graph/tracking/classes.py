@@ -16,6 +16,7 @@ from jeat_graph.data.arrays import FloatArray, IntArray, TextArray
 from jeat_graph.data.class_columns import unknown_classes
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.to_supervision import numbered
 from jeat_graph.tracking.by_track import carried_over, places
 from jeat_graph.tracking.update_log import UpdateLog
 
@@ -150,6 +151,25 @@ def check_names(tally: ClassTally | None, batch: Sequence[Scan]) -> None:
         return
     if len(np.union1d(known, np.concatenate(said))) > MOST_CLASSES:
         raise DataError(f"more than {MOST_CLASSES} names of classes: is it classes that these are?")
+
+
+def number_classes(known: dict[str, int], batch: Sequence[Scan]) -> dict[str, int]:
+    """Number the classes that a step names for the first time, so that each keeps its number.
+
+    Args:
+        known: numbers of the classes so far, by name.
+        batch: scans of the step.
+
+    Returns:
+        The numbers after it; the same dict where there is nothing new.
+    """
+    said = {name for scan in batch if scan.classes is not None for name in scan.classes.tolist()}
+    fresh = said - {""} - known.keys()
+    if not fresh:
+        return known
+    out = numbered(sorted(fresh), known)
+    del out[""]
+    return out
 
 
 def count_votes(

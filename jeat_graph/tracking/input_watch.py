@@ -15,6 +15,8 @@ from jeat_graph.io.time_units import LONGEST_STEP_S, likely_unit
 
 #: Boxes after which a first opinion is formed, and after which the watch ends.
 FIRST_BOXES, LAST_BOXES = 20, 200
+#: Boxes after which corners that can be nothing else are told of.
+CORNER_BOXES = 3
 #: Scans of one sensor by which its step is judged.
 STEP_SCANS = 6
 # Share of box centres outside the picture above which its size must be another.
@@ -30,7 +32,7 @@ _FOLLOWS = 0.5
 #: What is said of boxes that are no left, top, width, height.
 CORNERS = (
     "boxes look like x1, y1, x2, y2, taken for left, top, width, height: name the columns so, or convert "
-    "them (in Python Scan.from_xyxy)"
+    'them (in Python format="xyxy" of Tracker.update, or Scan.from_xyxy)'
 )
 
 
@@ -53,6 +55,20 @@ def look_like_corners(boxes: FloatArray, width: float, height: float) -> bool:
     if len(boxes) < FIRST_BOXES:
         return False
     return bool(((size - corner).std(axis=0) < _FOLLOWS * corner.std(axis=0)).all())
+
+
+def only_corners(boxes: FloatArray, width: float, height: float) -> bool:
+    """Whether boxes (M, 4) cannot but be two corners each: as such they lie in the picture, else beyond it.
+
+    Args:
+        boxes: as they were given (px).
+        width: of the picture (px).
+        height: of the picture (px).
+    """
+    corner, far = boxes[:, :2], boxes[:, 2:]
+    size = (width, height)
+    fit = (far > corner).all() and (corner >= 0.0).all() and (far <= size).all()
+    return bool(fit and ((corner + far).max(axis=0) > (_OVER_EDGE * width, _OVER_EDGE * height)).any())
 
 
 #: What is said of boxes in shares of the picture.
@@ -80,6 +96,7 @@ class InputWatch:
         self._newest: dict[str, float] = {}
         self._said: set[str] = set()
         self._ended = False
+        self._looked_for_corners = False
 
     def look(self, batch: Sequence[Scan]) -> None:
         """Take notice of the scans of one time; those that come again after a late one count once."""
@@ -97,11 +114,20 @@ class InputWatch:
             if self._count < LAST_BOXES and len(scan.boxes):
                 self._boxes.append(np.array(scan.boxes))
                 self._count += len(scan.boxes)
+        if not self._looked_for_corners and self._count >= CORNER_BOXES:
+            self._looked_for_corners = True
+            first = np.concatenate(self._boxes)
+            if only_corners(first, self._config.image.width, self._config.image.height):
+                self._say("corners", CORNERS)
         if self._count >= self._opinion_at and self._boxes:
             self._judge_boxes(np.concatenate(self._boxes))
             if self._opinion_at == LAST_BOXES:
                 self._boxes = []
             self._opinion_at = LAST_BOXES
+
+    def know(self, config: Config) -> None:
+        """Go on by another configuration: of a tracker that has met another sensor."""
+        self._config = config
 
     def end(self) -> None:
         """Look at nothing any more: for a tracker that goes on, whose first scans were looked at."""

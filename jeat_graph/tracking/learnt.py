@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from jeat_graph.config.fields import SMALLEST
 from jeat_graph.config.learnt import LearntConfig
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray
@@ -45,27 +46,32 @@ def learnt_of(scene: SceneState, config: Config) -> dict[str, LearntConfig]:
         if not np.isfinite(scene.first_look[s]):
             continue
         weights = _others_look(s, scene, config)
-        sums = {key: float(weights @ scene.claims[s][column]) for key, column in _SUMS.items()}
+        sums = {key: _told(weights @ scene.claims[s][column]) for key, column in _SUMS.items()}
         cov = scene.worth_cov[s]
         out[name] = LearntConfig(
-            worth=(float(scene.worth_mean[s, 0]), float(scene.worth_mean[s, 1])),
-            worth_cov=(float(cov[0, 0]), float(cov[0, 1]), float(cov[1, 1])),
-            lasting_odds=float(scene.lasting_odds[s]),
-            lasting_s=float(scene.lasting_seen[s]),
-            vain=float(scene.vain[s]),
-            vain_s=float(scene.vain_seen[s]),
-            lonely_s=max(float(weights @ scene.claims[s]["all"]) - sums["agreed_s"], sums["lonely_high_s"]),
-            agreed_odds=float(scene.agreed_odds[s]),
+            worth=(_told(scene.worth_mean[s, 0]), _told(scene.worth_mean[s, 1])),
+            worth_cov=(float(cov[0, 0]), _told(cov[0, 1]), float(cov[1, 1])),
+            lasting_odds=_told(scene.lasting_odds[s]),
+            lasting_s=_told(scene.lasting_seen[s]),
+            vain=_told(scene.vain[s]),
+            vain_s=_told(scene.vain_seen[s]),
+            lonely_s=max(_told(weights @ scene.claims[s]["all"] - sums["agreed_s"]), sums["lonely_high_s"]),
+            agreed_odds=_told(scene.agreed_odds[s]),
             agreed_without=tuple(
                 (other, float(scene.agreed_without[s, o]))
                 for o, other in enumerate(names)
-                if o != s and scene.agreed_without[s, o] > 0.0
+                if o != s and scene.agreed_without[s, o] > SMALLEST
             ),
             borne_out=max(float(scene.borne_out[s]), _LEAST_FACTOR),
             trust=max(float(scene.trust[s]), _LEAST_FACTOR),
             **sums,
         )
     return out
+
+
+def _told(value: float) -> float:
+    """Return a sum as a setting can have it: what is left of nothing by rounding is nothing."""
+    return 0.0 if abs(value) < SMALLEST else float(value)
 
 
 def _others_look(s: int, scene: SceneState, config: Config) -> FloatArray:

@@ -9,6 +9,9 @@ from jeat_graph.data.progress import write_line
 
 TRACKER = "the tracker"
 NOTICE = "compiling {what} for this machine, once (two to five minutes) …"
+#: The smoother is compiled beforehand for so many sensors whose errors last.
+MOST_COMPILED = 3
+MANY = "more than {most} sensors: the first smoothed rows may wait for the compiler, once on this machine"
 #: What is called instead where the tracker has to be compiled: the command line has other processors help.
 when_cold: Callable[[], object] | None = None
 #: Ends what was begun there, if anything was; said here, for asking the compiler's part would load all of it.
@@ -52,6 +55,17 @@ def notice_if_cold(function: Any = None, what: str = TRACKER) -> None:
         say_compiling(what)
         return
     when_cold()
+
+
+def notice_many(sensors: int) -> None:
+    """Say on stderr, once in a process, that so many sensors may have their smoother compiled.
+
+    Args:
+        sensors: number of those whose errors last.
+    """
+    if sensors > MOST_COMPILED and MANY not in _said:
+        _said.add(MANY)
+        write_line(f"jeat-graph: {MANY.format(most=MOST_COMPILED)}")
 
 
 def forget() -> None:

@@ -107,6 +107,7 @@ class SavedTracks(SmoothedTracks):
             "log": log,
             "smoothing": self._smoothers,
             "past": self._past,
+            "class_ids": self._class_ids,
         }
 
     @classmethod
@@ -116,7 +117,9 @@ class SavedTracks(SmoothedTracks):
         tracker = cls(without, diagnostics=state["diagnostics"])
         tracker.config, tracker._smoothers, tracker._past = config, state["smoothing"], state["past"]
         tracker.restore(state["now"])
+        tracker._told.forget()
         tracker._finished = state["finished"]
+        tracker._class_ids = dict(state["class_ids"])
         if state["log"] is not None:
             tracker._log = allocate_log(len(state["log"]))
             tracker._log.rows[:], tracker._log.count[0] = state["log"], len(state["log"])

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from jeat_graph.config.kernel_form import kernel_model
 from jeat_graph.config.learnt import LearntConfig
@@ -16,21 +15,20 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import BoolArray, IntArray, RecordArray
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.diagnostics import Diagnostics
-from jeat_graph.data.embeddings import EmbeddingArray, unit_embeddings
+from jeat_graph.data.embeddings import EmbeddingArray
 from jeat_graph.data.errors import JeatGraphError, TimeOrderError
-from jeat_graph.data.interop import boxes_of
 from jeat_graph.data.scan import time_of
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.appearance import Compared, Looks, compare, embeddings_of, remember
-from jeat_graph.tracking.classes import ClassTally, check_names, count_votes
+from jeat_graph.tracking.classes import ClassTally, check_names, count_votes, number_classes
 from jeat_graph.tracking.compaction import allocate, grow
+from jeat_graph.tracking.detector_results import DetectorResults
 from jeat_graph.tracking.direct_call import DirectCall
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.learnt import begin_with, learnt_of
 from jeat_graph.tracking.notice import notice_if_cold
 from jeat_graph.tracking.prediction import Prediction, predict_reported
 from jeat_graph.tracking.reporting import as_table, longest_gaps_s, report
-from jeat_graph.tracking.saving import SavedTracks
 from jeat_graph.tracking.scans import ScanLike, arrivals_of, as_scans
 from jeat_graph.tracking.sensor_state import SensorState, sensor_states
 from jeat_graph.tracking.snapshot import Snapshot
@@ -42,7 +40,7 @@ from jeat_graph.tracking.update_log import allocate_log
 _FIRST_CAPACITY = 64
 
 
-class Tracker(SavedTracks):
+class Tracker(DetectorResults):
     """Joint tracker of all vehicles over any number of asynchronous sensors (paper algorithm 1).
 
     Feed it scans in time order. Each step sees only what has arrived: the table it returns is causal. Memory
@@ -123,11 +121,16 @@ class Tracker(SavedTracks):
 
         Raises:
             DataError: boxes or scores that are not valid.
-            UnknownSensorError: a sensor that the configuration does not declare.
+            UnknownSensorError: a sensor that the configuration does not declare, if it has such refused
+                (`input.undeclared`); `default` has it declared (`meet`).
             TimeOrderError: a time before that of the last step. In all three cases the state is as before.
             JeatGraphError: after `finish`.
         """
-        self.hand_over(self.take_in(as_scans(scans)))
+        batch = as_scans(scans)
+        if not self._finished:
+            self.meet(batch)
+        self.hand_over(self._take_in(batch))
+        self._told.note("step", batch, sum(map(len, batch)))
         return self.causal()
 
     def take_in(self, batch: Sequence[Scan]) -> StepRecord | None:
@@ -143,6 +146,10 @@ class Tracker(SavedTracks):
             DataError, UnknownSensorError, TimeOrderError: as `step`.
             JeatGraphError: after `finish`.
         """
+        self._told.forget()
+        return self._take_in(batch)
+
+    def _take_in(self, batch: Sequence[Scan]) -> StepRecord | None:
         if self._finished:
             raise JeatGraphError("this tracker has been finished; make another one for another recording")
         arrivals = arrivals_of(batch, self.sensor_names)
@@ -172,6 +179,7 @@ class Tracker(SavedTracks):
         self._t = t
         living = self._tracks.track_id[: self._num_tracks]
         self._classes, votes = count_votes(self._classes, batch, self._log, living)
+        self._class_ids = number_classes(self._class_ids, batch)
         if compared is not None:
             self._looks = remember(compared, self._log, living)
         if self._smoothers is None:
@@ -200,6 +208,7 @@ class Tracker(SavedTracks):
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to a snapshot of this tracker."""
+        self._told.forget()
         self._t, self._next_id, self._num_tracks = snapshot.t, snapshot.next_id, snapshot.num_tracks
         self._classes, self._looks = snapshot.classes, snapshot.looks
         self._tracks = grow(self._tracks, 0, self._num_tracks)
@@ -231,33 +240,6 @@ class Tracker(SavedTracks):
             raise TimeOrderError(f"t = {t} s is before the last scan at {self._t} s: that is past")
         return predict_reported(self.snapshot(), t, self._model, self.sensor_names)
 
-    def update(
-        self,
-        source: Any,
-        *,
-        t: float,
-        sensor: str,
-        scores: npt.ArrayLike | None = None,
-        embeddings: npt.ArrayLike | None = None,
-    ) -> Trajectories:
-        """Take in what a detector returned for one picture.
-
-        Args:
-            source: `supervision.Detections`, a result of `ultralytics`, or boxes (M, 4) left, top, width,
-                height in px; none (M = 0) if the sensor looked and found nothing. Boxes without area, which
-                detectors clip, are left out.
-            t: time (s), not before that of the last step. It is believed: a wrong one in the future ends all
-                tracks, and right ones after it are refused (`LiveTracker` waits for others to confirm it).
-            sensor: name of the sensor.
-            scores: (M,) confidence in [0, 1], for boxes that come without; 1 where neither says it.
-            embeddings: (M, E) what each looks like, of a network for re-identification; NaN where unknown.
-
-        Returns and raises as `step`; also a DataError where it cannot be told what `source` is.
-        """
-        found = boxes_of(source, scores)
-        looks = None if embeddings is None else unit_embeddings(embeddings, len(found.kept))[found.kept]
-        return self.step(Scan(t, sensor, found.boxes, found.scores, found.classes, looks))
-
     def causal(self) -> Trajectories:
         """Return the tracks that are reported now, as the last step did."""
         t = 0.0 if self._t is None else self._t
@@ -267,7 +249,9 @@ class Tracker(SavedTracks):
         columns = self._report(
             self._tracks, self._num_tracks, t, gaps, settings.image, settings.output, by_existence
         )
-        return as_table(columns, self.sensor_names, self._classes)
+        table = as_table(columns, self.sensor_names, self._classes)
+        at = None if self._t is None else np.array([t])
+        return replace(table, instants=at, class_ids=self._class_ids or None)
 
     def last_updates(self) -> Diagnostics:
         """Return what the last step gave to the tracks, those too that are not reported.

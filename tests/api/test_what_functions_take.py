@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from jeat_graph import Detections, Trajectories, calibrate, evaluate, track
+from jeat_graph import Detections, Trajectories, calibrate, compare, evaluate, track
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.truth_frames import truth_of_frame
 
@@ -54,3 +54,23 @@ def test_what_is_no_truth_and_what_are_no_tracks_is_refused(what):
 def test_calibrate_takes_one_data_frame_as_one_recording():
     with pytest.raises(DataError, match="1 recordings and 2 truths"):
         calibrate(truth_frame(), [truth_frame()] * 2, image=(1920, 1080))
+
+
+def test_frame_numbers_take_the_rate_that_the_message_asks_for():
+    frame = truth_frame(40).drop(columns="time").assign(frame=np.arange(40), confidence=0.9)
+    detections = frame.drop(columns="id")
+    with pytest.raises(DataError, match="rate_hz"):
+        track(detections, image=(1280, 720))
+    causal = track(detections, image=(1280, 720), rate_hz=20.0).causal
+    assert causal.t.max() == pytest.approx(39 / 20)
+    with pytest.raises(DataError, match="rate_hz"):
+        evaluate(causal, frame)
+    assert evaluate(causal, frame, rate_hz=20.0)["causal"]["FN"] == 0
+    assert compare(detections, truth=frame, rate_hz=20.0, image=(1280, 720), lags_s=[0.0]).values
+    assert calibrate(detections, rate_hz=20.0, image=(1280, 720)).sensors["rgb"].rate_hz == pytest.approx(20)
+
+
+def test_files_of_frame_numbers_take_it_too(tmp_path):
+    path = tmp_path / "det.txt"
+    path.write_text("".join(f"{k},-1,{100 + 3 * k},100,60,40,0.9,-1,-1,-1\n" for k in range(1, 41)))
+    assert track(path, image=(1280, 720), rate_hz=10.0).causal.t.max() == pytest.approx(3.9)

@@ -7,6 +7,7 @@ import io
 import json
 import shutil
 
+import pandas as pd
 import pytest
 
 from jeat_graph.cli.main import main
@@ -112,3 +113,22 @@ def test_a_file_of_the_run_that_has_changed_is_refused(kept, tmp_path, capsys, n
     (run / name).unlink()
     assert main(["compare", str(run)]) == 2
     assert f"{name}: is missing from the run" in capsys.readouterr().err
+
+
+def test_boxes_without_velocities_give_errors_of_positions(folder, small_plots, capsys):
+    whole = pd.read_csv(folder / "sim" / "gt.csv")
+    boxes = folder / "boxes.csv"
+    whole[["t", "object_id", "left", "top", "width", "height"]].to_csv(boxes, index=False)
+    out = folder / "by-boxes"
+    with small_plots():
+        assert main(["compare", str(folder / "run"), "--gt", str(boxes), "--out", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert "lag 0.5 s" in printed
+    assert "velocity" not in printed.split("Consistency")[0].split("\n")[1]
+    values = json.loads((out / "compare.json").read_text())
+    assert len(values["lag_curve"]) > 1
+    filtered, full = (values["errors"][name]["position_rmse"] for name in ("filter", "full"))
+    assert 0.0 < full < filtered < 20.0
+    assert values["errors"]["full"]["velocity_rmse"] is None
+    for name in ("trajectories", "error-over-time", "rmse-against-lag"):
+        assert (out / f"{name}.png").read_bytes().startswith(b"\x89PNG")

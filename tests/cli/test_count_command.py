@@ -68,3 +68,55 @@ def test_a_result_without_variances_has_no_interval(tmp_path, capsys):
     (row,) = pd.read_csv(out).to_dict("records")
     assert (row["count"], row["low"], row["high"]) == (1, 0, 1)
     assert np.isnan(row["expected"])
+
+
+def late_run(tmp_path, start=0.0, alone=False):
+    """A recording of a minute: vehicles cross at 13.2 and 34.4 s; nothing is there before and after."""
+    folder = tmp_path / "run"
+    folder.mkdir()
+    rows = []
+    for track, crossing in enumerate((13.2, 34.4), 1):
+        for k in range(11):
+            t, y = crossing + 0.1 * (k - 5), 100.0 * (k - 5)
+            rows.append(f"{start + t:.3f},{track},10,{y - 5},10,10,0.99,15,{y},0,1000,0,0,1,1,1,1,1,1,rgb")
+    (folder / "causal.csv").write_text(HEADER + ",sensors\n" + "\n".join(rows) + "\n")
+    if not alone:
+        scans = "".join(f"{start + k / 25:.2f},rgb,0\n" for k in range(1500))
+        (folder / "scans.csv").write_text("t,sensor,detections\n" + scans)
+    return folder
+
+
+def counted(folder, tmp_path, *more):
+    out = tmp_path / "counts.csv"
+    assert main(["count", str(folder), "--line", "0,0,100,0", *more, "--out", str(out)]) == 0
+    return pd.read_csv(out)
+
+
+@pytest.mark.parametrize("start", [0.0, 1.7e9])
+def test_intervals_begin_at_multiples_and_include_those_without_anybody(tmp_path, start):
+    begin = start // 15 * 15
+    found = counted(late_run(tmp_path, start), tmp_path, "--interval", "15")
+    first = found.t_from.tolist()
+    assert first == [begin + 15.0 * k for k in range(len(first))]
+    assert found["count"].sum() == 2
+    if start == 0.0:
+        assert found["count"].tolist() == [1, 0, 1, 0]
+        assert found.t_to.tolist() == [15.0, 30.0, 45.0, 60.0]
+
+
+def test_an_interval_that_the_recording_just_fills_has_no_empty_one_behind(tmp_path):
+    found = counted(late_run(tmp_path), tmp_path, "--interval", "20")
+    assert found["count"].tolist() == [1, 1, 0]
+
+
+def test_of_a_table_alone_the_first_interval_is_that_of_its_first_row(tmp_path):
+    found = counted(late_run(tmp_path, alone=True) / "causal.csv", tmp_path, "--interval", "10")
+    assert found.t_from.tolist() == [10.0, 20.0, 30.0]
+    assert found["count"].tolist() == [1, 0, 1]
+
+
+def test_a_line_that_nobody_crosses_counts_none_in_both_directions(tmp_path):
+    found = counted(late_run(tmp_path), tmp_path, "--interval", "30", "--line", "other=0,5000,100,5000")
+    other = found[found.line == "other"]
+    assert other.direction.tolist() == ["left", "left", "right", "right"]
+    assert other["count"].tolist() == [0, 0, 0, 0]

@@ -1,6 +1,7 @@
 """What holds whatever the detectors say: arbitrary scans, sane or not. `make fuzz` tries more of them."""
 
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -204,7 +205,8 @@ REFUSED = {
 @pytest.mark.parametrize("what", REFUSED)
 def test_a_refused_scan_leaves_the_state_as_it_was(preset, what, state):
     scan, error, words = REFUSED[what]
-    tracker = Tracker(CONFIGS[preset])
+    config = CONFIGS[preset]
+    tracker = Tracker(replace(config, input=replace(config.input, undeclared="refuse")))
     for k in range(11):
         tracker.step((0.05 * k, "rgb", [[100 + k, 100, 40, 30], [300, 200, 40, 30]], [0.9, 0.8]))
     before, scene = state(tracker), [array.copy() for array in tracker._scene]

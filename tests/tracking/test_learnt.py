@@ -10,8 +10,9 @@ import pytest
 from jeat_graph.calibration.learning import learn_sensors
 from jeat_graph.config.learnt import LearntConfig
 from jeat_graph.config.reading import config_from_dict, config_to_dict, load_config
-from jeat_graph.data.detections import Detections
+from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import ConfigError
+from jeat_graph.tracking.learnt import learnt_of
 from jeat_graph.tracking.tracker import Tracker
 
 RATE_HZ = 10.0
@@ -156,3 +157,23 @@ def test_what_cannot_have_been_learnt_is_refused(change, message):
 def test_nothing_learnt_is_the_default():
     assert load_config("default").sensors["rgb"].learnt is None
     assert LearntConfig().trust == 1.0
+
+
+@pytest.mark.parametrize("score", [0.9, 0.37])
+@pytest.mark.parametrize("sensors", [("rgb",), ("rgb", "thermal")])
+def test_scores_that_are_all_alike_are_learnt_without_spread(score, sensors):
+    rng = np.random.default_rng(0)
+    tracker = Tracker("default", image=(1280, 720))
+    for k in range(300):
+        left = (np.arange(6) * 200.0 + (60.0 + 10.0 * np.arange(6)) * k / 20.0) % 1200.0
+        boxes = np.column_stack([left, 100.0 * np.arange(6) + 20.0, np.full(6, 80.0), np.full(6, 50.0)])
+        noisy = boxes + 2.0 * rng.standard_normal(boxes.shape)
+        tracker.step([Scan(k / 20.0, name, noisy, np.full(6, score)) for name in sensors])
+    learnt = tracker.learnt()  # settings closer to 0 than any of theirs may be were refused
+    for name in sensors:
+        assert abs(learnt[name].score_spread) < 1e-6
+    # What rounding left of nothing.
+    scene = tracker._scene
+    scene.claims["score_spread"][:] = 1.69e-30
+    scene.claims["score_kept"][:] = -3.0e-20
+    assert learnt_of(scene, tracker.config)["rgb"].score_spread == 0.0

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.tracking.first_sight import ToldSoFar
 
 if TYPE_CHECKING:
     from jeat_graph.tracking.smoothing.behind import Smoothing
@@ -29,6 +31,10 @@ class SmoothedTracks:
         self._smoothers: Smoothing | None = None
         if config.smoother.engine != "none":
             self._smoothers = _smoothing(config)
+        self._told = ToldSoFar()
+        if config.input.undeclared != "declare":
+            self._told.forget()  # no sensor is ever met
+        self._class_ids: dict[str, int] = {}  # number of each class named so far
         self._past: list[Trajectories] = []  # rows of earlier bases of time that were not fetched
 
     def smoothed(self) -> Trajectories:
@@ -43,7 +49,8 @@ class SmoothedTracks:
         Raises:
             JeatGraphError: the configuration asks for no smoother.
         """
-        return self._wanted_smoothers().smoothed()
+        self._told.note("smoothed")
+        return self._numbered(self._wanted_smoothers().smoothed())
 
     def drain_smoothed(self) -> Trajectories:
         """Return the smoothed rows that are final and forget them, in order of time over all calls.
@@ -56,13 +63,15 @@ class SmoothedTracks:
         Raises:
             JeatGraphError: the configuration asks for no smoother.
         """
+        self._told.note("drain_smoothed")
         rows = self._wanted_smoothers().drain()
         if self._past:
             rows, self._past = Trajectories.concatenate([*self._past, rows]), []
-        return rows
+        return self._numbered(rows)
 
     def smooth_anew(self) -> None:
         """End all tracks of the smoothers, which may then be told of earlier times; their rows wait."""
+        self._told.forget()
         if self._smoothers is not None:
             self._past.append(self._smoothers.finish())
             self._smoothers = _smoothing(self.config)
@@ -77,7 +86,11 @@ class SmoothedTracks:
             return Trajectories.empty(self.sensor_names)
         rows, past = self._smoothers.finish(), self._past
         self._past = []
-        return Trajectories.concatenate([*past, rows]) if past else rows
+        return self._numbered(Trajectories.concatenate([*past, rows]) if past else rows)
+
+    def _numbered(self, rows: Trajectories) -> Trajectories:
+        """Have rows know the numbers of their classes."""
+        return replace(rows, class_ids=self._class_ids) if self._class_ids else rows
 
     def settle(self) -> None:
         """Let the smoothers take in all that they had set aside, and begin anew from what is known then.
@@ -85,6 +98,7 @@ class SmoothedTracks:
         Their state after it follows from the steps so far alone, so that a tracker which is saved here and
         loaded goes on with the same bytes as one that settles here and is not saved.
         """
+        self._told.note("settle")
         if self._smoothers is not None:
             self._smoothers.settle()
 

@@ -24,13 +24,25 @@ _LOOK_WEIGHT = 0.1
 _PRIOR_SCANS = 10.0
 # However many misses, a vehicle is never certain to be hidden: then no later one could say that it is gone.
 _MOST_HIDDEN = 0.999
+# Of a sensor whose scans are further apart than this (s), each counts for less than the time it stands for.
+_CLOSE_S = 0.2
 
 
 @inner
 def scan_weight(s: int, model: Model) -> float:
-    """Weight of one scan of sensor `s` in what is learnt of the scene; 0 where nothing is."""
-    memory_s = model.settings.lifecycle.scene_memory_s
-    return min(model.sensors.period_s[s] / memory_s, 1.0) if memory_s > 0.0 else 0.0
+    """Weight of one scan of sensor `s` in what is learnt of the scene; 0 where nothing is.
+
+    It is the time between two scans over the memory, and less where scans are seldom: the further vehicles
+    move between two of them, the more of them have no track yet, and count as clutter. A memory of a few such
+    scans raises the clutter at once, then no track begins, and all that is found is clutter for good. So the
+    memory grows with the time T between two scans, as T^5/2, the way the spread of a random jerk does.
+    """
+    memory_s, period_s = model.settings.lifecycle.scene_memory_s, model.sensors.period_s[s]
+    if memory_s <= 0.0:
+        return 0.0
+    weight = min(period_s / memory_s, 1.0)
+    close = _CLOSE_S / period_s
+    return weight * close * close * math.sqrt(close) if close < 1.0 else weight
 
 
 @inlined

@@ -1,0 +1,107 @@
+"""What the functions of one call take: recordings, truth and tracks, as objects, data frames or files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.trajectories import GroundTruth, Trajectories
+from jeat_graph.io.detections_io import read_detections
+from jeat_graph.io.truth_io import read_truth
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+PathLike: TypeAlias = str | Path
+
+
+class Tracks(NamedTuple):
+    """What tracking a recording gives.
+
+    Attributes:
+        causal: the online estimates, each from what had arrived by its time.
+        smoothed: the smoothed trajectories; None without a smoother.
+    """
+
+    causal: Trajectories
+    smoothed: Trajectories | None
+
+
+class Run(NamedTuple):
+    """A run directory, read.
+
+    Attributes:
+        causal: the causal table, or None.
+        smoothed: the smoothed table, or None.
+        record: content of `run.json`; empty where there is none.
+    """
+
+    causal: Trajectories | None
+    smoothed: Trajectories | None
+    record: dict[str, Any]
+
+
+def recording_of(detections: Detections | pd.DataFrame | PathLike, rate_hz: float | None) -> Detections:
+    """Return a recording that is given as such, as a data frame, or as a file.
+
+    Raises:
+        DataError: it is none of these, or not valid.
+    """
+    if isinstance(detections, (str, Path)):
+        return read_detections(detections, rate_hz=rate_hz)
+    if isinstance(detections, Detections):
+        return detections
+    if hasattr(detections, "columns"):
+        return Detections.from_pandas(detections, rate_hz=rate_hz)
+    raise DataError(
+        "detections are Detections, a data frame, or the path of a file (make one of arrays with "
+        f"Detections.from_rows, of several with Detections.concatenate), not {type(detections).__name__}"
+    )
+
+
+def truth_of(truth: GroundTruth | pd.DataFrame | PathLike, rate_hz: float | None) -> GroundTruth:
+    """Return truth that is given as such, as a data frame, or as a file.
+
+    Raises:
+        DataError: it is none of these, or not valid.
+    """
+    if isinstance(truth, (str, Path)):
+        return read_truth(truth, rate_hz=rate_hz)
+    if isinstance(truth, GroundTruth):
+        return truth
+    if hasattr(truth, "columns"):
+        from jeat_graph.data.truth_frames import truth_of_frame
+
+        return truth_of_frame(truth, rate_hz=rate_hz)
+    raise DataError(
+        f"truth is a GroundTruth, a data frame, or the path of a file, not {type(truth).__name__}"
+    )
+
+
+def tables_of(tracks: Trajectories | Tracks | Run | pd.DataFrame, kind: str) -> dict[str, Trajectories]:
+    """Return tables by kind; `kind` says what a table alone is.
+
+    Raises:
+        DataError: these are no tracks, or no such kind.
+    """
+    if isinstance(tracks, (Tracks, Run)):
+        both = {"causal": tracks.causal, "smoothed": tracks.smoothed}
+        return {name: table for name, table in both.items() if table is not None}
+    if kind not in ("causal", "smoothed"):
+        raise DataError(f"kind {kind!r}: must be causal or smoothed")
+    if isinstance(tracks, Trajectories):
+        return {kind: tracks}
+    if hasattr(tracks, "columns"):
+        return {kind: Trajectories.from_pandas(tracks)}
+    raise DataError(
+        "tracks are what track or read_run gives, a table of it, a data frame of one, or a path, "
+        f"not {type(tracks).__name__}"
+    )
+
+
+def as_list(values: Any) -> list[Any]:
+    """Return one value, or several, as a list."""
+    one = isinstance(values, (str, Path, Detections, GroundTruth))
+    return [values] if one or hasattr(values, "columns") else list(values)

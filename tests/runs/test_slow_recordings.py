@@ -1,0 +1,79 @@
+"""One or two scans a second: to be told the true rate costs no tracks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from jeat_graph import Detections, GroundTruth, Tracker, Trajectories, evaluate, load_config, track
+
+DURATION_S, IMAGE, NOISE_PX, FOUND = 36.0, (1280, 720), 2.0, 0.91
+#: Top (px) and speed (px/s) of each lane: vehicles drive two to four times their size in a second.
+LANES = ((150.0, 260.0), (270.0, 320.0), (390.0, -240.0), (510.0, -300.0))
+
+
+def highway(rate_hz: float, seed: int) -> tuple[Detections, GroundTruth]:
+    """Four lanes that one camera sees, with misses and noise, and the truth."""
+    rng = np.random.default_rng(seed)
+    vehicles = []
+    for top, speed in LANES:
+        t = rng.uniform(1.0, 2.5)
+        while t < DURATION_S:
+            width = rng.uniform(80.0, 130.0)
+            vehicles.append((t, top, width, speed * rng.uniform(0.93, 1.07)))
+            t += rng.uniform(1.0, 2.5)
+    times = np.arange(0.0, DURATION_S, 1.0 / rate_hz)
+    true, seen = [], []
+    for t in times:
+        seen.append((t, np.nan, np.nan, np.nan, np.nan, np.nan))
+        for k, (begin, top, width, speed) in enumerate(vehicles):
+            centre = speed * (t - begin) + (-width / 2 if speed > 0 else IMAGE[0] + width / 2)
+            low, high = max(centre - width / 2, 0.0), min(centre + width / 2, IMAGE[0])
+            if t < begin or high - low < 10.0:
+                continue
+            box = np.array([low, top, high - low, 0.6 * width])
+            true.append((t, k, *box))
+            if rng.random() < FOUND:
+                box = box + NOISE_PX * rng.standard_normal(4)
+                seen.append((t, *box, np.clip(rng.normal(0.72, 0.12), 0.05, 1.0)))
+    d, g = np.array(seen), np.array(true)
+    none = np.isnan(d[:, 1])
+    detections = Detections.from_rows(d[:, 0], ["rgb"] * len(d), d[:, 1:5], d[:, 5], none)
+    truth = GroundTruth(
+        t=g[:, 0],
+        object_id=g[:, 1].astype(np.int64),
+        boxes=np.ascontiguousarray(g[:, 2:]),
+        motion=None,
+        ignore=np.zeros(len(g), dtype=bool),
+        frames=times,
+    )
+    return detections, truth
+
+
+def step_by_step(detections: Detections, *overrides: str) -> Trajectories:
+    tracker = Tracker(load_config("default", overrides), image=IMAGE)
+    return Trajectories.concatenate(list(tracker.run(detections)))
+
+
+def mota(tracks: Trajectories, truth: GroundTruth) -> float:
+    return evaluate(tracks, truth)["causal"]["MOTA"]
+
+
+@pytest.mark.parametrize("rate_hz", [1.5, 2.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_track_finds_at_least_what_a_tracker_finds_that_is_not_told_the_rate(rate_hz, seed):
+    detections, truth = highway(rate_hz, seed)
+    told, untold = track(detections, image=IMAGE).causal, step_by_step(detections)
+    for name in ("MOTA", "HOTA", "IDF1"):
+        assert evaluate(told, truth)["causal"][name] >= evaluate(untold, truth)["causal"][name], name
+    assert mota(told, truth) > (55.0 if rate_hz == 2.0 else 30.0)
+
+
+def test_a_tracker_may_be_told_the_rate_too():
+    detections, truth = highway(2.0, 0)
+    assert mota(step_by_step(detections, "sensors.rgb.rate_hz=2"), truth) > 50.0
+
+
+def test_from_five_scans_a_second_on_a_scan_counts_for_the_time_it_stands_for():
+    detections, truth = highway(5.0, 0)
+    assert mota(track(detections, image=IMAGE).causal, truth) > 80.0
