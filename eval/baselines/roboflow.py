@@ -8,6 +8,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import ConfigError
+from jeat_graph.data.extras import install
 from jeat_graph.eval.baselines.frames import BaselineFrame, TrackedFrame
 
 # Name: class in `trackers`, and what is set differently from its defaults.
@@ -78,7 +79,7 @@ def make_tracker(name: str, rate_hz: float, **parameters: Any) -> Any:
     except ImportError as error:
         raise ConfigError(
             "the baselines need the package trackers: "
-            "pip install 'jeat-graph[baselines]' && pip install --no-deps trackers"
+            f"{install('baselines')} && pip install --no-deps trackers"
         ) from error
     cls, fixed = ROBOFLOW[name]
     try:

@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 from jeat_graph.benchmark.contenders import NAMES, SEARCH_DURATION_S, SEARCH_SEED, key, streams
 from jeat_graph.benchmark.judging import METRICS, in_processes
 from jeat_graph.benchmark.recordings import SCENARIOS, kitti, simulated
+from jeat_graph.data.extras import install
 
 if TYPE_CHECKING:
     from jeat_graph.eval.tables import Cell, Table
 
 _INSTALL = {
-    "trackers": "pip install 'jeat-graph[baselines]' && pip install --no-deps trackers",
-    "supervision": "pip install 'jeat-graph[baselines]'",
+    "trackers": f"{install('baselines')} && pip install --no-deps trackers",
+    "supervision": install("baselines"),
     "norfair": "pip install rich filterpy && pip install --no-deps norfair",
 }
 

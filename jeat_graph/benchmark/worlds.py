@@ -19,6 +19,7 @@ from jeat_graph.benchmark import common
 from jeat_graph.benchmark.provenance import provenance
 from jeat_graph.config.argument_types import counting, drawn_size, positive
 from jeat_graph.data.errors import ConfigError
+from jeat_graph.data.extras import install
 from jeat_graph.data.processes import available_cores
 from jeat_graph.simulation.dataset.protocol import Protocol
 from jeat_graph.simulation.dataset.recording import record_dataset
@@ -70,7 +71,7 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
     try:
         import torch  # noqa: F401
     except ImportError:
-        raise ConfigError("training needs PyTorch: pip install 'jeat-graph[train]'") from None
+        raise ConfigError(f"training needs PyTorch: {install('train')}") from None
     if any(side % 16 for side in args.size):
         raise ConfigError(f"--size: {args.size[0]}x{args.size[1]} must be whole multiples of 16 px")
     rows: list[dict[str, Any]] = []

@@ -13,6 +13,7 @@ from jeat_graph.cli.options import add_settings
 from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import counting, natural, picture_size, positive
 from jeat_graph.data.errors import ConfigError
+from jeat_graph.data.extras import install
 
 if TYPE_CHECKING:
     from jeat_graph.training.procedure import TrainRequest
@@ -106,7 +107,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         import torch
     except ImportError:
-        raise ConfigError("training needs PyTorch: pip install 'jeat-graph[train]'") from None
+        raise ConfigError(f"training needs PyTorch: {install('train')}") from None
     from tqdm import tqdm
 
     from jeat_graph.io.atomic import check_writable

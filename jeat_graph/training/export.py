@@ -19,6 +19,7 @@ import numpy as np
 import torch
 
 from jeat_graph.data.errors import ConfigError
+from jeat_graph.data.extras import install
 from jeat_graph.detection.models.onnx_head import CARD
 from jeat_graph.io.atomic import atomic_path
 from jeat_graph.training.making import SECOND_LOOK
@@ -51,7 +52,7 @@ def write_onnx(
     try:
         import onnx
     except ImportError:
-        raise ConfigError("writing ONNX needs pip install 'jeat-graph[train]'") from None
+        raise ConfigError(f"writing ONNX needs {install('train')}") from None
     served = ServedNet(net, side, second_look).to("cpu").eval()
     inputs, state = net.to("cpu").inputs(side), served.empty_state()
     states = range(len(state))

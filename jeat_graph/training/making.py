@@ -17,6 +17,7 @@ import torch
 from torch import Tensor, nn
 
 from jeat_graph.data.errors import ConfigError, DataError
+from jeat_graph.data.extras import install
 from jeat_graph.detection.models.onnx_head import CARD, read_onnx_head
 from jeat_graph.training.fused_network import FusedNet, GatedSum, silence
 from jeat_graph.training.network import DetectionNet, VehicleNet
@@ -232,7 +233,7 @@ def _graph(path: Path) -> tuple[Any, dict[str, Tensor]]:
         import onnx
         from onnx import numpy_helper
     except ImportError:
-        raise ConfigError("reading weights needs pip install 'jeat-graph[train]'") from None
+        raise ConfigError(f"reading weights needs {install('train')}") from None
     graph = onnx.load(str(path)).graph
     values = {one.name: torch.from_numpy(numpy_helper.to_array(one).copy()) for one in graph.initializer}
     values = {name: one.float() if one.is_floating_point() else one for name, one in values.items()}

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.events import EventArray
+from jeat_graph.data.extras import install
 from jeat_graph.detection.models.event_places import EventPlaces, event_scale
 from jeat_graph.detection.models.feeding import place, usual_feed
 from jeat_graph.detection.models.model_settings import ModelSettings
@@ -64,7 +65,7 @@ def write_int8(source: Path, members: Sequence[Picture | EventSegment], about: o
         from onnxruntime.quantization import CalibrationDataReader, QuantFormat, QuantType, quantize_static
         from onnxruntime.quantization.shape_inference import quant_pre_process
     except ImportError:
-        raise ConfigError("--int8 needs pip install 'jeat-graph[train,onnxruntime]'") from None
+        raise ConfigError(f"--int8 needs {install('train', 'onnxruntime')}") from None
     settings = settings_of(source)
     if settings.kind == FUSED:
         raise ConfigError("--int8 is for networks of one sensor")

@@ -18,7 +18,7 @@ def refused(capsys, *words):
     return line
 
 
-def test_without_pytorch_the_extra_is_named(tmp_path, capsys, monkeypatch):
+def test_without_pytorch_the_packages_are_named(tmp_path, capsys, monkeypatch):
     real = builtins.__import__
 
     def lacking(name, *rest, **more):
@@ -28,7 +28,7 @@ def test_without_pytorch_the_extra_is_named(tmp_path, capsys, monkeypatch):
 
     monkeypatch.setattr(builtins, "__import__", lacking)
     line = refused(capsys, "frames", str(tmp_path), "--out", str(tmp_path / "n.onnx"))
-    assert "pip install 'jeat-graph[train]'" in line
+    assert "pip install 'torch==" in line
 
 
 @pytest.mark.parametrize(

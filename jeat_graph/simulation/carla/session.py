@@ -7,6 +7,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from typing import Any
 
 from jeat_graph.data.errors import ConfigError, DataError
+from jeat_graph.data.extras import install
 from jeat_graph.simulation.carla.config import TOWN, CarlaConfig
 from jeat_graph.simulation.scenario import Scenario
 
@@ -23,9 +24,7 @@ def client_api() -> Any:
     try:
         import carla
     except ImportError:
-        raise ConfigError(
-            "--sensors carla needs pip install 'jeat-graph[carla]' (Python 3.10 to 3.12)"
-        ) from None
+        raise ConfigError(f"--sensors carla needs {install('carla')} (Python 3.10 to 3.12)") from None
     return carla
 
 

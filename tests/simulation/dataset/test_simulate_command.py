@@ -140,5 +140,5 @@ def test_a_badly_written_argument_is_a_usage_error(arguments, capsys) -> None:
 def test_carla_without_its_client_package_is_one_line(tmp_path: Path, monkeypatch, capsys) -> None:
     monkeypatch.setitem(sys.modules, "carla", None)
     assert main(["simulate", "night", "--out", str(tmp_path / "set"), "--sensors", "carla"]) == 2
-    assert "pip install 'jeat-graph[carla]'" in capsys.readouterr().err
+    assert "pip install 'carla>=0.9.16'" in capsys.readouterr().err
     assert not (tmp_path / "set").exists()
