@@ -23,5 +23,5 @@ def run(args: argparse.Namespace) -> int:
 
     rerun_module()
     path = Path(args.source)
-    log_run(read_tables(path, args.rate), path.resolve().name)
+    log_run(read_tables(path, rate_hz=args.rate), path.resolve().name)
     return 0

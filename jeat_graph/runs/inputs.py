@@ -20,13 +20,13 @@ def describe_inputs(paths: Sequence[str | Path]) -> list[dict[str, Any]]:
     Raises:
         DataError: a file cannot be read.
     """
-    from jeat_graph.io.hashing import sha256_of
+    from jeat_graph.io.hashing import sha256_of, size_of
 
     return [
         {
             "path": str(p),
             "absolute": str(Path(p).resolve()),
-            "bytes": Path(p).stat().st_size,
+            "bytes": size_of(p),
             "sha256": sha256_of(p),
         }
         for p in paths
@@ -87,10 +87,10 @@ def find_input(given: str | Path, record: Mapping[str, Any], folder: Path) -> Pa
     Returns:
         The first file that is the input; else one at its place that has changed since; None without either.
     """
-    from jeat_graph.io.hashing import sha256_of
+    from jeat_graph.io.hashing import sha256_of, size_of
 
-    there = [place for place in dict.fromkeys(_places(Path(given), record, folder)) if place.is_file()]
-    same = (place for place in there if place.stat().st_size == record.get("bytes", place.stat().st_size))
+    there = [place for place in dict.fromkeys(_places(Path(given), record, folder)) if place.exists()]
+    same = (place for place in there if size_of(place) == record.get("bytes", size_of(place)))
     return next(
         (place for place in same if sha256_of(place) == record["sha256"]), there[0] if there else None
     )
