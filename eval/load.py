@@ -13,10 +13,12 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.class_columns import all_numbers, rows_of_class
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.notes import note
 from jeat_graph.data.progress import with_progress
 from jeat_graph.data.rates import ANY_RATE_HZ, median_rate_hz
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.pairing import check_lives, check_pair, check_truth
+from jeat_graph.eval.resampling import TIME_TOLERANCE_S
 from jeat_graph.io.formats import FIRST_OPEN
 from jeat_graph.io.frames import check_rate
 from jeat_graph.io.reading import Reading, ReadingOptions
@@ -91,12 +93,13 @@ def load_run(
         rate_hz = median_rate_hz(objects.frame_times()) or ANY_RATE_HZ
     counted = 0 if truth_form == "kitti" else first
     own = replace(how, rate_hz=rate_hz, time_unit="s")
-    if how.first_frame is None and form in FIRST_OPEN and counted == 0:
-        own = replace(own, first_frame=0)
+    alike = how.first_frame is None and form in FIRST_OPEN
     read: dict[str, Trajectories] = {}
     for kind, file in with_progress(tables.items()):
         read[kind], run_first = read_trajectories_counted(file, None, own)
-        if how.first_frame is None and run_first == 0 and first == 1:
+        if alike and run_first == 1 and counted == 0:
+            read[kind] = _from_0_as_truth(file, own, read[kind], objects)
+        if alike and run_first == 0 and first == 1:
             objects, first = _read_truth(truth_path, replace(how, rate_hz=rate_hz, first_frame=0))
     instants = objects.frame_times() if run_counts else read_instants(path)
     for kind, file in tables.items():
@@ -219,6 +222,19 @@ def _read_truth(path: Path, how: Reading) -> tuple[GroundTruth, int | None]:
     except DataError as error:
         raise DataError(error.message, path) from error
     return truth, first
+
+
+def _from_0_as_truth(path: Path, how: Reading, table: Trajectories, truth: GroundTruth) -> Trajectories:
+    """Let a result without a frame 0 count from 0 as its truth does, unless it would then end after it.
+
+    Trackers report nothing in their first frames, so that the lack of a frame 0 says little.
+    """
+    from_0, _ = read_trajectories_counted(path, None, replace(how, first_frame=0))
+    end = truth.frame_times()[-1] + TIME_TOLERANCE_S
+    if not len(table) or from_0.t.max() > end >= table.t.max():
+        return table
+    note(f"{path}: frames count from 0, as those of the truth do (--first-frame 1 says otherwise)")
+    return from_0
 
 
 def _restricted(truth: GroundTruth, classes: Sequence[str], path: Path) -> GroundTruth:

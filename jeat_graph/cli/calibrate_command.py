@@ -62,12 +62,24 @@ def run(args: argparse.Namespace) -> int:
     shown = None if args.frames is None else facts_of_frames(args.frames)
     if shown is not None and args.rate is None and not any(facts_beside([path]) for path in args.detections):
         args.rate = shown.rate_hz
-    recordings = [at_measurement(read_many([path], **reading(args)), base) for path in args.detections]
+    size = args.image or (None if shown is None else shown.size_px)
+    how = {**reading(args), "image": size}
+    recordings = [at_measurement(read_many([path], **how), base) for path in args.detections]
     beside = None if args.image else _size_beside(args.detections, shown)
     picture = _picture_from(args, base, beside)
     base = with_image(base, recordings, args.image or (None if beside is None else beside.size_px))
     if args.gt:
-        truths = [read_truth(path, rate_hz=args.rate, time_unit=args.time_unit) for path in args.gt]
+        truths = [
+            read_truth(
+                path,
+                rate_hz=args.rate,
+                time_unit=args.time_unit,
+                video=args.only_video,
+                class_names=args.class_names,
+                image=size,
+            )
+            for path in args.gt
+        ]
         pairs = list(zip(recordings, truths, strict=True))
         for path, pair in zip(args.gt, pairs, strict=True):
             _check_pair(path, *pair)

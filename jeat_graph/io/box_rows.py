@@ -172,5 +172,4 @@ def _yolo(path: str | Path, how: Reading) -> BoxRows:
         classes=name_classes(
             labels.kind.astype(np.str_), names_by_number(how.class_names, path, _FIRST_CLASS)
         ),
-        first=first,
     )

@@ -20,7 +20,7 @@ FORMATS = ("csv", "parquet", "motchallenge", "kitti", "prophesee", "coco", "yolo
 BY_FRAME = ("motchallenge", "kitti", "yolo")
 _BOM = b"\xef\xbb\xbf"
 #: Those that leave open from which number their frames count (`data.frame_numbers`).
-FIRST_OPEN = ("csv", "parquet", "coco", "yolo")
+FIRST_OPEN = ("csv", "parquet", "coco")
 _MAGIC = {b"PAR1": "parquet", b"\x93NUMPY": "prophesee"}
 _SUFFIX = {
     ".csv": "csv",
@@ -141,7 +141,7 @@ def _guess(path: Path) -> str:
     words = line.split()
     if len(words) >= _KITTI_FIELDS and "," not in line and not is_number(words[2]):
         return "kitti"
-    fields = re.split(r"\s*,\s*|\s+", line.strip())
+    fields = re.split(r"\s*,\s*|\s+", re.sub(r",\s*$", "", line).strip())
     if _is_label_of_yolo(fields):
         raise DataError(
             "looks like labels of YOLO (class, centre and size in shares of the picture, one file for each): "

@@ -7,11 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from jeat_graph.data.column_names import BOX, standing_in
+from jeat_graph.data.errors import DataError
 from jeat_graph.io.box_rows import BoxRows
 from jeat_graph.io.column_names import ASIDE, boxes_of, classes_of, of_one_video, times_of
 from jeat_graph.io.reading import Reading
 from jeat_graph.io.tables import read_table
 
+#: What is said of boxes without identities.
+NO_IDENTITIES = "has no identities (a column or field such as track_id); are these detections?"
 #: Columns that such a table has.
 RESULT_COLUMNS = ("t", "object_id", *BOX)
 
@@ -24,7 +27,13 @@ def read_result_table(path: str | Path, how: Reading) -> BoxRows:
     Raises:
         DataError: names the file, the line or row, and what is wrong.
     """
-    table = of_one_video(read_table(path, RESULT_COLUMNS, ("score", *ASIDE), short=("t",), aliases=True), how)
+    try:
+        whole = read_table(path, RESULT_COLUMNS, ("score", *ASIDE), short=("t",), aliases=True)
+    except DataError as error:
+        if not error.message.startswith("column 'object_id' is missing"):
+            raise
+        raise DataError(NO_IDENTITIES, error.path, error.line) from None
+    table = of_one_video(whole, how)
     times = times_of(table, how)
     table.bare(standing_in(table.names, BOX), "a frame without tracks has only t")
     rows = np.flatnonzero(~table.blank("object_id"))

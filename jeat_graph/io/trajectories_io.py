@@ -16,7 +16,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.class_columns import class_column, unknown_classes
-from jeat_graph.data.column_names import BOX
+from jeat_graph.data.column_names import BOX, standing_in
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.data.views import MEAN, SIZE_VAR, VAR
@@ -25,7 +25,7 @@ from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.formats import known_columns, recognise
 from jeat_graph.io.piecewise import PiecewiseWriter
 from jeat_graph.io.reading import Reading, ReadingOptions
-from jeat_graph.io.result_tables import RESULT_COLUMNS, read_result_table
+from jeat_graph.io.result_tables import NO_IDENTITIES, RESULT_COLUMNS, read_result_table
 from jeat_graph.io.rounding import round_decimals, round_significant
 from jeat_graph.io.table_writer import TableWriter
 from jeat_graph.io.tables import read_table
@@ -178,9 +178,10 @@ def read_trajectories_counted(
 
 
 def _is_result(path: str | Path) -> bool:
-    """Whether a table is another tracker's: it has identities, and nothing that only our own tables have."""
+    """Whether a table is another tracker's: it has boxes, and nothing that only our own tables have."""
     names = known_columns(path, RESULT_COLUMNS)
-    return "object_id" in names and not {"existence", "sensors", *VAR} & set(names)
+    boxes = set(standing_in(names, BOX)) <= set(names)
+    return boxes and not {"existence", "sensors", "x", "y", *VAR} & set(names)
 
 
 def _read_contract(table: FileTable) -> Trajectories:
@@ -235,8 +236,8 @@ def _sensor_order(texts: Iterable[str]) -> tuple[str, ...]:
 
 def _without_motion(rows: BoxRows, path: str | Path) -> Trajectories:
     n = len(rows.t)
-    if rows.ids is None and n:
-        raise DataError("has no identities (a column or field such as track_id); are these detections?", path)
+    if n and (rows.ids is None or (n > 1 and (rows.ids < 0).all())):
+        raise DataError(NO_IDENTITIES, path)
     ids = np.zeros(0, dtype=np.int64) if rows.ids is None else rows.ids
     existence = np.ones(n) if rows.scores is None else rows.scores
     mean = np.zeros((n, 6))

@@ -97,6 +97,8 @@ def test_both_ways_give_the_same_boxes(tmp_path):
     for name, more in (("quick.json", {}), ("slow.json", {"caption": "é"})):
         text = json.dumps([entries[0] | more, *entries[1:]], ensure_ascii=False)
         (tmp_path / name).write_text(text, encoding="utf-8")
-    quick, slow = (read_results(tmp_path / name, Reading(rate_hz=25.0)) for name in ("quick.json", "slow.json"))
+    quick, slow = (
+        read_results(tmp_path / name, Reading(rate_hz=25.0)) for name in ("quick.json", "slow.json")
+    )
     for field in ("t", "boxes", "scores", "classes"):
         np.testing.assert_array_equal(getattr(quick, field), getattr(slow, field))
