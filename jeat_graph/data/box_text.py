@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 # `'x1': 10.5`, `"x1": 10.5` or `'x1': np.float64(10.5)`, of each corner.
-_CORNER = re.compile(r"['\"]?([xy])([1-4])['\"]?\s*:\s*(?:\w+\.)*(?:\w+\()?\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)")
+_CORNER = re.compile(r"['\"]?([xy])([1-4])['\"]?\s*:\s*(?:[a-z]\w*[.(])*\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)")
 #: What is read, for messages.
 KNOWN = "{'x1': …, 'y1': …, 'x2': …, 'y2': …} in px"
 

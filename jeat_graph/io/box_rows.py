@@ -24,7 +24,7 @@ _FIRST_CLASS = 0
 
 
 @dataclass(frozen=True, eq=False)
-class BoxRows:
+class FileBoxes:
     """Boxes of one camera.
 
     Attributes:
@@ -52,7 +52,7 @@ class BoxRows:
     first: int | None = None
 
 
-def read_rows(path: str | Path, kind: str, how: Reading, *, truth: bool = False) -> BoxRows:
+def read_rows(path: str | Path, kind: str, how: Reading, *, truth: bool = False) -> FileBoxes:
     """Read a file.
 
     Args:
@@ -70,7 +70,7 @@ def read_rows(path: str | Path, kind: str, how: Reading, *, truth: bool = False)
     return readers[kind](path, how)
 
 
-def _motchallenge(path: str | Path, how: Reading, truth: bool) -> BoxRows:
+def _motchallenge(path: str | Path, how: Reading, truth: bool) -> FileBoxes:
     table = motchallenge.read_lines(path)
     numbers = table.whole("frame")
     first = first_frame(numbers, how.first_frame)
@@ -80,7 +80,7 @@ def _motchallenge(path: str | Path, how: Reading, truth: bool) -> BoxRows:
         note(f"{path}: frames count from {first}, for there is a frame {first}")
     challenge = truth and motchallenge.sequence_info(path).origin is not None
     conf = table.number("conf") if "conf" in table else None
-    return BoxRows(
+    return FileBoxes(
         t=frame / rate,
         boxes=motchallenge.boxes_of(table),
         error=table.error,
@@ -92,13 +92,13 @@ def _motchallenge(path: str | Path, how: Reading, truth: bool) -> BoxRows:
     )
 
 
-def _kitti(path: str | Path, how: Reading) -> BoxRows:
+def _kitti(path: str | Path, how: Reading) -> FileBoxes:
     table = kitti.read_lines(path)
     rate = check_rate(kitti.RATE_HZ if how.rate_hz is None else how.rate_hz, path)
     first = kitti.FIRST_FRAME if how.first_frame is None else how.first_frame
     frame = frames_of(table, first) - first
     classes = table.text("type")
-    return BoxRows(
+    return FileBoxes(
         t=frame / rate,
         boxes=kitti.boxes_of(table),
         error=table.error,
@@ -111,7 +111,7 @@ def _kitti(path: str | Path, how: Reading) -> BoxRows:
     )
 
 
-def _prophesee(path: str | Path, how: Reading) -> BoxRows:
+def _prophesee(path: str | Path, how: Reading) -> FileBoxes:
     table = prophesee.read_array(path)
     t = prophesee.times_of(table)
     names = names_by_number(how.class_names, path, _FIRST_CLASS)
@@ -120,7 +120,7 @@ def _prophesee(path: str | Path, how: Reading) -> BoxRows:
         gaps = np.zeros(0) if how.rate_hz is None else gap_times(t, how.rate_hz, path)
         return np.union1d(t, gaps)
 
-    return BoxRows(
+    return FileBoxes(
         t=t,
         boxes=prophesee.boxes_of(table),
         error=table.error,
@@ -131,7 +131,7 @@ def _prophesee(path: str | Path, how: Reading) -> BoxRows:
     )
 
 
-def _coco(path: str | Path, how: Reading) -> BoxRows:
+def _coco(path: str | Path, how: Reading) -> FileBoxes:
     found = coco.read_results(path, how)
 
     def error(row: int, message: str) -> DataError:
@@ -143,7 +143,7 @@ def _coco(path: str | Path, how: Reading) -> BoxRows:
         gaps = np.zeros(0) if how.rate_hz is None else gap_times(found.t, how.rate_hz, path)
         return np.union1d(found.t, gaps)
 
-    return BoxRows(
+    return FileBoxes(
         t=found.t,
         boxes=found.boxes,
         error=error,
@@ -156,13 +156,13 @@ def _coco(path: str | Path, how: Reading) -> BoxRows:
     )
 
 
-def _yolo(path: str | Path, how: Reading) -> BoxRows:
+def _yolo(path: str | Path, how: Reading) -> FileBoxes:
     labels = read_labels(path, how)
     first = first_frame(labels.looked, how.first_frame)
     if how.rate_hz is None:
         raise DataError("has frame numbers only; give their rate with --rate (in Python rate_hz)", path)
     rate = check_rate(how.rate_hz, path)
-    return BoxRows(
+    return FileBoxes(
         t=(labels.frame - first) / rate,
         boxes=labels.boxes,
         error=labels.error,

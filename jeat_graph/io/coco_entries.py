@@ -20,7 +20,7 @@ WANTED = (
 _LARGEST = 2**53  # beyond it a float cannot tell neighbouring whole numbers apart
 
 
-class _Row(NamedTuple):
+class _Entry(NamedTuple):
     """One entry, checked."""
 
     image: int
@@ -74,7 +74,7 @@ def finite_number(value: Any) -> float:
     return number
 
 
-def _row(entry: Any, k: int, path: str | Path, by_name: Mapping[str, int]) -> _Row:
+def _row(entry: Any, k: int, path: str | Path, by_name: Mapping[str, int]) -> _Entry:
     where = f"entry {k + 1}:"
     if not isinstance(entry, dict):
         raise DataError(f"{where} must be an object with image_id, bbox, score, category_id", path)
@@ -100,7 +100,7 @@ def _row(entry: Any, k: int, path: str | Path, by_name: Mapping[str, int]) -> _R
     if track is not None and not _is_whole(track):
         raise DataError(f"{where} track_id must be a whole number", path)
     ignore = bool(entry.get("iscrowd") or entry.get("ignore"))
-    return _Row(image, (left, top, width, height), score, category, track, ignore)
+    return _Entry(image, (left, top, width, height), score, category, track, ignore)
 
 
 def _image(image: Any, by_name: Mapping[str, int]) -> Any:

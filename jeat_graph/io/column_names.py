@@ -19,19 +19,18 @@ from jeat_graph.data.column_names import (
     standing_in,
 )
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.frame_columns import ASIDE as ASIDE
 from jeat_graph.data.frame_numbers import first_frame, split_picture_name
 from jeat_graph.data.notes import note
 from jeat_graph.data.time_units import in_seconds
+from jeat_graph.data.videos import choose_video
 from jeat_graph.io.class_names import name_classes, names_by_number
 from jeat_graph.io.frames import check_rate
 from jeat_graph.io.reading import Reading
-from jeat_graph.io.videos import choose_video
 
 if TYPE_CHECKING:
     from jeat_graph.io.file_table import FileTable
 
-#: Columns that a table may have beside those that a reader asks for.
-ASIDE = (*CLASS_COLUMNS, "video")
 _LISTS_COUNT_FROM = 0
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from jeat_graph.data.column_names import BOX, standing_in
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.box_rows import BoxRows
+from jeat_graph.io.box_rows import FileBoxes
 from jeat_graph.io.column_names import ASIDE, boxes_of, classes_of, of_one_video, times_of
 from jeat_graph.io.reading import Reading
 from jeat_graph.io.tables import read_table
@@ -19,7 +19,7 @@ NO_IDENTITIES = "has no identities (a column or field such as track_id); are the
 RESULT_COLUMNS = ("t", "object_id", *BOX)
 
 
-def read_result_table(path: str | Path, how: Reading) -> BoxRows:
+def read_result_table(path: str | Path, how: Reading) -> FileBoxes:
     """Read a table; a row without identity and box only says that a frame was looked at, and is passed over.
 
     Rows without an identity alone are boxes that the tracker has not given one yet; they are passed over too.
@@ -42,7 +42,7 @@ def read_result_table(path: str | Path, how: Reading) -> BoxRows:
     missing = np.isnan(boxes[rows]).any(axis=1)
     if missing.any():
         raise table.error(int(rows[int(np.argmax(missing))]), "a track needs a box")
-    return BoxRows(
+    return FileBoxes(
         t=times.t[rows],
         boxes=np.ascontiguousarray(boxes[rows]),
         error=lambda row, message: table.error(int(rows[row]), message),

@@ -20,7 +20,7 @@ from jeat_graph.data.column_names import BOX, standing_in
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.data.views import MEAN, SIZE_VAR, VAR
-from jeat_graph.io.box_rows import BoxRows, read_rows
+from jeat_graph.io.box_rows import FileBoxes, read_rows
 from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.formats import known_columns, recognise
 from jeat_graph.io.piecewise import PiecewiseWriter
@@ -181,7 +181,7 @@ def _is_result(path: str | Path) -> bool:
     """Whether a table is another tracker's: it has boxes, and nothing that only our own tables have."""
     names = known_columns(path, RESULT_COLUMNS)
     boxes = set(standing_in(names, BOX)) <= set(names)
-    return boxes and not {"existence", "sensors", "x", "y", *VAR} & set(names)
+    return boxes and not {"existence", "sensors", *VAR} & set(names)
 
 
 def _read_contract(table: FileTable) -> Trajectories:
@@ -234,7 +234,7 @@ def _sensor_order(texts: Iterable[str]) -> tuple[str, ...]:
         return tuple(ordered)
 
 
-def _without_motion(rows: BoxRows, path: str | Path) -> Trajectories:
+def _without_motion(rows: FileBoxes, path: str | Path) -> Trajectories:
     n = len(rows.t)
     if n and (rows.ids is None or (n > 1 and (rows.ids < 0).all())):
         raise DataError(NO_IDENTITIES, path)
@@ -258,7 +258,7 @@ def _stack(table: FileTable, names: Iterable[str]) -> FloatArray:
     return np.stack([table.number(name) for name in names], axis=1)
 
 
-def _check(table: FileTable | BoxRows, found: Trajectories) -> None:
+def _check(table: FileTable | FileBoxes, found: Trajectories) -> None:
     negative = (found.boxes[:, 2:] < 0).any(axis=1)
     if negative.any():
         row = int(np.argmax(negative))

@@ -11,7 +11,7 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.column_names import BOX, standing_in
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
-from jeat_graph.io.box_rows import BoxRows, read_rows
+from jeat_graph.io.box_rows import FileBoxes, read_rows
 from jeat_graph.io.column_names import ASIDE, boxes_of, classes_of, of_one_video, times_of
 from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.formats import recognise
@@ -169,7 +169,7 @@ def _ignore_flags(table: FileTable) -> BoolArray:
     return np.asarray(flags, dtype=bool)[index.reshape(-1)]
 
 
-def _check_unique(table: FileTable | BoxRows, t: FloatArray, ids: IntArray, exempt: BoolArray) -> None:
+def _check_unique(table: FileTable | FileBoxes, t: FloatArray, ids: IntArray, exempt: BoolArray) -> None:
     """Refuse an object that is there twice at one time, unless it is one that is not judged."""
     rows = np.flatnonzero(~exempt)
     order = rows[np.lexsort((rows, ids[rows], t[rows]))]

@@ -10,13 +10,15 @@ from jeat_graph.data.errors import DataError
 _MOST_NAMED = 5
 
 
-def choose_video(names: Sequence[str], wanted: str | int | None, path: str | Path) -> str | None:
+def choose_video(
+    names: Sequence[str], wanted: str | int | None, path: str | Path | None = None
+) -> str | None:
     """Choose one of the videos that a file holds.
 
     Args:
         names: of the videos, each once; a name and a number of one video are `3 (b.mp4)`.
         wanted: the user's choice: a name or a number, or None.
-        path: the file, for messages.
+        path: the file, for messages, if there is one.
 
     Returns:
         One of `names`; None where there is none to choose from.
