@@ -106,7 +106,7 @@ def load_run(
         _check_fits(file, read[kind], objects, instants is None)
     if classes is not None:
         objects = _restricted(objects, classes, truth_path)
-        read = {kind: restrict_tracks(table, classes) for kind, table in read.items()}
+        read = {kind: restrict_tracks(table, classes, objects) for kind, table in read.items()}
     return JudgedRun(str(run), objects, read.get("causal"), read.get("smoothed"), instants)
 
 
@@ -124,14 +124,24 @@ def restrict_classes(truth: GroundTruth, classes: Sequence[str]) -> GroundTruth:
     return dataclasses.replace(truth, ignore=truth.ignore | ~wanted)
 
 
-def restrict_tracks(table: Trajectories, classes: Sequence[str]) -> Trajectories:
+def restrict_tracks(table: Trajectories, classes: Sequence[str], truth: GroundTruth) -> Trajectories:
     """Leave out the rows that are of another class; those of which none is known stay.
 
+    Args:
+        table: the tracks.
+        classes: those that are judged.
+        truth: with the classes of all objects.
+
     Raises:
-        DataError: the table names classes, but none of these: most likely a name is misspelt.
+        DataError: the table names classes, but neither these nor any other that the truth has: most likely it
+            calls them otherwise.
     """
     if table.classes is None or not (table.classes != "").any():
         return table
+    there = set(np.unique(table.classes).tolist()) - {""}
+    known = set() if truth.classes is None else set(np.unique(truth.classes).tolist())
+    if not there & set(classes) and there & known:
+        return table.take(table.classes == "")  # only that there are none in this recording
     return table.take(rows_of_class(table.classes, classes, unknown=True))
 
 

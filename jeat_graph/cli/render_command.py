@@ -14,7 +14,6 @@ from jeat_graph.cli.options import (
     add_output_rate,
     add_tables,
     tables_read,
-    truth_read,
 )
 from jeat_graph.cli.terminal import warn
 from jeat_graph.config.argument_types import counting, drawn_size, not_negative, positive
@@ -110,7 +109,6 @@ def run(args: argparse.Namespace) -> int:
         trail_s=args.trails,
         classes=args.classes,
         reading=tables_read(args),
-        truth_reading=truth_read(args),
     )
     inputs = [path for path in (request.frames, request.events, request.truth) if path is not None]
     check_keeps(inputs, out)

@@ -19,7 +19,6 @@ from jeat_graph.data.column_names import (
     standing_in,
 )
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.frame_columns import ASIDE as ASIDE
 from jeat_graph.data.frame_numbers import first_frame, split_picture_name
 from jeat_graph.data.notes import note
 from jeat_graph.data.time_units import in_seconds

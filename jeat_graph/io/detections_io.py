@@ -14,9 +14,10 @@ from jeat_graph.data.boxes import without_area
 from jeat_graph.data.column_names import BOX, NUMBER_COLUMNS
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.frame_columns import ASIDE
 from jeat_graph.data.notes import note
 from jeat_graph.io.box_rows import read_rows
-from jeat_graph.io.column_names import ASIDE, boxes_of, classes_of, of_one_video, times_of
+from jeat_graph.io.column_names import boxes_of, classes_of, of_one_video, times_of
 from jeat_graph.io.csv_text import NUMBER, WORD
 from jeat_graph.io.detection_rows import (
     assemble,

@@ -8,8 +8,9 @@ import numpy as np
 
 from jeat_graph.data.column_names import BOX, standing_in
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.frame_columns import ASIDE
 from jeat_graph.io.box_rows import FileBoxes
-from jeat_graph.io.column_names import ASIDE, boxes_of, classes_of, of_one_video, times_of
+from jeat_graph.io.column_names import boxes_of, classes_of, of_one_video, times_of
 from jeat_graph.io.reading import Reading
 from jeat_graph.io.tables import read_table
 

@@ -10,9 +10,10 @@ import numpy as np
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.column_names import BOX, standing_in
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.frame_columns import ASIDE
 from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.io.box_rows import FileBoxes, read_rows
-from jeat_graph.io.column_names import ASIDE, boxes_of, classes_of, of_one_video, times_of
+from jeat_graph.io.column_names import boxes_of, classes_of, of_one_video, times_of
 from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.formats import recognise
 from jeat_graph.io.plain_text import check_sizes
