@@ -96,10 +96,12 @@ def load_run(
     alike = how.first_frame is None and form in FIRST_OPEN
     read: dict[str, Trajectories] = {}
     for kind, file in with_progress(tables.items()):
+        if alike and counted == 0:
+            read[kind] = _from_0_as_truth(file, own, objects)
+            continue
         read[kind], run_first = read_trajectories_counted(file, None, own)
-        if alike and run_first == 1 and counted == 0:
-            read[kind] = _from_0_as_truth(file, own, read[kind], objects)
         if alike and run_first == 0 and first == 1:
+            note(f"{truth_path}: frames count from 0, as those of the run do")
             objects, first = _read_truth(truth_path, replace(how, rate_hz=rate_hz, first_frame=0))
     instants = objects.frame_times() if run_counts else read_instants(path)
     for kind, file in tables.items():
@@ -234,15 +236,16 @@ def _read_truth(path: Path, how: Reading) -> tuple[GroundTruth, int | None]:
     return truth, first
 
 
-def _from_0_as_truth(path: Path, how: Reading, table: Trajectories, truth: GroundTruth) -> Trajectories:
-    """Let a result without a frame 0 count from 0 as its truth does, unless it would then end after it.
+def _from_0_as_truth(path: Path, how: Reading, truth: GroundTruth) -> Trajectories:
+    """Let a result count from 0 as its truth does, unless it has no frame 0 and would end after the truth.
 
     Trackers report nothing in their first frames, so that the lack of a frame 0 says little.
     """
-    from_0, _ = read_trajectories_counted(path, None, replace(how, first_frame=0))
-    end = truth.frame_times()[-1] + TIME_TOLERANCE_S
-    if not len(table) or from_0.t.max() > end >= table.t.max():
-        return table
+    from_0, first = read_trajectories_counted(path, None, replace(how, first_frame=0))
+    if first is None or not len(from_0) or from_0.t.min() == 0.0:
+        return from_0
+    if from_0.t.max() > truth.frame_times()[-1] + TIME_TOLERANCE_S:
+        return read_trajectories_counted(path, None, how)[0]
     note(f"{path}: frames count from 0, as those of the truth do (--first-frame 1 says otherwise)")
     return from_0
 
