@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +50,17 @@ class FileBoxes:
     ignore: BoolArray | None = None
     distance: FloatArray | None = None
     first: int | None = None
+
+    def take(self, rows: IntArray) -> FileBoxes:
+        """Return some of the boxes, whose errors still name the file's own places."""
+        columns = {name: getattr(self, name) for name in ("scores", "ids", "classes", "ignore", "distance")}
+        return replace(
+            self,
+            t=self.t[rows],
+            boxes=self.boxes[rows],
+            error=lambda row, message: self.error(int(rows[row]), message),
+            **{name: None if column is None else column[rows] for name, column in columns.items()},
+        )
 
 
 def read_rows(path: str | Path, kind: str, how: Reading, *, truth: bool = False) -> FileBoxes:

@@ -93,6 +93,8 @@ def _read_counted(
         return _read_contract(path, sensor, how)
     name = DEFAULT_SENSOR if sensor is None else sensor
     rows = read_rows(path, kind, how)
+    if rows.scores is None and rows.ignore is not None and rows.ignore.any():
+        rows = rows.take(np.flatnonzero(~rows.ignore))  # truth, and what it does not judge is no detection
     missing = np.setdiff1d(rows.recorded(), rows.t) if how.fill_empty else np.zeros(0)
     if not len(rows.t) and not len(missing):
         raise DataError(

@@ -118,7 +118,9 @@ class TestKitti:
 
     def test_labels_without_a_score_are_sure(self, write):
         text = "".join(line.rsplit(" ", 1)[0] + "\n" for line in KITTI.splitlines())
-        assert read_detections(write("0001.txt", text)).scores.tolist() == [1.0, 1.0]
+        found = read_detections(write("0001.txt", text + text.splitlines()[0].replace("Car", "DontCare")))
+        assert found.scores.tolist() == [1.0, 1.0]
+        assert found.classes.tolist() == ["Car", "Van"]
 
     def test_a_box_with_its_edges_swapped_is_named_by_its_line(self, write):
         path = write("0001.txt", KITTI + KITTI.splitlines()[0].replace("40 60", "5 60"))

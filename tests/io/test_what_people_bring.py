@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
@@ -99,6 +101,37 @@ class TestFirstFrame:
         frame["sensor"] = "rgb"
         assert Detections.from_pandas(frame, rate_hz=HZ).scan_t.tolist() == [0.0, 0.05]
         assert Detections.from_pandas(frame.assign(frame=[0, 1]), rate_hz=HZ).scan_t.tolist() == [0.0, 0.05]
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    frames=st.lists(st.integers(0, 60), min_size=1, max_size=12, unique=True),
+    lefts=st.lists(st.integers(0, 1000), min_size=12, max_size=12),
+    said=st.sampled_from([None, 0, 1]),
+)
+def test_one_recording_is_the_same_in_every_format_that_counts_frames(tmp_path_factory, frames, lefts, said):
+    """Whatever the first frame with a box is, and however the file says it."""
+    folder = tmp_path_factory.mktemp("alike")
+    rows = list(zip(frames, lefts, strict=False))
+    first = said if said is not None else (0 if 0 in frames else 1)
+    (folder / "m.txt").write_text("".join(f"{k},-1,{x},5,30,20,0.5,-1,-1,-1\n" for k, x in rows))
+    (folder / "h.csv").write_text(
+        "frame,left,top,width,height,conf\n" + "".join(f"{k},{x},5,30,20,0.5\n" for k, x in rows)
+    )
+    (folder / "n.csv").write_text(
+        "image,x1,y1,x2,y2,conf\n" + "".join(f"a_{k:04d}.png,{x},5,{x + 30},25,0.5\n" for k, x in rows)
+    )
+    entries = [{"image_id": k, "bbox": [x, 5, 30, 20], "score": 0.5} for k, x in rows]
+    (folder / "c.json").write_text(json.dumps(entries))
+    for name in ("m.txt", "h.csv", "n.csv", "c.json"):
+        if min(frames) < first:
+            with pytest.raises(DataError, match="count from 1, got 0"):
+                read_detections(folder / name, rate_hz=HZ, first_frame=said)
+            continue
+        found = read_detections(folder / name, rate_hz=HZ, first_frame=said, fill_empty=False)
+        order = sorted(rows)
+        np.testing.assert_allclose(found.scan_t, [(k - first) / HZ for k, _ in order], atol=1e-12)
+        assert found.boxes.tolist() == [[x, 5, 30, 20] for _, x in order]
 
 
 class TestTables:
