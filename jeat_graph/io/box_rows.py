@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -53,13 +54,16 @@ class FileBoxes:
 
     def take(self, rows: IntArray) -> FileBoxes:
         """Return some of the boxes, whose errors still name the file's own places."""
-        columns = {name: getattr(self, name) for name in ("scores", "ids", "classes", "ignore", "distance")}
+        columns: dict[str, Any] = {
+            name: getattr(self, name) for name in ("scores", "ids", "classes", "ignore", "distance")
+        }
+        columns = {name: None if column is None else column[rows] for name, column in columns.items()}
         return replace(
             self,
             t=self.t[rows],
             boxes=self.boxes[rows],
             error=lambda row, message: self.error(int(rows[row]), message),
-            **{name: None if column is None else column[rows] for name, column in columns.items()},
+            **columns,
         )
 
 

@@ -94,18 +94,19 @@ def _placed(
     kept = np.arange(len(found.image))
     recorded: FloatArray | None = None
     if images is None:
-        first: int | None = first_frame(found.image, how.first_frame)
+        counted = first_frame(found.image, how.first_frame)
+        first: int | None = counted
         if len(found.image) and how.rate_hz is None:
             raise DataError(
                 "COCO results have image ids only; give the frame rate (--rate, in Python rate_hz) "
                 "or the list of images (--images)",
                 path,
             )
-        if len(found.image) and found.image.min() < (first or 0):
+        if len(found.image) and found.image.min() < counted:
             stray = int(np.argmin(found.image))
-            raise DataError(f"entry {stray + 1}: images count from {first}, got {found.image[stray]}", path)
+            raise DataError(f"entry {stray + 1}: images count from {counted}, got {found.image[stray]}", path)
         rate = 1.0 if how.rate_hz is None else check_rate(how.rate_hz, path)
-        t = (found.image - first) / rate
+        t = (found.image - counted) / rate
     else:
         first, recorded = images.first, np.unique(np.array(list(images.time.values()), dtype=np.float64))
         image, of_entry = np.unique(found.image, return_inverse=True)

@@ -53,7 +53,7 @@ def read_images(tree: Mapping[str, Any], how: Reading, path: str | Path) -> Imag
         if isinstance(number, bool) or not isinstance(number, int):
             raise DataError(f"image {k + 1}: must be an object with a whole number as `id`", path)
     known = {image["id"] for image in images}
-    by_name = {}
+    by_name: dict[str, int] = {}
     for image in images:
         name = str(image.get("file_name", ""))
         by_name.setdefault(Path(name).stem, image["id"])

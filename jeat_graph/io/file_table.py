@@ -136,9 +136,13 @@ class FileTable:
         try:
             return self.number(name), False
         except DataError as error:
-            texts = self.text(name, blank_ok=True) if kind in (pa.string(), pa.large_string()) else []
-            first = next((text for text in texts if text and not is_number(text)), "")
-            if not looks_like_time(first):
+            texts = self.text(name, blank_ok=True) if kind in (pa.string(), pa.large_string()) else None
+            first = (
+                next((text for text in texts if text and not is_number(text)), "")
+                if texts is not None
+                else ""
+            )
+            if texts is None or not looks_like_time(first):
                 raise error from None
             if self.blank(name).any():
                 raise self.error(int(np.argmax(self.blank(name))), f"{name} is missing") from None

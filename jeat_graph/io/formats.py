@@ -89,7 +89,8 @@ def known_columns(path: str | Path, known: Sequence[str]) -> list[str]:
 
             names = parquet.read_schema(path).names
         else:
-            names = split_header(first_bytes(path, _HEADER_BYTES).removeprefix(_BOM), Path(path)).names
+            head = first_bytes(path, _HEADER_BYTES).removeprefix(_BOM)
+            names = split_header(head, Path(path)).names if head.strip() else []
     except Exception:  # whoever reads the whole file says what is wrong with it
         return []
     return usual_names(names, known)

@@ -71,8 +71,8 @@ def read_labels(path: str | Path, how: Reading) -> Labels:
     by_video: dict[str, list[tuple[int, Path]]] = {}
     for video, number, file in _files(folder):
         by_video.setdefault(video, []).append((number, file))
-    video = choose_video(sorted(by_video), how.video, folder)
-    files = sorted(by_video.get(video or "", []))
+    chosen = choose_video(sorted(by_video), how.video, folder)
+    files = sorted(by_video.get(chosen or "", []))
     if how.image is None:
         raise DataError(
             "holds boxes in shares of the picture; give its size with --image WIDTHxHEIGHT (in Python "

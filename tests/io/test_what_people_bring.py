@@ -382,6 +382,12 @@ class TestNothing:
         with pytest.raises(DataError, match=r"gt\.txt: is empty"):
             read_truth(write("gt.txt", ""), rate_hz=HZ)
 
+    @pytest.mark.parametrize("text", ["", "\n \n", "\ufeff"])
+    def test_a_table_without_a_header_is_refused_where_scans_are_needed(self, write, text):
+        for read in (read_detections, read_truth):
+            with pytest.raises(DataError, match=r"d\.csv: is empty"):
+                read(write("d.csv", text), rate_hz=HZ)
+
     def test_no_results_of_listed_images(self, write):
         images = write(
             "i.json", json.dumps({"images": [{"id": 1, "timestamp": 0.5}, {"id": 2, "timestamp": 0.6}]})
