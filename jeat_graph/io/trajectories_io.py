@@ -42,6 +42,8 @@ _VAR_DIGITS = 6
 _SCALE = np.repeat([10.0**PX_DECIMALS, 10.0**EXISTENCE_DECIMALS], [10, 1])
 _JOINT = "|"
 _TABLES = ("csv", "parquet")
+# A file of white space only is no larger.
+_BLANK_BYTES = 100
 _FLUSH_ROWS = 8192
 _MOST_SENSORS = 63  # bits of `Trajectories.used`
 
@@ -164,7 +166,7 @@ def read_trajectories_counted(
     """Read as `read_trajectories` does, and tell the first frame's number where the format leaves it open."""
     kind = recognise(path, fmt)
     if kind in _TABLES:
-        if Path(path).stat().st_size == 0:
+        if Path(path).stat().st_size < _BLANK_BYTES and not Path(path).read_bytes().strip():
             return Trajectories.empty(), None
         if not _is_result(path):
             table = read_table(path, COLUMNS, (*CLASS_COLUMNS, *SIZE_COLUMNS))

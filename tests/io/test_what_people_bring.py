@@ -367,6 +367,7 @@ class TestNothing:
     def test_an_empty_result_has_no_tracks(self, write):
         for name in ("r.txt", "r.csv"):
             assert len(read_trajectories(write(name, ""))) == 0
+            assert len(read_trajectories(write(name, "\n"))) == 0
 
     def test_empty_detections_beside_seqinfo_are_empty_scans(self, write):
         write("seqinfo.ini", "[Sequence]\nframeRate=10\nseqLength=4\n")
