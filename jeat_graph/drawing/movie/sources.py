@@ -96,8 +96,8 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
         frames = VideoBackground(stack.enter_context(open_frames(request.frames, request.frame_rate_hz)))
     truth = None
     if request.truth is not None:
-        # The first frame is said of the tracks.
-        truth = read_truth(request.truth, **{**request.reading, "first_frame": None})
+        how: ReadingOptions = {**request.reading, "first_frame": None}  # it is said of the tracks
+        truth = read_truth(request.truth, **how)
     rate_hz = request.rate_hz or _rate_of(frames) or DEFAULT_RATE_HZ
     if request.events is not None:
         window_s = request.window_s if request.window_s is not None else 1.0 / rate_hz
