@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 from benchmarks.contenders import NAMES, SEARCH_DURATION_S, SEARCH_SEED, key, streams
 from benchmarks.judging import METRICS, in_processes
 from benchmarks.recordings import SCENARIOS, kitti, simulated
+from jeat_graph.data.extras import install
 
 if TYPE_CHECKING:
     from jeat_graph.eval.tables import Cell, Table
 
 _INSTALL = {
-    "trackers": "pip install '.[baselines]' && pip install --no-deps trackers",
-    "supervision": "pip install '.[baselines]'",
+    "trackers": f"{install('baselines')} && pip install --no-deps trackers",
+    "supervision": install("baselines"),
     "norfair": "pip install rich filterpy && pip install --no-deps norfair",
 }
 

@@ -14,6 +14,7 @@ from tqdm import tqdm
 from benchmarks.readme import update_readme
 from benchmarks.speed_worker import SCANS_A_MINUTE, ask
 from jeat_graph.config.argument_types import counting
+from jeat_graph.data.extras import install
 
 OBJECTS = (10, 50, 200, 1000)
 VEHICLES = (30, 100, 300)
@@ -68,7 +69,7 @@ def _steps(args: argparse.Namespace) -> list[dict[str, Any]]:
         found = ask({"job": "peers"})
         names += found
         if not found:
-            how = "pip install '.[baselines]' && pip install --no-deps trackers"
+            how = f"{install('baselines')} && pip install --no-deps trackers"
             print(f"the peers are not installed: {how}", file=sys.stderr)
     objects = sorted(args.objects)
     rows = []

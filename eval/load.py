@@ -1,25 +1,31 @@
-"""Read what `eval` is given: runs, tables, MOTChallenge or KITTI results, and their truth."""
+"""Read what `eval` is given: runs, tables, results of other trackers, and their truth."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.data.class_columns import rows_of_class
+from jeat_graph.data.class_columns import all_numbers, rows_of_class
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.notes import note
 from jeat_graph.data.progress import with_progress
 from jeat_graph.data.rates import ANY_RATE_HZ, median_rate_hz
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.pairing import check_lives, check_pair, check_truth
-from jeat_graph.eval.resampling import on_the_clock_of
+from jeat_graph.eval.resampling import TIME_TOLERANCE_S, on_the_clock_of
 from jeat_graph.io.beside import check_beside
-from jeat_graph.io.formats import BY_FRAME
+from jeat_graph.io.formats import FIRST_OPEN
+from jeat_graph.io.frames import check_rate
+from jeat_graph.io.reading import Reading, ReadingOptions
 from jeat_graph.io.scans_io import read_instants
+from jeat_graph.io.trajectories_io import read_trajectories_counted
+from jeat_graph.io.truth_io import read_truth_counted
 
 SUFFIXES = (".csv", ".parquet")
 _SAME_RATE = 0.02  # relative: 29.97 Hz and 30 are one rate, 25 and 30 are two
@@ -61,44 +67,60 @@ def load_run(
     run: str | Path,
     truth: str | Path,
     *,
-    rate_hz: float | None = None,
-    time_unit: str = "s",
     classes: Sequence[str] | None = None,
+    **options: Unpack[ReadingOptions],
 ) -> JudgedRun:
     """Read a run and its truth, and check that they belong together.
 
+    Where both leave it open from which number their frames count, they count alike: from 0 where one of them
+    has a frame 0.
+
     Args:
         run: a run directory, a trajectory table (taken as smoothed if its name has `smoothed` in it, else as
-            causal), or a MOTChallenge or KITTI result.
+            causal), or another tracker's result in any format that `read_trajectories` knows.
         truth: the truth, in any format that `read_truth` knows.
-        rate_hz: frame rate of files that count frames; by default that of the truth.
-        time_unit: unit of the truth's column `t`, of `data.time_units`; runs are in seconds.
         classes: classes of objects to be found; others are ignored, and so are tracks that have another
             class. All by default.
+        options: as `io.reading.Reading` has it: `rate_hz` of files that count frames, by default that of the
+            truth; `time_unit` of the truth's column `t` (runs are in seconds); `first_frame` of the run;
+            `video` of both; `class_names` of the run, and of the truth where that has numbers; `image`.
 
     Raises:
         DataError: a file is missing or not valid, or run and truth do not fit together.
     """
-    from jeat_graph.io.formats import recognise
+    from jeat_graph.io.formats import counts_frames, recognise
 
-    path, truth_path = Path(run), Path(truth)
+    path, truth_path, how = Path(run), Path(truth), Reading(**options)
     tables = tables_of(path)
-    form = recognise(next(iter(tables.values())))
-    truth_form = recognise(truth_path)
-    if rate_hz is None and truth_form == "motchallenge":
-        rate_hz = _motchallenge_rate(truth_path, form == "motchallenge")
-    objects = _read_truth(truth_path, rate_hz, time_unit, classes)
-    if rate_hz is not None and form in BY_FRAME and truth_form not in BY_FRAME:
+    table = next(iter(tables.values()))
+    form, truth_form = recognise(table), recognise(truth_path)
+    run_counts, truth_counts = counts_frames(table, form), counts_frames(truth_path, truth_form)
+    rate_hz = how.rate_hz
+    if rate_hz is None and truth_counts and truth_form != "kitti":
+        rate_hz = _rate_beside(truth_path, truth_form, run_counts and form != "kitti")
+    objects, first = _read_truth(truth_path, replace(how, rate_hz=rate_hz, first_frame=None))
+    if rate_hz is not None and run_counts and not truth_counts:
         _check_rate(rate_hz, objects, truth_path)
-    if rate_hz is None and form in BY_FRAME:
+    if rate_hz is None and run_counts:
         rate_hz = median_rate_hz(objects.frame_times()) or ANY_RATE_HZ
-    instants = objects.frame_times() if form in BY_FRAME else read_instants(path)
-    read = {
-        kind: _read_table(file, objects, rate_hz, instants is None)
-        for kind, file in with_progress(tables.items())
-    }
+    counted = 0 if truth_form == "kitti" else first
+    own = replace(how, rate_hz=rate_hz, time_unit="s")
+    alike = how.first_frame is None and form in FIRST_OPEN
+    read: dict[str, Trajectories] = {}
+    for kind, file in with_progress(tables.items()):
+        if alike and counted == 0:
+            read[kind] = _from_0_as_truth(file, own, objects)
+            continue
+        read[kind], run_first = read_trajectories_counted(file, None, own)
+        if alike and run_first == 0 and first == 1:
+            note(f"{truth_path}: frames count from 0, as those of the run do")
+            objects, first = _read_truth(truth_path, replace(how, rate_hz=rate_hz, first_frame=0))
+    instants = objects.frame_times() if run_counts else read_instants(path)
+    for kind, file in tables.items():
+        _check_fits(file, read[kind], objects, instants is None)
     if classes is not None:
-        read = {kind: restrict_tracks(table, classes) for kind, table in read.items()}
+        objects = _restricted(objects, classes, truth_path)
+        read = {kind: restrict_tracks(table, classes, objects) for kind, table in read.items()}
     return JudgedRun(str(run), objects, read.get("causal"), read.get("smoothed"), instants)
 
 
@@ -116,14 +138,24 @@ def restrict_classes(truth: GroundTruth, classes: Sequence[str]) -> GroundTruth:
     return dataclasses.replace(truth, ignore=truth.ignore | ~wanted)
 
 
-def restrict_tracks(table: Trajectories, classes: Sequence[str]) -> Trajectories:
+def restrict_tracks(table: Trajectories, classes: Sequence[str], truth: GroundTruth) -> Trajectories:
     """Leave out the rows that are of another class; those of which none is known stay.
 
+    Args:
+        table: the tracks.
+        classes: those that are judged.
+        truth: with the classes of all objects.
+
     Raises:
-        DataError: the table names classes, but none of these: most likely a name is misspelt.
+        DataError: the table names classes, but neither these nor any other that the truth has: most likely it
+            calls them otherwise.
     """
     if table.classes is None or not (table.classes != "").any():
         return table
+    there = set(np.unique(table.classes).tolist()) - {""}
+    known = set() if truth.classes is None else set(np.unique(truth.classes).tolist())
+    if not there & set(classes) and there & known:
+        return table.take(table.classes == "")  # only that there are none in this recording
     return table.take(rows_of_class(table.classes, classes, unknown=True))
 
 
@@ -144,6 +176,8 @@ def tables_of(path: Path) -> dict[str, Path]:
     Raises:
         DataError: there is no such path, or it is a directory without either table, or with a link elsewhere.
     """
+    from jeat_graph.io.yolo_labels import is_label_folder
+
     if not path.exists():
         raise DataError("there is no such run directory or table", path)
     if not path.is_dir():
@@ -154,6 +188,8 @@ def tables_of(path: Path) -> dict[str, Path]:
         if here:
             check_beside(here[0], path)
             found[kind] = here[0]
+    if not found and is_label_folder(path):
+        return {"causal": path}
     if not found:
         raise DataError("this directory has neither causal.csv nor smoothed.csv, so it is no run", path)
     return found
@@ -173,55 +209,71 @@ def _check_rate(rate_hz: float, truth: GroundTruth, path: Path) -> None:
         )
 
 
-def read_tables(path: Path, rate_hz: float | None = None) -> dict[str, Trajectories]:
+def read_tables(path: Path, **options: Unpack[ReadingOptions]) -> dict[str, Trajectories]:
     """Read the tables of a run by kind, as `tables_of` finds them.
 
     Args:
-        path: run directory or table.
-        rate_hz: frame rate of a table that counts frames.
+        path: run directory, table or result.
+        options: what a result does not say itself, as `io.reading.Reading` has it.
 
     Raises:
         DataError: as `tables_of`; or a table is not valid.
     """
     from jeat_graph.io.trajectories_io import read_trajectories
 
-    return {kind: read_trajectories(file, rate_hz=rate_hz) for kind, file in tables_of(path).items()}
+    return {kind: read_trajectories(file, **options) for kind, file in tables_of(path).items()}
 
 
-def _motchallenge_rate(truth: Path, any_will_do: bool) -> float:
-    from jeat_graph.io.motchallenge import sequence_rate
+def _rate_beside(truth: Path, form: str, any_will_do: bool) -> float:
+    """Rate of a truth that counts frames, from `seqinfo.ini`; any, where the run counts frames too."""
+    from jeat_graph.io.motchallenge import sequence_info
 
-    try:
-        return sequence_rate(truth, None)[0]
-    except DataError:
-        if any_will_do:
-            return ANY_RATE_HZ
-        raise DataError(
-            "MOTChallenge truth has frame numbers only; give the frame rate with --rate", truth
-        ) from None
+    info = sequence_info(truth)
+    if form == "motchallenge" and info.rate_hz is not None:
+        return check_rate(info.rate_hz, truth)
+    if any_will_do:
+        return ANY_RATE_HZ
+    name = "MOTChallenge truth" if form == "motchallenge" else "the truth"
+    raise DataError(f"{name} has frame numbers only; give the frame rate with --rate", truth)
 
 
-def _read_truth(
-    path: Path, rate_hz: float | None, time_unit: str, classes: Sequence[str] | None
-) -> GroundTruth:
-    from jeat_graph.io.truth_io import read_truth
-
-    truth = read_truth(path, rate_hz=rate_hz, time_unit=time_unit)
+def _read_truth(path: Path, how: Reading) -> tuple[GroundTruth, int | None]:
+    """Read and check the truth; numbers of classes get the user's names where it has no names itself."""
+    truth, first = read_truth_counted(path, None, replace(how, class_names=None))
+    if how.class_names is not None and truth.classes is not None and all_numbers(np.unique(truth.classes)):
+        truth, first = read_truth_counted(path, None, how)
     try:
         check_truth(truth)
-        return truth if classes is None else restrict_classes(truth, classes)
+    except DataError as error:
+        raise DataError(error.message, path) from error
+    return truth, first
+
+
+def _from_0_as_truth(path: Path, how: Reading, truth: GroundTruth) -> Trajectories:
+    """Let a result count from 0 as its truth does, unless it has no frame 0 and would end after the truth.
+
+    Trackers report nothing in their first frames, so that the lack of a frame 0 says little.
+    """
+    from_0, first = read_trajectories_counted(path, None, replace(how, first_frame=0))
+    if first is None or not len(from_0) or from_0.t.min() == 0.0:
+        return from_0
+    if from_0.t.max() > truth.frame_times()[-1] + TIME_TOLERANCE_S:
+        return read_trajectories_counted(path, None, how)[0]
+    note(f"{path}: frames count from 0, as those of the truth do (--first-frame 1 says otherwise)")
+    return from_0
+
+
+def _restricted(truth: GroundTruth, classes: Sequence[str], path: Path) -> GroundTruth:
+    try:
+        return restrict_classes(truth, classes)
     except DataError as error:
         raise DataError(error.message, path) from error
 
 
-def _read_table(path: Path, truth: GroundTruth, rate_hz: float | None, alone: bool) -> Trajectories:
-    from jeat_graph.io.trajectories_io import read_trajectories
-
-    table = read_trajectories(path, rate_hz=rate_hz)
+def _check_fits(path: Path, table: Trajectories, truth: GroundTruth, alone: bool) -> None:
     try:
         check_pair(truth, table)
         if alone:
             check_lives(truth, table)
     except DataError as error:
         raise DataError(error.message, path) from error
-    return table

@@ -9,6 +9,7 @@ import numpy as np
 from benchmarks.baselines.frames import BaselineFrame, TrackedFrame
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import ConfigError
+from jeat_graph.data.extras import install
 
 # Name: class in `trackers`, and what is set differently from its defaults.
 ROBOFLOW: dict[str, tuple[str, dict[str, Any]]] = {
@@ -78,7 +79,7 @@ def make_tracker(name: str, rate_hz: float, **parameters: Any) -> Any:
     except ImportError as error:
         raise ConfigError(
             "the baselines need the package trackers: "
-            "pip install '.[baselines]' && pip install --no-deps trackers"
+            f"{install('baselines')} && pip install --no-deps trackers"
         ) from error
     cls, fixed = ROBOFLOW[name]
     try:

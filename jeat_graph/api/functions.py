@@ -103,7 +103,7 @@ def evaluate(
         if classes is not None:
             objects = restrict_classes(objects, classes)
             check_classes([objects], classes)
-            tables = {name: restrict_tracks(table, classes) for name, table in tables.items()}
+            tables = {name: restrict_tracks(table, classes, objects) for name, table in tables.items()}
         run = JudgedRun("tracks", objects, tables.get("causal"), tables.get("smoothed"))
     judged = judge_runs([run], outside=outside == "false")
     for line in rows_beyond(judged, [run.name]):

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jeat_graph.cli.options import add_config, add_image, add_reading, reading
+from jeat_graph.cli.options import add_config, add_image, add_reading, reading, truth_read
 from jeat_graph.cli.progress import stages
 from jeat_graph.cli.terminal import say
 from jeat_graph.data.errors import ConfigError, DataError
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from jeat_graph.data.detections import Detections
     from jeat_graph.data.trajectories import GroundTruth
     from jeat_graph.eval.tables import Cell, Table
+    from jeat_graph.io.reading import ReadingOptions
     from jeat_graph.runs.beside import Facts
 
 WRITES = ("out",)
@@ -63,12 +64,14 @@ def run(args: argparse.Namespace) -> int:
     shown = None if args.frames is None else facts_of_frames(args.frames)
     if shown is not None and args.rate is None and not any(facts_beside([path]) for path in args.detections):
         args.rate = shown.rate_hz
-    recordings = [at_measurement(read_many([path], **reading(args)), base) for path in args.detections]
+    how = {**reading(args), "image": args.image or (None if shown is None else shown.size_px)}
+    recordings = [at_measurement(read_many([path], **how), base) for path in args.detections]
     beside = None if args.image else _size_beside(args.detections, shown)
     picture = _picture_from(args, base, beside)
     base = with_image(base, recordings, args.image or (None if beside is None else beside.size_px))
     if args.gt:
-        truths = [read_truth(path, rate_hz=args.rate, time_unit=args.time_unit) for path in args.gt]
+        truth_how: ReadingOptions = {**truth_read(args), "time_unit": args.time_unit, "image": how["image"]}
+        truths = [read_truth(path, **truth_how) for path in args.gt]
         pairs = list(zip(recordings, truths, strict=True))
         for path, pair in zip(args.gt, pairs, strict=True):
             _check_pair(path, *pair)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from jeat_graph.cli.options import add_rate
+from jeat_graph.cli.options import add_tables, truth_read
 from jeat_graph.cli.progress import stages
 from jeat_graph.cli.terminal import warn
 from jeat_graph.config.argument_types import not_negative
@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="lags of the curve in seconds; 0 is the filter",
     )
-    add_rate(parser)
+    add_tables(parser)
     parser.add_argument("--no-plots", action="store_true", help="write no pictures")
 
 
@@ -66,9 +66,10 @@ def run(args: argparse.Namespace) -> int:
     folder = Path(args.run_directory)
     out = folder if args.out is None else Path(args.out)
     check_writable(out / "compare.json")
-    truth = (
-        None if args.gt is None else read_truth(args.gt, rate_hz=rate_of_truth(folder, args.gt, args.rate))
-    )
+    truth = None
+    if args.gt is not None:
+        args.rate = rate_of_truth(folder, args.gt, args.rate)
+        truth = read_truth(args.gt, **truth_read(args))
     if truth is not None and truth.motion is None:
         warn("compare", f"{args.gt} has no motion (x, y, vx, vy, ax, ay): positions are judged, by its boxes")
     with stages("compare", 2) as stage:

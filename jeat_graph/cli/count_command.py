@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.cli.options import add_classes, add_rate
+from jeat_graph.cli.options import add_classes, add_tables, tables_read
 from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import positive
 from jeat_graph.data.errors import DataError
@@ -27,7 +27,7 @@ HELP = "count vehicles over lines in the picture, by direction, with intervals"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("source", metavar="RUN", help="run directory or trajectory table")
+    parser.add_argument("source", metavar="RUN", help="run directory, trajectory table or result")
     parser.add_argument(
         "--line",
         action="append",
@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="length of one interval, which begin at its multiples (default: one for all)",
     )
     add_classes(parser, "count vehicles of these classes only (a track's class is the one it ends with)")
-    add_rate(parser)
+    add_tables(parser)
     parser.add_argument("--out", metavar="FILE", help="write the counts as CSV (default: print a table)")
     parser.add_argument("--crossings", metavar="FILE", help="also write every crossing as CSV")
 
@@ -61,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
         raise DataError(f"--line: {max(names, key=names.count)} is the name of two lines")
     tables = tables_of(Path(args.source))
     kind = "smoothed" if "smoothed" in tables else "causal"
-    table = read_trajectories(tables[kind], rate_hz=args.rate)
+    table = read_trajectories(tables[kind], **tables_read(args))
     first, last = _span(Path(args.source), tables[kind], table)
     if args.classes is not None:
         table = table.of_class(*args.classes, final=True)

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jeat_graph.cli.options import add_classes, add_rate, add_time_unit
+from jeat_graph.cli.options import add_classes, add_tables, add_time_unit, tables_read, truth_read
 from jeat_graph.cli.progress import stages
 from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import positive, share
@@ -17,9 +17,10 @@ from jeat_graph.data.progress import with_progress
 if TYPE_CHECKING:
     from jeat_graph.data.trajectories import GroundTruth
     from jeat_graph.eval.tables import Table
+    from jeat_graph.io.reading import ReadingOptions
 
 WRITES = ("json",)
-HELP = "Judge a run, a trajectory table, or a MOTChallenge or KITTI result against ground truth."
+HELP = "Judge a run, a trajectory table, or another tracker's result against ground truth."
 FORMATS = ("text", "markdown", "csv", "latex")
 _MANY: dict[str, Any] = {"nargs": "+", "action": "extend"}
 
@@ -34,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--format", choices=FORMATS, default="text", help="form of the table on stdout")
     add("--iou", type=share, default=0.5, help="smallest IoU of a match (0.5)")
     add_classes(parser, "classes to be found; others are ignored, and so are tracks of another class")
-    add_rate(parser)
+    add_tables(parser)
     add_time_unit(parser, " of --gt and --detections; RUN is in seconds")
     add("--max-age", type=positive, metavar="S", help="how far to predict causal rows (0.15)")
     add("--max-gap", type=positive, metavar="S", help="join no smoothed rows further apart than this")
@@ -66,16 +67,11 @@ def run(args: argparse.Namespace) -> int:
         raise DataError(f"{len(args.runs)} RUN and {len(args.gt)} --gt given; give one truth for each run")
     with stages("eval", 2 + args.breakdown + bool(args.detections)) as stage:
         stage("reading")
-        runs = [
-            load_run(
-                path,
-                truth,
-                rate_hz=rate_of_truth(path, truth, args.rate),
-                time_unit=args.time_unit,
-                classes=args.classes,
-            )
-            for path, truth in with_progress(list(zip(args.runs, args.gt, strict=True)))
-        ]
+        runs = []
+        for path, truth in with_progress(list(zip(args.runs, args.gt, strict=True))):
+            how: ReadingOptions = {**tables_read(args), "time_unit": args.time_unit}
+            how["rate_hz"] = rate_of_truth(path, truth, args.rate)
+            runs.append(load_run(path, truth, classes=args.classes, **how))
         if args.classes is not None:
             check_classes([one.truth for one in runs], args.classes)
         stage("judging")
@@ -144,9 +140,8 @@ def _detections(
 
     if len(args.detections) != len(truths):
         raise DataError(f"{len(truths)} RUN and {len(args.detections)} --detections given; give one for each")
-    detections = [
-        read_detections(path, rate_hz=args.rate, time_unit=args.time_unit) for path in args.detections
-    ]
+    how: ReadingOptions = {**truth_read(args), "time_unit": args.time_unit}
+    detections = [read_detections(path, **how) for path in args.detections]
     found = detection_ap(list(zip(truths, detections, strict=True)))
     values = {sensor: one.as_dict() for sensor, one in found.items()}
     records: list[dict[str, Cell]] = [{"sensor": sensor, **one} for sensor, one in values.items()]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jeat_graph.api.beside import FUNCTION_GROUP, find
-from jeat_graph.cli.options import add_output_rate, add_rate
+from jeat_graph.cli.options import add_output_rate, add_tables, tables_read
 from jeat_graph.data.errors import DataError
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "frames per second of the video or of the road's frames (default: as the run's input; roads: 25)",
         "--frames-per-second",
     )
-    add_rate(parser)
+    add_tables(parser)
     parser.add_argument(
         "--camera", metavar="CAMERA.yaml", help="with its place on the map, for sumo and geojson"
     )
@@ -86,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     if args.only and args.only not in files:
         raise DataError(f"{args.source}: there is no {args.only} table")
     kinds = [args.only] if args.only else list(files) if args.to == "rerun" else [list(files)[-1]]
-    tables = {kind: read_trajectories(files[kind], rate_hz=args.rate) for kind in kinds}
+    tables = {kind: read_trajectories(files[kind], **tables_read(args)) for kind in kinds}
     table = tables[kinds[-1]]
     if args.to == "rerun":
         from jeat_graph.drawing.rerun_log import log_run
@@ -108,7 +108,7 @@ def _write_ottrk(args: argparse.Namespace, frames: Trajectories, rate_hz: float)
     from jeat_graph.io.ottrk import OttrkVideo, write_ottrk
     from jeat_graph.runs.recorded import load_run_data
 
-    width, height = load_run_data(args.source, None, args.rate).size_px()
+    width, height = load_run_data(args.source, None, **tables_read(args)).size_px()
     name = args.video or f"{Path(args.source).resolve().name}.mp4"
     video = OttrkVideo(name, int(width), int(height), rate_hz, args.start or 0.0)
     write_ottrk(frames, args.out, video)
@@ -168,5 +168,5 @@ def _at_frames(args: argparse.Namespace, table: Trajectories, kind: Kind) -> Non
     if args.to == "ottrk":
         _write_ottrk(args, frames, rate_hz)
         return
-    width, height = load_run_data(args.source, None, args.rate).size_px()
+    width, height = load_run_data(args.source, None, **tables_read(args)).size_px()
     write_coco_tracks(frames, args.out, rate_hz, (round(width), round(height)))

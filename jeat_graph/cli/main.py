@@ -17,6 +17,7 @@ from jeat_graph.cli.held_outputs import holding
 from jeat_graph.cli.terminal import Terminated, describe, in_good_order, say, write_anything
 from jeat_graph.config import kernel_cache
 from jeat_graph.data.errors import ConfigError, JeatGraphError
+from jeat_graph.data.notes import listening
 from jeat_graph.io.outputs import check_named
 from jeat_graph.tracking import notice
 from jeat_graph.version import __version__
@@ -153,7 +154,8 @@ def _run(args: argparse.Namespace) -> int:
     try:
         if getattr(args, "out", None) is not None:
             check_named(args.out, stdout=args.command in _TO_STDOUT)
-        with holding(args, import_module(f"jeat_graph.cli.{args.command}_command")):
+        held = holding(args, import_module(f"jeat_graph.cli.{args.command}_command"))
+        with held, listening(partial(say, args.command)):
             code = int(args.run(args) or 0)
         sys.stdout.flush()  # what cannot be written is noticed here, not at exit
         return code

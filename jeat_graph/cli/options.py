@@ -2,6 +2,9 @@
 
 ========================  ================================================================================
 `--rate HZ`               frame rate of input files that count frames
+`--first-frame`           number of their first frame
+`--only-video`            which of several videos in a file is read
+`--classes`               names of the classes that a file numbers (`--class` chooses some)
 `--output-rate HZ`        frames or pictures per second of what is written
 `--image WxH`             size of the camera's picture, which boxes are given in
 `--size WxH`              size of pictures that are drawn
@@ -18,9 +21,11 @@ from typing import Any, NoReturn
 
 from jeat_graph.config.argument_types import output_rate, picture_size, positive
 from jeat_graph.config.smoothing import ENGINES
+from jeat_graph.data.frame_numbers import FIRST_FRAMES
 from jeat_graph.data.secrets import without_logins
 from jeat_graph.data.time_units import TIME_UNITS
 from jeat_graph.io.formats import FORMATS
+from jeat_graph.io.reading import ReadingOptions
 
 OUTPUT_FORMATS = ("csv", "parquet", "motchallenge", "kitti")
 SCORE_SCALES = ("unit", "percent", "logistic")
@@ -84,6 +89,54 @@ def add_rate(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_counting(parser: argparse.ArgumentParser) -> None:
+    """Declare how files are read that count frames, number classes, or hold several videos."""
+    add_rate(parser)
+    add = parser.add_argument
+    add(
+        "--first-frame",
+        type=int,
+        choices=FIRST_FRAMES,
+        help="number of the first frame of files that count frames (default: 0 where there is a frame 0, "
+        "else 1; KITTI 0)",
+    )
+    add("--only-video", metavar="NAME", help="the video to read of a file that holds several")
+    add(
+        "--classes",
+        dest="class_names",
+        metavar="FILE|NAMES",
+        help="names of classes that files number: one a line, YOLO's data.yaml, or with commas between them; "
+        "MOTChallenge text counts from 1, all else from 0 (default: labels.txt or classes.txt beside)",
+    )
+
+
+def add_tables(parser: argparse.ArgumentParser) -> None:
+    """Declare how results and truth are read (`tables_read`)."""
+    add_counting(parser)
+    parser.add_argument(
+        "--image",
+        type=picture_size,
+        metavar="WxH",
+        help="size of the picture, for boxes in shares of it (YOLO)",
+    )
+
+
+def tables_read(args: argparse.Namespace) -> ReadingOptions:
+    """Return what `add_tables` declared, as readers take it."""
+    return {
+        "rate_hz": args.rate,
+        "first_frame": args.first_frame,
+        "video": args.only_video,
+        "class_names": args.class_names,
+        "image": args.image,
+    }
+
+
+def truth_read(args: argparse.Namespace) -> ReadingOptions:
+    """Return what `add_tables` declared, for truth: its first frame is not the run's."""
+    return {**tables_read(args), "first_frame": None}
+
+
 def add_output_rate(parser: argparse.ArgumentParser, text: str, *old_names: str) -> None:
     """Declare `--output-rate`, the frame rate of what is written.
 
@@ -122,7 +175,7 @@ def add_old_name(
 def add_reading(parser: argparse.ArgumentParser) -> None:
     """Declare how files of detections are read: `reading` takes them from the parsed arguments."""
     add = parser.add_argument
-    add_rate(parser)
+    add_counting(parser)
     add("--input-format", choices=FORMATS, help="format of the input, if it is not recognised")
     add(
         "--score-scale",
@@ -155,6 +208,9 @@ def reading(args: argparse.Namespace) -> dict[str, Any]:
         "images": args.images,
         "time_unit": args.time_unit,
         "classes": args.classes,
+        "first_frame": args.first_frame,
+        "video": args.only_video,
+        "class_names": args.class_names,
     }
 
 

@@ -8,7 +8,13 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jeat_graph.cli.options import add_classes, add_old_name, add_output_rate, add_rate
+from jeat_graph.cli.options import (
+    add_classes,
+    add_old_name,
+    add_output_rate,
+    add_tables,
+    tables_read,
+)
 from jeat_graph.cli.terminal import warn
 from jeat_graph.config.argument_types import counting, drawn_size, not_negative, positive
 from jeat_graph.data.errors import DataError
@@ -60,7 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_output_rate(parser, "pictures per second of the film (default: each frame; else 25)")
     add("--size", type=drawn_size, metavar="WxH", help="size of each picture (default: the recording's)")
     add_classes(parser, "draw only tracks that are of one of these classes then")
-    add_rate(parser)
+    add_tables(parser)
     add_old_name(parser, "--frame-rate", "--rate")
     add(
         "--labels",
@@ -103,6 +109,7 @@ def run(args: argparse.Namespace) -> int:
         labels=args.labels,
         trail_s=args.trails,
         classes=args.classes,
+        reading=tables_read(args),
     )
     inputs = [path for path in (request.frames, request.events, request.truth) if path is not None]
     check_keeps(inputs, out)
@@ -127,10 +134,10 @@ def run(args: argparse.Namespace) -> int:
 
 def _counted(request: Request) -> bool:
     """Whether anything that is read may count frames: pictures, or a result or truth without times."""
-    from jeat_graph.io.formats import BY_FRAME, recognise
+    from jeat_graph.io.formats import counts_frames
 
     files = [path for path in (request.run, request.truth) if path is not None and path.is_file()]
-    return request.frames is not None or any(recognise(path) in BY_FRAME for path in files)
+    return request.frames is not None or any(map(counts_frames, files))
 
 
 def _write_movie(movie: Movie, rate_hz: float, out: Path) -> None:

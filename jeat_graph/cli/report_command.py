@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jeat_graph.cli.options import add_rate
+from jeat_graph.cli.options import add_tables, tables_read, truth_read
 from jeat_graph.cli.progress import stages
 from jeat_graph.cli.terminal import say
 from jeat_graph.data.progress import progress_span
@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("run_directory", metavar="RUN", help="run directory, or a table or result of tracks")
     add("--gt", metavar="FILE", help="truth; without it there are no scores")
     add("--out", required=True, metavar="FILE.html", help="the page")
-    add_rate(parser)
+    add_tables(parser)
     add(
         "--detections",
         nargs="+",
@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
         args.rate = rate_of_truth(args.run_directory, args.gt, args.rate)
     with stages("report", 3) as stage:
         stage("reading and judging")
-        data = load_run_data(args.run_directory, args.gt, args.rate)
+        data = load_run_data(args.run_directory, args.gt, **tables_read(args))
         stage("filter against smoother")
         compared, reason = _compare(args)
         stage("drawing")
@@ -88,7 +88,7 @@ def _compare(args: argparse.Namespace) -> tuple[ComparedRun | None, str | None]:
         if args.detections is not None:
             raise
         return None, f"Filter against smoother is not shown: {error}."
-    truth = None if args.gt is None else read_truth(args.gt, rate_hz=args.rate)
+    truth = None if args.gt is None else read_truth(args.gt, **truth_read(args))
     with progress_span(0.3, 0.8):
         comparison = with_road(compare_run(measured, truth), folder, road_truth_beside(folder, args.gt))
     with progress_span(0.8, 1.0):

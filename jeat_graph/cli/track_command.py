@@ -40,7 +40,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="*",
         metavar="DETECTIONS",
         help="files of one scene, say one a sensor: CSV or Parquet with t, sensor, left, top, width, height, "
-        "score; MOTChallenge det.txt; KITTI; Prophesee or DSEC .npy; COCO results; NAME=path names a sensor",
+        "score; MOTChallenge det.txt; KITTI; Prophesee or DSEC .npy; COCO; a folder of YOLO's labels; "
+        "NAME=path names a sensor",
     )
     add(
         "--out",
@@ -104,6 +105,9 @@ def run(args: argparse.Namespace) -> int:
         images=args.images,
         time_unit=args.time_unit,
         classes=None if args.classes is None else tuple(args.classes),
+        first_frame=args.first_frame,
+        video=args.only_video,
+        class_names=args.class_names,
         frames=args.frames,
         options=RunOptions(
             formats=extra_formats(args),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from jeat_graph.cli.options import add_rate
+from jeat_graph.cli.options import add_tables, tables_read
 
 HELP = "open a run in the viewer rerun (extra `rerun`): boxes, uncertainty and sensors on timelines"
 
@@ -13,7 +13,7 @@ HELP = "open a run in the viewer rerun (extra `rerun`): boxes, uncertainty and s
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument("source", metavar="RUN", help="run directory or trajectory table")
-    add_rate(parser)
+    add_tables(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -23,5 +23,5 @@ def run(args: argparse.Namespace) -> int:
 
     rerun_module()
     path = Path(args.source)
-    log_run(read_tables(path, args.rate), path.resolve().name)
+    log_run(read_tables(path, **tables_read(args)), path.resolve().name)
     return 0

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -57,6 +58,37 @@ def class_column(classes: Any, probability: Any) -> dict[str, Any]:
     return {"classes": np.array(texts, dtype=np.str_), "class_probability": share}
 
 
+#: Columns that say a class: its name or number, its number beside a name, and that name.
+CLASS_COLUMNS = ("class", "class_id", "name")
+_WHOLE = re.compile(r"(-?\d+)(?:\.0*)?")
+
+
+def all_numbers(texts: Iterable[str]) -> bool:
+    """Tell whether all of some texts are whole numbers, but for empty ones, and there is one."""
+    there = {text for text in texts if text}
+    return bool(there) and all(_WHOLE.fullmatch(text) for text in there)
+
+
+def said_classes(found: Mapping[str, TextArray]) -> TextArray | None:
+    """Choose among columns that say classes: names go before numbers, as in tables of YOLO's that have both.
+
+    Args:
+        found: (N,) texts by the name of their column, of `CLASS_COLUMNS`.
+
+    Returns:
+        Classes (N,), numbers without decimals; None where no column says them.
+    """
+    said = next((found[name] for name in CLASS_COLUMNS[:2] if name in found), None)
+    if said is None or not all_numbers(np.unique(said).tolist()):
+        return said
+    names, place = np.unique(said, return_inverse=True)
+    whole = [_WHOLE.sub(r"\1", name) for name in names.tolist()]
+    numbers: TextArray = np.array(whole, dtype=np.str_)[place.reshape(-1)]
+    if "name" not in found:
+        return numbers
+    return np.where(found["name"] == "", numbers, found["name"])
+
+
 def rows_of_class(classes: TextArray | None, wanted: Iterable[str], *, unknown: bool) -> BoolArray:
     """Tell which rows are of one of some classes.
 
@@ -76,6 +108,9 @@ def rows_of_class(classes: TextArray | None, wanted: Iterable[str], *, unknown: 
         raise DataError("there is no class to choose by: no detection has one")
     there = sorted({str(name) for name in np.unique(classes)} - {""})
     if not set(names) & set(there):
-        raise DataError(f"nothing is of class {' or '.join(names)}; there are: {', '.join(there) or 'none'}")
+        hint = " (--classes FILE names them, in Python class_names=)" if all_numbers(there) else ""
+        raise DataError(
+            f"nothing is of class {' or '.join(names)}; there are: {', '.join(there) or 'none'}{hint}"
+        )
     chosen = np.isin(classes, names)
     return np.asarray(chosen | (classes == "") if unknown else chosen, dtype=np.bool_)

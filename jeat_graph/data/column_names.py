@@ -12,7 +12,12 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
     "t_ms": ("time_ms", "timestamp_ms"),
     "t_us": ("time_us", "timestamp_us"),
     "t_ns": ("time_ns", "timestamp_ns"),
-    "frame": ("frame_id", "frame_number", "frame_index", "frame_idx", "frame_no", "frameid"),
+    "frame": (
+        *("frame_id", "frame_number", "frame_index", "frame_idx", "frame_no", "frame_num", "frameid"),
+        "image_index",
+    ),
+    "image": ("image_id", "image_name", "image_path", "file_name", "filename", "img", "img_name"),
+    "video": ("video_id", "video_name", "video_file", "sequence_name"),
     "sensor": ("camera", "sensor_name"),
     "left": ("x1", "xmin", "x_min", "bb_left", "bbox_left", "box_left"),
     "top": ("y1", "ymin", "y_min", "bb_top", "bbox_top", "box_top"),
@@ -24,7 +29,8 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
     "height": ("h", "bb_height", "bbox_height", "box_height"),
     "score": ("conf", "confidence", "prob", "probability"),
     "class": ("class_name", "label", "category", "cls"),
-    "object_id": ("objectid", "obj_id", "id", "track_id"),
+    "class_id": ("classid", "class_number", "category_id", "cls_id"),
+    "object_id": ("objectid", "obj_id", "id", "track_id", "tracker_id"),
 }
 #: Sides of a box, in the order of arrays (M, 4).
 BOX = ("left", "top", "width", "height")
@@ -32,12 +38,16 @@ BOX = ("left", "top", "width", "height")
 TIME_COLUMNS = {"t_ms": "ms", "t_us": "us", "t_ns": "ns"}
 #: Columns of times and boxes that hold numbers, by any of their names.
 NUMBER_COLUMNS = ("t", *TIME_COLUMNS, *BOX, "right", "bottom", "cx", "cy")
+#: A whole box in one field (`data.box_text`).
+BOX_TEXT = "box"
+#: Columns that count frames, by number or by the name of a picture.
+FRAME_COLUMNS = ("frame", "image")
 _STAND_INS = {
-    "t": (*TIME_COLUMNS, "frame"),
-    "left": ("cx",),
-    "top": ("cy",),
-    "width": ("right",),
-    "height": ("bottom",),
+    "t": (*TIME_COLUMNS, *FRAME_COLUMNS),
+    "left": ("cx", BOX_TEXT),
+    "top": ("cy", BOX_TEXT),
+    "width": ("right", BOX_TEXT),
+    "height": ("bottom", BOX_TEXT),
 }
 _CANONICAL = {alias: name for name, aliases in ALIASES.items() for alias in aliases}
 

@@ -12,7 +12,15 @@ from jeat_graph.data.boxes import without_area
 from jeat_graph.data.column_names import BOX
 from jeat_graph.data.embeddings import EmbeddingArray, embeddings_of_objects
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.frame_columns import boxes_of_columns, named_columns, numbers_of, times_of_columns
+from jeat_graph.data.frame_columns import (
+    ASIDE,
+    boxes_of_columns,
+    check_one_video,
+    classes_of_columns,
+    named_columns,
+    numbers_of,
+    times_of_columns,
+)
 from jeat_graph.data.interop import boxes_of
 from jeat_graph.data.to_supervision import supervision_of
 
@@ -68,14 +76,16 @@ class DetectionViews:
                 is a scan that found nothing; a box without area is left out, and counted in `dropped`.
             sensor: name of the sensor where the frame has no such column.
             time_unit: unit of a column `t` of numbers: `s`, `ms`, `us` or `ns`.
-            rate_hz: frames per second (Hz), for a frame with frame numbers in place of times.
+            rate_hz: frames per second (Hz), for a frame with frame numbers in place of times; these count
+                from 0 where there is a frame 0, else from 1.
 
         Raises:
             DataError: a column is missing, or a row is no detection; the message names it.
         """
         if not hasattr(frame, "columns"):
             raise DataError(f"detections are read from a data frame, not from {type(frame).__name__}")
-        c = named_columns(frame, ("t", *BOX), ("sensor", "score", "class", "embedding"), "detections")
+        c = named_columns(frame, ("t", *BOX), ("sensor", "score", "embedding", *ASIDE), "detections")
+        check_one_video(c)
         box = boxes_of_columns(c)
         empty = np.isnan(box).all(axis=1)
         flat = without_area(box)
@@ -85,7 +95,7 @@ class DetectionViews:
             box,
             numbers_of(c["score"], "score") if "score" in c else np.ones(len(box)),
             empty | flat,
-            c.get("class"),
+            classes_of_columns(c, len(box)),
             embeddings_of_objects(list(c["embedding"])) if "embedding" in c else None,
         )
         return replace(found, dropped=int(flat.sum()))

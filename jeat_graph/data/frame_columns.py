@@ -9,12 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray, TextArray
+from jeat_graph.data.box_text import KNOWN, sides_of
 from jeat_graph.data.boxes import class_texts
-from jeat_graph.data.column_names import BOX, TIME_COLUMNS, sides_to_boxes, standing_in, usual_names
+from jeat_graph.data.class_columns import CLASS_COLUMNS, said_classes
+from jeat_graph.data.column_names import BOX, BOX_TEXT, TIME_COLUMNS, sides_to_boxes, standing_in, usual_names
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.frame_numbers import first_frame
 from jeat_graph.data.time_units import in_seconds
+from jeat_graph.data.videos import choose_video
 
+#: Columns that say classes, and which video a row is of.
+ASIDE = (*CLASS_COLUMNS, "video")
 #: What is said where a box is missing; `x` and `y` alone may be a corner or the centre.
 KNOWN_BOXES = (
     "known are left, top, width, height, or x1, y1 and cx, cy for the place, w, h and right, bottom or "
@@ -59,6 +65,8 @@ def boxes_of_columns(columns: Mapping[str, Any]) -> FloatArray:
         DataError: a column that does not hold numbers.
     """
     names = standing_in(list(columns), BOX)
+    if BOX_TEXT in names:
+        return _boxes_in_one_field(columns[BOX_TEXT])
     return sides_to_boxes(names, np.column_stack([numbers_of(columns[name], name) for name in names]))
 
 
@@ -68,10 +76,26 @@ def detector_columns(table: Any) -> tuple[FloatArray, FloatArray | None, Any]:
     Raises:
         DataError: as `named_columns` and `boxes_of_columns`.
     """
-    columns = named_columns(table, BOX, ("score", "class"), "boxes")
+    columns = named_columns(table, BOX, ("score", *CLASS_COLUMNS), "boxes")
     boxes = boxes_of_columns(columns)
     scores = numbers_of(columns["score"], "score") if "score" in columns else None
-    return boxes, scores, class_texts(columns["class"], len(boxes)) if "class" in columns else None
+    return boxes, scores, classes_of_columns(columns, len(boxes))
+
+
+def classes_of_columns(columns: Mapping[str, Any], count: int) -> TextArray | None:
+    """Return classes (R,) of columns from `named_columns`: names before numbers; None without any."""
+    found = {name: class_texts(columns[name], count) for name in CLASS_COLUMNS if name in columns}
+    return said_classes(found)
+
+
+def check_one_video(columns: Mapping[str, Any]) -> None:
+    """Refuse rows of several videos, which would be laid over each other.
+
+    Raises:
+        DataError: names some of them.
+    """
+    if "video" in columns:
+        choose_video(sorted({str(name) for name in columns["video"]}), None)
 
 
 def times_of_columns(columns: Mapping[str, Any], unit: str, rate_hz: float | None) -> FloatArray:
@@ -80,7 +104,8 @@ def times_of_columns(columns: Mapping[str, Any], unit: str, rate_hz: float | Non
     Args:
         columns: with `t` (numbers, dates or spans of time), one that names its unit, or frame numbers.
         unit: of the column `t` where it holds numbers.
-        rate_hz: frames per second; frame k is at k / rate.
+        rate_hz: frames per second; frames count from 0 where there is a frame 0, else from 1
+            (`frame_numbers`).
 
     Raises:
         DataError: a column that holds none of these, another unit than its own, or frames without a rate.
@@ -94,11 +119,24 @@ def times_of_columns(columns: Mapping[str, Any], unit: str, rate_hz: float | Non
     if name == "frame":
         if rate_hz is None or not (math.isfinite(rate_hz) and rate_hz > 0.0):
             raise DataError("there are frame numbers only; give their rate (Hz) as rate_hz")
-        return np.asarray(numbers / rate_hz)
+        return np.asarray((numbers - first_frame(numbers)) / rate_hz)
     own = TIME_COLUMNS.get(name, unit)
     if unit not in ("s", own):
         raise DataError(f"column {name!r} is in {own}, but time_unit says {unit}; leave it out")
     return in_seconds(numbers, own)
+
+
+def _boxes_in_one_field(column: Any) -> FloatArray:
+    """Boxes (M, 4) of a column of corners by name; NaN where there is none."""
+    boxes = np.full((len(column), 4), np.nan)
+    for row, value in enumerate(column):
+        if value is None or value != value:
+            continue
+        sides = sides_of(value)
+        if sides is None:
+            raise DataError(f"row {row}: box must be {KNOWN}, not {str(value)[:40]!r}")
+        boxes[row] = sides
+    return sides_to_boxes(("left", "top", "right", "bottom"), boxes)
 
 
 def seconds_of(times: Any) -> FloatArray | None:

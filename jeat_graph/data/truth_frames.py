@@ -7,14 +7,22 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.data.boxes import class_texts, find_bad_row
+from jeat_graph.data.boxes import find_bad_row
 from jeat_graph.data.column_names import BOX
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.frame_columns import boxes_of_columns, named_columns, numbers_of, times_of_columns
+from jeat_graph.data.frame_columns import (
+    ASIDE,
+    boxes_of_columns,
+    check_one_video,
+    classes_of_columns,
+    named_columns,
+    numbers_of,
+    times_of_columns,
+)
 from jeat_graph.data.trajectories import GroundTruth
 
 _MOTION = ("x", "y", "vx", "vy", "ax", "ay")
-_OPTIONAL = (*_MOTION, "class", "ignore", "distance")
+_OPTIONAL = (*_MOTION, "ignore", "distance", *ASIDE)
 
 
 def truth_of_frame(frame: Any, *, rate_hz: float | None = None) -> GroundTruth:
@@ -30,6 +38,7 @@ def truth_of_frame(frame: Any, *, rate_hz: float | None = None) -> GroundTruth:
         DataError: a column is missing, or a row is no object; the message names it.
     """
     c = named_columns(frame, ("t", "object_id", *BOX), _OPTIONAL, "true boxes")
+    check_one_video(c)
     t, boxes, number = (
         times_of_columns(c, "s", rate_hz),
         boxes_of_columns(c),
@@ -49,13 +58,14 @@ def truth_of_frame(frame: Any, *, rate_hz: float | None = None) -> GroundTruth:
     judged = np.column_stack([t[rows], ids])[~ignore]
     if len(np.unique(judged, axis=0)) < len(judged):
         raise DataError("an object is there twice at one time")
+    classes = classes_of_columns(c, len(t))
     return GroundTruth(
         t=t[rows],
         object_id=ids.astype(np.int64),
         boxes=boxes,
         motion=_motion(c, boxes, rows) if any(name in c for name in _MOTION) else None,
         ignore=ignore,
-        classes=class_texts(c["class"], len(t))[rows] if "class" in c else None,
+        classes=None if classes is None else classes[rows],
         distance=numbers_of(c["distance"], "distance")[rows] if "distance" in c else None,
         frames=np.unique(t),
     )

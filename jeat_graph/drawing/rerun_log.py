@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.extras import install
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.atomic import atomic_path
 
@@ -28,7 +29,7 @@ def rerun_module() -> Any:
     try:
         import rerun
     except ImportError:
-        raise DataError("the package rerun is missing: pip install 'jeat-graph[rerun]'") from None
+        raise DataError(f"the package rerun is missing: {install('rerun')}") from None
     return rerun
 
 

@@ -13,14 +13,18 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.io.arrow_arrays import to_numpy
 
 _LIST = re.compile(rb"[ \t\r\n]*\[[ \t\r\n]*(?=\{)")
 _NAMED_LIST = re.compile(rb'"annotations"[ \t\r\n]*:[ \t\r\n]*\[[ \t\r\n]*(?=\{)')
 _BETWEEN = re.compile(rb"\}[ \t\r\n]*,[ \t\r\n]*\{")
 _END = re.compile(rb"\}([ \t\r\n]*\])")
+_MARKS = ("iscrowd", "ignore")
+_NEEDED = ("image_id", "bbox", "category_id")
+_OPTIONAL = ("score", "track_id", "instance_id", *_MARKS)
 #: So much is read at a time, that what is neither text nor column yet stays small (bytes).
 _PIECE = 1 << 23
 
@@ -31,16 +35,20 @@ class Entries(NamedTuple):
     Attributes:
         image: (R,) `image_id`.
         boxes: (R, 4) `bbox`.
-        scores: (R,) `score`.
+        scores: (R,) `score`; None where no entry has one.
         category: (R,) `category_id`.
         rest: the file's JSON without its entries: an empty list, or an object with an empty `annotations`.
+        track: (R,) `track_id` or `instance_id`; None where no entry has one.
+        ignore: (R,) true where `iscrowd` or `ignore` is not 0; None where no entry has them.
     """
 
     image: IntArray
     boxes: FloatArray
-    scores: FloatArray
+    scores: FloatArray | None
     category: IntArray
     rest: Any
+    track: IntArray | None = None
+    ignore: BoolArray | None = None
 
 
 def read_entries(data: bytes) -> Entries | None:
@@ -63,12 +71,24 @@ def read_entries(data: bytes) -> Entries | None:
         parts = [_columns(piece, count) for piece, count in _pieces(data, begin.end(), end.start(1))]
     except (ValueError, RecursionError, pa.ArrowException):
         return None
-    image, boxes, scores, category = (np.concatenate(part) for part in zip(*parts, strict=True))
-    if not (np.isfinite(boxes).all() and np.isfinite(scores).all()):
+    found = {name: [part[name] for part in parts if name in part] for name in (*_NEEDED, *_OPTIONAL)}
+    if any(0 < len(pieces) < len(parts) for pieces in found.values()):
+        return None  # some entries have it and others have not
+    columns = {name: np.concatenate(pieces) for name, pieces in found.items() if pieces}
+    track = columns.get("track_id", columns.get("instance_id"))
+    if track is None and b'"track_id"' in data:
+        return None  # it stands somewhere within the entries
+    numbers = [columns["bbox"], *(columns[name] for name in ("score",) if name in columns)]
+    if not all(np.isfinite(column).all() for column in numbers):
         return None
-    if np.abs(image).max() > 2**53 or np.abs(category).max() > 2**53:
+    if np.abs(columns["image_id"]).max() > 2**53 or np.abs(columns["category_id"]).max() > 2**53:
         return None
-    return Entries(image, boxes, scores, category, rest)
+    marks = [columns[name] != 0 for name in _MARKS if name in columns]
+    return Entries(
+        *(columns["image_id"], columns["bbox"], columns.get("score"), columns["category_id"], rest),
+        track=track,
+        ignore=np.any(marks, axis=0) if marks else None,
+    )
 
 
 def _pieces(data: bytes, start: int, end: int) -> Iterator[tuple[bytes, int]]:
@@ -82,8 +102,8 @@ def _pieces(data: bytes, start: int, end: int) -> Iterator[tuple[bytes, int]]:
         yield piece.replace(mark, b"}\n{"), piece.count(mark) + 1
 
 
-def _columns(piece: bytes, count: int) -> tuple[IntArray, FloatArray, FloatArray, IntArray]:
-    """Columns of some entries.
+def _columns(piece: bytes, count: int) -> dict[str, npt.NDArray[Any]]:
+    """Columns of some entries by name; of those that need not be there, the ones that all entries have.
 
     Raises:
         ValueError: these are not so many entries with all that they need.
@@ -91,12 +111,8 @@ def _columns(piece: bytes, count: int) -> tuple[IntArray, FloatArray, FloatArray
     import pyarrow as pa
     from pyarrow import json as arrow_json
 
-    kinds = {
-        "image_id": pa.int64(),
-        "bbox": pa.list_(pa.float64()),
-        "score": pa.float64(),
-        "category_id": pa.int64(),
-    }
+    kinds = {name: pa.int64() for name in (*_NEEDED, *_OPTIONAL)}
+    kinds |= {"bbox": pa.list_(pa.float64()), "score": pa.float64()}
     table = arrow_json.read_json(
         pa.BufferReader(piece),
         read_options=arrow_json.ReadOptions(use_threads=False, block_size=len(piece) + 1),
@@ -104,10 +120,12 @@ def _columns(piece: bytes, count: int) -> tuple[IntArray, FloatArray, FloatArray
             explicit_schema=pa.schema(list(kinds.items())), unexpected_field_behavior="ignore"
         ),
     )
-    image, boxes, scores, category = (table.column(name).combine_chunks() for name in kinds)
+    columns = {name: table.column(name).combine_chunks() for name in kinds}
+    there = {name: one for name, one in columns.items() if name in _NEEDED or one.null_count < len(one)}
+    boxes = there.pop("bbox")
     values = boxes.flatten()
-    if len(table) != count or any(column.null_count for column in (image, boxes, scores, category, values)):
+    if len(table) != count or any(one.null_count for one in (*there.values(), boxes, values)):
         raise ValueError("an entry is not as it should be")
     if not (np.diff(to_numpy(boxes.offsets)) == 4).all():
         raise ValueError("a box has not four numbers")
-    return to_numpy(image), to_numpy(values).reshape(-1, 4), to_numpy(scores), to_numpy(category)
+    return {name: to_numpy(one) for name, one in there.items()} | {"bbox": to_numpy(values).reshape(-1, 4)}

@@ -1,45 +1,114 @@
-"""Times and boxes of a file's table, by whichever of their names its columns go."""
+"""Times, boxes, classes and videos of a file's table, by whichever of their names its columns go."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from jeat_graph.data.arrays import FloatArray
-from jeat_graph.data.column_names import BOX, TIME_COLUMNS, sides_to_boxes, standing_in
+from jeat_graph.data.arrays import FloatArray, IntArray, TextArray
+from jeat_graph.data.box_text import KNOWN, sides_of
+from jeat_graph.data.class_columns import CLASS_COLUMNS, said_classes
+from jeat_graph.data.column_names import (
+    BOX,
+    BOX_TEXT,
+    FRAME_COLUMNS,
+    TIME_COLUMNS,
+    sides_to_boxes,
+    standing_in,
+)
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.frame_numbers import first_frame, split_picture_name
+from jeat_graph.data.notes import note
 from jeat_graph.data.time_units import in_seconds
+from jeat_graph.data.videos import choose_video
+from jeat_graph.io.class_names import name_classes, names_by_number
 from jeat_graph.io.frames import check_rate
+from jeat_graph.io.reading import Reading
 
 if TYPE_CHECKING:
     from jeat_graph.io.file_table import FileTable
 
+_LISTS_COUNT_FROM = 0
 
-def times_of(table: FileTable, unit: str, rate_hz: float | None) -> FloatArray:
-    """Return the times (R,) of a table's rows (s): from `t`, `t_ms` and so on, or frames by their rate.
+
+@dataclass(frozen=True, eq=False)
+class Times:
+    """When the rows of a table are.
+
+    Attributes:
+        t: (R,) s.
+        frames: (R,) frame numbers that the times are made of, or None.
+        first: number of the first frame, or None.
+    """
+
+    t: FloatArray
+    frames: IntArray | None = None
+    first: int | None = None
+
+
+def of_one_video(table: FileTable, how: Reading) -> FileTable:
+    """Return the rows of one video, where the table tells videos apart: by a column, or by pictures' names.
+
+    Raises:
+        DataError: there are several and none is chosen, or the one chosen is not there.
+    """
+    if "video" in table:
+        names, index = table.words("video", blank_ok=True)
+    elif standing_in(table.names, ["t"])[0] in FRAME_COLUMNS:
+        labels = _picture_names(table, standing_in(table.names, ["t"])[0])
+        if labels is None:
+            return table
+        distinct, index = np.unique(np.array(labels[0], dtype=np.str_), return_inverse=True)
+        names, index = distinct.tolist(), index.reshape(-1)
+    else:
+        return table
+    chosen = choose_video([name or "(no name)" for name in names], how.video, table.path)
+    if chosen is None or len(names) == 1:
+        return table
+    return table.take(np.flatnonzero(index == [name or "(no name)" for name in names].index(chosen)))
+
+
+def times_of(table: FileTable, how: Reading) -> Times:
+    """Return the times of a table's rows: from `t`, `t_ms` and so on, or from frames by their rate.
 
     Args:
         table: with one of these columns.
-        unit: of the column `t`; `s` also where nobody said anything.
-        rate_hz: frames per second; frame k is at k / rate.
+        how: unit of `t`, rate and first frame.
 
     Raises:
         DataError: the first row without a time; frames without a rate; or a column that names another unit.
     """
-    name = standing_in(table.names, ["t"])[0]
+    name, unit = standing_in(table.names, ["t"])[0], how.time_unit
     if name in TIME_COLUMNS:
         if unit not in ("s", TIME_COLUMNS[name]):
             raise DataError(
                 f"column {name!r} is in {TIME_COLUMNS[name]}, but --time-unit says {unit}; leave it out",
                 table.path,
             )
-        return in_seconds(table.number(name), TIME_COLUMNS[name])
-    if name != "frame":
-        return in_seconds(table.number(name), unit)
-    if rate_hz is None:
-        raise DataError("has frame numbers only; give their rate with --rate (in Python rate_hz)", table.path)
-    return np.asarray(table.whole("frame") / check_rate(rate_hz, table.path))
+        return Times(in_seconds(table.number(name), TIME_COLUMNS[name]))
+    if name not in FRAME_COLUMNS:
+        numbers, seconds = table.times(name, how.rate_hz)
+        if seconds and unit != "s":
+            raise DataError(
+                f"column {name!r} holds dates, but --time-unit says {unit}; leave it out", table.path
+            )
+        return Times(numbers if seconds else in_seconds(numbers, unit))
+    frames = _frame_numbers(table, name)
+    first = first_frame(frames, how.first_frame)
+    if len(frames) and frames.min() < first:
+        row = int(np.argmin(frames >= first))
+        raise table.error(row, f"frames count from {first}, got {frames[row]}")
+    if how.rate_hz is None:
+        if len(frames):
+            raise DataError(
+                "has frame numbers only; give their rate with --rate (in Python rate_hz)", table.path
+            )
+        return Times(np.zeros(0), frames, first)
+    if how.first_frame is None and first and len(frames):
+        note(f"{table.path}: frames count from 1, for there is no frame 0 (--first-frame 0 says otherwise)")
+    return Times(np.asarray((frames - first) / check_rate(how.rate_hz, table.path)), frames, first)
 
 
 def boxes_of(table: FileTable) -> FloatArray:
@@ -50,6 +119,48 @@ def boxes_of(table: FileTable) -> FloatArray:
     """
     names = standing_in(table.names, BOX)
     boxes = np.empty((len(table), 4))
+    if BOX_TEXT in names:
+        for row, value in enumerate(table.values(BOX_TEXT)):
+            sides = None if value is None else sides_of(value)
+            if value is not None and (sides is None or not np.isfinite(sides).all()):
+                raise table.error(row, f"box must be {KNOWN}, got {str(value)[:40]!r}")
+            boxes[row] = np.nan if sides is None else sides
+        return sides_to_boxes(("left", "top", "right", "bottom"), boxes)
     for k, name in enumerate(names):
         boxes[:, k] = table.number(name, blank_ok=True)
     return sides_to_boxes(names, boxes)
+
+
+def classes_of(table: FileTable, how: Reading) -> TextArray | None:
+    """Return the classes (R,) of a table's rows, empty where unknown; None where no row has one.
+
+    Raises:
+        DataError: a list of names that cannot be read.
+    """
+    found = {name: table.text(name, blank_ok=True) for name in CLASS_COLUMNS if name in table}
+    classes = said_classes(found)
+    if classes is None or not (classes != "").any():
+        return None
+    return name_classes(classes, names_by_number(how.class_names, table.path, _LISTS_COUNT_FROM))
+
+
+def _frame_numbers(table: FileTable, name: str) -> IntArray:
+    """Frame numbers (R,) of a column of numbers, or of pictures' names."""
+    labels = _picture_names(table, name)
+    if labels is None:
+        return table.whole(name)
+    return np.array(labels[1], dtype=np.int64)
+
+
+def _picture_names(table: FileTable, name: str) -> tuple[list[str], list[int]] | None:
+    """What the pictures' names (R,) share and their numbers (R,); None where the column holds numbers."""
+    try:
+        table.whole(name)
+    except DataError:
+        texts = [] if table.blank(name).any() else table.values(name)
+        found = [split_picture_name(text) if isinstance(text, str) else None for text in texts]
+        there = [one for one in found if one is not None]
+        if not there or len(there) < len(found):
+            raise
+        return [label for label, _ in there], [number for _, number in there]
+    return None

@@ -43,8 +43,12 @@ def read_bytes(path: str | Path) -> bytes:
         raise DataError(f"cannot be read: {error}", path) from None
 
 
-def read_text(path: str | Path) -> bytes:
+def read_text(path: str | Path, *, blank_ok: bool = False) -> bytes:
     """Return a text file's bytes as UTF-8 without a byte order mark.
+
+    Args:
+        path: the file.
+        blank_ok: whether it may be empty.
 
     Raises:
         DataError: as `read_bytes`; the file is empty, not UTF-8, or holds NUL bytes.
@@ -58,7 +62,7 @@ def read_text(path: str | Path) -> bytes:
     if data.startswith(_WIDE_BOMS):
         raise DataError("is UTF-16; save it as UTF-8", path)
     data = data.removeprefix(_BOM)
-    if not _SOMETHING.search(data):
+    if not blank_ok and not _SOMETHING.search(data):
         raise DataError("is empty", path)
     if b"\0" in data:
         raise DataError("is not text (NUL byte)", path, line_at(data, data.index(b"\0")))
@@ -192,7 +196,7 @@ class CsvBody:
         return list(table.columns)
 
     def filled_up(self) -> CsvBody:
-        """Empty the lines of white space only, and give short lines their commas; line numbers stay."""
+        """Empty lines of white space, give short lines their commas, take a comma too many; lines stay."""
         blank = rb"(?m)^ +(?=\r?$)" if self.delimiter == "\t" else rb"(?m)^[ \t]+(?=\r?$)"
         data = re.sub(blank, b"", self.data[self.start :])
         if 0 < self.short < self.width:
@@ -200,6 +204,10 @@ class CsvBody:
             field = rb"[^" + mark + rb'"\r\n]+'
             line = rb"(?m)^(" + mark.join([field] * self.short) + rb")(?=\r?$)"
             data = re.sub(line, rb"\g<1>" + mark * (self.width - self.short), data)
+        mark = re.escape(self.delimiter.encode())
+        field = rb"[^" + mark + rb'"\r\n]*'
+        full = rb"(?m)^(" + mark.join([field] * self.width) + rb")" + mark + rb"(?=\r?$)"
+        data = re.sub(full, rb"\g<1>", data)
         return replace(self, data=data, start=0, short=0)
 
     def _records(self) -> Iterator[tuple[int, list[str]]]:

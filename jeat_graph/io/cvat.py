@@ -14,6 +14,7 @@ import numpy as np
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.atomic import atomic_path
 from jeat_graph.io.frame_results import by_frame
+from jeat_graph.io.zipped import LABELS, MEMBER
 
 _FIRST_FRAME = _FIRST_LABEL = 1
 # A fixed date: the same tracks give the same bytes.
@@ -44,5 +45,5 @@ def write_cvat(table: Trajectories, path: str | Path, rate_hz: float, label: str
             f"{frame[k] + _FIRST_FRAME},{rows.track_id[k]},{box},1,{number[k]},{rows.existence[k]:.3f}\n"
         )
     with atomic_path(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr(zipfile.ZipInfo("gt/gt.txt", _DATE), "".join(lines))
-        archive.writestr(zipfile.ZipInfo("gt/labels.txt", _DATE), "".join(f"{name}\n" for name in labels))
+        archive.writestr(zipfile.ZipInfo(MEMBER, _DATE), "".join(lines))
+        archive.writestr(zipfile.ZipInfo(LABELS, _DATE), "".join(f"{name}\n" for name in labels))

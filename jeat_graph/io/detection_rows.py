@@ -30,7 +30,7 @@ def read_embeddings(table: FileTable) -> EmbeddingArray | None:
 
 def rows_without_box(table: FileTable) -> BoolArray:
     """Which rows (R,) only say that a scan took place; a row with part of a box is an error."""
-    values = [*standing_in(table.names, BOX), "score"]
+    values = [*standing_in(table.names, BOX), *(name for name in ("score",) if name in table)]
     return table.bare(values, "a scan that found nothing has only t and sensor")
 
 

@@ -6,17 +6,18 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
-from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.boxes import without_area
 from jeat_graph.data.column_names import BOX, NUMBER_COLUMNS
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
-from jeat_graph.io import coco, kitti, motchallenge, prophesee
-from jeat_graph.io.column_names import boxes_of, times_of
+from jeat_graph.data.frame_columns import ASIDE
+from jeat_graph.data.notes import note
+from jeat_graph.io.box_rows import read_rows
+from jeat_graph.io.column_names import boxes_of, classes_of, of_one_video, times_of
 from jeat_graph.io.csv_text import NUMBER, WORD
 from jeat_graph.io.detection_rows import (
     assemble,
@@ -25,93 +26,84 @@ from jeat_graph.io.detection_rows import (
     rows_without_box,
 )
 from jeat_graph.io.file_table import FileTable
-from jeat_graph.io.formats import recognise
-from jeat_graph.io.frames import check_rate, fill_frames, gap_times, scale_scores
-from jeat_graph.io.plain_text import frames_of
+from jeat_graph.io.formats import counts_frames, known_columns, recognise
+from jeat_graph.io.frames import check_rate, fill_frames, scale_scores
+from jeat_graph.io.reading import Reading, ReadingOptions
 from jeat_graph.io.rounding import round_decimals
 from jeat_graph.io.table_writer import write_columns
 from jeat_graph.io.tables import read_table
 
 DEFAULT_SENSOR = "rgb"
 _COLUMNS = ("t", "sensor", *BOX, "score")
-_OPTIONAL = ("class", "sensor", "embedding")
-_KINDS = {**dict.fromkeys((*NUMBER_COLUMNS, "score"), NUMBER), "sensor": WORD, "class": WORD}
+_KINDS = {
+    **dict.fromkeys((*NUMBER_COLUMNS, "score"), NUMBER),
+    **dict.fromkeys(("sensor", *ASIDE), WORD),
+}
+_TABLES = ("csv", "parquet")
 
 
 def read_detections(
     path: str | Path,
     *,
     sensor: str | None = None,
-    rate_hz: float | None = None,
     fmt: str | None = None,
-    score_scale: str = "unit",
-    fill_empty: bool = True,
-    images: str | Path | None = None,
-    time_unit: str = "s",
+    **options: Unpack[ReadingOptions],
 ) -> Detections:
     """Read detections from a file of any known format.
 
     ============  ==========================================================================================
-    csv, parquet  `t, sensor, left, top, width, height, score[, class]`, rows in any order; a row with only
+    csv, parquet  `t, sensor, left, top, width, height[, score, class]`, rows in any order; a row with only
                   `t` and `sensor` is an empty scan. Usual other names are understood, see `column_names`;
-                  other columns are passed over. `;` or tabs between fields, `.csv.gz`.
-    motchallenge  `frame, id, left, top, width, height, conf, …`, frames from 1; rate from `rate_hz` or
-                  `seqinfo.ini`.
-    kitti         tracking labels with a score (18 columns), frames from 0; 10 Hz unless `rate_hz` says else.
+                  other columns are passed over. `;` or tabs between fields, `.csv.gz`. A table that counts
+                  frames may lack `sensor`.
+    motchallenge  `frame, id, left, top, width, height, conf, …`; rate from `rate_hz` or `seqinfo.ini`. Also
+                  in a zip that CVAT takes or gives (`MOT 1.1`).
+    kitti         tracking labels (17 columns) or results (18), frames from 0; 10 Hz unless `rate_hz` says so.
     prophesee     structured `.npy` with `t` or `ts` (µs), `x, y, w, h`, `class_confidence` or `confidence`.
-    coco          results JSON; times from `images`, else image_id / `rate_hz`.
+    coco          results or data set, JSON; times from `images`, else image_id by `rate_hz`.
+    yolo          folder of labels, one file a picture; needs `image` and `rate_hz`.
     ============  ==========================================================================================
 
-    Only CSV and Parquet can say that a scan found nothing. For the others, with `fill_empty`, frames between
-    the first and the last that have no box become empty scans (to the length in `seqinfo.ini`, if there is
-    one; by `rate_hz` for `prophesee`, and only if it is given; all listed images for `coco`).
+    A file without scores gives every box the score 1. Only tables can say that a scan found nothing. For the
+    others, with `fill_empty`, frames between the first and the last that have no box become empty scans (to
+    the length in `seqinfo.ini`, if there is one; by `rate_hz` for `prophesee`, and only if it is given; all
+    listed images for `coco`); so do those of a table that counts frames and has neither `sensor` nor empty
+    scans.
 
     Args:
         path: the file.
         sensor: the sensor's name where the format has none (default `rgb`); renames the one sensor of a CSV
             or Parquet file, or names it if the file has no such column.
-        rate_hz: frames per second.
         fmt: the format, if it should not be recognised from the file.
-        score_scale: `unit` if scores are in [0, 1], `percent`, or `logistic` for raw scores of any size.
-        fill_empty: whether frames without boxes are empty scans rather than no scans.
-        images: COCO data set JSON with the list of images.
-        time_unit: unit of the column `t`: `s`, `ms`, `us` or `ns`.
+        options: what the file does not say itself, as `io.reading.Reading` has it: `rate_hz`, `time_unit`,
+            `first_frame`, `video`, `class_names`, `image`, `score_scale`, `fill_empty`, `images`.
 
     Raises:
         DataError: names the file, the line or row, and what is wrong.
     """
+    return _read_counted(path, sensor, fmt, Reading(**options))[0]
+
+
+def _read_counted(
+    path: str | Path, sensor: str | None, fmt: str | None, how: Reading
+) -> tuple[Detections, int | None]:
+    """Read detections, and tell the first frame's number where the file leaves it open."""
     kind = recognise(path, fmt)
-    if kind in ("csv", "parquet"):
-        return _read_contract(path, sensor, score_scale, rate_hz, time_unit)
+    if kind in _TABLES:
+        return _read_contract(path, sensor, how)
     name = DEFAULT_SENSOR if sensor is None else sensor
-    if kind == "coco":
-        return _read_coco(path, name, rate_hz, score_scale, fill_empty, images)
-    kinds: Any
-    missing: FloatArray = np.zeros(0)
-    if kind == "motchallenge":
-        table = motchallenge.read_lines(path)
-        rate, length = motchallenge.sequence_rate(path, rate_hz)
-        frame = frames_of(table, motchallenge.FIRST_FRAME) - motchallenge.FIRST_FRAME
-        t, boxes, kinds = frame / rate, motchallenge.boxes_of(table), motchallenge.class_names(table)
-        scores = _scores(table, "conf", "column 7 (confidence)")
-        if fill_empty:
-            wanted = fill_frames(frame + 1, path, length) - 1
-            missing = np.setdiff1d(wanted, frame) / rate
-    elif kind == "kitti":
-        table = kitti.read_lines(path)
-        rate = check_rate(kitti.RATE_HZ if rate_hz is None else rate_hz, path)
-        frame = frames_of(table, kitti.FIRST_FRAME)
-        t, boxes, kinds = frame / rate, kitti.boxes_of(table), table.text("type")
-        scores = _scores(table, "score", "column 18 (score)")
-        if fill_empty:
-            missing = np.setdiff1d(fill_frames(frame, path), frame) / rate
-    else:
-        table = prophesee.read_array(path)
-        t, boxes, kinds = prophesee.times_of(table), prophesee.boxes_of(table), prophesee.class_names(table)
-        scores = _scores(table, "class_confidence", "the field class_confidence (or confidence)")
-        if fill_empty and rate_hz is not None:
-            missing = gap_times(t, rate_hz, path)
-    return assemble(t, name, boxes, scale_scores(scores, score_scale, path), kinds, missing, table.error)
+    rows = read_rows(path, kind, how)
+    if rows.scores is None and rows.ignore is not None and rows.ignore.any():
+        rows = rows.take(np.flatnonzero(~rows.ignore))  # truth, and what it does not judge is no detection
+    missing = np.setdiff1d(rows.recorded(), rows.t) if how.fill_empty else np.zeros(0)
+    if not len(rows.t) and not len(missing):
+        raise DataError(
+            "is empty, and how many frames were looked at is not known: put seqinfo.ini beside it, or write "
+            "a table with a row of t and sensor for each scan",
+            path,
+        )
+    scores = np.ones(len(rows.t)) if rows.scores is None else scale_scores(rows.scores, how.score_scale, path)
+    return assemble(rows.t, name, rows.boxes, scores, rows.classes, missing, rows.error), rows.first
 
 
 def read_many(paths: Sequence[str | Path], **options: Any) -> Detections:
@@ -129,18 +121,37 @@ def read_many(paths: Sequence[str | Path], **options: Any) -> Detections:
         raise DataError("no detections file given")
     # The files of some sensors may have classes and others none: chosen when they are together.
     classes = options.pop("classes", None)
-    parts: list[Detections] = []
+    fmt, sensor = options.pop("fmt", None), options.pop("sensor", None)
+    how = Reading(**options)
+    found: list[tuple[Detections, int | None]] = []
     unnamed: str | Path | None = None
     for item in paths:
         name, path = split_name(item)
-        name = name if name is not None else options.get("sensor")
-        if name is None and recognise(path, options.get("fmt")) not in ("csv", "parquet"):
+        name = name if name is not None else sensor
+        if name is None and not _names_sensors(path, fmt):
             if unnamed is not None:
                 raise DataError(f"does not name its sensor, nor does {unnamed}; give NAME=path", path)
             unnamed = path
-        parts.append(read_detections(path, **{**options, "sensor": name}))
+        found.append(_read_counted(path, name, fmt, how))
+    firsts = {first for _, first in found} - {None}
+    if len(firsts) > 1:
+        # Files of one scene count alike: one that begins later counts from 0 as those that have a frame 0 do.
+        note("frames count from 0 in all files, for one of them has a frame 0")
+        for k, (item, (_, first)) in enumerate(zip(paths, found, strict=True)):
+            if first == 1:
+                name, path = split_name(item)
+                found[k] = _read_counted(path, name or sensor, fmt, replace(how, first_frame=0))
+    parts = [one for one, _ in found]
     whole = parts[0] if len(parts) == 1 else Detections.concatenate(parts)
     return whole if classes is None else _of_class(whole, classes, split_name(paths[0])[1])
+
+
+def _names_sensors(path: str | Path, fmt: str | None) -> bool:
+    """Tell whether a file can say which sensor its boxes are of."""
+    kind = recognise(path, fmt)
+    return kind in _TABLES and not (
+        counts_frames(path, kind) and "sensor" not in known_columns(path, _COLUMNS)
+    )
 
 
 def _of_class(detections: Detections, classes: Sequence[str], path: str | Path) -> Detections:
@@ -180,28 +191,13 @@ def write_detections(detections: Detections, path: str | Path, decimals: int | N
     write_columns(columns, path)
 
 
-def _read_contract(
-    path: str | Path, sensor: str | None, score_scale: str, rate_hz: float | None, time_unit: str
-) -> Detections:
-    required = _COLUMNS if sensor is None else tuple(name for name in _COLUMNS if name != "sensor")
-    try:
-        table = read_table(
-            path,
-            required,
-            ("class", "sensor", "embedding"),
-            short=("t", "sensor"),
-            aliases=True,
-            kinds=_KINDS,
-        )
-    except DataError as error:
-        if error.message.startswith("column 'sensor' is missing;"):
-            raise DataError(
-                "column 'sensor' is missing; name the sensor with NAME=path (in Python sensor=)",
-                error.path,
-                error.line,
-            ) from None
-        raise
-    t = times_of(table, time_unit, rate_hz)
+def _read_contract(path: str | Path, sensor: str | None, how: Reading) -> tuple[Detections, int | None]:
+    table = _table_of(path, sensor)
+    table = of_one_video(table, how)
+    times = times_of(table, how)
+    t = times.t
+    if sensor is None and "sensor" not in table:
+        sensor = DEFAULT_SENSOR
     names, code = [""], np.zeros(len(t), dtype=np.int64)
     if "sensor" in table:
         names, code = table.words("sensor", blank_ok=sensor is not None)
@@ -210,42 +206,38 @@ def _read_contract(
             raise DataError(f"holds the sensors {', '.join(names)}; none can be renamed to {sensor}", path)
         names = [sensor] if len(t) else []
     empty = rows_without_box(table)
-    boxes, scores = boxes_of(table), table.number("score", blank_ok=True)
-    scores = scale_scores(scores, score_scale, path)
-    classes = table.text("class", blank_ok=True) if "class" in table else None
-    if classes is not None and not (classes != "").any():
-        classes = None
+    boxes = boxes_of(table)
+    scores = table.number("score", blank_ok=True) if "score" in table else np.where(empty, np.nan, 1.0)
+    scores = scale_scores(scores, how.score_scale, path) if "score" in table else scores
+    classes = classes_of(table, how)
     looks = read_embeddings(table) if "embedding" in table else None
     flat = without_area(boxes) & ~empty
     check_rows(boxes, scores, empty | flat, table.error)
+    if times.frames is not None and "sensor" not in table and not empty.any() and how.fill_empty and len(t):
+        rate = check_rate(how.rate_hz or 0.0, path)
+        missing = np.setdiff1d((fill_frames(times.frames, path) - (times.first or 0)) / rate, t)
+        if looks is None and len(missing):
+            return assemble(t, names[0], boxes, scores, classes, missing, table.error), times.first
     del table  # the file's own columns are in the way of what is to come
     found = Detections.from_checked(t, names, code, (boxes, scores, classes), empty | flat, looks)
-    return replace(found, dropped=int(flat.sum()))
+    return replace(found, dropped=int(flat.sum())), times.first
 
 
-def _read_coco(
-    path: str | Path,
-    sensor: str,
-    rate_hz: float | None,
-    score_scale: str,
-    fill_empty: bool,
-    images: str | Path | None,
-) -> Detections:
-    found = coco.read_results(path, rate_hz, images)
-    missing = np.zeros(0)
-    if fill_empty and found.recorded is not None:
-        missing = np.setdiff1d(found.recorded, found.t)
-    elif fill_empty and rate_hz is not None:
-        missing = gap_times(found.t, rate_hz, path)
-
-    def error(row: int, message: str) -> DataError:
-        return DataError(f"entry {row + 1}: {message}", path)
-
-    scores = scale_scores(found.scores, score_scale, path)
-    return assemble(found.t, sensor, found.boxes, scores, found.classes, missing, error)
-
-
-def _scores(table: FileTable, name: str, spoken: str) -> FloatArray:
-    if name not in table:
-        raise DataError(f"{spoken} is missing; detections need a score", table.path)
-    return table.number(name)
+def _table_of(path: str | Path, sensor: str | None) -> FileTable:
+    """Read a table; one that counts frames may lack the column `sensor`, as other formats do."""
+    required = [
+        name for name in _COLUMNS if name != "score" and not (name == "sensor" and sensor is not None)
+    ]
+    optional = ("score", "sensor", "embedding", *ASIDE)
+    if sensor is None and counts_frames(path, "csv"):
+        required.remove("sensor")
+    try:
+        return read_table(path, required, optional, short=("t", "sensor"), aliases=True, kinds=_KINDS)
+    except DataError as error:
+        if error.message.startswith("column 'sensor' is missing;"):
+            raise DataError(
+                "column 'sensor' is missing; name the sensor with NAME=path (in Python sensor=)",
+                error.path,
+                error.line,
+            ) from None
+        raise

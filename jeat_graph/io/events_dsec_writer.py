@@ -11,6 +11,7 @@ import numpy.typing as npt
 from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.events import EventArray
+from jeat_graph.data.extras import install
 from jeat_graph.io.atomic import atomic_path
 from jeat_graph.io.events_dsec import LABEL, US_PER_MS
 from jeat_graph.io.piecewise import PiecewiseWriter
@@ -180,6 +181,6 @@ def compression_filter(compression: str) -> dict[str, Any]:
         try:
             import hdf5plugin
         except ImportError:
-            raise ConfigError("compression blosc needs pip install 'jeat-graph[hdf5]'") from None
+            raise ConfigError(f"compression blosc needs {install('hdf5')}") from None
         return dict(hdf5plugin.Blosc(cname="zstd", clevel=5, shuffle=hdf5plugin.Blosc.SHUFFLE))
     raise ConfigError(f"compression must be one of {', '.join(COMPRESSIONS)}, not {compression!r}")

@@ -16,7 +16,9 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.arrow_arrays import first_refused, to_numpy
+from jeat_graph.data.time_text import all_seconds, looks_like_time
+from jeat_graph.io.arrow_arrays import first_refused, from_numpy, to_numpy
+from jeat_graph.io.headers import is_number
 from jeat_graph.io.spreadsheets import unguarded
 from jeat_graph.io.vector_columns import read_vectors
 
@@ -45,6 +47,7 @@ class FileTable:
         self._columns = columns
         self._line_of = line_of
         self._decimal_comma = decimal_comma
+        self._row_of: Callable[[int], int] = int
 
     def __len__(self) -> int:
         return min((len(column) for column in self._columns.values()), default=0)
@@ -60,7 +63,7 @@ class FileTable:
     def error(self, row: int, message: str) -> DataError:
         """Make an error that points at a row (from 0): by line number (CSV), else as `row N` from 1."""
         if self._line_of is None:
-            return DataError(f"row {row + 1}: {message}", self.path)
+            return DataError(f"row {self._row_of(int(row)) + 1}: {message}", self.path)
         return DataError(message, self.path, self._line_of(int(row)))
 
     def blank(self, name: str) -> BoolArray:
@@ -87,6 +90,64 @@ class FileTable:
             row = int(np.argmax(torn))
             raise self.error(row, f"{names[int(np.argmax(blanks[row]))]} is missing; {what}")
         return none
+
+    def take(self, rows: IntArray) -> FileTable:
+        """Return a table of some rows (from 0), whose errors still name the file's own lines."""
+        taken = {name: column.take(from_numpy(rows)) for name, column in self._columns.items()}
+        line_of = self._line_of
+
+        def line(row: int) -> int:
+            assert line_of is not None
+            return line_of(int(rows[row]))
+
+        # Parquet has rows but no lines; those of a part are counted in the whole.
+        own = line if line_of is not None else None
+        part = FileTable(self.path, taken, own, decimal_comma=self._decimal_comma)
+        part._row_of = lambda row: self._row_of(int(rows[row]))
+        return part
+
+    def values(self, name: str) -> list[Any]:
+        """Return a column's fields as Python objects (R,), None where blank."""
+        values: list[Any] = self._columns[name].to_pylist()
+        return values
+
+    def times(self, name: str, rate_hz: float | None) -> tuple[FloatArray, bool]:
+        """Convert a column of times.
+
+        Args:
+            name: the column: numbers, dates (a Parquet file's own, or ISO 8601), or time codes.
+            rate_hz: frames per second, for time codes with frames.
+
+        Returns:
+            Times (R,), and whether they are in seconds by what they are: dates and time codes are, numbers
+            are in the unit that the user says.
+
+        Raises:
+            DataError: names the first line or row that is blank or no time.
+        """
+        import pyarrow as pa
+
+        kind = self._columns[name].type
+        if pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
+            numbers = self._columns[name].cast(pa.int64())
+            per_s = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}[kind.unit]
+            if self.blank(name).any():
+                raise self.error(int(np.argmax(self.blank(name))), f"{name} is missing")
+            return to_numpy(numbers) / per_s, True
+        try:
+            return self.number(name), False
+        except DataError as error:
+            texts = self.text(name, blank_ok=True) if kind in (pa.string(), pa.large_string()) else None
+            first = (
+                next((text for text in texts if text and not is_number(text)), "")
+                if texts is not None
+                else ""
+            )
+            if texts is None or not looks_like_time(first):
+                raise error from None
+            if self.blank(name).any():
+                raise self.error(int(np.argmax(self.blank(name))), f"{name} is missing") from None
+            return all_seconds(texts, self.error, rate_hz), True
 
     def number(self, name: str, *, blank_ok: bool = False, nan_ok: bool = False) -> FloatArray:
         """Convert a column to numbers.
@@ -221,8 +282,6 @@ def _advice(text: str) -> str:
     """What to do about a field that is no number, where that can be told."""
     if re.fullmatch(r"\s*[\d.,]+\s*%\s*", text):
         return "; leave the sign away, and give --score-scale percent"
-    if re.match(r"\s*\d{4}-\d\d-\d\d", text):
-        return "; dates are not read: give seconds, such as those since 1970"
     return ""
 
 

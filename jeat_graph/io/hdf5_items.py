@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.extras import install
 from jeat_graph.io.limits import check_room
 
 #: A chunk is read whole, whatever part of it is wanted (bytes).
@@ -81,7 +82,7 @@ def reading_error(data: Any, error: Exception, path: Path) -> DataError:
     missing = " and ".join(missing_filters(data).values())
     reason = " ".join(str(error).split())[:200]
     if missing:
-        cure = "; pip install 'jeat-graph[hdf5]' has filters such as blosc"
+        cure = f"; {install('hdf5')} has filters such as blosc"
         return DataError(f"cannot be read: it is packed by {missing}, which is not installed{cure}", path)
     return DataError(f"cannot be read, it is damaged: {reason}", path)
 

@@ -13,6 +13,8 @@ from typing import NamedTuple
 from jeat_graph.data.errors import DataError
 
 _MOST_COLUMNS = 10_000
+# Columns that people's tables may well have others beside which are called much alike.
+_NO_SLIP = ("class_id", "name", "video", "image", "box")
 _LINE_END = re.compile(rb"\r\n|\n|\r")
 
 
@@ -84,7 +86,7 @@ def check_names(
     twice = next((name for name, count in Counter(names).items() if count > 1), None)
     if twice is not None:
         raise DataError(f"column {twice!r} is there twice", path, line)
-    absent = [name for name in (*required, *optional) if name not in names]
+    absent = [name for name in (*required, *optional) if name not in names and name not in _NO_SLIP]
     unknown = [name for name in names if name not in required and name not in optional]
     for name in required:
         if name not in names:

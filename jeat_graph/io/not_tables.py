@@ -5,6 +5,11 @@ from __future__ import annotations
 _EVENTS = "is a file of events, no table; `detect` and `track` take it as --events"
 _VIDEO = "is a video, no table; `detect` and `track` take it as --frames"
 _PICTURE = "is a picture, no table; `detect` and `track` take a folder of them as --frames"
+#: What is said of XML, which annotation tools write in many forms.
+XML = (
+    "is XML (Pascal VOC, or CVAT's own), which is not read: export it as MOT 1.1, COCO or YOLO from the "
+    "program that wrote it"
+)
 #: First bytes of what is no text, and what to do about it.
 _STARTS = {
     b"\x1f\x8b": "is compressed with gzip; give it a name that ends in .gz, or unpack it",
@@ -19,7 +24,10 @@ _STARTS = {
     b"RIFF": _VIDEO,
     b"\x89PNG": _PICTURE,
     b"\xff\xd8\xff": _PICTURE,
+    b"<?xml": XML,
+    b"<annotation": XML,
 }
+_BOM = b"\xef\xbb\xbf"
 #: RAW and DAT of Prophesee begin with lines of text.
 _PROPHESEE = b"%"
 #: So many bytes tell what a file is.
@@ -32,8 +40,9 @@ def what_it_is(data: bytes) -> str | None:
     Args:
         data: the first bytes of a file, or all.
     """
+    head = data[:HEAD_BYTES].removeprefix(_BOM).lstrip()
     for start, text in _STARTS.items():
-        if data.startswith(start):
+        if head.startswith(start):
             return text
     if data[4:8] == b"ftyp":
         return _VIDEO

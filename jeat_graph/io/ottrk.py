@@ -1,13 +1,14 @@
-"""Write tracks as OpenTrafficCam's `.ottrk`: JSON, compressed with bz2, which its analysis tool reads.
+"""Write tracks as OpenTrafficCam's `.ottrk`: JSON, compressed with bz2, which its OTAnalytics reads.
 
-It counts frames of a video from 1; x, y are the middle of a box. Only what that tool needs is there. The
-video itself is found by its name, beside the file.
+It counts frames of a video from 1. Since version 1.1 of its detections x, y are the top left corner of a box,
+and since 1.2 times are seconds since 1970. The video itself is found by its name, beside the file.
 """
 
 from __future__ import annotations
 
 import bz2
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,6 +22,8 @@ from jeat_graph.version import __version__
 
 _FIRST_FRAME = 1
 _FORMAT, _DETECTION_FORMAT = "1.1", "1.2"
+# Class of vehicles of which it is not known.
+_UNKNOWN = "car"
 
 
 class OttrkVideo(NamedTuple):
@@ -57,7 +60,7 @@ def write_ottrk(
     """
     frame, rows = by_frame(table, path, video.rate_hz)
     kinds = rows.classes if classes is None else classes
-    kinds = np.full(len(rows), "car") if kinds is None or len(kinds) != len(rows) else kinds
+    kinds = np.full(len(rows), _UNKNOWN) if kinds is None or len(kinds) != len(rows) else kinds
     last_of = {int(k): int(frame[rows.track_id == k].max()) for k in np.unique(rows.track_id)}
     seen: set[int] = set()
     detections = []
@@ -66,10 +69,10 @@ def write_ottrk(
         left, top, width, height = rows.boxes[k].tolist()
         detections.append(
             {
-                "class": str(kinds[k]) or "car",
+                "class": str(kinds[k]) or _UNKNOWN,
                 "confidence": round(float(rows.existence[k]), 4),
-                "x": round(left + width / 2.0, 3),
-                "y": round(top + height / 2.0, 3),
+                "x": round(left, 3),
+                "y": round(top, 3),
                 "w": round(width, 3),
                 "h": round(height, 3),
                 "frame": at + _FIRST_FRAME,
@@ -83,12 +86,16 @@ def write_ottrk(
         )
         seen.add(one)
     frames = int(frame.max()) + 1 if len(rows) else 0
-    content: dict[str, Any] = {"metadata": _metadata(video, frames), "data": {"detections": detections}}
+    names = sorted({str(kind) or _UNKNOWN for kind in kinds.tolist()}) or [_UNKNOWN]
+    content: dict[str, Any] = {
+        "metadata": _metadata(video, frames, names),
+        "data": {"detections": detections},
+    }
     with atomic_path(path) as temporary:
         temporary.write_bytes(bz2.compress(json.dumps(content, ensure_ascii=False).encode("utf-8")))
 
 
-def _metadata(video: OttrkVideo, frames: int) -> dict[str, Any]:
+def _metadata(video: OttrkVideo, frames: int, classes: Sequence[str]) -> dict[str, Any]:
     seconds = frames / video.rate_hz
     minutes, rest = divmod(int(seconds), 60)
     hours, minutes = divmod(minutes, 60)
@@ -96,7 +103,7 @@ def _metadata(video: OttrkVideo, frames: int) -> dict[str, Any]:
     return {
         "otdet_version": _DETECTION_FORMAT,
         "ottrk_version": _FORMAT,
-        "vid": {
+        "video": {
             "filename": name.stem,
             "filetype": name.suffix,
             "width": video.width,
@@ -108,13 +115,21 @@ def _metadata(video: OttrkVideo, frames: int) -> dict[str, Any]:
             "recorded_start_date": video.start,
             "length": f"{hours}:{minutes:02d}:{rest:02d}",
         },
-        "det": {
+        "detection": {
             "otvision_version": "",
-            "model": {"name": "jeat-graph", "weights": "", "iou_threshold": 0.0, "image_size": 0},
+            "model": {
+                "name": "jeat-graph",
+                "weights": "",
+                "iou_threshold": 0.0,
+                "image_size": 0,
+                "max_confidence": 1.0,
+                "half_precision": False,
+                "classes": {str(number): name for number, name in enumerate(classes)},
+            },
             "chunksize": 1,
             "normalized_bbox": False,
         },
-        "trk": {
+        "tracking": {
             "otvision_version": "",
             "first_tracked_video_start": video.start,
             "last_tracked_video_end": video.start + seconds,

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -15,30 +16,43 @@ from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.tables import table_of
 
 
-def read_plain(path: str | Path, names: Mapping[int, Sequence[str]], kind: str) -> FileTable:
-    """Read lines of fields separated by commas or white space.
+def read_plain(
+    path: str | Path, names: Mapping[int, Sequence[str]], kind: str, data: bytes | None = None
+) -> FileTable:
+    """Read lines of fields separated by commas or white space; a comma may stand behind the last field.
 
     Args:
-        path: the file.
+        path: the file; one without any line is a table without rows.
         names: the column names by number of fields; the first line's count of fields decides.
         kind: the format's name, for messages.
+        data: the file's text, where it has been read.
 
     Raises:
         DataError: names the first line with a wrong number of fields.
     """
     file = Path(path)
-    data = read_text(file)
+    data = read_text(file, blank_ok=True) if data is None else data
+    if not data.strip():
+        return _without_rows(file, names[min(names)])
     data = re.sub(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)", b"", data)
     data = re.sub(rb"[ \t]*,[ \t]*|[ \t]+", b",", data)
     blank_lines = len(data) - len(data.lstrip())
     first = re.split(rb"[\r\n]", data.lstrip(), maxsplit=1)[0]
     width = first.count(b",") + 1
+    if width not in names and width - 1 in names and first.endswith(b","):
+        data, width = re.sub(rb"(?m),(?=\r?$)", b"", data), width - 1
     if width not in names:
         known = " or ".join(str(count) for count in sorted(names))
         line = 1 + len(data[:blank_lines].splitlines())
         raise DataError(f"{width} fields, but a {kind} line has {known}", path, line)
     body, columns = CsvBody(file, data, 1, width, "the first line has").parse()
     return table_of(body, names[width], columns)
+
+
+def _without_rows(file: Path, names: Sequence[str]) -> FileTable:
+    import pyarrow as pa
+
+    return FileTable(file, {name: pa.chunked_array([], type=pa.string()) for name in names})
 
 
 def frames_of(table: FileTable, first: int) -> IntArray:
@@ -58,7 +72,15 @@ def frames_of(table: FileTable, first: int) -> IntArray:
     return frame
 
 
-def check_sizes(table: FileTable, boxes: FloatArray) -> None:
+class _CanSayWhere(Protocol):
+    """What can make an error that names the place of a row (from 0) in its file."""
+
+    @property
+    def error(self) -> Callable[[int, str], DataError]:
+        """Makes the error from the row and a message."""
+
+
+def check_sizes(table: _CanSayWhere, boxes: FloatArray) -> None:
     """Check that widths and heights are positive.
 
     Args:

@@ -1,4 +1,4 @@
-"""Trajectory tables from and to files: the run's own tables; results of MOTChallenge and KITTI are read too.
+"""Trajectory tables from and to files: the run's own tables; results of other trackers are read too.
 
 A run's table keeps times to the last bit, boxes and motion to 0.001 px (px/s, px/s²), existence to 1e-6 and
 variances to six significant digits, in CSV and Parquet alike; the same table gives the same bytes.
@@ -10,22 +10,22 @@ import graphlib
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.class_columns import class_column, unknown_classes
-from jeat_graph.data.column_names import BOX
+from jeat_graph.data.column_names import BOX, standing_in
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.data.views import MEAN, SIZE_VAR, VAR
-from jeat_graph.io import kitti, motchallenge
+from jeat_graph.io.box_rows import FileBoxes, read_rows
 from jeat_graph.io.file_table import FileTable
-from jeat_graph.io.formats import recognise
-from jeat_graph.io.frames import check_rate
+from jeat_graph.io.formats import known_columns, recognise
 from jeat_graph.io.piecewise import PiecewiseWriter
-from jeat_graph.io.plain_text import frames_of
+from jeat_graph.io.reading import Reading, ReadingOptions
+from jeat_graph.io.result_tables import NO_IDENTITIES, RESULT_COLUMNS, read_result_table
 from jeat_graph.io.rounding import round_decimals, round_significant
 from jeat_graph.io.table_writer import TableWriter
 from jeat_graph.io.tables import read_table
@@ -41,6 +41,9 @@ EXISTENCE_DECIMALS = 6
 _VAR_DIGITS = 6
 _SCALE = np.repeat([10.0**PX_DECIMALS, 10.0**EXISTENCE_DECIMALS], [10, 1])
 _JOINT = "|"
+_TABLES = ("csv", "parquet")
+# A file of white space only is no larger.
+_BLANK_BYTES = 100
 _FLUSH_ROWS = 8192
 _MOST_SENSORS = 63  # bits of `Trajectories.used`
 
@@ -136,39 +139,51 @@ def write_trajectories(table: Trajectories, path: str | Path) -> None:
 
 
 def read_trajectories(
-    path: str | Path, *, rate_hz: float | None = None, fmt: str | None = None
+    path: str | Path, *, fmt: str | None = None, **options: Unpack[ReadingOptions]
 ) -> Trajectories:
-    """Read a table of the contract (CSV, Parquet), or a MOTChallenge or KITTI result.
+    """Read a table of the contract (CSV, Parquet), or another tracker's result in any format of detections.
 
-    A result has boxes only. Its mean is then the box's centre with velocity and acceleration 0, its variances
-    are NaN, and no sensor is named. Its confidence is the existence where it is in [0, 1];
-    any other value (MOTChallenge writes -1 for unknown) counts as 1.
+    A result has boxes with identities only. Its mean is then the box's centre with velocity and acceleration
+    0, its variances are NaN, and no sensor is named. Its confidence is the existence where it is in [0, 1];
+    any other value (MOTChallenge writes -1 for unknown) counts as 1. A file without any line is a result
+    without tracks.
 
     Args:
-        path: the file.
-        rate_hz: frame rate of a result; see `read_truth`.
+        path: the file, or the folder of YOLO's labels.
         fmt: the format, if it should not be recognised from the file.
+        options: what a result does not say itself, as `io.reading.Reading` has it: `rate_hz`, `first_frame`,
+            `video`, `class_names`, `image`, `time_unit`.
 
     Raises:
         DataError: names the file, the line or row, and what is wrong, such as a track twice at one time.
     """
-    kind = recognise(path, fmt, ("csv", "parquet", "motchallenge", "kitti"))
-    if kind == "motchallenge":
-        table = motchallenge.read_lines(path)
-        rate, _ = motchallenge.sequence_rate(path, rate_hz)
-        frame = frames_of(table, motchallenge.FIRST_FRAME) - motchallenge.FIRST_FRAME
-        found = _without_motion(table, frame / rate, motchallenge.boxes_of(table), "conf")
-    elif kind == "kitti":
-        table = kitti.read_lines(path)
-        rate = check_rate(kitti.RATE_HZ if rate_hz is None else rate_hz, path)
-        frame = frames_of(table, kitti.FIRST_FRAME)
-        found = _without_motion(table, frame / rate, kitti.boxes_of(table), "score")
-        found = replace(found, **class_column(table.text("type"), None))
-    else:
-        table = read_table(path, COLUMNS, (*CLASS_COLUMNS, *SIZE_COLUMNS))
-        found = _read_contract(table)
-    _check(table, found)
-    return found
+    return read_trajectories_counted(path, fmt, Reading(**options))[0]
+
+
+def read_trajectories_counted(
+    path: str | Path, fmt: str | None, how: Reading
+) -> tuple[Trajectories, int | None]:
+    """Read as `read_trajectories` does, and tell the first frame's number where the format leaves it open."""
+    kind = recognise(path, fmt)
+    if kind in _TABLES:
+        if Path(path).stat().st_size < _BLANK_BYTES and not Path(path).read_bytes().strip():
+            return Trajectories.empty(), None
+        if not _is_result(path):
+            table = read_table(path, COLUMNS, (*CLASS_COLUMNS, *SIZE_COLUMNS))
+            found = _read_contract(table)
+            _check(table, found)
+            return found, None
+    rows = read_rows(path, kind, how) if kind not in _TABLES else read_result_table(path, how)
+    found = _without_motion(rows, path)
+    _check(rows, found)
+    return found, rows.first
+
+
+def _is_result(path: str | Path) -> bool:
+    """Whether a table is another tracker's: it has boxes, and nothing that only our own tables have."""
+    names = known_columns(path, RESULT_COLUMNS)
+    boxes = set(standing_in(names, BOX)) <= set(names)
+    return boxes and not {"existence", "sensors", *VAR} & set(names)
 
 
 def _read_contract(table: FileTable) -> Trajectories:
@@ -221,27 +236,31 @@ def _sensor_order(texts: Iterable[str]) -> tuple[str, ...]:
         return tuple(ordered)
 
 
-def _without_motion(table: FileTable, t: FloatArray, boxes: FloatArray, score: str) -> Trajectories:
-    n = len(t)
-    existence = table.number(score) if score in table else np.ones(n)
+def _without_motion(rows: FileBoxes, path: str | Path) -> Trajectories:
+    n = len(rows.t)
+    if n and (rows.ids is None or (n > 1 and (rows.ids < 0).all())):
+        raise DataError(NO_IDENTITIES, path)
+    ids = np.zeros(0, dtype=np.int64) if rows.ids is None else rows.ids
+    existence = np.ones(n) if rows.scores is None else rows.scores
     mean = np.zeros((n, 6))
-    mean[:, :2] = boxes[:, :2] + boxes[:, 2:] / 2
-    return Trajectories(
-        t=t,
-        track_id=table.whole("id"),
-        boxes=boxes,
+    mean[:, :2] = rows.boxes[:, :2] + rows.boxes[:, 2:] / 2
+    found = Trajectories(
+        t=rows.t,
+        track_id=ids,
+        boxes=rows.boxes,
         existence=np.where((existence >= 0) & (existence <= 1), existence, 1.0),
         mean=mean,
         var=np.full((n, 6), np.nan),
         used=np.zeros(n, dtype=np.int64),
     )
+    return replace(found, **class_column(rows.classes, None))
 
 
 def _stack(table: FileTable, names: Iterable[str]) -> FloatArray:
     return np.stack([table.number(name) for name in names], axis=1)
 
 
-def _check(table: FileTable, found: Trajectories) -> None:
+def _check(table: FileTable | FileBoxes, found: Trajectories) -> None:
     negative = (found.boxes[:, 2:] < 0).any(axis=1)
     if negative.any():
         row = int(np.argmax(negative))

@@ -3,96 +3,94 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.column_names import BOX, standing_in
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.frame_columns import ASIDE
 from jeat_graph.data.trajectories import GroundTruth
-from jeat_graph.io import kitti, motchallenge, prophesee
-from jeat_graph.io.column_names import boxes_of, times_of
+from jeat_graph.io.box_rows import FileBoxes, read_rows
+from jeat_graph.io.column_names import boxes_of, classes_of, of_one_video, times_of
 from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.formats import recognise
-from jeat_graph.io.frames import check_rate, fill_frames, gap_times
-from jeat_graph.io.plain_text import check_sizes, frames_of
+from jeat_graph.io.plain_text import check_sizes
+from jeat_graph.io.reading import Reading, ReadingOptions
 from jeat_graph.io.table_writer import write_columns
 from jeat_graph.io.tables import read_table
 
 _REQUIRED = ("t", "object_id", *BOX)
 _MOTION = ("x", "y", "vx", "vy", "ax", "ay")
-_OPTIONAL = (*_MOTION, "class", "ignore", "distance")
+_OPTIONAL = (*_MOTION, "ignore", "distance", *ASIDE)
 _TRUTH_WORDS = {"": False, "0": False, "1": True, "false": False, "true": True}
 
 
-def read_truth(
-    path: str | Path, *, rate_hz: float | None = None, fmt: str | None = None, time_unit: str = "s"
-) -> GroundTruth:
+def read_truth(path: str | Path, *, fmt: str | None = None, **options: Unpack[ReadingOptions]) -> GroundTruth:
     """Read ground truth from a file of any known format.
 
     ============  ==========================================================================================
     csv, parquet  `t, object_id, left, top, width, height`, optional `x, y, vx, vy, ax, ay, class, ignore,
                   distance`; a row with only `t` is a recorded frame without objects. With any motion column
                   there is motion: a column that is absent is NaN, except x and y, then the box's centre.
-                  Usual other names are understood, see `column_names`; `time_unit` is the unit of `t`.
-    motchallenge  column 7 = 0 means ignore. With 9 columns the 8th is the class; with 10, columns 8 to 10 are
-                  world coordinates and are passed over. Rate from `rate_hz` or `seqinfo.ini`.
+                  Usual other names are understood, see `column_names`.
+    motchallenge  column 7 = 0 means ignore. With 9 columns the 8th is the class, by the challenge's names
+                  beside a `seqinfo.ini`, else by number unless `labels.txt` lies beside it; with 10, columns
+                  8 to 10 are world coordinates and are passed over. Rate from `rate_hz` or `seqinfo.ini`.
+                  Also in a zip that CVAT takes or gives (`MOT 1.1`).
     kitti         tracking labels (17 columns); type is the class, `DontCare` is ignored, `distance` is that
                   of the 3D location. 10 Hz unless `rate_hz` says else.
     prophesee     structured `.npy` with `t` or `ts` (µs), `x, y, w, h, track_id`, optional `class_id`.
+    coco          data set whose annotations have `track_id`; `iscrowd` or `ignore` means ignore.
+    yolo          folder of labels with a track in the last column; needs `image` and `rate_hz`.
     ============  ==========================================================================================
 
-    MOTChallenge and KITTI cannot say that a frame is empty: all frames between the first and the last are
-    taken as recorded (every n-th, see `fill_frames`; to the length in `seqinfo.ini`, if there is
-    one). For `prophesee` that is done only where `rate_hz` is given.
+    MOTChallenge, KITTI and YOLO cannot say that a frame is empty: all frames between the first and the last
+    are taken as recorded (every n-th, see `fill_frames`; to the length in `seqinfo.ini`, if there is one).
+    For `prophesee` and `coco` without a list of images that is done only where `rate_hz` is given.
+
+    Args:
+        path: the file.
+        fmt: the format, if it should not be recognised from the file.
+        options: what the file does not say itself, as `io.reading.Reading` has it.
 
     Raises:
         DataError: names the file, the line or row, and what is wrong, such as an object twice at one time.
     """
-    kind = recognise(path, fmt, ("csv", "parquet", "motchallenge", "kitti", "prophesee"))
+    return read_truth_counted(path, fmt, Reading(**options))[0]
+
+
+def read_truth_counted(path: str | Path, fmt: str | None, how: Reading) -> tuple[GroundTruth, int | None]:
+    """Read truth as `read_truth` does, and tell the first frame's number where its format leaves it open."""
+    kind = recognise(path, fmt)
     if kind in ("csv", "parquet"):
-        return _read_contract(path, rate_hz, time_unit)
-    distance: FloatArray | None = None
-    if kind == "motchallenge":
-        table = motchallenge.read_lines(path)
-        rate, length = motchallenge.sequence_rate(path, rate_hz)
-        frame = frames_of(table, motchallenge.FIRST_FRAME) - motchallenge.FIRST_FRAME
-        t, ids, boxes = frame / rate, table.whole("id"), motchallenge.boxes_of(table)
-        classes = motchallenge.class_names(table)
-        ignore = table.number("conf") == 0 if "conf" in table else np.zeros(len(t), dtype=bool)
-        frames = (fill_frames(frame + 1, path, length) - 1) / rate
-        negative = (ids < 0) & ~ignore
-        if negative.any():
-            raise table.error(int(np.argmax(negative)), "truth needs an id, got -1; are these detections?")
-    elif kind == "kitti":
-        table = kitti.read_lines(path)
-        rate = check_rate(kitti.RATE_HZ if rate_hz is None else rate_hz, path)
-        frame = frames_of(table, kitti.FIRST_FRAME)
-        t, ids, boxes, classes = frame / rate, table.whole("id"), kitti.boxes_of(table), table.text("type")
-        ignore = classes == kitti.NO_OBJECT
-        distance = kitti.distances_of(table)
-        frames = fill_frames(frame, path) / rate
-    else:
-        table = prophesee.read_array(path)
-        if "track_id" not in table:
-            raise DataError("field 'track_id' is missing; truth needs ids", path)
-        t, ids, boxes = prophesee.times_of(table), table.whole("track_id"), prophesee.boxes_of(table)
-        classes, ignore, frames = prophesee.class_names(table), np.zeros(len(t), dtype=bool), np.unique(t)
-        if rate_hz is not None:
-            frames = np.union1d(frames, gap_times(t, rate_hz, path))
-    check_sizes(table, boxes)
-    _check_unique(table, t, ids, ignore)
-    return GroundTruth(
-        t=t,
+        return _read_contract(path, how)
+    rows = read_rows(path, kind, how, truth=True)
+    frames = np.unique(rows.recorded())
+    if rows.ids is None and len(rows.t):
+        raise DataError("has no identities (a column or field such as track_id); truth needs ids", path)
+    if not len(frames):
+        raise DataError("is empty, and how many frames were recorded is not known", path)
+    ids = np.zeros(0, dtype=np.int64) if rows.ids is None else rows.ids
+    ignore = np.zeros(len(ids), dtype=bool) if rows.ignore is None else rows.ignore
+    negative = (ids < 0) & ~ignore
+    if negative.any():
+        row = int(np.argmax(negative))
+        raise rows.error(row, f"truth needs an id, got {ids[row]}; are these detections?")
+    check_sizes(rows, rows.boxes)
+    _check_unique(rows, rows.t, ids, ignore)
+    truth = GroundTruth(
+        t=rows.t,
         object_id=ids,
-        boxes=boxes,
+        boxes=rows.boxes,
         motion=None,
         ignore=np.asarray(ignore, dtype=bool),
-        classes=classes,
-        distance=distance,
+        classes=rows.classes,
+        distance=rows.distance,
         frames=frames,
     )
+    return truth, rows.first
 
 
 def write_truth(truth: GroundTruth, path: str | Path) -> None:
@@ -124,9 +122,10 @@ def write_truth(truth: GroundTruth, path: str | Path) -> None:
     write_columns(columns, path)
 
 
-def _read_contract(path: str | Path, rate_hz: float | None, time_unit: str) -> GroundTruth:
-    table = read_table(path, _REQUIRED, _OPTIONAL, short=("t",), aliases=True)
-    all_t = times_of(table, time_unit, rate_hz)
+def _read_contract(path: str | Path, how: Reading) -> tuple[GroundTruth, int | None]:
+    table = of_one_video(read_table(path, _REQUIRED, _OPTIONAL, short=("t",), aliases=True), how)
+    times = times_of(table, how)
+    all_t = times.t
     values = standing_in(table.names, _REQUIRED[1:])
     bare = table.bare(values, "a frame without objects has only t")
     rows = np.flatnonzero(~bare)
@@ -142,16 +141,20 @@ def _read_contract(path: str | Path, rate_hz: float | None, time_unit: str) -> G
             if name in table:
                 motion[:, k] = table.number(name, blank_ok=True, nan_ok=True)
     distance = table.number("distance", blank_ok=True, nan_ok=True)[rows] if "distance" in table else None
-    return GroundTruth(
+    classes = classes_of(table, how)
+    if classes is None and "class" in table:
+        classes = np.zeros(len(all_t), dtype="U1")
+    truth = GroundTruth(
         t=all_t[rows],
         object_id=ids[rows],
         boxes=np.ascontiguousarray(boxes[rows]),
         motion=None if motion is None else motion[rows],
         ignore=ignore[rows],
-        classes=table.text("class", blank_ok=True)[rows] if "class" in table else None,
+        classes=None if classes is None else classes[rows],
         distance=distance,
         frames=np.unique(all_t),
     )
+    return truth, times.first
 
 
 def _ignore_flags(table: FileTable) -> BoolArray:
@@ -167,7 +170,7 @@ def _ignore_flags(table: FileTable) -> BoolArray:
     return np.asarray(flags, dtype=bool)[index.reshape(-1)]
 
 
-def _check_unique(table: FileTable, t: FloatArray, ids: IntArray, exempt: BoolArray) -> None:
+def _check_unique(table: FileTable | FileBoxes, t: FloatArray, ids: IntArray, exempt: BoolArray) -> None:
     """Refuse an object that is there twice at one time, unless it is one that is not judged."""
     rows = np.flatnonzero(~exempt)
     order = rows[np.lexsort((rows, ids[rows], t[rows]))]

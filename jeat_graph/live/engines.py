@@ -10,6 +10,7 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
 from jeat_graph.data.errors import JeatGraphError
+from jeat_graph.data.extras import install
 from jeat_graph.data.processes import SafePool, end_with_parent
 
 ENGINES = ("local", "ray")
@@ -124,7 +125,7 @@ def run_on_ray(
     try:
         import ray
     except ImportError:
-        raise JeatGraphError("--engine ray needs Ray: pip install 'jeat-graph[ray]'") from None
+        raise JeatGraphError(f"--engine ray needs Ray: {install('ray')}") from None
     options: dict[str, Any] = {"log_to_driver": False, "logging_level": "error"}
     if address is None:
         options |= {"num_cpus": workers, "include_dashboard": False}

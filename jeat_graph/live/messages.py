@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jeat_graph.data.errors import DataError, JeatGraphError
+from jeat_graph.data.extras import install
 from jeat_graph.io.scan_batch import ScanBatch
 from jeat_graph.io.scan_lines import batch_of
 from jeat_graph.live.memory import Memory, fingerprint
@@ -126,7 +127,7 @@ def _msgpack() -> Any:
     try:
         import msgpack
     except ImportError:
-        raise JeatGraphError("MessagePack needs a package more: pip install 'jeat-graph[msgpack]'") from None
+        raise JeatGraphError(f"MessagePack needs a package more: {install('msgpack')}") from None
     return msgpack
 
 

@@ -95,15 +95,16 @@ def rate_of_truth(run: str | Path, truth: str | Path, rate_hz: float | None) -> 
         rate_hz: what the user says, or None.
 
     Returns:
-        The user's rate (Hz); without it, where the truth is MOTChallenge text without `seqinfo.ini`, the one
+        The user's rate (Hz); without it, where the truth counts frames and no `seqinfo.ini` says it, the one
         that the run's input was read by; else None.
 
     Raises:
         DataError: the user's rate is not that of `seqinfo.ini` beside the truth, or of the run's input.
     """
-    from jeat_graph.io.formats import recognise
+    from jeat_graph.io.formats import counts_frames, recognise
 
-    counts = recognise(truth) == "motchallenge"
+    kind = recognise(truth)
+    counts = kind != "kitti" and counts_frames(truth, kind)
     known = facts_beside([truth]) if counts else None
     recorded = recorded_rate(run)
     if rate_hz is None:

@@ -15,8 +15,11 @@ from jeat_graph.runs.clocks import check_clocks, wrong_times
 from jeat_graph.runs.declaring import LEAST_SCANS, scan_rate_hz
 from jeat_graph.tracking.input_watch import CORNERS, SHARES, look_like_corners, look_like_shares
 
-# A box at the edge may have its centre outside; a recording of another picture size has far more of them.
-MOST_OUTSIDE = 0.05
+# Detectors guess what the picture cuts off, so that a tenth or two of the centres may lie outside. Where most
+# of them do, the picture is another.
+MOST_OUTSIDE = 0.5
+# So many outside are worth a question, whether they are corners taken for sizes.
+MANY_OUTSIDE = 0.05
 # A clock that differs this much from the declared one is worth a word: rates decide about clutter and misses.
 RATE_FACTOR = 1.5
 
@@ -33,7 +36,7 @@ def check_detections(detections: Detections, config: Config, names: str = "the d
         Warnings, each one line.
 
     Raises:
-        DataError: there is no scan at all, the times are not in seconds, or the boxes do not belong to a
+        DataError: there is no scan at all, the times are not in seconds, most of the boxes lie outside a
             picture of this size, or sensors have different clocks.
         UnknownSensorError: a sensor that the configuration does not declare.
     """
@@ -117,7 +120,7 @@ def _check_picture(detections: Detections, config: Config, names: str) -> list[s
         f"{names}: {count} of {total} box centres lie outside the picture of {width:g} x {height:g} px "
         f"(they reach from {low[0]:.0f}, {low[1]:.0f} to {high[0]:.0f}, {high[1]:.0f})"
     )
-    if count > MOST_OUTSIDE * total and look_like_corners(boxes, width, height):
+    if count > MANY_OUTSIDE * total and look_like_corners(boxes, width, height):
         raise DataError(f"{names}: {CORNERS}")
     if count > MOST_OUTSIDE * total:
         raise DataError(f"{found}; give the picture's size: --image WIDTHxHEIGHT")

@@ -21,13 +21,13 @@ def describe_inputs(paths: Sequence[str | Path]) -> list[dict[str, Any]]:
     Raises:
         DataError: a file cannot be read.
     """
-    from jeat_graph.io.hashing import sha256_of
+    from jeat_graph.io.hashing import sha256_of, size_of
 
     return [
         {
             "path": str(p),
             "absolute": str(Path(p).resolve()),
-            "bytes": Path(p).stat().st_size,
+            "bytes": size_of(p),
             "sha256": sha256_of(p),
         }
         for p in paths
@@ -93,9 +93,10 @@ def find_input(given: str | Path, record: Mapping[str, Any], folder: Path) -> Pa
     Raises:
         DataError: there is such a file, but it does not lie beside the run.
     """
-    from jeat_graph.io.hashing import sha256_of
+    from jeat_graph.io.hashing import sha256_of, size_of
 
-    found = [place for place in dict.fromkeys(_places(Path(given), record, folder)) if place.is_file()]
+    # A folder of labels is an input, too.
+    found = [place for place in dict.fromkeys(_places(Path(given), record, folder)) if place.exists()]
     there = [place for place in found if lies_beside(place, folder)]
     if found and not there:
         raise DataError(
@@ -103,7 +104,7 @@ def find_input(given: str | Path, record: Mapping[str, Any], folder: Path) -> Pa
             "--diagnostics, which keeps in the run what is needed",
             given,
         )
-    same = (place for place in there if place.stat().st_size == record.get("bytes", place.stat().st_size))
+    same = (place for place in there if size_of(place) == record.get("bytes", size_of(place)))
     return next(
         (place for place in same if sha256_of(place) == record.get("sha256")), there[0] if there else None
     )

@@ -213,7 +213,7 @@ def recorded_inputs(
     for name, described in zip(names, inputs, strict=True):
         prefix, file = split_name(name)
         place = find_input(file, described, folder) if moved is None else Path(file)
-        if place is None or not place.is_file():
+        if place is None or not place.exists():
             raise DataError("input of the run is not there; say where it is with --detections", file)
         if sha256_of(place) != described["sha256"]:
             raise DataError("has changed since the run; track it again", file)

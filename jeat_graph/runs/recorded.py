@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from jeat_graph.data.progress import progress_span
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.eval.judge import Judgement
 from jeat_graph.io.beside import check_beside
+from jeat_graph.io.reading import ReadingOptions
 from jeat_graph.runs.directory import DIAGNOSTICS, read_record
 
 
@@ -73,13 +74,15 @@ class RunData:
         return min(float(t.min()) for t in tables), max(float(t.max()) for t in tables)
 
 
-def load_run_data(run: str | Path, truth: str | Path | None = None, rate_hz: float | None = None) -> RunData:
+def load_run_data(
+    run: str | Path, truth: str | Path | None = None, **options: Unpack[ReadingOptions]
+) -> RunData:
     """Read a run's files, and judge it where there is truth.
 
     Args:
-        run: a run directory, a trajectory table, or a MOTChallenge or KITTI result.
+        run: a run directory, a trajectory table, or another tracker's result.
         truth: true boxes, or None.
-        rate_hz: frame rate of files that count frames.
+        options: what files do not say themselves, as `eval.load.load_run` takes it.
 
     Raises:
         DataError: a file is missing or not valid, or run and truth do not fit together.
@@ -93,12 +96,12 @@ def load_run_data(run: str | Path, truth: str | Path | None = None, rate_hz: flo
     judged: dict[str, Judgement] = {}
     if truth is not None:
         with progress_span(0.0, 0.4):
-            one = load_run(run, truth, rate_hz=rate_hz)
+            one = load_run(run, truth, **options)
         with progress_span(0.4, 1.0):
             judged = judge_runs([one])
         causal, smoothed = one.causal, one.smoothed
     else:
-        read = {kind: read_trajectories(path, rate_hz=rate_hz) for kind, path in files.items()}
+        read = {kind: read_trajectories(path, **options) for kind, path in files.items()}
         causal, smoothed = read.get("causal"), read.get("smoothed")
     record = read_record(folder) if folder.is_dir() else {}
     diagnostics = _read_diagnostics(folder)

@@ -31,6 +31,10 @@ class TrackRequest:
         images: COCO data set with the times of COCO results, or None.
         time_unit: unit of the column `t`, of `data.time_units`.
         classes: classes of detections to be taken, and those without one; None takes all.
+        first_frame: number of the first frame of files that count frames, or None for the usual rule.
+        video: the one that is read of a file's several videos, or None.
+        class_names: names of classes that files number, as `io.class_names` takes them from a command.
+        image: size of the picture (px) for boxes in shares of it; None for that of the configuration.
         frames: pictures that tell the picture's size and the frame rate, or None.
         options: how the run is written.
     """
@@ -45,6 +49,10 @@ class TrackRequest:
     images: str | None = None
     time_unit: str = "s"
     classes: tuple[str, ...] | None = None
+    first_frame: int | None = None
+    video: str | None = None
+    class_names: str | None = None
+    image: tuple[float, float] | None = None
     frames: str | None = None
     options: RunOptions = field(default_factory=RunOptions)
 
@@ -102,14 +110,20 @@ class TrackRequest:
         }
 
     def _reading(self) -> dict[str, Any]:
-        classes = {} if self.classes is None else {"classes": list(self.classes)}
+        more = {
+            "classes": None if self.classes is None else list(self.classes),
+            "first_frame": self.first_frame,
+            "video": self.video,
+            "class_names": self.class_names,
+            "image": self.image,
+        }
         return {
             "rate_hz": self.rate_hz,
             "fmt": self.input_format,
             "score_scale": self.score_scale,
             "images": self.images,
             "time_unit": self.time_unit,
-            **classes,
+            **{name: value for name, value in more.items() if value is not None},
         }
 
 
@@ -132,6 +146,7 @@ def track_files(
         JeatGraphError: the configuration or a file is not valid, or they do not fit together.
     """
     from jeat_graph.io.detections_io import read_many
+    from jeat_graph.io.formats import recognise
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.directory import RunDirectory
     from jeat_graph.runs.input_checks import check_detections, check_units
@@ -143,6 +158,8 @@ def track_files(
     check_distinct(request.detections)
     directory = RunDirectory(request.out, inputs=request.files)
     request = request.with_facts()[0]
+    if config.input.picture == "given" and any(recognise(path) == "yolo" for path in request.files):
+        request = replace(request, image=(config.image.width, config.image.height))
     for note in notes:
         say(note)
     detections = read_many(request.detections, **request._reading())

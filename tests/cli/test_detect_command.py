@@ -121,7 +121,7 @@ def test_what_cannot_be_is_said_in_one_line(words, said, tmp_path, monkeypatch, 
 
 @pytest.mark.skipif(not STREET.is_file(), reason=f"{STREET} is not there")
 def test_a_real_street_from_one_file(tmp_path):
-    pytest.importorskip("aedat", reason="pip install 'jeat-graph[aedat4]'")
+    pytest.importorskip("aedat", reason="pip install 'aedat>=2.2,<3'")
     assert main(["track", "--frames", str(STREET), "--events", str(STREET), "--out", str(tmp_path)]) == 0
     table = pd.read_csv(tmp_path / "smoothed.csv")
     # Three cars: near and white all the time, far and white all the time, dark from the shadow at 1.2 s.

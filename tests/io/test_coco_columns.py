@@ -11,6 +11,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.io import coco_columns
 from jeat_graph.io.coco import read_results
 from jeat_graph.io.coco_columns import read_entries
+from jeat_graph.io.reading import Reading
 
 GOOD = {"image_id": 3, "bbox": [1, 2.5, 1e-3, 40], "score": 0.25, "category_id": 2}
 MASK = {"segmentation": {"size": [2, 2], "counts": "a}, {b"}, "area": 1.5}
@@ -82,7 +83,7 @@ def test_the_entry_that_is_wrong_is_named(tmp_path, wrong):
     path = tmp_path / "r.json"
     path.write_text(json.dumps([*RESULTS, GOOD | wrong]), encoding="utf-8")
     with pytest.raises(DataError, match=r"r\.json: entry 8: "):
-        read_results(path, 10.0, None)
+        read_results(path, Reading(rate_hz=10.0))
 
 
 def test_both_ways_give_the_same_boxes(tmp_path):
@@ -96,6 +97,8 @@ def test_both_ways_give_the_same_boxes(tmp_path):
     for name, more in (("quick.json", {}), ("slow.json", {"caption": "é"})):
         text = json.dumps([entries[0] | more, *entries[1:]], ensure_ascii=False)
         (tmp_path / name).write_text(text, encoding="utf-8")
-    quick, slow = (read_results(tmp_path / name, 25.0, None) for name in ("quick.json", "slow.json"))
+    quick, slow = (
+        read_results(tmp_path / name, Reading(rate_hz=25.0)) for name in ("quick.json", "slow.json")
+    )
     for field in ("t", "boxes", "scores", "classes"):
         np.testing.assert_array_equal(getattr(quick, field), getattr(slow, field))

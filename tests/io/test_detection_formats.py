@@ -71,7 +71,7 @@ class TestMotChallenge:
     @pytest.mark.parametrize(
         ("row", "words"),
         [
-            ("0,-1,10,20,30,40,0.9,-1,-1,-1", "frames count from 1, got 0"),
+            ("-1,-1,10,20,30,40,0.9,-1,-1,-1", "frames count from 1, got -1"),
             ("1.5,-1,10,20,30,40,0.9,-1,-1,-1", "frame must be a whole number"),
             (
                 "2,-1,10,20,30,40,12.5,-1,-1,-1",
@@ -116,10 +116,11 @@ class TestKitti:
     def test_the_type_is_the_class(self, write):
         assert read_detections(write("0001.txt", KITTI)).classes.tolist() == ["Car", "Van"]
 
-    def test_labels_without_a_score_are_no_detections(self, write):
+    def test_labels_without_a_score_are_sure(self, write):
         text = "".join(line.rsplit(" ", 1)[0] + "\n" for line in KITTI.splitlines())
-        with pytest.raises(DataError, match="score"):
-            read_detections(write("0001.txt", text))
+        found = read_detections(write("0001.txt", text + text.splitlines()[0].replace("Car", "DontCare")))
+        assert found.scores.tolist() == [1.0, 1.0]
+        assert found.classes.tolist() == ["Car", "Van"]
 
     def test_a_box_with_its_edges_swapped_is_named_by_its_line(self, write):
         path = write("0001.txt", KITTI + KITTI.splitlines()[0].replace("40 60", "5 60"))
@@ -157,8 +158,6 @@ class TestPropheseeAndDsec:
         [
             (np.zeros(3), "1-D structured array"),
             (np.zeros(3, dtype=PROPHESEE[1:]), "field 't' is missing"),
-            (np.ones(3, dtype=PROPHESEE), "detections need a score"),
-            (np.ones(3, dtype=[*PROPHESEE[:-1], ("class_confidence", "f4", 2)]), "detections need a score"),
         ],
     )
     def test_an_array_of_another_kind_is_refused(self, tmp_path, array, words):
@@ -192,9 +191,9 @@ class TestCoco:
     def test_image_ids_become_times_by_the_rate(self, write):
         found = read_detections(write("r.json", json.dumps(self.RESULTS)), rate_hz=10)
         assert summary(found) == [
-            (1.0, "rgb", [[5.5, 6, 7, 8]], [1.0]),
-            (1.1, "rgb", [], []),
-            (1.2, "rgb", [[1, 2, 3, 4]], [0.5]),
+            (0.9, "rgb", [[5.5, 6, 7, 8]], [1.0]),
+            (1.0, "rgb", [], []),
+            (1.1, "rgb", [[1, 2, 3, 4]], [0.5]),
         ]
 
     def test_the_list_of_images_gives_times_names_and_empty_scans(self, write):
@@ -229,7 +228,14 @@ class TestCoco:
                 '[{"image_id": 1, "bbox": [1,2,3,NaN], "score": 1}]',
                 "entry 1: bbox must be four finite numbers",
             ),
-            ('[{"image_id": 1, "bbox": [1,2,3,4]}]', "entry 1: score must be a finite number"),
+            (
+                '[{"image_id": 1, "bbox": [1,2,3,4], "score": null}]',
+                "entry 1: score must be a finite number",
+            ),
+            (
+                '[{"image_id": 1, "bbox": [1,2,3,4]}, {"image_id": 1, "bbox": [1,2,3,4], "score": 1}]',
+                "entry 1: score is missing",
+            ),
             ('[{"image_id": 1, "bbox": [1,2,3,4], "score": 3}]', "entry 1: score must be in [0, 1]"),
             (
                 '[{"image_id": 1, "bbox": [1,2,-1,4], "score": 1}]',
@@ -283,7 +289,7 @@ class TestRecognition:
         assert recognise(write("b.txt", "1 -1 1 1 1 1 1\n")) == "motchallenge"
 
     def test_a_format_that_makes_no_sense_is_refused(self, write):
-        with pytest.raises(DataError, match="unknown format 'yolo'; known: csv"):
-            recognise(write("a.csv", MOT), "yolo")
+        with pytest.raises(DataError, match="unknown format 'voc'; known: csv"):
+            recognise(write("a.csv", MOT), "voc")
         with pytest.raises(DataError, match="is coco; here only csv can be read"):
             recognise(write("a.json", "[]"), allowed=("csv",))

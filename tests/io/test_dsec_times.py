@@ -65,5 +65,5 @@ def test_a_blosc_file_without_its_filter_names_the_extra(tmp_path):
         file.append(events)
     command = [sys.executable, "-c", WITHOUT_PLUGIN, tmp_path / "e.h5"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert "pip install 'jeat-graph[hdf5]'" in done.stdout
+    assert "pip install 'hdf5plugin>=5'" in done.stdout
     assert done.stdout.count("\n") == 1

@@ -19,6 +19,8 @@ HEADERS = [
     "t,sensor,left,top,width,height,score",
     "t,object_id,left,top,width,height,ignore,class",
     ",".join(COLUMNS),
+    "video,image,track_id,box,score,class_id,name",
+    "frame_index,x_min,y_min,x_max,y_max,class_id,confidence,tracker_id",
 ]
 FIELDS = st.sampled_from(
     [

@@ -134,7 +134,7 @@ def test_a_filter_that_is_missing_is_named(tmp_path):
         plist.set_filter(40_000, h5py.h5z.FLAG_OPTIONAL, ())
         h5py.h5d.create(file.id, b"x", h5py.h5t.NATIVE_UINT16, h5py.h5s.create_simple((4,)), plist)
         said = str(reading_error(file["x"], OSError("no"), path))
-    assert "packed by filter 40000, which is not installed; pip install 'jeat-graph[hdf5]'" in said
+    assert "packed by filter 40000, which is not installed; pip install 'hdf5plugin>=5'" in said
 
 
 def test_links_within_the_file_are_followed(damaged):

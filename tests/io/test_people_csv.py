@@ -87,7 +87,7 @@ def test_a_compressed_motchallenge_file_is_recognised(tmp_path):
 
 
 def test_frames_take_their_times_from_the_rate(write):
-    text = "frame,sensor,x1,y1,x2,y2,confidence\n10,rgb,10.5,20,40.5,60,0.9\n11,rgb,,,,,\n"
+    text = "frame,sensor,x1,y1,x2,y2,confidence\n11,rgb,10.5,20,40.5,60,0.9\n12,rgb,,,,,\n"
     same(write("d.csv", text), rate_hz=20.0)
     with pytest.raises(DataError, match="frame numbers only; give their rate with --rate"):
         read_detections(write("d.csv", text))

@@ -135,9 +135,11 @@ class TestMotChallenge:
         assert found.frame_times().tolist() == [0.0, 0.1, 0.2]
         assert found.classes is None
 
-    def test_nine_columns_have_a_class(self, write):
-        found = read_truth(write("gt.txt", "1,1,1,2,3,4,1,3,0.5\n1,2,1,2,3,4,1,99,1\n"), rate_hz=10)
-        assert found.classes.tolist() == ["car", "99"]
+    def test_nine_columns_have_a_class_which_the_challenge_names(self, write):
+        path = write("gt.txt", "1,1,1,2,3,4,1,3,0.5\n1,2,1,2,3,4,1,99,1\n")
+        assert read_truth(path, rate_hz=10).classes.tolist() == ["3", "99"]
+        write("seqinfo.ini", "[Sequence]\nframeRate=10\n")
+        assert read_truth(path).classes.tolist() == ["car", "99"]
 
     def test_detections_are_no_truth(self, write):
         with pytest.raises(DataError, match=r"gt\.txt:1: truth needs an id"):

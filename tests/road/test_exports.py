@@ -246,7 +246,32 @@ def test_ottrk_is_compressed_json_of_detections_by_frame(tmp_path: Path) -> None
     assert [(r["track-id"], r["frame"]) for r in rows] == [(7, 1), (7, 2), (9, 2), (7, 3), (9, 3)]
     assert [r["first"] for r in rows] == [True, False, True, False, False]
     assert [r["finished"] for r in rows] == [False, False, False, True, True]
-    assert (rows[0]["x"], rows[0]["y"]) == (25.0, 40.0)
+    # Since version 1.1 of detections: the top left corner, not the centre.
+    assert (rows[0]["x"], rows[0]["y"], rows[0]["w"], rows[0]["h"]) == (10.0, 20.0, 30.0, 40.0)
     assert rows[1]["interpolated-detection"]
     assert rows[1]["occurrence"] == pytest.approx(1_777_636_800.05)
-    assert content["metadata"]["vid"]["number_of_frames"] == 3
+
+
+def test_ottrk_says_what_otanalytics_asks_for_of_the_video_the_detector_and_the_tracker(
+    tmp_path: Path,
+) -> None:
+    nothing, boxes = np.zeros((3, 6)), np.tile([10.0, 20.0, 30.0, 40.0], (3, 1))
+    kinds, share = np.array(["truck", "", "bus"]), np.ones(3)
+    table = Trajectories(
+        *(np.array([0.0, 0.05, 0.1]), np.array([7, 8, 9]), boxes, np.full(3, 0.9), nothing, nothing),
+        *(np.ones(3, dtype=np.int64), ("rgb",)),
+        classes=kinds,
+        class_probability=share,
+    )
+    write_ottrk(table, tmp_path / "a.ottrk", OttrkVideo("cam.mp4", 1280, 720, 20.0, 1_777_636_800.0))
+    said = json.loads(bz2.decompress((tmp_path / "a.ottrk").read_bytes()))["metadata"]
+    assert (said["otdet_version"], said["ottrk_version"]) == ("1.2", "1.1")
+    video = said["video"]
+    assert video["filename"] + video["filetype"] == "cam.mp4"
+    assert float(video["recorded_start_date"]) == 1_777_636_800.0
+    assert (video["width"], video["height"], video["number_of_frames"]) == (1280, 720, 3)
+    assert (float(video["recorded_fps"]), float(video["actual_fps"])) == (20.0, 20.0)
+    assert video["expected_duration"] == 1
+    # The classes that it offers as filters: all that occur in the detections.
+    assert set(said["detection"]["model"]["classes"].values()) == {"truck", "bus", "car"}
+    assert {"tracking_run_id", "frame_group"} <= set(said["tracking"])

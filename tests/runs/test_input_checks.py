@@ -66,6 +66,29 @@ def test_corners_taken_for_sizes_are_named_before_the_size_of_the_picture():
         check_detections(rows, config, "det")
 
 
+@pytest.mark.parametrize("outside", [1, 7, 19, 45])
+def test_boxes_that_reach_beyond_the_picture_are_told_of_and_tracked(outside):
+    """Detectors such as YOLOX guess what the picture cuts off: up to a fifth of their centres lie outside."""
+    x = np.full(100, 600.0)
+    x[:outside] = -90.0
+    boxes = np.column_stack([x, np.full(100, 200.0), np.full(100, 60.0), np.full(100, 40.0)])
+    t, names, full = np.arange(100) * 0.05, np.full(100, "rgb"), np.zeros(100, dtype=bool)
+    rows = Detections.from_rows(t, names, boxes, np.full(100, 0.9), full, None)
+    config = load_config("default", ["image.width=640", "image.height=480"])
+    (warning,) = check_detections(rows, config, "det")
+    assert f"{outside} of 100 box centres lie outside the picture of 640 x 480 px" in warning
+
+
+def test_a_recording_of_another_picture_is_refused():
+    rows = Detections.from_rows(
+        *(np.arange(20) * 0.05, np.full(20, "rgb"), np.tile([900.0, 500.0, 60.0, 40.0], (20, 1))),
+        *(np.full(20, 0.9), np.zeros(20, dtype=bool), None),
+    )
+    config = load_config("default", ["image.width=640", "image.height=480"])
+    with pytest.raises(DataError, match=r"20 of 20 box centres lie outside .*; give the picture's size"):
+        check_detections(rows, config, "det")
+
+
 def test_a_recording_of_which_next_to_nothing_is_tracked_is_told_of(tmp_path, capsys):
     """Boxes that are never twice at one place."""
     rng = np.random.default_rng(0)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.errors import ConfigError, DataError
+from jeat_graph.data.extras import install
 from jeat_graph.detection.models.onnx_head import OnnxHead
 
 
@@ -44,7 +45,7 @@ def open_engine(path: str | Path, head: OnnxHead, backend: str, threads: int) ->
             import onnxruntime  # noqa: F401
         except ImportError:
             if backend == "onnxruntime":
-                raise ConfigError("backend onnxruntime needs pip install 'jeat-graph[onnxruntime]'") from None
+                raise ConfigError(f"backend onnxruntime needs {install('onnxruntime')}") from None
         else:
             return _OnnxRuntime(Path(path), threads)
     return _OpenCv(Path(path), head, threads)
@@ -90,7 +91,7 @@ class _OpenCv:
             self._net = cv2.dnn.readNetFromONNX(str(path))
         except Exception as error:
             raise DataError(
-                f"cannot be run by OpenCV: {_short(error)}; pip install 'jeat-graph[onnxruntime]' runs more",
+                f"cannot be run by OpenCV: {_short(error)}; {install('onnxruntime')} runs more",
                 path,
             ) from None
 
@@ -101,7 +102,7 @@ class _OpenCv:
             found = self._net.forward(self._names)
         except Exception as error:
             raise DataError(
-                f"fails in OpenCV: {_short(error)}; pip install 'jeat-graph[onnxruntime]' runs more",
+                f"fails in OpenCV: {_short(error)}; {install('onnxruntime')} runs more",
                 self._path,
             ) from None
         return {name: np.asarray(value) for name, value in zip(self._names, found, strict=True)}

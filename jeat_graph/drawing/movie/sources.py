@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,7 @@ from jeat_graph.drawing.movie.backgrounds import (
 )
 from jeat_graph.drawing.movie.moments import TRAIL_S, TracksAt, TruthAt
 from jeat_graph.drawing.movie.panels import Movie
+from jeat_graph.io.reading import ReadingOptions
 from jeat_graph.runs.directory import RUN_JSON, read_record
 
 #: Names within a simulated data set, as jeat-graph-sehn writes it: its segments, and their files.
@@ -51,6 +52,7 @@ class Request:
         labels: which tracks have their number beside them: `all`, `thin` or `none`.
         trail_s: how far trails go back (s).
         classes: classes of the tracks to be drawn.
+        reading: what a result or truth does not say itself.
     """
 
     run: Path
@@ -68,6 +70,7 @@ class Request:
     labels: str = "thin"
     trail_s: float = TRAIL_S
     classes: list[str] | None = None
+    reading: ReadingOptions = field(default_factory=ReadingOptions)
 
 
 def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[str]]:
@@ -94,7 +97,8 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
         frames = VideoBackground(stack.enter_context(open_frames(request.frames, request.frame_rate_hz)))
     truth = None
     if request.truth is not None:
-        truth = read_truth(request.truth, rate_hz=request.frame_rate_hz)
+        how: ReadingOptions = {**request.reading, "first_frame": None}  # it is said of the tracks
+        truth = read_truth(request.truth, **how)
     rate_hz = request.rate_hz or _rate_of(frames) or DEFAULT_RATE_HZ
     if request.events is not None:
         window_s = request.window_s if request.window_s is not None else 1.0 / rate_hz
@@ -127,8 +131,6 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
 
 def _resolve(request: Request) -> tuple[dict[str, Trajectories], Request]:
     """Read the tracks; a segment without tracks stands for its own frames, events and truth."""
-    from dataclasses import replace
-
     from jeat_graph.eval.load import tables_of
     from jeat_graph.io.trajectories_io import read_trajectories
 
@@ -149,7 +151,7 @@ def _resolve(request: Request) -> tuple[dict[str, Trajectories], Request]:
     if request.only is not None and request.only not in files:
         raise DataError(f"has no {request.only} table", run)
     kinds = [request.only] if request.only is not None else list(files)
-    tables = {kind: read_trajectories(files[kind], rate_hz=request.frame_rate_hz) for kind in kinds}
+    tables = {kind: read_trajectories(files[kind], **request.reading) for kind in kinds}
     if request.classes is not None:
         tables = {kind: table.of_class(*request.classes) for kind, table in tables.items()}
     return tables, request

@@ -15,6 +15,7 @@ import numpy as np
 
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.events import EventArray
+from jeat_graph.data.extras import install
 from jeat_graph.io.events.ascending import Ascending
 from jeat_graph.io.events.reader import PIECE_ROWS, EventReader, Triggers, agreed_size
 
@@ -153,7 +154,7 @@ def _decoder(path: Path) -> Any:
     try:
         import aedat
     except ImportError:
-        raise ConfigError("AEDAT4 files need pip install 'jeat-graph[aedat4]'") from None
+        raise ConfigError(f"AEDAT4 files need {install('aedat4')}") from None
     try:
         return aedat.Decoder(str(path))
     except BaseException as error:

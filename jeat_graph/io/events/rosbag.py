@@ -23,6 +23,7 @@ import numpy.typing as npt
 
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.events import EventArray
+from jeat_graph.data.extras import install
 from jeat_graph.io.events.ascending import Ascending
 from jeat_graph.io.events.evt3 import Evt3Reader
 from jeat_graph.io.events.reader import PIECE_ROWS, EventReader, agreed_size
@@ -211,7 +212,7 @@ def _open(path: Path) -> tuple[Any, _Topic]:
         from rosbags.rosbag1 import Reader as Reader1
         from rosbags.rosbag2 import Reader as Reader2
     except ImportError:
-        raise ConfigError("ROS bags need pip install 'jeat-graph[ros]'") from None
+        raise ConfigError(f"ROS bags need {install('ros')}") from None
     second = path.is_dir()
     try:
         bag: Any = (Reader2 if second else Reader1)(path)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from jeat_graph.data.errors import ConfigError, JeatGraphError
+from jeat_graph.data.extras import install
 from jeat_graph.live.transport.address import Address, parse_address
 from jeat_graph.live.transport.notices import Notices, Tell, say_nothing
 from jeat_graph.live.transport.patience import Overdue, never
@@ -186,4 +187,4 @@ def _scheme(url: str) -> str:
 
 
 def _missing(scheme: str, error: ImportError) -> JeatGraphError:
-    return JeatGraphError(f"{scheme}:// needs a package more: pip install 'jeat-graph[{scheme}]' ({error})")
+    return JeatGraphError(f"{scheme}:// needs a package more: {install(scheme)} ({error})")

@@ -18,7 +18,7 @@ def refused(capsys, *words):
     return line
 
 
-def test_without_pytorch_the_extra_is_named(tmp_path, capsys, monkeypatch):
+def test_without_pytorch_the_packages_are_named(tmp_path, capsys, monkeypatch):
     real = builtins.__import__
 
     def lacking(name, *rest, **more):

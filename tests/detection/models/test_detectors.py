@@ -35,7 +35,7 @@ BACKENDS = ("opencv", "onnxruntime")
 
 def backend(name):
     if name == "onnxruntime":
-        pytest.importorskip("onnxruntime", reason="pip install 'jeat-graph[onnxruntime]'")
+        pytest.importorskip("onnxruntime", reason="pip install 'onnxruntime>=1.20,<2'")
     return name
 
 

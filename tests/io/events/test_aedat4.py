@@ -11,7 +11,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.io.events.opening import open_events
 
-pytest.importorskip("aedat", reason="pip install 'jeat-graph[aedat4]'")
+pytest.importorskip("aedat", reason="pip install 'aedat>=2.2,<3'")
 
 STREET = Path(__file__).parents[4] / "shared" / "data" / "davis346" / "street.aedat4"
 street = pytest.mark.skipif(not STREET.is_file(), reason=f"{STREET} is not there")

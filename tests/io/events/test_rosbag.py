@@ -13,7 +13,7 @@ from jeat_graph.io.events.opening import open_events
 
 from .plain import random_evt3, read_evt3
 
-rosbags = pytest.importorskip("rosbags", reason="pip install 'jeat-graph[ros]'")
+rosbags = pytest.importorskip("rosbags", reason="pip install 'rosbags>=0.10.6,<0.12'")
 
 EVENT = "uint16 x\nuint16 y\n{time} ts\nbool polarity"
 ARRAY = "std_msgs/Header header\nuint32 height\nuint32 width\ndvs_msgs/Event[] events"
