@@ -24,6 +24,7 @@ from jeat_graph.detection.picture_detector import PictureDetector
 from jeat_graph.detection.settings import BESIDE_RATE_HZ, DetectionSettings
 
 if TYPE_CHECKING:
+    from jeat_graph.io.events.layout import EventLayout
     from jeat_graph.io.events.reader import EventReader
     from jeat_graph.io.video import FrameSource
 
@@ -48,6 +49,7 @@ class DetectRequest:
         detector_fused: a network that looks at both at once, instead of the other two; or None.
         rate_hz: frames per second where neither the video nor a table beside it says.
         event_size_px: width and height of the event camera's picture, where the file does not say.
+        event_layout: columns, unit of time and recording, where the file of events leaves that open.
         events_later_s: what to add to the times of the events for the clock of the frames (s).
         one_picture: whether pictures and events must be of the same pixels, as who tracks them needs.
         settings: of the detectors.
@@ -60,6 +62,7 @@ class DetectRequest:
     detector_fused: str | None = None
     rate_hz: float | None = None
     event_size_px: tuple[int, int] | None = None
+    event_layout: EventLayout | None = None
     events_later_s: float = 0.0
     one_picture: bool = False
     settings: DetectionSettings = field(default_factory=DetectionSettings)
@@ -118,8 +121,8 @@ def picture_of(request: DetectRequest) -> tuple[int, int] | None:
 
     if request.frames is not None or request.events is None:
         return None
-    with open_events(request.events, request.event_size_px) as reader:
-        return reader.size_px
+    with open_events(request.events, request.event_size_px, request.event_layout) as reader:
+        return reader.needed_size()
 
 
 def detect_files(
@@ -233,13 +236,11 @@ def _events(request: DetectRequest, stack: ExitStack, say: Callable[[str], objec
     from jeat_graph.io.events.opening import open_events
 
     assert request.events is not None
-    reader = stack.enter_context(open_events(request.events, request.event_size_px))
+    reader = stack.enter_context(open_events(request.events, request.event_size_px, request.event_layout))
     reader.labels = False
-    if reader.size_px is None:
-        raise DataError("does not say the size of its picture; give it with --event-size WxH", request.events)
-    width, height = reader.size_px
+    width, height = reader.needed_size()
     say(f"events: {reader.format_name} of {width} x {height} px, {request.events}")
-    return reader, reader.size_px
+    return reader, (width, height)
 
 
 def _event_scans(request: DetectRequest, recording: _Recording, say: Callable[[str], object]) -> _Scans:

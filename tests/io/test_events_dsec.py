@@ -141,7 +141,6 @@ def test_dsec_files_give_their_offset_and_no_size(tmp_path: Path) -> None:
     ("spoil", "words"),
     [
         (lambda f: f.__delitem__("events/x"), "'events/x' is missing"),
-        (lambda f: f.__delitem__("ms_to_idx"), "'ms_to_idx' is missing"),
         (lambda f: replace(f, "events/t", f["events/t"][:].astype(float)), "whole numbers, not float64"),
         (lambda f: replace(f, "events/p", f["events/p"][:-1]), "different lengths"),
         (lambda f: replace(f, "events/t", f["events/t"][:][::-1]), "run backwards at event 1"),

@@ -63,10 +63,8 @@ def convert(
     Raises:
         DataError: nothing says the size of the picture, or something cannot be read or written.
     """
-    if reader.size_px is None:
-        raise DataError("does not say the size of its picture; give it with --size WxH", reader.path)
     count = 0
-    with event_writer(path, fmt, reader.size_px) as writer:
+    with event_writer(path, fmt, reader.needed_size()) as writer:
         for piece in reader.pieces():
             writer.append(EventArray.trusted(piece.t_us, piece.x, piece.y, piece.polarity))
             count += len(piece)

@@ -56,6 +56,10 @@ class Damage:
         leaps: single times ahead by more than `decoding.LEAP_US` that the next one took back: passed over.
         tail_bytes: bytes behind the last whole word, left out: the file is cut off.
         unfinished: words at the end that others of a whole packet should follow.
+        sorted: events that came after later ones and were put in order.
+        rounded: columns and rows between pixels, which were rounded.
+        assumed: what the file should say and does not, and what was taken instead.
+        clock: how the times were brought to the clock of the file, where there were two.
         events: events that were handed out.
     """
 
@@ -70,6 +74,10 @@ class Damage:
     leaps: int = 0
     tail_bytes: int = 0
     unfinished: str = ""
+    sorted: int = 0
+    rounded: int = 0
+    assumed: str = ""
+    clock: str = ""
     events: int = 0
 
     def notes(self) -> list[str]:
@@ -85,10 +93,12 @@ class Damage:
                 "times a single time leaps ahead by more than 1 s and the next takes it back; it was passed "
                 "over",
             ),
+            (self.sorted, "events came after later ones and were put in order"),
+            (self.rounded, "columns or rows lie between pixels and were rounded"),
             (self.tail_bytes, "bytes at the end are no whole event: the file is cut off"),
         )
         lines = [f"{count:,} {text}" for count, text in found if count]
-        return lines + ([self.unfinished] if self.unfinished else [])
+        return lines + [text for text in (self.assumed, self.clock, self.unfinished) if text]
 
     def _steps_back(self) -> str:
         """What became of the events after steps back; many of them are damage of its own."""
@@ -164,3 +174,32 @@ class EventReader:
             DataError: the content is not of the format that the file says it is.
         """
         raise NotImplementedError
+
+    def measure(self) -> tuple[int, int] | None:
+        """Return how far the events reach (width, height, px), or None where that is not looked for.
+
+        Raises:
+            DataError: the file cannot be read, or its events reach too far to be those of a camera.
+        """
+        return None
+
+    def needed_size(self) -> tuple[int, int]:
+        """Return width and height of the picture; where nothing says them, take how far the events reach.
+
+        `damage` then says that this was done.
+
+        Raises:
+            DataError: they are not known and cannot be measured.
+        """
+        if self.size_px is None:
+            self.size_px = self.measure()
+            if self.size_px is None:
+                raise DataError(
+                    "does not say the size of its picture; give it with --event-size WxH", self.path
+                )
+            width, height = self.size_px
+            self.damage.assumed = (
+                f"the file does not say the size of its picture; {width} x {height} px, as far as its events "
+                "reach, were taken; --event-size says another"
+            )
+        return self.size_px
