@@ -64,7 +64,7 @@ def convert(
         DataError: nothing says the size of the picture, or something cannot be read or written.
     """
     count = 0
-    with event_writer(path, fmt, reader.needed_size()) as writer:
+    with event_writer(path, fmt, reader.needed_size("--size")) as writer:
         for piece in reader.pieces():
             writer.append(EventArray.trusted(piece.t_us, piece.x, piece.y, piece.polarity))
             count += len(piece)

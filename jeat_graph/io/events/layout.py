@@ -50,12 +50,16 @@ _MOST_PLACES = 0.99
 _MOST_STEPS_BACK = 0.05
 
 # Events of a pixel in a second. Noise alone makes .05 to 10, a road .1 to 100; less is left after filters.
-_USUAL_HZ_PX, _LOW_HZ_PX, _HIGH_HZ_PX = 0.2, 0.02, 2000.0
+_LOW_HZ_PX, _HIGH_HZ_PX = 0.02, 500.0
 #: Finely divided times are seconds down to this rate (Hz/px): hardly anything else is written so.
 _LEAST_HZ_PX = 1e-5
 #: With fewer events, or a smaller picture (px), a rate says nothing.
 _LEAST_EVENTS, _LEAST_PIXELS = 100, 64 * 64
 _THOUSAND = 1000
+#: So many different times that are all thousands are so by no chance.
+_LEAST_TIMES = 10
+#: So many steps of a floating-point number may a decimal fraction be off.
+_ROUNDINGS = 4
 #: Times since 1970 lie above this (s): the year 1998. As a camera's own time that is 28 years.
 _EPOCH_S = 9e8
 _LAST_EPOCH_S = 2.2e9
@@ -205,25 +209,25 @@ def _since_1970(median: float, whole: bool) -> str | None:
 
 
 def _whole_unit(t: npt.NDArray[Any], hz_px: dict[str, float], likely: str | None) -> str | None:
-    """The unit of times that are whole numbers: µs, as cameras count, or ns."""
-    rate = hz_px["us"]
-    if _USUAL_HZ_PX <= rate <= _HIGH_HZ_PX:
-        return "us"
-    thousands = bool((np.mod(t, _THOUSAND) == 0).all()) and len(np.unique(t)) >= _LEAST_EVENTS
-    if rate < _LOW_HZ_PX and thousands and hz_px["ns"] >= _LOW_HZ_PX:
+    """The unit of times that are whole numbers: µs, as cameras count, or ns.
+
+    Times that are all thousands come from a clock of µs, in ns, or from a simulator that steps by ms, in µs:
+    the rate tells them apart, but for rates that either may have.
+    """
+    thousands = bool((np.mod(t, _THOUSAND) == 0).all()) and len(np.unique(t)) >= _LEAST_TIMES
+    if thousands and hz_px["us"] < _LOW_HZ_PX <= hz_px["ns"]:
         return "ns"
-    if likely is not None:
+    if thousands and hz_px["ns"] <= _HIGH_HZ_PX:
         return likely
-    return "us" if _LOW_HZ_PX <= rate <= _HIGH_HZ_PX and not thousands else None
+    return "us" if likely == "us" or _LOW_HZ_PX <= hz_px["us"] <= _HIGH_HZ_PX else None
 
 
 def _divided_unit(t: npt.NDArray[Any], hz_px: dict[str, float]) -> str | None:
-    """The unit of times with decimals: s; or ms, where there are three of them at most."""
-    in_thousandths = np.asarray(t, dtype=np.float64) * _THOUSAND
-    if (
-        np.abs(in_thousandths - np.rint(in_thousandths)) > 1e-6 * np.maximum(np.abs(in_thousandths), 1)
-    ).any():
+    """The unit of times with decimals: s; or ms, where there are three at most, as of a clock of µs."""
+    thousandths = t.astype(np.float64) * _THOUSAND
+    uncertain = _ROUNDINGS * _THOUSAND * np.spacing(np.abs(t)).astype(np.float64)
+    if (np.abs(thousandths - np.rint(thousandths)) > uncertain).any():
         return "s" if hz_px["s"] >= _LEAST_HZ_PX else None
-    if hz_px["s"] >= _USUAL_HZ_PX:
-        return "s"
-    return "ms" if hz_px["s"] < _LOW_HZ_PX <= hz_px["ms"] else None
+    if hz_px["s"] < _LOW_HZ_PX <= hz_px["ms"]:
+        return "ms"
+    return "s" if hz_px["s"] <= _HIGH_HZ_PX < hz_px["ms"] else None

@@ -183,10 +183,13 @@ class EventReader:
         """
         return None
 
-    def needed_size(self) -> tuple[int, int]:
+    def needed_size(self, option: str = "--event-size") -> tuple[int, int]:
         """Return width and height of the picture; where nothing says them, take how far the events reach.
 
         `damage` then says that this was done.
+
+        Args:
+            option: what the user gives the size by, for messages.
 
         Raises:
             DataError: they are not known and cannot be measured.
@@ -194,12 +197,10 @@ class EventReader:
         if self.size_px is None:
             self.size_px = self.measure()
             if self.size_px is None:
-                raise DataError(
-                    "does not say the size of its picture; give it with --event-size WxH", self.path
-                )
+                raise DataError(f"does not say the size of its picture; give it with {option} WxH", self.path)
             width, height = self.size_px
             self.damage.assumed = (
                 f"the file does not say the size of its picture; {width} x {height} px, as far as its events "
-                "reach, were taken; --event-size says another"
+                f"reach, were taken; {option} says another"
             )
         return self.size_px

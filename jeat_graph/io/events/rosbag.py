@@ -130,7 +130,7 @@ class RosbagReader(EventReader):
                 yield whole.take(slice(first, first + PIECE_ROWS))
         if drift[0] > _DRIFT_US:
             self.damage.clock = (
-                f"stamps of messages and the camera's clock part by up to {drift[0] / _US_PER_S:.6g} s; "
+                f"stamps of messages and the camera's clock part by up to {drift[0] / _US_PER_S:.3g} s; "
                 "times are those of the camera, from the first stamp on"
             )
         if edges:

@@ -132,8 +132,10 @@ def _blocks(path: Path, begin: _Open, head: TextHead, damage: Damage) -> Iterato
                 if not ended and not end and len(data) > BLOCK_BYTES:
                     raise DataError("has a line without an end", path, line)
                 data, rest = data[:end], data[end:]
-                if data.strip():
-                    block = _block(path, data, head, (line, row), damage if ended else None)
+                if ended and len(_fields_of(data, head)) < len(head.words):
+                    damage.tail_bytes = len(data)  # the last line has no end, and is cut off
+                elif data.strip():
+                    block = _block(path, data, head, (line, row))
                     yield block
                     row += len(block.columns[0])
                 line += data.count(b"\n")
@@ -141,7 +143,7 @@ def _blocks(path: Path, begin: _Open, head: TextHead, damage: Damage) -> Iterato
         raise DataError(f"is damaged near line {line}: {error}", path) from None
 
 
-def _block(path: Path, data: bytes, head: TextHead, at: tuple[int, int], last: Damage | None) -> Block:
+def _block(path: Path, data: bytes, head: TextHead, at: tuple[int, int]) -> Block:
     """Return the columns of some lines.
 
     Args:
@@ -149,19 +151,12 @@ def _block(path: Path, data: bytes, head: TextHead, at: tuple[int, int], last: D
         data: the lines.
         head: what they look like.
         at: number of the first line, from 1, and of the first event, from 0.
-        last: where the last line of the file is counted if it is cut off; None before.
     """
     line, row = at
     columns = _parsed(data, head)
     if columns is None:
         data = _plain(data, head.delimiter)
         columns = _parsed(data, head)
-    if columns is None and last is not None and not data.endswith(b"\n"):
-        whole = data[: data.rfind(b"\n") + 1]
-        if whole.strip():
-            columns = _parsed(whole, head)
-            if columns is not None:
-                last.tail_bytes = len(data) - len(whole)
     if columns is None:
         raise _diagnosis(path, data, head, line)
 
@@ -213,12 +208,16 @@ def _plain(data: bytes, delimiter: bytes) -> bytes:
     return data if delimiter == b"\t" else re.sub(rb" *" + delimiter + rb" *", delimiter, data)
 
 
+def _fields_of(line: bytes, head: TextHead) -> list[bytes]:
+    return line.split() if head.delimiter == b" " else line.split(head.delimiter)
+
+
 def _diagnosis(path: Path, data: bytes, head: TextHead, first: int) -> DataError:
     """Say which line is not as it should be."""
     for number, line in enumerate(data.splitlines(), first):
         if not line.strip():
             continue
-        fields = line.split() if head.delimiter == b" " else line.split(head.delimiter)
+        fields = _fields_of(line, head)
         shown = line[:60].decode("utf-8", "replace")
         if len(fields) != len(head.words):
             text = f"{len(fields)} fields, but the first event has {len(head.words)}: {shown!r}"

@@ -30,7 +30,7 @@ OTHERS = {
     b"% Version 2\n\x0c": "ends in its header: the file is cut off",
     b"% Version 3\n\x0c\x08": "is DAT of version '3'",
     b"% evt 3.0\n% geometry 0x720\n% end\n": "its header says a picture of 0 x 720 px",
-    b"left,top,width,height\n1,2,3,1\n": "has the columns left, top, width, height: which of them is t, x, y, p",
+    b"left,top,w,h\n1,2,3,1\n": "has the columns left, top, w, h: which of them is t, x, y, p",
     b"some words\n": "is none of the files of events that are read",
     b"": "is empty",
 }
