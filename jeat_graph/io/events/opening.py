@@ -185,10 +185,7 @@ def _open_hdf5(place: Path, size_px: tuple[int, int] | None, layout: EventLayout
         if layout == EventLayout():
             if find_item(file, TABLE, place) is not None:
                 return PropheseeHdf5Reader(place, file, size_px)
-            if (
-                find_item(file, "ms_to_idx", place) is not None
-                and find_item(file, "events", place) is not None
-            ):
+            if _is_indexed(file, place):
                 file.close()
                 return DsecReader(place, size_px)
         return TableReader(place, hdf5_table(place, file, layout), size_px, layout)
@@ -198,3 +195,13 @@ def _open_hdf5(place: Path, size_px: tuple[int, int] | None, layout: EventLayout
     except BaseException:
         file.close()
         raise
+
+
+def _is_indexed(file: Any, place: Path) -> bool:
+    """Whether HDF5 has the layout of DSEC with its index by time; times in s have no such index."""
+    from jeat_graph.io.hdf5_items import find_item
+
+    if find_item(file, "ms_to_idx", place) is None or find_item(file, "events", place) is None:
+        return False
+    times = find_item(file, "events/t", place)
+    return getattr(getattr(times, "dtype", None), "kind", "u") in "uib"

@@ -39,6 +39,16 @@ class Triggers(NamedTuple):
         """Return no edges."""
         return Triggers(np.zeros(0, dtype=np.int64), np.zeros(0, np.uint8), np.zeros(0, np.uint8))
 
+    @staticmethod
+    def joined(parts: list[Triggers]) -> Triggers:
+        """Join edges that follow one another."""
+        parts = parts or [Triggers.none()]
+        return Triggers(
+            np.concatenate([part.t_us for part in parts]),
+            np.concatenate([part.channel for part in parts]),
+            np.concatenate([part.value for part in parts]),
+        )
+
 
 @dataclass
 class Damage:

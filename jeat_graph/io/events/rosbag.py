@@ -21,8 +21,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.io.events.ascending import Ascending
@@ -126,7 +124,7 @@ class RosbagReader(EventReader):
             self.damage.events += len(t)
             whole = EventArray(t, decoded.x[inside], decoded.y[inside], decoded.p[inside])
             for first in range(0, len(whole), PIECE_ROWS):
-                self.triggers, edges = _joined(edges), []
+                self.triggers, edges = Triggers.joined(edges), []
                 yield whole.take(slice(first, first + PIECE_ROWS))
         if drift[0] > _DRIFT_US:
             self.damage.clock = (
@@ -134,7 +132,7 @@ class RosbagReader(EventReader):
                 "times are those of the camera, from the first stamp on"
             )
         if edges:
-            self.triggers = _joined(edges)
+            self.triggers = Triggers.joined(edges)
             yield EventArray.empty()
 
     def _set_clock(self, stamp_us: int, first_us: int) -> None:
@@ -226,12 +224,6 @@ def _package(connection: Any) -> str:
 
 def _space(topic: str) -> str:
     return topic.rpartition("/")[0]
-
-
-def _joined(edges: list[Triggers]) -> Triggers:
-    if not edges:
-        return Triggers.none()
-    return Triggers(*(np.concatenate(column) for column in zip(*edges, strict=True)))
 
 
 def _is_second(path: Path) -> bool:

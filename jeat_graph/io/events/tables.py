@@ -104,7 +104,8 @@ class TableReader(EventReader):
         looked_at = next(table.blocks(), Block((), 0))
         self._places, named_unit = _places(table.names, looked_at.columns, layout, path)
         look = slice(0, _LOOKED_AT)
-        t, x, y = (np.asarray(looked_at.columns[self._places[r]])[look] for r in "txy")
+        none = [np.zeros(0)] * (max(self._places.values()) + 1)
+        t, x, y = (np.asarray((looked_at.columns or none)[self._places[r]])[look] for r in "txy")
         self._unit = layout.time_unit or named_unit or _unit(t, x, y, table.likely_unit, path)
         if len(t) and t.dtype.kind == "f" and t.dtype.itemsize < np.dtype(np.float64).itemsize:
             _check_single_precision(t, self._unit, path)

@@ -438,3 +438,51 @@ def test_an_offset_leads_to_the_clock_of_the_frames(tmp_path):
     events, reader = read(path)
     assert reader.t_offset_us == 49_599_300_523
     np.testing.assert_array_equal(events.t_us, T - start)
+
+
+def test_float_seconds_beside_an_index_are_read(tmp_path):
+    path = tmp_path / "e.h5"
+    index = np.searchsorted(T, 1000 * np.arange(2402))
+    h5(path, events__x=X, events__y=Y, events__p=P, events__t=T / 1e6, ms_to_idx=index)
+    np.testing.assert_array_equal(read(path)[0].t_us, T)
+
+
+def test_places_between_pixels_are_rounded_and_it_is_said(tmp_path):
+    path = tmp_path / "e.npz"
+    x = X.astype(float)
+    x[5] += 0.3
+    npz(path, x=x, y=Y, t=T, p=P)
+    events, reader = read(path)
+    np.testing.assert_array_equal(events.x, X)
+    assert reader.damage.notes() == ["1 columns or rows lie between pixels and were rounded"]
+
+
+def test_times_in_single_precision_that_cannot_tell_events_apart_are_refused(tmp_path):
+    path = tmp_path / "e.npy"
+    npy(path, np.c_[T / 1e6 + 40_000, X, Y, P].astype(np.float32))
+    with pytest.raises(DataError, match=r"times in single precision, at least 0.00391 s apart"):
+        read(path, layout=EventLayout(time_unit="s"))
+
+
+def test_names_without_events_are_a_file_without_events(tmp_path, capsys):
+    path = tmp_path / "e.csv"
+    path.write_text("t,x,y,p\n")
+    assert main(["events", "info", str(path)]) == 0
+    assert "events: 0" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("spoilt", ["not a zip at all", "encrypted"])
+def test_archives_that_cannot_be_read(tmp_path, spoilt):
+    path = tmp_path / "e.zip"
+    zipped(path, ("events.txt", RPG))
+    data = bytearray(path.read_bytes())
+    if spoilt == "encrypted":
+        central = data.index(b"PK\x01\x02")
+        data[6] |= 1
+        data[central + 8] |= 1
+    else:
+        del data[200:]
+    path.write_bytes(bytes(data))
+    with pytest.raises(DataError) as caught:
+        read(path)
+    assert "\n" not in str(caught.value)
