@@ -97,7 +97,7 @@ def detect_scans(
     """
     with ExitStack() as stack:
         source = None if request.frames is None else _frames(request, stack, say)
-        recording = None if request.events is None else _events(request, stack, say)
+        recording = None if request.events is None else _events(request, source, stack, say)
         _check_sizes(request, source, recording, say)
         streams: list[_Scans] = []
         if request.detector_fused is not None:
@@ -231,14 +231,16 @@ def _fused_scans(
     return _pushed(detector, reader, request, say)
 
 
-def _events(request: DetectRequest, stack: ExitStack, say: Callable[[str], object]) -> _Recording:
+def _events(
+    request: DetectRequest, source: FrameSource | None, stack: ExitStack, say: Callable[[str], object]
+) -> _Recording:
     """Open the events; return them, and width and height of their picture (px)."""
     from jeat_graph.io.events.opening import open_events
 
     assert request.events is not None
     reader = stack.enter_context(open_events(request.events, request.event_size_px, request.event_layout))
     reader.labels = False
-    width, height = reader.needed_size()
+    width, height = reader.needed_size(beside_px=None if source is None else source.size_px)
     say(f"events: {reader.format_name} of {width} x {height} px, {request.events}")
     return reader, (width, height)
 

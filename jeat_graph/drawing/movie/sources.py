@@ -96,13 +96,12 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
     frames = events = None
     if request.frames is not None:
         frames = VideoBackground(stack.enter_context(open_frames(request.frames, request.frame_rate_hz)))
-    truth = None
-    if request.truth is not None:
-        truth = read_truth(request.truth, rate_hz=request.frame_rate_hz)
+    truth = read_truth(request.truth, rate_hz=request.frame_rate_hz) if request.truth else None
     rate_hz = request.rate_hz or (median_rate_hz(frames.times_s) if frames else None) or DEFAULT_RATE_HZ
     if request.events is not None:
         window_s = request.window_s if request.window_s is not None else 1.0 / rate_hz
-        stretches = open_stretches(request.events, request.event_size_px, request.event_layout)
+        beside = frames.size_px if frames else None
+        stretches = open_stretches(request.events, request.event_size_px, request.event_layout, beside)
         stack.callback(stretches.close)
         events = EventBackground(stretches, window_s)
     times = _times(request, _span(frames, events, tables, truth), frames, rate_hz)

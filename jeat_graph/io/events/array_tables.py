@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.events.layout import ROLES, EventLayout, roles_of_names
-from jeat_graph.io.events.npz_members import ARCHIVE_ERRORS, NpzMember
+from jeat_graph.io.events.npz_members import NpzMember
 from jeat_graph.io.events.reader import PIECE_ROWS
 from jeat_graph.io.events.tables import Block, EventTable
 from jeat_graph.io.limits import check_room
@@ -217,7 +217,7 @@ def rows_of(data: Any, shape: tuple[int, ...]) -> ReadRows:
 def _npy_items(path: Path) -> dict[str, ArrayItem]:
     try:
         data: Any = np.load(path, mmap_mode="r", allow_pickle=False)
-    except ARCHIVE_ERRORS as error:
+    except Exception as error:  # numpy raises nearly anything on a damaged header
         reason = " ".join(str(error).split())[:160]
         raise DataError(f"is a NumPy array that cannot be read: {reason}", path) from None
     return {"": ArrayItem(data.shape, data.dtype, rows_of(data, data.shape))}
@@ -233,7 +233,7 @@ def _npz_items(path: Path) -> dict[str, ArrayItem]:
                 member = NpzMember(path, name)
                 items[name.removesuffix(".npy")] = ArrayItem(member.shape, member.dtype, member.rows)
                 member.close()
-    except ARCHIVE_ERRORS as error:
+    except Exception as error:  # numpy raises nearly anything on a damaged header
         raise DataError(
             f"is an archive that cannot be read: {' '.join(str(error).split())[:160]}", path
         ) from None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -13,17 +12,6 @@ import numpy.typing as npt
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.events.reader import PIECE_ROWS
 from jeat_graph.io.limits import check_room
-
-#: What reading a damaged archive, or an array in it, raises.
-ARCHIVE_ERRORS = (
-    OSError,
-    EOFError,
-    ValueError,
-    zlib.error,
-    zipfile.BadZipFile,
-    NotImplementedError,
-    RuntimeError,
-)
 
 
 class NpzMember:
@@ -64,7 +52,9 @@ class NpzMember:
                 self._begin()
                 self._skip(first)
             return self._take(end - first)
-        except ARCHIVE_ERRORS as error:
+        except DataError:
+            raise
+        except Exception as error:  # of a damaged header, or of packed bytes
             raise DataError(
                 f"{self._name} cannot be read: {' '.join(str(error).split())[:160]}", self._path
             ) from None

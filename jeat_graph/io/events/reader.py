@@ -193,24 +193,29 @@ class EventReader:
         """
         return None
 
-    def needed_size(self, option: str = "--event-size") -> tuple[int, int]:
+    def needed_size(
+        self, option: str = "--event-size", beside_px: tuple[int, int] | None = None
+    ) -> tuple[int, int]:
         """Return width and height of the picture; where nothing says them, take how far the events reach.
 
         `damage` then says that this was done.
 
         Args:
             option: what the user gives the size by, for messages.
+            beside_px: width and height of frames of the same scene, taken instead if the events lie in them.
 
         Raises:
             DataError: they are not known and cannot be measured.
         """
         if self.size_px is None:
-            self.size_px = self.measure()
-            if self.size_px is None:
+            reach = self.measure()
+            if reach is None:
                 raise DataError(f"does not say the size of its picture; give it with {option} WxH", self.path)
-            width, height = self.size_px
+            fits = beside_px is not None and reach[0] <= beside_px[0] and reach[1] <= beside_px[1]
+            width, height = self.size_px = beside_px if beside_px is not None and fits else reach
+            origin = "those of the frames" if fits else "as far as its events reach"
             self.damage.assumed = (
-                f"the file does not say the size of its picture; {width} x {height} px, as far as its events "
-                f"reach, were taken; {option} says another"
+                f"the file does not say the size of its picture; {width} x {height} px, {origin}, were "
+                f"taken; {option} says another"
             )
         return self.size_px

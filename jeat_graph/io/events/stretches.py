@@ -83,6 +83,8 @@ class ForwardStretches:
         path: the file.
         size_px: width and height of the picture, where the file does not say.
         layout: columns, unit of time and recording, where the file leaves that open.
+        beside_px: width and height of frames of the same scene, taken if nothing says the size and events lie
+            in them.
 
     Raises:
         ConfigError: an extra package is needed for this format.
@@ -90,7 +92,11 @@ class ForwardStretches:
     """
 
     def __init__(
-        self, path: str | Path, size_px: tuple[int, int] | None = None, layout: EventLayout | None = None
+        self,
+        path: str | Path,
+        size_px: tuple[int, int] | None = None,
+        layout: EventLayout | None = None,
+        beside_px: tuple[int, int] | None = None,
     ) -> None:
         self._open = partial(open_events, path, size_px, layout)
         self._reader: EventReader = self._open()
@@ -99,7 +105,7 @@ class ForwardStretches:
         self._held = EventArray.empty()
         self._from_us = -(1 << 62)
         self._duration_us: int | None = None
-        self.size_px = self._reader.needed_size()
+        self.size_px = self._reader.needed_size(beside_px=beside_px)
         self._assumed = self._reader.damage.assumed
         self.t_offset_us = self._reader.t_offset_us
 
@@ -157,7 +163,10 @@ class ForwardStretches:
 
 
 def open_stretches(
-    path: str | Path, size_px: tuple[int, int] | None = None, layout: EventLayout | None = None
+    path: str | Path,
+    size_px: tuple[int, int] | None = None,
+    layout: EventLayout | None = None,
+    beside_px: tuple[int, int] | None = None,
 ) -> IndexedStretches | ForwardStretches:
     """Open a file of events for any time; HDF5 of DSEC has an index, others are read forwards.
 
@@ -165,6 +174,8 @@ def open_stretches(
         path: the file.
         size_px: width and height of the picture, where the file does not say.
         layout: columns, unit of time and recording, where the file leaves that open.
+        beside_px: width and height of frames of the same scene, taken if nothing says the size and events lie
+            in them.
 
     Raises:
         ConfigError: an extra package is needed for this format.
@@ -172,4 +183,6 @@ def open_stretches(
     """
     with open_events(path, size_px, layout) as reader:
         indexed = isinstance(reader, DsecReader)
-    return IndexedStretches(Path(path), size_px) if indexed else ForwardStretches(path, size_px, layout)
+    if indexed:
+        return IndexedStretches(Path(path), size_px)
+    return ForwardStretches(path, size_px, layout, beside_px)
