@@ -486,3 +486,15 @@ def test_archives_that_cannot_be_read(tmp_path, spoilt):
     with pytest.raises(DataError) as caught:
         read(path)
     assert "\n" not in str(caught.value)
+
+
+def test_the_offset_to_the_frames_survives_in_hdf5_and_its_loss_is_said(tmp_path, capsys):
+    path = tmp_path / "e.h5"
+    h5(path, events__x=X, events__y=Y, events__p=P, events__t=T, t_offset=np.int64(77))
+    assert main(["events", "convert", str(path), str(tmp_path / "o.h5")]) == 0
+    assert "t_offset" not in capsys.readouterr().err
+    assert read(tmp_path / "o.h5")[1].t_offset_us == 77
+    assert main(["events", "convert", str(path), str(tmp_path / "o.raw")]) == 0
+    assert (
+        "t_offset of 77 µs, which leads to the clock of the frames, is left behind" in capsys.readouterr().err
+    )
