@@ -52,8 +52,14 @@ def open_events(
             The file says a picture larger than the one given. Columns, times or the recording cannot be told;
             the message names the option that says it.
     """
-    reader = _opened(Path(path), size_px, layout or EventLayout())
+    layout = layout or EventLayout()
+    reader = _opened(Path(path), size_px, layout)
     reader.size_given = size_px is not None
+    for name in ("columns", "time_unit", "stream"):
+        if getattr(layout, name) is not None and name not in reader.understands:
+            reader.close()
+            option = f"--event-{name.replace('_', '-')}"
+            raise DataError(f"is {reader.format_name}, where {option} says nothing; leave it out", Path(path))
     return reader
 
 

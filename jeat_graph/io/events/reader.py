@@ -151,12 +151,14 @@ class EventReader:
         size_given: whether the caller says it.
         t_offset_us: what to add to the events' times for the clock of frames that belong to them (µs).
         origin_us: time 0 on the clock that the file gives times by (µs).
+        understands: attributes of `EventLayout` that this format leaves to the user.
         labels: whether pieces say what caused the events, where the file does.
         triggers: edges of external signals that came with the last piece.
         damage: what was passed over so far.
     """
 
     format_name = "events"
+    understands: tuple[str, ...] = ()
 
     def __init__(self, path: str | Path, size_px: tuple[int, int] | None) -> None:
         self.path = Path(path)

@@ -47,9 +47,9 @@ class _Topic(NamedTuple):
 
 
 class _Dated(NamedTuple):
-    """What a message holds, with its stamp on the clock of the bag (µs)."""
+    """What a message holds, piece by piece; the first piece has its stamp on the clock of the bag (µs)."""
 
-    stamp_us: int
+    stamp_us: int | None
     decoded: Decoded
 
 
@@ -67,6 +67,7 @@ class RosbagReader(EventReader):
     """
 
     format_name = "ROS bag"
+    understands = ("stream",)
 
     def __init__(
         self, path: Path, size_px: tuple[int, int] | None, layout: EventLayout | None = None
@@ -104,17 +105,17 @@ class RosbagReader(EventReader):
         ascending = Ascending(self.damage)
         width, height = self.size_px or (1 << 16, 1 << 16)
         edges: list[Triggers] = []
-        drift = (0, 0)
+        drift_us = 0
         for stamp_us, decoded in self._decoded():
             first_us = decoded.first_us
             if first_us is None:
                 continue
             if self._offset_us is None:
+                assert stamp_us is not None
                 self._set_clock(stamp_us, first_us)
             assert self._offset_us is not None
-            if abs(stamp_us - first_us) > _OTHER_CLOCK_US:
-                apart = stamp_us - first_us - self._offset_us
-                drift = max(drift, (abs(apart), stamp_us))
+            if stamp_us is not None and abs(stamp_us - first_us) > _OTHER_CLOCK_US:
+                drift_us = max(drift_us, abs(stamp_us - first_us - self._offset_us))
             later = self._offset_us - self.origin_us
             if len(decoded.triggers.t_us):
                 edges.append(decoded.triggers._replace(t_us=decoded.triggers.t_us + later))
@@ -126,9 +127,9 @@ class RosbagReader(EventReader):
             for first in range(0, len(whole), PIECE_ROWS):
                 self.triggers, edges = Triggers.joined(edges), []
                 yield whole.take(slice(first, first + PIECE_ROWS))
-        if drift[0] > _DRIFT_US:
+        if drift_us > _DRIFT_US:
             self.damage.clock = (
-                f"stamps of messages and the camera's clock part by up to {drift[0] / _US_PER_S:.3g} s; "
+                f"stamps of messages and the camera's clock part by up to {drift_us / _US_PER_S:.3g} s; "
                 "times are those of the camera, from the first stamp on"
             )
         if edges:
@@ -157,8 +158,10 @@ class RosbagReader(EventReader):
             except (struct.error, ValueError):
                 raise DataError("has a message of events that cannot be read", self.path) from None
             if packet.encoding == EDGES or id(connection) not in alone:
+                stamp: int | None = stamp_us
                 for decoded in self._decoder.decode(packet):
-                    yield _Dated(stamp_us, decoded)
+                    yield _Dated(stamp, decoded)
+                    stamp = None if decoded.first_us is not None else stamp
             lead = (self._offset_us or 0) - self.origin_us
             self._decoder.count(self.damage, lead)
 

@@ -94,6 +94,8 @@ class TableReader(EventReader):
         DataError: columns or times that can be read in several ways, or in none.
     """
 
+    understands = ("columns", "time_unit", "stream")
+
     def __init__(
         self, path: Path, table: EventTable, size_px: tuple[int, int] | None, layout: EventLayout
     ) -> None:

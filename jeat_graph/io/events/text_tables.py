@@ -52,6 +52,8 @@ def text_table(path: Path, layout: EventLayout, start: bytes) -> EventTable | No
         if member is None:
             return None
         kind, begin = f"text in a zip archive, {member}", partial(_open_member, path, member)
+    elif layout.stream is not None:
+        raise DataError(f"is one text, of which --event-stream {layout.stream} names no part", path)
     elif start.startswith(b"\x1f\x8b"):
         kind, begin = "text in gzip", partial(_open_gzip, path)
     try:
@@ -132,9 +134,11 @@ def _blocks(path: Path, begin: _Open, head: TextHead, damage: Damage) -> Iterato
                 if not ended and not end and len(data) > BLOCK_BYTES:
                     raise DataError("has a line without an end", path, line)
                 data, rest = data[:end], data[end:]
-                if ended and len(_fields_of(data, head)) < len(head.words):
+                if not data.strip():
+                    pass
+                elif ended and len(_fields_of(data, head)) < len(head.words):
                     damage.tail_bytes = len(data)  # the last line has no end, and is cut off
-                elif data.strip():
+                else:
                     block = _block(path, data, head, (line, row))
                     yield block
                     row += len(block.columns[0])

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.io.events.layout import EventLayout
 from jeat_graph.io.events.opening import open_events
 
 from .plain import HEADERS
@@ -169,3 +170,25 @@ def test_hdf5_whose_list_of_items_is_damaged_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(h5py.Group, "__iter__", broken)
     with pytest.raises(DataError, match="cannot be read as HDF5: Link iteration failed"):
         open_events(path)
+
+
+@pytest.mark.parametrize(
+    ("layout", "option"),
+    [
+        (EventLayout(columns=("t", "x", "y", "p")), "--event-columns"),
+        (EventLayout(time_unit="us"), "--event-time-unit"),
+        (EventLayout(stream="left"), "--event-stream"),
+    ],
+)
+def test_what_a_format_does_not_leave_open_cannot_be_said(tmp_path, layout, option):
+    path = tmp_path / "e.raw"
+    path.write_bytes(HEADERS["evt3"])
+    with pytest.raises(DataError, match=f"is EVT3, where {option} says nothing; leave it out"):
+        open_events(path, layout=layout)
+
+
+def test_a_part_of_one_text_cannot_be_named(tmp_path):
+    path = tmp_path / "e.csv"
+    path.write_text("t,x,y,p\n1,2,3,1\n")
+    with pytest.raises(DataError, match="is one text, of which --event-stream left names no part"):
+        open_events(path, layout=EventLayout(stream="left"))

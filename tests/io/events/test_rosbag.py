@@ -10,6 +10,7 @@ import pytest
 from jeat_graph.cli.main import main
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
+from jeat_graph.io.events import words
 from jeat_graph.io.events.layout import EventLayout
 from jeat_graph.io.events.opening import open_events
 
@@ -325,3 +326,13 @@ def test_two_topics_must_be_told_apart(tmp_path):
         open_events(tmp_path / "bag")
     with open_events(tmp_path / "bag", layout=EventLayout(stream="/right/events")) as reader:
         assert sum(len(piece) for piece in reader.pieces()) == 4
+
+
+def test_a_message_of_several_pieces_does_not_part_from_its_own_stamp(tmp_path, monkeypatch):
+    monkeypatch.setattr(words, "PIECE_ROWS", 200)
+    store = store_of(2)
+    data = random_evt3(random.Random(0), 4000)
+    message = packet(store, 2, "evt3", data)
+    found, reader = read(write(tmp_path, 2, [message], "event_camera_msgs/msg/EventPacket", store))
+    assert [row[1:] for row in rows(found)] == [row[1:] for row in read_evt3(data).events]
+    assert reader.damage.notes() == []
