@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     add = parser.add_argument
     add("--frames", metavar="VIDEO|DIR|AEDAT4", help="a video, a folder of pictures, or an AEDAT4 file")
-    add("--events", metavar="FILE", help="a file of events: RAW, DAT, AEDAT, HDF5, ROS bag")
+    add("--events", metavar="FILE", help="a file of events, in any of the formats of `events info`")
     add_detecting(parser)
     add_rate(parser)
     add(

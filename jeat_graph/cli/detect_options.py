@@ -10,7 +10,10 @@ from jeat_graph.config.argument_types import finite, picture_size, positive
 
 if TYPE_CHECKING:
     from jeat_graph.detection.detecting import DetectRequest
+    from jeat_graph.io.events.layout import EventLayout
 
+#: Units of time of tables of events.
+UNITS = ("s", "ms", "us", "ns")
 #: The preset of who names none.
 DEFAULT = "default"
 
@@ -56,18 +59,61 @@ def add_detecting(parser: argparse._ActionsContainer) -> None:
         metavar="HZ",
         help="scans of the events per second (default: 50; of networks beside frames, and of both, 20)",
     )
-    add(
-        "--event-size",
-        type=picture_size,
-        metavar="WxH",
-        help="picture of the events, if their file does not say (if it does, no smaller)",
-    )
+    add_event_layout(parser)
     add(
         "--event-delay",
         type=finite,
         default=0.0,
         metavar="S",
         help="what to add to the events' times for the clock of the frames (default: 0)",
+    )
+
+
+def add_event_layout(parser: argparse._ActionsContainer, *names_of_size: str) -> None:
+    """Declare what a file of events may leave open: size, columns, unit of time, which of several recordings.
+
+    Args:
+        parser: of a command.
+        names_of_size: what the command calls `--event-size` besides.
+    """
+    add = parser.add_argument
+    add(
+        "--event-size",
+        *names_of_size,
+        type=picture_size,
+        metavar="WxH",
+        help="size of the events' picture in px, if their file does not say; not smaller than it says",
+    )
+    add(
+        "--event-columns",
+        metavar="t,x,y,p",
+        help="what the columns of a table of events are, if neither names nor data say (- passes one over)",
+    )
+    add(
+        "--event-time-unit",
+        choices=UNITS,
+        help="unit of the times of a table of events, if neither names nor data say",
+    )
+    add(
+        "--event-stream",
+        metavar="NAME",
+        help="which events of a file with several: topic of a bag, group of HDF5, file of an archive",
+    )
+
+
+def event_layout(args: argparse.Namespace) -> EventLayout:
+    """Return what the arguments say of a file of events.
+
+    Raises:
+        ConfigError: columns that are none.
+    """
+    from jeat_graph.io.events.layout import EventLayout
+
+    columns = args.event_columns
+    return EventLayout(
+        columns=None if columns is None else tuple(name.strip() for name in columns.split(",")),
+        time_unit=args.event_time_unit,
+        stream=args.event_stream,
     )
 
 
@@ -117,6 +163,9 @@ def _without_input(args: argparse.Namespace) -> list[tuple[str, str]]:
         "--detector-events": ("--events", args.events, args.detector_events != "motion"),
         "--event-rate": ("--events", args.events, args.event_rate is not None),
         "--event-size": ("--events", args.events, args.event_size is not None),
+        "--event-columns": ("--events", args.events, args.event_columns is not None),
+        "--event-time-unit": ("--events", args.events, args.event_time_unit is not None),
+        "--event-stream": ("--events", args.events, args.event_stream is not None),
         "--event-delay": ("--events", args.events, args.event_delay != 0.0),
     }
     return [(name, source) for name, (source, file, said) in given.items() if said and file is None]
@@ -151,6 +200,7 @@ def detect_request(args: argparse.Namespace) -> DetectRequest:
         detector_fused=args.detector_fused,
         rate_hz=args.rate,
         event_size_px=args.event_size,
+        event_layout=event_layout(args),
         events_later_s=args.event_delay,
         settings=settings,
     )

@@ -9,16 +9,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from jeat_graph.cli.detect_options import add_event_layout, event_layout
 from jeat_graph.cli.terminal import warn
-from jeat_graph.config.argument_types import picture_size
 from jeat_graph.io.events.converting import WRITTEN
 from jeat_graph.io.events.opening import FORMATS
 
 WRITES = ("out",)
-HELP = "say what is in a file of events, or convert it: RAW (EVT2, EVT3), DAT, AEDAT, HDF5, ROS bags"
-
-
-_SIZE_HELP = "size of the picture in px, if the file does not say; not smaller than it says"
+HELP = "say what is in a file of events, or convert it: RAW, DAT, AEDAT, HDF5, ROS bags, text, arrays"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--format", choices=tuple(WRITTEN), help="format of OUT, where its name leaves a choice (evt2)"
     )
     for sub in (info, change):
-        sub.add_argument("--size", type=picture_size, metavar="WxH", help=_SIZE_HELP)
+        add_event_layout(sub, "--size")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -44,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.io.events.opening import open_events
     from jeat_graph.io.outputs import check_keeps
 
-    with open_events(args.file, args.size) as reader:
+    with open_events(args.file, args.event_size, event_layout(args)) as reader:
         if args.todo == "info":
             from jeat_graph.detection.summary import summarise
 

@@ -8,13 +8,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jeat_graph.cli.options import (
-    add_classes,
-    add_old_name,
-    add_output_rate,
-    add_tables,
-    tables_read,
-)
+from jeat_graph.cli.detect_options import add_event_layout, event_layout
+from jeat_graph.cli.options import add_classes, add_old_name, add_output_rate, add_tables, tables_read
 from jeat_graph.cli.terminal import warn
 from jeat_graph.config.argument_types import counting, drawn_size, not_negative, positive
 from jeat_graph.data.errors import DataError
@@ -43,8 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--events",
         metavar="FILE",
-        help="events (RAW, DAT, AEDAT, HDF5) to draw on; beside the frames if both",
+        help="events (every format of `events info`) to draw on; beside the frames if both",
     )
+    add_event_layout(parser)
     add("--gt", metavar="FILE", help="truth, drawn as thin outlines")
     add(
         "--out",
@@ -110,6 +106,8 @@ def run(args: argparse.Namespace) -> int:
         trail_s=args.trails,
         classes=args.classes,
         reading=tables_read(args),
+        event_size_px=args.event_size,
+        event_layout=event_layout(args),
     )
     inputs = [path for path in (request.frames, request.events, request.truth) if path is not None]
     check_keeps(inputs, out)

@@ -78,7 +78,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "in the run directory holds what was found. With DETECTIONS, --detector-frames, --detector-events "
         "and --detector-fused say which networks made the boxes of the sensors rgb, evt and fused.",
     )
-    raw.add_argument("--events", metavar="FILE", help="events to detect in: RAW, DAT, AEDAT, HDF5, ROS bag")
+    raw.add_argument("--events", metavar="FILE", help="events to detect in, in any format of `events info`")
     add_detecting(raw)
 
 

@@ -24,6 +24,7 @@ from jeat_graph.detection.picture_detector import PictureDetector
 from jeat_graph.detection.settings import BESIDE_RATE_HZ, DetectionSettings
 
 if TYPE_CHECKING:
+    from jeat_graph.io.events.layout import EventLayout
     from jeat_graph.io.events.reader import EventReader
     from jeat_graph.io.video import FrameSource
 
@@ -48,6 +49,7 @@ class DetectRequest:
         detector_fused: a network that looks at both at once, instead of the other two; or None.
         rate_hz: frames per second where neither the video nor a table beside it says.
         event_size_px: width and height of the event camera's picture, where the file does not say.
+        event_layout: columns, unit of time and recording, where the file of events leaves that open.
         events_later_s: what to add to the times of the events for the clock of the frames (s).
         one_picture: whether pictures and events must be of the same pixels, as who tracks them needs.
         settings: of the detectors.
@@ -60,6 +62,7 @@ class DetectRequest:
     detector_fused: str | None = None
     rate_hz: float | None = None
     event_size_px: tuple[int, int] | None = None
+    event_layout: EventLayout | None = None
     events_later_s: float = 0.0
     one_picture: bool = False
     settings: DetectionSettings = field(default_factory=DetectionSettings)
@@ -94,7 +97,7 @@ def detect_scans(
     """
     with ExitStack() as stack:
         source = None if request.frames is None else _frames(request, stack, say)
-        recording = None if request.events is None else _events(request, stack, say)
+        recording = None if request.events is None else _events(request, source, stack, say)
         _check_sizes(request, source, recording, say)
         streams: list[_Scans] = []
         if request.detector_fused is not None:
@@ -118,8 +121,8 @@ def picture_of(request: DetectRequest) -> tuple[int, int] | None:
 
     if request.frames is not None or request.events is None:
         return None
-    with open_events(request.events, request.event_size_px) as reader:
-        return reader.size_px
+    with open_events(request.events, request.event_size_px, request.event_layout) as reader:
+        return reader.needed_size()
 
 
 def detect_files(
@@ -237,18 +240,18 @@ def _with_note(scans: _Scans, note: Callable[[], str], say: Callable[[str], obje
         say(note())
 
 
-def _events(request: DetectRequest, stack: ExitStack, say: Callable[[str], object]) -> _Recording:
+def _events(
+    request: DetectRequest, source: FrameSource | None, stack: ExitStack, say: Callable[[str], object]
+) -> _Recording:
     """Open the events; return them, and width and height of their picture (px)."""
     from jeat_graph.io.events.opening import open_events
 
     assert request.events is not None
-    reader = stack.enter_context(open_events(request.events, request.event_size_px))
+    reader = stack.enter_context(open_events(request.events, request.event_size_px, request.event_layout))
     reader.labels = False
-    if reader.size_px is None:
-        raise DataError("does not say the size of its picture; give it with --event-size WxH", request.events)
-    width, height = reader.size_px
+    width, height = reader.needed_size(beside_px=None if source is None else source.size_px)
     say(f"events: {reader.format_name} of {width} x {height} px, {request.events}")
-    return reader, reader.size_px
+    return reader, (width, height)
 
 
 def _event_scans(request: DetectRequest, recording: _Recording, say: Callable[[str], object]) -> _Scans:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jeat_graph.data.events import EventArray
 from jeat_graph.detection.noise import NoiseFilter, NoiseSettings
 from jeat_graph.io.events.reader import EventReader
 
@@ -31,6 +32,7 @@ class EventSummary(NamedTuple):
         hot_pixels: pixels that were hot at the end of the recording.
         hottest_hz: rate of the pixel with most events (Hz).
         notes: what was wrong with the file, one line each.
+        origin_s: time 0 on the clock of the file (s), where its times are from 1970 on.
     """
 
     format_name: str
@@ -45,6 +47,7 @@ class EventSummary(NamedTuple):
     hot_pixels: int
     hottest_hz: float
     notes: list[str]
+    origin_s: float = 0.0
 
     @property
     def rate_hz(self) -> float:
@@ -60,6 +63,7 @@ class EventSummary(NamedTuple):
             f"picture: {width} x {height} px{known}",
             f"events: {self.events}, {100.0 * self.share_on:.1f} % of them ON",
             f"time: from {self.first_s:.6f} s, {self.duration_s:.6f} s long",
+            *([f"clock: time 0 is {self.origin_s:.6f} s of the file's clock"] if self.origin_s else []),
             f"rate: {self.rate_hz / _US_PER_S:.4g} million events/s",
             f"noise: {self.noise_hz_px:.3g} Hz/px stand alone",
             f"hot pixels: {self.hot_pixels}; the most active one fires at {self.hottest_hz:.4g} Hz",
@@ -85,6 +89,8 @@ def summarise(reader: EventReader, advance: Callable[[int], object] = lambda _: 
     first = last = None
     for piece in reader.pieces():
         triggers += len(reader.triggers.t_us)
+        if reader.size_px is None:
+            piece = _within(piece, reader)
         if not len(piece):
             continue
         first = int(piece.t_us[0]) if first is None else first
@@ -112,7 +118,16 @@ def summarise(reader: EventReader, advance: Callable[[int], object] = lambda _: 
         hot_pixels=int(noise.hot.sum()),
         hottest_hz=float(counts.max()) * per_second,
         notes=reader.damage.notes(),
+        origin_s=reader.origin_us / _US_PER_S,
     )
+
+
+def _within(piece: EventArray, reader: EventReader) -> EventArray:
+    """Leave out events that no camera has, where nothing says how large the picture is."""
+    inside = (piece.x < _LARGEST) & (piece.y < _LARGEST)
+    outside = len(piece) - int(inside.sum())
+    reader.damage.outside += outside
+    return piece.take(inside) if outside else piece
 
 
 def _reach(picture: np.ndarray[tuple[int, int], np.dtype[np.int64]]) -> tuple[int, int]:

@@ -4,7 +4,8 @@
 `events/x`, `events/y`  (N,) uint16 column and row (px)
 `events/p`              (N,) uint8 polarity, 1 brighter, 0 darker
 `events/t`              (N,) uint32 time (µs), not decreasing
-`ms_to_idx`             (M,) uint64: the first event at or after `ms` milliseconds, for ms = 0, 1, …
+`ms_to_idx`             (M,) uint64: the first event at or after `ms` milliseconds, for ms = 0, 1, …; where it
+                        is missing, times are searched for in `events/t`
 `t_offset`              int64: add to `events/t` for the time on the clock of other files (µs)
 ======================  =====================================================================================
 
@@ -26,6 +27,7 @@ import numpy.typing as npt
 from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
+from jeat_graph.io.events.hdf5_tables import picture_size, whole_number
 from jeat_graph.io.hdf5_chunks import read_chunks
 from jeat_graph.io.hdf5_items import check_storage, find_item, opening_error, reading_error, single_item
 
@@ -34,7 +36,6 @@ LABEL = "by_motion"
 _COLUMNS = ("x", "y", "p", "t")
 _PIECE_ROWS = 1 << 20
 _MOST_MS = 24 * 3600 * 1000
-_MOST_PX = 1 << 16  # columns and rows have 16 bits
 _LATEST = 1 << 53  # µs; whole numbers up to here are exact as floats
 
 
@@ -60,20 +61,12 @@ class EventFile:
         self._file = _open(self.path)
         try:
             self._events = self._columns()
-            index = self._dataset("ms_to_idx", "ui")
-            if index.shape[0] > _MOST_MS:
-                raise DataError(
-                    f"ms_to_idx has {index.shape[0]} entries, but at most a day is read", self.path
-                )
-            self._index: npt.NDArray[np.int64] = np.asarray(self._read(index, slice(None)), dtype=np.int64)
-            if len(self._index) and (
-                self._index[0] < 0 or self._index[-1] > len(self) or (np.diff(self._index) < 0).any()
-            ):
-                raise DataError("ms_to_idx does not belong to these events", self.path)
+            self._index = self._read_index()
             offset = single_item(self._file, "t_offset", self.path)
-            self.t_offset_us = 0 if offset is None else self._whole("t_offset", offset, -_LATEST, _LATEST)
-            sides = [self._attribute(name, 1, _MOST_PX) for name in ("width", "height")]
-            self.size_px = None if sides[0] is None or sides[1] is None else (sides[0], sides[1])
+            self.t_offset_us = (
+                0 if offset is None else whole_number("t_offset", offset, -_LATEST, _LATEST, self.path)
+            )
+            self.size_px = picture_size(self._file, "events", self.path)
             self.labelled = LABEL in self._events
             stored = self._attribute("duration_us", 0, _LATEST)
             last = int(self._read(self._events["t"], slice(len(self) - 1, None))[0]) + 1 if len(self) else 0
@@ -150,11 +143,43 @@ class EventFile:
             yield self.rows(first, min(first + rows, len(self)), labels)
 
     def ms_to_idx(self) -> IntArray:
-        """Return the index by millisecond as it is in the file (M,)."""
-        return self._index
+        """Return the index by millisecond (M,), as it is in the file or as it should be."""
+        if self._index is not None:
+            return self._index
+        count = self.duration_us // US_PER_MS + 1
+        if count > _MOST_MS:
+            raise DataError("lasts for more than a day, which is not read", self.path)
+        per_ms = np.zeros(count + 1, dtype=np.int64)
+        for piece in self.pieces(labels=False):
+            per_ms[1:] += np.bincount(piece.t_us // US_PER_MS, minlength=count)
+        return np.cumsum(per_ms)
 
     def _index_at(self, ms: int) -> int:
+        if self._index is None:
+            return self._first_at(ms * US_PER_MS)
         return int(self._index[ms]) if ms < len(self._index) else len(self)
+
+    def _first_at(self, t_us: int) -> int:
+        """Return the number of the first event at or after a time, by halving; times must ascend."""
+        low, high = 0, len(self)
+        while low < high:
+            middle = (low + high) // 2
+            if int(self._read(self._events["t"], slice(middle, middle + 1))[0]) < t_us:
+                low = middle + 1
+            else:
+                high = middle
+        return low
+
+    def _read_index(self) -> IntArray | None:
+        if find_item(self._file, "ms_to_idx", self.path) is None:
+            return None
+        data = self._dataset("ms_to_idx", "ui")
+        if data.shape[0] > _MOST_MS:
+            raise DataError(f"ms_to_idx has {data.shape[0]} entries, but at most a day is read", self.path)
+        index: IntArray = np.asarray(self._read(data, slice(None)), dtype=np.int64)
+        if len(index) and (index[0] < 0 or index[-1] > len(self) or (np.diff(index) < 0).any()):
+            raise DataError("ms_to_idx does not belong to these events", self.path)
+        return index
 
     def _columns(self) -> dict[str, Any]:
         columns = {name: self._dataset(f"events/{name}", "uib") for name in _COLUMNS}
@@ -169,9 +194,7 @@ class EventFile:
     def _dataset(self, name: str, kinds: str) -> Any:
         data = find_item(self._file, name, self.path)
         if data is None or not hasattr(data, "shape"):
-            raise DataError(
-                f"data set {name!r} is missing; an event file has events/x, y, p, t and ms_to_idx", self.path
-            )
+            raise DataError(f"data set {name!r} is missing; an event file has events/x, y, p, t", self.path)
         if data.shape is None or data.dtype.kind not in kinds or len(data.shape) != 1:
             raise DataError(
                 f"{name} must be a column of whole numbers, not {data.dtype} {data.shape}", self.path
@@ -184,18 +207,7 @@ class EventFile:
             value = self._file.attrs.get(name)
         except (OSError, KeyError, RuntimeError, ValueError, TypeError):
             raise DataError(f"the attribute {name} cannot be read", self.path) from None
-        return None if value is None else self._whole(f"the attribute {name}", value, low, high)
-
-    def _whole(self, name: str, value: Any, low: int, high: int) -> int:
-        try:
-            number = float(np.asarray(value).reshape(-1)[0])
-            good = low <= number <= high and number == round(number)
-        except (ValueError, TypeError, IndexError, OverflowError):
-            good = False
-        if not good:
-            shown = " ".join(repr(value).split())[:40]
-            raise DataError(f"{name} must be a whole number from {low} to {high}, not {shown}", self.path)
-        return int(np.asarray(value).reshape(-1)[0])
+        return None if value is None else whole_number(f"the attribute {name}", value, low, high, self.path)
 
     def _read(self, data: Any, rows: slice) -> npt.NDArray[Any]:
         try:

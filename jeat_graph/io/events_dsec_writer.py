@@ -32,16 +32,20 @@ class EventWriter(PiecewiseWriter):
         path: the file.
         size_px: width and height of the picture.
         compression: `gzip`, `none`, or `blosc`, which needs the extra `hdf5` to write and to read.
+        t_offset_us: what leads from the events' times to the clock of other files (µs).
 
     Raises:
         ConfigError: no such compression, or `blosc` without the extra.
     """
 
-    def __init__(self, path: str | Path, size_px: tuple[int, int], compression: str = "gzip") -> None:
+    def __init__(
+        self, path: str | Path, size_px: tuple[int, int], compression: str = "gzip", t_offset_us: int = 0
+    ) -> None:
         super().__init__()
         self._path = Path(path)
         self._size_px = size_px
         self._filter = compression_filter(compression)
+        self._t_offset_us = t_offset_us
         self._file: Any = None
         self._pending: list[EventArray] = []
         self._pending_rows = 0
@@ -159,7 +163,7 @@ class EventWriter(PiecewiseWriter):
         index = np.zeros(length, dtype=np.uint64)
         np.cumsum(np.pad(counts, (0, length - 1 - len(counts))), out=index[1:], dtype=np.uint64)
         self._file.create_dataset("ms_to_idx", data=index, track_times=False)
-        self._file.create_dataset("t_offset", data=np.int64(0), track_times=False)
+        self._file.create_dataset("t_offset", data=np.int64(self._t_offset_us), track_times=False)
         self._file.attrs["width"], self._file.attrs["height"] = self._size_px
         # RVT's preprocessing looks for the size here, and takes 1280 x 720 for granted where it is not.
         for name, size in zip(("width", "height"), self._size_px, strict=True):

@@ -42,6 +42,32 @@ def raw(tmp_path_factory):
     return folder
 
 
+def test_tracks_of_events_do_not_depend_on_the_kind_of_file(raw, tmp_path):
+    """A table of events gives the tracks of the RAW file that has the same events."""
+    from jeat_graph.io.events.opening import open_events
+
+    with open_events(raw / "events.raw") as reader:
+        columns = [np.c_[p.t_us, p.x, p.y, p.polarity] for p in reader.pieces()]
+    table = tmp_path / "events.txt"
+    np.savetxt(table, np.concatenate(columns), fmt="%d", header=f"{SIZE[0]} {SIZE[1]}", comments="")
+    for name, events in (("raw", raw / "events.raw"), ("table", table)):
+        assert main(["track", "--events", str(events), "--out", str(tmp_path / name)]) == 0
+    causal = [(tmp_path / name / "causal.csv").read_bytes() for name in ("raw", "table")]
+    assert causal[0] == causal[1]
+
+
+def test_events_without_a_size_have_that_of_the_frames_beside_them(raw, tmp_path, capsys):
+    from jeat_graph.io.events.opening import open_events
+
+    with open_events(raw / "events.raw") as reader:
+        rows = np.concatenate([np.c_[p.t_us, p.x, p.y, p.polarity] for p in reader.pieces()])
+    table = tmp_path / "events.npy"
+    np.save(table, rows[rows[:, 1] < SIZE[0] - 5])  # they reach less far than the frames
+    both = ["--frames", str(raw / "frames"), "--events", str(table), "--out", str(tmp_path / "run")]
+    assert main(["track", *both]) == 0
+    assert f"{SIZE[0]} x {SIZE[1]} px, those of the frames, were taken" in capsys.readouterr().err
+
+
 def test_detect_writes_the_boxes_of_both_cameras(raw, tmp_path, capsys):
     out = tmp_path / "detections.csv"
     command = [

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import random
+import zipfile
 
 import h5py
 import numpy as np
 import pytest
+from scipy import io as scipy_io
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.events import reader as readers
@@ -73,6 +75,38 @@ def test_a_damaged_file_of_hdf5(tmp_path, layout):
             file.attrs["geometry"] = "640x480"
     good = path.read_bytes()
     rng = np.random.default_rng(SEED)
+    ends = set()
+    for _ in range(HDF5_MUTATIONS):
+        path.write_bytes(mutated(good, rng))
+        ends.add(survives(path))
+    assert "refused" in ends
+
+
+@pytest.mark.parametrize("layout", ["text", "zip", "npy", "npz", "mat", "hdf5"])
+def test_a_damaged_table(tmp_path, layout):
+    path = tmp_path / "e"
+    rng = np.random.default_rng(SEED)
+    t = np.sort(rng.integers(0, 100_000, WORDS))
+    columns = t, rng.integers(0, 640, WORDS), rng.integers(0, 480, WORDS), rng.integers(0, 2, WORDS)
+    rows = np.stack(columns, axis=1)
+    text = "\n".join(",".join(map(str, row)) for row in rows.tolist())
+    with path.open("wb") as file:
+        if layout == "text":
+            file.write(f"t,x,y,p\n{text}\n".encode())
+        elif layout == "zip":
+            with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+                archive.writestr("events.txt", text)
+        elif layout == "npy":
+            np.save(file, rows)
+        elif layout == "npz":
+            np.savez_compressed(file, **dict(zip("txyp", columns, strict=True)))
+        elif layout == "mat":
+            scipy_io.savemat(file, dict(zip("txyp", columns, strict=True)), do_compression=True)
+        else:
+            with h5py.File(file, "w") as hdf5:
+                for name, column in zip("txyp", columns, strict=True):
+                    hdf5.create_dataset(f"events/{name}", data=column, chunks=(100,), compression="gzip")
+    good = path.read_bytes()
     ends = set()
     for _ in range(HDF5_MUTATIONS):
         path.write_bytes(mutated(good, rng))

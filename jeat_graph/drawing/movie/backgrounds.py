@@ -9,7 +9,6 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.events import EventArray
 from jeat_graph.drawing.palette import BRIGHTER, DARK, DARKER
-from jeat_graph.io.events.dsec import DSEC_SIZE
 from jeat_graph.io.events.stretches import Stretches
 from jeat_graph.io.video import FrameSource, RgbImage
 
@@ -79,7 +78,8 @@ class EventBackground:
     name = "events"
 
     def __init__(self, source: Stretches, window_s: float) -> None:
-        self.size_px = source.size_px or DSEC_SIZE
+        assert source.size_px is not None
+        self.size_px = source.size_px
         self._source = source
         self._window_us = max(round(window_s * _US_PER_S), 1)
         offset = source.t_offset_us

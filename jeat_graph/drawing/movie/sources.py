@@ -21,6 +21,7 @@ from jeat_graph.drawing.movie.backgrounds import (
 )
 from jeat_graph.drawing.movie.moments import TRAIL_S, TracksAt, TruthAt
 from jeat_graph.drawing.movie.panels import Movie
+from jeat_graph.io.events.layout import EventLayout
 from jeat_graph.io.reading import ReadingOptions
 from jeat_graph.runs.directory import RUN_JSON, read_record
 
@@ -53,6 +54,8 @@ class Request:
         trail_s: how far trails go back (s).
         classes: classes of the tracks to be drawn.
         reading: what a result or truth does not say itself.
+        event_size_px: width and height of the events' picture, where their file does not say.
+        event_layout: columns, unit of time and recording, where the file of events leaves that open.
     """
 
     run: Path
@@ -71,6 +74,8 @@ class Request:
     trail_s: float = TRAIL_S
     classes: list[str] | None = None
     reading: ReadingOptions = field(default_factory=ReadingOptions)
+    event_size_px: tuple[int, int] | None = None
+    event_layout: EventLayout | None = None
 
 
 def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[str]]:
@@ -99,10 +104,11 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
     if request.truth is not None:
         how: ReadingOptions = {**request.reading, "first_frame": None}  # it is said of the tracks
         truth = read_truth(request.truth, **how)
-    rate_hz = request.rate_hz or _rate_of(frames) or DEFAULT_RATE_HZ
+    rate_hz = request.rate_hz or (median_rate_hz(frames.times_s) if frames else None) or DEFAULT_RATE_HZ
     if request.events is not None:
         window_s = request.window_s if request.window_s is not None else 1.0 / rate_hz
-        stretches = open_stretches(request.events)
+        beside = frames.size_px if frames else None
+        stretches = open_stretches(request.events, request.event_size_px, request.event_layout, beside)
         stack.callback(stretches.close)
         events = EventBackground(stretches, window_s)
     times = _times(request, _span(frames, events, tables, truth), frames, rate_hz)
@@ -126,6 +132,7 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
         labels=request.labels,
     )
     warnings += _absent(frames, tables, truth, times)
+    warnings += [f"{request.events}: {note}" for note in ([] if events is None else stretches.notes())]
     return movie, rate_hz, warnings
 
 
@@ -161,10 +168,6 @@ def _has_frames(folder: Path) -> bool:
     from jeat_graph.io.video import VIDEO_FILES
 
     return any((folder / name).exists() for name in VIDEO_FILES.values())
-
-
-def _rate_of(frames: VideoBackground | None) -> float | None:
-    return None if frames is None else median_rate_hz(frames.times_s)
 
 
 def _span(

@@ -70,15 +70,13 @@ class Aedat4Reader(EventReader):
                 continue
             t = ascending(t)
             self.damage.events += len(t)
-            self.triggers = (
-                Triggers(*(np.concatenate(column) for column in zip(*edges, strict=True)))
-                if edges
-                else Triggers.none()
-            )
-            edges = []
             whole = EventArray(t, rows["x"][inside], rows["y"][inside], rows["on"][inside].astype(np.uint8))
             for first in range(0, len(whole), PIECE_ROWS):
+                self.triggers, edges = Triggers.joined(edges), []
                 yield whole.take(slice(first, first + PIECE_ROWS))
+        if edges:
+            self.triggers = Triggers.joined(edges)
+            yield EventArray.empty()
 
     def _packets(self) -> Iterator[Any]:
         """Packets of events and triggers; a file that is cut off ends with a note of it."""

@@ -15,13 +15,14 @@ WRITTEN = {"evt3": ".raw", "evt2": ".raw", "dat": ".dat", "hdf5": ".h5"}
 SUFFIXES = {".raw": "evt3", ".dat": "dat", ".h5": "hdf5", ".hdf5": "hdf5"}
 
 
-def event_writer(path: Path, fmt: str | None, size_px: tuple[int, int]) -> Any:
+def event_writer(path: Path, fmt: str | None, size_px: tuple[int, int], t_offset_us: int = 0) -> Any:
     """Return the writer of a format, to be entered.
 
     Args:
         path: the file to be.
         fmt: one of `WRITTEN`; None chooses by the suffix.
         size_px: width and height of the picture.
+        t_offset_us: what leads to the clock of other files (µs); only HDF5 can say it.
 
     Raises:
         DataError: the suffix tells no format, or not this one.
@@ -37,8 +38,9 @@ def event_writer(path: Path, fmt: str | None, size_px: tuple[int, int]) -> Any:
     name = fmt or SUFFIXES[suffix]
     if WRITTEN[name] != WRITTEN[SUFFIXES[suffix]]:
         raise DataError(f"{name} is written to files that end in {WRITTEN[name]}", path)
-    writers = {"evt2": Evt2Writer, "evt3": Evt3Writer, "dat": DatWriter, "hdf5": EventWriter}
-    return writers[name](path, size_px)
+    if name == "hdf5":
+        return EventWriter(path, size_px, t_offset_us=t_offset_us)
+    return {"evt2": Evt2Writer, "evt3": Evt3Writer, "dat": DatWriter}[name](path, size_px)
 
 
 def convert(
@@ -49,7 +51,8 @@ def convert(
 ) -> int:
     """Write the events of a reader into another file.
 
-    Times are those of the file, `t_offset_us` not added; triggers and labels are left behind.
+    Times are those of the file. `t_offset_us` is kept in HDF5; other formats cannot say it, and a note of
+    `reader.damage` then says so. Triggers and labels are left behind.
 
     Args:
         reader: what to read.
@@ -63,10 +66,14 @@ def convert(
     Raises:
         DataError: nothing says the size of the picture, or something cannot be read or written.
     """
-    if reader.size_px is None:
-        raise DataError("does not say the size of its picture; give it with --size WxH", reader.path)
     count = 0
-    with event_writer(path, fmt, reader.size_px) as writer:
+    offset_us = reader.t_offset_us
+    if offset_us and SUFFIXES.get(path.suffix.lower()) != "hdf5":
+        reader.damage.clock = (
+            f"t_offset of {offset_us} µs, which leads to the clock of the frames, is left behind: "
+            f"{path.suffix} cannot say it"
+        )
+    with event_writer(path, fmt, reader.needed_size("--size"), offset_us) as writer:
         for piece in reader.pieces():
             writer.append(EventArray.trusted(piece.t_us, piece.x, piece.y, piece.polarity))
             count += len(piece)

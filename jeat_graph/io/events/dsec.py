@@ -19,7 +19,8 @@ class DsecReader(EventReader):
 
     Args:
         path: the file.
-        size_px: width and height of the picture; by default as the file says, else that of DSEC.
+        size_px: width and height of the picture; by default as the file says, else that of DSEC. Where events
+            lie outside of the latter, the file is refused: it is none of DSEC's.
 
     Raises:
         DataError: as `EventFile`, or a size that is smaller than the file's.
@@ -36,6 +37,7 @@ class DsecReader(EventReader):
             raise
         super().__init__(path, size or DSEC_SIZE)
         self._events = file
+        self._assumed = size is None
         self.t_offset_us = file.t_offset_us
 
     def close(self) -> None:
@@ -52,6 +54,23 @@ class DsecReader(EventReader):
         width, height = self.size_px
         for piece in self._events.pieces(PIECE_ROWS, self.labels):
             inside = (piece.x < width) & (piece.y < height)
+            if self._assumed:
+                check_assumed(piece, self.path)
             self.damage.outside += int((~inside).sum())
             self.damage.events += int(inside.sum())
             yield piece if inside.all() else piece.take(inside)
+
+
+def check_assumed(events: EventArray, path: Path) -> None:
+    """Check that events lie in the picture of DSEC, which was assumed as the file does not say its own.
+
+    Raises:
+        DataError: one of them does not.
+    """
+    width, height = DSEC_SIZE
+    if len(events) and (int(events.x.max()) >= width or int(events.y.max()) >= height):
+        raise DataError(
+            f"does not say the size of its picture, and its events reach x = {events.x.max()}, y = "
+            f"{events.y.max()}, beyond the {width} x {height} px of DSEC; give it with --event-size WxH",
+            path,
+        )

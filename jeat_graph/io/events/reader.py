@@ -39,6 +39,16 @@ class Triggers(NamedTuple):
         """Return no edges."""
         return Triggers(np.zeros(0, dtype=np.int64), np.zeros(0, np.uint8), np.zeros(0, np.uint8))
 
+    @staticmethod
+    def joined(parts: list[Triggers]) -> Triggers:
+        """Join edges that follow one another."""
+        parts = parts or [Triggers.none()]
+        return Triggers(
+            np.concatenate([part.t_us for part in parts]),
+            np.concatenate([part.channel for part in parts]),
+            np.concatenate([part.value for part in parts]),
+        )
+
 
 @dataclass
 class Damage:
@@ -56,6 +66,10 @@ class Damage:
         leaps: single times ahead by more than `decoding.LEAP_US` that the next one took back: passed over.
         tail_bytes: bytes behind the last whole word, left out: the file is cut off.
         unfinished: words at the end that others of a whole packet should follow.
+        sorted: events that came after later ones and were put in order.
+        rounded: columns and rows between pixels, which were rounded.
+        assumed: what the file should say and does not, and what was taken instead.
+        clock: how the times were brought to the clock of the file, where there were two.
         events: events that were handed out.
     """
 
@@ -70,6 +84,10 @@ class Damage:
     leaps: int = 0
     tail_bytes: int = 0
     unfinished: str = ""
+    sorted: int = 0
+    rounded: int = 0
+    assumed: str = ""
+    clock: str = ""
     events: int = 0
 
     def notes(self) -> list[str]:
@@ -85,10 +103,12 @@ class Damage:
                 "times a single time leaps ahead by more than 1 s and the next takes it back; it was passed "
                 "over",
             ),
+            (self.sorted, "events came after later ones and were put in order"),
+            (self.rounded, "columns or rows lie between pixels and were rounded"),
             (self.tail_bytes, "bytes at the end are no whole event: the file is cut off"),
         )
         lines = [f"{count:,} {text}" for count, text in found if count]
-        return lines + ([self.unfinished] if self.unfinished else [])
+        return lines + [text for text in (self.assumed, self.clock, self.unfinished) if text]
 
     def _steps_back(self) -> str:
         """What became of the events after steps back; many of them are damage of its own."""
@@ -131,12 +151,14 @@ class EventReader:
         size_given: whether the caller says it.
         t_offset_us: what to add to the events' times for the clock of frames that belong to them (µs).
         origin_us: time 0 on the clock that the file gives times by (µs).
+        understands: attributes of `EventLayout` that this format leaves to the user.
         labels: whether pieces say what caused the events, where the file does.
         triggers: edges of external signals that came with the last piece.
         damage: what was passed over so far.
     """
 
     format_name = "events"
+    understands: tuple[str, ...] = ()
 
     def __init__(self, path: str | Path, size_px: tuple[int, int] | None) -> None:
         self.path = Path(path)
@@ -164,3 +186,38 @@ class EventReader:
             DataError: the content is not of the format that the file says it is.
         """
         raise NotImplementedError
+
+    def measure(self) -> tuple[int, int] | None:
+        """Return how far the events reach (width, height, px), or None where that is not looked for.
+
+        Raises:
+            DataError: the file cannot be read, or its events reach too far to be those of a camera.
+        """
+        return None
+
+    def needed_size(
+        self, option: str = "--event-size", beside_px: tuple[int, int] | None = None
+    ) -> tuple[int, int]:
+        """Return width and height of the picture; where nothing says them, take how far the events reach.
+
+        `damage` then says that this was done.
+
+        Args:
+            option: what the user gives the size by, for messages.
+            beside_px: width and height of frames of the same scene, taken instead if the events lie in them.
+
+        Raises:
+            DataError: they are not known and cannot be measured.
+        """
+        if self.size_px is None:
+            reach = self.measure()
+            if reach is None:
+                raise DataError(f"does not say the size of its picture; give it with {option} WxH", self.path)
+            fits = beside_px is not None and reach[0] <= beside_px[0] and reach[1] <= beside_px[1]
+            width, height = self.size_px = beside_px if beside_px is not None and fits else reach
+            origin = "those of the frames" if fits else "as far as its events reach"
+            self.damage.assumed = (
+                f"the file does not say the size of its picture; {width} x {height} px, {origin}, were "
+                f"taken; {option} says another"
+            )
+        return self.size_px

@@ -3,75 +3,89 @@
 ========================================  ====================================================================
 `dvs_msgs/EventArray`,                    an event is x, y (uint16), seconds, nanoseconds (32 bits), polarity
 `prophesee_event_msgs/EventArray`
-`event_camera_msgs/EventPacket`           words of the camera; of the encodings `evt3` is read
+`event_camera_msgs/EventPacket`,          words of the camera, in one of the encodings of `ros_messages`
+`event_array_msgs/EventArray`
 ========================================  ====================================================================
 
+A bag is a file of ROS 1, a folder of ROS 2, or one file of it alone (MCAP, SQLite). Events have the camera's
+clock or that of the bag. If they are far from the stamp in the header of the first message, they have the
+camera's: then that stamp says when the message's first event was, and the camera's clock leads on from there.
 Times count from the first event's whole second; `origin_us` leads back to the clock of the bag.
 Sources: https://github.com/uzh-rpg/rpg_dvs_ros, https://github.com/ros-event-camera/event_camera_msgs
 """
 
 from __future__ import annotations
 
-import io
 import struct
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.data.extras import install
 from jeat_graph.io.events.ascending import Ascending
-from jeat_graph.io.events.evt3 import Evt3Reader
-from jeat_graph.io.events.reader import PIECE_ROWS, EventReader, agreed_size
-from jeat_graph.io.events.words import COUNTED
+from jeat_graph.io.events.layout import EventLayout
+from jeat_graph.io.events.reader import PIECE_ROWS, EventReader, Triggers, agreed_size
+from jeat_graph.io.events.ros_messages import EDGES, ENCODINGS, Decoded, PacketDecoder, RosMessage
 
 _ARRAYS = ("dvs_msgs", "prophesee_event_msgs")
-_PACKETS = "event_camera_msgs"
+_PACKETS = ("event_camera_msgs", "event_array_msgs")
 _US_PER_S, _NS_PER_US = 1_000_000, 1000
-_CDR_HEADER = 4
-# One event of ROS 1, without gaps; in ROS 2 its numbers lie on multiples of their size: 16 bytes apart.
-_EVENT_1 = np.dtype([("x", "<u2"), ("y", "<u2"), ("s", "<u4"), ("ns", "<u4"), ("p", "u1")])
-_EVENT_2 = np.dtype(
-    {"names": ["s", "ns", "p"], "formats": ["<u4", "<u4", "u1"], "offsets": [4, 8, 12], "itemsize": 16}
-)
+#: Events this far from their message's stamp have another clock than it (µs).
+_OTHER_CLOCK_US = 10 * _US_PER_S
+#: Stamps and the camera's clock that part by more than this are remarked on (µs).
+_DRIFT_US = 20_000
+#: Suffixes by which the package knows files of ROS 2.
+_FILES = {b"\x89MCAP0": ".mcap", b"SQLite": ".db3"}
 
 
 class _Topic(NamedTuple):
-    """What is read of a bag: a connection's id and topic, its message's type, and whether it is ROS 2."""
+    """What is read of a bag: connections with events, and those with edges of signals beside them."""
 
-    connection: Any
-    kind: str
-    second: bool
+    connections: list[Any]
+    edges: list[Any]
+
+
+class _Dated(NamedTuple):
+    """What a message holds, piece by piece; the first piece has its stamp on the clock of the bag (µs)."""
+
+    stamp_us: int | None
+    decoded: Decoded
 
 
 class RosbagReader(EventReader):
-    """Reads the first topic with events of a bag.
+    """Reads the events of a bag, and the edges of signals that come with them.
 
     Args:
-        path: the bag: a file of ROS 1, or a folder of ROS 2.
+        path: the bag: a file of ROS 1, a folder of ROS 2, or one of its files.
         size_px: width and height of the picture; by default as the messages say.
+        layout: which topic to read, where several have events.
 
     Raises:
         ConfigError: the package `rosbags` is not installed.
-        DataError: no bag, or no events in it.
+        DataError: no bag, no events in it, or several topics with some.
     """
 
     format_name = "ROS bag"
+    understands = ("stream",)
 
-    def __init__(self, path: Path, size_px: tuple[int, int] | None) -> None:
+    def __init__(
+        self, path: Path, size_px: tuple[int, int] | None, layout: EventLayout | None = None
+    ) -> None:
         super().__init__(path, size_px)
-        self._bag, self._topic = _open(path)
+        self._second = _is_second(path)
+        self._bag = _open(path, self._second)
+        self._offset_us: int | None = None
         try:
-            first = next(self._messages(), None)
+            self._topic = self._choose((layout or EventLayout()).stream)
+            first = next(self._messages(self._topic.connections), None)
             if first is not None:
-                message = _Message(first, self._topic.second)
+                message = RosMessage(first[2], self._second)
                 message.header()
                 height, width = message.whole("I"), message.whole("I")
                 self.size_px = agreed_size(size_px, (width, height) if width and height else None, path)
+            self._decoder = PacketDecoder(path, self.size_px)
         except DataError:
             self.close()
             raise
@@ -89,140 +103,160 @@ class RosbagReader(EventReader):
         Raises:
             DataError: a message cannot be read, or is of an encoding that is not.
         """
-        ascending = None
+        ascending = Ascending(self.damage)
         width, height = self.size_px or (1 << 16, 1 << 16)
-        for x, y, t_us, p in self._columns():
-            if not len(t_us):
+        edges: list[Triggers] = []
+        drift_us = 0
+        for stamp_us, decoded in self._decoded():
+            first_us = decoded.first_us
+            if first_us is None:
                 continue
-            if ascending is None:
-                self.origin_us = int(t_us[0]) // _US_PER_S * _US_PER_S
-                ascending = Ascending(self.damage)
-            inside = (x < width) & (y < height)
+            if self._offset_us is None:
+                assert stamp_us is not None
+                self._set_clock(stamp_us, first_us)
+            assert self._offset_us is not None
+            if stamp_us is not None and abs(stamp_us - first_us) > _OTHER_CLOCK_US:
+                drift_us = max(drift_us, abs(stamp_us - first_us - self._offset_us))
+            later = self._offset_us - self.origin_us
+            if len(decoded.triggers.t_us):
+                edges.append(decoded.triggers._replace(t_us=decoded.triggers.t_us + later))
+            inside = (decoded.x < width) & (decoded.y < height)
             self.damage.outside += int((~inside).sum())
-            t = ascending((t_us - self.origin_us)[inside])
+            t = ascending((decoded.t_us + later)[inside])
             self.damage.events += len(t)
-            whole = EventArray(t, x[inside], y[inside], p[inside])
+            whole = EventArray(t, decoded.x[inside], decoded.y[inside], decoded.p[inside])
             for first in range(0, len(whole), PIECE_ROWS):
+                self.triggers, edges = Triggers.joined(edges), []
                 yield whole.take(slice(first, first + PIECE_ROWS))
+        if drift_us > _DRIFT_US:
+            self.damage.clock = (
+                f"stamps of messages and the camera's clock part by up to {drift_us / _US_PER_S:.3g} s; "
+                "times are those of the camera, from the first stamp on"
+            )
+        if edges:
+            self.triggers = Triggers.joined(edges)
+            yield EventArray.empty()
 
-    def _columns(self) -> Iterator[tuple[Any, Any, Any, Any]]:
-        reader: Evt3Reader | None = None
-        for raw in self._messages():
-            message = _Message(raw, self._topic.second)
+    def _set_clock(self, stamp_us: int, first_us: int) -> None:
+        """Lead from the clock of the events to that of the bag, by the first message."""
+        apart = stamp_us - first_us
+        self._offset_us = apart if abs(apart) > _OTHER_CLOCK_US else 0
+        self.origin_us = (first_us + self._offset_us) // _US_PER_S * _US_PER_S
+
+    def _decoded(self) -> Iterator[_Dated]:
+        self._decoder.size_given = self.size_given
+        alone = {id(connection) for connection in self._topic.edges}
+        for connection, recorded_ns, raw in self._messages([*self._topic.connections, *self._topic.edges]):
+            message = RosMessage(raw, self._second)
             try:
-                message.header()
+                stamp_us = message.header() or recorded_ns // _NS_PER_US
                 message.whole("I")
                 message.whole("I")
-                if self._topic.kind != _PACKETS:
-                    yield message.events()
+                if _package(connection) in _ARRAYS:
+                    yield _Dated(stamp_us, Decoded(*message.events(), Triggers.none()))
                     continue
-                words = message.packet(self.path)
+                packet = message.packet()
             except (struct.error, ValueError):
                 raise DataError("has a message of events that cannot be read", self.path) from None
-            if reader is None:
-                reader = Evt3Reader(self.path, io.BytesIO(), self.size_px)
-                reader.size_given = self.size_given
-            reader._file = io.BytesIO(words)
-            for piece in reader.pieces():
-                yield piece.x, piece.y, piece.t_us, piece.polarity
-            for name in COUNTED:
-                setattr(self.damage, name, getattr(reader.damage, name))
-            if self.damage.held:
-                self.damage.held_from_us -= self.origin_us
+            if packet.encoding == EDGES or id(connection) not in alone:
+                stamp: int | None = stamp_us
+                for decoded in self._decoder.decode(packet):
+                    yield _Dated(stamp, decoded)
+                    stamp = None if decoded.first_us is not None else stamp
+            lead = (self._offset_us or 0) - self.origin_us
+            self._decoder.count(self.damage, lead)
 
-    def _messages(self) -> Iterator[bytes]:
+    def _choose(self, wanted: str | None) -> _Topic:
+        """Choose the topic with events, and what has edges of signals beside it.
+
+        Raises:
+            DataError: there is none, or there are several and none is named.
+        """
+        topics: dict[str, list[Any]] = {}
+        edges: dict[str, list[Any]] = {}
+        for connection in self._bag.connections:
+            if _package(connection) in (*_ARRAYS, *_PACKETS):
+                known = edges if self._encoding(connection) == EDGES else topics
+                known.setdefault(connection.topic, []).append(connection)
+        names = ", ".join(sorted(topics))
+        if wanted is not None and wanted not in topics:
+            raise DataError(f"has no events of the topic {wanted!r}, but of {names or 'none'}", self.path)
+        if not topics:
+            found = sorted({f"{c.topic} ({c.msgtype})" for c in self._bag.connections})
+            raise DataError(f"holds no events, but {', '.join(found) or 'nothing'}", self.path)
+        if wanted is None and len(topics) > 1:
+            raise DataError(
+                f"has events of {len(topics)} topics: {names}; name one with --event-stream", self.path
+            )
+        name = wanted or next(iter(topics))
+        beside = [c for topic, some in edges.items() for c in some if _space(topic) == _space(name)]
+        return _Topic(topics[name], beside)
+
+    def _encoding(self, connection: Any) -> str:
+        """Return the encoding of a connection's first packet; empty if it has none, or no packets.
+
+        Raises:
+            DataError: one that is not read.
+        """
+        first = next(self._messages([connection]), None)
+        if first is None or _package(connection) in _ARRAYS:
+            return ""
+        message = RosMessage(first[2], self._second)
+        message.header()
+        message.whole("I")
+        message.whole("I")
+        encoding = message.packet().encoding
+        if encoding not in (*ENCODINGS, EDGES):
+            raise DataError(
+                f"has packets of the encoding {encoding!r} ({connection.topic}); {', '.join(ENCODINGS)} are "
+                "read: record with one of these, or export the events with the tools of the camera's driver",
+                self.path,
+            )
+        return encoding
+
+    def _messages(self, connections: list[Any]) -> Iterator[tuple[Any, int, bytes]]:
         try:
-            for _, _, raw in self._bag.messages(connections=[self._topic.connection]):
-                yield bytes(raw)
+            for connection, recorded_ns, raw in self._bag.messages(connections=connections):
+                yield connection, int(recorded_ns), bytes(raw)
         except Exception as error:
             raise DataError(f"cannot be read: {' '.join(str(error).split())[:200]}", self.path) from None
 
 
-class _Message:
-    """Takes the bytes of one message apart, field by field; `second` for ROS 2, which aligns them."""
-
-    def __init__(self, raw: bytes, second: bool) -> None:
-        self._raw = raw[_CDR_HEADER:] if second else raw
-        self._second = second
-        self._at = 0
-
-    def whole(self, code: str) -> int:
-        """Read one number by its code of `struct`."""
-        size = struct.calcsize(code)
-        if self._second:
-            self._at += -self._at % size
-        (value,) = struct.unpack_from("<" + code, self._raw, self._at)
-        self._at += size
-        return int(value)
-
-    def text(self) -> str:
-        length = self.whole("I")
-        found = self._raw[self._at : self._at + length]
-        self._at += length
-        return found.rstrip(b"\0").decode("latin-1")
-
-    def header(self) -> None:
-        """Pass over number (ROS 1 only), time and frame."""
-        for _ in range(2 if self._second else 3):
-            self.whole("I")
-        self.text()
-
-    def events(self) -> tuple[Any, Any, Any, Any]:
-        """Read a list of events: x, y, time (µs), polarity."""
-        count = self.whole("I")
-        rest = np.frombuffer(self._raw, np.uint8, offset=self._at)
-        if not self._second:
-            found = np.frombuffer(rest.tobytes()[: count * _EVENT_1.itemsize], _EVENT_1, count)
-            x, y = found["x"], found["y"]
-        else:
-            padded = np.zeros(16 * count + 16, dtype=np.uint8)
-            if len(rest) < 16 * count - 3 * (count > 0):
-                raise ValueError("too short")
-            padded[: min(len(rest), len(padded))] = rest[: len(padded)]
-            found = np.frombuffer(padded.tobytes(), _EVENT_2, count)
-            # Places of x and y: 0 and 2, then 14 and 16, 30 and 32, …, two before each further event's
-            # sixteen.
-            start = np.arange(count) * 16 - 2 * (np.arange(count) > 0)
-            x, y = _two(padded, start), _two(padded, start + 2)
-        t = found["s"].astype(np.int64) * _US_PER_S + found["ns"] // _NS_PER_US
-        return x.astype(np.uint16), y.astype(np.uint16), t, (found["p"] != 0).astype(np.uint8)
-
-    def packet(self, path: Path) -> bytes:
-        """Read a packet's words.
-
-        Raises:
-            DataError: they are not EVT3.
-        """
-        self.whole("Q")
-        self.whole("Q")
-        encoding = self.text()
-        self.whole("B")
-        if encoding != "evt3":
-            raise DataError(f"has packets of encoding {encoding!r}; of packets evt3 is read", path)
-        length = self.whole("I")
-        return self._raw[self._at : self._at + length]
+def _package(connection: Any) -> str:
+    return str(connection.msgtype).split("/")[0]
 
 
-def _two(data: npt.NDArray[np.uint8], at: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    return data[at].astype(np.int64) | (data[at + 1].astype(np.int64) << 8)
+def _space(topic: str) -> str:
+    return topic.rpartition("/")[0]
 
 
-def _open(path: Path) -> tuple[Any, _Topic]:
+def _is_second(path: Path) -> bool:
+    """Whether a bag is of ROS 2.
+
+    Raises:
+        DataError: the file's name does not end as the package needs it.
+    """
+    if path.is_dir():
+        return True
+    with path.open("rb") as file:
+        start = file.read(8)
+    for magic, suffix in _FILES.items():
+        if start.startswith(magic):
+            if path.suffix.lower() != suffix:
+                raise DataError(f"is a file of a ROS 2 bag; give it a name that ends in {suffix}", path)
+            return True
+    return False
+
+
+def _open(path: Path, second: bool) -> Any:
     try:
         from rosbags.rosbag1 import Reader as Reader1
         from rosbags.rosbag2 import Reader as Reader2
     except ImportError:
         raise ConfigError(f"ROS bags need {install('ros')}") from None
-    second = path.is_dir()
     try:
         bag: Any = (Reader2 if second else Reader1)(path)
         bag.open()
     except Exception as error:
         raise DataError(f"cannot be read as a bag: {' '.join(str(error).split())[:200]}", path) from None
-    for connection in bag.connections:
-        kind = connection.msgtype.split("/")[0]
-        if kind in (*_ARRAYS, _PACKETS):
-            return bag, _Topic(connection, kind, second)
-    topics = ", ".join(sorted({f"{c.topic} ({c.msgtype})" for c in bag.connections})) or "nothing"
-    bag.close()
-    raise DataError(f"holds no events, but {topics}", path)
+    return bag

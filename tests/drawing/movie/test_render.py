@@ -208,6 +208,21 @@ def test_a_frame_is_shown_until_the_next_one(segment, picture):
         assert picture(segment, t)[70, 120, 0] == grey_frame(k)[0, 0, 0]
 
 
+def test_events_of_a_table_are_drawn_like_those_of_a_file(segment, run, picture, capsys):
+    """A CSV file says nothing of its picture's size; the option does."""
+    from jeat_graph.io.events.opening import open_events
+
+    with open_events(segment / "events.h5") as reader:
+        events = EventArray.concatenate(list(reader.pieces()))
+    columns = np.c_[events.t_us, events.x, events.y, events.polarity]
+    table = segment / "events.csv"
+    np.savetxt(table, columns, fmt="%d", delimiter=",", header="time_us,x,y,p", comments="")
+    size = ["--event-size", f"{WIDTH}x{HEIGHT}"]
+    image = picture(run, 0.3, "--events", table, *size, "--only", "causal")
+    expected = picture(run, 0.3, "--events", segment / "events.h5", "--only", "causal")
+    np.testing.assert_array_equal(image, expected)
+
+
 def test_tracks_lie_on_frames_and_events_alike(segment, run, picture):
     image = picture(run, 0.3, "--frames", segment, "--events", segment / "events.h5", "--only", "causal")
     lit = close_to(image, track_rgb(1), 60)

@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.io.events.layout import EventLayout
 from jeat_graph.io.events.opening import open_events
 
 from .plain import HEADERS
 
 OTHERS = {
     b"Event Stream\x02\x00": "is an Event Stream",
-    b"\x93NUMPY\x01\x00": "is a NumPy array",
+    b"\x93NUMPY\x01\x00": "is a NumPy array that cannot be read",
     b"\x00\x00\x00\x20ftypisom": "is an MP4 video",
     b"\x1a\x45\xdf\xa3": "is a Matroska or WebM video",
     b"\x1f\x8b\x08": "is compressed with gzip",
@@ -30,7 +31,8 @@ OTHERS = {
     b"% Version 2\n\x0c": "ends in its header: the file is cut off",
     b"% Version 3\n\x0c\x08": "is DAT of version '3'",
     b"% evt 3.0\n% geometry 0x720\n% end\n": "its header says a picture of 0 x 720 px",
-    b"t,x,y,p\n1,2,3,1\n": "is none of the files of events that are read",
+    b"left,top,w,h\n1,2,3,1\n": "has the columns left, top, w, h: which of them is t, x, y, p",
+    b"some words\n": "is none of the files of events that are read",
     b"": "is empty",
 }
 
@@ -126,7 +128,9 @@ def test_damaged_gzip_is_not_called_a_missing_filter(tmp_path):
 def test_other_hdf5_is_named(tmp_path):
     with h5py.File(tmp_path / "o.h5", "w") as file:
         file["pictures"] = np.zeros(3)
-    with pytest.raises(DataError, match="is HDF5 without events: it holds pictures"):
+    with pytest.raises(
+        DataError, match="holds no events: it has pictures; events are x, y, t, p or rows of them"
+    ):
         open_events(tmp_path / "o.h5")
 
 
@@ -166,3 +170,25 @@ def test_hdf5_whose_list_of_items_is_damaged_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(h5py.Group, "__iter__", broken)
     with pytest.raises(DataError, match="cannot be read as HDF5: Link iteration failed"):
         open_events(path)
+
+
+@pytest.mark.parametrize(
+    ("layout", "option"),
+    [
+        (EventLayout(columns=("t", "x", "y", "p")), "--event-columns"),
+        (EventLayout(time_unit="us"), "--event-time-unit"),
+        (EventLayout(stream="left"), "--event-stream"),
+    ],
+)
+def test_what_a_format_does_not_leave_open_cannot_be_said(tmp_path, layout, option):
+    path = tmp_path / "e.raw"
+    path.write_bytes(HEADERS["evt3"])
+    with pytest.raises(DataError, match=f"is EVT3, where {option} says nothing; leave it out"):
+        open_events(path, layout=layout)
+
+
+def test_a_part_of_one_text_cannot_be_named(tmp_path):
+    path = tmp_path / "e.csv"
+    path.write_text("t,x,y,p\n1,2,3,1\n")
+    with pytest.raises(DataError, match="is one text, of which --event-stream left names no part"):
+        open_events(path, layout=EventLayout(stream="left"))

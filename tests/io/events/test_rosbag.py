@@ -7,8 +7,11 @@ import random
 import numpy as np
 import pytest
 
+from jeat_graph.cli.main import main
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
+from jeat_graph.io.events import words
+from jeat_graph.io.events.layout import EventLayout
 from jeat_graph.io.events.opening import open_events
 
 from .plain import random_evt3, read_evt3
@@ -129,7 +132,8 @@ def test_steps_back_within_packets_are_counted(tmp_path):
     own = read_evt3(early).events
     damage = reader.damage
     assert (damage.backwards, damage.held) == (1, len(own))
-    assert damage.held_from_us == own[0][0] - reader.origin_us
+    # Times count from the stamp of the first message on, a whole second.
+    assert damage.held_from_us == own[0][0] - read_evt3(data).events[0][0]
     assert damage.events == len(read_evt3(data).events)
 
 
@@ -146,3 +150,189 @@ def test_no_bag_at_all(tmp_path):
     path.write_bytes(b"#ROSBAG V2.0\nnothing")
     with pytest.raises(DataError, match="cannot be read as a bag"):
         open_events(path)
+
+
+class Word:
+    """16-bit words of `libcaer_cmp`, from its description."""
+
+    @staticmethod
+    def time(us: int) -> list[int]:
+        return [0 << 12 | us >> 12, 1 << 12 | us & 0xFFF]
+
+    @staticmethod
+    def event(x: int, y: int, p: int) -> list[int]:
+        return [2 << 12 | x, 3 << 12 | p << 11 | y]
+
+    @staticmethod
+    def column_of_rows(x: int, base: int, p: int, *bits: int) -> list[int]:
+        return [2 << 12 | x, 4 << 12 | p << 11 | base, *(5 << 12 | one for one in bits)]
+
+
+def packet(
+    store, version, encoding, data, stamp_s=SECOND, time_base=0, kind="event_camera_msgs/msg/EventPacket"
+):
+    time = store.types["builtin_interfaces/msg/Time"](sec=int(stamp_s), nanosec=round(stamp_s % 1 * 1e9))
+    extra = {"seq": 0} if version == 1 else {}
+    return store.types[kind](
+        header=store.types["std_msgs/msg/Header"](stamp=time, frame_id="cam", **extra),
+        height=480,
+        width=640,
+        seq=0,
+        time_base=time_base,
+        encoding=encoding,
+        is_bigendian=False,
+        events=np.frombuffer(data, np.uint8),
+    )
+
+
+def rows(events):
+    return list(
+        zip(*(getattr(events, name).tolist() for name in ("t_us", "x", "y", "polarity")), strict=True)
+    )
+
+
+def test_compressed_packets_of_libcaer_are_read(tmp_path):
+    store = store_of(2)
+    base = SECOND * 10**9 + 5_000_000  # ns
+    first = [*Word.time(0), *Word.event(5, 7, 1), *Word.column_of_rows(9, 100, 0, 0b101, 0b10000000)]
+    second = [*Word.time(70_000), 3 << 12 | 8, *Word.event(639, 479, 1)]  # 3: the column goes on
+    messages = [
+        packet(store, 2, "libcaer_cmp", np.array(words, "<u2").tobytes(), SECOND + 0.01 * k, base + k * 10**7)
+        for k, words in enumerate((first, second))
+    ]
+    found, reader = read(write(tmp_path, 2, messages, "event_camera_msgs/msg/EventPacket", store))
+    assert rows(found) == [
+        (5_000, 5, 7, 1),
+        (5_000, 9, 100, 0),
+        (5_000, 9, 102, 0),
+        (5_000, 9, 115, 0),
+        (85_000, 9, 8, 0),
+        (85_000, 639, 479, 1),
+    ]
+    assert reader.origin_us == SECOND * 10**6
+
+
+def test_plain_packets_of_libcaer_are_read_over_the_turn_of_their_clock(tmp_path):
+    store = store_of(2)
+    events = [(2**31 - 2, 3, 4, 1), (2**31 + 5, 639, 479, 0)]
+    words = [(x << 17 | y << 2 | p << 1 | 1, t % 2**31) for t, x, y, p in events]
+    base = SECOND * 10**9 - (2**31 - 2) * 1000
+    message = packet(store, 2, "libcaer", np.array(words, "<u4").tobytes(), SECOND, base)
+    found, _reader = read(write(tmp_path, 2, [message], "event_camera_msgs/msg/EventPacket", store))
+    assert rows(found) == [(0, 3, 4, 1), (7, 639, 479, 0)]
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_packets_of_the_old_kind_are_read_with_the_topic_of_their_triggers(tmp_path, version):
+    from rosbags.rosbag1 import Writer as Writer1
+    from rosbags.rosbag2 import Writer as Writer2
+    from rosbags.typesys import get_types_from_msg
+
+    kind = "event_array_msgs/msg/EventArray"
+    store = store_of(version)
+    store.register(get_types_from_msg(PACKET, kind))
+    base = 123 * 10**9  # the camera's own time (ns)
+    words = np.array([(2000 * k) | k << 32 | (k + 1) << 48 | (k % 2) << 63 for k in range(10)], "<u8")
+    edges = np.array([1000 | 3 << 48 | 1 << 63, 9000 | 3 << 48], "<u8")
+    path = tmp_path / ("b.bag" if version == 1 else "bag")
+    with Writer1(path) if version == 1 else Writer2(path, version=9) as bag:
+        for topic, encoding, data in (("/cam/events", "mono", words), ("/cam/trigger", "trigger", edges)):
+            message = packet(store, version, encoding, data.tobytes(), SECOND + 0.25, base, kind)
+            raw = store.serialize_ros1(message, kind) if version == 1 else store.serialize_cdr(message, kind)
+            bag.write(bag.add_connection(topic, kind, typestore=store), SECOND * 10**9, raw)
+    with open_events(path) as reader:
+        found, triggers = [], []
+        for piece in reader.pieces():
+            found += rows(piece)
+            triggers += list(zip(*(column.tolist() for column in reader.triggers), strict=True))
+    # The stamp says when the first event was: .25 s after a whole second.
+    assert found == [(250_000 + 2 * k, k, k + 1, k % 2) for k in range(10)]
+    assert triggers == [(250_001, 3, 1), (250_009, 3, 0)]
+
+
+def test_triggers_among_the_words_of_evt3_are_counted(tmp_path, capsys):
+    store = store_of(2)
+    data = random_evt3(random.Random(0), 4000)
+    expected = read_evt3(data)
+    path = write(tmp_path, 2, packets_of(store, 2, data), "event_camera_msgs/msg/EventPacket", store)
+    with open_events(path) as reader:
+        found = []
+        for _ in reader.pieces():
+            found += list(zip(*(column.tolist() for column in reader.triggers), strict=True))
+    first = min(expected.events[0][0], expected.triggers[0][0])
+    assert len(expected.triggers) > 50
+    assert found == [(t - first, channel, value) for t, channel, value in expected.triggers]
+    assert main(["events", "info", str(path)]) == 0
+    assert f"triggers: {len(expected.triggers)}\n" in capsys.readouterr().out
+
+
+def test_stamps_give_the_clock_and_the_camera_the_times(tmp_path):
+    store = store_of(2)
+    words = np.array([(k * 1_000_000) | 5 << 32 | 6 << 48 for k in range(3)], "<u8").tobytes()
+    stamps = [SECOND + 0.5, SECOND + 0.5 + 0.013, SECOND + 0.5 + 0.070]  # late by 0, 3 and 50 ms
+    messages = [packet(store, 2, "mono", words, stamp, 10**7 * k) for k, stamp in enumerate(stamps)]
+    found, reader = read(write(tmp_path, 2, messages, "event_camera_msgs/msg/EventPacket", store))
+    assert reader.origin_us == SECOND * 10**6
+    assert found.t_us.tolist() == [500_000 + 10_000 * k + 1000 * j for k in range(3) for j in range(3)]
+    (note,) = reader.damage.notes()
+    assert "stamps of messages and the camera's clock part by up to 0.05 s" in note
+
+
+def test_one_file_of_a_bag_alone_is_read(tmp_path):
+    from rosbags.rosbag2 import StoragePlugin, Writer
+
+    store = store_of(2)
+    data = random_evt3(random.Random(0), 2000)
+    kind = "event_camera_msgs/msg/EventPacket"
+    for plugin, suffix in ((StoragePlugin.MCAP, ".mcap"), (StoragePlugin.SQLITE3, ".db3")):
+        folder = tmp_path / suffix[1:]
+        with Writer(folder, version=9, storage_plugin=plugin) as bag:
+            connection = bag.add_connection("/events", kind, typestore=store)
+            for k, message in enumerate(packets_of(store, 2, data)):
+                bag.write(connection, SECOND * 10**9 + k, store.serialize_cdr(message, kind))
+        (file,) = folder.glob(f"*{suffix}")
+        alone = file.rename(tmp_path / f"alone{suffix}")
+        found, _ = read(alone)
+        assert [row[1:] for row in rows(found)] == [row[1:] for row in read_evt3(data).events]
+        other = alone.rename(tmp_path / "alone.events")
+        with pytest.raises(DataError, match=f"give it a name that ends in {suffix}"):
+            open_events(other)
+        other.unlink()
+
+
+def test_an_encoding_that_is_not_read_is_named_with_what_to_do(tmp_path):
+    store = store_of(2)
+    path = write(tmp_path, 2, [packet(store, 2, "evt4", b"0123")], "event_camera_msgs/msg/EventPacket", store)
+    said = (
+        r"packets of the encoding 'evt4' \(/events\); evt3, libcaer_cmp, libcaer, mono are read: record with"
+    )
+    with pytest.raises(DataError, match=said):
+        open_events(path)
+
+
+def test_two_topics_must_be_told_apart(tmp_path):
+    from rosbags.rosbag2 import Writer
+
+    store = store_of(2)
+    kind = "event_camera_msgs/msg/EventPacket"
+    words = np.array([k | k << 32 for k in range(9)], "<u8").tobytes()
+    with Writer(tmp_path / "bag", version=9) as bag:
+        for topic in ("/left/events", "/right/events"):
+            message = packet(store, 2, "mono", words if topic < "/r" else words[:32])
+            bag.write(bag.add_connection(topic, kind, typestore=store), 0, store.serialize_cdr(message, kind))
+    with pytest.raises(
+        DataError, match=r"2 topics: /left/events, /right/events; name one with --event-stream"
+    ):
+        open_events(tmp_path / "bag")
+    with open_events(tmp_path / "bag", layout=EventLayout(stream="/right/events")) as reader:
+        assert sum(len(piece) for piece in reader.pieces()) == 4
+
+
+def test_a_message_of_several_pieces_does_not_part_from_its_own_stamp(tmp_path, monkeypatch):
+    monkeypatch.setattr(words, "PIECE_ROWS", 200)
+    store = store_of(2)
+    data = random_evt3(random.Random(0), 4000)
+    message = packet(store, 2, "evt3", data)
+    found, reader = read(write(tmp_path, 2, [message], "event_camera_msgs/msg/EventPacket", store))
+    assert [row[1:] for row in rows(found)] == [row[1:] for row in read_evt3(data).events]
+    assert reader.damage.notes() == []
