@@ -154,7 +154,8 @@ def _run(args: argparse.Namespace) -> int:
     try:
         if getattr(args, "out", None) is not None:
             check_named(args.out, stdout=args.command in _TO_STDOUT)
-        held = holding(args, import_module(f"jeat_graph.cli.{args.command}_command"))
+        # A command may come with another distribution, so what it writes is asked of where its function lies.
+        held = holding(args, sys.modules[args.run.__module__])
         with held, listening(partial(say, args.command)):
             code = int(args.run(args) or 0)
         sys.stdout.flush()  # what cannot be written is noticed here, not at exit
