@@ -1,4 +1,4 @@
-# Every target does its own set-up in .venv and needs only make and Python 3.11 or later.
+# Every target does its own set-up in .venv and needs only make, Python 3.11 or later and a C++20 compiler.
 #
 #   make demo    track simulated detections, and go from raw pictures and events to tracks on a film (in demo/)
 #   make test    run the tests, those of time by themselves
@@ -11,6 +11,8 @@
 #   make lint    style, format, docstrings, and known weaknesses of what is installed
 #   make types   type-check the built package
 #   make bounds  run the numerical tests with the oldest versions allowed of what is needed
+#   make core    build what is compiled, after a change of it
+#   make sanitize   run the tests of what is compiled with AddressSanitizer and UndefinedBehaviorSanitizer
 #   make build   build the wheel (in dist/)
 #   make docs    build the documentation (in docs/_build/html)
 #   make clean   remove what was built and computed, .venv included
@@ -27,6 +29,7 @@ export PYTHONDONTWRITEBYTECODE :=
 # The build without what GPUs need, which takes gigabytes. Where pip does not find it by itself, give PIP_EXTRA_INDEX_URL
 # the address of PyTorch's index for processors.
 TORCH := torch==2.13.0+cpu
+CORE := $(shell find jeat_graph/core -name '*.?pp' -o -name CMakeLists.txt)
 SOURCES := $(shell find jeat_graph filters association smoothers eval -name '*.py')
 
 # Other kernels than this machine would choose: the oldest of OpenBLAS, none of NumPy's for newer processors, and
@@ -37,10 +40,11 @@ OTHER_KERNELS = OPENBLAS_CORETYPE=$(if $(filter x86_64 AMD64,$(shell uname -m)),
 	NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python .ci/kernels.py names)" \
 	NUMBA_CPU_NAME=generic NUMBA_CACHE_DIR=$(CURDIR)/$(VENV)/numba-generic
 
-.PHONY: demo test test-slow test-all compiled-for-tests test-portable licences live fuzz lint types bounds build docs clean
+.PHONY: demo test test-slow test-all compiled-for-tests test-portable licences live fuzz lint types bounds core sanitize \
+	build docs clean
 .DELETE_ON_ERROR:
 
-demo: $(VENV)/.run
+demo: $(VENV)/.core
 	@$(BIN)/jeat-graph demo --from-raw --out demo
 
 test: compiled-for-tests
@@ -54,7 +58,7 @@ test-slow: compiled-for-tests
 	@$(BIN)/python -m pytest -p no:randomly -n 0 -m slow tests/performance/test_time.py
 
 # The tracker on one core, what the tests call beside it on the other.
-compiled-for-tests: $(VENV)/.test
+compiled-for-tests: $(VENV)/.test $(VENV)/.core
 	@$(MAKE) --no-print-directory -j 2 $(VENV)/.compiled $(VENV)/.compiled-beside
 
 # One after the other, also with make -j: both would wait for each other's processor time.
@@ -76,7 +80,7 @@ live: $(VENV)/.test $(VENV)/.compiled
 fuzz: $(VENV)/.test $(VENV)/.compiled
 	@JEAT_GRAPH_FULL=1 $(BIN)/python -m pytest -n 2 tests/fuzz tests/tracking/test_invariants.py
 
-lint: $(VENV)/.lint $(VENV)/.run
+lint: $(VENV)/.lint $(VENV)/.core
 	@$(BIN)/ruff check
 	@$(BIN)/ruff format --check
 	@$(BIN)/interrogate --quiet jeat_graph filters association smoothers eval configs || \
@@ -90,6 +94,13 @@ types: build/.installed
 bounds: | $(BIN)/python
 	@PYTHON=$(BIN)/python .ci/bounds
 
+core: $(VENV)/.core
+
+# What is compiled, built with the sanitizers and the checks of the C++ library, in a copy of the package.
+sanitize: $(VENV)/.test $(VENV)/.core
+	@echo "make: building the core with the sanitizers"
+	@PYTHON=$(BIN)/python .ci/sanitize
+
 build: build/.wheel
 
 # A warning is an error: a link or a name that leads nowhere.
@@ -98,7 +109,7 @@ docs: $(VENV)/.docs
 	@echo "make: open docs/_build/html/index.html"
 
 clean:
-	rm -rf $(VENV) build dist demo docs/_build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) build dist demo docs/_build *.egg-info jeat_graph/core/_core jeat_graph/core/_core.* .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:
@@ -106,14 +117,24 @@ $(BIN)/python:
 	@echo "make: creating $(VENV)"
 	@$(PYTHON) -m venv $(VENV)
 
+# Without a build environment of its own, so that the next build goes on where the last one ended. CMake and Ninja
+# come along where the machine has none.
 $(VENV)/.run: pyproject.toml | $(BIN)/python
 	@echo "make: installing jeat-graph and what it needs (a minute or two)"
-	@$(PIP) --editable .
+	@$(PIP) $$($(BIN)/python -c "import tomllib; \
+		print(*tomllib.load(open('pyproject.toml', 'rb'))['build-system']['requires'])") \
+		$$(command -v cmake > /dev/null || echo cmake) $$(command -v ninja > /dev/null || echo ninja)
+	@$(PIP) --no-build-isolation --editable .
+	@touch $@ $(VENV)/.core
+
+$(VENV)/.core: $(CORE) $(VENV)/.run
+	@echo "make: building the core"
+	@$(PIP) --no-build-isolation --no-deps --editable .
 	@touch $@
 
 $(VENV)/.test: pyproject.toml $(VENV)/.run
 	@echo "make: installing what the tests need"
-	@$(PIP) --editable '.[test]'
+	@$(PIP) --no-build-isolation --editable '.[test]'
 	@$(PIP) --no-deps 'trackers>=2.6,<3' norfair==2.3.0 'trackeval>=1.3,<2'
 	@$(PIP) $(TORCH) 2> /dev/null || \
 		echo "make: no PyTorch for processors to be had: the tests of training skip"
@@ -121,7 +142,7 @@ $(VENV)/.test: pyproject.toml $(VENV)/.run
 
 $(VENV)/.docs: pyproject.toml $(VENV)/.run
 	@echo "make: installing what builds the documentation"
-	@$(PIP) --editable '.[docs]'
+	@$(PIP) --no-build-isolation --editable '.[docs]'
 	@touch $@
 
 $(VENV)/.lint: pyproject.toml | $(BIN)/python
@@ -132,7 +153,7 @@ $(VENV)/.lint: pyproject.toml | $(BIN)/python
 	@touch $@
 
 # Code that no longer fits its sources is thrown away at the first import (config/stale_kernels.py).
-$(VENV)/.compiled: $(SOURCES) $(VENV)/.run
+$(VENV)/.compiled: $(SOURCES) $(VENV)/.core
 	@$(BIN)/python -m jeat_graph.tracking.warm_up
 	@touch $@
 
@@ -140,7 +161,7 @@ $(VENV)/.compiled-beside: $(SOURCES) $(VENV)/.test
 	@$(BIN)/python tests/loaded/compile_beside.py
 	@touch $@
 
-build/.wheel: $(SOURCES) $(shell find eval configs -name '*.py' -o -name '*.yaml') pyproject.toml | $(BIN)/python
+build/.wheel: $(SOURCES) $(CORE) $(shell find eval configs -name '*.py' -o -name '*.yaml') pyproject.toml | $(BIN)/python
 	@echo "make: building the wheel"
 	@$(PIP) build
 	@rm -rf build dist

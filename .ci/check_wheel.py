@@ -6,7 +6,15 @@ import sys
 import zipfile
 from pathlib import Path
 
-NEEDED = ("jeat_graph/py.typed", "jeat_graph/configs/default.yaml", "jeat_graph/configs/paper.yaml")
+NEEDED = (
+    "jeat_graph/py.typed",
+    "jeat_graph/configs/default.yaml",
+    "jeat_graph/configs/paper.yaml",
+    "jeat_graph/core/_core/__init__.pyi",
+    *(f"jeat_graph/core/_core/{folder}.pyi" for folder in ("detection", "events", "io")),
+)
+#: Sources of what is compiled, and what the build of a checkout leaves in it.
+UNWANTED = (".hpp", ".cpp", ".txt", ".pth", ".new")
 
 
 def problems(wheel: Path) -> list[str]:
@@ -17,7 +25,11 @@ def problems(wheel: Path) -> list[str]:
         f"{name} does not belong in the wheel"
         for name in names
         if not (name.startswith("jeat_graph/") or name.split("/")[0].endswith(".dist-info"))
+        or (name.startswith("jeat_graph/") and name.endswith(UNWANTED))
     ]
+    compiled = [name for name in names if name.startswith("jeat_graph/core/_core.")]
+    if len(compiled) != 1:
+        found.append(f"one compiled core belongs in the wheel, not {compiled}")
     wanted = set(NEEDED)
     wanted |= {f"jeat_graph/{path.as_posix()}" for path in Path("configs").rglob("*.yaml")}
     modules = [path for kind in ("py", "js", "css") for path in Path("jeat_graph").rglob(f"*.{kind}")]

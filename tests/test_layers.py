@@ -18,7 +18,7 @@ TOP = ("filters", "association", "smoothers", "eval", "configs")
 #: Low to high: a module imports from its own layer and from those before it. The first name that fits
 #: counts; "" is the package itself, as its users import it.
 LAYERS = (
-    ("version", "data.arrays", "data.errors", "data.progress"),
+    ("version", "data.arrays", "data.errors", "data.progress", "core"),
     ("filters", "association"),
     ("smoothers",),
     ("data",),

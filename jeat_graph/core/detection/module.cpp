@@ -1,0 +1,4 @@
+#include "arrays.hpp"
+namespace jeat::detection {
+void bind(nb::module_&) {}
+}
