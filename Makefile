@@ -164,7 +164,7 @@ $(VENV)/.compiled-beside: $(SOURCES) $(VENV)/.test
 build/.wheel: $(SOURCES) $(CORE) $(shell find eval configs -name '*.py' -o -name '*.yaml') pyproject.toml | $(BIN)/python
 	@echo "make: building the wheel"
 	@$(PIP) build
-	@rm -rf build dist
+	@rm -rf dist
 	@$(BIN)/python -m build --wheel --outdir dist . > $(VENV)/build.log 2>&1 || { cat $(VENV)/build.log; exit 1; }
 	@mkdir -p build && touch $@
 

@@ -11,7 +11,7 @@
 #include <span>
 #include <stdexcept>
 #include <string>
-#include <vector>
+#include <utility>
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
@@ -29,24 +29,45 @@ template <class T> using In3 = nb::ndarray<const T, nb::numpy, nb::ndim<3>, nb::
 template <class T> using Out3 = nb::ndarray<T, nb::numpy, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 template <class T> using In4 = nb::ndarray<const T, nb::numpy, nb::ndim<4>, nb::c_contig, nb::device::cpu>;
 
+// A view of rows of one length.
+template <class T> struct View2 {
+    T* data;
+    std::size_t rows, columns;
+    T* operator[](std::size_t row) const { return data + row * columns; }
+    std::size_t size() const { return rows * columns; }
+};
+template <class T, class... Rest> View2<T> view2(const nb::ndarray<T, Rest...>& array) {
+    return {array.data(), array.shape(0), array.shape(1)};
+}
+
 // The elements of an array of any shape, in their order.
 template <class T, class... Rest> std::span<T> span(const nb::ndarray<T, Rest...>& array) {
     return {array.data(), array.size()};
 }
 
-// An array that Python receives and owns from then on; the vector's memory is handed over, not copied.
-template <class T> Out<T> handed_over(std::vector<T>&& values) {
-    auto owned = std::make_unique<std::vector<T>>(std::move(values));
-    nb::capsule owner(owned.get(), [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
-    auto* vector = owned.release();
-    return Out<T>(vector->data(), {vector->size()}, owner);
-}
+// Memory for what a kernel returns, of which the first `used` elements are filled.
+template <class T> struct Buffer {
+    explicit Buffer(std::size_t room) : data(std::make_unique_for_overwrite<T[]>(room)), room(room), used(room) {}
+    T& operator[](std::size_t k) { return data[k]; }
+    const T& operator[](std::size_t k) const { return data[k]; }
 
-template <class T> Out2<T> handed_over(std::vector<T>&& values, std::size_t columns) {
-    auto owned = std::make_unique<std::vector<T>>(std::move(values));
-    nb::capsule owner(owned.get(), [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
-    auto* vector = owned.release();
-    return Out2<T>(vector->data(), {vector->size() / columns, columns}, owner);
+    std::unique_ptr<T[]> data;
+    std::size_t room, used;
+};
+
+// An array of what is used of a buffer; Python owns its memory from then on, without a copy.
+template <class T> nb::capsule owner_of(Buffer<T>& buffer) {
+    nb::capsule owner(buffer.data.get(), [](void* memory) noexcept { delete[] static_cast<T*>(memory); });
+    buffer.data.release();
+    return owner;
+}
+template <class T> Out<T> handed_over(Buffer<T>&& buffer) {
+    T* const data = buffer.data.get();
+    return Out<T>(data, {buffer.used}, owner_of(buffer));
+}
+template <class T> Out2<T> handed_over(Buffer<T>&& buffer, std::size_t rows, std::size_t columns) {
+    T* const data = buffer.data.get();
+    return Out2<T>(data, {rows, columns}, owner_of(buffer));
 }
 
 // Raise ValueError in Python where columns that belong together are not of one length.
