@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <bit>
+#include <limits>
+#include <numeric>
 #include <vector>
 
 #include "arrays.hpp"
@@ -21,32 +23,39 @@ struct Collected {
 
 // Collects the marked pixels: those whose bits are set in the rows of `bits` (H, B).
 template <class Mark> Collected collect_marked(Bits bits, View2<const Mark> marks) {
-    std::size_t number = 0;
-    for (std::size_t k = 0; k < bits.size(); ++k) number += static_cast<std::size_t>(std::popcount(bits.data[k]));
-    Collected found{Buffer<std::int32_t>(number), Buffer<std::int32_t>(number), Buffer<std::int64_t>(bits.rows + 1), 0};
+    Buffer<std::int32_t> columns(bits.size() * WORD);  // most of this memory is never touched
+    Buffer<std::int64_t> start(bits.rows + 1);
     std::size_t p = 0;
     for (std::size_t row = 0; row < bits.rows; ++row) {
-        found.start[row] = static_cast<std::int64_t>(p);
+        start[row] = static_cast<std::int64_t>(p);
         for (std::size_t n = 0; n < bits.columns; ++n) {
             for (std::uint64_t word = bits[row][n]; word != 0; word &= word - 1) {
-                const std::size_t column = n * WORD + static_cast<std::size_t>(std::countr_zero(word));
-                if (column >= marks.columns) throw std::out_of_range("a marked pixel lies outside the picture");
-                found.x[p] = static_cast<std::int32_t>(column);
-                const auto mark = static_cast<std::int32_t>(marks[row][column]);
-                found.weight[p++] = mark;
-                found.total += mark;
+                columns[p++] = static_cast<std::int32_t>(n) * WORD + std::countr_zero(word);
             }
         }
     }
-    found.start[bits.rows] = static_cast<std::int64_t>(p);
+    start[bits.rows] = static_cast<std::int64_t>(p);
+    Collected found{Buffer<std::int32_t>(p), Buffer<std::int32_t>(p), std::move(start), 0};
+    std::copy_n(columns.data.get(), p, found.x.data.get());
+    for (std::size_t row = 0; row < bits.rows; ++row) {
+        const auto end = static_cast<std::size_t>(found.start[row + 1]);
+        for (auto k = static_cast<std::size_t>(found.start[row]); k < end; ++k) {
+            const auto column = static_cast<std::size_t>(columns[k]);
+            if (column >= marks.columns) throw std::out_of_range("a marked pixel lies outside the picture");
+            const auto mark = static_cast<std::int32_t>(marks[row][column]);
+            found.weight[k] = mark;
+            found.total += mark;
+        }
+    }
     return found;
 }
 
 // Runs of a dilated picture: first and last column before it grows sideways, and where rows begin (H + 1).
 struct Runs {
-    std::vector<std::int32_t> first, last;
+    explicit Runs(std::size_t most) : first(most), last(most) {}
+    Buffer<std::int32_t> first, last;
     std::vector<std::size_t> begin;
-    std::size_t size() const { return first.size(); }
+    std::size_t size = 0;
 };
 
 // Sets the bits up to `columns` (less than 64) behind each that is set, twice as far each time.
@@ -61,20 +70,27 @@ inline void smear(std::vector<std::uint64_t>& line, std::int32_t columns) {
     }
 }
 
+// Sets in `line` what is set in any of some rows that follow one another.
+JEAT_GRAPH_WIDE void or_rows(const std::uint64_t* bits, std::size_t rows, std::uint64_t* line, std::size_t words) {
+    for (std::size_t row = 0; row < rows; ++row) {
+        for (std::size_t n = 0; n < words; ++n) line[n] |= bits[row * words + n];
+    }
+}
+
 // A dilation reaches `link / 2` px to the right and down, and the rest of its side to the left and up.
 inline Runs dilated_runs(Bits bits, std::int32_t link) {
-    Runs runs;
+    Runs runs(bits.rows * (bits.columns * (WORD / 2) + 1));  // most of this memory is never touched
     runs.begin.reserve(bits.rows + 1);
     std::vector<std::uint64_t> line(bits.columns);
     const std::int64_t down = link / 2, up = link - 1 - link / 2, height = static_cast<std::int64_t>(bits.rows);
     const std::int32_t behind = std::min(link, WORD) - 1;  // columns that are set behind each: gaps close
     for (std::int64_t row = 0; row < height; ++row) {
-        runs.begin.push_back(runs.size());
+        runs.begin.push_back(runs.size);
         std::fill(line.begin(), line.end(), 0);
-        const std::int64_t end = std::min(row + up, height - 1);
-        for (std::int64_t near = std::max(row - down, std::int64_t{0}); near <= end; ++near) {
-            const std::uint64_t* own = bits[static_cast<std::size_t>(near)];
-            for (std::size_t n = 0; n < line.size(); ++n) line[n] |= own[n];
+        const std::int64_t from = std::max(row - down, std::int64_t{0}), end = std::min(row + up, height - 1) + 1;
+        if (from < end) {
+            or_rows(bits[static_cast<std::size_t>(from)], static_cast<std::size_t>(end - from), line.data(),
+                    line.size());
         }
         smear(line, behind);
         std::uint64_t set_before = 0;
@@ -84,21 +100,26 @@ inline Runs dilated_runs(Bits bits, std::int32_t link) {
                 const int bit = std::countr_zero(edges);
                 const std::int32_t column = static_cast<std::int32_t>(n) * WORD + bit;
                 if ((word >> bit & 1) == 0) {
-                    runs.last.back() = column - 1 - behind;
-                } else if (!(runs.size() > runs.begin.back() && column - runs.last.back() <= link)) {
-                    runs.first.push_back(column);
-                    runs.last.push_back(column);
-                }  // else wider gaps than a word closes: the run goes on
+                    runs.last[runs.size - 1] = column - 1 - behind;
+                } else if (runs.size > runs.begin.back() && column - runs.last[runs.size - 1] <= link) {
+                    continue;  // wider gaps than a word closes: the run goes on
+                } else {
+                    runs.first[runs.size] = runs.last[runs.size] = column;
+                    ++runs.size;
+                }
             }
             set_before = word >> (WORD - 1);
         }
     }
-    runs.begin.push_back(runs.size());
+    runs.begin.push_back(runs.size);
     return runs;
 }
 
+// For each run one of its group that comes not after it.
+using Parents = std::vector<std::uint32_t>;
+
 // The run that stands for the group of a run; the way to it is halved.
-inline std::size_t root_of(std::vector<std::size_t>& parent, std::size_t r) {
+inline std::uint32_t root_of(Parents& parent, std::uint32_t r) {
     while (parent[r] != r) {
         parent[r] = parent[parent[r]];
         r = parent[r];
@@ -107,10 +128,11 @@ inline std::size_t root_of(std::vector<std::size_t>& parent, std::size_t r) {
 }
 
 // For each run the first run of its group: those of neighbouring rows that touch are of one.
-inline std::vector<std::size_t> joined(const Runs& runs, std::int32_t link) {
-    const auto& [first, last, begin] = runs;
-    std::vector<std::size_t> parent(runs.size());
-    for (std::size_t r = 0; r < parent.size(); ++r) parent[r] = r;
+inline Parents joined(const Runs& runs, std::int32_t link) {
+    const auto &first = runs.first, &last = runs.last;
+    const auto& begin = runs.begin;
+    Parents parent(runs.size);
+    std::iota(parent.begin(), parent.end(), 0U);
     for (std::size_t row = 1; row + 1 < begin.size(); ++row) {
         std::size_t a = begin[row], b = begin[row - 1];
         while (a < begin[row + 1] && b < begin[row]) {
@@ -119,18 +141,19 @@ inline std::vector<std::size_t> joined(const Runs& runs, std::int32_t link) {
             } else if (first[a] - last[b] > link) {
                 ++b;
             } else {
-                const std::size_t one = root_of(parent, a), other = root_of(parent, b);
+                const std::uint32_t one = root_of(parent, static_cast<std::uint32_t>(a));
+                const std::uint32_t other = root_of(parent, static_cast<std::uint32_t>(b));
                 parent[std::max(one, other)] = std::min(one, other);
                 ++(last[a] < last[b] ? a : b);
             }
         }
     }
-    for (std::size_t& own : parent) own = parent[own];  // a parent comes first, and knows its root by now
+    for (std::uint32_t& own : parent) own = parent[own];  // a parent comes first, and knows its root by now
     return parent;
 }
 
 // Number of each group at its first run, from 1 in the order of blocks of 2 x 2; 0 where it is too light.
-inline std::pair<std::vector<std::int32_t>, std::int64_t> numbered(const std::vector<std::size_t>& parent,
+inline std::pair<std::vector<std::int32_t>, std::int64_t> numbered(const Parents& parent,
                                                                    const std::vector<std::int64_t>& size,
                                                                    const Runs& runs, std::int32_t link,
                                                                    double least) {
@@ -162,8 +185,8 @@ struct Linked {
 inline Linked link_marked(Bits bits, std::span<const std::int32_t> x, std::span<const std::int32_t> weight,
                           std::span<const std::int64_t> start, std::int32_t link, double least) {
     const Runs runs = dilated_runs(bits, link);
-    const std::vector<std::size_t> parent = joined(runs, link);
-    std::vector<std::size_t> run(x.size());
+    const Parents parent = joined(runs, link);
+    Buffer<std::uint32_t> run(x.size());
     std::vector<std::int64_t> size(parent.size(), 0);
     for (std::size_t row = 0; row < bits.rows; ++row) {
         std::size_t r = runs.begin[row];

@@ -21,33 +21,33 @@ using Histogram = std::array<std::int64_t, 2 * GREY + 1>;
 inline void middle_and_spread(View2<const std::uint8_t> pictures, double* middle, float* spread) {
     const auto count = static_cast<std::int64_t>(pictures.rows);
     const std::int64_t low = (count - 1) / 2, high = count / 2;
-    constexpr std::int64_t NONE = std::numeric_limits<std::int64_t>::max();
-    std::vector<std::int64_t> values(pictures.rows);
+    constexpr std::int32_t NONE = std::numeric_limits<std::int32_t>::max();
+    std::vector<std::int32_t> sorted(pictures.rows);
+    std::int32_t* const values = sorted.data();
     for (std::size_t pixel = 0; pixel < pictures.columns; ++pixel) {
         // Few values: each is put where it belongs among those before.
-        for (std::size_t n = 0; n < pictures.rows; ++n) {
-            const std::int64_t value = pictures[n][pixel];
-            std::size_t k = n;
+        const std::uint8_t* own = pictures.data + pixel;
+        for (std::int64_t n = 0; n < count; ++n, own += pictures.columns) {
+            const std::int32_t value = *own;
+            std::int64_t k = n;
             for (; k > 0 && values[k - 1] > value; --k) values[k] = values[k - 1];
             values[k] = value;
         }
-        const std::int64_t twice = values[static_cast<std::size_t>(low)] + values[static_cast<std::size_t>(high)];
+        const std::int32_t twice = values[low] + values[high];
         // The deviations are in order from the middle outwards: the nearer of the two ends comes next.
-        std::int64_t left = low, right = low + 1, one = 0, other = 0;
+        std::int64_t left = low, right = low + 1;
+        std::int32_t one = 0, other = 0;
         for (std::int64_t k = 0; k <= high; ++k) {
-            const std::int64_t to_left = left >= 0 ? twice - 2 * values[static_cast<std::size_t>(left)] : NONE;
-            const std::int64_t to_right = right < count ? 2 * values[static_cast<std::size_t>(right)] - twice : NONE;
+            const std::int32_t to_left = left >= 0 ? twice - 2 * values[left] : NONE;
+            const std::int32_t to_right = right < count ? 2 * values[right] - twice : NONE;
             one = other;
             other = std::min(to_left, to_right);
-            if (to_left <= to_right) {
-                --left;
-            } else {
-                ++right;
-            }
+            const bool leftwards = to_left <= to_right;
+            left -= leftwards;
+            right += !leftwards;
         }
-        middle[pixel] = static_cast<double>(twice) / 2.0;
-        spread[pixel] = static_cast<float>(count % 2 == 0 ? static_cast<double>(one + other) / 4.0
-                                                           : static_cast<double>(other) / 2.0);
+        middle[pixel] = twice / 2.0;
+        spread[pixel] = static_cast<float>(count % 2 == 0 ? (one + other) / 4.0 : other / 2.0);
     }
 }
 
@@ -83,9 +83,10 @@ inline std::pair<std::int64_t, double> usual_difference(View2<const std::uint8_t
 }
 
 // Marks the pixels that differ by more than both limits; returns how many do.
-inline std::int64_t mark_different(std::span<const std::uint8_t> grey, std::span<const std::uint8_t> background,
-                                   std::int32_t brighter, std::int32_t limit, std::span<const std::int16_t> limits,
-                                   std::uint8_t* marks) {
+JEAT_GRAPH_WIDE std::int64_t mark_different(std::span<const std::uint8_t> grey,
+                                            std::span<const std::uint8_t> background, std::int32_t brighter,
+                                            std::int32_t limit, std::span<const std::int16_t> limits,
+                                            std::uint8_t* marks) {
     std::int64_t number = 0;
     // In parts whose number fits into 32 bits of a register of several.
     constexpr std::size_t PART = 1 << 14;

@@ -88,6 +88,14 @@ inline void events_of_few(const Ring& ring, std::span<const std::int32_t> y, std
     }
 }
 
+// Adds the cells of a bin to sums.
+JEAT_GRAPH_WIDE void add_cells(const std::uint8_t* darker, const std::uint8_t* brighter, std::uint16_t* sum,
+                               std::size_t size) {
+    for (std::size_t k = 0; k < size; ++k) {
+        sum[k] = static_cast<std::uint16_t>(sum[k] + darker[k] + brighter[k]);
+    }
+}
+
 // The same for many pixels: all of the picture are summed, neighbours in memory at once.
 inline void events_of_many(const Ring& ring, std::span<const std::int32_t> y, std::span<const std::int32_t> x,
                            std::int32_t* out) {
@@ -100,9 +108,7 @@ inline void events_of_many(const Ring& ring, std::span<const std::int32_t> y, st
         for (const std::int64_t slot : ring.slots) {
             const std::uint8_t* darker = ring.cells + 2 * static_cast<std::size_t>(slot) * size;
             const std::uint8_t* brighter = darker + size;
-            for (std::size_t k = from; k < end; ++k) {
-                sum[k] = static_cast<std::uint16_t>(sum[k] + darker[k] + brighter[k]);
-            }
+            add_cells(darker + from, brighter + from, sum + from, end - from);
         }
     }
     for (std::size_t p = 0; p < x.size(); ++p) {

@@ -36,6 +36,14 @@ inline int power_below(double size) {
     return size >= ten ? above : power;
 }
 
+// The whole number nearest to a value, the even one of two: without the function of the C library, which not every
+// processor has an instruction for.
+inline double nearest_whole(double value) {
+    constexpr double WHOLE = 0x1p52;  // from here on doubles are whole numbers
+    const double size = std::abs(value);
+    return size < WHOLE ? std::copysign((size + WHOLE) - WHOLE, value) : value;
+}
+
 // Rounds to significant decimal digits, in place; zero, NaN and infinity stay, and minus zero becomes zero.
 inline void round_significant(std::span<double> values, int digits) {
     const auto& powers = powers_of_ten();
@@ -48,7 +56,7 @@ inline void round_significant(std::span<double> values, int digits) {
         const int place = std::min(digits - 1 - power_below(size), MOST_DECIMALS);
         // Both factors are exact powers of ten, one is 1: the result is the double nearest to its digits.
         const double up = powers[std::max(place, 0)], down = powers[std::max(-place, 0)];
-        const double rounded = std::nearbyint(value * up / down) / up * down;
+        const double rounded = nearest_whole(value * up / down) / up * down;
         if (std::isfinite(rounded)) value = rounded + 0.0;
     }
 }
