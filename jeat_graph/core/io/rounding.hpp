@@ -28,9 +28,9 @@ inline const std::array<double, MOST_POWER + 1>& powers_of_ten() {
 inline int power_below(double size) {
     const auto& powers = powers_of_ten();
     // From the power of two below, which gives one that is at most one too small.
-    int exponent = 0;
-    std::frexp(size, &exponent);
-    const int power = static_cast<int>(std::floor((exponent - 1) * LOG10_2)), above = power + 1;
+    const double estimate = std::ilogb(size) * LOG10_2;
+    const int towards_zero = static_cast<int>(estimate);
+    const int power = towards_zero - (estimate < towards_zero), above = power + 1;
     if (power < -MOST_POWER || above > MOST_POWER) return power;
     const double ten = above >= 0 ? powers[above] : 1.0 / powers[-above];
     return size >= ten ? above : power;
