@@ -16,15 +16,6 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
-// Loops over pixels whose results do not depend on how wide a vector is: on processors that have wider ones than
-// the baseline they are used. Multiplications and additions stay apart there, too.
-#if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__linux__) && \
-    !defined(JEAT_GRAPH_SANITIZE)
-#define JEAT_GRAPH_WIDE __attribute__((target_clones("avx2", "default"))) static
-#else
-#define JEAT_GRAPH_WIDE inline
-#endif
-
 namespace jeat {
 
 namespace nb = nanobind;

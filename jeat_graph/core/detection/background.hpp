@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "arrays.hpp"
+#include "wide.hpp"
 
 namespace jeat::detection {
 

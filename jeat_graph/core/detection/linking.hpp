@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "arrays.hpp"
+#include "wide.hpp"
 
 namespace jeat::detection {
 
@@ -71,11 +72,18 @@ inline void smear(std::vector<std::uint64_t>& line, std::int32_t columns) {
 }
 
 // Sets in `line` what is set in any of some rows that follow one another.
-JEAT_GRAPH_WIDE void or_rows(const std::uint64_t* bits, std::size_t rows, std::uint64_t* line, std::size_t words) {
+inline void or_few_rows(const std::uint64_t* bits, std::size_t rows, std::uint64_t* line, std::size_t words) {
     for (std::size_t row = 0; row < rows; ++row) {
         for (std::size_t n = 0; n < words; ++n) line[n] |= bits[row * words + n];
     }
 }
+
+// The same with wider vectors, which pays where there are more rows than FEW_ROWS.
+JEAT_GRAPH_WIDE void or_many_rows(const std::uint64_t* bits, std::size_t rows, std::uint64_t* line,
+                                  std::size_t words) {
+    or_few_rows(bits, rows, line, words);
+}
+inline constexpr std::size_t FEW_ROWS = 4;
 
 // A dilation reaches `link / 2` px to the right and down, and the rest of its side to the left and up.
 inline Runs dilated_runs(Bits bits, std::int32_t link) {
@@ -89,8 +97,9 @@ inline Runs dilated_runs(Bits bits, std::int32_t link) {
         std::fill(line.begin(), line.end(), 0);
         const std::int64_t from = std::max(row - down, std::int64_t{0}), end = std::min(row + up, height - 1) + 1;
         if (from < end) {
-            or_rows(bits[static_cast<std::size_t>(from)], static_cast<std::size_t>(end - from), line.data(),
-                    line.size());
+            const auto rows = static_cast<std::size_t>(end - from);
+            (rows > FEW_ROWS ? or_many_rows : or_few_rows)(bits[static_cast<std::size_t>(from)], rows, line.data(),
+                                                           line.size());
         }
         smear(line, behind);
         std::uint64_t set_before = 0;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "arrays.hpp"
+#include "wide.hpp"
 
 namespace jeat::detection {
 

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "arrays.hpp"
+#include "wide.hpp"
 
 namespace jeat::detection {
 

@@ -7,6 +7,7 @@
 
 #include "events/decoding.hpp"
 #include "events/evt3_block.hpp"
+#include "wide.hpp"
 
 namespace jeat::events::evt3 {
 
@@ -96,7 +97,7 @@ private:
 
     // Takes plain words of 64, and returns how many. What changes is kept in local variables: what is written
     // through pointers to bytes could else be any member, and each would be read again.
-    std::size_t take_block(const std::uint16_t* words) {
+    JEAT_GRAPH_TWICE std::size_t take_block(const std::uint16_t* words) {
         Block block;
         look_at(words, static_cast<unsigned>(high_), static_cast<unsigned>(low_), block);
         const auto word_of_last = [words](std::uint64_t said) -> std::int64_t {
