@@ -1,4 +1,4 @@
-# Every target does its own set-up in .venv and needs only make and Python 3.11 or later.
+# Every target does its own set-up in .venv and needs only make, Python 3.11 or later and a C++20 compiler.
 #
 #   make demo    track detections, and go from simulated pictures and events to tracks on a film (in demo/)
 #   make test    run the tests, those of time by themselves
@@ -12,6 +12,8 @@
 #   make lint    style, format, docstrings, and known weaknesses of what is installed
 #   make types   type-check the built packages and the benchmarks
 #   make bounds  run the numerical tests with the oldest versions allowed of what is needed
+#   make core    build what is compiled, after a change of it
+#   make sanitize   run the tests of what is compiled with AddressSanitizer and UndefinedBehaviorSanitizer
 #   make build   build the wheels (in dist/)
 #   make docs    build the documentation (in docs/_build/html)
 #   make clean   remove what was built and computed, .venv included
@@ -28,6 +30,7 @@ export PYTHONDONTWRITEBYTECODE :=
 # The build without what GPUs need, which takes gigabytes. Where pip does not find it by itself, give PIP_EXTRA_INDEX_URL
 # the address of PyTorch's index for processors.
 TORCH := torch==2.13.0+cpu
+CORE := $(shell find jeat_graph/core -name '*.?pp' -o -name CMakeLists.txt)
 SOURCES := $(shell find jeat_graph filters association smoothers eval -name '*.py')
 # What is no part of the tracker's distribution: the simulator and training, and the benchmarks.
 BESIDE := $(shell find sehn/jeat_graph_sehn benchmarks -name '*.py' -o -name '*.yaml')
@@ -43,10 +46,11 @@ OTHER_KERNELS = OPENBLAS_CORETYPE=$(if $(filter x86_64 AMD64,$(shell uname -m)),
 
 DOCUMENTED := jeat_graph filters association smoothers eval configs sehn/jeat_graph_sehn benchmarks
 
-.PHONY: demo test test-slow test-all compiled-for-tests test-portable benchmark licences live fuzz lint types bounds build docs clean
+.PHONY: demo test test-slow test-all compiled-for-tests test-portable benchmark licences live fuzz lint types bounds core \
+	sanitize build docs clean
 .DELETE_ON_ERROR:
 
-demo: $(VENV)/.run $(VENV)/.sehn
+demo: $(VENV)/.core $(VENV)/.sehn
 	@$(BIN)/jeat-graph demo --from-raw --out demo
 
 test: compiled-for-tests
@@ -60,7 +64,7 @@ test-slow: compiled-for-tests
 	@$(BIN)/python -m pytest -p no:randomly -n 0 -m slow tests/performance/test_time.py
 
 # The tracker on one core, what the tests call beside it on the other.
-compiled-for-tests: $(VENV)/.test
+compiled-for-tests: $(VENV)/.test $(VENV)/.core
 	@$(MAKE) --no-print-directory -j 2 $(VENV)/.compiled $(VENV)/.compiled-beside
 
 # One after the other, also with make -j: both would wait for each other's processor time.
@@ -85,7 +89,7 @@ live: $(VENV)/.test $(VENV)/.compiled
 fuzz: $(VENV)/.test $(VENV)/.compiled
 	@JEAT_GRAPH_FULL=1 $(BIN)/python -m pytest -n 2 tests/fuzz tests/tracking/test_invariants.py
 
-lint: $(VENV)/.lint $(VENV)/.run $(VENV)/.sehn
+lint: $(VENV)/.lint $(VENV)/.core $(VENV)/.sehn
 	@$(BIN)/ruff check
 	@$(BIN)/ruff format --check
 	@$(BIN)/interrogate --quiet $(DOCUMENTED) || $(BIN)/interrogate -v $(DOCUMENTED)
@@ -101,6 +105,13 @@ types: build/.installed
 bounds: | $(BIN)/python
 	@PYTHON=$(BIN)/python .ci/bounds
 
+core: $(VENV)/.core
+
+# What is compiled, built with the sanitizers and the checks of the C++ library, in a copy of the package.
+sanitize: $(VENV)/.test $(VENV)/.core
+	@echo "make: building the core with the sanitizers"
+	@PYTHON=$(BIN)/python .ci/sanitize
+
 build: build/.wheel
 
 # A warning is an error: a link or a name that leads nowhere.
@@ -109,7 +120,7 @@ docs: $(VENV)/.docs
 	@echo "make: open docs/_build/html/index.html"
 
 clean:
-	rm -rf $(VENV) build dist demo docs/_build *.egg-info sehn/build sehn/*.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) build dist demo docs/_build *.egg-info sehn/build sehn/*.egg-info jeat_graph/core/_core jeat_graph/core/_core.* .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:
@@ -117,9 +128,19 @@ $(BIN)/python:
 	@echo "make: creating $(VENV)"
 	@$(PYTHON) -m venv $(VENV)
 
+# Without a build environment of its own, so that the next build goes on where the last one ended. CMake and Ninja
+# come along where the machine has none.
 $(VENV)/.run: pyproject.toml | $(BIN)/python
 	@echo "make: installing jeat-graph and what it needs (a minute or two)"
-	@$(PIP) --editable .
+	@$(PIP) $$($(BIN)/python -c "import tomllib; \
+		print(*tomllib.load(open('pyproject.toml', 'rb'))['build-system']['requires'])") \
+		$$(command -v cmake > /dev/null || echo cmake) $$(command -v ninja > /dev/null || echo ninja)
+	@$(PIP) --no-build-isolation --editable .
+	@touch $@ $(VENV)/.core
+
+$(VENV)/.core: $(CORE) $(VENV)/.run
+	@echo "make: building the core"
+	@$(PIP) --no-build-isolation --no-deps --editable .
 	@touch $@
 
 # By its path: it is in no index.
@@ -130,7 +151,8 @@ $(VENV)/.sehn: sehn/pyproject.toml $(VENV)/.run
 
 $(VENV)/.test: pyproject.toml sehn/pyproject.toml $(VENV)/.run
 	@echo "make: installing what the tests need"
-	@$(PIP) --editable '.[test]' --editable './sehn[test]'
+	@$(PIP) --no-build-isolation --editable '.[test]'
+	@$(PIP) --editable './sehn[test]'
 	@$(PIP) --no-deps 'trackers>=2.6,<3' norfair==2.3.0 'trackeval>=1.3,<2'
 	@$(PIP) $(TORCH) 2> /dev/null || \
 		echo "make: no PyTorch for processors to be had: the tests of training skip"
@@ -138,7 +160,7 @@ $(VENV)/.test: pyproject.toml sehn/pyproject.toml $(VENV)/.run
 
 $(VENV)/.docs: pyproject.toml $(VENV)/.run $(VENV)/.sehn
 	@echo "make: installing what builds the documentation"
-	@$(PIP) --editable '.[docs]'
+	@$(PIP) --no-build-isolation --editable '.[docs]'
 	@touch $@
 
 $(VENV)/.lint: pyproject.toml | $(BIN)/python
@@ -149,7 +171,7 @@ $(VENV)/.lint: pyproject.toml | $(BIN)/python
 	@touch $@
 
 # Code that no longer fits its sources is thrown away at the first import (config/stale_kernels.py).
-$(VENV)/.compiled: $(SOURCES) $(VENV)/.run
+$(VENV)/.compiled: $(SOURCES) $(VENV)/.core
 	@$(BIN)/python -m jeat_graph.tracking.warm_up
 	@touch $@
 
@@ -157,10 +179,10 @@ $(VENV)/.compiled-beside: $(SOURCES) $(BESIDE) $(VENV)/.test
 	@$(BIN)/python -m tests.loaded.compile_beside
 	@touch $@
 
-build/.wheel: $(SOURCES) $(BESIDE) $(shell find configs -type f -not -name '*.pyc') pyproject.toml sehn/pyproject.toml | $(BIN)/python
+build/.wheel: $(SOURCES) $(CORE) $(BESIDE) $(shell find configs -type f -not -name '*.pyc') pyproject.toml sehn/pyproject.toml | $(BIN)/python
 	@echo "make: building the wheels"
 	@$(PIP) build
-	@rm -rf build dist sehn/build
+	@rm -rf dist sehn/build
 	@$(BIN)/python -m build --wheel --outdir dist . > $(VENV)/build.log 2>&1 || { cat $(VENV)/build.log; exit 1; }
 	@$(BIN)/python -m build --wheel --outdir dist sehn > $(VENV)/build.log 2>&1 || { cat $(VENV)/build.log; exit 1; }
 	@mkdir -p build && touch $@

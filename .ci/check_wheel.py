@@ -9,6 +9,13 @@ from pathlib import Path
 #: Folders that are parts of jeat_graph once it is built.
 PARTS = ("filters", "association", "smoothers", "eval", "configs")
 DATA = ("py", "js", "css", "yaml", "onnx", "gz", "json", "typed")
+#: Type stubs of what is compiled, which its build writes.
+STUBS = (
+    "jeat_graph/core/_core/__init__.pyi",
+    *(f"jeat_graph/core/_core/{folder}.pyi" for folder in ("detection", "events", "io")),
+)
+#: Sources of what is compiled, and what the build of a checkout leaves in it.
+UNWANTED = (".hpp", ".cpp", ".txt", ".pth", ".new")
 
 
 def wanted(package: str) -> set[str]:
@@ -19,6 +26,7 @@ def wanted(package: str) -> set[str]:
         found += [
             Path(package) / path for part in PARTS for kind in DATA for path in Path(part).rglob(f"*.{kind}")
         ]
+        found += [Path(stub) for stub in STUBS]
     return {path.as_posix() for path in found if "__pycache__" not in path.parts}
 
 
@@ -31,7 +39,12 @@ def problems(wheel: Path) -> list[str]:
         f"{name} does not belong in the wheel"
         for name in names
         if not (name.startswith(f"{package}/") or name.split("/")[0].endswith(".dist-info"))
+        or (name.startswith(f"{package}/") and name.endswith(UNWANTED))
     ]
+    if package == "jeat_graph":
+        compiled = [name for name in names if name.startswith("jeat_graph/core/_core.")]
+        if len(compiled) != 1:
+            found.append(f"one compiled core belongs in the wheel, not {compiled}")
     return found + [f"{name} is missing from the wheel" for name in sorted(wanted(package) - set(names))]
 
 

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+# In a checkout `filters`, `association` and so on lie beside this folder; installed, they lie in it.
+if not (_FOLDER := Path(__file__).parent).joinpath("filters").is_dir():
+    __path__.append(str(_FOLDER.parent))
 
 from jeat_graph.config.kernel_cache import choose_cache
 from jeat_graph.version import __version__

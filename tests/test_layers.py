@@ -20,7 +20,7 @@ BESIDE = {"jeat_graph_sehn": ROOT / "sehn" / "jeat_graph_sehn", "benchmarks": RO
 #: Low to high: a module imports from its own layer and from those before it. The first name that fits
 #: counts; "" is the package itself, as its users import it.
 LAYERS = (
-    ("version", "data.arrays", "data.errors", "data.progress"),
+    ("version", "data.arrays", "data.errors", "data.progress", "core"),
     ("filters", "association"),
     ("smoothers",),
     ("data",),

@@ -25,6 +25,10 @@ class OtherRunError(JeatGraphError):
     """A run that was broken off and cannot be gone on with: its state is another's, or damaged."""
 
 
+class CoreMissingError(JeatGraphError, ImportError):
+    """A checkout whose compiled core was not built, or not for this version of Python."""
+
+
 class InputWarning(UserWarning):
     """Input that is valid but most likely not what was meant, such as times in ms."""
 

@@ -15,20 +15,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import cv2
-import numba
 import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.config.fields import Section, number
+from jeat_graph.core import detection as core
 
 _Counts = npt.NDArray[np.uint16]
 _Means = npt.NDArray[np.float32]
 #: What is usual at first: of so many by so many parts of the picture (px) the one that this share is below.
 _PART_PX, _PARTS, _QUIETER = 16, 9, 0.25
-#: Of what stands out the mean follows so many deviations, and so many events: or it would become usual.
-_FOLLOWED_SIGMAS, _FOLLOWED_EVENTS = 1.0, 0.5
-#: Where hardly any are usual, the normal distribution is wrong by about so many events.
-_MORE_EVENTS = 2.0
 
 
 @dataclass(frozen=True)
@@ -83,7 +79,7 @@ class UsualActivity:
         self._seen += 1
         first = max(self._share, 1.0 / (self._seen + 1.0))
         out = np.empty_like(counts)
-        _mark(counts, around, self._mean, (settings.sigmas, first, self._share), out)
+        core.mark_unusual(counts, around, self._mean, (settings.sigmas, first, self._share), out)
         return out
 
 
@@ -95,27 +91,3 @@ def _usual(around: _Means) -> _Means:
     nearby = np.lib.stride_tricks.sliding_window_view(sums, (_PARTS, _PARTS))
     quiet = np.quantile(nearby, _QUIETER, axis=(2, 3)).astype(np.float32)
     return np.ascontiguousarray(cv2.resize(quiet, (width, height)))
-
-
-@numba.njit(cache=True, nogil=True)
-def _mark(
-    counts: _Counts, around: _Means, mean: _Means, how: tuple[float, float, float], out: _Counts
-) -> None:
-    """Write the counts (H, W) that stand out, and let the means of the sums around them follow.
-
-    Of what does not stand out the means are at first those of all windows so far; what does is followed
-    slowly from the first on, or a slow vehicle would be usual before it has left its place.
-    """
-    sigmas, quick, slow = np.float32(how[0]), np.float32(how[1]), np.float32(how[2])
-    height, width = counts.shape
-    for row in range(height):
-        for column in range(width):
-            usual, now = mean[row, column], around[row, column]
-            sigma = np.sqrt(usual)
-            if now > usual + sigmas * sigma + np.float32(_MORE_EVENTS):
-                out[row, column] = counts[row, column]
-                more = np.float32(_FOLLOWED_SIGMAS) * sigma + np.float32(_FOLLOWED_EVENTS)
-                mean[row, column] = usual + slow * min(now - usual, more)
-            else:
-                out[row, column] = 0
-                mean[row, column] = usual + quick * (now - usual)

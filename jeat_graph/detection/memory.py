@@ -7,11 +7,9 @@ it was never one thing.
 
 from __future__ import annotations
 
-from typing import Any
-
-import numba
 import numpy as np
 
+from jeat_graph.core import detection as core
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.detection.components import Marked, Whole
 
@@ -76,7 +74,7 @@ class CloudMemory:
         new, pieces = self._pieces(marked, share, near, old, expected)
         if all(len(names) < 2 for names in pieces) and new is marked.group:
             return count, marked  # as they were
-        extents, sizes = _extents(marked._replace(group=new), base + len(old))
+        extents, sizes = core.cloud_extents(marked._replace(group=new), base + len(old))
         table = np.arange(base + len(old))
         for k, names in enumerate(pieces):
             names = [name for name in dict.fromkeys(names) if sizes[name]]
@@ -121,7 +119,7 @@ class CloudMemory:
                 new = cloud.copy() if new is cloud else new
                 rows = np.flatnonzero(cloud == m)
                 places = np.column_stack([marked.x[rows], marked.y[rows]]).astype(np.float64) + 0.5
-                new[rows] = base + touched[_nearest(places, expected[touched])]
+                new[rows] = base + touched[core.nearest_boxes(places, expected[touched])]
                 divided[m] = True
                 for k in touched.tolist():
                     pieces[k].insert(0, base + k)
@@ -198,90 +196,11 @@ def _join(
             whole = both
 
 
-@numba.njit(cache=True, nogil=True)
-def _extents(marked: Marked, names: int) -> tuple[Any, Any]:
-    """Left, top, right, bottom (names, 4) of the pixels of each cloud (px), and their number (names,)."""
-    extents = np.empty((names, 4))
-    extents[:, :2] = np.inf
-    extents[:, 2:] = -np.inf
-    sizes = np.zeros(names, dtype=np.int64)
-    p, end = 0, len(marked.x)
-    while p < end:
-        # What lies together in a row is mostly of one cloud.
-        name, row, first = marked.group[p], marked.y[p], p
-        while p < end and marked.group[p] == name and marked.y[p] == row:
-            p += 1
-        sizes[name] += p - first
-        extents[name, 0] = min(extents[name, 0], marked.x[first])
-        extents[name, 1] = min(extents[name, 1], row)
-        extents[name, 2] = max(extents[name, 2], marked.x[p - 1] + 1)
-        extents[name, 3] = max(extents[name, 3], row + 1)
-    return extents, sizes
-
-
 def _shares(marked: Marked, boxes: FloatArray, by: float, names: int) -> tuple[FloatArray, FloatArray]:
     """Share of each cloud's pixels with middles in each box (names, K), and in it grown `by` to all sides."""
-    inside, near, count = _count_inside(marked, boxes, _grown(boxes, by), names)
+    inside, near, count = core.count_inside(marked, boxes, _grown(boxes, by), names)
     most = np.maximum(count, 1)[:, None]
     return inside / most, near / most
-
-
-@numba.njit(cache=True, nogil=True)
-def _count_inside(marked: Marked, boxes: FloatArray, grown: FloatArray, names: int) -> tuple[Any, Any, Any]:
-    """Pixels of each cloud in each box and in the one around it (names, K), and of each cloud (names,)."""
-    x, y, cloud = marked.x, marked.y, marked.group
-    inside = np.zeros((names, len(boxes)), dtype=np.int64)
-    near = np.zeros((names, len(boxes)), dtype=np.int64)
-    count = np.zeros(names, dtype=np.int64)
-    # Where each row begins: a box asks but few pixels of its own rows.
-    start = np.zeros(y[len(y) - 1] + 2, dtype=np.int64)
-    p = 0
-    while p < len(cloud):
-        name, row, first = cloud[p], y[p], p
-        while p < len(cloud) and cloud[p] == name and y[p] == row:
-            p += 1
-        count[name] += p - first
-        start[row + 1] = p
-    for row in range(1, len(start)):
-        start[row] = max(start[row], start[row - 1])
-    for j in range(len(boxes)):
-        left, top, width, height = boxes[j]
-        out_left, out_top, out_width, out_height = grown[j]
-        row = max(int(np.floor(out_top - 0.5)), 0)
-        while row < len(start) - 1 and row + 0.5 - out_top <= out_height:
-            if row + 0.5 >= out_top:
-                in_rows = row + 0.5 >= top and row + 0.5 - top <= height
-                k, end = start[row], start[row + 1]
-                k += np.searchsorted(x[k:end], out_left - 1.0)
-                while k < end and x[k] + 0.5 - out_left <= out_width:
-                    name = cloud[k]
-                    one, other = 0, 0
-                    while k < end and cloud[k] == name and x[k] + 0.5 - out_left <= out_width:
-                        from_left = x[k] + 0.5 - left
-                        one += (from_left >= 0.0) & (from_left <= width)
-                        other += x[k] + 0.5 - out_left >= 0.0
-                        k += 1
-                    near[name, j] += other
-                    if in_rows:
-                        inside[name, j] += one
-            row += 1
-    return inside, near, count
-
-
-@numba.njit(cache=True, nogil=True)
-def _nearest(places: FloatArray, boxes: FloatArray) -> Any:
-    """Return which box each place belongs to: distances in halves of a box, so that 1 is its edge."""
-    out = np.zeros(len(places), dtype=np.int64)
-    for k in range(len(places)):
-        least = np.inf
-        for j in range(len(boxes)):
-            half_x, half_y = max(boxes[j, 2] / 2.0, 1.0), max(boxes[j, 3] / 2.0, 1.0)
-            dx = abs(places[k, 0] - boxes[j, 0] - boxes[j, 2] / 2.0) / half_x
-            dy = abs(places[k, 1] - boxes[j, 1] - boxes[j, 3] / 2.0) / half_y
-            if max(dx, dy) < least:
-                least = max(dx, dy)
-                out[k] = j
-    return out
 
 
 def _iou(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -9,14 +9,12 @@ Source of the first: Delbruck, "Frame-free dynamic digital vision" (2008).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-import numba
 import numpy as np
-import numpy.typing as npt
 
 from jeat_graph.config.fields import Section, flag, number
-from jeat_graph.data.arrays import BoolArray, IntArray
+from jeat_graph.core import detection as core
+from jeat_graph.data.arrays import BoolArray
 from jeat_graph.data.events import EventArray
 
 _US_PER_S = 1e6
@@ -87,13 +85,18 @@ class NoiseFilter:
             return events
         if events.by_motion is not None:
             return events.take(np.flatnonzero(good))
-        return EventArray.trusted(*_taken(events.t_us, events.x, events.y, events.polarity, good))
+        columns = (events.t_us, events.x, events.y, events.polarity)
+        kinds = (np.int64, np.uint16, np.uint16, np.uint8)
+        t, x, y, polarity = (np.ascontiguousarray(a, kind) for a, kind in zip(columns, kinds, strict=True))
+        return EventArray.trusted(*core.take_events(t, x, y, polarity, good))
 
     def signal(self, events: EventArray) -> BoolArray:
         """Return which events (N,) are not noise."""
         settings = self.settings
         good: BoolArray = np.zeros(len(events), dtype=bool)
         period_us = round(settings.period_s * _US_PER_S)
+        all_t = np.ascontiguousarray(events.t_us, np.int64)
+        all_x, all_y = np.ascontiguousarray(events.x, np.uint16), np.ascontiguousarray(events.y, np.uint16)
         start = 0
         while start < len(events):
             if events.t_us[start] >= self._period_end:
@@ -103,14 +106,14 @@ class NoiseFilter:
             last_us = min(self._period_end, self._begin_us + 2 * _MOST_LATER_US)
             end = int(np.searchsorted(events.t_us, last_us))
             rows = slice(start, max(end, start + 1))
+            t, x, y = all_t[rows], all_x[rows], all_y[rows]
             if settings.hot_pixels:
-                _add(events.x[rows], events.y[rows], self._counts)
-            x, y = events.x[rows], events.y[rows]
+                core.count_pixels(x, y, self._counts)
             if settings.alone:
                 times = self._begin_us, round(settings.support_s * _US_PER_S)
-                self.alone += int(_judge(events.t_us[rows], x, y, self._last, self.hot, times, good[rows]))
+                self.alone += core.judge_noise(t, x, y, self._last, self.hot, times, good[rows])
             else:
-                _leave_hot(x, y, self.hot, good[rows])
+                core.leave_hot(x, y, self.hot, good[rows])
             start = rows.stop
         return good
 
@@ -134,84 +137,3 @@ class NoiseFilter:
             often = self._counts >= self.settings.hot_hz * period_s
             self.hot = often & (self._counts * _NEIGHBOURS >= self.settings.hot_ratio * around)
         self._counts[:] = 0
-
-
-@numba.njit(cache=True, nogil=True)
-def _add(x: npt.NDArray[np.uint16], y: npt.NDArray[np.uint16], counts: npt.NDArray[np.int32]) -> None:
-    """Count the events of each pixel (H, W)."""
-    height, width = counts.shape
-    for k in range(len(x)):
-        column, row = np.int64(x[k]), np.int64(y[k])
-        if column < width and row < height:
-            counts[row, column] += np.int32(1)
-
-
-@numba.njit(cache=True, nogil=True)
-def _judge(
-    t: IntArray,
-    x: npt.NDArray[np.uint16],
-    y: npt.NDArray[np.uint16],
-    last: npt.NDArray[np.int32],
-    hot: BoolArray,
-    times: tuple[int, int],
-    good: BoolArray,
-) -> int:
-    """Mark the events that are no noise in `good`, keep the last times; return how many stood alone."""
-    begin_us, support_us = times
-    height, width = np.uint64(hot.shape[0]), np.uint64(hot.shape[1])
-    one, two = np.uint64(1), np.uint64(2)
-    flat, line = last.reshape(-1), np.uint64(last.shape[1])
-    any_hot = hot.any()
-    alone = 0
-    for k in range(len(t)):
-        column, row = np.uint64(x[k]), np.uint64(y[k])
-        if column >= width or row >= height or (any_hot and hot[row, column]):
-            continue
-        now = t[k] - begin_us
-        since = np.int32(max(now - support_us, _NEVER + 1))
-        # All eight around are asked, though the first that fired will do: which one that is cannot be
-        # guessed, and a wrong guess takes the processor longer.
-        above = row * line + column
-        here = above + line
-        below = here + line
-        newest = max(
-            max(max(flat[above], flat[above + one]), max(flat[above + two], flat[here])),
-            max(max(flat[here + two], flat[below]), max(flat[below + one], flat[below + two])),
-        )
-        near = newest >= since
-        flat[here + one] = now
-        alone += not near
-        good[k] = near
-    return alone
-
-
-@numba.njit(cache=True, nogil=True)
-def _leave_hot(x: npt.NDArray[np.uint16], y: npt.NDArray[np.uint16], hot: BoolArray, good: BoolArray) -> None:
-    """Mark the events in `good` that are in the picture and not of hot pixels."""
-    height, width = np.uint64(hot.shape[0]), np.uint64(hot.shape[1])
-    any_hot = hot.any()
-    for k in range(len(x)):
-        column, row = np.uint64(x[k]), np.uint64(y[k])
-        good[k] = column < width and row < height and not (any_hot and hot[row, column])
-
-
-@numba.njit(cache=True, nogil=True)
-def _taken(
-    t: IntArray,
-    x: npt.NDArray[np.uint16],
-    y: npt.NDArray[np.uint16],
-    polarity: npt.NDArray[np.uint8],
-    good: BoolArray,
-) -> tuple[Any, Any, Any, Any]:
-    """Times, columns, rows and polarities of the events that are marked in `good` (N,)."""
-    number = 0
-    for k in range(len(good)):
-        number += good[k]
-    # One more, for an event is written before it is known whether it stays.
-    out_t, out_x = np.empty(number + 1, t.dtype), np.empty(number + 1, x.dtype)
-    out_y, out_p = np.empty(number + 1, y.dtype), np.empty(number + 1, polarity.dtype)
-    n = 0
-    for k in range(len(good)):
-        out_t[n], out_x[n], out_y[n], out_p[n] = t[k], x[k], y[k], polarity[k]
-        n += good[k]
-    return out_t[:n], out_x[:n], out_y[:n], out_p[:n]

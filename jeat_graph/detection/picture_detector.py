@@ -13,13 +13,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.data.arrays import IntArray
+from jeat_graph.core import detection as core
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError
 from jeat_graph.detection.components import Components, measured, without_inner
@@ -30,8 +28,6 @@ from jeat_graph.io.decoders import RgbImage
 
 # Standard deviation of a normal error, from its median absolute deviation.
 _SIGMA_PER_MAD = 1.4826
-# The brightness of a picture is judged by every so manieth pixel along rows and columns.
-_STRIDE = 4
 _BLUR_PX = 3
 _GREY = 255
 # Two pictures differ by less, a change of brightness included.
@@ -78,7 +74,7 @@ class PictureDetector:
         if len(greys) < 3 or any(grey.shape != greys[0].shape for grey in greys):
             raise DataError("the background needs at least three pictures of one size")
         stack = np.stack(greys)
-        middle, mad = _middle_and_spread(stack)
+        middle, mad = core.middle_and_spread(stack)
         self._background = np.rint(middle).astype(np.uint8)
         noise = _SIGMA_PER_MAD * mad
         # Differences are whole numbers: larger than a limit is larger than the whole number below it.
@@ -139,12 +135,12 @@ class PictureDetector:
         """Mark the pixels (H, W) that are foreground; None where the whole picture has changed."""
         assert self._background is not None
         settings = self.settings
-        brighter, deviation = _usual(grey, self._background)
+        brighter, deviation = core.usual_difference(grey, self._background)
         common = min(_SIGMA_PER_MAD * deviation, self._most_noise)  # another scene is no noise
         # As precise as the limits, which are rounded down, too.
         level = float(np.float32(max(settings.least_contrast, settings.sigmas * common)))
         limit = int(min(level, float(_BEYOND)))
-        marks, number = _different(grey, self._background, brighter, limit, self._limit)
+        marks, number = core.mark_different(grey, self._background, brighter, limit, self._limit)
         if t - self._adapted_s >= settings.adapt_s:
             self._adapted_s = t
             self._background += (grey > self._background).astype(np.uint8)
@@ -152,7 +148,7 @@ class PictureDetector:
         if number / marks.size > settings.most_share:
             self._background, self._memory = None, None
             return None
-        return np.asarray(marks, dtype=np.uint8)
+        return marks
 
     def _groups(self, marks: npt.NDArray[np.uint8]) -> Components:
         settings = self.settings
@@ -166,90 +162,6 @@ class PictureDetector:
         if self._memory is not None:
             self._memory.remember(found.boxes)
         return found
-
-
-@numba.njit(cache=True, nogil=True)
-def _middle_and_spread(stack: npt.NDArray[np.uint8]) -> tuple[Any, Any]:
-    """Median (H, W) of pictures (N, H, W), and the median of the deviations from it."""
-    count, height, width = stack.shape
-    middle = np.empty((height, width))
-    spread = np.empty((height, width), dtype=np.float32)
-    values = np.empty(count, dtype=np.int64)
-    low, high = (count - 1) // 2, count // 2
-    for row in range(height):
-        for column in range(width):
-            # Few values: each is put where it belongs among those before.
-            for n in range(count):
-                value, k = np.int64(stack[n, row, column]), n
-                while k > 0 and values[k - 1] > value:
-                    values[k] = values[k - 1]
-                    k -= 1
-                values[k] = value
-            twice = values[low] + values[high]
-            # The deviations are in order from the middle outwards: the nearer of the two ends comes next.
-            left, right, one, other = low, low + 1, 0, 0
-            for _ in range(high + 1):
-                to_left = twice - 2 * values[left] if left >= 0 else np.iinfo(np.int64).max
-                to_right = 2 * values[right] - twice if right < count else np.iinfo(np.int64).max
-                one, other = other, min(to_left, to_right)
-                if to_left <= to_right:
-                    left -= 1
-                else:
-                    right += 1
-            middle[row, column] = twice / 2.0
-            spread[row, column] = (one + other) / 4.0 if count % 2 == 0 else other / 2.0
-    return middle, spread
-
-
-@numba.njit(cache=True, nogil=True)
-def _usual(grey: npt.NDArray[np.uint8], background: npt.NDArray[np.uint8]) -> tuple[int, float]:
-    """Median difference of a picture (H, W) from the background, without its fraction, and that from it."""
-    height, width = grey.shape
-    number = np.zeros(2 * _GREY + 1, dtype=np.int64)
-    for row in range(0, height, _STRIDE):
-        for column in range(0, width, _STRIDE):
-            number[_GREY + np.int64(grey[row, column]) - np.int64(background[row, column])] += 1
-    brighter = int(_median(number) - _GREY)
-    apart = np.zeros(2 * _GREY + 1, dtype=np.int64)
-    for k in range(len(number)):
-        apart[abs(k - _GREY - brighter)] += number[k]
-    return brighter, _median(apart)
-
-
-@numba.njit(cache=True, nogil=True)
-def _median(number: IntArray) -> float:
-    """Median of whole numbers from 0, of which there are so many each."""
-    count = number.sum()
-    k, low, passed = 0, -1, number[0]
-    while True:
-        if low < 0 and passed > (count - 1) // 2:
-            low = k
-        if passed > count // 2:
-            return (low + k) / 2.0
-        k += 1
-        passed += number[k]
-
-
-@numba.njit(cache=True, nogil=True)
-def _different(
-    grey: npt.NDArray[np.uint8],
-    background: npt.NDArray[np.uint8],
-    brighter: int,
-    limit: int,
-    limits: npt.NDArray[np.int16],
-) -> tuple[Any, int]:
-    """Mark the pixels (H, W) that differ by more than both limits; also return how many do."""
-    height, width = grey.shape
-    marks = np.empty((height, width), dtype=np.uint8)
-    number = 0
-    for row in range(height):
-        for column in range(width):
-            difference = abs(
-                np.int32(grey[row, column]) - np.int32(background[row, column]) - np.int32(brighter)
-            )
-            marks[row, column] = difference > max(np.int32(limits[row, column]), np.int32(limit))
-            number += marks[row, column]
-    return marks, number
 
 
 def _grey(frame: RgbImage) -> npt.NDArray[np.uint8]:

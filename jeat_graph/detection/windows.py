@@ -9,19 +9,15 @@ Source: Gehrig and Scaramuzza, "Recurrent Vision Transformers for Object Detecti
 
 from __future__ import annotations
 
-from typing import Any
-
-import numba
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.data.arrays import IntArray
+from jeat_graph.core import detection as core
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.events import EventArray
 from jeat_graph.detection.components import Whole
 
 _US_PER_S = 1e6
-_MOST = 255
 #: A bin with fewer events than this share of its cells is emptied event by event, a fuller one as a whole.
 _SPARSE_SHARE = 0.01
 #: Where more than this share of the pixels is asked for, all are summed: neighbours in memory at once.
@@ -72,13 +68,14 @@ class EventBins:
         most = _SPARSE_SHARE * slot.size
         count, x, y = self._filled[self._newest]
         if count > most:
-            _clear_all(slot, self._total)
+            core.empty_bin(slot, self._total)
         else:
-            _clear(x, y, slot, self._total)
-        _count(events.x, events.y, events.polarity, slot, self._total)
+            core.empty_cells(x, y, slot, self._total)
+        columns, rows = np.ascontiguousarray(events.x, np.uint16), np.ascontiguousarray(events.y, np.uint16)
+        core.count_events(columns, rows, _polarities(events.polarity), slot, self._total)
         # Copies, for who gives the events may use their memory again.
         few = slice(len(events) if len(events) <= most else 0)
-        self._filled[self._newest] = (len(events), events.x[few].copy(), events.y[few].copy())
+        self._filled[self._newest] = (len(events), columns[few].copy(), rows[few].copy())
         self.end_us += self.bin_us
 
     def skip_to(self, end_us: int) -> None:
@@ -109,84 +106,13 @@ class EventBins:
             x: (P,) columns (px).
         """
         slots = (self._newest - np.arange(bins)) % len(self._ring)
-        if len(x) > _DENSE_SHARE * self._total.size:
-            return np.asarray(_picked(_planes(self._ring, slots), y, x))
-        return np.asarray(_summed(self._ring, slots, y, x))
+        y, x = np.ascontiguousarray(y, np.int32), np.ascontiguousarray(x, np.int32)
+        many = len(x) > _DENSE_SHARE * self._total.size
+        return (core.events_of_many if many else core.events_of_few)(self._ring, slots, y, x)
 
 
-@numba.njit(cache=True, nogil=True)
-def _count(
-    x: npt.NDArray[np.uint16],
-    y: npt.NDArray[np.uint16],
-    polarity: npt.NDArray[np.uint8],
-    slot: npt.NDArray[np.uint8],
-    total: npt.NDArray[np.uint16],
-) -> None:
-    height, width = total.shape
-    for k in range(len(x)):
-        column, row = np.int64(x[k]), np.int64(y[k])
-        if column < width and row < height:
-            which = 1 if polarity[k] > 0 else 0
-            if slot[which, row, column] < _MOST:
-                slot[which, row, column] += 1
-                total[row, column] += 1
-
-
-@numba.njit(cache=True, nogil=True)
-def _clear_all(slot: npt.NDArray[np.uint8], total: npt.NDArray[np.uint16]) -> None:
-    """Empty all cells (2, H, W) of a bin, and take them off the total (H, W)."""
-    height, width = total.shape
-    for row in range(height):
-        for column in range(width):
-            total[row, column] -= np.uint16(slot[0, row, column]) + np.uint16(slot[1, row, column])
-    slot[:] = 0
-
-
-@numba.njit(cache=True, nogil=True)
-def _clear(
-    x: npt.NDArray[np.uint16],
-    y: npt.NDArray[np.uint16],
-    slot: npt.NDArray[np.uint8],
-    total: npt.NDArray[np.uint16],
-) -> None:
-    """Empty the cells (2, H, W) of a bin's events, and take them off the total (H, W)."""
-    height, width = total.shape
-    for k in range(len(x)):
-        column, row = np.int64(x[k]), np.int64(y[k])
-        if column < width and row < height:
-            total[row, column] -= slot[0, row, column] + slot[1, row, column]
-            slot[0, row, column] = 0
-            slot[1, row, column] = 0
-
-
-@numba.njit(cache=True, nogil=True)
-def _summed(ring: npt.NDArray[np.uint8], slots: IntArray, y: Whole, x: Whole) -> Any:
-    out = np.empty(len(x), dtype=np.int32)
-    for p in range(len(x)):
-        total = np.int32(0)
-        for slot in slots:
-            total += np.int32(ring[slot, 0, y[p], x[p]]) + np.int32(ring[slot, 1, y[p], x[p]])
-        out[p] = total
-    return out
-
-
-@numba.njit(cache=True, nogil=True)
-def _planes(ring: npt.NDArray[np.uint8], slots: IntArray) -> Any:
-    """Events (H, W) of all pixels in some bins."""
-    _, _, height, width = ring.shape
-    out = np.zeros((height, width), dtype=np.uint16)
-    for row in range(height):
-        for slot in slots:
-            for column in range(width):
-                out[row, column] += np.uint16(ring[slot, 0, row, column]) + np.uint16(
-                    ring[slot, 1, row, column]
-                )
-    return out
-
-
-@numba.njit(cache=True, nogil=True)
-def _picked(plane: npt.NDArray[np.uint16], y: Whole, x: Whole) -> Any:
-    out = np.empty(len(x), dtype=np.int32)
-    for p in range(len(x)):
-        out[p] = plane[y[p], x[p]]
-    return out
+def _polarities(polarity: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+    """Return what is 1 where it became brighter, as the core takes it."""
+    if polarity.dtype != np.uint8:
+        polarity = (polarity > 0).astype(np.uint8)
+    return np.ascontiguousarray(polarity)

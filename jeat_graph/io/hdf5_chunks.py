@@ -9,7 +9,6 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import Any
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
@@ -74,16 +73,5 @@ def _values(flat: bytes, rows: int, dtype: np.dtype[Any], shuffled: bool) -> npt
         return None
     if not shuffled or dtype.itemsize == 1:
         return np.frombuffer(flat, dtype=dtype)
-    values = np.empty(rows, dtype=f"u{dtype.itemsize}")
-    _unshuffle(np.frombuffer(flat, dtype=np.uint8).reshape(dtype.itemsize, rows), values)
-    return values.view(dtype)
-
-
-@numba.njit(cache=True, nogil=True)
-def _unshuffle(planes: npt.NDArray[np.uint8], values: Any) -> None:
-    """Put values (N,) together from their first bytes, their second bytes and so on (B, N)."""
-    for k in range(len(values)):
-        values[k] = planes[0, k]
-    for b in range(1, len(planes)):
-        for k in range(len(values)):
-            values[k] |= np.uint64(planes[b, k]) << np.uint64(8 * b)
+    planes = np.frombuffer(flat, dtype=np.uint8).reshape(dtype.itemsize, rows)
+    return np.ascontiguousarray(planes.T).view(dtype).reshape(-1)

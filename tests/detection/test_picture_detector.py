@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from jeat_graph.core import detection as core
 from jeat_graph.data.errors import DataError
-from jeat_graph.detection.picture_detector import PictureDetector, _different, _middle_and_spread, _usual
+from jeat_graph.detection.picture_detector import PictureDetector
 from jeat_graph.detection.settings import PictureSettings
 
 from .moving import SIZE, box_at, iou, picture_of
@@ -99,7 +100,7 @@ def test_pictures_must_fit(scene):
 def test_middle_and_spread_are_the_medians(count):
     stack = np.random.default_rng(count).integers(0, 256, (count, 6, 7)).astype(np.uint8)
     stack[:, 0] = stack[0, 0]  # pixels that never change
-    middle, spread = _middle_and_spread(stack)
+    middle, spread = core.middle_and_spread(stack)
     np.testing.assert_array_equal(middle, np.median(stack, axis=0))
     np.testing.assert_array_equal(spread, np.median(np.abs(stack - np.median(stack, axis=0)), axis=0))
 
@@ -110,11 +111,11 @@ def test_what_is_usual_and_what_differs_are_those_of_the_definition():
         background = rng.integers(0, 256, (37, 50)).astype(np.uint8)
         grey = np.clip(background + rng.integers(-spread, spread + 1, (37, 50)) + 7, 0, 255).astype(np.uint8)
         difference = grey.astype(np.int64) - background
-        brighter, deviation = _usual(grey, background)
+        brighter, deviation = core.usual_difference(grey, background)
         assert brighter == int(np.median(difference[::4, ::4]))
         apart = abs(difference - brighter)
         assert deviation == np.median(apart[::4, ::4])
         limits = rng.integers(0, 60, (37, 50)).astype(np.int16)
-        marks, number = _different(grey, background, brighter, 12, limits)
+        marks, number = core.mark_different(grey, background, brighter, 12, limits)
         np.testing.assert_array_equal(marks, apart > np.maximum(limits, 12))
         assert number == marks.sum()

@@ -10,9 +10,12 @@ import pytest
 
 from benchmarks.speed_subjects import installed_peers
 from benchmarks.speed_timing import summarise, time_side_by_side
+from jeat_graph.data.events import EventArray
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.metrics import evaluate
 from jeat_graph.io.detections_io import read_detections
+from jeat_graph.io.events.evt3_writer import Evt3Writer
+from jeat_graph.io.events.opening import open_events
 from jeat_graph.io.tables import read_table
 from jeat_graph.io.trajectories_io import read_trajectories, write_trajectories
 from jeat_graph.smoothers.engine import make_smoother
@@ -200,6 +203,30 @@ def test_boxes_of_coco_are_read_faster_than_by_pythons_own_reader_and_conversion
         lambda: read_detections(results, rate_hz=20.0), plain, until=lambda coco, tree: coco < tree
     )
     assert coco < tree
+
+
+@pytest.mark.parametrize(("columns", "times"), [(1, 1.4), (12, 2.0)])
+def test_events_of_evt3_are_read_faster_than_by_the_package_evt3(tmp_path, least, columns, times):
+    """Events anywhere, and groups of neighbours, for which one word stands."""
+    evt3 = pytest.importorskip("evt3", reason="pip install evt3")
+    n, rng = 1_000_000, np.random.default_rng(0)
+    groups = n // columns
+    t = np.sort(rng.integers(0, n, groups))
+    x, y = rng.integers(0, 1280 - columns, groups), rng.integers(0, 720, groups)
+    x = (x[:, None] + np.arange(columns)).reshape(-1).astype(np.uint16)
+    t, y, p = (np.repeat(column, columns) for column in (t, y, rng.integers(0, 2, groups)))
+    with Evt3Writer(tmp_path / "e.raw", (1280, 720)) as writer:
+        writer.append(EventArray(t, x, y.astype(np.uint16), p.astype(np.uint8)))
+
+    def ours():
+        with open_events(tmp_path / "e.raw") as reader:
+            assert sum(len(piece) for piece in reader.pieces()) == len(t)
+
+    def theirs():
+        assert len(evt3.decode_file(str(tmp_path / "e.raw"))) == len(t)
+
+    fast, slow = least(ours, theirs, until=lambda fast, slow: times * fast < slow)
+    assert times * fast < slow
 
 
 @pytest.mark.slow

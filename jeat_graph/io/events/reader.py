@@ -62,8 +62,8 @@ class Damage:
         late_us: by how much their time is later than their own at most (µs).
         unknown: words that the format does not have, left out.
         untimed: events before the first time, or before their row, is known, left out.
-        jumps: steps forward in time of more than `decoding.JUMP_US`.
-        leaps: single times ahead by more than `decoding.LEAP_US` that the next one took back: passed over.
+        jumps: steps forward in time of more than 10 s.
+        leaps: single times ahead by more than 1 s that the next one took back: passed over.
         tail_bytes: bytes behind the last whole word, left out: the file is cut off.
         unfinished: words at the end that others of a whole packet should follow.
         sorted: events that came after later ones and were put in order.

@@ -8,17 +8,16 @@ from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
-from jeat_graph.data.arrays import IntArray
+from jeat_graph.core import events as core
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.io.atomic import atomic_path
 from jeat_graph.io.piecewise import PiecewiseWriter
 
 _ROOM_WORDS = 1 << 18
-_STATE_SIZE = 8
 
 #: (t, x, y, polarity, words, state) -> events taken, words written; less than all where the room is full.
-Encode = Callable[[Any, Any, Any, Any, Any, IntArray], tuple[int, int]]
+Encode = Callable[[Any, Any, Any, Any, Any, core.EncoderState], tuple[int, int]]
 
 
 class Layout(NamedTuple):
@@ -51,7 +50,7 @@ class WordWriter(PiecewiseWriter):
         self._layout = layout
         self._path, self._size_px = Path(path), size_px
         self._file: BinaryIO | None = None
-        self._state = np.full(_STATE_SIZE, -1, dtype=np.int64)
+        self._state = core.EncoderState()
         self._last_us = 0
 
     def _begin(self) -> None:
@@ -89,10 +88,15 @@ class WordWriter(PiecewiseWriter):
             )
         self._last_us = int(events.t_us[-1])
         words = np.empty(_ROOM_WORDS, dtype=self._layout.word)
+        whole = (
+            np.ascontiguousarray(events.t_us, np.int64),
+            np.ascontiguousarray(events.x, np.uint16),
+            np.ascontiguousarray(events.y, np.uint16),
+            np.ascontiguousarray(events.polarity, np.uint8),
+        )
         done = 0
         while done < len(events):
-            rows = slice(done, None)
-            columns = (events.t_us[rows], events.x[rows], events.y[rows], events.polarity[rows])
-            taken, count = self._layout.encode(*columns, words, self._state)
+            t, x, y, polarity = (column[done:] for column in whole)
+            taken, count = self._layout.encode(t, x, y, polarity, words, self._state)
             self._file.write(words[:count].tobytes())
             done += taken

@@ -6,35 +6,17 @@ from block to block. A format that is not what its header says shows by words th
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from jeat_graph.core import events
+from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
-from jeat_graph.io.events.decoding import (
-    BACKWARDS,
-    ENDED,
-    FILLED,
-    HELD,
-    HELD_FROM,
-    JUMPS,
-    LATE,
-    LEAPS,
-    MOST_OF_A_WORD,
-    OUTSIDE,
-    TRIGGERS,
-    UNKNOWN,
-    UNTIMED,
-    WAITS,
-    Columns,
-    Decode,
-    Limits,
-    empty_state,
-)
 from jeat_graph.io.events.reader import PIECE_ROWS, EventReader, Triggers
 
 BLOCK_BYTES = 1 << 20
@@ -43,18 +25,32 @@ BLOCK_BYTES = 1 << 20
 _MOST_WRONG = 0.05
 _TRIGGER_ROWS = 1 << 12
 _NO_LIMIT = 1 << 16
-#: Fields of `Damage` that the loops count, and where.
-COUNTED = {
-    "outside": OUTSIDE,
-    "backwards": BACKWARDS,
-    "held": HELD,
-    "held_from_us": HELD_FROM,
-    "late_us": LATE,
-    "unknown": UNKNOWN,
-    "untimed": UNTIMED,
-    "jumps": JUMPS,
-    "leaps": LEAPS,
-}
+#: Fields of `Damage` that the loops count in their state.
+COUNTED = (
+    "outside",
+    "backwards",
+    "held",
+    "held_from_us",
+    "late_us",
+    "unknown",
+    "untimed",
+    "jumps",
+    "leaps",
+)
+
+
+class Columns(NamedTuple):
+    """Room for events: t_us (N,) int64, x, y (N,) uint16, polarity (N,) uint8."""
+
+    t: IntArray
+    x: npt.NDArray[np.uint16]
+    y: npt.NDArray[np.uint16]
+    p: npt.NDArray[np.uint8]
+
+
+#: (words, state, events, triggers, first column and row outside the picture) -> words that were used: all,
+#: unless the room is full or the state `waits` for more words.
+Decode = Callable[[Any, events.DecoderState, Columns, Triggers, tuple[int, int]], int]
 
 
 class WordReader(EventReader):
@@ -75,7 +71,7 @@ class WordReader(EventReader):
         self._file = file
         self._word = np.dtype(word)
         self._decode = decode
-        self._state = empty_state()
+        self._state = events.DecoderState()
         self._words = 0
         self._judged = False
 
@@ -89,8 +85,7 @@ class WordReader(EventReader):
         Raises:
             DataError: words that the format does not have: the file is of another one.
         """
-        width, height = self.size_px or (_NO_LIMIT, _NO_LIMIT)
-        limits = Limits(width, height)
+        limits = self.size_px or (_NO_LIMIT, _NO_LIMIT)
         triggers = _trigger_room()
         out = _room()
         state = self._state
@@ -98,21 +93,21 @@ class WordReader(EventReader):
         for block, ended in self._blocks():
             words = np.concatenate((rest, block)) if len(rest) else block
             rest = rest[:0]
-            state[ENDED] = ended
+            state.ended = ended
             used = 0
             while used < len(words):
                 got = self._decode(words[used:], state, out, triggers, limits)
                 used += got
                 self._words += got
-                if state[FILLED] + MOST_OF_A_WORD > PIECE_ROWS or state[TRIGGERS] == _TRIGGER_ROWS:
+                if state.filled + events.MOST_OF_A_WORD > PIECE_ROWS or state.triggers == _TRIGGER_ROWS:
                     yield self._take(out, triggers)
                     out = _room()
-                if state[WAITS]:
-                    state[WAITS] = 0
+                if state.waits:
+                    state.waits = False
                     rest = words[used:].copy()  # the block's memory is filled anew
                     break
         self._judge()
-        if state[FILLED] or state[TRIGGERS]:
+        if state.filled or state.triggers:
             yield self._take(out, triggers)
 
     def _blocks(self) -> Iterator[tuple[npt.NDArray[Any], bool]]:
@@ -140,8 +135,8 @@ class WordReader(EventReader):
         """Hand out what was decoded, and empty the room for triggers."""
         self._judge()
         state = self._state
-        n, m = int(state[FILLED]), int(state[TRIGGERS])
-        state[FILLED] = state[TRIGGERS] = 0
+        n, m = state.filled, state.triggers
+        state.filled = state.triggers = 0
         self.damage.events += n
         self.triggers = Triggers(
             triggers.t_us[:m].copy(), triggers.channel[:m].copy(), triggers.value[:m].copy()
@@ -150,8 +145,8 @@ class WordReader(EventReader):
         return EventArray.trusted(out.t[:n], out.x[:n], out.y[:n], out.p[:n])
 
     def _count(self) -> None:
-        for name, place in COUNTED.items():
-            setattr(self.damage, name, int(self._state[place]))
+        for name in COUNTED:
+            setattr(self.damage, name, getattr(self._state, name))
 
     def _judge(self) -> None:
         """Refuse a file that is not what it says, before anything of it is handed out."""
@@ -165,7 +160,7 @@ class WordReader(EventReader):
         if self.size_given and self.size_px is not None and wrong <= most < damage.outside + wrong:
             width, height = self.size_px
             raise DataError(
-                f"has {damage.outside} of its first {self._state[FILLED] + damage.outside} events outside "
+                f"has {damage.outside} of its first {self._state.filled + damage.outside} events outside "
                 f"the picture of {width} x {height} px that was given; give that of the camera",
                 self.path,
             )

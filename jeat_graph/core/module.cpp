@@ -1,0 +1,24 @@
+// The extension jeat_graph.core._core: one submodule for each folder.
+#include <nanobind/nanobind.h>
+
+namespace nb = nanobind;
+
+namespace jeat::detection {
+void bind(nb::module_& module);
+}
+namespace jeat::events {
+void bind(nb::module_& module);
+}
+namespace jeat::io {
+void bind(nb::module_& module);
+}
+
+NB_MODULE(_core, module) {
+    module.doc() = "The compiled part of jeat-graph; its submodules have the names of the package's folders.";
+    auto detection = module.def_submodule("detection", "Kernels of jeat_graph.detection.");
+    jeat::detection::bind(detection);
+    auto events = module.def_submodule("events", "Decoders and encoders of jeat_graph.io.events.");
+    jeat::events::bind(events);
+    auto io = module.def_submodule("io", "Kernels of jeat_graph.io.");
+    jeat::io::bind(io);
+}
