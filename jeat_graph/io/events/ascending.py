@@ -9,9 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import IntArray
-from jeat_graph.io.events.decoding import JUMP_US, LEAP_US
 from jeat_graph.io.events.reader import Damage
 
+#: A time that steps ahead by more than this (µs) is remarked on: a camera's clock does not do so. This and the next are
+#: those of `core/events/decoding.hpp`.
+JUMP_US = 10_000_000
+#: A single time that leaps ahead by more than this (µs), and that the next one takes back, is no time.
+LEAP_US = 1_000_000
 #: So many events may lie between one and an earlier one that follows it: they are held to be sorted.
 SORT_ROWS = 1 << 20
 
