@@ -11,8 +11,8 @@ import numpy.typing as npt
 from jeat_graph.data.arrays import IntArray
 from jeat_graph.io.events.reader import Damage
 
-#: A time that steps ahead by more than this (µs) is remarked on: a camera's clock does not do so. This and the next are
-#: those of `core/events/decoding.hpp`.
+#: A time that steps ahead by more than this (µs) is remarked on: no camera's clock does so. This and the
+#: next are those of `core/events/decoding.hpp`.
 JUMP_US = 10_000_000
 #: A single time that leaps ahead by more than this (µs), and that the next one takes back, is no time.
 LEAP_US = 1_000_000
