@@ -10,7 +10,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from jeat_graph.config.schema import Config, SensorConfig
+from jeat_graph.config.schema import Config, InputConfig, SensorConfig
 from jeat_graph.config.section_tree import build, check_keys, parse_change, plain, read_tree
 from jeat_graph.data.errors import ConfigError
 
@@ -77,20 +77,32 @@ def config_from_dict(tree: Mapping[str, Any]) -> Config:
     sensors = tree.get("sensors")
     if not isinstance(sensors, Mapping) or not sensors:
         raise ConfigError("sensors: at least one sensor must be declared")
-    parts: dict[str, Any] = {
-        "sensors": {
-            str(name): build(SensorConfig, value, f"sensors.{name}.") for name, value in sensors.items()
-        }
-    }
+    parts: dict[str, Any] = {}
     check_keys(tree, [f.name for f in dataclasses.fields(Config)], "")
     hints = typing.get_type_hints(Config)
     for f in dataclasses.fields(Config):
         if f.name != "sensors" and f.name in tree:
             parts[f.name] = build(hints[f.name], tree[f.name], f.name + ".")
+    assumed = _assumed_of_sensors(parts.get("input"))
+    parts["sensors"] = {
+        str(name): build(
+            SensorConfig, {**assumed, **value} if isinstance(value, Mapping) else value, f"sensors.{name}."
+        )
+        for name, value in sensors.items()
+    }
     sized = {"width", "height"} & set(tree.get("image") or {})
     if sized and "input" in parts:
         parts["input"] = dataclasses.replace(parts["input"], picture="given")
     return Config(**parts)
+
+
+def _assumed_of_sensors(given: InputConfig | None) -> dict[str, Any]:
+    """What is assumed of a sensor where it does not say otherwise itself.
+
+    Where undeclared sensors are declared by what is seen of them, whoever declares one by its rate alone says
+    nothing else of it, so all else is as for an undeclared one.
+    """
+    return given.of_any_sensor() if given is not None and given.undeclared == "declare" else {}
 
 
 def config_to_dict(config: Config) -> dict[str, Any]:

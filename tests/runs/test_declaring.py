@@ -9,6 +9,7 @@ import pytest
 
 from jeat_graph.calibration.procedure import calibrate_without_truth
 from jeat_graph.config.reading import as_config, config_to_dict, load_config
+from jeat_graph.config.schema import SensorConfig
 from jeat_graph.data.detections import Detections
 from jeat_graph.runs.declaring import fit_input, own_picture
 
@@ -124,3 +125,32 @@ def test_scans_that_come_seldom_are_said_to_bound_what_can_be_followed():
     usual, notes = fit_input(load_config("default"), camera(0.0, scans=30, rate=10.0))
     assert usual.motion == load_config("default").motion
     assert not any("length" in note for note in notes)
+
+
+def test_a_sensor_declared_by_its_rate_alone_is_as_an_undeclared_one():
+    seen = camera(0.0, name="gantry")
+    declared = load_config("default", ["sensors.gantry={rate_hz: 20}"])
+    assert fit_input(declared, seen)[0].sensors == fit_input(load_config("default"), seen)[0].sensors
+
+
+def test_what_a_declared_sensor_says_itself_counts():
+    sensor = load_config("default", ["sensors.gantry={rate_hz: 20, sigma_px: 4}"]).sensors["gantry"]
+    assumed = load_config("default").input.undeclared_sensor()
+    assert sensor == replace(assumed, rate_hz=20.0, sigma_px=4.0)
+
+
+def test_a_preset_that_declares_no_sensors_by_itself_assumes_nothing_of_them():
+    sensor = load_config("paper", ["sensors.gantry={rate_hz: 20}"]).sensors["gantry"]
+    assert sensor == SensorConfig(rate_hz=20.0)
+
+
+@pytest.mark.parametrize(("beyond", "clip"), [(0, True), (1, True), (4, False)])
+def test_tracks_are_clipped_unless_the_boxes_themselves_reach_beyond_the_picture(beyond, clip):
+    boxes = np.tile([500.0, 300.0, 60.0, 40.0], (200, 1))
+    boxes[:beyond, 0] = -30.0
+    config, notes = fit_input(as_config("default", (1280, 720)), recording(boxes))
+    assert config.output.clip is clip
+    assert any("beyond the picture" in note for note in notes) is not clip
+    highway = load_config("highway").sensors["rgb"]
+    known = replace(as_config("highway", (1280, 720)), sensors={"cam": highway})
+    assert fit_input(known, recording(boxes))[0].output.clip
