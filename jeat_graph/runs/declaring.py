@@ -68,7 +68,7 @@ def fit_input(config: Config, *recordings: Detections) -> tuple[Config, list[str
 
 
 def _reach_beyond(config: Config, recordings: Sequence[Detections]) -> bool:
-    """Whether detectors tell how far objects go on outside the picture, instead of cutting boxes at its edge."""
+    """Whether detectors follow objects beyond the picture, instead of cutting boxes at its edge."""
     filled = [d.boxes for d in recordings if len(d)]
     if not filled or config.input.undeclared != "declare":
         return False
