@@ -225,7 +225,7 @@ def read_run(path: PathLike, *, rate_hz: float | None = None) -> Run:
     from jeat_graph.runs.directory import read_record
 
     folder = Path(path)
-    tables = read_tables(folder, rate_hz)
+    tables = read_tables(folder, rate_hz=rate_hz)
     if "causal" in tables:
         tables["causal"] = replace(tables["causal"], instants=read_instants(folder))
     return Run(tables.get("causal"), tables.get("smoothed"), read_record(folder))

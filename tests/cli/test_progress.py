@@ -128,7 +128,15 @@ def test_judging_and_comparing_tell_how_far_they_are(recording, small_plots, tmp
 
 def _compare(run: Path, truth: str) -> object:
     arguments = argparse.Namespace(
-        no_compare=False, run_directory=str(run), detections=None, gt=truth, rate=None
+        no_compare=False,
+        run_directory=str(run),
+        detections=None,
+        gt=truth,
+        rate=None,
+        first_frame=None,
+        only_video=None,
+        class_names=None,
+        image=None,
     )
     return report_command._compare(arguments)
 

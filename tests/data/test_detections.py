@@ -246,7 +246,7 @@ def test_sensors_are_selected_by_one_name_or_by_several():
         ({"time": [0.5]}, {}),
         ({"timestamp_ms": [500]}, {}),
         ({"t": [500]}, {"time_unit": "ms"}),
-        ({"Frame": [10]}, {"rate_hz": 20.0}),
+        ({"Frame": [11]}, {"rate_hz": 20.0}),
     ],
 )
 def test_a_data_frame_has_the_names_that_files_have(times, options):

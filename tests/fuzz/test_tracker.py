@@ -27,7 +27,7 @@ OTHER_JERK = 0.1
 
 def run(preset: str, engine: str, steps: list[Step], *more: str) -> tuple[list[Trajectories], Trajectories]:
     """Take a stream step by step; refused scans must raise what is documented, all others must not."""
-    tracker = Tracker(load_config(preset, [f"smoother.engine={engine}", *more]))
+    tracker = Tracker(load_config(preset, [f"smoother.engine={engine}", "input.undeclared=refuse", *more]))
     living, next_id = np.zeros(0, dtype=np.int64), 0
     tables = []
     for step in steps:

@@ -148,7 +148,7 @@ def test_memory_of_sources_is_bounded_and_who_is_heard_stays_known():
     for k in range(count):
         assert duplicates.is_new(at(0, 0.05 * k, f"source {k}"))
         assert duplicates.is_new(at(k + 1, 0.05 * k, "steady"))
-        assert not duplicates.is_new(at(k, 0.05 * k, "steady"))
+        assert not duplicates.is_new(at(k, 0.05 * max(k - 1, 0), "steady"))
     assert len(duplicates.seen) == Duplicates.SOURCES
     assert duplicates.forgotten == count + 1 - Duplicates.SOURCES
     assert not duplicates.is_new(at(0, 0.05 * (count - 1), f"source {count - 1}"))

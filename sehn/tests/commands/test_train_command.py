@@ -36,7 +36,7 @@ def test_without_pytorch_the_packages_are_named(tmp_path, capsys, monkeypatch):
     [
         (["frames", "{dir}", "--out", "{dir}/n.pt"], "must end in .onnx"),
         (["frames", "{dir}", "--out", "{dir}/n.onnx"], "holds no segments with truth"),
-        (["frames", "{dir}/none.json", "--out", "{dir}/n.onnx"], "none.json: cannot be read"),
+        (["frames", "{dir}/none.json", "--out", "{dir}/n.onnx"], "none.json: no such file"),
         (["events", "{dir}/none", "--out", "{dir}/n.onnx"], "holds no segments with truth"),
         (["events", "{dir}", "--out", "{dir}/n.onnx", "--crop", "100x64"], "whole multiples of 16"),
         (

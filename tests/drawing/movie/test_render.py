@@ -375,4 +375,4 @@ def test_a_failure_halfway_leaves_no_movie(segment, tmp_path, capsys):
     out = tmp_path / "out" / "x.mp4"
     assert main(["render", str(segment), "--out", str(out)]) == 2
     assert "000006.png" in capsys.readouterr().err
-    assert list(out.parent.iterdir()) == []
+    assert list(out.parent.glob("*")) == []

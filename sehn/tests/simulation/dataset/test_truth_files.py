@@ -11,6 +11,7 @@ import pytest
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.coco import read_results
+from jeat_graph.io.reading import Reading
 from jeat_graph.io.truth_io import read_truth
 from jeat_graph_sehn.simulation.dataset.truth_files import SegmentTruth
 
@@ -64,7 +65,7 @@ def test_coco_says_the_times_of_the_images_and_the_boxes_of_each(segment: Path, 
     tree = json.loads((segment / "coco.json").read_text())
     results = tmp_path / "results.json"
     results.write_text(json.dumps([a | {"score": 1.0} for a in tree["annotations"]]))
-    read = read_results(results, None, segment / "coco.json")
+    read = read_results(results, Reading(images=segment / "coco.json"))
     truth = read_truth(segment / "gt.csv")
     assert read.t == pytest.approx(truth.t, abs=1e-9)
     assert read.boxes == pytest.approx(truth.boxes, abs=1e-3)
