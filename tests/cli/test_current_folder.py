@@ -63,7 +63,7 @@ def test_every_command_from_a_folder_of_strange_modules(trap, recording):
         ["count", "run", "--line", "0,300,2000,300"],
         ["export", "run", "--to", "cvat", "--out", "run.zip", "--output-rate", "20"],
         ["report", "run", "--out", "run.html"],
-        ["compare", "run", *truth],
+        ["compare", "run", *truth, "--detections", detections],
         ["events", "info", "run/run.json"],
         ["stream", "--help"],
         ["road", "run", "--camera", "none.yaml", "--out", "road"],
