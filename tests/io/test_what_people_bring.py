@@ -351,6 +351,15 @@ class TestYoloLabels:
         (tmp_path / "a_1.txt").write_text("1 0.5 0.5 0.1 0.1 1\n1 0.2 0.2 0.1 0.1 2\n")
         assert read_truth(tmp_path, rate_hz=HZ, image=(100, 100)).object_id.tolist() == [1, 2]
 
+    def test_a_sixth_column_of_ones_or_of_fractions_is_a_score(self, tmp_path):
+        (tmp_path / "a_1.txt").write_text("1 0.5 0.5 0.1 0.1 1\n1 0.2 0.2 0.1 0.1 1\n")
+        assert read_detections(tmp_path, rate_hz=HZ, image=(100, 100)).scores.tolist() == [1.0, 1.0]
+        with pytest.raises(DataError, match="has no identities"):
+            read_truth(tmp_path, rate_hz=HZ, image=(100, 100))
+        (tmp_path / "a_1.txt").write_text("1 0.5 0.5 0.1 0.1 90\n1 0.2 0.2 0.1 0.1 12.5\n")
+        found = read_detections(tmp_path, rate_hz=HZ, image=(100, 100), score_scale="percent")
+        assert found.scores.tolist() == [0.9, 0.125]
+
     def test_a_score_of_minus_1_is_none_and_says_nothing_of_the_track(self, tmp_path):
         (tmp_path / "a_1.txt").write_text("1 0.5 0.5 0.1 0.1 -1 7\n")
         found = read_trajectories(tmp_path, rate_hz=HZ, image=(100, 100))

@@ -86,6 +86,24 @@ def test_times_that_a_simulator_steps_by_milliseconds_are_left_to_the_user(hz_px
     assert unit_of(t_us // 1000 * 1000, x, y, "us") == "us"
 
 
+@pytest.mark.parametrize("hz_px", [0.03, 1.0, 15.0])
+def test_thousandths_are_milliseconds_where_as_seconds_they_would_be_far_too_slow(hz_px):
+    t_us, x, y, _ = events(20_000, hz_px * 640 * 480, (640, 480), 0)
+    assert unit_of(t_us / 1e3, x, y) == "ms"
+
+
+@pytest.mark.parametrize("hz_px", [1.0, 400.0])
+def test_thousandths_are_seconds_where_as_milliseconds_they_would_be_far_too_fast(hz_px):
+    t_us, x, y, _ = events(20_000, hz_px * 64 * 64, (64, 64), 0)
+    assert unit_of(t_us // 1000 / 1e3, x, y) == "s"
+
+
+@pytest.mark.parametrize("hz_px", [0.03, 400.0])
+def test_nanoseconds_that_the_layout_stands_for_are_believed_at_every_rate_of_a_camera(hz_px):
+    t_us, x, y, _ = events(20_000, hz_px * 640 * 480, (640, 480), 0)
+    assert unit_of(t_us * 1000, x, y, "ns") == "ns"
+
+
 def test_whole_milliseconds_of_a_busy_camera_are_not_taken_for_microseconds():
     t_us, x, y, _ = events(200_000, 1.0 * 640 * 480, (640, 480), 0)
     assert unit_of(t_us // 1000, x, y) is None
