@@ -207,6 +207,12 @@ def test_a_bad_row_is_named_by_its_line(write, column, value, words):
     assert words in str(caught.value)
 
 
+def test_a_box_may_reach_beyond_the_picture(write):
+    row = dict.fromkeys(COLUMNS, "0.5") | {"track_id": "3", "left": "-7", "top": "-9", "sensors": "rgb"}
+    found = read_trajectories(write("t.csv", "\n".join([",".join(COLUMNS), ",".join(row.values())])))
+    assert found.boxes.tolist() == [[-7, -9, 0.5, 0.5]]
+
+
 class TestMotChallenge:
     def test_the_result_has_frames_from_1_and_the_last_row_of_a_track_in_a_frame(self, tmp_path):
         rows = simple((0.0, 2, 9), (0.0, 1, 10), (0.099, 1, 11), (0.101, 1, 12), (0.26, 1, 13.12345))

@@ -416,6 +416,32 @@ def test_five_columns_without_names_are_left_to_the_user(tmp_path):
         read(tmp_path / "e.csv", layout=EventLayout(columns=("t", "x", "y", "p")))
 
 
+def test_a_single_event_is_a_recording(tmp_path):
+    (tmp_path / "e.csv").write_text("t,x,y,p\n1700000000500000,3,4,1\n")
+    events, reader = read(tmp_path / "e.csv")
+    assert (events.t_us.tolist(), events.x.tolist(), events.y.tolist()) == ([500_000], [3], [4])
+    assert reader.origin_us == 1_700_000_000_000_000
+
+
+def test_blanks_and_tabs_may_be_mixed(tmp_path):
+    rows = RPG.splitlines(keepends=True)
+    text = "".join([*rows[:9], *(row.replace(" ", " \t") for row in rows[9:])])
+    (tmp_path / "e.txt").write_text(text)
+    events, _ = read(tmp_path / "e.txt")
+    np.testing.assert_array_equal(events.t_us, T)
+    np.testing.assert_array_equal(events.y, Y)
+
+
+def test_a_line_without_an_end_is_refused_before_it_fills_the_memory(tmp_path, monkeypatch):
+    monkeypatch.setattr(text_tables, "BLOCK_BYTES", 1000)
+    head = "t,x,y,p\n" + "".join(f"{t},3,4,1\n" for t in range(1000, 9000))
+    (tmp_path / "e.csv").write_text(head)
+    assert len(read(tmp_path / "e.csv")[0]) == 8000
+    (tmp_path / "e.csv").write_text(head + "9" * 5000)
+    with pytest.raises(DataError, match=r"e\.csv:8002: has a line without an end"):
+        read(tmp_path / "e.csv")
+
+
 def test_a_missing_field_is_named_and_a_cut_end_is_a_note(tmp_path):
     path = tmp_path / "e.csv"
     text = lines(T, X, Y, P, header="t,x,y,p\n")
