@@ -425,7 +425,8 @@ def test_a_single_event_is_a_recording(tmp_path):
 
 def test_blanks_and_tabs_may_be_mixed(tmp_path):
     rows = RPG.splitlines(keepends=True)
-    text = "".join([*rows[:9], *(row.replace(" ", " \t") for row in rows[9:])])
+    mixed = (row.replace(" ", " \t", 1).replace(" ", "\t") for row in rows[9:])
+    text = "".join([*rows[:9], *mixed])
     (tmp_path / "e.txt").write_text(text)
     events, _ = read(tmp_path / "e.txt")
     np.testing.assert_array_equal(events.t_us, T)
