@@ -48,6 +48,9 @@ def test_an_order_that_the_data_leave_open_is_not_guessed():
 def test_columns_that_are_no_events_have_no_order():
     rng = np.random.default_rng(0)
     assert orders_of([rng.random(100), rng.random(100), rng.random(100), rng.random(100)]) == []
+    t, _, y, p = events(100, 2e5, (640, 480), 0)
+    assert orders_of([t, np.full(100, "left"), y, p]) == []
+    assert orders_of([t[:0], y[:0], y[:0], p[:0]]) == []
 
 
 @settings(max_examples=80, deadline=None)
