@@ -102,6 +102,15 @@ def module_of(dotted: str) -> str | None:
     return rest
 
 
+def is_there(dotted: str) -> bool:
+    """Whether a dotted name is a module, or something in one; what is compiled is a part of `core`."""
+    found = module_of(dotted)
+    if found in (None, "core"):
+        return True
+    name = dotted if dotted.partition(".")[0] in BESIDE else dotted.partition(".")[2]
+    return found in (name, name.rpartition(".")[0])
+
+
 def for_types_only(node: ast.AST) -> bool:
     """Whether a statement is `if TYPE_CHECKING:`."""
     return isinstance(node, ast.If) and getattr(node.test, "id", None) == "TYPE_CHECKING"
@@ -220,6 +229,17 @@ def test_no_modules_import_each_other_in_a_circle():
         if runs:
             edges.setdefault(importer, set()).add(imported)
     assert circles(edges) == []
+
+
+def test_what_is_imported_is_there():
+    """Also where two changes meet, of which one removes a module and the other asks for it."""
+    missing = [
+        f"{name} imports {dotted}"
+        for name in modules()
+        for dotted, _ in imports_within(tree(name))
+        if not is_there(dotted)
+    ]
+    assert missing == []
 
 
 def test_no_module_lies_loose_beside_the_rooms():

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterable
 from datetime import UTC, datetime, timedelta
+from decimal import Decimal
 
 import numpy as np
 
@@ -12,7 +14,8 @@ from jeat_graph.data.arrays import FloatArray
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _DATE = re.compile(r"\d{4}-\d\d-\d\d([T ].*)?$")
-_FRACTION = re.compile(r"(:\d\d)[.,](\d+)")
+# Python takes a decimal fraction of a minute or an hour, too, and reads it as one of a second.
+_FRACTION = re.compile(r"([T ]\d\d:\d\d:\d\d)[.,](\d+)")
 # Hours, minutes and seconds with a fraction, or with the number of the frame within the second.
 _CODE = re.compile(r"(?:(\d+):)?([0-5]?\d):([0-5]?\d)(?:[.,](\d+)|[:;](\d+))?$")
 _MINUTE_S, _HOUR_S = 60, 3600
@@ -48,13 +51,15 @@ def _date(text: str) -> float | None:
     # Python knows six decimals of a second; loggers write up to nine.
     fraction = _FRACTION.search(text)
     bare = text if fraction is None else text[: fraction.start()] + fraction[1] + text[fraction.end() :]
+    if "." in bare or "," in bare:
+        return None
     try:
         moment = datetime.fromisoformat(bare)
     except ValueError:
         return None
     moment = moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment
     whole = (moment - _EPOCH) // timedelta(seconds=1)
-    return float(f"{whole}.{fraction[2]}") if fraction and whole >= 0 else float(whole)
+    return float(whole + Decimal(f"0.{fraction[2]}")) if fraction else float(whole)
 
 
 def looks_like_time(text: str) -> bool:
@@ -82,6 +87,8 @@ def all_seconds(
                 known = f"; known are {KNOWN}"
                 hint = "; give the rate of its frames with --rate" if _has_frames(text) else known
                 raise refuse(row, f"t must be a time, got {text[:40]!r}{hint}") from None
+            if not math.isfinite(value):
+                raise refuse(row, f"t must be a finite number, got {value}")
         out.append(value)
     return np.array(out, dtype=np.float64)
 

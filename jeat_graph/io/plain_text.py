@@ -15,11 +15,13 @@ from jeat_graph.io.csv_text import CsvBody, read_text
 from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.tables import table_of
 
+_NO_COMMA_AT_END = re.compile(rb"[^,\r\n](?:[\r\n]|\Z)")
+
 
 def read_plain(
     path: str | Path, names: Mapping[int, Sequence[str]], kind: str, data: bytes | None = None
 ) -> FileTable:
-    """Read lines of fields separated by commas or white space; a comma may stand behind the last field.
+    """Read lines of fields separated by commas or white space; a comma may stand behind every line's last.
 
     Args:
         path: the file; one without any line is a table without rows.
@@ -39,7 +41,7 @@ def read_plain(
     blank_lines = len(data) - len(data.lstrip())
     first = re.split(rb"[\r\n]", data.lstrip(), maxsplit=1)[0]
     width = first.count(b",") + 1
-    if width not in names and width - 1 in names and first.endswith(b","):
+    if width - 1 in names and first.endswith(b",") and not _NO_COMMA_AT_END.search(data):
         data, width = re.sub(rb"(?m),(?=\r?$)", b"", data), width - 1
     if width not in names:
         known = " or ".join(str(count) for count in sorted(names))

@@ -54,6 +54,24 @@ class TestMotChallenge:
         found = read_detections(write("det.txt", MOT.replace(",", " ")), rate_hz=10)
         assert found.boxes.tolist() == [[10, 20, 30, 40], [11, 21, 31, 41]]
 
+    @pytest.mark.parametrize("count", [6, 7, 8, 9, 10])
+    @pytest.mark.parametrize("end", ["\n", "\r\n"])
+    def test_a_comma_behind_every_line_is_no_field(self, write, count, end):
+        fields = ["1,-1,10,20,30,40,0.9,3,0.5", "2,-1,11,21,31,41,0.8,4,0.25"]
+        if count == 10:
+            fields = [row.rsplit(",", 2)[0] + ",-1,-1,-1" for row in fields]
+        rows = [",".join(row.split(",")[:count]) for row in fields]
+        plain = read_detections(write("a.txt", end.join(rows)), rate_hz=10)
+        found = read_detections(write("b.txt", f",{end}".join([*rows, ""])), rate_hz=10)
+        assert summary(found) == summary(plain)
+        assert found.scores.tolist() == ([1.0, 1.0] if count == 6 else [0.9, 0.8])
+        classes = ["3", "4"] if count in (8, 9) else None
+        assert (None if found.classes is None else found.classes.tolist()) == classes
+
+    def test_a_field_that_is_blank_in_some_lines_is_missing_in_them(self, write):
+        with pytest.raises(DataError, match=r"a\.txt:1: conf is missing"):
+            read_detections(write("a.txt", "1,-1,10,20,30,40,\n2,-1,10,20,30,40,0.9\n"), rate_hz=10)
+
     def test_rate_and_length_come_from_seqinfo(self, write):
         write("seq/seqinfo.ini", "[Sequence]\nname=x\nframeRate=25\nseqLength=6\n")
         found = read_detections(write("seq/det/det.txt", MOT))
@@ -268,6 +286,8 @@ class TestRecognition:
             ("a.txt", MOT, "motchallenge"),
             ("a.txt", "\n\n" + MOT, "motchallenge"),
             ("a.txt", KITTI, "kitti"),
+            ("a.txt", " ".join(KITTI.split()[:17]) + "\n", "kitti"),
+            ("a.txt", " ".join(KITTI.split()[:16]) + "\n", "csv"),
             ("a", '[{"image_id": 1}]', "coco"),
             ("a.json", "[]", "coco"),
             ("a.dat", b"PAR1....", "parquet"),

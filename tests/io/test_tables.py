@@ -103,6 +103,14 @@ def test_what_is_wrong_is_said_with_its_line(write, content, line, words):
     assert words in str(error)
 
 
+def test_no_table_has_more_than_10_000_columns(write):
+    names = [f"c{k}" for k in range(10_000)]
+    table = read_table(write("t.csv", ",".join(names) + "\n" + ",".join(["1"] * 10_000)), ("c9999",))
+    assert table.whole("c9999").tolist() == [1]
+    with pytest.raises(DataError, match="has 10001 columns; at most 10000 are read"):
+        read_table(write("t.csv", ",".join([*names, "more"])), ("c9999",))
+
+
 def test_a_missing_file_is_said_to_be_missing(tmp_path):
     assert "no such file" in str(failure(tmp_path / "none.csv"))
 

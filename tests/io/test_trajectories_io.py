@@ -100,7 +100,7 @@ def test_the_csv_is_what_the_contract_says(tmp_path):
         t=np.array([1700000000.1234567]),
         track_id=np.array([7]),
         boxes=np.array([[1.23456, -0.0001, 3.0, 4.5]]),
-        existence=np.array([0.99999999]),
+        existence=np.array([0.12345678]),
         mean=np.array([[2.7346, 2.25, -12.3456, 0, 1e-9, -1e-9]]),
         var=np.array([[1.23456789, 0.000123456789, 123456789.0, 1e-30, 1e5, np.nan]]),
         used=np.array([3]),
@@ -115,7 +115,8 @@ def test_the_csv_is_what_the_contract_says(tmp_path):
     )
     fields = line.split(",")
     assert float(fields[0]) == 1700000000.1234567
-    assert fields[1:13] == ["7", "1.235", "0", "3", "4.5", "1", "2.735", "2.25", "-12.346", "0", "0", "0"]
+    assert fields[1:7] == ["7", "1.235", "0", "3", "4.5", "0.123457"]
+    assert fields[7:13] == ["2.735", "2.25", "-12.346", "0", "0", "0"]
     assert [float(field) for field in fields[13:17]] == [1.23457, 0.000123457, 123457000, 0.0]
     assert fields[17:] == ["100000", "", "rgb|evt", "0.25", ""]
 
@@ -204,6 +205,12 @@ def test_a_bad_row_is_named_by_its_line(write, column, value, words):
         read_trajectories(path)
     assert str(caught.value).startswith(f"{path}:4: ")
     assert words in str(caught.value)
+
+
+def test_a_box_may_reach_beyond_the_picture(write):
+    row = dict.fromkeys(COLUMNS, "0.5") | {"track_id": "3", "left": "-7", "top": "-9", "sensors": "rgb"}
+    found = read_trajectories(write("t.csv", "\n".join([",".join(COLUMNS), ",".join(row.values())])))
+    assert found.boxes.tolist() == [[-7, -9, 0.5, 0.5]]
 
 
 class TestMotChallenge:

@@ -170,6 +170,17 @@ class TestTables:
         with pytest.raises(DataError, match=r"u\.csv:2: box must be \{'x1'"):
             read_detections(write("u.csv", f'frame,box\n0,"{box}"\n'), rate_hz=HZ)
 
+    def test_a_track_of_a_result_needs_its_box(self, write):
+        rows = "0,1,1,2,3,4\n0.05\n0.1,1,5,6,7,8\n0.15,1,,,,\n"
+        path = write("r.csv", "t,track_id,left,top,width,height\n" + rows)
+        with pytest.raises(DataError, match=r"r\.csv:5: a track needs a box"):
+            read_trajectories(path)
+
+    def test_a_row_of_a_result_without_a_track_is_passed_over(self, write):
+        rows = "0,1,1,2,3,4\n0.05,,,,,\n0.1,,5,6,7,8\n"
+        found = read_trajectories(write("r.csv", "t,track_id,left,top,width,height\n" + rows))
+        assert (found.t.tolist(), found.boxes.tolist()) == ([0.0], [[1, 2, 3, 4]])
+
     def test_yolov5(self, write):
         rows = "".join(f"{n},{corners(k, i)},{s},7,truck,{k - 1}\n" for n, (k, i, *_, s) in enumerate(ROWS))
         path = write("y.csv", ",xmin,ymin,xmax,ymax,confidence,class,name,frame\n" + rows)
@@ -339,6 +350,46 @@ class TestYoloLabels:
         assert read_detections(tmp_path, rate_hz=HZ, image=(100, 100)).scores.tolist() == [0.9]
         (tmp_path / "a_1.txt").write_text("1 0.5 0.5 0.1 0.1 1\n1 0.2 0.2 0.1 0.1 2\n")
         assert read_truth(tmp_path, rate_hz=HZ, image=(100, 100)).object_id.tolist() == [1, 2]
+
+    def test_a_sixth_column_of_ones_or_of_fractions_is_a_score(self, tmp_path):
+        (tmp_path / "a_1.txt").write_text("1 0.5 0.5 0.1 0.1 1\n1 0.2 0.2 0.1 0.1 1\n")
+        assert read_detections(tmp_path, rate_hz=HZ, image=(100, 100)).scores.tolist() == [1.0, 1.0]
+        with pytest.raises(DataError, match="has no identities"):
+            read_truth(tmp_path, rate_hz=HZ, image=(100, 100))
+        (tmp_path / "a_1.txt").write_text("1 0.5 0.5 0.1 0.1 90\n1 0.2 0.2 0.1 0.1 12.5\n")
+        found = read_detections(tmp_path, rate_hz=HZ, image=(100, 100), score_scale="percent")
+        assert found.scores.tolist() == [0.9, 0.125]
+
+    def test_a_score_of_minus_1_is_none_and_says_nothing_of_the_track(self, tmp_path):
+        (tmp_path / "a_1.txt").write_text("1 0.5 0.5 0.1 0.1 -1 7\n")
+        found = read_trajectories(tmp_path, rate_hz=HZ, image=(100, 100))
+        assert (found.existence.tolist(), found.track_id.tolist()) == ([1.0], [7])
+
+    def test_classes_count_from_0(self, tmp_path):
+        (tmp_path / "a_1.txt").write_text("0 0.5 0.5 0.1 0.1\n")
+        found = read_detections(tmp_path, rate_hz=HZ, image=(100, 100), class_names="person,bicycle")
+        assert found.classes.tolist() == ["person"]
+
+    @pytest.mark.parametrize(
+        ("line", "words"),
+        [
+            ("-1 0.5 0.5 0.1 0.1", "the class must be a whole number, got -1"),
+            ("0.5 0.5 0.5 0.1 0.1", "the class must be a whole number, got 0.5"),
+            ("0 0.5 0.5 -0.1 0.1", "width and height must not be negative"),
+            ("0 0.5 0.5 0.1 -0.1", "width and height must not be negative"),
+            ("0 0.5 0.5 0.1", "4 fields, but a label of YOLO has 5 to 7"),
+            ("0 0.5 0.5 0.1 0.1 0.9 1 1", "8 fields, but a label of YOLO has 5 to 7"),
+        ],
+    )
+    def test_what_is_no_label_is_named_by_its_line(self, tmp_path, line, words):
+        (tmp_path / "a_1.txt").write_text(f"\n0 0.5 0.5 0.1 0.1\n{line}\n")
+        with pytest.raises(DataError, match=rf"a_1\.txt:3: {words}"):
+            read_detections(tmp_path, rate_hz=HZ, image=(100, 100))
+
+    def test_a_box_without_area_is_left_out_as_in_other_formats(self, tmp_path):
+        (tmp_path / "a_1.txt").write_text("0 0.5 0.5 0 0.1\n0 0.5 0.5 0.1 0.1\n")
+        found = read_detections(tmp_path, rate_hz=HZ, image=(100, 100))
+        assert (len(found), found.dropped) == (1, 1)
 
     def test_one_file_alone_is_told_to_come_as_a_folder(self, folder):
         with pytest.raises(DataError, match=r"looks like labels of YOLO .* give the folder"):

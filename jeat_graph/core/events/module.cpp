@@ -93,6 +93,8 @@ void bind_states(nb::module_& module) {
 
 void bind(nb::module_& module) {
     module.attr("MOST_OF_A_WORD") = MOST_OF_A_WORD;
+    module.attr("JUMP_US") = JUMP_US;
+    module.attr("LEAP_US") = LEAP_US;
     bind_states(module);
     bind_decoder<std::uint32_t>(module, "decode_evt2", "Decode EVT 2.0; see `jeat_graph.io.events.words.Decode`.",
                                 evt2::decode);

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from jeat_graph.core import events as decoders
 from jeat_graph.data.arrays import IntArray
 from jeat_graph.io.events.reader import Damage
 
@@ -18,6 +19,8 @@ JUMP_US = 10_000_000
 LEAP_US = 1_000_000
 #: So many events may lie between one and an earlier one that follows it: they are held to be sorted.
 SORT_ROWS = 1 << 20
+# What a jump and a leap are is the same for times that come as words and for those that come as arrays (µs).
+JUMP_US, LEAP_US = decoders.JUMP_US, decoders.LEAP_US
 
 
 class Ascending:
@@ -132,7 +135,7 @@ class Sorter:
 
 
 def _mended(t: IntArray, latest: int) -> tuple[IntArray, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """Return times (N,) of which single ones that leap away by more than `LEAP_US` have the time before them.
+    """Return times (N,) in which a single one that leaps by more than `LEAP_US` has the time before it.
 
     Args:
         t: times in the order of the file (µs).

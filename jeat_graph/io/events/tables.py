@@ -208,7 +208,12 @@ class TableReader(EventReader):
         """Return times in µs, rounded; where they are whole ns, rounded down."""
         if t.dtype.kind != "f":
             t = t.astype(np.int64)
-            return t // _NS_PER_US if self._unit == "ns" else t * (_US_PER_S // PER_SECOND[self._unit])
+            if self._unit == "ns":
+                return t // _NS_PER_US
+            us_per_unit = _US_PER_S // PER_SECOND[self._unit]
+            # What would be beyond 64 bits stays too large, or negative.
+            most = _LATEST_US // us_per_unit + 1
+            return np.clip(t, -most, most) * us_per_unit
         scaled = t.astype(np.float64) * (_US_PER_S / PER_SECOND[self._unit])
         bounded = np.clip(scaled, -float(_LATEST_US), 1.5 * _LATEST_US)
         return np.rint(bounded).astype(np.int64)
@@ -225,8 +230,10 @@ class TableReader(EventReader):
             self._refuse(block, row, f"its polarity is {p[row]:g}; it must be 0 or 1, or -1 or 1")
         self._zero, self._negative = self._zero or zeros, self._negative or negatives
         if self._zero and self._negative:
-            row = int(np.argmax(p == (0 if zeros else -1)))
-            self._refuse(block, row, "polarities are 0 here and -1 elsewhere; which of them is darker?")
+            here, elsewhere = (0, -1) if zeros else (-1, 0)
+            row = int(np.argmax(p == here))
+            text = f"polarities are {here} here and {elsewhere} elsewhere; which of them is darker?"
+            self._refuse(block, row, text)
         polarity: npt.NDArray[np.uint8] = on.astype(np.uint8)
         return polarity
 

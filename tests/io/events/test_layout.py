@@ -48,6 +48,9 @@ def test_an_order_that_the_data_leave_open_is_not_guessed():
 def test_columns_that_are_no_events_have_no_order():
     rng = np.random.default_rng(0)
     assert orders_of([rng.random(100), rng.random(100), rng.random(100), rng.random(100)]) == []
+    t, _, y, p = events(100, 2e5, (640, 480), 0)
+    assert orders_of([t, np.full(100, "left"), y, p]) == []
+    assert orders_of([t[:0], y[:0], y[:0], p[:0]]) == []
 
 
 @settings(max_examples=80, deadline=None)
@@ -84,6 +87,24 @@ def test_times_that_a_simulator_steps_by_milliseconds_are_left_to_the_user(hz_px
     t_us, x, y, _ = events(20_000, hz_px * 640 * 480, (640, 480), 0)
     assert unit_of(t_us // 1000 * 1000, x, y) is None
     assert unit_of(t_us // 1000 * 1000, x, y, "us") == "us"
+
+
+@pytest.mark.parametrize("hz_px", [0.03, 1.0, 15.0])
+def test_thousandths_are_milliseconds_where_as_seconds_they_would_be_far_too_slow(hz_px):
+    t_us, x, y, _ = events(20_000, hz_px * 640 * 480, (640, 480), 0)
+    assert unit_of(t_us / 1e3, x, y) == "ms"
+
+
+@pytest.mark.parametrize("hz_px", [1.0, 400.0])
+def test_thousandths_are_seconds_where_as_milliseconds_they_would_be_far_too_fast(hz_px):
+    t_us, x, y, _ = events(20_000, hz_px * 64 * 64, (64, 64), 0)
+    assert unit_of(t_us // 1000 / 1e3, x, y) == "s"
+
+
+@pytest.mark.parametrize("hz_px", [0.03, 400.0])
+def test_nanoseconds_that_the_layout_stands_for_are_believed_at_every_rate_of_a_camera(hz_px):
+    t_us, x, y, _ = events(20_000, hz_px * 640 * 480, (640, 480), 0)
+    assert unit_of(t_us * 1000, x, y, "ns") == "ns"
 
 
 def test_whole_milliseconds_of_a_busy_camera_are_not_taken_for_microseconds():

@@ -354,6 +354,95 @@ def test_a_wrong_value_is_named_with_its_line(tmp_path, what):
         read(path)
 
 
+@pytest.mark.parametrize(
+    ("column", "value", "said"),
+    [
+        (3, 2, r"event 41: its polarity is 2; it must be 0 or 1"),
+        (3, -1, r"event 0: polarities are 0 here and -1 elsewhere"),
+        (0, np.nan, r"event 41: its t is no number"),
+        (1, np.inf, r"event 41: its x is no number"),
+        (0, -5, r"event 41: its time is negative"),
+        (0, 1e19, r"event 41: its time is too large"),
+    ],
+)
+def test_a_wrong_value_of_an_array_is_named_by_its_event(tmp_path, column, value, said):
+    rows = np.c_[T, X, Y, P].astype(float)
+    rows[0, 3], rows[41, column] = 0, value
+    npy(tmp_path / "e.npy", rows)
+    layout = EventLayout(columns=("t", "x", "y", "p"), time_unit="us")
+    with pytest.raises(DataError, match=rf"e\.npy: {said}"):
+        read(tmp_path / "e.npy", layout=layout)
+
+
+@pytest.mark.parametrize("unit", ["s", "ms", "us"])
+def test_a_whole_number_that_is_no_time_is_too_large_in_every_unit(tmp_path, unit):
+    """In µs it would be beyond the numbers of a computer, and come out as any other."""
+    rows = np.c_[np.arange(COUNT), X, Y, P]
+    rows[41, 0] = 2**62 + 2**40
+    npy(tmp_path / "e.npy", rows)
+    layout = EventLayout(columns=("t", "x", "y", "p"), time_unit=unit)
+    with pytest.raises(DataError, match=r"e\.npy: event 41: its time is too large"):
+        read(tmp_path / "e.npy", layout=layout)
+    rows[41, 0] = -(2**62) - 2**40
+    npy(tmp_path / "e.npy", rows)
+    with pytest.raises(DataError, match=r"e\.npy: event 41: its time is negative"):
+        read(tmp_path / "e.npy", layout=layout)
+
+
+@pytest.mark.parametrize(("first", "then"), [(0, -1), (-1, 0)])
+def test_polarities_of_two_kinds_are_named_where_the_second_kind_begins(tmp_path, monkeypatch, first, then):
+    monkeypatch.setattr(text_tables, "BLOCK_BYTES", 10_000)
+    p = np.where(np.arange(COUNT) < 3000, first, 1)
+    p[4000:] = then
+    (tmp_path / "e.csv").write_text(lines(T, X, Y, p, header="t,x,y,p\n"))
+    with pytest.raises(DataError, match=rf"e\.csv:4002: polarities are {then} here and {first} elsewhere"):
+        read(tmp_path / "e.csv")
+
+
+@pytest.mark.parametrize(("on", "off"), [("True", "False"), ("ON", "off"), ("+", "-"), ('"true"', '"false"')])
+def test_polarity_may_be_said_in_words(tmp_path, on, off):
+    rows = (f"{t},{x},{y},{on if p else off}" for t, x, y, p in zip(T, X, Y, P, strict=True))
+    (tmp_path / "e.csv").write_text("t,x,y,p\n" + "\n".join(rows) + "\n")
+    np.testing.assert_array_equal(read(tmp_path / "e.csv")[0].polarity, P)
+
+
+def test_five_columns_without_names_are_left_to_the_user(tmp_path):
+    (tmp_path / "e.csv").write_text(lines(T, X, Y, P, P))
+    with pytest.raises(DataError, match=r"does not name its 5 columns, .* not to be told apart"):
+        read(tmp_path / "e.csv")
+    said = EventLayout(columns=("t", "x", "y", "p", "-"))
+    np.testing.assert_array_equal(read(tmp_path / "e.csv", layout=said)[0].polarity, P)
+    with pytest.raises(DataError, match="has 5 columns, but --event-columns names 4"):
+        read(tmp_path / "e.csv", layout=EventLayout(columns=("t", "x", "y", "p")))
+
+
+def test_a_single_event_is_a_recording(tmp_path):
+    (tmp_path / "e.csv").write_text("t,x,y,p\n1700000000500000,3,4,1\n")
+    events, reader = read(tmp_path / "e.csv")
+    assert (events.t_us.tolist(), events.x.tolist(), events.y.tolist()) == ([500_000], [3], [4])
+    assert reader.origin_us == 1_700_000_000_000_000
+
+
+def test_blanks_and_tabs_may_be_mixed(tmp_path):
+    rows = RPG.splitlines(keepends=True)
+    mixed = (row.replace(" ", " \t", 1).replace(" ", "\t") for row in rows[9:])
+    text = "".join([*rows[:9], *mixed])
+    (tmp_path / "e.txt").write_text(text)
+    events, _ = read(tmp_path / "e.txt")
+    np.testing.assert_array_equal(events.t_us, T)
+    np.testing.assert_array_equal(events.y, Y)
+
+
+def test_a_line_without_an_end_is_refused_before_it_fills_the_memory(tmp_path, monkeypatch):
+    monkeypatch.setattr(text_tables, "BLOCK_BYTES", 1000)
+    head = "t,x,y,p\n" + "".join(f"{t},3,4,1\n" for t in range(1000, 9000))
+    (tmp_path / "e.csv").write_text(head)
+    assert len(read(tmp_path / "e.csv")[0]) == 8000
+    (tmp_path / "e.csv").write_text(head + "9" * 5000)
+    with pytest.raises(DataError, match=r"e\.csv:8002: has a line without an end"):
+        read(tmp_path / "e.csv")
+
+
 def test_a_missing_field_is_named_and_a_cut_end_is_a_note(tmp_path):
     path = tmp_path / "e.csv"
     text = lines(T, X, Y, P, header="t,x,y,p\n")
