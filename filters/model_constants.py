@@ -45,8 +45,8 @@ class ModelConstants:
         clutter_precision: share of leftovers that are real all the same.
         score_floor: likelihood of any score under any hypothesis, added: scores may be anything at times.
         innovation_clip: largest normalised innovation that teaches noise.
-        nis_cap, nis_target: a square above the cap counts as the cap; so capped, that of t-distributed
-            innovations has the target as its mean.
+        nis_cap, nis_target: a square above the cap counts as the cap, and their mean is led to the target: of
+            errors of Student's t above, what is learnt is then the standard deviation.
         noise_rate, process_rate, walk_rate: steps of the stochastic approximation of the log variances, a
         scan.
         noise_tracks: tracks from which on a scan counts in full.
@@ -74,7 +74,6 @@ class ModelConstants:
         most_gain: largest gain in log likelihood that one detection has against noise.
         duplicate_weight: of ln(1 − overlap) in the log odds.
         duplicate_log_odds: evidence of scores at which that weight is halved.
-        absent: log weight of "a false object of sensor s" where s has not seen it.
         peak_share: share of the peak, the rest being the mean, in a track's score (logits).
         peak_decay_s, mean_memory_s, smoothing_s: of the peak, of the mean, of what the peak is taken of (s).
         unknown_score: score of a box that has none.
@@ -171,7 +170,6 @@ class ModelConstants:
     most_gain: float = 4.0
     duplicate_weight: float = 6.0
     duplicate_log_odds: float = 0.5
-    absent: float = -50.0
 
     peak_share: float = 0.5
     peak_decay_s: float = 2.0

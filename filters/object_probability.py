@@ -205,7 +205,7 @@ def posterior(evidence: Evidence, sensors: SensorModel, c: ModelConstants) -> Po
     prior = np.where(found, sensors.prior_odds, 0.0)
     real = object_seen.sum(axis=1) + scores.sum(axis=1) + duplicate_log_odds(evidence.overlap, scores, c)
     others = (shared + prior).sum(axis=1)[:, None] - shared - prior
-    false = np.logaddexp.reduce(np.where(found, others + seen, c.absent), axis=1)
+    false = np.logaddexp.reduce(np.where(found, others + seen, -np.inf), axis=1)
     odds = math.log(sensors.noise_share / (1.0 - sensors.noise_share))
     noise = odds - evidence.gained + prior.sum(axis=1) - prior[rows, evidence.owner]
     not_real = np.logaddexp(false, noise)

@@ -113,7 +113,7 @@ def step(state: ReferenceState, t: float, scans: Sequence[SensorScan], c: ModelC
 
 def order_of_scans(state: ReferenceState, scans: Sequence[SensorScan]) -> list[int]:
     """Return the places of scans: the most exact sensor first, equals by what they see."""
-    content = [(state.log_side_variance[s.sensor], s.boxes.tolist(), s.logits.tolist()) for s in scans]
+    content = [(state.log_side_variance[s.sensor], s.logits.tolist(), s.boxes.tolist()) for s in scans]
     return sorted(range(len(scans)), key=content.__getitem__)
 
 

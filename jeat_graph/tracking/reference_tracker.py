@@ -84,6 +84,7 @@ class ReferenceTracker:
         self._records: list[FilterRecord] = []
         self._moments: list[Moment] = []
         self._classes: ClassTally | None = None
+        self._called: dict[int, tuple[str, float]] = {}  # class and its share of each track so far
         self._causal = Trajectories.empty()
         self._finished = False
 
@@ -162,31 +163,30 @@ class ReferenceTracker:
     def smoothed(self) -> Trajectories:
         """Return the smoothed trajectories so far, of each track from its first to its last detection.
 
-        Whether a track is real does not change in its life, so by Bayes' rule what was known at its last
-        detection holds for all of it: tracks are told whose posterior then is above one half.
+        A row is told from the time on at which the track's posterior passed one half, and its existence is
+        the largest posterior up to then. The final one, which Bayes' rule gives for the whole life of a thing
+        that does not change, tells too much: what began as a second box is often taken over by an object.
 
         Raises:
             JeatGraphError: the configuration asks for no smoother.
         """
         if not self._smooths:
             raise JeatGraphError("the configuration asks for no smoother: smoother.engine is none")
-        first = np.full(self._state.next_id, np.inf)
-        last, real = np.full(self._state.next_id, -np.inf), np.zeros(self._state.next_id)
+        last, best = np.full(self._state.next_id, -np.inf), np.zeros(self._state.next_id)
+        existence = {}
         for moment in self._moments:
-            hit = moment.used != 0
-            ids = moment.track_id[hit]
-            first[ids] = np.minimum(first[ids], moment.t)
-            last[ids], real[ids] = moment.t, moment.real[hit]
-        at = {moment.record: moment for moment in self._moments}
+            ids = moment.track_id
+            last[ids[moment.used != 0]] = moment.t
+            best[ids] = np.maximum(best[ids], moment.real)
+            existence[moment.record] = moment, best[ids]
         parts = []
         for number, mean, covariance in smooth(self._records):
-            if number not in at:
-                continue
-            moment = at[number]
-            ids = moment.track_id
-            told = (real[ids] > self.constants.report) & (first[ids] <= moment.t) & (moment.t <= last[ids])
-            state = mean[told], covariance[told], real[ids[told]], moment.used[told]
-            parts.append(self._rows(moment.t, ids[told], *state))
+            if number in existence:
+                moment, real = existence[number]
+                ids = moment.track_id
+                told = (real > self.constants.report) & (moment.t <= last[ids])
+                state = mean[told], covariance[told], real[told], moment.used[told]
+                parts.append(self._rows(moment.t, ids[told], *state))
         return Trajectories.concatenate(parts[::-1]) if parts else Trajectories.empty(self.sensor_names)
 
     def finish(self) -> Trajectories:
@@ -233,10 +233,14 @@ class ReferenceTracker:
             self.sensor_names = (*self.sensor_names, name)
 
     def _count_classes(self, batch: Sequence[Scan], living: IntArray, taker: IntArray) -> None:
-        """Let the boxes of a step vote for the classes of their tracks."""
+        """Let the boxes of a step vote for the classes of their tracks; of ended ones the last result stays."""
         votes = Votes.of_batch(batch, np.arange(len(taker), dtype=np.int64))
-        if votes is not None or self._classes is not None:
-            self._classes = (self._classes or ClassTally.start()).after(living, taker, votes)
+        if votes is None and self._classes is None:
+            return
+        self._classes = (self._classes or ClassTally.start()).after(living, taker, votes)
+        names, shares = self._classes.columns(living)
+        called = zip(names.tolist(), shares.tolist(), strict=True)
+        self._called.update(zip(living.tolist(), called, strict=True))
 
     def _table(self, t: float, done: Reported) -> Trajectories:
         """Return the rows of a step."""
@@ -255,6 +259,8 @@ class ReferenceTracker:
         """Return tracks (N,) at one time as a table."""
         sides, size = box_sides.corners(mean), singer.box_size(mean)
         variance = np.diagonal(covariance, axis1=2, axis2=3)
+        called = [self._called.get(track, ("", np.nan)) for track in ids.tolist()]
+        known = self._classes is not None
         motion = [singer.POSITION, singer.VELOCITY, singer.ACCELERATION]
         return Trajectories(
             t=np.full(len(ids), t),
@@ -265,5 +271,7 @@ class ReferenceTracker:
             var=variance[:, :, motion].transpose(0, 2, 1).reshape(-1, 6),
             used=used,
             sensors=self.sensor_names,
+            classes=np.array([name for name, _ in called], dtype=np.str_) if known else None,
+            class_probability=np.array([share for _, share in called], dtype=np.float64) if known else None,
             size_var=size**2 * variance[:, :, singer.LOG_SIZE],
         )
