@@ -6,8 +6,8 @@ Popoli, *Design and Analysis of Modern Tracking Systems*, ch. 6):
     ln L = ln P_D/(1 − P_D) + ln p(y) + ln p(score | track)/p(score | clutter) − ln κ
 
 p(y) is Student's t of the four sides, or for a share of boxes that cover a part of the object a wide normal
-one; κ is the density of leftover boxes: uniform in place and in ln width, ln height. Pairs below 0 are never
-made, and the assignment whose sum is greatest is taken. N tracks, M boxes.
+one; κ is the density of leftover boxes: uniform in place and in ln width, ln height. AssociatedPairs below 0
+are never made, and the assignment whose sum is greatest is taken. N tracks, M boxes.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.special import expit, gammaln
 
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.filters.box_sides import SIDES, Innovations, determinant, squared_distance, with_variance
+from jeat_graph.filters.box_sides import SIDES, SideInnovations, determinant, squared_distance, with_variance
 from jeat_graph.filters.model_constants import ModelConstants
 
 # The probability that a track is detected is kept from 0 and 1, and its posterior from 0: a track of one scan
@@ -29,7 +29,7 @@ _LEAST_POSTERIOR = 0.02
 
 
 def sides_log_density(
-    innovation: Innovations, size: FloatArray, c: ModelConstants
+    innovation: SideInnovations, size: FloatArray, c: ModelConstants
 ) -> tuple[FloatArray, FloatArray]:
     """Return ln p(y) (N, M), and the squared distance (N, M) for the gate.
 
@@ -42,7 +42,7 @@ def sides_log_density(
     """
     y, S, d2 = innovation.y, innovation.S, innovation.d2.sum(axis=2)
     nu = c.degrees_of_freedom
-    constant = gammaln((nu + SIDES) / 2.0) - gammaln(nu / 2.0) - SIDES / 2.0 * math.log(nu * math.pi)
+    constant = float(gammaln((nu + SIDES) / 2.0) - gammaln(nu / 2.0) - SIDES / 2.0 * math.log(nu * math.pi))
     body = constant - 0.5 * _log_determinant(S)[:, None] - (nu + SIDES) / 2.0 * np.log1p(d2 / nu)
     extra = (c.outlier_std**2 * size.prod(axis=1))[:, None]
     wide = with_variance(S, extra, extra)

@@ -31,7 +31,7 @@ _OUTWARDS, _MOST_DISTANCE = -20.0, 200.0
 _LOG_2PI = math.log(2.0 * math.pi)
 
 
-class Innovations(NamedTuple):
+class SideInnovations(NamedTuple):
     """Of each box from each track.
 
     Attributes:
@@ -117,7 +117,7 @@ def with_variance(S: FloatArray, left: FloatArray, right: FloatArray) -> FloatAr
 
 def innovations(
     mean: FloatArray, covariance: FloatArray, boxes: FloatArray, log_variance: float, c: ModelConstants
-) -> Innovations:
+) -> SideInnovations:
     """Compare boxes (M, 4) with tracks: y = z − h(m), S = H P Hᵀ + R.
 
     Args:
@@ -131,7 +131,7 @@ def innovations(
     H, R = measurement_matrix(size), side_variance(size, log_variance, c)
     S = with_variance(H @ covariance @ H.transpose(0, 1, 3, 2), R, R)
     y = by_axis(boxes)[None] - by_axis(corners(mean))[:, None]
-    return Innovations(y, S, squared_distance(y, S[:, None]), H, R)
+    return SideInnovations(y, S, squared_distance(y, S[:, None]), H, R)
 
 
 def student_weight(d2: FloatArray, c: ModelConstants) -> FloatArray:

@@ -115,11 +115,13 @@ def _reweighted_least_squares(
     A[::2, 0] = A[1::2, 1] = 1.0
     A[::2, 2], A[1::2, 2] = place[:, 0], place[:, 1]
     flat, variance = y.reshape(-1), S.reshape(-1)
-    theta, covariance = np.zeros(3), np.diag(1.0 / precision)
+    theta: FloatArray = np.zeros(3)
+    covariance: FloatArray = np.diag(1.0 / precision)
     for _ in range(_ITERATIONS):
         d2 = ((flat - A @ theta) ** 2 / variance).reshape(-1, 2).sum(axis=1)
         weight = np.repeat((_DEGREES + 2.0) / (_DEGREES + d2), 2) / variance
-        covariance = np.linalg.inv((A * weight[:, None]).T @ A + np.diag(precision))
+        information: FloatArray = (A * weight[:, None]).T @ A + np.diag(precision)
+        covariance = np.linalg.inv(information).astype(np.float64)
         theta = covariance @ ((A * weight[:, None]).T @ flat)
     return CameraMotion(theta, covariance)
 

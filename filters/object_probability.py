@@ -22,14 +22,13 @@ tracks, S sensors.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import ClassVar, NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import betaln, expit
 
-from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
-from jeat_graph.filters.array_table import ArrayTable
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.filters.evidence import Evidence
 from jeat_graph.filters.model_constants import ModelConstants
 
 # A second box that covers all leaves this much of 1 − o; a mean of nothing is divided by the other.
@@ -44,91 +43,7 @@ _LEAST_MISSES = 0.2
 _LEAST_LOOKS = 1.0
 
 
-class Clock(NamedTuple):
-    """Of one scan: its time (s), the sensor's period (s), and the weight of a look in correlation times."""
-
-    t: float
-    period_s: float
-    weight: float
-
-
-@dataclass(frozen=True, eq=False)
-class Evidence(ArrayTable):
-    """Sufficient statistics of tracks, for their posterior.
-
-    Attributes:
-        hits, misses: (N, S) in correlation times.
-        found: (N, S) whether the sensor has ever found it.
-        recent, recent_weight: (N, S) sum of logits over a few scans, and its weight.
-        peak: (N, S) decaying peak of the logits.
-        total, total_weight: (N, S) sum of logits over a few seconds, and its weight.
-        overlap: (N,) least IoU ever with a better track.
-        gained: (N,) log likelihood that later detections gained against noise.
-        detections: (N,) number of detections.
-        owner: (N,) index of the sensor that found it first.
-        born_s, last_s: (N,) times of the first and the last detection (s).
-    """
-
-    PER_SENSOR: ClassVar[frozenset[str]] = frozenset(
-        ("hits", "misses", "found", "recent", "recent_weight", "peak", "total", "total_weight")
-    )
-
-    hits: FloatArray
-    misses: FloatArray
-    found: BoolArray
-    recent: FloatArray
-    recent_weight: FloatArray
-    peak: FloatArray
-    total: FloatArray
-    total_weight: FloatArray
-    overlap: FloatArray
-    gained: FloatArray
-    detections: FloatArray
-    owner: IntArray
-    born_s: FloatArray
-    last_s: FloatArray
-
-    def __len__(self) -> int:
-        return len(self.owner)
-
-    @classmethod
-    def none(cls, sensors: int) -> Self:
-        """Return the evidence of no track."""
-        per_sensor, one = np.zeros((0, sensors)), np.zeros(0)
-        whole, truth = np.zeros(0, dtype=np.int64), np.zeros((0, sensors), dtype=np.bool_)
-        scores = [per_sensor.copy() for _ in range(5)]
-        return cls(per_sensor, per_sensor, truth, *scores, one, one, one, whole, one, one)
-
-    @classmethod
-    def of_births(
-        cls, t: float, sensor: int, sensors: int, logits: FloatArray, overlap: FloatArray, weight: float
-    ) -> Self:
-        """Return the evidence of tracks that begin at detections: their scores, and no hit beyond.
-
-        Args:
-            t: time (s).
-            sensor: index of the sensor.
-            sensors: number of sensors.
-            logits: (M,) of the scores.
-            overlap: (M,) IoU with a better track or box.
-            weight: of one detection, in correlation times.
-        """
-        number = len(logits)
-        columns = [np.zeros((number, sensors)) for _ in range(7)]
-        hits, misses, recent, recent_weight, peak, total, total_weight = columns
-        found = np.zeros((number, sensors), dtype=np.bool_)
-        found[:, sensor] = True
-        recent[:, sensor] = total[:, sensor] = logits * weight
-        recent_weight[:, sensor] = total_weight[:, sensor] = weight
-        peak[:, sensor] = logits
-        scores = (recent, recent_weight, peak, total, total_weight)
-        owner, time = np.full(number, sensor, dtype=np.int64), np.full(number, t)
-        return cls(
-            hits, misses, found, *scores, overlap, np.zeros(number), np.ones(number), owner, time, time.copy()
-        )
-
-
-class SensorModel(NamedTuple):
+class SensorBelief(NamedTuple):
     """What is believed of the sensors.
 
     Attributes:
@@ -164,10 +79,10 @@ class Posterior(NamedTuple):
     scores: FloatArray
 
 
-def initial_sensor(c: ModelConstants) -> SensorModel:
+def initial_sensor(c: ModelConstants) -> SensorBelief:
     """Return the model of one sensor before anything is learnt."""
     one = np.ones(1)
-    return SensorModel(c.p_detect * one, c.unseen_share * one, 0.0 * one, 0.0 * one, c.noise_share)
+    return SensorBelief(c.p_detect * one, c.unseen_share * one, 0.0 * one, 0.0 * one, c.noise_share)
 
 
 def beta_binomial(
@@ -178,7 +93,7 @@ def beta_binomial(
     return np.asarray(betaln(a + hits, b + misses) - betaln(a, b))
 
 
-def score_log_odds(evidence: Evidence, sensors: SensorModel, c: ModelConstants) -> FloatArray:
+def score_log_odds(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> FloatArray:
     """Return η (N, S): a plus a mean of the peak and of the mean logit, once a track; 0 where never found."""
     mean = evidence.total / np.maximum(evidence.total_weight, _LEAST_WEIGHT)
     score = c.peak_share * evidence.peak + (1.0 - c.peak_share) * mean
@@ -193,7 +108,7 @@ def duplicate_log_odds(overlap: FloatArray, scores: FloatArray, c: ModelConstant
     return np.asarray(c.duplicate_weight * doubt * np.log(np.maximum(1.0 - overlap, _LEAST_APART)))
 
 
-def posterior(evidence: Evidence, sensors: SensorModel, c: ModelConstants) -> Posterior:
+def posterior(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> Posterior:
     """Weigh the hypotheses of each track by Bayes' rule, as the head of this module says."""
     found, rows = evidence.found, np.arange(len(evidence))
     seen = beta_binomial(evidence.hits, evidence.misses, sensors.p_detect, c)
@@ -213,7 +128,7 @@ def posterior(evidence: Evidence, sensors: SensorModel, c: ModelConstants) -> Po
     return Posterior(expit(log_odds), log_odds, np.exp(noise - not_real), np.exp(never - object_seen), scores)
 
 
-def learn_sensors(evidence: Evidence, sensors: SensorModel, c: ModelConstants) -> SensorModel:
+def learn_sensors(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> SensorBelief:
     """Estimate the sensors' parameters from tracks, weighted by their posteriors (two rounds of EM).
 
     Args:
@@ -241,7 +156,7 @@ def learn_sensors(evidence: Evidence, sensors: SensorModel, c: ModelConstants) -
         odds = ((trust * real).sum(axis=0) + c.sensor_count) / (
             (trust * (1.0 - real)).sum(axis=0) + c.sensor_count
         )
-        sensors = SensorModel(
+        sensors = SensorBelief(
             p_detect=np.clip(p_detect, *c.p_detect_bounds),
             unseen=np.clip(unseen, *c.unseen_bounds),
             indifference=sensors.indifference,
@@ -249,56 +164,6 @@ def learn_sensors(evidence: Evidence, sensors: SensorModel, c: ModelConstants) -
             noise_share=float(np.clip(noise, *c.noise_bounds)),
         )
     return sensors
-
-
-def count_hits(
-    evidence: Evidence,
-    rows: IntArray,
-    sensor: int,
-    logits: FloatArray,
-    gain: FloatArray,
-    clock: Clock,
-    c: ModelConstants,
-) -> Evidence:
-    """Return the evidence after a sensor found some tracks again.
-
-    Args:
-        evidence: before.
-        rows: (K,) tracks that were found.
-        sensor: index of the sensor.
-        logits: (K,) of the scores.
-        gain: (K,) log likelihood of each detection against noise.
-        clock: of the sensor's scan.
-        c: constants.
-    """
-    new = evidence.copy()
-    at = (rows, sensor)
-    first = (new.hits[at] <= 0.0) & (new.owner[rows] != sensor)
-    new.hits[at] += clock.weight
-    new.found[at] = True
-    for total, weight, memory in (
-        (new.recent, new.recent_weight, c.smoothing_s),
-        (new.total, new.total_weight, c.mean_memory_s),
-    ):
-        keep = math.exp(-clock.period_s / memory)
-        total[at] = total[at] * keep + logits * clock.weight
-        weight[at] = weight[at] * keep + clock.weight
-    now = new.recent[at] / new.recent_weight[at]
-    fallen = new.peak[at] - clock.period_s / c.peak_decay_s * np.maximum(new.peak[at] - now, 0.0)
-    new.peak[at] = np.where(first, now, np.maximum(fallen, now))
-    new.gained[rows] += np.minimum(gain, c.most_gain)
-    new.detections[rows] += 1.0
-    new.last_s[rows] = clock.t
-    return new
-
-
-def count_misses(
-    evidence: Evidence, rows: IntArray, sensor: int, visible: FloatArray, weight: float
-) -> Evidence:
-    """Return the evidence after a sensor missed some tracks (K,), visible with a probability (K,)."""
-    misses = evidence.misses.copy()
-    misses[rows, sensor] += weight * visible
-    return replace(evidence, misses=misses)
 
 
 def _share(hits: FloatArray, of: FloatArray, prior: float, count: float) -> FloatArray:

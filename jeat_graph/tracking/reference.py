@@ -22,15 +22,15 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.filters import (
     box_sides,
     camera_motion,
+    evidence,
     gap_survival,
     noise_learning,
-    object_probability,
     score_calibration,
     singer,
     visibility,
 )
+from jeat_graph.filters.evidence import ScanClock
 from jeat_graph.filters.model_constants import ModelConstants
-from jeat_graph.filters.object_probability import Clock
 from jeat_graph.filters.visibility import VISIBLE
 from jeat_graph.smoothers.state_rts import FilterRecord
 from jeat_graph.tracking.reference_life import (
@@ -51,7 +51,7 @@ _GAP_PERIODS, _LONGEST_PERIOD_S = 1.5, 0.1
 _CAMERA_DETECTIONS, _CAMERA_AGE_S = 2, 0.5
 
 
-class Pairs(NamedTuple):
+class AssociatedPairs(NamedTuple):
     """What association found in one scan.
 
     Attributes:
@@ -65,7 +65,7 @@ class Pairs(NamedTuple):
     box: IntArray
     ratio: FloatArray
     p_detect: FloatArray
-    innovation: box_sides.Innovations
+    innovation: box_sides.SideInnovations
 
 
 class Reported(NamedTuple):
@@ -117,7 +117,7 @@ def order_of_scans(state: ReferenceState, scans: Sequence[SensorScan]) -> list[i
     return sorted(range(len(scans)), key=content.__getitem__)
 
 
-def look(state: ReferenceState, t: float, scan: SensorScan, c: ModelConstants) -> Clock:
+def look(state: ReferenceState, t: float, scan: SensorScan, c: ModelConstants) -> ScanClock:
     """Take notice of a scan: the sensor's period, its indifference point, the unknown picture."""
     k = scan.sensor
     if not state.picture_known and len(scan.boxes):
@@ -133,7 +133,7 @@ def look(state: ReferenceState, t: float, scan: SensorScan, c: ModelConstants) -
     state.repetition = (*state.repetition[:k], counts, *state.repetition[k + 1 :])
     state.sensors.indifference[k] = score_calibration.indifference(counts, c)
     period = c.first_period_s if math.isnan(state.period_s[k]) else float(state.period_s[k])
-    return Clock(t, period, min(1.0, period / c.correlation_time_s))
+    return ScanClock(t, period, min(1.0, period / c.correlation_time_s))
 
 
 def predict(state: ReferenceState, t: float, c: ModelConstants) -> FloatArray:
@@ -161,7 +161,7 @@ def follow_camera(state: ReferenceState, scan: SensorScan, c: ModelConstants) ->
         state.tracks = replace(tracks, mean=mean, covariance=covariance)
 
 
-def associate(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> Pairs:
+def associate(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> AssociatedPairs:
     """Find the boxes of tracks: the assignment of greatest log likelihood ratio."""
     tracks, k = state.tracks, scan.sensor
     hits, misses = tracks.recent_hits[:, k], tracks.recent_misses[:, k]
@@ -178,10 +178,10 @@ def associate(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> Pai
     present = tracks.presence[:, VISIBLE] * p_detect
     ratio = likelihood_ratio.pair_log_ratio(density, d2, present, score, clutter, c)
     track, box = likelihood_ratio.assign(ratio)
-    return Pairs(track, box, ratio[track, box], p_detect, innovation)
+    return AssociatedPairs(track, box, ratio[track, box], p_detect, innovation)
 
 
-def count_gaps(state: ReferenceState, scan: SensorScan, pairs: Pairs, c: ModelConstants) -> None:
+def count_gaps(state: ReferenceState, scan: SensorScan, pairs: AssociatedPairs, c: ModelConstants) -> None:
     """Count the gaps that end now, and whether the object was where it had been predicted."""
     tracks = state.tracks
     gap = state.time - tracks.evidence.last_s[pairs.track]
@@ -193,7 +193,7 @@ def count_gaps(state: ReferenceState, scan: SensorScan, pairs: Pairs, c: ModelCo
 
 
 def learn_noise(
-    state: ReferenceState, scan: SensorScan, pairs: Pairs, clock: Clock, c: ModelConstants
+    state: ReferenceState, scan: SensorScan, pairs: AssociatedPairs, clock: ScanClock, c: ModelConstants
 ) -> None:
     """Learn measurement noise of the sensor and process noise of the scene from innovations."""
     tracks, i, seen = state.tracks, pairs.track, pairs.innovation
@@ -214,7 +214,7 @@ def learn_noise(
     state.tracks = replace(tracks, innovation=innovation, has_innovation=has_innovation)
 
 
-def update(state: ReferenceState, pairs: Pairs, c: ModelConstants) -> None:
+def update(state: ReferenceState, pairs: AssociatedPairs, c: ModelConstants) -> None:
     """Update the states of tracks by their boxes: heavy tails, and sides that are cut, have less weight."""
     tracks, i, seen = state.tracks, pairs.track, pairs.innovation
     y, size = seen.y[i, pairs.box], singer.box_size(tracks.mean[i])
@@ -225,7 +225,7 @@ def update(state: ReferenceState, pairs: Pairs, c: ModelConstants) -> None:
 
 
 def count_hits_and_misses(
-    state: ReferenceState, scan: SensorScan, pairs: Pairs, clock: Clock, c: ModelConstants
+    state: ReferenceState, scan: SensorScan, pairs: AssociatedPairs, clock: ScanClock, c: ModelConstants
 ) -> None:
     """Write down what the sensor found and what it did not: evidence, the track's own P_D, presence."""
     tracks, k, hit = state.tracks, scan.sensor, pairs.track
@@ -235,8 +235,8 @@ def count_hits_and_misses(
     presence[hit] = visibility.seen(len(hit))
     presence[missed] = visibility.miss(presence[missed], pairs.p_detect[missed])
     logits = scan.logits[pairs.box]
-    evidence = object_probability.count_hits(tracks.evidence, hit, k, logits, pairs.ratio, clock, c)
-    evidence = object_probability.count_misses(evidence, missed, k, visible, clock.weight)
+    counted = evidence.count_hits(tracks.evidence, hit, k, logits, pairs.ratio, clock, c)
+    counted = evidence.count_misses(counted, missed, k, visible, clock.weight)
     keep = math.exp(-clock.weight * c.correlation_time_s / c.track_p_detect_memory_s)
     recent_hits, recent_misses, used = (
         tracks.recent_hits.copy(),
@@ -248,11 +248,19 @@ def count_hits_and_misses(
     recent_hits[hit, k] += clock.weight
     recent_misses[missed, k] += clock.weight * visible
     used[hit] |= np.int64(1) << k
-    counts = {"recent_hits": recent_hits, "recent_misses": recent_misses, "used": used}
-    state.tracks = replace(tracks, presence=presence, evidence=evidence, **counts)
+    state.tracks = replace(
+        tracks,
+        presence=presence,
+        evidence=counted,
+        recent_hits=recent_hits,
+        recent_misses=recent_misses,
+        used=used,
+    )
 
 
-def count_clutter(state: ReferenceState, scan: SensorScan, pairs: Pairs, c: ModelConstants) -> IntArray:
+def count_clutter(
+    state: ReferenceState, scan: SensorScan, pairs: AssociatedPairs, c: ModelConstants
+) -> IntArray:
     """Return the boxes (F,) that no track took, and keep their mean number."""
     free = np.setdiff1d(np.arange(len(scan.boxes)), pairs.box)
     mean = c.clutter_memory * state.leftovers[scan.sensor] + (1.0 - c.clutter_memory) * len(free)
@@ -260,7 +268,7 @@ def count_clutter(state: ReferenceState, scan: SensorScan, pairs: Pairs, c: Mode
     return free
 
 
-def taker_of(state: ReferenceState, pairs: Pairs, free: IntArray) -> IntArray:
+def taker_of(state: ReferenceState, pairs: AssociatedPairs, free: IntArray) -> IntArray:
     """Return the identity of the track (M,) that each box of a scan went to; births are the last tracks."""
     ids = state.tracks.track_id
     out = np.zeros(len(pairs.box) + len(free), dtype=np.int64)

@@ -8,8 +8,8 @@ import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.filters import box_sides, gap_survival, object_probability
+from jeat_graph.filters.evidence import Evidence, ScanClock
 from jeat_graph.filters.model_constants import ModelConstants
-from jeat_graph.filters.object_probability import Clock, Evidence
 from jeat_graph.filters.visibility import GONE
 from jeat_graph.tracking.reference_state import ReferenceState, ReferenceTracks, SensorScan
 
@@ -21,7 +21,7 @@ _LEAST_AREA = 1e-9
 
 
 def begin_tracks(
-    state: ReferenceState, scan: SensorScan, free: IntArray, clock: Clock, c: ModelConstants
+    state: ReferenceState, scan: SensorScan, free: IntArray, clock: ScanClock, c: ModelConstants
 ) -> None:
     """Begin a track at every box that is left: what it is, the posterior tells."""
     boxes, logits, tracks = scan.boxes[free], scan.logits[free], state.tracks

@@ -13,9 +13,10 @@ from jeat_graph.filters import camera_motion, gap_survival, object_probability, 
 from jeat_graph.filters.array_table import ArrayTable
 from jeat_graph.filters.box_sides import SIDES
 from jeat_graph.filters.camera_motion import CameraVariance
+from jeat_graph.filters.evidence import Evidence
 from jeat_graph.filters.gap_survival import GapCounts
 from jeat_graph.filters.model_constants import ModelConstants
-from jeat_graph.filters.object_probability import Evidence, SensorModel
+from jeat_graph.filters.object_probability import SensorBelief
 from jeat_graph.filters.score_calibration import Repetition
 from jeat_graph.filters.singer import STATES, ProcessNoise
 from jeat_graph.filters.visibility import seen
@@ -124,7 +125,7 @@ class ReferenceState:
     process_noise: ProcessNoise
     camera: CameraVariance
     gaps: GapCounts
-    sensors: SensorModel
+    sensors: SensorBelief
     ended: Evidence
     learnt_s: float
     log_side_variance: FloatArray
@@ -157,7 +158,7 @@ def initial_state(picture: tuple[float, float] | None, c: ModelConstants) -> Ref
         process_noise=singer.initial_process_noise(c),
         camera=camera_motion.initial_variance(c),
         gaps=gap_survival.no_gaps(),
-        sensors=SensorModel(none, none, none, none, c.noise_share),
+        sensors=SensorBelief(none, none, none, none, c.noise_share),
         ended=Evidence.none(0),
         learnt_s=-math.inf,
         log_side_variance=none,
@@ -172,7 +173,7 @@ def declare_sensor(state: ReferenceState, c: ModelConstants) -> None:
     """Add a sensor that has not looked yet, of which what is usual is believed."""
     new, old = object_probability.initial_sensor(c), state.sensors
     columns = [np.append(a, b) for a, b in zip(old[:-1], new[:-1], strict=True)]
-    state.sensors = SensorModel(*columns, noise_share=old.noise_share)
+    state.sensors = SensorBelief(columns[0], columns[1], columns[2], columns[3], old.noise_share)
     state.tracks, state.ended = state.tracks.widened(), state.ended.widened()
     state.log_side_variance = np.append(state.log_side_variance, 2.0 * math.log(c.side_std))
     state.leftovers = np.append(state.leftovers, c.first_leftovers)

@@ -233,7 +233,7 @@ class ReferenceTracker:
             self.sensor_names = (*self.sensor_names, name)
 
     def _count_classes(self, batch: Sequence[Scan], living: IntArray, taker: IntArray) -> None:
-        """Let the boxes of a step vote for the classes of their tracks; of ended ones the last result stays."""
+        """Let the boxes of a step vote for the classes of their tracks; ended ones keep theirs."""
         votes = Votes.of_batch(batch, np.arange(len(taker), dtype=np.int64))
         if votes is None and self._classes is None:
             return

@@ -13,6 +13,7 @@ from scipy.integrate import quad
 from scipy.stats import beta
 
 from jeat_graph.filters import object_probability as op
+from jeat_graph.filters.evidence import Evidence, ScanClock, count_hits
 from jeat_graph.filters.model_constants import ModelConstants
 
 C = ModelConstants()
@@ -24,7 +25,7 @@ def evidence_of(hits, misses, scores, owner=0, gained=0.0, overlap=0.0, detectio
     found = ~np.isnan(scores)
     logits = np.where(found, scores, 0.0)[None]
     weight = found.astype(float)[None]
-    return op.Evidence(
+    return Evidence(
         hits=np.array([hits], dtype=float),
         misses=np.array([misses], dtype=float),
         found=found[None],
@@ -44,7 +45,7 @@ def evidence_of(hits, misses, scores, owner=0, gained=0.0, overlap=0.0, detectio
 
 def sensors_of(number, p_detect=0.7, unseen=0.1, indifference=-1.0, prior_odds=0.3, noise=0.5):
     rows = [np.full(number, value) for value in (p_detect, unseen, indifference, prior_odds)]
-    return op.SensorModel(*rows, noise_share=noise)
+    return op.SensorBelief(*rows, noise_share=noise)
 
 
 def marginal(hits, misses, p_detect):
@@ -145,7 +146,7 @@ def test_permuted_sensors_give_the_same_posterior():
     rng = np.random.default_rng(0)
     hits, misses, scores = rng.uniform(0, 4, 3), rng.uniform(0, 4, 3), rng.normal(size=3)
     base = sensors_of(3)._replace(p_detect=np.array([0.5, 0.7, 0.9]), prior_odds=np.array([0.1, -0.4, 0.6]))
-    there = op.SensorModel(*(column[order] for column in base[:-1]), noise_share=base.noise_share)
+    there = op.SensorBelief(*(column[order] for column in base[:-1]), noise_share=base.noise_share)
     one = op.posterior(evidence_of(hits, misses, scores, owner=1), base, C)
     other = op.posterior(evidence_of(hits[order], misses[order], scores[order], owner=2), there, C)
     assert other.log_odds[0] == pytest.approx(one.log_odds[0], rel=1e-12)
@@ -172,14 +173,14 @@ def test_learning_finds_a_sensors_probability_of_detection():
 
 def test_learning_from_nothing_changes_nothing():
     sensors = sensors_of(2)
-    assert op.learn_sensors(op.Evidence.none(2), sensors, C) is sensors
+    assert op.learn_sensors(Evidence.none(2), sensors, C) is sensors
 
 
 def test_scores_count_once_a_track_however_often_it_is_found():
-    logits, clock = np.array([1.0]), op.Clock(0.0, 0.05, 0.05 / 0.3)
-    evidence = op.Evidence.of_births(0.0, 0, 1, logits, np.zeros(1), clock.weight)
+    logits, clock = np.array([1.0]), ScanClock(0.0, 0.05, 0.05 / 0.3)
+    evidence = Evidence.of_births(0.0, 0, 1, logits, np.zeros(1), clock.weight)
     for n in range(1, 100):
-        evidence = op.count_hits(
+        evidence = count_hits(
             evidence, np.array([0]), 0, logits, np.array([2.0]), clock._replace(t=0.05 * n), C
         )
     eta = op.score_log_odds(evidence, sensors_of(1), C)[0, 0]
