@@ -13,6 +13,7 @@ from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.detections import Detections, Scan
+from jeat_graph.data.embeddings import unit_embeddings
 from jeat_graph.data.errors import DataError, JeatGraphError, TimeOrderError
 from jeat_graph.data.interop import boxes_of
 from jeat_graph.data.trajectories import Trajectories
@@ -107,7 +108,7 @@ class ReferenceTracker:
         """Take in one scan, or several of one and the same time; see `Tracker.step`.
 
         Raises:
-            DataError: boxes or scores that are not valid, or too many sensors.
+            DataError: boxes or scores that are not valid, embeddings, or too many sensors.
             TimeOrderError: a time before that of the last step. In both cases the state is as before.
             JeatGraphError: after `finish`.
         """
@@ -117,6 +118,8 @@ class ReferenceTracker:
         t = batch[0].t
         if self.time is not None and t < self.time:
             raise TimeOrderError(f"scan at t = {t} s is older than the last one at {self.time} s")
+        if any(scan.embeddings is not None for scan in batch):
+            raise DataError("the reference engine compares no embeddings; leave them or the engine away")
         check_names(self._classes, batch)
         self._declare(batch)
         # Several scans of one sensor at one time are one.
@@ -146,10 +149,12 @@ class ReferenceTracker:
         t: float,
         sensor: str,
         scores: npt.ArrayLike | None = None,
+        embeddings: npt.ArrayLike | None = None,
     ) -> Trajectories:
-        """Take in what a detector returned for one picture; see `Tracker.update`."""
+        """Take in what a detector returned for one picture; see `Tracker.update`. Embeddings are refused."""
         found = boxes_of(source, scores)
-        return self.step(Scan(t, sensor, found.boxes, found.scores, found.classes))
+        looks = None if embeddings is None else unit_embeddings(embeddings, len(found.kept))[found.kept]
+        return self.step(Scan(t, sensor, found.boxes, found.scores, found.classes, looks))
 
     def causal(self) -> Trajectories:
         """Return the tracks that are reported now, as the last step did."""

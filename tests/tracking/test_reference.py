@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from jeat_graph import Tracker, Trajectories, load_config
 from jeat_graph.data.errors import ConfigError, DataError, JeatGraphError, TimeOrderError
+from jeat_graph.live.late import LiveTracker
 from jeat_graph.tracking.reference_tracker import ReferenceTracker
 
 IMAGE = (1920, 1080)
@@ -103,6 +104,18 @@ def test_what_it_lacks_it_says_in_one_line(call):
 def test_an_unknown_engine_is_named():
     with pytest.raises(ConfigError, match=r"engine is one of compiled, reference, not 'fast'"):
         Tracker(engine="fast")
+
+
+def test_embeddings_are_refused_and_not_ignored():
+    made = tracker()
+    with pytest.raises(DataError, match="compares no embeddings"):
+        made.update([[0, 0, 4, 4]], t=0.0, sensor="rgb", embeddings=[[1.0, 0.0]])
+    assert made.time is None
+
+
+def test_late_scans_need_an_engine_that_goes_back():
+    with pytest.raises(JeatGraphError, match="the reference engine has no"):
+        LiveTracker(tracker()).step((0.0, "rgb", [[0, 0, 4, 4]], [0.5]))
 
 
 def test_time_goes_forward_and_ends():
