@@ -15,7 +15,7 @@ class ArrayTable:
     """Base of frozen dataclasses whose fields are arrays of N rows, or tables of these.
 
     Attributes:
-        PER_SENSOR: names of the fields (N, S) that have one column a sensor.
+        PER_SENSOR: names of the fields (N, S, ...) that have one column a sensor.
     """
 
     PER_SENSOR: ClassVar[frozenset[str]] = frozenset()
@@ -49,7 +49,9 @@ class ArrayTable:
     def widened(self) -> Self:
         """Return the same rows with one sensor more, which has not looked yet."""
         wide = {
-            name: column.widened() if isinstance(column, ArrayTable) else np.pad(column, ((0, 0), (0, 1)))
+            name: column.widened()
+            if isinstance(column, ArrayTable)
+            else np.pad(column, ((0, 0), (0, 1), *[(0, 0)] * (column.ndim - 2)))
             for name, column in self.columns().items()
             if isinstance(column, ArrayTable) or name in self.PER_SENSOR
         }

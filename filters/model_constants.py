@@ -36,6 +36,9 @@ class ModelConstants:
         cut_share: prior probability that one given side is cut by an occluder.
         outlier_share: share of boxes that cover a part of the object, or more than it.
         outlier_std: standard deviation of a side of these (sizes).
+        offset_count: pairs of boxes that the prior of two sensors' mean difference counts for.
+        offset_clip: difference from the mean (sizes, or ln size) from which on a pair counts for less.
+        offset_age_s: boxes of two sensors that are further apart in time are not compared (s).
         gate: largest squared Mahalanobis distance of four sides.
         outlier_gate: factor on the squared distance of an outlier, compared with the gate.
         clutter_size_area: area in (ln width, ln height) over which the sizes of leftover boxes spread.
@@ -64,7 +67,8 @@ class ModelConstants:
         chance_hit: probability of a hit on what a sensor cannot see.
         unseen_share: share of real objects that a sensor never sees. Prior.
         unseen_bounds: of the learnt share: "the one never sees it" and "the other invents it" explain the
-            same data, so the share is bounded.
+            same data, so the share is bounded; few objects of a sort teach that there are none, so it does
+            not fall below its prior.
         shared_false: share of persistent false objects that another sensor reports, too.
         noise_share: prior odds of noise that is seen once, as a probability. Prior.
         noise_bounds: of the learnt share.
@@ -127,6 +131,10 @@ class ModelConstants:
     outlier_share: float = 0.2
     outlier_std: float = 0.3
 
+    offset_count: float = 10.0
+    offset_clip: float = 0.2
+    offset_age_s: float = 0.011
+
     gate: float = 60.0
     outlier_gate: float = 3.0
     clutter_size_area: float = 2.0
@@ -160,7 +168,7 @@ class ModelConstants:
     looks_count: float = 5.0
     chance_hit: float = 0.02
     unseen_share: float = 0.1
-    unseen_bounds: tuple[float, float] = (0.01, 0.9)
+    unseen_bounds: tuple[float, float] = (0.1, 0.9)
     shared_false: float = 0.3
     noise_share: float = 0.5
     noise_bounds: tuple[float, float] = (0.05, 0.95)

@@ -1,7 +1,7 @@
 """The reference tracker's step in NumPy: the definition of the model, as the method's page has it.
 
-predict → follow the camera → associate → update → hits and misses → births → posterior → learn → report
-→ end.
+predict → correct boxes → follow the camera → associate → update → hits and misses → births → compare sensors
+→ posterior → learn → report → end.
 
 Every stage has what it reads and writes in its name and in `ReferenceState`; the formulas are in the modules
 of `filters` and `association` that it calls. Scans of one time are taken one after the other, the sensor with
@@ -26,6 +26,7 @@ from jeat_graph.filters import (
     gap_survival,
     noise_learning,
     score_calibration,
+    sensor_offsets,
     singer,
     visibility,
 )
@@ -36,6 +37,7 @@ from jeat_graph.smoothers.state_rts import FilterRecord
 from jeat_graph.tracking.reference_life import (
     begin_tracks,
     compare_overlaps,
+    compare_sensors,
     end_tracks,
     judge,
     learn,
@@ -89,9 +91,10 @@ def step(state: ReferenceState, t: float, scans: Sequence[SensorScan], c: ModelC
     state.tracks = replace(state.tracks, used=np.zeros_like(state.tracks.used))
     takers, records = [np.zeros(0, dtype=np.int64) for _ in scans], []
     for place in order_of_scans(state, scans):
-        scan = scans[place]
-        clock = look(state, t, scan, c)
+        given = scans[place]
+        clock = look(state, t, given, c)
         transition = predict(state, t, c)
+        scan = correct_boxes(state, given, c)
         follow_camera(state, scan, c)
         before = state.tracks
         pairs = associate(state, scan, c)
@@ -102,6 +105,7 @@ def step(state: ReferenceState, t: float, scans: Sequence[SensorScan], c: ModelC
         free = count_clutter(state, scan, pairs, c)
         begin_tracks(state, scan, free, clock, c)
         takers[place] = taker_of(state, pairs, free)
+        compare_sensors(state, given, takers[place], c)
         records.append(record(before, state.tracks, transition))
     compare_overlaps(state)
     judge(state, c)
@@ -147,6 +151,12 @@ def predict(state: ReferenceState, t: float, c: ModelConstants) -> FloatArray:
         presence = visibility.predict(tracks.presence, dt, c)
         state.tracks = replace(tracks, mean=mean, covariance=covariance, presence=presence)
     return model.F
+
+
+def correct_boxes(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> SensorScan:
+    """Return the scan with boxes as the sensors have them on the average."""
+    offset = sensor_offsets.offsets(state.offsets, state.log_side_variance, c)[scan.sensor]
+    return scan._replace(boxes=sensor_offsets.corrected(scan.boxes, offset))
 
 
 def follow_camera(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> None:

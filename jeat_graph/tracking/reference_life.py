@@ -1,4 +1,4 @@
-"""The reference tracker's life of tracks: births, what each is, what that teaches, reports, ends."""
+"""The reference tracker's life of tracks: births, sensors compared, what each is, what it teaches, ends."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
-from jeat_graph.filters import box_sides, gap_survival, object_probability
+from jeat_graph.filters import box_sides, gap_survival, object_probability, sensor_offsets
 from jeat_graph.filters.evidence import Evidence, ScanClock
 from jeat_graph.filters.model_constants import ModelConstants
+from jeat_graph.filters.singer import VELOCITY
 from jeat_graph.filters.visibility import GONE
 from jeat_graph.tracking.reference_state import ReferenceState, ReferenceTracks, SensorScan
 
@@ -38,6 +39,23 @@ def begin_tracks(
     ids = np.arange(state.next_id, state.next_id + len(free), dtype=np.int64)
     new = ReferenceTracks.begun(ids, *box_sides.initial_state(boxes, noise, c), evidence)
     state.tracks, state.next_id = tracks.append(new), state.next_id + len(free)
+
+
+def compare_sensors(state: ReferenceState, given: SensorScan, taker: IntArray, c: ModelConstants) -> None:
+    """Count what a sensor's boxes differ by from the others' last ones on the same real tracks; keep them."""
+    tracks, k = state.tracks, given.sensor
+    row = np.searchsorted(tracks.track_id, taker)
+    for other in range(state.num_sensors):
+        age = state.time - tracks.last_box_s[row, other]
+        before = tracks.last_box[row, other]
+        told = (before[:, 2] > before[:, 0]) & (age <= c.offset_age_s) & (tracks.real[row] > c.report)
+        if other != k and told.any():
+            moved = tracks.mean[row[told], :, VELOCITY] * age[told, None]
+            d = sensor_offsets.differences(given.boxes[told], before[told], moved)
+            state.offsets = sensor_offsets.count(state.offsets, k, other, d, c)
+    last_box, last_box_s = tracks.last_box.copy(), tracks.last_box_s.copy()
+    last_box[row, k], last_box_s[row, k] = given.boxes, state.time
+    state.tracks = replace(tracks, last_box=last_box, last_box_s=last_box_s)
 
 
 def compare_overlaps(state: ReferenceState) -> None:

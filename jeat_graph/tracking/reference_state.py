@@ -9,7 +9,14 @@ from typing import ClassVar, NamedTuple, Self
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
-from jeat_graph.filters import camera_motion, gap_survival, object_probability, score_calibration, singer
+from jeat_graph.filters import (
+    camera_motion,
+    gap_survival,
+    object_probability,
+    score_calibration,
+    sensor_offsets,
+    singer,
+)
 from jeat_graph.filters.array_table import ArrayTable
 from jeat_graph.filters.box_sides import SIDES
 from jeat_graph.filters.camera_motion import CameraVariance
@@ -18,6 +25,7 @@ from jeat_graph.filters.gap_survival import GapCounts
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.filters.object_probability import SensorBelief
 from jeat_graph.filters.score_calibration import Repetition
+from jeat_graph.filters.sensor_offsets import OffsetSums
 from jeat_graph.filters.singer import STATES, ProcessNoise
 from jeat_graph.filters.visibility import seen
 
@@ -33,6 +41,9 @@ class ReferenceTracks(ArrayTable):
         covariance: (N, 2, 5, 5).
         presence: (N, 3) probabilities of visible, hidden, gone.
         recent_hits, recent_misses: (N, S) with a memory, for the track's own P_D, in correlation times.
+        last_box: (N, S, 4) the last box of each sensor (left, top, right, bottom in px), as it was given; 0
+            before the first.
+        last_box_s: (N, S) its time (s).
         innovation: (N, 4) the last normalised innovation of centre and ln size.
         has_innovation: (N,) whether there was one.
         evidence: what the posterior rests on.
@@ -41,7 +52,9 @@ class ReferenceTracks(ArrayTable):
         used: (N,) bit k is set where sensor k has found it at the time of this step.
     """
 
-    PER_SENSOR: ClassVar[frozenset[str]] = frozenset(("recent_hits", "recent_misses"))
+    PER_SENSOR: ClassVar[frozenset[str]] = frozenset(
+        ("recent_hits", "recent_misses", "last_box", "last_box_s")
+    )
 
     track_id: IntArray
     mean: FloatArray
@@ -49,6 +62,8 @@ class ReferenceTracks(ArrayTable):
     presence: FloatArray
     recent_hits: FloatArray
     recent_misses: FloatArray
+    last_box: FloatArray
+    last_box_s: FloatArray
     innovation: FloatArray
     has_innovation: BoolArray
     evidence: Evidence
@@ -70,6 +85,8 @@ class ReferenceTracks(ArrayTable):
             presence=seen(number),
             recent_hits=np.zeros((number, sensors)),
             recent_misses=np.zeros((number, sensors)),
+            last_box=np.zeros((number, sensors, SIDES)),
+            last_box_s=np.zeros((number, sensors)),
             innovation=np.zeros((number, SIDES)),
             has_innovation=np.zeros(number, dtype=np.bool_),
             evidence=evidence,
@@ -110,6 +127,7 @@ class ReferenceState:
         sensors: what is believed of each. `learn`; indifference points: `look`
         ended: evidence of the last tracks that ended. `end_tracks`
         learnt_s: when sensors were learnt last (s). `learn`
+        offsets: what two sensors' boxes differ by. `compare_sensors`
         log_side_variance: (S,) ln ρ² of the sensors' sides. `learn_noise`
         leftovers: (S,) running mean of boxes a scan that no track takes. `count_clutter`
         period_s: (S,) running mean of the time between two scans (s); NaN before the second. `look`
@@ -128,6 +146,7 @@ class ReferenceState:
     sensors: SensorBelief
     ended: Evidence
     learnt_s: float
+    offsets: OffsetSums
     log_side_variance: FloatArray
     leftovers: FloatArray
     period_s: FloatArray
@@ -161,6 +180,7 @@ def initial_state(picture: tuple[float, float] | None, c: ModelConstants) -> Ref
         sensors=SensorBelief(none, none, none, none, c.noise_share),
         ended=Evidence.none(0),
         learnt_s=-math.inf,
+        offsets=sensor_offsets.no_offsets(),
         log_side_variance=none,
         leftovers=none,
         period_s=none,
@@ -175,6 +195,7 @@ def declare_sensor(state: ReferenceState, c: ModelConstants) -> None:
     columns = [np.append(a, b) for a, b in zip(old[:-1], new[:-1], strict=True)]
     state.sensors = SensorBelief(columns[0], columns[1], columns[2], columns[3], old.noise_share)
     state.tracks, state.ended = state.tracks.widened(), state.ended.widened()
+    state.offsets = sensor_offsets.widened(state.offsets)
     state.log_side_variance = np.append(state.log_side_variance, 2.0 * math.log(c.side_std))
     state.leftovers = np.append(state.leftovers, c.first_leftovers)
     state.period_s = np.append(state.period_s, np.nan)

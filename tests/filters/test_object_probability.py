@@ -195,3 +195,15 @@ def test_a_sensor_more_changes_no_posterior():
     assert replace(evidence.widened()).hits.shape == (1, 2)
     one, two = op.posterior(evidence, sensors, C), op.posterior(evidence.widened(), wide, C)
     assert two.log_odds[0] == pytest.approx(one.log_odds[0], rel=1e-12)
+
+
+def test_many_objects_that_a_sensor_finds_do_not_teach_that_it_finds_all():
+    """A parked car among hundreds that drove by: events never show it, and it stays real by its scores."""
+    driven = evidence_of([9.0, 9.0], [1.0, 1.0], [2.5, 2.5], gained=20.0)
+    evidence = driven
+    for _ in range(200):
+        evidence = evidence.append(driven)
+    learnt = op.learn_sensors(evidence, sensors_of(2, prior_odds=0.0), C)
+    assert (learnt.unseen >= C.unseen_share).all()
+    parked = evidence_of([0.0, 40.0], [40.0, 1.0], [np.nan, 3.5], owner=1, gained=40.0)
+    assert op.posterior(parked, learnt._replace(prior_odds=np.zeros(2)), C).real[0] > 0.5

@@ -274,3 +274,26 @@ def test_covariances_stay_positive_definite_whatever_comes(seed, gaps):
     smoothed = made.finish()
     assert np.isfinite(smoothed.mean).all()
     assert not len(smoothed) or smoothed.var.min() > 0.0
+
+
+# Detectors that differ.
+
+
+@pytest.mark.parametrize("wider", [1.25, 0.8])
+def test_what_the_boxes_of_two_detectors_differ_by_is_learnt(wider):
+    """One draws its boxes a quarter wider, or narrower: tracks do not breathe from scan to scan."""
+    made = tracker()
+    rng = np.random.default_rng(1)
+    breath = []
+    for k in range(100):
+        left = np.array([100.0, 500.0, 900.0, 1300.0]) + 2.0 * k
+        boxes = np.stack([left, np.full(4, 300.0), np.full(4, 80.0), np.full(4, 60.0)], axis=1)
+        other = boxes.copy()
+        other[:, 0] += (1.0 - wider) * 40.0
+        other[:, 2] *= wider
+        noise = rng.normal(0.0, 1.0, (2, 4, 4))
+        one = made.step((0.1 * k, "one", boxes + noise[0], [0.9] * 4))
+        two = made.step((0.1 * k + 0.005, "two", other + noise[1], [0.9] * 4))
+        breath.append(np.mean(two.boxes[:, 2] - one.boxes[:, 2]) if len(one) == len(two) == 4 else np.nan)
+    assert made.num_tracks == made.num_born == 4
+    assert abs(np.nanmean(breath[50:])) < 0.01 * 80.0
