@@ -24,6 +24,7 @@ from jeat_graph.tracking.classes import ClassTally, check_names, count_votes, nu
 from jeat_graph.tracking.compaction import allocate, grow
 from jeat_graph.tracking.detector_results import DetectorResults
 from jeat_graph.tracking.direct_call import DirectCall
+from jeat_graph.tracking.engines import ChosenEngine
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.learnt import begin_with, learnt_of
 from jeat_graph.tracking.notice import notice_if_cold
@@ -40,7 +41,7 @@ from jeat_graph.tracking.update_log import allocate_log
 _FIRST_CAPACITY = 64
 
 
-class Tracker(DetectorResults):
+class Tracker(ChosenEngine, DetectorResults):
     """Joint tracker of all vehicles over any number of asynchronous sensors (paper algorithm 1).
 
     Feed it scans in time order. Each step sees only what has arrived: the table it returns is causal. Memory
@@ -49,6 +50,7 @@ class Tracker(DetectorResults):
     Args:
         config: sensors and settings, from `load_config`; or the name of a preset, or of a YAML file.
         image: width and height of the picture (px), also as "1920x1080", if not those of the configuration.
+        engine: "compiled", or "reference": the model to read, in NumPy (`reference_tracker`).
         diagnostics: take down how well each detection fitted its track, for `last_updates`.
 
     Example:
@@ -65,6 +67,7 @@ class Tracker(DetectorResults):
         *,
         image: tuple[float, float] | str | None = None,
         diagnostics: bool = False,
+        engine: str = "compiled",
     ) -> None:
         config = as_config(config, image)
         super().__init__(config)
@@ -192,8 +195,8 @@ class Tracker(DetectorResults):
 
     def _compare(self, embeddings: EmbeddingArray, sensor: IntArray) -> Compared:
         """Compare the embeddings (M, E) of a step's detections with the living tracks."""
-        looks = self._looks or Looks.start(len(self.sensor_names), embeddings.shape[1])
-        living = self._tracks.track_id[: self._num_tracks]
+        looks, living = self._looks, self._tracks.track_id[: self._num_tracks]
+        looks = looks or Looks.start(len(self.sensor_names), embeddings.shape[1])
         return compare(looks.of(living), embeddings, sensor, self.config.association.most_alike)
 
     def hand_over(self, taken: StepRecord | None) -> None:
@@ -243,8 +246,7 @@ class Tracker(DetectorResults):
     def causal(self) -> Trajectories:
         """Return the tracks that are reported now, as the last step did."""
         t = 0.0 if self._t is None else self._t
-        settings = self._model.settings
-        by_existence = settings.lifecycle.by_existence
+        settings, by_existence = self._model.settings, self._model.settings.lifecycle.by_existence
         gaps = longest_gaps_s(self._scene, self._model, t)
         columns = self._report(
             self._tracks, self._num_tracks, t, gaps, settings.image, settings.output, by_existence
@@ -274,9 +276,8 @@ class Tracker(DetectorResults):
         """
         if not self._diagnostics:
             raise JeatGraphError("make the tracker with diagnostics=True to be told of its updates")
-        n, count = self._num_tracks, int(self._log.count[0])
-        ids, confirmed = self._tracks.track_id[:n], self._tracks.confirmed[:n]
-        return self._log.rows[:count].copy(), ids.copy(), confirmed.copy()
+        n, rows = self._num_tracks, self._log.rows[: int(self._log.count[0])]
+        return rows.copy(), self._tracks.track_id[:n].copy(), self._tracks.confirmed[:n].copy()
 
     def run(self, detections: Detections) -> Iterator[Trajectories]:
         """Step through a recording and yield the table of each time; scans of one time are taken jointly."""

@@ -1,0 +1,121 @@
+"""Which track a box belongs to: a log likelihood ratio for each pair, and the best assignment of all.
+
+The ratio of "this box is of this track" to "this track is missed, and this box is clutter" (Blackman and
+Popoli, *Design and Analysis of Modern Tracking Systems*, ch. 6):
+
+    ln L = ln P_D/(1 − P_D) + ln p(y) + ln p(score | track)/p(score | clutter) − ln κ
+
+p(y) is Student's t of the four sides, or for a share of boxes that cover a part of the object a wide normal
+one; κ is the density of leftover boxes: uniform in place and in ln width, ln height. AssociatedPairs below 0
+are never made, and the assignment whose sum is greatest is taken. N tracks, M boxes.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.special import expit, gammaln
+
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.filters.box_sides import SIDES, SideInnovations, determinant, squared_distance, with_variance
+from jeat_graph.filters.model_constants import ModelConstants
+
+# The probability that a track is detected is kept from 0 and 1, and its posterior from 0: a track of one scan
+# may grow.
+_P_DETECT_BOUNDS = (0.01, 0.99)
+_LEAST_POSTERIOR = 0.02
+
+
+def sides_log_density(
+    innovation: SideInnovations, size: FloatArray, c: ModelConstants
+) -> tuple[FloatArray, FloatArray]:
+    """Return ln p(y) (N, M), and the squared distance (N, M) for the gate.
+
+    p = (1 − e) t_ν(y; 0, S) + e N(y; 0, S + σ² I), in px⁻⁴, with σ a part of the object's size.
+
+    Args:
+        innovation: of all boxes from all tracks.
+        size: (N, 2) predicted width and height (px).
+        c: constants.
+    """
+    y, S, d2 = innovation.y, innovation.S, innovation.d2.sum(axis=2)
+    nu = c.degrees_of_freedom
+    constant = float(gammaln((nu + SIDES) / 2.0) - gammaln(nu / 2.0) - SIDES / 2.0 * math.log(nu * math.pi))
+    body = constant - 0.5 * _log_determinant(S)[:, None] - (nu + SIDES) / 2.0 * np.log1p(d2 / nu)
+    extra = (c.outlier_std**2 * size.prod(axis=1))[:, None]
+    wide = with_variance(S, extra, extra)
+    d2_wide = squared_distance(y, wide[:, None]).sum(axis=2)
+    constant = -SIDES / 2.0 * math.log(2.0 * math.pi)
+    tail = constant - 0.5 * _log_determinant(wide)[:, None] - 0.5 * d2_wide
+    share = c.outlier_share
+    density = np.logaddexp(math.log1p(-share) + body, math.log(share) + tail)
+    return density, np.minimum(d2, c.outlier_gate * d2_wide)
+
+
+def score_log_ratio(real: FloatArray, log_odds: FloatArray, c: ModelConstants) -> FloatArray:
+    """Return ln of the scores' likelihood ratio (N, M) of a track to clutter.
+
+    A box whose score says "real" with q fits a track that is real with r as r q + (1 − r)(1 − q), and
+    clutter, of which a share is real, likewise.
+
+    Args:
+        real: (N,) posterior of the tracks.
+        log_odds: (M,) log odds of being real by score.
+        c: constants.
+    """
+    q, r, clutter = expit(log_odds), np.maximum(real, _LEAST_POSTERIOR)[:, None], c.clutter_precision
+    of_track = r * q + (1.0 - r) * (1.0 - q) + c.score_floor
+    of_clutter = clutter * q + (1.0 - clutter) * (1.0 - q) + c.score_floor
+    return np.log(of_track) - np.log(of_clutter)
+
+
+def clutter_log_density(
+    size: FloatArray, leftovers: float, picture: tuple[float, float], c: ModelConstants
+) -> FloatArray:
+    """Return ln κ (N,) in px⁻⁴ at boxes of the tracks' sizes (N, 2) px.
+
+    Args:
+        size: (N, 2) predicted width and height (px).
+        leftovers: running mean of boxes a scan that no track took.
+        picture: width and height (px).
+        c: constants.
+    """
+    area = picture[0] * picture[1] * c.clutter_size_area
+    return np.asarray(math.log((leftovers + c.clutter_prior) / area) - np.log(size.prod(axis=1)))
+
+
+def pair_log_ratio(
+    density: FloatArray,
+    d2: FloatArray,
+    p_detect: FloatArray,
+    score: FloatArray,
+    clutter: FloatArray,
+    c: ModelConstants,
+) -> FloatArray:
+    """Return ln L (N, M), 0 where it is negative or outside the gate.
+
+    Args:
+        density: (N, M) ln p(y).
+        d2: (N, M) squared distance for the gate.
+        p_detect: (N,) probability that the track is visible and detected.
+        score: (N, M) ln of the scores' ratio.
+        clutter: (N,) ln κ.
+        c: constants.
+    """
+    p = np.clip(p_detect, *_P_DETECT_BOUNDS)
+    ratio = np.log(p / (1.0 - p))[:, None] + density + score - clutter[:, None]
+    return np.where(d2 > c.gate, 0.0, np.maximum(ratio, 0.0))
+
+
+def assign(ratio: FloatArray) -> tuple[IntArray, IntArray]:
+    """Return tracks (K,) and boxes (K,) of the assignment whose sum of ln L (N, M) is greatest."""
+    rows, columns = linear_sum_assignment(-ratio)
+    made = ratio[rows, columns] > 0.0
+    return rows[made].astype(np.int64), columns[made].astype(np.int64)
+
+
+def _log_determinant(S: FloatArray) -> FloatArray:
+    """Return Σ over both axes of ln det S (N,); S (N, 2, 2, 2)."""
+    return np.asarray(np.log(determinant(S)).sum(axis=1))

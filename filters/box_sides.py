@@ -1,0 +1,217 @@
+"""Extended Kalman filter of boxes: a detection measures the four sides of its box.
+
+Along each axis a box at p with ln size l has the sides z = p ∓ e^l / 2, so with w = e^l
+
+    H = ∂z/∂[p, v, a, l, r] = [[1, 0, 0, −w/2, 0], [1, 0, 0, +w/2, 0]],   R = r I₂.
+
+Errors have heavy tails (Student's t, Roth, Özkan and Gustafsson, ICASSP 2013: R is divided by the weight
+(ν + 4)/(ν + d²)), and an occluder may cut one side inwards, whose error says nothing of the object: both
+sides measure, or only the left, or only the right one (a mixture, whose probabilities divide R side by side).
+Shapes: N tracks, M boxes; axis 0 is x, side 0 is left or top; boxes here are left, top, right, bottom (px).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.filters.model_constants import ModelConstants
+from jeat_graph.filters.singer import ACCELERATION, GROWTH, LOG_SIZE, POSITION, STATES, VELOCITY, box_size
+
+SIDES = 4
+# A smaller area is none (px²).
+_LEAST_AREA = 1e-9
+# Probabilities and weights are kept from 0, lest R be infinite.
+_LEAST_PROBABILITY, _LEAST_WEIGHT = 0.02, 1e-3
+# ln of the probability that an occluder moves a side outwards, and the largest d² whose weight is computed.
+_OUTWARDS, _MOST_DISTANCE = -20.0, 200.0
+_LOG_2PI = math.log(2.0 * math.pi)
+
+
+class SideInnovations(NamedTuple):
+    """Of each box from each track.
+
+    Attributes:
+        y: (N, M, 2, 2) innovation by axis and side (px).
+        S: (N, 2, 2, 2) its covariance by axis.
+        d2: (N, M, 2) squared Mahalanobis distance by axis.
+        H: (N, 2, 2, 5) measurement matrix by axis.
+        side_variance: (N, 2) variance of one measured side by axis (px²).
+    """
+
+    y: FloatArray
+    S: FloatArray
+    d2: FloatArray
+    H: FloatArray
+    side_variance: FloatArray
+
+
+def corners(mean: FloatArray) -> FloatArray:
+    """Return the boxes (N, 4) left, top, right, bottom of states (N, 2, 5)."""
+    half = box_size(mean) / 2.0
+    centre = mean[:, :, POSITION]
+    return np.concatenate([centre - half, centre + half], axis=1)
+
+
+def intersection_over_union(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the IoU (N, M) of boxes (N, 4) and (M, 4) left, top, right, bottom."""
+    low = np.maximum(a[:, None, :2], b[None, :, :2])
+    high = np.minimum(a[:, None, 2:], b[None, :, 2:])
+    common = np.clip(high - low, 0.0, None).prod(axis=2)
+    areas = (a[:, 2:] - a[:, :2]).prod(axis=1)[:, None] + (b[:, 2:] - b[:, :2]).prod(axis=1)[None]
+    return np.asarray(common / np.maximum(areas - common, _LEAST_AREA))
+
+
+def side_variance(size: FloatArray, log_variance: float, c: ModelConstants) -> FloatArray:
+    """Return the variance (N, 2) of one measured side (px²): ρ² (½ √(w h) + ½ w)² + σ_px².
+
+    Args:
+        size: (N, 2) width and height (px).
+        log_variance: ln ρ² of the sensor.
+        c: constants.
+    """
+    both = np.sqrt(size.prod(axis=1))[:, None]
+    return np.asarray(math.exp(log_variance) * (0.5 * both + 0.5 * size) ** 2 + c.pixel_std**2)
+
+
+def measurement_matrix(size: FloatArray) -> FloatArray:
+    """Return H (N, 2, 2, 5): derivatives of both sides of each axis by its state."""
+    H = np.zeros((len(size), 2, 2, STATES))
+    H[..., POSITION] = 1.0
+    H[:, :, 0, LOG_SIZE], H[:, :, 1, LOG_SIZE] = -size / 2.0, size / 2.0
+    return H
+
+
+def by_axis(boxes: FloatArray) -> FloatArray:
+    """Return boxes (M, 4) left, top, right, bottom as (M, 2, 2) by axis and side."""
+    return boxes.reshape(-1, 2, 2).transpose(0, 2, 1)
+
+
+def squared_distance(y: FloatArray, S: FloatArray) -> FloatArray:
+    """Return yᵀ S⁻¹ y by axis.
+
+    Args:
+        y: (..., 2, 2) innovation by axis and side.
+        S: (..., 2, 2, 2) covariance, of a shape that fits.
+    """
+    a, b, d = S[..., 0, 0], S[..., 0, 1], S[..., 1, 1]
+    left, right = y[..., 0], y[..., 1]
+    return np.asarray((left**2 * d + right**2 * a - 2.0 * left * right * b) / (a * d - b**2))
+
+
+def determinant(S: FloatArray) -> FloatArray:
+    """Return the determinant (...) of matrices (..., 2, 2)."""
+    return np.asarray(S[..., 0, 0] * S[..., 1, 1] - S[..., 0, 1] ** 2)
+
+
+def with_variance(S: FloatArray, left: FloatArray, right: FloatArray) -> FloatArray:
+    """Return matrices (..., 2, 2) with variances (...) added to their diagonals."""
+    out = S.copy()
+    out[..., 0, 0] += left
+    out[..., 1, 1] += right
+    return out
+
+
+def innovations(
+    mean: FloatArray, covariance: FloatArray, boxes: FloatArray, log_variance: float, c: ModelConstants
+) -> SideInnovations:
+    """Compare boxes (M, 4) with tracks: y = z − h(m), S = H P Hᵀ + R.
+
+    Args:
+        mean: (N, 2, 5) predicted states.
+        covariance: (N, 2, 5, 5).
+        boxes: (M, 4) left, top, right, bottom (px).
+        log_variance: ln ρ² of the sensor's sides.
+        c: constants.
+    """
+    size = box_size(mean)
+    H, R = measurement_matrix(size), side_variance(size, log_variance, c)
+    S = with_variance(H @ covariance @ H.transpose(0, 1, 3, 2), R, R)
+    y = by_axis(boxes)[None] - by_axis(corners(mean))[:, None]
+    return SideInnovations(y, S, squared_distance(y, S[:, None]), H, R)
+
+
+def student_weight(d2: FloatArray, c: ModelConstants) -> FloatArray:
+    """Return the weight (ν + 4)/(ν + d²) (N,) of four sides, at most 1; d² (N,)."""
+    nu = c.degrees_of_freedom
+    weight = (nu + SIDES) / (nu + np.minimum(d2, _MOST_DISTANCE))
+    return np.asarray(np.clip(weight, _LEAST_WEIGHT, 1.0))
+
+
+def cut_probabilities(y: FloatArray, S: FloatArray, size: FloatArray, c: ModelConstants) -> FloatArray:
+    """Return the probability (N, 2, 2) by axis and side that this side is cut, and the other is not.
+
+    Where both measure, y ~ N(0, S). Where an occluder cuts one (prior ε), the other is N(0, S_ii) and the cut
+    one lies anywhere inwards within the object: density 1/w.
+
+    Args:
+        y: (N, 2, 2) innovations.
+        S: (N, 2, 2, 2) their covariances.
+        size: (N, 2) width and height (px).
+        c: constants.
+    """
+    both = -0.5 * squared_distance(y, S) - 0.5 * np.log(determinant(S)) - _LOG_2PI
+    variance = np.diagonal(S, axis1=2, axis2=3)
+    alone = -0.5 * y**2 / variance - 0.5 * (np.log(variance) + _LOG_2PI)
+    other = alone[..., ::-1] - np.log(size)[..., None] + math.log(c.cut_share)
+    inwards = np.stack([y[..., 0] > 0.0, y[..., 1] < 0.0], axis=-1)
+    cut = other + np.where(inwards, 0.0, _OUTWARDS)
+    total = np.logaddexp(np.logaddexp(both, cut[..., 1]), cut[..., 0])
+    return np.asarray(np.exp(cut - total[..., None]))
+
+
+def measured_variance(
+    y: FloatArray, S: FloatArray, R: FloatArray, size: FloatArray, c: ModelConstants
+) -> FloatArray:
+    """Return the variance (N, 2, 2) by axis and side with which an update takes each side (px²).
+
+    Args:
+        y: (N, 2, 2) innovations.
+        S: (N, 2, 2, 2) their covariances.
+        R: (N, 2) variances of the sides as assumed (px²).
+        size: (N, 2) width and height (px).
+        c: constants.
+    """
+    heavy = 1.0 / student_weight(squared_distance(y, S).sum(axis=1), c)
+    cut = cut_probabilities(y, S, size, c)
+    # Where a cut explains the innovation, what is left fits and has no heavy tail.
+    tail = np.where(cut.sum(axis=2) > 0.5, 1.0, heavy[:, None])
+    return np.asarray((R * tail)[..., None] / np.maximum(1.0 - cut, _LEAST_PROBABILITY))
+
+
+def update(
+    mean: FloatArray, covariance: FloatArray, y: FloatArray, H: FloatArray, R: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Update states by their boxes, in Joseph's form: P = (I − K H) P (I − K H)ᵀ + K R Kᵀ.
+
+    Args:
+        mean: (N, 2, 5) predicted states.
+        covariance: (N, 2, 5, 5).
+        y: (N, 2, 2) innovations.
+        H: (N, 2, 2, 5) measurement matrices.
+        R: (N, 2, 2) variances of the sides (px²).
+    """
+    Ht = H.transpose(0, 1, 3, 2)
+    S = with_variance(H @ covariance @ Ht, R[..., 0], R[..., 1])
+    K = covariance @ Ht @ np.linalg.inv(S)
+    rest = np.eye(STATES) - K @ H
+    noise = (K * R[..., None, :]) @ K.transpose(0, 1, 3, 2)
+    return mean + (K @ y[..., None])[..., 0], rest @ covariance @ rest.transpose(0, 1, 3, 2) + noise
+
+
+def initial_state(boxes: FloatArray, log_variance: float, c: ModelConstants) -> tuple[FloatArray, FloatArray]:
+    """Return mean (M, 2, 5) and covariance (M, 2, 5, 5) of tracks that begin at boxes (M, 4)."""
+    size = boxes[:, 2:] - boxes[:, :2]
+    R, scale = side_variance(size, log_variance, c), np.sqrt(size.prod(axis=1))[:, None]
+    mean = np.zeros((len(boxes), 2, STATES))
+    mean[:, :, POSITION], mean[:, :, LOG_SIZE] = (boxes[:, :2] + boxes[:, 2:]) / 2.0, np.log(size)
+    covariance = np.zeros((len(boxes), 2, STATES, STATES))
+    covariance[..., POSITION, POSITION] = R / 2.0
+    covariance[..., VELOCITY, VELOCITY] = (c.velocity_std * scale) ** 2
+    covariance[..., ACCELERATION, ACCELERATION] = (c.acceleration_std * scale) ** 2
+    covariance[..., LOG_SIZE, LOG_SIZE] = 2.0 * R / size**2
+    covariance[..., GROWTH, GROWTH] = c.growth_std**2
+    return mean, covariance

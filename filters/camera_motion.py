@@ -1,0 +1,138 @@
+"""Motion of the camera between two scans: a shift and a scale that all tracks have in common.
+
+Innovations of the centres of confirmed tracks are y = A θ + e, θ = (shift x, shift y, scale), one row of A an
+axis: [1, 0, x − W/2] and [0, 1, y − H/2]. θ ~ N(0, C) with a learnt C, e ~ t(ν, S): iteratively reweighted
+least squares (Lange, Little and Taylor, *Robust statistical modeling using the t distribution*, JASA 1989).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jeat_graph.data.arrays import BoolArray, FloatArray
+from jeat_graph.filters.box_sides import side_variance
+from jeat_graph.filters.model_constants import ModelConstants
+from jeat_graph.filters.singer import LOG_SIZE, POSITION, box_size
+
+# Tracks and boxes are paired by position and ln size, four numbers, with this gate (χ², 98 %).
+_GATE = 12.0
+# Allowance for the camera's own motion when pairing: three standard deviations, at most this variance
+# (sizes²).
+_PAIRING_DEVIATIONS, _PAIRING_MOST = 9.0, 0.16
+# Degrees of freedom of a track's two coordinates, and the number of reweightings.
+_DEGREES, _ITERATIONS = 3.0, 4
+# Fewer tracks tell nothing of a camera.
+_LEAST_TRACKS = 2
+
+
+class CameraVariance(NamedTuple):
+    """Variances of the motion between two scans: of shift (sizes²), and of scale."""
+
+    shift: float
+    scale: float
+
+
+class CameraMotion(NamedTuple):
+    """Motion of the camera: θ (3,) as shift x, y (px) and scale, and its covariance (3, 3)."""
+
+    theta: FloatArray
+    covariance: FloatArray
+
+
+def initial_variance(c: ModelConstants) -> CameraVariance:
+    """Return the variances before anything is learnt."""
+    return CameraVariance(c.camera_shift_std**2, c.camera_scale_std**2)
+
+
+def estimate(
+    mean: FloatArray,
+    covariance: FloatArray,
+    boxes: FloatArray,
+    log_variance: float,
+    picture: tuple[float, float],
+    prior: CameraVariance,
+    c: ModelConstants,
+) -> tuple[CameraMotion | None, CameraVariance]:
+    """Estimate the camera's motion since the last scan.
+
+    Args:
+        mean: (N, 2, 5) predicted states of tracks that are surely real.
+        covariance: (N, 2, 5, 5).
+        boxes: (M, 4) left, top, right, bottom (px).
+        log_variance: ln ρ² of the sensor's sides.
+        picture: width and height (px).
+        prior: learnt variances.
+        c: constants.
+
+    Returns:
+        The motion, or None where too few tracks have a box, and the variances learnt from it.
+    """
+    if len(mean) < _LEAST_TRACKS or not len(boxes):
+        return None, prior
+    size = box_size(mean)
+    scale = np.sqrt(size.prod(axis=1))
+    R = side_variance(size, log_variance, c)
+    S = covariance[..., POSITION, POSITION] + R / 2.0
+    S_size = covariance[..., LOG_SIZE, LOG_SIZE] + 2.0 * R / size**2
+    y = (boxes[:, :2] + boxes[:, 2:])[None] / 2.0 - mean[:, None, :, POSITION]
+    allowance = min(prior.shift * _PAIRING_DEVIATIONS, _PAIRING_MOST) * scale**2
+    d2 = (y**2 / (S + allowance[:, None])[:, None]).sum(axis=2)
+    y_size = np.log(boxes[:, 2:] - boxes[:, :2])[None] - mean[:, None, :, LOG_SIZE]
+    d2 += (y_size**2 / S_size[:, None]).sum(axis=2)
+    box = d2.argmin(axis=1)
+    track = np.arange(len(mean))
+    paired: BoolArray = (d2[track, box] < _GATE) & (d2[:, box].argmin(axis=0) == track)
+    if paired.sum() < _LEAST_TRACKS:
+        return None, prior
+    track, box = track[paired], box[paired]
+    place = mean[track][:, :, POSITION] - np.array(picture) / 2.0
+    typical = float(np.median(scale[track]))
+    precision = 1.0 / np.array([prior.shift * typical**2, prior.shift * typical**2, prior.scale])
+    motion = _reweighted_least_squares(y[track, box], S[track], place, precision)
+    return motion, _learnt(prior, motion, typical, c)
+
+
+def compensate(
+    mean: FloatArray, covariance: FloatArray, motion: CameraMotion, picture: tuple[float, float]
+) -> tuple[FloatArray, FloatArray]:
+    """Return the states (N, 2, 5) and covariances as the camera sees them after its motion."""
+    shift, scale = motion.theta[:2], motion.theta[2]
+    mean, covariance = mean.copy(), covariance.copy()
+    place = mean[:, :, POSITION]
+    mean[:, :, POSITION] = place + shift + scale * (place - np.array(picture) / 2.0)
+    mean[:, :, LOG_SIZE] += scale
+    covariance[..., POSITION, POSITION] += np.diag(motion.covariance)[:2]
+    return mean, covariance
+
+
+def _reweighted_least_squares(
+    y: FloatArray, S: FloatArray, place: FloatArray, precision: FloatArray
+) -> CameraMotion:
+    """Solve for θ; y, S, place (K, 2): innovations (px), variances, places from the middle."""
+    A = np.zeros((2 * len(y), 3))
+    A[::2, 0] = A[1::2, 1] = 1.0
+    A[::2, 2], A[1::2, 2] = place[:, 0], place[:, 1]
+    flat, variance = y.reshape(-1), S.reshape(-1)
+    theta: FloatArray = np.zeros(3)
+    covariance: FloatArray = np.diag(1.0 / precision)
+    for _ in range(_ITERATIONS):
+        d2 = ((flat - A @ theta) ** 2 / variance).reshape(-1, 2).sum(axis=1)
+        weight = np.repeat((_DEGREES + 2.0) / (_DEGREES + d2), 2) / variance
+        information: FloatArray = (A * weight[:, None]).T @ A + np.diag(precision)
+        covariance = np.linalg.inv(information).astype(np.float64)
+        theta = covariance @ ((A * weight[:, None]).T @ flat)
+    return CameraMotion(theta, covariance)
+
+
+def _learnt(prior: CameraVariance, motion: CameraMotion, typical: float, c: ModelConstants) -> CameraVariance:
+    """Return the variances after a scan: running means of E[θ²], within their bounds."""
+    second = motion.theta**2 + np.diag(motion.covariance)
+    keep = c.camera_memory
+    shift = keep * prior.shift + (1.0 - keep) * float(second[:2].mean()) / typical**2
+    scale = keep * prior.scale + (1.0 - keep) * float(second[2])
+    low, high = c.camera_shift_bounds, c.camera_scale_bounds
+    return CameraVariance(
+        float(np.clip(shift, low[0] ** 2, low[1] ** 2)), float(np.clip(scale, high[0] ** 2, high[1] ** 2))
+    )

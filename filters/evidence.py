@@ -1,0 +1,152 @@
+"""What is counted of a track by every sensor: the sufficient statistics of its posterior.
+
+Hits and misses count in correlation times, since a detector's errors last: two looks closer together are one
+witness. Scores are kept as a decaying peak and as a mean, and count once a track (`object_probability`). N
+tracks, S sensors.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import ClassVar, NamedTuple, Self
+
+import numpy as np
+
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.filters.array_table import ArrayTable
+from jeat_graph.filters.model_constants import ModelConstants
+
+
+class ScanClock(NamedTuple):
+    """Of one scan: its time (s), the sensor's period (s), and the weight of a look in correlation times."""
+
+    t: float
+    period_s: float
+    weight: float
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence(ArrayTable):
+    """Sufficient statistics of tracks, for their posterior.
+
+    Attributes:
+        hits, misses: (N, S) in correlation times.
+        found: (N, S) whether the sensor has ever found it.
+        recent, recent_weight: (N, S) sum of logits over a few scans, and its weight.
+        peak: (N, S) decaying peak of the logits.
+        total, total_weight: (N, S) sum of logits over a few seconds, and its weight.
+        overlap: (N,) least IoU ever with a better track.
+        gained: (N,) log likelihood that later detections gained against noise.
+        detections: (N,) number of detections.
+        owner: (N,) index of the sensor that found it first.
+        born_s, last_s: (N,) times of the first and the last detection (s).
+    """
+
+    PER_SENSOR: ClassVar[frozenset[str]] = frozenset(
+        ("hits", "misses", "found", "recent", "recent_weight", "peak", "total", "total_weight")
+    )
+
+    hits: FloatArray
+    misses: FloatArray
+    found: BoolArray
+    recent: FloatArray
+    recent_weight: FloatArray
+    peak: FloatArray
+    total: FloatArray
+    total_weight: FloatArray
+    overlap: FloatArray
+    gained: FloatArray
+    detections: FloatArray
+    owner: IntArray
+    born_s: FloatArray
+    last_s: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.owner)
+
+    @classmethod
+    def none(cls, sensors: int) -> Self:
+        """Return the evidence of no track."""
+        per_sensor, one = np.zeros((0, sensors)), np.zeros(0)
+        whole, truth = np.zeros(0, dtype=np.int64), np.zeros((0, sensors), dtype=np.bool_)
+        logits = per_sensor, per_sensor, per_sensor, per_sensor, per_sensor
+        return cls(per_sensor, per_sensor, truth, *logits, one, one, one, whole, one, one)
+
+    @classmethod
+    def of_births(
+        cls, t: float, sensor: int, sensors: int, logits: FloatArray, overlap: FloatArray, weight: float
+    ) -> Self:
+        """Return the evidence of tracks that begin at detections: their scores, and no hit beyond.
+
+        Args:
+            t: time (s).
+            sensor: index of the sensor.
+            sensors: number of sensors.
+            logits: (M,) of the scores.
+            overlap: (M,) IoU with a better track or box.
+            weight: of one detection, in correlation times.
+        """
+        number = len(logits)
+        columns = [np.zeros((number, sensors)) for _ in range(7)]
+        hits, misses, recent, recent_weight, peak, total, total_weight = columns
+        found = np.zeros((number, sensors), dtype=np.bool_)
+        found[:, sensor] = True
+        recent[:, sensor] = total[:, sensor] = logits * weight
+        recent_weight[:, sensor] = total_weight[:, sensor] = weight
+        peak[:, sensor] = logits
+        scores = (recent, recent_weight, peak, total, total_weight)
+        owner, time = np.full(number, sensor, dtype=np.int64), np.full(number, t)
+        return cls(
+            hits, misses, found, *scores, overlap, np.zeros(number), np.ones(number), owner, time, time.copy()
+        )
+
+
+def count_hits(
+    evidence: Evidence,
+    rows: IntArray,
+    sensor: int,
+    logits: FloatArray,
+    gain: FloatArray,
+    clock: ScanClock,
+    c: ModelConstants,
+) -> Evidence:
+    """Return the evidence after a sensor found some tracks again.
+
+    Args:
+        evidence: before.
+        rows: (K,) tracks that were found.
+        sensor: index of the sensor.
+        logits: (K,) of the scores.
+        gain: (K,) log likelihood of each detection against noise.
+        clock: of the sensor's scan.
+        c: constants.
+    """
+    new = evidence.copy()
+    at = (rows, sensor)
+    first = (new.hits[at] <= 0.0) & (new.owner[rows] != sensor)
+    new.hits[at] += clock.weight
+    new.found[at] = True
+    for total, weight, memory in (
+        (new.recent, new.recent_weight, c.smoothing_s),
+        (new.total, new.total_weight, c.mean_memory_s),
+    ):
+        keep = math.exp(-clock.period_s / memory)
+        total[at] = total[at] * keep + logits * clock.weight
+        weight[at] = weight[at] * keep + clock.weight
+    now = new.recent[at] / new.recent_weight[at]
+    fallen = new.peak[at] - clock.period_s / c.peak_decay_s * np.maximum(new.peak[at] - now, 0.0)
+    new.peak[at] = np.where(first, now, np.maximum(fallen, now))
+    new.gained[rows] += np.minimum(gain, c.most_gain)
+    new.detections[rows] += 1.0
+    new.last_s[rows] = clock.t
+    return new
+
+
+def count_misses(
+    evidence: Evidence, rows: IntArray, sensor: int, visible: FloatArray, weight: float
+) -> Evidence:
+    """Return the evidence after a sensor missed some tracks (K,), visible with a probability (K,)."""
+    misses = evidence.misses.copy()
+    misses[rows, sensor] += weight * visible
+    return replace(evidence, misses=misses)

@@ -1,0 +1,222 @@
+"""Every constant of the reference model, once, with its unit and where it comes from.
+
+Lengths are in sizes of the object (√(width · height)) wherever nothing else is said, so that the constants
+hold for any picture. "Prior" marks what only begins the learning of `noise_learning`, `object_probability`,
+`score_calibration` and `gap_survival`; "measured" was chosen on recordings of real detectors, one number for
+all of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ModelConstants:
+    """Constants of the reference model; frozen and hashable.
+
+    Attributes:
+        velocity_time_s: correlation time of the velocity (s); objects that nobody sees come to rest at last.
+        acceleration_time_s: correlation time of the acceleration (s) (Singer 1970).
+        growth_time_s: correlation time of the rate of ln size (s).
+        jerk: root spectral density of what drives the acceleration (sizes/s^2.5). Prior.
+        growth_noise: that of what drives the rate of ln size (1/s^1.5). Prior.
+        position_walk: that of the position's random walk (sizes/√s). Prior.
+        size_walk: that of the random walk of ln size (1/√s). Prior.
+        perspective_jerk: jerk that perspective adds, times (growth rate)^2.5 (sizes/s^2.5 at 1/s). A point
+            that nears the camera at constant speed has image coordinates ~ 1/Z, so its jerk grows with that
+            power.
+        fastest_growth: largest growth rate that perspective is computed for (1/s).
+        velocity_std, acceleration_std, growth_std: at a birth (sizes/s, sizes/s², 1/s).
+        side_std: standard deviation of a measured side (sizes). Prior.
+        side_std_bounds: least and largest learnt value of it. Without a floor parked cars, of which a
+            detector repeats the same box, teach that boxes are exact.
+        pixel_std: part of it that does not shrink with the object (px): boxes in whole pixels.
+        degrees_of_freedom: of Student's t of the sides; heavy tails as measured.
+        cut_share: prior probability that one given side is cut by an occluder.
+        outlier_share: share of boxes that cover a part of the object, or more than it.
+        outlier_std: standard deviation of a side of these (sizes).
+        offset_count: pairs of boxes that the prior of two sensors' mean difference counts for.
+        offset_clip: difference from the mean (sizes, or ln size) from which on a pair counts for less.
+        offset_age_s: boxes of two sensors that are further apart in time are not compared (s).
+        gate: largest squared Mahalanobis distance of four sides.
+        outlier_gate: factor on the squared distance of an outlier, compared with the gate.
+        clutter_size_area: area in (ln width, ln height) over which the sizes of leftover boxes spread.
+        clutter_memory: share of the running mean of leftovers that a scan keeps.
+        clutter_prior: leftovers a scan added to that mean.
+        first_leftovers: that mean before the first scan.
+        clutter_precision: share of leftovers that are real all the same.
+        score_floor: likelihood of any score under any hypothesis, added: scores may be anything at times.
+        innovation_clip: largest normalised innovation that teaches noise.
+        nis_cap, nis_target: a square above the cap counts as the cap, and their mean is led to the target: of
+            errors of Student's t above, what is learnt is then the standard deviation.
+        noise_rate, process_rate, walk_rate: steps of the stochastic approximation of the log variances, a
+        scan.
+        noise_tracks: tracks from which on a scan counts in full.
+        noise_period_s: period from which on a scan counts in full (s); faster ones repeat their errors.
+        noise_hits: detections of a track before its innovations teach.
+        jerk_bounds, growth_bounds, walk_bounds: least and largest learnt values, in their units above.
+        correlation_time_s: hits, and misses, closer together are one witness (s). Measured on real detectors.
+        first_period_s: period of a sensor of which there was one scan (s).
+        p_detect, p_detect_strength: mean and strength of the Beta prior of one object's P_D. Prior.
+        p_detect_bounds: of the sensor's learnt mean.
+        track_p_detect_bounds: of a track's own mean, in association.
+        track_p_detect_memory_s: memory of a track's own hits and misses (s).
+        p_detect_count: objects that the prior of the sensor's mean counts for.
+        looks_count: looks from which on an object counts no more for that mean.
+        chance_hit: probability of a hit on what a sensor cannot see.
+        unseen_share: share of real objects that a sensor never sees. Prior.
+        unseen_bounds: of the learnt share: "the one never sees it" and "the other invents it" explain the
+            same data, so the share is bounded; few objects of a sort teach that there are none, so it does
+            not fall below its prior.
+        shared_false: share of persistent false objects that another sensor reports, too.
+        noise_share: prior odds of noise that is seen once, as a probability. Prior.
+        noise_bounds: of the learnt share.
+        sensor_count: objects that the priors of shares count for.
+        weight_hits, weight_bounds: a track's weight in a sensor's prior odds: detections over the first,
+        bounded.
+        most_gain: largest gain in log likelihood that one detection has against noise.
+        duplicate_weight: of ln(1 − overlap) in the log odds.
+        duplicate_log_odds: evidence of scores at which that weight is halved.
+        peak_share: share of the peak, the rest being the mean, in a track's score (logits).
+        peak_decay_s, mean_memory_s, smoothing_s: of the peak, of the mean, of what the peak is taken of (s).
+        unknown_score: score of a box that has none.
+        repeat_overlap: IoU from which on a box comes again at its place.
+        repeat_share: prior share of the best boxes that come again.
+        repeat_count: boxes that this prior counts for, in each score bin.
+        best_share: of the boxes, by score, that are the yardstick.
+        indifference_offset, indifference_slope: a_s = −(offset + slope · z), z the logit below which fewer
+            than half as many come again as of the best. Measured.
+        indifference_bounds: of z.
+        visible_to_hidden, hidden_to_visible, visible_to_gone, hidden_to_gone: rates of the chain of presence
+        (1/s).
+        gap_prior_s: a gap of length u ends well with exp(−u / this). Prior.
+        gap_prior_count: gaps that the prior counts for.
+        gap_prior_least_s: shortest u of the prior (s).
+        gap_overlap: IoU with the predicted box from which on a gap ended well.
+        longest_gap_s: a track that nobody has seen for so long ends (s).
+        camera_shift_std, camera_scale_std: of common shift (sizes) and scale between two scans. Prior.
+        camera_shift_bounds, camera_scale_bounds: of the learnt values.
+        camera_memory: share of these variances that a scan keeps.
+        report: least posterior, times the survival of its gap, of a track that is reported.
+        inside_share: least share of a box within the picture of a track that is reported while nobody sees
+        it. rival, rival_age_s: least posterior, and longest time since its last detection (s), of a track
+            that a birth may be a second box of.
+        doubtful_gap_s: a track that is less likely real than not ends after so long unseen (s).
+        false_posterior, false_gap_s: one of a smaller posterior ends after so long (s).
+        least_presence: a track that is visible or hidden with less ends.
+        outside_share, outside_gap_s: one with less of its box within the picture ends after so long (s).
+        learn_period_s: time between two updates of the sensors' parameters (s).
+        remembered_tracks: ended tracks from which sensors' parameters are learnt.
+    """
+
+    velocity_time_s: float = 20.0
+    acceleration_time_s: float = 0.5
+    growth_time_s: float = 1.0
+    jerk: float = 2.0
+    growth_noise: float = 0.5
+    position_walk: float = 0.05
+    size_walk: float = 0.05
+    perspective_jerk: float = 10.0
+    fastest_growth: float = 4.0
+    velocity_std: float = 1.5
+    acceleration_std: float = 1.0
+    growth_std: float = 0.3
+
+    side_std: float = 0.06
+    side_std_bounds: tuple[float, float] = (0.02, 0.4)
+    pixel_std: float = 0.5
+    degrees_of_freedom: float = 6.0
+    cut_share: float = 0.02
+    outlier_share: float = 0.2
+    outlier_std: float = 0.3
+
+    offset_count: float = 10.0
+    offset_clip: float = 0.2
+    offset_age_s: float = 0.011
+
+    gate: float = 60.0
+    outlier_gate: float = 3.0
+    clutter_size_area: float = 2.0
+    clutter_memory: float = 0.98
+    clutter_prior: float = 0.5
+    first_leftovers: float = 1.0
+    clutter_precision: float = 0.3
+    score_floor: float = 0.02
+
+    innovation_clip: float = 3.0
+    nis_cap: float = 4.0
+    nis_target: float = 0.8
+    noise_rate: float = 0.02
+    process_rate: float = 0.03
+    walk_rate: float = 0.1
+    noise_tracks: float = 8.0
+    noise_period_s: float = 0.05
+    noise_hits: int = 3
+    jerk_bounds: tuple[float, float] = (0.3, 60.0)
+    growth_bounds: tuple[float, float] = (0.1, 20.0)
+    walk_bounds: tuple[float, float] = (0.003, 1.0)
+
+    correlation_time_s: float = 0.3
+    first_period_s: float = 0.05
+    p_detect: float = 0.7
+    p_detect_strength: float = 3.0
+    p_detect_bounds: tuple[float, float] = (0.05, 0.98)
+    track_p_detect_bounds: tuple[float, float] = (0.02, 0.98)
+    track_p_detect_memory_s: float = 1.5
+    p_detect_count: float = 6.0
+    looks_count: float = 5.0
+    chance_hit: float = 0.02
+    unseen_share: float = 0.1
+    unseen_bounds: tuple[float, float] = (0.1, 0.9)
+    shared_false: float = 0.3
+    noise_share: float = 0.5
+    noise_bounds: tuple[float, float] = (0.05, 0.95)
+    sensor_count: float = 5.0
+    weight_hits: float = 4.0
+    weight_bounds: tuple[float, float] = (0.25, 5.0)
+    most_gain: float = 4.0
+    duplicate_weight: float = 6.0
+    duplicate_log_odds: float = 0.5
+
+    peak_share: float = 0.5
+    peak_decay_s: float = 2.0
+    mean_memory_s: float = 3.0
+    smoothing_s: float = 0.05
+    unknown_score: float = 0.8
+    repeat_overlap: float = 0.4
+    repeat_share: float = 0.8
+    repeat_count: float = 4.0
+    best_share: float = 0.3
+    indifference_offset: float = 0.4
+    indifference_slope: float = 0.85
+    indifference_bounds: tuple[float, float] = (-1.0, 3.0)
+
+    visible_to_hidden: float = 0.3
+    hidden_to_visible: float = 1.0
+    visible_to_gone: float = 0.1
+    hidden_to_gone: float = 0.3
+    gap_prior_s: float = 0.4
+    gap_prior_count: float = 4.0
+    gap_prior_least_s: float = 0.02
+    gap_overlap: float = 0.5
+    longest_gap_s: float = 3.0
+
+    camera_shift_std: float = 0.05
+    camera_scale_std: float = 0.02
+    camera_shift_bounds: tuple[float, float] = (1e-3, 0.2**0.5)
+    camera_scale_bounds: tuple[float, float] = (1e-4, 0.1)
+    camera_memory: float = 0.97
+
+    report: float = 0.5
+    inside_share: float = 0.4
+    rival: float = 0.3
+    rival_age_s: float = 0.3
+    doubtful_gap_s: float = 1.0
+    false_posterior: float = 0.05
+    false_gap_s: float = 0.1
+    least_presence: float = 0.05
+    outside_share: float = 0.1
+    outside_gap_s: float = 0.2
+    learn_period_s: float = 0.5
+    remembered_tracks: int = 400

@@ -1,0 +1,171 @@
+"""What a track is: the posterior over its hypotheses, and what is learnt of the sensors from it.
+
+- *real*: an object. Each sensor either sees it, with a P_D of its own (Beta), or never does (share g).
+- *persistent false object of sensor s*: what s takes for one again and again, a window or a sign. s finds it
+as it
+  finds objects; every other sensor finds it by chance, or (share c) has it in common.
+- *noise*: boxes of the moment. Every later detection where a track predicts it speaks against it.
+- *second box* of another track: no hypothesis of its own but a term in the odds of "real".
+
+With h hits and m misses in correlation times, BB their Beta-binomial, ch = ε^h (1 − ε)^m and η_s the log odds
+by score:
+
+    ln w_real  = Σ_s ln[g_s ch + (1 − g_s) BB] + Σ_s η_s + k ln(1 − o) / (1 + e^(max η − η₀))
+    ln w_false = ln Σ_s exp(ln BB_s + Σ_{s' ≠ s} (ln[(1 − c) ch + c BB]_{s'} + π_{s'}))
+    ln w_noise = ln ν/(1 − ν) − gained + Σ_{s ≠ first} π_s
+
+Every sensor's testimony is bounded: scores count once a track, and ln BB ~ −½ ln h only. (Gelman et al.,
+*Bayesian Data Analysis*, ch. 5, for the Beta-binomial; Musicki and Evans, IPDA, 1994, for existence.) N
+tracks, S sensors.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import betaln, expit
+
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.filters.evidence import Evidence
+from jeat_graph.filters.model_constants import ModelConstants
+
+# A second box that covers all leaves this much of 1 − o; a mean of nothing is divided by the other.
+_LEAST_APART, _LEAST_WEIGHT = 1e-3, 1e-9
+# Odds of duplicates saturate beyond this.
+_MOST_LOG_ODDS = 30.0
+# Rounds of "posterior, then sensors" in learning: the second sees the first one's posterior.
+_ROUNDS = 2
+# A track with fewer misses than this, one hit and no gain is too young to say what it is (correlation times).
+_LEAST_MISSES = 0.2
+# Looks in correlation times from which on a track says whether a sensor sees it.
+_LEAST_LOOKS = 1.0
+
+
+class SensorBelief(NamedTuple):
+    """What is believed of the sensors.
+
+    Attributes:
+        p_detect: (S,) mean P_D of objects that it sees.
+        unseen: (S,) share g of real objects that it never sees.
+        indifference: (S,) a: logit + a is the log odds that a box is real.
+        prior_odds: (S,) π: log odds that what it finds is real; shares how often "false" explains a find.
+        noise_share: prior share ν of noise among what is not real.
+    """
+
+    p_detect: FloatArray
+    unseen: FloatArray
+    indifference: FloatArray
+    prior_odds: FloatArray
+    noise_share: float
+
+
+class Posterior(NamedTuple):
+    """What tracks are.
+
+    Attributes:
+        real: (N,) probability of a real object.
+        log_odds: (N,) its log odds.
+        noise: (N,) probability of noise, given that it is not real.
+        unseen: (N, S) probability that a real object is one that the sensor never sees.
+        scores: (N, S) log odds by score, 0 where the sensor has not found it.
+    """
+
+    real: FloatArray
+    log_odds: FloatArray
+    noise: FloatArray
+    unseen: FloatArray
+    scores: FloatArray
+
+
+def initial_sensor(c: ModelConstants) -> SensorBelief:
+    """Return the model of one sensor before anything is learnt."""
+    one = np.ones(1)
+    return SensorBelief(c.p_detect * one, c.unseen_share * one, 0.0 * one, 0.0 * one, c.noise_share)
+
+
+def beta_binomial(
+    hits: FloatArray, misses: FloatArray, p_detect: FloatArray, c: ModelConstants
+) -> FloatArray:
+    """Return ln ∫ p^h (1 − p)^m Beta(p; s P_D, s (1 − P_D)) dp (N, S); h, m (N, S), P_D (S,)."""
+    a, b = p_detect * c.p_detect_strength, (1.0 - p_detect) * c.p_detect_strength
+    return np.asarray(betaln(a + hits, b + misses) - betaln(a, b))
+
+
+def score_log_odds(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> FloatArray:
+    """Return η (N, S): a plus a mean of the peak and of the mean logit, once a track; 0 where never found."""
+    mean = evidence.total / np.maximum(evidence.total_weight, _LEAST_WEIGHT)
+    score = c.peak_share * evidence.peak + (1.0 - c.peak_share) * mean
+    return np.where(evidence.found, sensors.indifference + np.where(evidence.found, score, 0.0), 0.0)
+
+
+def duplicate_log_odds(overlap: FloatArray, scores: FloatArray, c: ModelConstants) -> FloatArray:
+    """Return the term (N,) of second boxes: the more it overlaps a better track, and the worse its scores."""
+    doubt = 1.0 / (
+        1.0 + np.exp(np.clip(scores.max(axis=1) - c.duplicate_log_odds, -_MOST_LOG_ODDS, _MOST_LOG_ODDS))
+    )
+    return np.asarray(c.duplicate_weight * doubt * np.log(np.maximum(1.0 - overlap, _LEAST_APART)))
+
+
+def posterior(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> Posterior:
+    """Weigh the hypotheses of each track by Bayes' rule, as the head of this module says."""
+    found, rows = evidence.found, np.arange(len(evidence))
+    seen = beta_binomial(evidence.hits, evidence.misses, sensors.p_detect, c)
+    chance = evidence.hits * math.log(c.chance_hit) + evidence.misses * math.log1p(-c.chance_hit)
+    never = np.log(sensors.unseen) + chance
+    object_seen = np.logaddexp(never, np.log1p(-sensors.unseen) + seen)
+    shared = np.logaddexp(math.log1p(-c.shared_false) + chance, math.log(c.shared_false) + seen)
+    scores = score_log_odds(evidence, sensors, c)
+    prior = np.where(found, sensors.prior_odds, 0.0)
+    real = object_seen.sum(axis=1) + scores.sum(axis=1) + duplicate_log_odds(evidence.overlap, scores, c)
+    others = (shared + prior).sum(axis=1)[:, None] - shared - prior
+    false = np.logaddexp.reduce(np.where(found, others + seen, -np.inf), axis=1)
+    odds = math.log(sensors.noise_share / (1.0 - sensors.noise_share))
+    noise = odds - evidence.gained + prior.sum(axis=1) - prior[rows, evidence.owner]
+    not_real = np.logaddexp(false, noise)
+    log_odds = real - not_real
+    return Posterior(expit(log_odds), log_odds, np.exp(noise - not_real), np.exp(never - object_seen), scores)
+
+
+def learn_sensors(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> SensorBelief:
+    """Estimate the sensors' parameters from tracks, weighted by their posteriors (two rounds of EM).
+
+    Args:
+        evidence: of living tracks and of the last that ended.
+        sensors: what was believed before; indifference points stay as they are.
+        c: constants.
+    """
+    if not len(evidence):
+        return sensors
+    looks = evidence.hits + evidence.misses
+    grown = (evidence.last_s > evidence.born_s) | (evidence.gained > 0.0)
+    told = grown | (evidence.misses.sum(axis=1) > _LEAST_MISSES)
+    trust = evidence.found * np.clip(evidence.detections / c.weight_hits, *c.weight_bounds)[:, None]
+    for _ in range(_ROUNDS):
+        belief = posterior(evidence, sensors, c)
+        real = belief.real[:, None]
+        weight = (
+            real * (1.0 - belief.unseen) * np.minimum(1.0, c.looks_count / np.maximum(looks, _LEAST_WEIGHT))
+        )
+        p_detect = _share(weight * evidence.hits, weight * looks, c.p_detect, c.p_detect_count)
+        weight = real * (looks > _LEAST_LOOKS)
+        unseen = _share(weight * belief.unseen, weight, c.unseen_share, c.sensor_count)
+        false = (1.0 - belief.real)[told]
+        noise = _share(false * belief.noise[told], false, c.noise_share, c.sensor_count)
+        odds = ((trust * real).sum(axis=0) + c.sensor_count) / (
+            (trust * (1.0 - real)).sum(axis=0) + c.sensor_count
+        )
+        sensors = SensorBelief(
+            p_detect=np.clip(p_detect, *c.p_detect_bounds),
+            unseen=np.clip(unseen, *c.unseen_bounds),
+            indifference=sensors.indifference,
+            prior_odds=np.log(odds),
+            noise_share=float(np.clip(noise, *c.noise_bounds)),
+        )
+    return sensors
+
+
+def _share(hits: FloatArray, of: FloatArray, prior: float, count: float) -> FloatArray:
+    """Return the mean of a Beta posterior: (Σ hits + count · prior) / (Σ of + count), summed over tracks."""
+    return np.asarray((hits.sum(axis=0) + count * prior) / (of.sum(axis=0) + count))

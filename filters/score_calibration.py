@@ -1,0 +1,118 @@
+"""At which score a sensor's box is as likely real as not: its indifference point.
+
+What is real is there again in the next scan, and was there in the one before. So for each score the share of
+boxes is counted that come again at their place (IoU) in both neighbouring scans, relative to that of the
+sensor's best boxes. z₀ is the logit below which that share is under one half, and the indifference point in
+logits is −a, a = −(b₀ + b₁ · clip(z₀)), with b₀ and b₁ measured on real detectors.
+False boxes that repeat make z₀ too low: it bounds, and hits, misses and other sensors tell the rest.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from jeat_graph.data.arrays import BoolArray, FloatArray
+from jeat_graph.filters.box_sides import intersection_over_union
+from jeat_graph.filters.model_constants import ModelConstants
+
+#: Logits at which the share is estimated, and the bandwidth of the kernel.
+SCORE_GRID = np.arange(-4.5, 7.01, 0.25)
+_BANDWIDTH = 0.35
+# The share of the best boxes that divides the others starts with the prior of so many boxes.
+_BEST_COUNT = 5.0
+# Scores are kept this far from 0 and 1, lest a logit be infinite.
+_LEAST_SCORE = 1e-3
+# z₀ before anything is counted.
+_FIRST_Z = 0.0
+
+
+class PreviousScan(NamedTuple):
+    """A sensor's last scan: boxes (M, 4), logits (M,), which had a box at their place in the one before."""
+
+    boxes: FloatArray
+    logits: FloatArray
+    had_before: BoolArray
+
+
+class Repetition(NamedTuple):
+    """What is counted of one sensor.
+
+    Attributes:
+        boxes: (G,) boxes by score, at the logits of `SCORE_GRID`.
+        repeated: (G,) those of them that came again in both neighbouring scans.
+        scans: number of scans.
+        last: the last one; None before the first.
+    """
+
+    boxes: FloatArray
+    repeated: FloatArray
+    scans: int
+    last: PreviousScan | None
+
+
+def no_repetition() -> Repetition:
+    """Return the counts of a sensor before its first scan."""
+    return Repetition(np.zeros(len(SCORE_GRID)), np.zeros(len(SCORE_GRID)), 0, None)
+
+
+def logit(score: FloatArray) -> FloatArray:
+    """Return ln(s / (1 − s)) of scores (M,), bounded."""
+    bounded = np.clip(score, _LEAST_SCORE, 1.0 - _LEAST_SCORE)
+    return np.asarray(np.log(bounded / (1.0 - bounded)))
+
+
+def count_repetition(
+    counts: Repetition, boxes: FloatArray, logits: FloatArray, c: ModelConstants
+) -> Repetition:
+    """Count which boxes of the scan before have one at their place on both sides.
+
+    Args:
+        counts: of the sensor so far.
+        boxes: (M, 4) left, top, right, bottom of the scan now (px).
+        logits: (M,) of their scores.
+        c: constants.
+    """
+    had_before = np.zeros(len(boxes), dtype=np.bool_)
+    total, repeated = counts.boxes, counts.repeated
+    if counts.last is not None:
+        last = counts.last
+        has_after = np.zeros(len(last.boxes), dtype=np.bool_)
+        if len(boxes) and len(last.boxes):
+            overlap = intersection_over_union(last.boxes, boxes)
+            i, j = linear_sum_assignment(-overlap)
+            same = overlap[i, j] >= c.repeat_overlap
+            has_after[i[same]], had_before[j[same]] = True, True
+        if len(last.boxes) and counts.scans > 1:
+            kernel = _kernel(last.logits)
+            total = total + kernel.sum(axis=1)
+            repeated = repeated + kernel @ (has_after & last.had_before)
+    return Repetition(total, repeated, counts.scans + 1, PreviousScan(boxes, logits, had_before))
+
+
+def half_as_many(counts: Repetition, c: ModelConstants) -> float:
+    """Return z₀: the logit below which fewer than half as many boxes come again as of the best ones."""
+    total, repeated = counts.boxes, counts.repeated
+    if total.sum() <= 0.0:
+        return _FIRST_Z
+    best = np.cumsum(total[::-1])[::-1] <= c.best_share * total.sum()
+    best[-1] = True
+    top = (repeated[best].sum() + _BEST_COUNT * c.repeat_share) / (total[best].sum() + _BEST_COUNT)
+    share = (repeated + c.repeat_count * c.repeat_share * top) / (total + c.repeat_count) / top
+    low = np.flatnonzero(share < 0.5)
+    return float(SCORE_GRID[low[-1] if len(low) else 0])
+
+
+def indifference(counts: Repetition, c: ModelConstants) -> float:
+    """Return a: logit + a is the log odds that a box is real, by its score alone."""
+    z = float(np.clip(half_as_many(counts, c), *c.indifference_bounds))
+    return -(c.indifference_offset + c.indifference_slope * z)
+
+
+def _kernel(logits: FloatArray) -> FloatArray:
+    """Return the share (G, M) of each box in each place of the grid: a Gaussian kernel of the grid's step."""
+    step = SCORE_GRID[1] - SCORE_GRID[0]
+    normal = np.exp(-0.5 * ((SCORE_GRID[:, None] - logits) / _BANDWIDTH) ** 2)
+    return np.asarray(normal * (step / _BANDWIDTH / np.sqrt(2.0 * np.pi)))

@@ -1,0 +1,157 @@
+"""Singer's motion model of the box centre, and of the logarithm of its size, one axis at a time.
+
+State of one axis: [p, v, a, l, r]: position (px), velocity (px/s), acceleration (px/s²), ln size, its rate
+(1/s).
+
+    dp = v dt + σ_p dβ₁,   dv = (a − v/τ_v) dt,   da = −a/τ_a dt + σ_j dβ₂,
+    dl = r dt + σ_l dβ₃,   dr = −r/τ_r dt + σ_r dβ₄
+
+(Singer, *Estimating optimal tracking filter performance for manned maneuvering targets*, 1970; Särkkä and
+Solin, *Applied Stochastic Differential Equations*, ch. 6). The random walks of position and size stand for
+what a detector's boxes do that lasts and is no motion. For τ → ∞ and σ_p = 0 the first three are the paper's
+constant acceleration driven by white jerk (eq. 2). Arrays hold all tracks: mean (N, 2, 5), covariance (N, 2,
+5, 5); the axes are independent.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import expm
+
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.filters.model_constants import ModelConstants
+
+#: Places in the state of one axis, and its length.
+POSITION, VELOCITY, ACCELERATION, LOG_SIZE, GROWTH, STATES = range(6)
+# Van Loan's exponential has terms e^(Δ/τ), which overflow for long steps: these are made by doubling.
+_LONGEST_STEP_S = 1.0
+# Steps are taken in whole microseconds: what follows depends on time differences, not on the clock's origin.
+_TICKS_PER_S = 1e6
+# Image coordinates go as 1/Z: p⃛ = 6 p (Ż/Z)³, and half of a power less is what a root spectral density has.
+_PERSPECTIVE_POWER = 2.5
+
+
+class ProcessNoise(NamedTuple):
+    """Natural logarithms of the spectral densities (squares of the root densities) of the four noises.
+
+    Attributes:
+        jerk: of the acceleration (sizes²/s⁵).
+        growth: of the rate of ln size (1/s³).
+        position: of the position's random walk (sizes²/s).
+        size: of the random walk of ln size (1/s).
+    """
+
+    jerk: float
+    growth: float
+    position: float
+    size: float
+
+
+class Discretised(NamedTuple):
+    """The model over one step: transition, and the covariance by each noise of unit density, (5, 5) each."""
+
+    F: FloatArray
+    jerk: FloatArray
+    growth: FloatArray
+    position: FloatArray
+    size: FloatArray
+
+
+def initial_process_noise(c: ModelConstants) -> ProcessNoise:
+    """Return the process noise before anything is learnt."""
+    return ProcessNoise(*(2.0 * math.log(s) for s in (c.jerk, c.growth_noise, c.position_walk, c.size_walk)))
+
+
+def discretise(dt: float, c: ModelConstants) -> Discretised:
+    """Return the model over `dt` seconds (>= 0), to the microsecond."""
+    return _discretised(round(dt * _TICKS_PER_S), c)
+
+
+@lru_cache(maxsize=2048)
+def _discretised(ticks: int, c: ModelConstants) -> Discretised:
+    """Matrix exponential and Van Loan's integrals (IEEE Trans. Automatic Control 23, 1978).
+
+    exp([[−A, L], [0, Aᵀ]] Δ) = [[·, F⁻¹ Q], [0, Fᵀ]]; a long step is made of equal halves: Q(2Δ) = Q + F Q
+    Fᵀ.
+    """
+    dt = ticks / _TICKS_PER_S
+    doublings = max(0, math.ceil(math.log2(dt / _LONGEST_STEP_S))) if dt > 0.0 else 0
+    short = dt / 2**doublings
+    A = drift(c)
+    F = np.asarray(expm(A * short))
+    noises = []
+    for driven in (ACCELERATION, GROWTH, POSITION, LOG_SIZE):
+        block = np.zeros((2 * STATES, 2 * STATES))
+        block[:STATES, :STATES], block[STATES:, STATES:] = -A, A.T
+        block[driven, STATES + driven] = 1.0
+        noises.append(F @ np.asarray(expm(block * short))[:STATES, STATES:])
+    for _ in range(doublings):
+        noises = [Q + F @ Q @ F.T for Q in noises]
+        F = F @ F
+    return Discretised(F, *noises)
+
+
+def drift(c: ModelConstants) -> FloatArray:
+    """Return the drift matrix A (5, 5) of dx = A x dt + noise."""
+    A = np.zeros((STATES, STATES))
+    A[POSITION, VELOCITY] = A[VELOCITY, ACCELERATION] = A[LOG_SIZE, GROWTH] = 1.0
+    A[VELOCITY, VELOCITY] = -1.0 / c.velocity_time_s
+    A[ACCELERATION, ACCELERATION] = -1.0 / c.acceleration_time_s
+    A[GROWTH, GROWTH] = -1.0 / c.growth_time_s
+    return A
+
+
+def process_covariance(
+    size: FloatArray, growth: FloatArray, step: Discretised, q: ProcessNoise, c: ModelConstants
+) -> FloatArray:
+    """Return the covariance Q (N, 1, 5, 5) that a step adds to tracks; both axes have the same.
+
+    Q = s² (σ_j + k g^2.5)² Q_j + σ_r² Q_r + s² σ_p² Q_p + σ_l² Q_l.
+
+    Args:
+        size: (N,) size s (px) before the step.
+        growth: (N,) growth rate g (1/s) after it, >= 0.
+        step: the model over that time.
+        q: densities of the process noise.
+        c: constants.
+    """
+    jerk = (
+        math.exp(q.jerk / 2.0)
+        + c.perspective_jerk * np.minimum(growth, c.fastest_growth) ** _PERSPECTIVE_POWER
+    )
+    s_jerk, s_walk = (jerk * size) ** 2, math.exp(q.position) * size**2
+    same = math.exp(q.growth) * step.growth + math.exp(q.size) * step.size
+    out = s_jerk[:, None, None] * step.jerk + same + s_walk[:, None, None] * step.position
+    return np.asarray(out[:, None])
+
+
+def predict(
+    mean: FloatArray, covariance: FloatArray, step: Discretised, q: ProcessNoise, c: ModelConstants
+) -> tuple[FloatArray, FloatArray]:
+    """Predict all tracks over a step: m⁻ = F m, P⁻ = F P Fᵀ + Q.
+
+    Args:
+        mean: (N, 2, 5).
+        covariance: (N, 2, 5, 5).
+        step: the model over that time.
+        q: densities of the process noise.
+        c: constants.
+    """
+    predicted = mean @ step.F.T
+    growth = np.abs(predicted[:, :, GROWTH]).mean(axis=1)
+    Q = process_covariance(object_size(mean), growth, step, q, c)
+    return predicted, step.F @ covariance @ step.F.T + Q
+
+
+def box_size(mean: FloatArray) -> FloatArray:
+    """Return width and height (N, 2) in px."""
+    return np.exp(mean[:, :, LOG_SIZE])
+
+
+def object_size(mean: FloatArray) -> FloatArray:
+    """Return the size √(width · height) (N,) in px."""
+    return np.exp(mean[:, :, LOG_SIZE].mean(axis=1))

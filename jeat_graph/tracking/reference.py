@@ -1,0 +1,294 @@
+"""The reference tracker's step in NumPy: the definition of the model, as the method's page has it.
+
+predict → correct boxes → follow the camera → associate → update → hits and misses → births → compare sensors
+→ posterior → learn → report → end.
+
+Every stage has what it reads and writes in its name and in `ReferenceState`; the formulas are in the modules
+of `filters` and `association` that it calls. Scans of one time are taken one after the other, the sensor with
+the most exact boxes first, as sequential updates are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from jeat_graph.association import likelihood_ratio
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.filters import (
+    box_sides,
+    camera_motion,
+    evidence,
+    gap_survival,
+    noise_learning,
+    score_calibration,
+    sensor_offsets,
+    singer,
+    visibility,
+)
+from jeat_graph.filters.evidence import ScanClock
+from jeat_graph.filters.model_constants import ModelConstants
+from jeat_graph.filters.visibility import VISIBLE
+from jeat_graph.smoothers.state_rts import FilterRecord
+from jeat_graph.tracking.reference_life import (
+    begin_tracks,
+    compare_overlaps,
+    compare_sensors,
+    end_tracks,
+    judge,
+    learn,
+    report,
+)
+from jeat_graph.tracking.reference_state import ReferenceState, ReferenceTracks, SensorScan
+
+# Share of the running mean of a sensor's period that a scan keeps.
+_PERIOD_MEMORY = 0.9
+# A gap is longer than so many of the shortest period, or of this one (s), however slow the sensors.
+_GAP_PERIODS, _LONGEST_PERIOD_S = 1.5, 0.1
+# Tracks that show the camera's motion: really there, with so many detections, the last so recent (s).
+_CAMERA_DETECTIONS, _CAMERA_AGE_S = 2, 0.5
+
+
+class AssociatedPairs(NamedTuple):
+    """What association found in one scan.
+
+    Attributes:
+        track, box: (K,) rows of tracks, and of boxes.
+        ratio: (K,) ln L of each.
+        p_detect: (N,) each track's own P_D.
+        innovation: of all boxes from all tracks.
+    """
+
+    track: IntArray
+    box: IntArray
+    ratio: FloatArray
+    p_detect: FloatArray
+    innovation: box_sides.SideInnovations
+
+
+class Reported(NamedTuple):
+    """What a step tells.
+
+    Attributes:
+        tracks: (N,) the tracks after it, before any ends.
+        reported: (N,) which are reported.
+        takers: per scan (M,) identity of the track that took each box; every box has one.
+        records: per scan, for the smoother.
+    """
+
+    tracks: ReferenceTracks
+    reported: BoolArray
+    takers: list[IntArray]
+    records: list[FilterRecord]
+
+
+def step(state: ReferenceState, t: float, scans: Sequence[SensorScan], c: ModelConstants) -> Reported:
+    """Take in all scans of one time (s), at most one of each sensor."""
+    state.tracks = replace(state.tracks, used=np.zeros_like(state.tracks.used))
+    takers, records = [np.zeros(0, dtype=np.int64) for _ in scans], []
+    for place in order_of_scans(state, scans):
+        given = scans[place]
+        clock = look(state, t, given, c)
+        transition = predict(state, t, c)
+        scan = correct_boxes(state, given, c)
+        follow_camera(state, scan, c)
+        before = state.tracks
+        pairs = associate(state, scan, c)
+        count_gaps(state, scan, pairs, c)
+        learn_noise(state, scan, pairs, clock, c)
+        update(state, pairs, c)
+        count_hits_and_misses(state, scan, pairs, clock, c)
+        free = count_clutter(state, scan, pairs, c)
+        begin_tracks(state, scan, free, clock, c)
+        takers[place] = taker_of(state, pairs, free)
+        compare_sensors(state, given, takers[place], c)
+        records.append(record(before, state.tracks, transition))
+    compare_overlaps(state)
+    judge(state, c)
+    learn(state, t, c)
+    out = Reported(state.tracks, report(state, t, c), takers, records)
+    end_tracks(state, t, c)
+    return out
+
+
+def order_of_scans(state: ReferenceState, scans: Sequence[SensorScan]) -> list[int]:
+    """Return the places of scans: the most exact sensor first, equals by what they see."""
+    content = [(state.log_side_variance[s.sensor], s.logits.tolist(), s.boxes.tolist()) for s in scans]
+    return sorted(range(len(scans)), key=content.__getitem__)
+
+
+def look(state: ReferenceState, t: float, scan: SensorScan, c: ModelConstants) -> ScanClock:
+    """Take notice of a scan: the sensor's period, its indifference point, the unknown picture."""
+    k = scan.sensor
+    if not state.picture_known and len(scan.boxes):
+        width, height = scan.boxes[:, 2:].max(axis=0)
+        state.picture = max(state.picture[0], float(width)), max(state.picture[1], float(height))
+    since = t - state.last_look_s[k]
+    if not math.isnan(since):
+        known = not math.isnan(state.period_s[k])
+        mean = _PERIOD_MEMORY * state.period_s[k] + (1.0 - _PERIOD_MEMORY) * since
+        state.period_s[k] = mean if known else since
+    state.last_look_s[k] = t
+    counts = score_calibration.count_repetition(state.repetition[k], scan.boxes, scan.logits, c)
+    state.repetition = (*state.repetition[:k], counts, *state.repetition[k + 1 :])
+    state.sensors.indifference[k] = score_calibration.indifference(counts, c)
+    period = c.first_period_s if math.isnan(state.period_s[k]) else float(state.period_s[k])
+    return ScanClock(t, period, min(1.0, period / c.correlation_time_s))
+
+
+def predict(state: ReferenceState, t: float, c: ModelConstants) -> FloatArray:
+    """Predict states and presence to a time; return the transition (5, 5)."""
+    dt = 0.0 if state.t is None else t - state.t
+    state.t = t
+    model = singer.discretise(dt, c)
+    tracks = state.tracks
+    if dt > 0.0 and len(tracks):
+        mean, covariance = singer.predict(tracks.mean, tracks.covariance, model, state.process_noise, c)
+        presence = visibility.predict(tracks.presence, dt, c)
+        state.tracks = replace(tracks, mean=mean, covariance=covariance, presence=presence)
+    return model.F
+
+
+def correct_boxes(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> SensorScan:
+    """Return the scan with boxes as the sensors have them on the average."""
+    offset = sensor_offsets.offsets(state.offsets, state.log_side_variance, c)[scan.sensor]
+    return scan._replace(boxes=sensor_offsets.corrected(scan.boxes, offset))
+
+
+def follow_camera(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> None:
+    """Estimate what shift and scale all tracks have in common, and take them along."""
+    tracks, noise = state.tracks, float(state.log_side_variance[scan.sensor])
+    recent = state.time - tracks.evidence.last_s < _CAMERA_AGE_S
+    sure = (tracks.real > c.report) & (tracks.evidence.detections > _CAMERA_DETECTIONS) & recent
+    seen = tracks.mean[sure], tracks.covariance[sure], scan.boxes
+    motion, state.camera = camera_motion.estimate(*seen, noise, state.picture, state.camera, c)
+    if motion is not None:
+        mean, covariance = camera_motion.compensate(tracks.mean, tracks.covariance, motion, state.picture)
+        state.tracks = replace(tracks, mean=mean, covariance=covariance)
+
+
+def associate(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> AssociatedPairs:
+    """Find the boxes of tracks: the assignment of greatest log likelihood ratio."""
+    tracks, k = state.tracks, scan.sensor
+    hits, misses = tracks.recent_hits[:, k], tracks.recent_misses[:, k]
+    p_detect = (state.sensors.p_detect[k] * c.p_detect_strength + hits) / (
+        c.p_detect_strength + hits + misses
+    )
+    p_detect = np.clip(p_detect, *c.track_p_detect_bounds)
+    noise = float(state.log_side_variance[k])
+    innovation = box_sides.innovations(tracks.mean, tracks.covariance, scan.boxes, noise, c)
+    size = singer.box_size(tracks.mean)
+    density, d2 = likelihood_ratio.sides_log_density(innovation, size, c)
+    score = likelihood_ratio.score_log_ratio(tracks.real, state.sensors.indifference[k] + scan.logits, c)
+    clutter = likelihood_ratio.clutter_log_density(size, float(state.leftovers[k]), state.picture, c)
+    present = tracks.presence[:, VISIBLE] * p_detect
+    ratio = likelihood_ratio.pair_log_ratio(density, d2, present, score, clutter, c)
+    track, box = likelihood_ratio.assign(ratio)
+    return AssociatedPairs(track, box, ratio[track, box], p_detect, innovation)
+
+
+def count_gaps(state: ReferenceState, scan: SensorScan, pairs: AssociatedPairs, c: ModelConstants) -> None:
+    """Count the gaps that end now, and whether the object was where it had been predicted."""
+    tracks = state.tracks
+    gap = state.time - tracks.evidence.last_s[pairs.track]
+    period = np.nanmin(np.append(state.period_s, _LONGEST_PERIOD_S))
+    ends = (tracks.real[pairs.track] > c.report) & (gap > _GAP_PERIODS * period)
+    predicted, found = box_sides.corners(tracks.mean[pairs.track[ends]]), scan.boxes[pairs.box[ends]]
+    overlap = np.diagonal(box_sides.intersection_over_union(predicted, found))
+    state.gaps = gap_survival.count_ends(state.gaps, gap[ends], overlap >= c.gap_overlap)
+
+
+def learn_noise(
+    state: ReferenceState, scan: SensorScan, pairs: AssociatedPairs, clock: ScanClock, c: ModelConstants
+) -> None:
+    """Learn measurement noise of the sensor and process noise of the scene from innovations."""
+    tracks, i, seen = state.tracks, pairs.track, pairs.innovation
+    size = singer.box_size(tracks.mean[i])
+    e = noise_learning.normalised_innovations(seen.y[i, pairs.box], seen.S[i], size, c)
+    sure = (tracks.evidence.detections[i] > c.noise_hits) & (tracks.real[i] > c.report)
+    if sure.any():
+        share = noise_learning.share_of_scan(int(sure.sum()), clock.period_s, c)
+        k, known = scan.sensor, i[sure]
+        log_variance = float(state.log_side_variance[k])
+        state.log_side_variance[k] = noise_learning.learn_measurement_noise(log_variance, e[sure], share, c)
+        before = tracks.innovation[known], tracks.has_innovation[known]
+        state.process_noise = noise_learning.learn_process_noise(
+            state.process_noise, e[sure], *before, share, c
+        )
+    innovation, has_innovation = tracks.innovation.copy(), tracks.has_innovation.copy()
+    innovation[i], has_innovation[i] = e, True
+    state.tracks = replace(tracks, innovation=innovation, has_innovation=has_innovation)
+
+
+def update(state: ReferenceState, pairs: AssociatedPairs, c: ModelConstants) -> None:
+    """Update the states of tracks by their boxes: heavy tails, and sides that are cut, have less weight."""
+    tracks, i, seen = state.tracks, pairs.track, pairs.innovation
+    y, size = seen.y[i, pairs.box], singer.box_size(tracks.mean[i])
+    R = box_sides.measured_variance(y, seen.S[i], seen.side_variance[i], size, c)
+    mean, covariance = tracks.mean.copy(), tracks.covariance.copy()
+    mean[i], covariance[i] = box_sides.update(mean[i], covariance[i], y, seen.H[i], R)
+    state.tracks = replace(tracks, mean=mean, covariance=covariance)
+
+
+def count_hits_and_misses(
+    state: ReferenceState, scan: SensorScan, pairs: AssociatedPairs, clock: ScanClock, c: ModelConstants
+) -> None:
+    """Write down what the sensor found and what it did not: evidence, the track's own P_D, presence."""
+    tracks, k, hit = state.tracks, scan.sensor, pairs.track
+    missed = np.setdiff1d(np.arange(len(tracks)), hit)
+    presence = tracks.presence.copy()
+    visible = presence[missed, VISIBLE]
+    presence[hit] = visibility.seen(len(hit))
+    presence[missed] = visibility.miss(presence[missed], pairs.p_detect[missed])
+    logits = scan.logits[pairs.box]
+    counted = evidence.count_hits(tracks.evidence, hit, k, logits, pairs.ratio, clock, c)
+    counted = evidence.count_misses(counted, missed, k, visible, clock.weight)
+    keep = math.exp(-clock.weight * c.correlation_time_s / c.track_p_detect_memory_s)
+    recent_hits, recent_misses, used = (
+        tracks.recent_hits.copy(),
+        tracks.recent_misses.copy(),
+        tracks.used.copy(),
+    )
+    recent_hits[:, k] *= keep
+    recent_misses[:, k] *= keep
+    recent_hits[hit, k] += clock.weight
+    recent_misses[missed, k] += clock.weight * visible
+    used[hit] |= np.int64(1) << k
+    state.tracks = replace(
+        tracks,
+        presence=presence,
+        evidence=counted,
+        recent_hits=recent_hits,
+        recent_misses=recent_misses,
+        used=used,
+    )
+
+
+def count_clutter(
+    state: ReferenceState, scan: SensorScan, pairs: AssociatedPairs, c: ModelConstants
+) -> IntArray:
+    """Return the boxes (F,) that no track took, and keep their mean number."""
+    free = np.setdiff1d(np.arange(len(scan.boxes)), pairs.box)
+    mean = c.clutter_memory * state.leftovers[scan.sensor] + (1.0 - c.clutter_memory) * len(free)
+    state.leftovers[scan.sensor] = mean
+    return free
+
+
+def taker_of(state: ReferenceState, pairs: AssociatedPairs, free: IntArray) -> IntArray:
+    """Return the identity of the track (M,) that each box of a scan went to; births are the last tracks."""
+    ids = state.tracks.track_id
+    out = np.zeros(len(pairs.box) + len(free), dtype=np.int64)
+    out[pairs.box], out[free] = ids[pairs.track], ids[len(ids) - len(free) :]
+    return out
+
+
+def record(before: ReferenceTracks, after: ReferenceTracks, F: FloatArray) -> FilterRecord:
+    """Return what the smoother needs of an update; of a track that begins, no prediction is ever asked."""
+    n = len(before)
+    mean = np.concatenate([before.mean, after.mean[n:]])
+    covariance = np.concatenate([before.covariance, after.covariance[n:]])
+    return FilterRecord(after.track_id, F, mean, covariance, after.mean, after.covariance)

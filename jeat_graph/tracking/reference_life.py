@@ -1,0 +1,123 @@
+"""The reference tracker's life of tracks: births, sensors compared, what each is, what it teaches, ends."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.filters import box_sides, gap_survival, object_probability, sensor_offsets
+from jeat_graph.filters.evidence import Evidence, ScanClock
+from jeat_graph.filters.model_constants import ModelConstants
+from jeat_graph.filters.singer import VELOCITY
+from jeat_graph.filters.visibility import GONE
+from jeat_graph.tracking.reference_state import ReferenceState, ReferenceTracks, SensorScan
+
+# Two times that differ by less are one (s).
+_SAME_TIME_S = 1e-6
+# Before this share of the shortest period is over no sensor has had the time to miss a track.
+_DUE = 0.9
+_LEAST_AREA = 1e-9
+
+
+def begin_tracks(
+    state: ReferenceState, scan: SensorScan, free: IntArray, clock: ScanClock, c: ModelConstants
+) -> None:
+    """Begin a track at every box that is left: what it is, the posterior tells."""
+    boxes, logits, tracks = scan.boxes[free], scan.logits[free], state.tracks
+    overlap = np.zeros(len(free))
+    rivals = (tracks.real > c.rival) & (clock.t - tracks.evidence.last_s < c.rival_age_s)
+    if rivals.any():
+        overlap = box_sides.intersection_over_union(boxes, box_sides.corners(tracks.mean[rivals])).max(axis=1)
+    if len(free) > 1:
+        among = box_sides.intersection_over_union(boxes, boxes)
+        among[logits[None] <= logits[:, None]] = 0.0
+        overlap = np.maximum(overlap, among.max(axis=1))
+    evidence = Evidence.of_births(clock.t, scan.sensor, state.num_sensors, logits, overlap, clock.weight)
+    noise = float(state.log_side_variance[scan.sensor])
+    ids = np.arange(state.next_id, state.next_id + len(free), dtype=np.int64)
+    new = ReferenceTracks.begun(ids, *box_sides.initial_state(boxes, noise, c), evidence)
+    state.tracks, state.next_id = tracks.append(new), state.next_id + len(free)
+
+
+def compare_sensors(state: ReferenceState, given: SensorScan, taker: IntArray, c: ModelConstants) -> None:
+    """Count what a sensor's boxes differ by from the others' last ones on the same real tracks; keep them."""
+    tracks, k = state.tracks, given.sensor
+    row = np.searchsorted(tracks.track_id, taker)
+    for other in range(state.num_sensors):
+        age = state.time - tracks.last_box_s[row, other]
+        before = tracks.last_box[row, other]
+        told = (before[:, 2] > before[:, 0]) & (age <= c.offset_age_s) & (tracks.real[row] > c.report)
+        if other != k and told.any():
+            moved = tracks.mean[row[told], :, VELOCITY] * age[told, None]
+            d = sensor_offsets.differences(given.boxes[told], before[told], moved)
+            state.offsets = sensor_offsets.count(state.offsets, k, other, d, c)
+    last_box, last_box_s = tracks.last_box.copy(), tracks.last_box_s.copy()
+    last_box[row, k], last_box_s[row, k] = given.boxes, state.time
+    state.tracks = replace(tracks, last_box=last_box, last_box_s=last_box_s)
+
+
+def compare_overlaps(state: ReferenceState) -> None:
+    """Keep of each track that was found now the least overlap ever with a better one."""
+    tracks, evidence = state.tracks, state.tracks.evidence
+    boxes = box_sides.corners(tracks.mean)
+    better = tracks.log_odds[None] > tracks.log_odds[:, None]
+    better &= evidence.detections[None] >= evidence.detections[:, None]
+    overlap = np.where(better, box_sides.intersection_over_union(boxes, boxes), 0.0).max(axis=1, initial=0.0)
+    least = np.where(
+        unseen_for(state) < _SAME_TIME_S, np.minimum(evidence.overlap, overlap), evidence.overlap
+    )
+    state.tracks = replace(tracks, evidence=replace(evidence, overlap=least))
+
+
+def judge(state: ReferenceState, c: ModelConstants) -> None:
+    """Compute the posterior of every track."""
+    belief = object_probability.posterior(state.tracks.evidence, state.sensors, c)
+    state.tracks = replace(state.tracks, real=belief.real, log_odds=belief.log_odds)
+
+
+def learn(state: ReferenceState, t: float, c: ModelConstants) -> None:
+    """Learn what the sensors are worth from tracks that live and from those that ended."""
+    if t - state.learnt_s >= c.learn_period_s:
+        state.learnt_s = t
+        told = state.ended.append(state.tracks.evidence)
+        state.sensors = object_probability.learn_sensors(told, state.sensors, c)
+
+
+def report(state: ReferenceState, t: float, c: ModelConstants) -> BoolArray:
+    """Return which tracks (N,) are reported: real, and their gap, if any, likely to end well."""
+    gap = unseen_for(state)
+    survival = gap_survival.survival(state.gaps, gap, c)
+    period = np.where(state.period_s > 0.0, state.period_s, np.nan)
+    due = _DUE * np.nanmin(np.append(period, np.inf))
+    survival = np.where((gap <= _SAME_TIME_S) | (gap < due), 1.0, survival)
+    inside = (share_inside(state) > c.inside_share) | (gap < _SAME_TIME_S)
+    return np.asarray((state.tracks.real * survival > c.report) & inside)
+
+
+def end_tracks(state: ReferenceState, t: float, c: ModelConstants) -> None:
+    """End the tracks that are false, gone, outside, or unseen for too long; their evidence stays."""
+    gap, real = unseen_for(state), state.tracks.real
+    ends = (gap > c.longest_gap_s) | ((real < c.report) & (gap > c.doubtful_gap_s))
+    ends |= (real < c.false_posterior) & (gap > c.false_gap_s)
+    ends |= 1.0 - state.tracks.presence[:, GONE] < c.least_presence
+    ends |= (share_inside(state) < c.outside_share) & (gap > c.outside_gap_s)
+    if ends.any():
+        state.gaps = gap_survival.count_losses(state.gaps, int((real[ends] > c.report).sum()))
+        ended = state.ended.append(state.tracks.evidence.take(ends))
+        state.ended = ended.take(slice(-c.remembered_tracks, None))
+        state.tracks = state.tracks.take(~ends)
+
+
+def unseen_for(state: ReferenceState) -> FloatArray:
+    """Return for how long (N,) no sensor has found each track (s)."""
+    return np.asarray(state.time - state.tracks.evidence.last_s)
+
+
+def share_inside(state: ReferenceState) -> FloatArray:
+    """Return the share (N,) of each predicted box that lies within the picture."""
+    boxes = box_sides.corners(state.tracks.mean)
+    common = np.minimum(boxes[:, 2:], state.picture) - np.maximum(boxes[:, :2], 0.0)
+    area = (boxes[:, 2:] - boxes[:, :2]).prod(axis=1)
+    return np.asarray(np.clip(common, 0.0, None).prod(axis=1) / np.maximum(area, _LEAST_AREA))

@@ -1,0 +1,203 @@
+"""State of the reference tracker: the tracks in arrays, and what is learnt of sensors and scene."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple, Self
+
+import numpy as np
+
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.filters import (
+    camera_motion,
+    gap_survival,
+    object_probability,
+    score_calibration,
+    sensor_offsets,
+    singer,
+)
+from jeat_graph.filters.array_table import ArrayTable
+from jeat_graph.filters.box_sides import SIDES
+from jeat_graph.filters.camera_motion import CameraVariance
+from jeat_graph.filters.evidence import Evidence
+from jeat_graph.filters.gap_survival import GapCounts
+from jeat_graph.filters.model_constants import ModelConstants
+from jeat_graph.filters.object_probability import SensorBelief
+from jeat_graph.filters.score_calibration import Repetition
+from jeat_graph.filters.sensor_offsets import OffsetSums
+from jeat_graph.filters.singer import STATES, ProcessNoise
+from jeat_graph.filters.visibility import seen
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceTracks(ArrayTable):
+    """All living tracks, in ascending order of identity.
+
+    Attributes:
+        track_id: (N,) identities, from 1 on.
+        mean: (N, 2, 5) per axis position (px), velocity (px/s), acceleration (px/s²), ln size, its rate
+            (1/s).
+        covariance: (N, 2, 5, 5).
+        presence: (N, 3) probabilities of visible, hidden, gone.
+        recent_hits, recent_misses: (N, S) with a memory, for the track's own P_D, in correlation times.
+        last_box: (N, S, 4) the last box of each sensor (left, top, right, bottom in px), as it was given; 0
+            before the first.
+        last_box_s: (N, S) its time (s).
+        innovation: (N, 4) the last normalised innovation of centre and ln size.
+        has_innovation: (N,) whether there was one.
+        evidence: what the posterior rests on.
+        real: (N,) posterior of a real object, as of the last step.
+        log_odds: (N,) its log odds.
+        used: (N,) bit k is set where sensor k has found it at the time of this step.
+    """
+
+    PER_SENSOR: ClassVar[frozenset[str]] = frozenset(
+        ("recent_hits", "recent_misses", "last_box", "last_box_s")
+    )
+
+    track_id: IntArray
+    mean: FloatArray
+    covariance: FloatArray
+    presence: FloatArray
+    recent_hits: FloatArray
+    recent_misses: FloatArray
+    last_box: FloatArray
+    last_box_s: FloatArray
+    innovation: FloatArray
+    has_innovation: BoolArray
+    evidence: Evidence
+    real: FloatArray
+    log_odds: FloatArray
+    used: IntArray
+
+    def __len__(self) -> int:
+        return len(self.track_id)
+
+    @classmethod
+    def begun(cls, track_id: IntArray, mean: FloatArray, covariance: FloatArray, evidence: Evidence) -> Self:
+        """Return tracks (M,) that have just begun with these states and this evidence."""
+        number, sensors = evidence.hits.shape
+        return cls(
+            track_id=track_id,
+            mean=mean,
+            covariance=covariance,
+            presence=seen(number),
+            recent_hits=np.zeros((number, sensors)),
+            recent_misses=np.zeros((number, sensors)),
+            last_box=np.zeros((number, sensors, SIDES)),
+            last_box_s=np.zeros((number, sensors)),
+            innovation=np.zeros((number, SIDES)),
+            has_innovation=np.zeros(number, dtype=np.bool_),
+            evidence=evidence,
+            real=np.zeros(number),
+            log_odds=np.zeros(number),
+            used=np.int64(1) << evidence.owner,
+        )
+
+    @classmethod
+    def none(cls) -> Self:
+        """Return no tracks of no sensors."""
+        state = np.zeros((0, 2, STATES)), np.zeros((0, 2, STATES, STATES))
+
+        return cls.begun(np.zeros(0, dtype=np.int64), *state, Evidence.none(0))
+
+
+class SensorScan(NamedTuple):
+    """One look of a sensor: its index, boxes (M, 4) left, top, right, bottom (px), logits (M,)."""
+
+    sensor: int
+    boxes: FloatArray
+    logits: FloatArray
+
+
+@dataclass
+class ReferenceState:
+    """Everything that the next step depends on; behind each field stands the stage that writes it.
+
+    Attributes:
+        tracks: the living tracks.
+        t: time of the last step (s); None before the first. `predict`
+        next_id: identity of the next track. `begin_tracks`
+        picture: width and height (px); 1 x 1 and growing with the boxes where it is not known. `look`
+        picture_known: whether it is.
+        process_noise: of the scene. `learn_noise`
+        camera: variances of the camera's motion. `follow_camera`
+        gaps: how gaps ended. `count_gaps`, and `end_tracks` for those that never end
+        sensors: what is believed of each. `learn`; indifference points: `look`
+        ended: evidence of the last tracks that ended. `end_tracks`
+        learnt_s: when sensors were learnt last (s). `learn`
+        offsets: what two sensors' boxes differ by. `compare_sensors`
+        log_side_variance: (S,) ln ρ² of the sensors' sides. `learn_noise`
+        leftovers: (S,) running mean of boxes a scan that no track takes. `count_clutter`
+        period_s: (S,) running mean of the time between two scans (s); NaN before the second. `look`
+        last_look_s: (S,) time of the last scan (s); NaN before it. `look`
+        repetition: of S sensors, which boxes come again. `look`
+    """
+
+    tracks: ReferenceTracks
+    t: float | None
+    next_id: int
+    picture: tuple[float, float]
+    picture_known: bool
+    process_noise: ProcessNoise
+    camera: CameraVariance
+    gaps: GapCounts
+    sensors: SensorBelief
+    ended: Evidence
+    learnt_s: float
+    offsets: OffsetSums
+    log_side_variance: FloatArray
+    leftovers: FloatArray
+    period_s: FloatArray
+    last_look_s: FloatArray
+    repetition: tuple[Repetition, ...]
+
+    @property
+    def time(self) -> float:
+        """Time that the tracks are predicted to (s)."""
+        assert self.t is not None, "tracks are predicted before anything else"
+        return self.t
+
+    @property
+    def num_sensors(self) -> int:
+        """Number of sensors that have been declared."""
+        return len(self.repetition)
+
+
+def initial_state(picture: tuple[float, float] | None, c: ModelConstants) -> ReferenceState:
+    """Return the state before the first scan, of no sensor; `picture` is width and height (px) if known."""
+    none = np.zeros(0)
+    return ReferenceState(
+        tracks=ReferenceTracks.none(),
+        t=None,
+        next_id=1,
+        picture=(1.0, 1.0) if picture is None else picture,
+        picture_known=picture is not None,
+        process_noise=singer.initial_process_noise(c),
+        camera=camera_motion.initial_variance(c),
+        gaps=gap_survival.no_gaps(),
+        sensors=SensorBelief(none, none, none, none, c.noise_share),
+        ended=Evidence.none(0),
+        learnt_s=-math.inf,
+        offsets=sensor_offsets.no_offsets(),
+        log_side_variance=none,
+        leftovers=none,
+        period_s=none,
+        last_look_s=none,
+        repetition=(),
+    )
+
+
+def declare_sensor(state: ReferenceState, c: ModelConstants) -> None:
+    """Add a sensor that has not looked yet, of which what is usual is believed."""
+    new, old = object_probability.initial_sensor(c), state.sensors
+    columns = [np.append(a, b) for a, b in zip(old[:-1], new[:-1], strict=True)]
+    state.sensors = SensorBelief(columns[0], columns[1], columns[2], columns[3], old.noise_share)
+    state.tracks, state.ended = state.tracks.widened(), state.ended.widened()
+    state.offsets = sensor_offsets.widened(state.offsets)
+    state.log_side_variance = np.append(state.log_side_variance, 2.0 * math.log(c.side_std))
+    state.leftovers = np.append(state.leftovers, c.first_leftovers)
+    state.period_s = np.append(state.period_s, np.nan)
+    state.last_look_s = np.append(state.last_look_s, np.nan)
+    state.repetition = (*state.repetition, score_calibration.no_repetition())

@@ -1,0 +1,84 @@
+"""Association against an enumeration of all assignments, and its densities against integrals."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import multivariate_normal, multivariate_t
+
+from jeat_graph.association import likelihood_ratio
+from jeat_graph.filters import box_sides
+from jeat_graph.filters.model_constants import ModelConstants
+
+C = ModelConstants()
+
+
+def best_sum(ratio):
+    """Greatest sum over every way to give tracks at most one box each."""
+    rows, columns = ratio.shape
+    padded = np.zeros((rows, columns + rows))
+    padded[:, :columns] = ratio
+    return max(
+        sum(padded[i, j] for i, j in enumerate(choice))
+        for choice in permutations(range(columns + rows), rows)
+    )
+
+
+@given(
+    seed=st.integers(0, 10_000),
+    shape=st.tuples(st.integers(0, 4), st.integers(0, 4)),
+    share=st.floats(0, 1),
+)
+def test_assignment_is_the_best_of_all(seed, shape, share):
+    rng = np.random.default_rng(seed)
+    ratio = np.maximum(rng.normal(2.0, 4.0, shape), 0.0) * (rng.random(shape) < share)
+    track, box = likelihood_ratio.assign(ratio)
+    assert len(set(track)) == len(track)
+    assert len(set(box)) == len(box)
+    assert (ratio[track, box] > 0.0).all()
+    assert ratio[track, box].sum() == pytest.approx(best_sum(ratio))
+
+
+def test_the_density_is_a_mixture_of_t_and_normal():
+    boxes = np.array(
+        [[200.0, 300.0, 300.0, 360.0], [203.0, 297.0, 306.0, 365.0], [230.0, 300.0, 300.0, 360.0]]
+    )
+    mean, P = box_sides.initial_state(boxes[:1], 2.0 * np.log(0.06), C)
+    seen = box_sides.innovations(mean, P, boxes, 2.0 * np.log(0.06), C)
+    size = np.array([[100.0, 60.0]])
+    got, _ = likelihood_ratio.sides_log_density(seen, size, C)
+    S = np.zeros((4, 4))
+    S[:2, :2], S[2:, 2:] = seen.S[0]
+    wide = S + C.outlier_std**2 * 6000.0 * np.eye(4)
+    y = seen.y[0].reshape(3, 4)
+    t, normal = (
+        multivariate_t(np.zeros(4), S, df=C.degrees_of_freedom),
+        multivariate_normal(np.zeros(4), wide),
+    )
+    want = (1 - C.outlier_share) * t.pdf(y) + C.outlier_share * normal.pdf(y)
+    np.testing.assert_allclose(got[0], np.log(want), rtol=1e-9)
+
+
+def test_clutter_is_spread_over_picture_and_sizes():
+    got = likelihood_ratio.clutter_log_density(np.array([[50.0, 20.0]]), 3.0, (640.0, 480.0), C)
+    # d(left, top, right, bottom) = w h d(x, y, ln w, ln h)
+    want = (3.0 + C.clutter_prior) / (640 * 480 * C.clutter_size_area) / (50 * 20)
+    assert np.exp(got[0]) == pytest.approx(want)
+
+
+def test_a_box_in_doubt_fits_a_track_in_doubt():
+    ratio = likelihood_ratio.score_log_ratio(np.array([0.95, 0.1]), np.array([4.0, -4.0]), C)
+    assert ratio[0, 0] > 0.0 > ratio[0, 1]
+    assert ratio[1, 1] > ratio[1, 0]
+
+
+def test_outside_the_gate_no_pair_is_made():
+    density, d2 = np.zeros((1, 2)), np.array([[C.gate - 1.0, C.gate + 1.0]])
+    ratio = likelihood_ratio.pair_log_ratio(density, d2, np.array([0.5]), density, np.array([-8.0]), C)
+    np.testing.assert_allclose(ratio, [[8.0, 0.0]])
+    track, box = likelihood_ratio.assign(ratio)
+    assert (track.tolist(), box.tolist()) == ([0], [0])

@@ -1,0 +1,209 @@
+"""The posterior of a track against an enumeration of hypotheses, and the bounds of what a sensor can say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import quad
+from scipy.stats import beta
+
+from jeat_graph.filters import object_probability as op
+from jeat_graph.filters.evidence import Evidence, ScanClock, count_hits
+from jeat_graph.filters.model_constants import ModelConstants
+
+C = ModelConstants()
+
+
+def evidence_of(hits, misses, scores, owner=0, gained=0.0, overlap=0.0, detections=5):
+    """Evidence of one track: hits, misses (S,) in correlation times; logits (S,), NaN where never found."""
+    scores = np.asarray(scores, dtype=float)
+    found = ~np.isnan(scores)
+    logits = np.where(found, scores, 0.0)[None]
+    weight = found.astype(float)[None]
+    return Evidence(
+        hits=np.array([hits], dtype=float),
+        misses=np.array([misses], dtype=float),
+        found=found[None],
+        recent=logits,
+        recent_weight=weight,
+        peak=logits,
+        total=logits,
+        total_weight=weight,
+        overlap=np.array([overlap]),
+        gained=np.array([gained]),
+        detections=np.array([float(detections)]),
+        owner=np.array([owner]),
+        born_s=np.zeros(1),
+        last_s=np.ones(1),
+    )
+
+
+def sensors_of(number, p_detect=0.7, unseen=0.1, indifference=-1.0, prior_odds=0.3, noise=0.5):
+    rows = [np.full(number, value) for value in (p_detect, unseen, indifference, prior_odds)]
+    return op.SensorBelief(*rows, noise_share=noise)
+
+
+def marginal(hits, misses, p_detect):
+    """Probability of hits and misses with a P_D drawn from its prior, by numeric integration."""
+    law = beta(C.p_detect_strength * p_detect, C.p_detect_strength * (1 - p_detect))
+    return quad(lambda p: p**hits * (1 - p) ** misses * law.pdf(p), 0.0, 1.0)[0]
+
+
+def enumerated(evidence, sensors):
+    """Probability of a real object, by the sum over every hypothesis and what each sensor is in it."""
+    S = evidence.hits.shape[1]
+    hits, misses, found = evidence.hits[0], evidence.misses[0], evidence.found[0]
+    seen = [marginal(hits[s], misses[s], sensors.p_detect[s]) for s in range(S)]
+    chance = [C.chance_hit ** hits[s] * (1 - C.chance_hit) ** misses[s] for s in range(S)]
+    odds = [np.exp(sensors.indifference[s] + evidence.peak[0, s]) if found[s] else 1.0 for s in range(S)]
+    prior = [np.exp(sensors.prior_odds[s]) if found[s] else 1.0 for s in range(S)]
+    real = 0.0
+    for sees in product([True, False], repeat=S):
+        weight = 1.0
+        for s in range(S):
+            g = sensors.unseen[s]
+            weight *= ((1 - g) * seen[s] if sees[s] else g * chance[s]) * odds[s]
+        real += weight
+    false = 0.0
+    for owner in np.flatnonzero(found):
+        for common in product([True, False], repeat=S):
+            if not common[owner]:
+                continue
+            weight = 1.0
+            for s in range(S):
+                if s == owner:
+                    weight *= seen[s]
+                else:
+                    c = C.shared_false
+                    weight *= (c * seen[s] if common[s] else (1 - c) * chance[s]) * prior[s]
+            false += weight
+    noise = sensors.noise_share / (1 - sensors.noise_share) * np.exp(-evidence.gained[0])
+    noise *= np.prod([prior[s] for s in range(S) if s != evidence.owner[0]])
+    return real / (real + false + noise)
+
+
+@pytest.mark.parametrize(
+    ("hits", "misses", "scores"),
+    [
+        ([0.5], [0.0], [1.0]),
+        ([3.0], [2.0], [-1.0]),
+        ([1.0, 0.0], [0.0, 2.0], [2.0, np.nan]),
+        ([1.0, 2.0], [0.5, 0.5], [0.5, -0.5]),
+        ([4.0, 0.3, 0.0], [1.0, 2.0, 3.0], [1.5, 0.2, np.nan]),
+    ],
+)
+@pytest.mark.parametrize("gained", [0.0, 3.0])
+def test_posterior_is_the_enumeration_of_hypotheses(hits, misses, scores, gained):
+    evidence, sensors = evidence_of(hits, misses, scores, gained=gained), sensors_of(len(hits))
+    assert op.posterior(evidence, sensors, C).real[0] == pytest.approx(
+        enumerated(evidence, sensors), rel=1e-6
+    )
+
+
+@given(
+    hits=st.lists(st.floats(0, 50), min_size=1, max_size=4),
+    miss=st.floats(0, 50),
+    score=st.floats(-6, 6),
+    gained=st.floats(0, 50),
+    overlap=st.floats(0, 1),
+)
+def test_a_posterior_is_a_probability(hits, miss, score, gained, overlap):
+    number = len(hits)
+    evidence = evidence_of(hits, [miss] * number, [score] * number, gained=gained, overlap=overlap)
+    belief = op.posterior(evidence, sensors_of(number), C)
+    for value in (belief.real, belief.noise, belief.unseen):
+        assert ((value >= 0.0) & (value <= 1.0)).all()
+    assert np.isfinite(belief.log_odds).all()
+
+
+@given(first=st.floats(1, 1e4), more=st.floats(1, 1e4), score=st.floats(-6, 6))
+def test_hits_of_one_sensor_alone_say_nothing_of_what_repeats(first, more, score):
+    """A window that a network takes for a car in every picture: its hits fit "false" as they fit "real"."""
+    sensors = sensors_of(1)
+    few = op.posterior(evidence_of([first], [0.0], [score], gained=1e3), sensors, C).log_odds[0]
+    many = op.posterior(evidence_of([first + more], [0.0], [score], gained=1e3), sensors, C).log_odds[0]
+    assert abs(many - few) < 0.12  # no more than −ln(1 − g)
+    assert many == pytest.approx(score + sensors.indifference[0], abs=0.12)
+
+
+@given(hits=st.floats(0, 1e3), misses=st.floats(0, 1e3), silent=st.floats(0, 1e4))
+def test_silence_of_one_sensor_is_bounded(hits, misses, silent):
+    """However often it looks in vain: it may be blind to the object (g), or to the false one (1 − c)."""
+    sensors, bound = sensors_of(2), np.log((1.0 - C.shared_false) / C.unseen_share)
+    scores = [1.0, np.nan]
+    before = op.posterior(evidence_of([hits, 0.0], [misses, 0.0], scores, gained=1e4), sensors, C)
+    told = op.posterior(evidence_of([hits, 0.0], [misses, silent], scores, gained=1e4), sensors, C)
+    assert before.log_odds[0] - told.log_odds[0] <= bound + 1e-9
+
+
+def test_permuted_sensors_give_the_same_posterior():
+    order = [2, 0, 1]
+    rng = np.random.default_rng(0)
+    hits, misses, scores = rng.uniform(0, 4, 3), rng.uniform(0, 4, 3), rng.normal(size=3)
+    base = sensors_of(3)._replace(p_detect=np.array([0.5, 0.7, 0.9]), prior_odds=np.array([0.1, -0.4, 0.6]))
+    there = op.SensorBelief(*(column[order] for column in base[:-1]), noise_share=base.noise_share)
+    one = op.posterior(evidence_of(hits, misses, scores, owner=1), base, C)
+    other = op.posterior(evidence_of(hits[order], misses[order], scores[order], owner=2), there, C)
+    assert other.log_odds[0] == pytest.approx(one.log_odds[0], rel=1e-12)
+
+
+def test_the_better_a_second_box_scores_the_less_it_is_doubted():
+    apart = [op.duplicate_log_odds(np.array([0.6]), np.array([[z]]), C)[0] for z in (-3.0, 0.5, 4.0)]
+    assert apart[0] < apart[1] < apart[2] < 0.0
+    assert apart[1] == pytest.approx(3.0 * np.log(0.4))
+
+
+def test_learning_finds_a_sensors_probability_of_detection():
+    rng = np.random.default_rng(3)
+    parts = []
+    for _ in range(300):
+        hits = float(rng.binomial(10, 0.4))
+        parts.append(evidence_of([hits, 9.0], [10.0 - hits, 1.0], [2.5, 2.5], gained=20.0))
+    evidence = parts[0]
+    for part in parts[1:]:
+        evidence = evidence.append(part)
+    learnt = op.learn_sensors(evidence, sensors_of(2, prior_odds=0.0), C)
+    np.testing.assert_allclose(learnt.p_detect, [0.4, 0.9], atol=0.04)
+
+
+def test_learning_from_nothing_changes_nothing():
+    sensors = sensors_of(2)
+    assert op.learn_sensors(Evidence.none(2), sensors, C) is sensors
+
+
+def test_scores_count_once_a_track_however_often_it_is_found():
+    logits, clock = np.array([1.0]), ScanClock(0.0, 0.05, 0.05 / 0.3)
+    evidence = Evidence.of_births(0.0, 0, 1, logits, np.zeros(1), clock.weight)
+    for n in range(1, 100):
+        evidence = count_hits(
+            evidence, np.array([0]), 0, logits, np.array([2.0]), clock._replace(t=0.05 * n), C
+        )
+    eta = op.score_log_odds(evidence, sensors_of(1), C)[0, 0]
+    assert eta == pytest.approx(1.0 - 1.0)
+    assert evidence.hits[0, 0] == pytest.approx(99 * 0.05 / 0.3)
+    assert evidence.last_s[0] == pytest.approx(4.95)
+
+
+def test_a_sensor_more_changes_no_posterior():
+    evidence, sensors = evidence_of([2.0], [1.0], [0.7], gained=2.0), sensors_of(1)
+    wide = sensors_of(2)
+    assert replace(evidence.widened()).hits.shape == (1, 2)
+    one, two = op.posterior(evidence, sensors, C), op.posterior(evidence.widened(), wide, C)
+    assert two.log_odds[0] == pytest.approx(one.log_odds[0], rel=1e-12)
+
+
+def test_many_objects_that_a_sensor_finds_do_not_teach_that_it_finds_all():
+    """A parked car among hundreds that drove by: events never show it, and it stays real by its scores."""
+    driven = evidence_of([9.0, 9.0], [1.0, 1.0], [2.5, 2.5], gained=20.0)
+    evidence = driven
+    for _ in range(200):
+        evidence = evidence.append(driven)
+    learnt = op.learn_sensors(evidence, sensors_of(2, prior_odds=0.0), C)
+    assert (learnt.unseen >= C.unseen_share).all()
+    parked = evidence_of([0.0, 40.0], [40.0, 1.0], [np.nan, 3.5], owner=1, gained=40.0)
+    assert op.posterior(parked, learnt._replace(prior_odds=np.zeros(2)), C).real[0] > 0.5

@@ -1,0 +1,141 @@
+"""What is learnt of noise, gaps, scores, presence and the camera, against cases whose answer is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from jeat_graph.filters import (
+    box_sides,
+    camera_motion,
+    gap_survival,
+    noise_learning,
+    score_calibration,
+    singer,
+    visibility,
+)
+from jeat_graph.filters.model_constants import ModelConstants
+
+C = ModelConstants()
+
+
+def test_measurement_noise_goes_to_what_makes_the_squares_right():
+    rng = np.random.default_rng(0)
+    log_variance, true_scale = 2.0 * np.log(0.06), 0.12
+    for _ in range(4000):
+        y = rng.standard_t(C.degrees_of_freedom, size=(10, 4)) * true_scale
+        e = y / np.exp(log_variance / 2.0)
+        log_variance = noise_learning.learn_measurement_noise(log_variance, e, 1.0, C)
+    # What is learnt is the standard deviation of these errors, of t with six degrees of freedom.
+    assert np.exp(log_variance / 2.0) == pytest.approx(true_scale * np.sqrt(6.0 / 4.0), rel=0.03)
+
+
+def test_measurement_noise_stays_above_its_floor():
+    log_variance = 2.0 * np.log(0.06)
+    for _ in range(2000):
+        log_variance = noise_learning.learn_measurement_noise(log_variance, np.zeros((8, 4)), 1.0, C)
+    assert np.exp(log_variance / 2.0) == pytest.approx(C.side_std_bounds[0])
+
+
+def test_process_noise_follows_successive_innovations_and_white_ones_leave_it():
+    q = singer.initial_process_noise(C)
+    alike, known = np.ones((8, 4)), np.ones(8, dtype=bool)
+    more = noise_learning.learn_process_noise(q, alike, alike, known, 1.0, C)
+    less = noise_learning.learn_process_noise(q, alike, -alike, known, 1.0, C)
+    same = noise_learning.learn_process_noise(q, alike, 0.0 * alike, known, 1.0, C)
+    assert all(a > b > c for a, b, c in zip(more, q, less, strict=True))
+    assert same == q
+    assert noise_learning.learn_process_noise(q, alike, alike, ~known, 1.0, C) == q
+
+
+def test_presence_follows_the_chain_of_its_rates():
+    hide, show = C.visible_to_hidden, C.hidden_to_visible
+    leave, vanish = C.visible_to_gone, C.hidden_to_gone
+    generator = np.array([[-hide - leave, hide, leave], [show, -show - vanish, vanish], [0, 0, 0]])
+    presence, small = visibility.seen(1)[0], 1e-5
+    for _ in range(100_000):  # Euler's steps
+        presence = presence + presence @ generator * small
+    for steps in (1, 4):
+        there = visibility.seen(1)
+        for _ in range(steps):
+            there = visibility.predict(there, 1.0 / steps, C)
+        np.testing.assert_allclose(there[0], presence, atol=1e-5)
+
+
+@given(dt=st.floats(0, 10), p=st.floats(0.02, 0.98), times=st.integers(1, 20))
+def test_presence_is_a_distribution(dt, p, times):
+    presence = visibility.seen(1)
+    for _ in range(times):
+        presence = visibility.miss(visibility.predict(presence, dt, C), np.array([p]))
+    assert presence.sum() == pytest.approx(1.0)
+    assert presence.min() >= 0.0
+
+
+def test_a_miss_is_bayes_rule():
+    got = visibility.miss(np.array([[0.5, 0.3, 0.2]]), np.array([0.8]))
+    np.testing.assert_allclose(got, [[0.1 / 0.6, 0.3 / 0.6, 0.2 / 0.6]])
+
+
+def test_survival_goes_from_the_prior_to_what_is_counted():
+    counts = gap_survival.no_gaps()
+    prior = gap_survival.survival(counts, np.array([0.0, 0.5, 9.0]), C)
+    np.testing.assert_allclose(prior, np.exp(-np.array([0.02, 0.4, 1.8]) / C.gap_prior_s))
+    for _ in range(1000):
+        counts = gap_survival.count_ends(counts, np.array([0.5, 0.5]), np.array([True, False]))
+    half = gap_survival.survival(counts, np.array([0.1, 0.45]), C)
+    np.testing.assert_allclose(half, 0.5, atol=0.01)
+    # No gap lasted longer: the prior stands.
+    assert gap_survival.survival(counts, np.array([2.0]), C)[0] == pytest.approx(prior[2])
+    lost = gap_survival.count_losses(counts, 10_000)
+    assert gap_survival.survival(lost, np.array([0.1]), C)[0] < 0.1
+
+
+def test_scores_above_which_boxes_come_again_are_found():
+    rng = np.random.default_rng(2)
+    counts = score_calibration.no_repetition()
+    steady = np.arange(20)[:, None] * 50.0 + np.array([[0.0, 0.0, 30.0, 30.0]])
+    for _ in range(200):
+        stray = rng.uniform(0, 1000, (20, 1)) + np.array([[500.0, 500.0, 520.0, 520.0]])
+        boxes = np.concatenate([steady, stray])
+        logits = np.concatenate([rng.normal(3.0, 0.3, 20), rng.normal(-1.0, 0.3, 20)])
+        counts = score_calibration.count_repetition(counts, boxes, logits, C)
+    assert -0.5 < score_calibration.half_as_many(counts, C) < 2.5
+    z = score_calibration.half_as_many(counts, C)
+    want = -(C.indifference_offset + C.indifference_slope * z)
+    assert score_calibration.indifference(counts, C) == pytest.approx(want)
+
+
+def test_logits_of_certain_scores_are_finite():
+    np.testing.assert_allclose(
+        score_calibration.logit(np.array([0.0, 0.5, 1.0])), [-6.9068, 0.0, 6.9068], atol=1e-4
+    )
+
+
+@pytest.mark.parametrize("theta", [(12.0, -5.0, 0.0), (0.0, 0.0, 0.01), (3.0, 2.0, -0.005)])
+def test_the_cameras_shift_and_scale_are_found_in_spite_of_a_stray(theta):
+    rng = np.random.default_rng(1)
+    centre = rng.uniform(100, 1800, (12, 2)) * [1.0, 0.55]
+    boxes = np.concatenate([centre - 30.0, centre + 30.0], axis=1)
+    mean, covariance = box_sides.initial_state(boxes, 2.0 * np.log(0.03), C)
+    picture = (1920.0, 1080.0)
+    moved = centre + theta[:2] + theta[2] * (centre - np.array(picture) / 2.0)
+    moved[0] += 25.0
+    half = 30.0 * (1.0 + theta[2])
+    seen = np.concatenate([moved - half, moved + half], axis=1)
+    prior = camera_motion.CameraVariance(0.04, 1e-3)
+    motion, learnt = camera_motion.estimate(mean, covariance, seen, 2.0 * np.log(0.03), picture, prior, C)
+    assert motion is not None
+    np.testing.assert_allclose(motion.theta / [0.6, 0.6, 1e-3], theta / np.array([0.6, 0.6, 1e-3]), atol=1.0)
+    assert learnt != prior
+    after, _ = camera_motion.compensate(mean, covariance, motion, picture)
+    np.testing.assert_allclose(after[1:, :, singer.POSITION], moved[1:], atol=1.5)
+
+
+def test_one_track_tells_nothing_of_the_camera():
+    mean, covariance = box_sides.initial_state(np.array([[0.0, 0.0, 9.0, 9.0]]), -5.0, C)
+    prior = camera_motion.initial_variance(C)
+    motion, learnt = camera_motion.estimate(mean, covariance, np.ones((0, 4)), -5.0, (100.0, 100.0), prior, C)
+    assert motion is None
+    assert learnt == prior

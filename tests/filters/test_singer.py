@@ -1,0 +1,81 @@
+"""The Singer model against numeric integration, and against constant acceleration for long times."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import quad_vec, solve_ivp
+
+from jeat_graph.filters import motion, singer
+from jeat_graph.filters.model_constants import ModelConstants
+
+C = ModelConstants()
+STEPS = [1e-3, 0.04, 0.5, 2.7]
+DRIVEN = {"position": 0, "jerk": 2, "size": 3, "growth": 4}
+
+
+@pytest.mark.parametrize("dt", STEPS)
+def test_transition_solves_the_differential_equation(dt):
+    start = np.array([3.0, -2.0, 5.0, 0.3, 0.7])
+    A = singer.drift(C)
+    end = solve_ivp(lambda _, x: A @ x, (0.0, dt), start, rtol=1e-11, atol=1e-12).y[:, -1]
+    np.testing.assert_allclose(singer.discretise(dt, C).F @ start, end, rtol=1e-8, atol=1e-9)
+
+
+@pytest.mark.parametrize("dt", STEPS)
+@pytest.mark.parametrize("noise", DRIVEN)
+def test_process_noise_is_the_integral_of_what_is_driven(dt, noise):
+    def integrand(s):
+        F, term = np.eye(5), np.eye(5)
+        for n in range(1, 60):  # the exponential's series, not the function that the code uses
+            term = term @ singer.drift(C) * (s / n)
+            F = F + term
+        return np.outer(F[:, DRIVEN[noise]], F[:, DRIVEN[noise]])
+
+    want, _ = quad_vec(integrand, 0.0, dt, epsrel=1e-11)
+    got = getattr(singer.discretise(dt, C), noise)
+    np.testing.assert_allclose(got, want, rtol=1e-7, atol=1e-9 * np.abs(want).max())
+
+
+@pytest.mark.parametrize("dt", [0.02, 0.3, 1.5])
+def test_long_times_give_the_papers_constant_acceleration(dt):
+    long = replace(C, velocity_time_s=1e7, acceleration_time_s=1e7)
+    model = singer.discretise(dt, long)
+    np.testing.assert_allclose(model.F[:3, :3], motion.transition.py_func(dt), rtol=1e-5, atol=1e-6)
+    want = motion.process_noise.py_func(dt, 1.0)
+    np.testing.assert_allclose(model.jerk[:3, :3], want, rtol=1e-5)
+
+
+@given(first=st.integers(1, 3_000_000), second=st.integers(1, 3_000_000))
+def test_two_steps_are_one_long_step(first, second):
+    a, b = singer.discretise(first / 1e6, C), singer.discretise(second / 1e6, C)
+    both = singer.discretise((first + second) / 1e6, C)
+    np.testing.assert_allclose(b.F @ a.F, both.F, rtol=1e-9, atol=1e-12)
+    for noise in DRIVEN:
+        joined = b.F @ getattr(a, noise) @ b.F.T + getattr(b, noise)
+        want = getattr(both, noise)
+        np.testing.assert_allclose(joined, want, rtol=1e-8, atol=1e-10 * np.abs(want).max())
+
+
+def test_a_step_of_a_day_is_finite():
+    model = singer.discretise(86_400.0, C)
+    assert all(np.isfinite(part).all() for part in model)
+    assert model.F[1, 1] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_no_time_changes_nothing():
+    model = singer.discretise(0.0, C)
+    np.testing.assert_array_equal(model.F, np.eye(5))
+    assert not any(part.any() for part in model[1:])
+
+
+def test_noise_grows_with_size_and_with_perspective():
+    q, step = singer.initial_process_noise(C), singer.discretise(0.1, C)
+    small, large = singer.process_covariance(np.array([10.0, 20.0]), np.zeros(2), step, q, C)
+    assert large[0, 1, 1] == pytest.approx(4.0 * small[0, 1, 1])
+    calm, near = singer.process_covariance(np.array([10.0, 10.0]), np.array([0.0, 1.0]), step, q, C)
+    assert near[0, 2, 2] / calm[0, 2, 2] == pytest.approx((2.0 + 10.0) ** 2 / 2.0**2)

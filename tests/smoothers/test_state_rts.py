@@ -1,0 +1,77 @@
+"""The smoother against one dense least-squares problem over all times."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jeat_graph.filters import box_sides, singer
+from jeat_graph.filters.model_constants import ModelConstants
+from jeat_graph.smoothers.state_rts import FilterRecord, smooth
+
+C = ModelConstants()
+
+
+def dense_solve(prior, transitions, shifts, noises, H, R, z):
+    """Mean and covariance of all states by the normal equations: no recursion."""
+    times, D = len(z), len(prior[0])
+    information, vector = np.zeros((times * D, times * D)), np.zeros(times * D)
+
+    def add(jacobian, weight, value):
+        information[:] += jacobian.T @ weight @ jacobian
+        vector[:] += jacobian.T @ weight @ value
+
+    select = np.eye(times * D).reshape(times, D, -1)
+    add(select[0], np.linalg.inv(prior[1]), prior[0])
+    for k in range(times):
+        if k:
+            add(select[k] - transitions[k] @ select[k - 1], np.linalg.inv(noises[k]), shifts[k])
+        add(H @ select[k], np.linalg.inv(R), z[k])
+    covariance = np.linalg.inv(information)
+    blocks = np.array([covariance[k * D : k * D + D, k * D : k * D + D] for k in range(times)])
+    return (covariance @ vector).reshape(times, D), blocks
+
+
+def test_smoothed_states_are_the_least_squares_solution():
+    rng = np.random.default_rng(4)
+    steps = [0.0, 0.1, 0.05, 0.3, 0.1, 0.02]
+    models = [singer.discretise(dt, C) for dt in steps]
+    D, H, R = 5, np.array([[1.0, 0, 0, -20.0, 0], [1.0, 0, 0, 20.0, 0]]), np.diag([4.0, 9.0])
+    z = rng.normal(size=(len(steps), 2)) * 5
+    noises = [400.0 * (m.jerk + m.position) + m.growth + m.size for m in models]
+    shifts = [np.array([s, 0.0, 0.0, 0.01 * s, 0.0]) for s in rng.normal(size=len(steps))]
+    prior = np.zeros(D), np.diag([100.0, 400.0, 900.0, 0.04, 0.09])
+    records, mean, P = [], *prior
+    for k, model in enumerate(models):
+        if k:
+            mean, P = model.F @ mean + shifts[k], model.F @ P @ model.F.T + noises[k]
+        before = mean, P
+        one = np.ones((1, 1)), np.ones((1, 1, 1))
+        y = (z[k] - H @ mean)[None, None] * one[1]
+        means, covariances = box_sides.update(
+            mean[None, None], P[None, None], y, H[None, None], np.diag(R)[None, None]
+        )
+        mean, P = means[0, 0], covariances[0, 0]
+        states = (before[0][None, None], before[1][None, None], means, covariances)
+        records.append(FilterRecord(np.array([1]), model.F, *states))
+    want_mean, want_covariance = dense_solve(prior, [m.F for m in models], shifts, noises, H, R, z)
+    for k, got, covariance in smooth(records):
+        scale = np.sqrt(np.diag(want_covariance[k]))
+        np.testing.assert_allclose((got[0, 0] - want_mean[k]) / scale, 0.0, atol=1e-6)
+        np.testing.assert_allclose(
+            covariance[0, 0] / np.outer(scale, scale), want_covariance[k] / np.outer(scale, scale), atol=1e-6
+        )
+
+
+def test_tracks_come_and_go():
+    one, F = np.eye(5)[None, None], np.eye(5)
+
+    def record(ids):
+        n = len(ids)
+        mean, P = np.zeros((n, 1, 5)) + np.array(ids)[:, None, None], np.repeat(one, n, axis=0)
+        return FilterRecord(np.array(ids), F, mean, 2.0 * P, mean, P)
+
+    out = {k: (mean, P) for k, mean, P in smooth([record([1]), record([1, 2]), record([2, 5]), record([])])}
+    np.testing.assert_allclose(out[1][0][:, 0, 0], [1.0, 2.0])
+    # Track 1 ends at record 1 and keeps its covariance; the next record tells of track 2, with G = 1/2.
+    np.testing.assert_allclose(out[1][1][:, 0, 0, 0], [1.0, 0.75])
+    assert out[3][0].shape == (0, 1, 5)
