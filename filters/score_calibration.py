@@ -37,7 +37,7 @@ class PreviousScan(NamedTuple):
     had_before: BoolArray
 
 
-class Repetition(NamedTuple):
+class RepeatCounts(NamedTuple):
     """What is counted of one sensor.
 
     Attributes:
@@ -53,9 +53,9 @@ class Repetition(NamedTuple):
     last: PreviousScan | None
 
 
-def no_repetition() -> Repetition:
+def no_repetition() -> RepeatCounts:
     """Return the counts of a sensor before its first scan."""
-    return Repetition(np.zeros(len(SCORE_GRID)), np.zeros(len(SCORE_GRID)), 0, None)
+    return RepeatCounts(np.zeros(len(SCORE_GRID)), np.zeros(len(SCORE_GRID)), 0, None)
 
 
 def logit(score: FloatArray) -> FloatArray:
@@ -65,8 +65,8 @@ def logit(score: FloatArray) -> FloatArray:
 
 
 def count_repetition(
-    counts: Repetition, boxes: FloatArray, logits: FloatArray, c: ModelConstants
-) -> Repetition:
+    counts: RepeatCounts, boxes: FloatArray, logits: FloatArray, c: ModelConstants
+) -> RepeatCounts:
     """Count which boxes of the scan before have one at their place on both sides.
 
     Args:
@@ -89,10 +89,10 @@ def count_repetition(
             kernel = _kernel(last.logits)
             total = total + kernel.sum(axis=1)
             repeated = repeated + kernel @ (has_after & last.had_before)
-    return Repetition(total, repeated, counts.scans + 1, PreviousScan(boxes, logits, had_before))
+    return RepeatCounts(total, repeated, counts.scans + 1, PreviousScan(boxes, logits, had_before))
 
 
-def half_as_many(counts: Repetition, c: ModelConstants) -> float:
+def half_as_many(counts: RepeatCounts, c: ModelConstants) -> float:
     """Return z₀: the logit below which fewer than half as many boxes come again as of the best ones."""
     total, repeated = counts.boxes, counts.repeated
     if total.sum() <= 0.0:
@@ -105,7 +105,7 @@ def half_as_many(counts: Repetition, c: ModelConstants) -> float:
     return float(SCORE_GRID[low[-1] if len(low) else 0])
 
 
-def indifference(counts: Repetition, c: ModelConstants) -> float:
+def indifference(counts: RepeatCounts, c: ModelConstants) -> float:
     """Return a: logit + a is the log odds that a box is real, by its score alone."""
     z = float(np.clip(half_as_many(counts, c), *c.indifference_bounds))
     return -(c.indifference_offset + c.indifference_slope * z)

@@ -24,7 +24,7 @@ from jeat_graph.filters.evidence import Evidence
 from jeat_graph.filters.gap_survival import GapCounts
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.filters.object_probability import SensorBelief
-from jeat_graph.filters.score_calibration import Repetition
+from jeat_graph.filters.score_calibration import RepeatCounts
 from jeat_graph.filters.sensor_offsets import OffsetSums
 from jeat_graph.filters.singer import STATES, ProcessNoise
 from jeat_graph.filters.visibility import seen
@@ -151,7 +151,7 @@ class ReferenceState:
     leftovers: FloatArray
     period_s: FloatArray
     last_look_s: FloatArray
-    repetition: tuple[Repetition, ...]
+    repetition: tuple[RepeatCounts, ...]
 
     @property
     def time(self) -> float:

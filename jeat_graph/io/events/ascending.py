@@ -12,11 +12,6 @@ from jeat_graph.core import events as decoders
 from jeat_graph.data.arrays import IntArray
 from jeat_graph.io.events.reader import Damage
 
-#: A time that steps ahead by more than this (µs) is remarked on: no camera's clock does so. This and the
-#: next are those of `core/events/decoding.hpp`.
-JUMP_US = 10_000_000
-#: A single time that leaps ahead by more than this (µs), and that the next one takes back, is no time.
-LEAP_US = 1_000_000
 #: So many events may lie between one and an earlier one that follows it: they are held to be sorted.
 SORT_ROWS = 1 << 20
 # What a jump and a leap are is the same for times that come as words and for those that come as arrays (µs).
