@@ -220,7 +220,7 @@ def solve_sparse(
             if row_of[best_col] < 0:
                 sink = best_col
                 break
-            row = row_of[best_col]
+            row = int(row_of[best_col])
         u[start] += reached
         for c in seen:
             if done[c] and row_of[c] >= 0:

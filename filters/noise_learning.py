@@ -31,7 +31,9 @@ def normalised_innovations(y: FloatArray, S: FloatArray, size: FloatArray, c: Mo
     centre = y.mean(axis=2) / np.sqrt(S.mean(axis=(2, 3)))
     variance = (S[..., 0, 0] + S[..., 1, 1] - 2.0 * S[..., 0, 1]) / size**2
     extent = (y[..., 1] - y[..., 0]) / size / np.sqrt(variance)
-    return np.clip(np.concatenate([centre, extent], axis=1), -c.innovation_clip, c.innovation_clip)
+    both: FloatArray = np.concatenate([centre, extent], axis=1)
+    clipped: FloatArray = np.clip(both, -c.innovation_clip, c.innovation_clip)
+    return clipped
 
 
 def share_of_scan(teachers: int, period_s: float, c: ModelConstants) -> float:

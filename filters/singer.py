@@ -154,4 +154,5 @@ def box_size(mean: FloatArray) -> FloatArray:
 
 def object_size(mean: FloatArray) -> FloatArray:
     """Return the size √(width · height) (N,) in px."""
-    return np.exp(mean[:, :, LOG_SIZE].mean(axis=1))
+    size: FloatArray = np.exp(mean[:, :, LOG_SIZE].mean(axis=1))
+    return size

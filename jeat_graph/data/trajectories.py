@@ -101,7 +101,9 @@ class Trajectories(TrajectoryViews):
         if any(part.sensors != parts[0].sensors for part in parts):
             names = tuple(sorted({name for part in parts for name in part.sensors}))
             parts = [_naming(part, names) for part in parts]
-        stacked = {name: np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS}
+        stacked: dict[str, Any] = {
+            name: np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS
+        }
         ids: dict[str, int] = {}
         for part in parts:
             ids |= part.class_ids or {}

@@ -213,7 +213,8 @@ class TableReader(EventReader):
             us_per_unit = _US_PER_S // PER_SECOND[self._unit]
             # What would be beyond 64 bits stays too large, or negative.
             most = _LATEST_US // us_per_unit + 1
-            return np.clip(t, -most, most) * us_per_unit
+            whole: IntArray = np.clip(t, -most, most) * us_per_unit
+            return whole
         scaled = t.astype(np.float64) * (_US_PER_S / PER_SECOND[self._unit])
         bounded = np.clip(scaled, -float(_LATEST_US), 1.5 * _LATEST_US)
         return np.rint(bounded).astype(np.int64)

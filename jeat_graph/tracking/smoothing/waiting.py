@@ -83,7 +83,7 @@ class WaitingRows:
 
     def _in_memory(self) -> Trajectories:
         """The rows in memory, as views."""
-        columns = {name: column[: self._count] for name, column in self._columns.items()}
+        columns: dict[str, Any] = {name: column[: self._count] for name, column in self._columns.items()}
         return Trajectories(**columns, sensors=self._sensors)
 
     def _put_aside(self) -> None:

@@ -42,7 +42,8 @@ def scan_weight(s: int, model: Model) -> float:
         return 0.0
     weight = min(period_s / memory_s, 1.0)
     close = _CLOSE_S / period_s
-    return weight * close * close * math.sqrt(close) if close < 1.0 else weight
+    less: float = weight * close * close * math.sqrt(close)
+    return less if close < 1.0 else weight
 
 
 @inlined
