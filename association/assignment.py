@@ -218,7 +218,7 @@ def solve_sparse(
             reached = best
             done[best_col] = True
             if row_of[best_col] < 0:
-                sink = best_col
+                sink = int(best_col)
                 break
             row = int(row_of[best_col])
         u[start] += reached
