@@ -12,6 +12,7 @@ from typing import Any
 
 from jeat_graph.config.schema import Config, InputConfig, SensorConfig
 from jeat_graph.config.section_tree import build, check_keys, parse_change, plain, read_tree
+from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.data.errors import ConfigError
 
 
@@ -36,6 +37,7 @@ def load_config(name_or_path: str | Path = "default", overrides: Iterable[str] =
     tree = read_tree(str(name_or_path), preset_names(), _preset_text, "preset")
     for text in [overrides] if isinstance(overrides, str) else overrides:
         _apply_override(tree, text)
+    _assume(tree, _sensors_of_preset(str(name_or_path)))
     return config_from_dict(tree)
 
 
@@ -77,32 +79,49 @@ def config_from_dict(tree: Mapping[str, Any]) -> Config:
     sensors = tree.get("sensors")
     if not isinstance(sensors, Mapping) or not sensors:
         raise ConfigError("sensors: at least one sensor must be declared")
-    parts: dict[str, Any] = {}
+    parts: dict[str, Any] = {
+        "sensors": {
+            str(name): build(SensorConfig, value, f"sensors.{name}.") for name, value in sensors.items()
+        }
+    }
     check_keys(tree, [f.name for f in dataclasses.fields(Config)], "")
     hints = typing.get_type_hints(Config)
     for f in dataclasses.fields(Config):
         if f.name != "sensors" and f.name in tree:
             parts[f.name] = build(hints[f.name], tree[f.name], f.name + ".")
-    assumed = _assumed_of_sensors(parts.get("input"))
-    parts["sensors"] = {
-        str(name): build(
-            SensorConfig, {**assumed, **value} if isinstance(value, Mapping) else value, f"sensors.{name}."
-        )
-        for name, value in sensors.items()
-    }
     sized = {"width", "height"} & set(tree.get("image") or {})
     if sized and "input" in parts:
         parts["input"] = dataclasses.replace(parts["input"], picture="given")
     return Config(**parts)
 
 
-def _assumed_of_sensors(given: InputConfig | None) -> dict[str, Any]:
-    """What is assumed of a sensor where it does not say otherwise itself.
+def _assume(tree: dict[str, Any], known: set[str]) -> None:
+    """Fill in what is assumed of sensors that a preset does not know, where they do not say otherwise.
 
     Where undeclared sensors are declared by what is seen of them, whoever declares one by its rate alone says
     nothing else of it, so all else is as for an undeclared one.
+
+    Args:
+        tree: nested mappings, changed.
+        known: names of the sensors that the preset itself declares.
     """
-    return given.of_any_sensor() if given is not None and given.undeclared == "declare" else {}
+    sensors, given = tree.get("sensors"), build(InputConfig, tree.get("input", {}), "input.")
+    if given.undeclared == "declare" and isinstance(sensors, dict):
+        assumed = given.of_any_sensor()
+        tree["sensors"] = {
+            name: {**assumed, **value} if name not in known and isinstance(value, dict) else value
+            for name, value in sensors.items()
+        }
+
+
+def _sensors_of_preset(source: str) -> set[str]:
+    """Names of the sensors of a preset, or of the one that a file is laid over."""
+    while source not in preset_names():
+        base = load_yaml(Path(source).read_text(encoding="utf-8")).get("base")
+        if base is None:
+            return set()
+        source = str(base)
+    return set(read_tree(source, preset_names(), _preset_text, "preset").get("sensors", {}))
 
 
 def config_to_dict(config: Config) -> dict[str, Any]:
