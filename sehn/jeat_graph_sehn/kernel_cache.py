@@ -12,6 +12,7 @@ import stat
 import tempfile
 from pathlib import Path
 
+from jeat_graph.config.compiler_guard import is_as_sources, is_private
 from jeat_graph_sehn.stale_kernels import drop_stale
 
 _VARIABLE = "NUMBA_CACHE_DIR"
@@ -31,24 +32,34 @@ def choose_cache() -> None:
     if os.environ.get(_VARIABLE):
         drop_stale(_PACKAGE, Path(os.environ[_VARIABLE]))
         return
-    if _takes_files(_PACKAGE["jeat_graph_sehn"] / "__pycache__"):
+    sources = _PACKAGE["jeat_graph_sehn"]
+    beside = sources / "__pycache__"
+    open_beside = _takes_files(beside)
+    if open_beside and is_as_sources(beside, sources):
         drop_stale(_PACKAGE)
         return
     folder = _user_cache()
-    if _takes_files(folder):
+    if _takes_files(folder) and is_private(folder):
+        if open_beside:  # the compiler would take that first
+            _keep_in(folder)
         drop_stale(_PACKAGE, folder)
         return
     temporary = _temporary_folder()
     if temporary is not None:
-        from numba.core import config
-
-        os.environ[_VARIABLE] = str(temporary)  # for processes that this one starts
-        config.CACHE_DIR = str(temporary)  # type: ignore[attr-defined]
+        _keep_in(temporary)
         notice = f"neither the installation nor a home can be written: compiled code is kept in {temporary}"
         drop_stale(_PACKAGE, temporary)
         return
     notice = "no folder can be written: the renderer is compiled anew in each run; set NUMBA_CACHE_DIR"
     _compile_without_cache()
+
+
+def _keep_in(folder: Path) -> None:
+    """Have the compiler keep its code in a folder, here and in processes that this one starts."""
+    from numba.core import config
+
+    os.environ[_VARIABLE] = str(folder)
+    config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
 
 
 def _user_cache() -> Path:

@@ -27,6 +27,7 @@ PUBLIC = {
     "jeat_graph.cli.options",
     "jeat_graph.cli.terminal",
     "jeat_graph.config.argument_types",
+    "jeat_graph.config.compiler_guard",
     "jeat_graph.config.fields",
     "jeat_graph.config.section_tree",
     "jeat_graph.config.yaml_text",
