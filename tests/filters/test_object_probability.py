@@ -133,7 +133,7 @@ def test_hits_of_one_sensor_alone_say_nothing_of_what_repeats(first, more, score
 
 @given(hits=st.floats(0, 1e3), misses=st.floats(0, 1e3), silent=st.floats(0, 1e4))
 def test_silence_of_one_sensor_is_bounded(hits, misses, silent):
-    """However often it looks in vain: it may be blind to the object (g), or to the false one (1 − c)."""
+    """The evidence of misses is bounded: a sensor may be blind to the object (g) or the false one (1 − c)."""
     sensors, bound = sensors_of(2), np.log((1.0 - C.shared_false) / C.unseen_share)
     scores = [1.0, np.nan]
     before = op.posterior(evidence_of([hits, 0.0], [misses, 0.0], scores, gained=1e4), sensors, C)

@@ -56,7 +56,7 @@ class KafkaSource:
 
     Args:
         address: option `group` (default `jeat-graph.TOPIC`).
-        overdue: tells when the program is to end; nothing is waited for that long here.
+        overdue: tells when the program is to end; not asked here, since no wait is that long.
         notices: takes what the user is to know.
 
     Raises:

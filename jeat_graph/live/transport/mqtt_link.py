@@ -81,7 +81,7 @@ class MqttLink:
         """Connect.
 
         Args:
-            patience_s: how long the broker is waited for.
+            patience_s: longest wait for the broker (s).
 
         Raises:
             JeatGraphError: nobody answers, or the broker refuses.

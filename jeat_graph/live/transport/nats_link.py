@@ -34,7 +34,7 @@ class NatsLink:
         address: the server and the subject.
         overdue: tells when the program is to end.
         notices: takes what the user is to know.
-        patience_s: how long the server is waited for at first.
+        patience_s: longest wait for the first connection to the server (s).
 
     Attributes:
         client: of the server.
