@@ -119,11 +119,11 @@ class ModelConstants:
     size_walk: float = 0.05
     perspective_jerk: float = 10.0
     fastest_growth: float = 4.0
-    velocity_std: float = 1.5
-    acceleration_std: float = 1.0
+    velocity_std: float = 3.0
+    acceleration_std: float = 0.5
     growth_std: float = 0.3
 
-    side_std: float = 0.06
+    side_std: float = 0.09
     side_std_bounds: tuple[float, float] = (0.02, 0.4)
     pixel_std: float = 0.5
     degrees_of_freedom: float = 6.0
@@ -136,7 +136,7 @@ class ModelConstants:
     offset_age_s: float = 0.011
 
     gate: float = 60.0
-    outlier_gate: float = 3.0
+    outlier_gate: float = 6.0
     clutter_size_area: float = 2.0
     clutter_memory: float = 0.98
     clutter_prior: float = 0.5
@@ -207,6 +207,10 @@ class ModelConstants:
     camera_shift_bounds: tuple[float, float] = (1e-3, 0.2**0.5)
     camera_scale_bounds: tuple[float, float] = (1e-4, 0.1)
     camera_memory: float = 0.97
+    camera_most_memory: float = 1.0
+    velocity_count: float = 1e9
+    velocity_age_s: float = 0.3
+    velocity_keep: float = 0.98
 
     report: float = 0.5
     inside_share: float = 0.4
