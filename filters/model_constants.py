@@ -117,11 +117,11 @@ class ModelConstants:
     growth_noise: float = 0.5
     position_walk: float = 0.05
     size_walk: float = 0.05
-    perspective_jerk: float = 10.0
+    perspective_jerk: float = 2.0
     fastest_growth: float = 4.0
     velocity_std: float = 3.0
     acceleration_std: float = 0.5
-    growth_std: float = 0.3
+    growth_std: float = 0.6
 
     side_std: float = 0.09
     side_std_bounds: tuple[float, float] = (0.02, 0.4)
@@ -208,6 +208,7 @@ class ModelConstants:
     camera_scale_bounds: tuple[float, float] = (1e-4, 0.1)
     camera_memory: float = 0.97
     camera_most_memory: float = 1.0
+    perspective: float = 1.0
     velocity_count: float = 1e9
     velocity_age_s: float = 0.3
     velocity_keep: float = 0.98

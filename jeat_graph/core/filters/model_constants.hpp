@@ -105,6 +105,7 @@ struct Bounds {
     JEAT_PAIR(camera_scale_bounds) \
     JEAT_ONE(camera_memory) \
     JEAT_ONE(camera_most_memory) \
+    JEAT_ONE(perspective) \
     JEAT_ONE(velocity_count) \
     JEAT_ONE(velocity_age_s) \
     JEAT_ONE(velocity_keep) \

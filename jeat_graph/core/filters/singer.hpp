@@ -115,9 +115,26 @@ inline Discretised discretise(double dt, const ModelConstants& c) {
 
 inline double object_size(const double* mean) { return exp_of(0.5 * (mean[kLogSize] + mean[kStates + kLogSize])); }
 
+// The transition of a track that moves at constant speed in space: a = 2 g v, dg/dt = g^2 (g the rate of ln size).
+inline Matrix in_perspective(const Matrix& F, const double* mean, double dt, const ModelConstants& c) {
+    Matrix out = F;
+    const double g = 0.5 * c.perspective * (mean[kGrowth] + mean[kStates + kGrowth]);
+    const double x = clamp(g * dt, -0.4, 0.4);
+    if (std::abs(x) < 1e-6) return out;
+    const double faster = exp_of(2.0 * x), further = (faster - 1.0) / (2.0 * x);
+    const double growing = 1.0 / (1.0 - x), grown = -log_of(1.0 - x) / x;
+    out[kPosition * kStates + kVelocity] *= further;
+    out[kVelocity * kStates + kVelocity] *= faster;
+    out[kLogSize * kStates + kGrowth] *= grown;
+    out[kGrowth * kStates + kGrowth] *= growing;
+    return out;
+}
+
 // m <- F m, P <- F P F' + Q.
-inline void predict(double* mean, double* covariance, const Discretised& step, const ProcessNoise& q,
+inline void predict(double* mean, double* covariance, const Discretised& general, double dt, const ProcessNoise& q,
                     const ModelConstants& c) {
+    Discretised step = general;
+    step.F = in_perspective(general.F, mean, dt, c);
     const double size = object_size(mean);
     std::array<double, kMean> predicted{};
     for (int axis = 0; axis < 2; ++axis)

@@ -146,10 +146,11 @@ public:
                     while (j < later.track_id.size() && later.track_id[j] < now.track_id[i]) ++j;
                     if (j == later.track_id.size()) break;
                     if (later.track_id[j] != now.track_id[i]) continue;
+                    const Matrix F = in_perspective(later.F, &now.mean[i * kMean], later.dt, state_.constants);
                     for (int axis = 0; axis < 2; ++axis) {
                         const std::size_t m = i * kMean + axis * kStates, m2 = j * kMean + axis * kStates;
                         const std::size_t p = i * kCovariance + axis * kMatrix, p2 = j * kCovariance + axis * kMatrix;
-                        smoothers::rts_axis(&mean[m], &covariance[p], later.F, &later.predicted_mean[m2],
+                        smoothers::rts_axis(&mean[m], &covariance[p], F, &later.predicted_mean[m2],
                                             &later.predicted_covariance[p2], &next_mean[m2], &next_covariance[p2]);
                     }
                 }

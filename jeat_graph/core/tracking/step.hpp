@@ -30,6 +30,7 @@ struct Scan {
 struct Record {
     std::vector<std::int64_t> track_id;
     Matrix F;
+    double dt;
     std::vector<double> predicted_mean, predicted_covariance, mean, covariance;
 };
 
@@ -143,7 +144,7 @@ private:
         if (dt <= 0.0) return;
         Tracks& tracks = s_.tracks;
         for (std::size_t i = 0; i < tracks.size(); ++i) {
-            filters::predict(tracks.mean_of(i), tracks.covariance_of(i), step_, s_.process_noise, c_);
+            filters::predict(tracks.mean_of(i), tracks.covariance_of(i), step_, dt, s_.process_noise, c_);
             predict_presence(tracks.presence.data() + i * kPresences, presence_step_);
         }
     }
@@ -403,6 +404,7 @@ private:
     void begin_record(std::vector<Record>& records) {
         records.emplace_back();
         records.back().F = step_.F;
+        records.back().dt = static_cast<double>(ticks_) / 1e6;
         records.back().predicted_mean = s_.tracks.mean;
         records.back().predicted_covariance = s_.tracks.covariance;
     }
