@@ -118,11 +118,17 @@ public:
                     later[id] = std::max(later[id], moments_[k].real[i]);
                     if (mode == 1) existence[k][i] = std::min(existence[k][i], later[id]);
                     if (mode >= 7) {
-                        existence[k][i] = std::min(existence[k][i], later[id]);
+                        const double now = moments_[k].real[i];
+                        if (mode < 10) existence[k][i] = std::min(existence[k][i], later[id]);
+                        if (mode == 10) existence[k][i] = now;
+                        if (mode == 11) existence[k][i] = fin[id] > .5 ? std::min(existence[k][i], later[id]) : now;
+                        if (mode == 12) existence[k][i] = fin[id] > .9 ? std::max(now, fin[id]) : now;
+                        if (mode == 13) existence[k][i] = (now + std::min(existence[k][i], later[id])) / 2;
+                        if (mode == 14) existence[k][i] = std::min(now, later[id]) ;
                         if (moments_[k].used[i]) { next[id] = moments_[k].t; }
                         else {
                             const double ub = moments_[k].t - prev[k][i], uf = next[id] - moments_[k].t;
-                            const double u = mode == 7 ? std::min(ub, uf) : mode == 8 ? ub + uf : (ub+uf)/2;
+                            const double u = mode >= 7 && mode != 8 && mode != 9 ? std::min(ub, uf) : mode == 8 ? ub + uf : (ub+uf)/2;
                             if (uf < 1e100) existence[k][i] *= state_.gaps.survival(u, state_.constants);
                         }
                     }
