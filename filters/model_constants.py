@@ -121,7 +121,7 @@ class ModelConstants:
     fastest_growth: float = 4.0
     velocity_std: float = 3.0
     acceleration_std: float = 0.5
-    growth_std: float = 0.6
+    growth_std: float = 0.3
 
     side_std: float = 0.09
     side_std_bounds: tuple[float, float] = (0.02, 0.4)
@@ -193,10 +193,10 @@ class ModelConstants:
     indifference_bounds: tuple[float, float] = (-1.0, 3.0)
 
     visible_to_hidden: float = 0.3
-    hidden_to_visible: float = 1.0
+    hidden_to_visible: float = 2.0
     visible_to_gone: float = 0.1
     hidden_to_gone: float = 0.3
-    gap_prior_s: float = 0.4
+    gap_prior_s: float = 0.3
     gap_prior_count: float = 4.0
     gap_prior_least_s: float = 0.02
     gap_overlap: float = 0.5
@@ -214,7 +214,7 @@ class ModelConstants:
     velocity_keep: float = 0.98
 
     report: float = 0.5
-    inside_share: float = 0.4
+    inside_share: float = 0.8
     rival: float = 0.3
     rival_age_s: float = 0.3
     doubtful_gap_s: float = 1.0
