@@ -117,6 +117,7 @@ class ModelConstants:
     growth_noise: float = 0.5
     position_walk: float = 0.05
     size_walk: float = 0.05
+    most_perspective: float = 0.4
     perspective_jerk: float = 2.0
     fastest_growth: float = 4.0
     velocity_std: float = 3.0
@@ -200,6 +201,7 @@ class ModelConstants:
     gap_prior_count: float = 4.0
     gap_prior_least_s: float = 0.02
     gap_overlap: float = 0.5
+    sure: float = 0.9
     longest_gap_s: float = 3.0
 
     camera_shift_std: float = 0.05
@@ -207,11 +209,6 @@ class ModelConstants:
     camera_shift_bounds: tuple[float, float] = (1e-3, 0.2**0.5)
     camera_scale_bounds: tuple[float, float] = (1e-4, 0.1)
     camera_memory: float = 0.97
-    camera_most_memory: float = 1.0
-    perspective: float = 1.0
-    velocity_count: float = 1e9
-    velocity_age_s: float = 0.3
-    velocity_keep: float = 0.98
 
     report: float = 0.5
     inside_share: float = 0.8

@@ -137,7 +137,7 @@ inline void update(double* mean, double* covariance, const std::array<double, 4>
 }
 
 // The state of a track that begins at a box.
-inline void initial_state(const Sides& box, double log_variance, double velocity_variance, const ModelConstants& c, double* mean,
+inline void initial_state(const Sides& box, double log_variance, const ModelConstants& c, double* mean,
                           double* covariance) {
     std::fill(mean, mean + kMean, 0.0);
     std::fill(covariance, covariance + kCovariance, 0.0);
@@ -147,7 +147,7 @@ inline void initial_state(const Sides& box, double log_variance, double velocity
         const double R = side_variance(size[axis], both, log_variance, c);
         mean[axis * kStates + kPosition] = centre[axis];
         mean[axis * kStates + kLogSize] = log_of(size[axis]);
-        const double variance[] = {R / 2.0, velocity_variance * square(both), square(c.acceleration_std * both),
+        const double variance[] = {R / 2.0, square(c.velocity_std * both), square(c.acceleration_std * both),
                                    2.0 * R / square(size[axis]), square(c.growth_std)};
         for (int i = 0; i < kStates; ++i) covariance[axis * kMatrix + i * kStates + i] = variance[i];
     }

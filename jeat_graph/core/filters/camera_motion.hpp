@@ -93,7 +93,8 @@ inline CameraMotion estimate_camera(const std::vector<CameraTrack>& tracks, cons
     const ByLeft index(boxes);
     const double variance = std::min(prior.shift * kPairingDeviations, kPairingMost);
     auto pairs = nearest_pairs(tracks, boxes, index, {}, width, height, variance);
-    if (c.camera_most_memory > 0.0) {
+    // The camera may have gone on as before: rows of like objects are else taken for their neighbours.
+    {
         const std::array<double, 3> again{prior.last[0] * dt, prior.last[1] * dt, prior.last[2] * dt};
         auto moved = nearest_pairs(tracks, boxes, index, again, width, height, variance);
         if (moved.size() > pairs.size()) pairs = std::move(moved);

@@ -22,6 +22,7 @@ struct Bounds {
     JEAT_ONE(growth_noise) \
     JEAT_ONE(position_walk) \
     JEAT_ONE(size_walk) \
+    JEAT_ONE(most_perspective) \
     JEAT_ONE(perspective_jerk) \
     JEAT_ONE(fastest_growth) \
     JEAT_ONE(velocity_std) \
@@ -98,17 +99,13 @@ struct Bounds {
     JEAT_ONE(gap_prior_count) \
     JEAT_ONE(gap_prior_least_s) \
     JEAT_ONE(gap_overlap) \
+    JEAT_ONE(sure) \
     JEAT_ONE(longest_gap_s) \
     JEAT_ONE(camera_shift_std) \
     JEAT_ONE(camera_scale_std) \
     JEAT_PAIR(camera_shift_bounds) \
     JEAT_PAIR(camera_scale_bounds) \
     JEAT_ONE(camera_memory) \
-    JEAT_ONE(camera_most_memory) \
-    JEAT_ONE(perspective) \
-    JEAT_ONE(velocity_count) \
-    JEAT_ONE(velocity_age_s) \
-    JEAT_ONE(velocity_keep) \
     JEAT_ONE(report) \
     JEAT_ONE(inside_share) \
     JEAT_ONE(rival) \

@@ -14,6 +14,9 @@ inline constexpr int kStates = 5, kPosition = 0, kVelocity = 1, kAcceleration = 
 // The state of a track: two axes; its covariance: one matrix for each, row by row.
 inline constexpr int kMean = 2 * kStates, kMatrix = kStates * kStates, kCovariance = 2 * kMatrix;
 
+// Less growth in a step has no effect.
+inline constexpr double kLeastPerspective = 1e-6;
+
 using Matrix = std::array<double, kMatrix>;
 
 // Natural logarithms of the spectral densities.
@@ -118,9 +121,9 @@ inline double object_size(const double* mean) { return exp_of(0.5 * (mean[kLogSi
 // The transition of a track that moves at constant speed in space: a = 2 g v, dg/dt = g^2 (g the rate of ln size).
 inline Matrix in_perspective(const Matrix& F, const double* mean, double dt, const ModelConstants& c) {
     Matrix out = F;
-    const double g = 0.5 * c.perspective * (mean[kGrowth] + mean[kStates + kGrowth]);
-    const double x = clamp(g * dt, -0.4, 0.4);
-    if (std::abs(x) < 1e-6) return out;
+    const double g = 0.5 * (mean[kGrowth] + mean[kStates + kGrowth]);
+    const double x = clamp(g * dt, -c.most_perspective, c.most_perspective);
+    if (std::abs(x) < kLeastPerspective) return out;
     const double faster = exp_of(2.0 * x), further = (faster - 1.0) / (2.0 * x);
     const double growing = 1.0 / (1.0 - x), grown = -log_of(1.0 - x) / x;
     out[kPosition * kStates + kVelocity] *= further;

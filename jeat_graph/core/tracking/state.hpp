@@ -90,11 +90,6 @@ struct State {
     CameraVariance camera;          // follow_camera
     GapCounts gaps;                 // count_gaps, end_tracks
     SensorBelief belief;            // learn
-    double velocity_number = 0.0, velocity_sum = 0.0;  // learn_velocity
-    double velocity_variance() const {
-        return (c_count() * square(constants.velocity_std) + velocity_sum) / (c_count() + velocity_number);
-    }
-    double c_count() const { return constants.velocity_count; }
     OffsetSums offsets;             // compare_sensors
     std::vector<double> log_side_variance;  // learn_noise
     std::vector<Sensor> sensors;

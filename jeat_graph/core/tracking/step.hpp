@@ -11,12 +11,15 @@
 #include "association/assignment.hpp"
 #include "association/likelihood_ratio.hpp"
 #include "filters/noise_learning.hpp"
+#include "smoothers/histories.hpp"
 #include "tracking/state.hpp"
 
 namespace jeat::tracking {
 
 inline constexpr double kPeriodMemory = 0.9, kGapPeriods = 1.5, kLongestPeriodS = 0.1;
 inline constexpr double kCameraDetections = 2.0, kCameraAgeS = 0.5, kSameTimeS = 1e-6, kDue = 0.9;
+
+using smoothers::Histories;
 
 // One look of a sensor.
 struct Scan {
@@ -26,20 +29,12 @@ struct Scan {
     std::vector<std::int64_t> takers;  // written: the track that each box went to
 };
 
-// What the smoother needs of an update.
-struct Record {
-    std::vector<std::int64_t> track_id;
-    Matrix F;
-    double dt;
-    std::vector<double> predicted_mean, predicted_covariance, mean, covariance;
-};
-
 class Step {
 public:
     explicit Step(State& state) : s_(state), c_(state.constants) {}
 
     // Take in all scans of one time, at most one of each sensor; `reported` is written.
-    void run(double t, std::vector<Scan>& scans, std::vector<std::uint8_t>& reported, std::vector<Record>* records) {
+    void run(double t, std::vector<Scan>& scans, std::vector<std::uint8_t>& reported, Histories* histories) {
         std::fill(s_.tracks.used.begin(), s_.tracks.used.end(), 0);
         for (const std::size_t place : order_of(scans)) {
             Scan& scan = scans[place];
@@ -47,26 +42,33 @@ public:
             predict(t);
             correct_boxes(scan);
             follow_camera(scan);
-            if (records) begin_record(*records);
+            if (histories) write_predictions(*histories);
             associate(scan);
             count_gaps(scan);
             learn_noise(scan, clock);
             update(scan);
-            learn_velocity();
             count_hits_and_misses(scan, clock);
             count_clutter(scan);
             begin_tracks(scan, clock);
             compare_sensors(scan);
-            if (records) end_record(records->back());
+            if (histories) write_updates(*histories);
         }
         compare_overlaps();
         judge();
         learn(t);
         report(reported);
+        if (!histories) return;
+        for (std::size_t i = 0; i < s_.tracks.size(); ++i) {
+            smoothers::Entry& entry = histories->living()[i].entries.back();
+            entry.real = s_.tracks.real[i];
+            entry.used = s_.tracks.used[i];
+            entry.last_of_step = true;
+        }
+        histories->advance(t, s_.gaps, c_);
     }
 
     // End the tracks that are false, gone, outside, or unseen for too long; their evidence stays.
-    void end_tracks() {
+    void end_tracks(Histories* histories) {
         Tracks& tracks = s_.tracks;
         std::vector<std::uint8_t> ends(tracks.size()), kept(tracks.size());
         bool any = false;
@@ -88,6 +90,7 @@ public:
             std::fill(last.begin(), last.end() - static_cast<std::ptrdiff_t>(most), 0);
             keep_rows(s_.ended, last);
         }
+        if (histories) histories->end(kept, s_.gaps, c_);
         keep_rows(tracks, kept);
     }
 
@@ -207,22 +210,6 @@ private:
         made_ = assignment_.solve(pairs_, n, boxes_.size());
     }
 
-    void learn_velocity() {
-        Tracks& tracks = s_.tracks;
-        for (const std::size_t k : made_) {
-            const std::size_t i = pairs_[k].row;
-            const double born = tracks.evidence.born_s[i];
-            if (!(tracks.real[i] > c_.report) || tracks.evidence.last_s[i] - born >= c_.velocity_age_s ||
-                s_.t - born < c_.velocity_age_s)
-                continue;
-            const double *m = tracks.mean_of(i), *P = tracks.covariance_of(i);
-            const int v = kVelocity * kStates + kVelocity;
-            const double second = (square(m[kVelocity]) + P[v] + square(m[kStates + kVelocity]) + P[kMatrix + v]) / 2.0;
-            s_.velocity_number = c_.velocity_keep * s_.velocity_number + 1.0;
-            s_.velocity_sum = c_.velocity_keep * s_.velocity_sum + second / square(object_size(m));
-        }
-    }
-
     void count_gaps(const Scan&) {
         Tracks& tracks = s_.tracks;
         double period = kLongestPeriodS;
@@ -320,7 +307,7 @@ private:
                 if (scan.logits[free_[g]] > scan.logits[j])
                     overlap = std::max(overlap, intersection_over_union(boxes_[j], free_boxes_[g]));
             });
-            initial_state(boxes_[j], s_.log_side_variance[k], s_.velocity_variance(), c_, tracks.mean_of(row), tracks.covariance_of(row));
+            initial_state(boxes_[j], s_.log_side_variance[k], c_, tracks.mean_of(row), tracks.covariance_of(row));
             tracks.track_id[row] = s_.next_id++;
             tracks.used[row] = std::int64_t{1} << k;
             see_presence(tracks.presence.data() + row * kPresences);
@@ -401,21 +388,32 @@ private:
         }
     }
 
-    void begin_record(std::vector<Record>& records) {
-        records.emplace_back();
-        records.back().F = step_.F;
-        records.back().dt = static_cast<double>(ticks_) / 1e6;
-        records.back().predicted_mean = s_.tracks.mean;
-        records.back().predicted_covariance = s_.tracks.covariance;
+    void write_predictions(Histories& histories) {
+        Tracks& tracks = s_.tracks;
+        for (std::size_t i = 0; i < tracks.size(); ++i) {
+            smoothers::Entry& entry = histories.living()[i].entries.emplace_back();
+            entry.t = s_.t;
+            entry.dt = static_cast<double>(ticks_) / 1e6;
+            std::copy_n(tracks.mean_of(i), kMean, entry.predicted_mean.begin());
+            std::copy_n(tracks.covariance_of(i), kCovariance, entry.predicted_covariance.begin());
+        }
     }
-    void end_record(Record& record) {
-        const Tracks& tracks = s_.tracks;
-        record.track_id = tracks.track_id;
-        record.mean = tracks.mean;
-        record.covariance = tracks.covariance;
-        const std::size_t m = record.predicted_mean.size(), p = record.predicted_covariance.size();
-        record.predicted_mean.insert(record.predicted_mean.end(), tracks.mean.begin() + static_cast<std::ptrdiff_t>(m), tracks.mean.end());
-        record.predicted_covariance.insert(record.predicted_covariance.end(), tracks.covariance.begin() + static_cast<std::ptrdiff_t>(p), tracks.covariance.end());
+    void write_updates(Histories& histories) {
+        Tracks& tracks = s_.tracks;
+        auto& living = histories.living();
+        for (std::size_t i = 0; i < tracks.size(); ++i) {
+            if (i == living.size()) {
+                living.emplace_back().track_id = tracks.track_id[i];
+                smoothers::Entry& first = living[i].entries.emplace_back();
+                first.t = s_.t;
+                first.dt = 0.0;
+                std::copy_n(tracks.mean_of(i), kMean, first.predicted_mean.begin());
+                std::copy_n(tracks.covariance_of(i), kCovariance, first.predicted_covariance.begin());
+            }
+            smoothers::Entry& entry = living[i].entries.back();
+            std::copy_n(tracks.mean_of(i), kMean, entry.mean.begin());
+            std::copy_n(tracks.covariance_of(i), kCovariance, entry.covariance.begin());
+        }
     }
 
     double unseen_for(std::size_t row) const { return s_.t - s_.tracks.evidence.last_s[row]; }
