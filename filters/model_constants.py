@@ -129,6 +129,8 @@ class ModelConstants:
     pixel_std: float = 0.5
     degrees_of_freedom: float = 6.0
     cut_share: float = 0.02
+    cut_in_association: float = 0.02
+    cut_gate: float = 20.0
     outlier_share: float = 0.2
     outlier_std: float = 0.3
 

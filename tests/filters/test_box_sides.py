@@ -21,11 +21,13 @@ def tracked(box=BOX, seconds=0.04, times=30):
     mean, covariance = box_sides.initial_state(box, LOG_VARIANCE, C)
     step, q = singer.discretise(seconds, C), singer.initial_process_noise(C)
     for _ in range(times):
-        mean, covariance = singer.predict(mean, covariance, step, q, C)
+        F = singer.in_perspective(step.F, mean, seconds, C)
+        mean, covariance = singer.predict(mean, covariance, step, F, q, C)
         seen = box_sides.innovations(mean, covariance, box, LOG_VARIANCE, C)
         R = np.repeat(seen.side_variance[..., None], 2, axis=2)
         mean, covariance = box_sides.update(mean, covariance, seen.y[:, 0], seen.H, R)
-    return singer.predict(mean, covariance, step, q, C)
+    F = singer.in_perspective(step.F, mean, seconds, C)
+    return singer.predict(mean, covariance, step, F, q, C)
 
 
 def test_measurement_matrix_is_the_derivative_of_the_sides():

@@ -43,16 +43,28 @@ inline double sides_log_density(const Sides& box, const SidesExpected& expected,
                                 const ModelConstants& c) {
     const auto y = filters::side_innovations(box, expected.box);
     const double d2 = filters::squared_distance(y, expected.S), wide = filters::squared_distance(y, expected.wide);
-    if (std::min(d2, c.outlier_gate * wide) > c.gate) return -1e9;
+    double cut = -1e9;
+    if (c.cut_in_association > 0.0)
+        for (int axis = 0; axis < 2; ++axis) {
+            const filters::Pair2 &S = expected.S[axis], &T = expected.S[1 - axis];
+            const double l = y[2 * axis], r = y[2 * axis + 1], other = T.squared_distance(y[2 - 2 * axis], y[3 - 2 * axis]);
+            if (other > c.cut_gate) continue;
+            const double base = -0.5 * other - 0.5 * log_of(T.determinant()) - filters::kLog2Pi - log_of(expected.size[axis]) - 0.5 * filters::kLog2Pi;
+            if (l > 0.0 && l < expected.size[axis] && r * r / S.rr + other < c.cut_gate) cut = log_add(cut, base - 0.5 * r * r / S.rr - 0.5 * log_of(S.rr));
+            if (r < 0.0 && -r < expected.size[axis] && l * l / S.ll + other < c.cut_gate) cut = log_add(cut, base - 0.5 * l * l / S.ll - 0.5 * log_of(S.ll));
+        }
+    const bool whole = std::min(d2, c.outlier_gate * wide) <= c.gate;
+    if (!whole && cut < -1e8) return -1e9;
     const double nu = c.degrees_of_freedom;
     const double body = terms.student_constant - 0.5 * expected.log_det - (nu + 4.0) / 2.0 * log1p_of(d2 / nu);
     const double tail = terms.normal_constant - 0.5 * expected.log_det_wide - 0.5 * wide;
-    return log_add(terms.log_body + body, terms.log_tail + tail);
+    const double all = whole ? log_add(terms.log_body + body, terms.log_tail + tail) : -1e9;
+    return cut < -1e8 ? all : log_add(all, log_of(c.cut_in_association) + cut);
 }
 
 // How far a box's left side may lie from the expected one at most.
 inline double reach(const SidesExpected& expected, const ModelConstants& c) {
-    return std::sqrt(c.gate * std::max(expected.S[0].ll, expected.wide[0].ll / c.outlier_gate));
+    return std::max(c.cut_in_association > 0. ? expected.size[0] : 0., std::sqrt(c.gate * std::max(expected.S[0].ll, expected.wide[0].ll / c.outlier_gate)));
 }
 
 }  // namespace jeat::association

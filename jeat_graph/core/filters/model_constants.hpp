@@ -33,6 +33,8 @@ struct Bounds {
     JEAT_ONE(pixel_std) \
     JEAT_ONE(degrees_of_freedom) \
     JEAT_ONE(cut_share) \
+    JEAT_ONE(cut_in_association) \
+    JEAT_ONE(cut_gate) \
     JEAT_ONE(outlier_share) \
     JEAT_ONE(outlier_std) \
     JEAT_ONE(offset_count) \

@@ -87,6 +87,9 @@ public:
         out["unseen"] = array_of(state_.belief.unseen);
         out["indifference"] = array_of(state_.belief.indifference);
         out["prior_odds"] = array_of(state_.belief.prior_odds);
+        std::vector<double> leftovers;
+        for (const Sensor& sensor : state_.sensors) leftovers.push_back(sensor.leftovers);
+        out["leftovers"] = array_of(leftovers);
         out["noise_share"] = state_.belief.noise_share;
         out["log_side_variance"] = array_of(state_.log_side_variance);
         const ProcessNoise& q = state_.process_noise;
