@@ -184,11 +184,11 @@ def associate(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> Ass
     noise = float(state.log_side_variance[k])
     innovation = box_sides.innovations(tracks.mean, tracks.covariance, scan.boxes, noise, c)
     size = singer.box_size(tracks.mean)
-    density, d2 = likelihood_ratio.sides_log_density(innovation, size, c)
+    density = likelihood_ratio.sides_log_density(innovation, size, c)
     score = likelihood_ratio.score_log_ratio(tracks.real, state.sensors.indifference[k] + scan.logits, c)
     clutter = likelihood_ratio.clutter_log_density(size, float(state.leftovers[k]), state.picture, c)
     present = tracks.presence[:, VISIBLE] * p_detect
-    ratio = likelihood_ratio.pair_log_ratio(density, d2, present, score, clutter, c)
+    ratio = likelihood_ratio.pair_log_ratio(density, present, score, clutter)
     track, box = likelihood_ratio.assign(ratio)
     return AssociatedPairs(track, box, ratio[track, box], p_detect, innovation)
 
@@ -232,7 +232,8 @@ def update(state: ReferenceState, pairs: AssociatedPairs, c: ModelConstants) -> 
     y, size = seen.y[i, pairs.box], singer.box_size(tracks.mean[i])
     R = box_sides.measured_variance(y, seen.S[i], seen.side_variance[i], size, c)
     mean, covariance = tracks.mean.copy(), tracks.covariance.copy()
-    mean[i], covariance[i] = box_sides.update(mean[i], covariance[i], y, seen.H[i], R)
+    grown = box_sides.uncovered_covariance(covariance[i], y, seen.S[i], size, c)
+    mean[i], covariance[i] = box_sides.update(mean[i], grown, y, seen.H[i], R)
     state.tracks = replace(tracks, mean=mean, covariance=covariance)
 
 

@@ -38,33 +38,47 @@ inline double score_log_ratio(double real, double q, const ModelConstants& c) {
     return log_of(of_track / of_clutter);
 }
 
-// ln p(y) of a pair, or a number below every bound where it lies outside the gate.
+inline constexpr double kImpossible = -1e9;
+
+// ln p(y) where an occluder cuts one side, or has cut it so far, and the other three fit.
+inline double cut_log_density(const std::array<double, 4>& y, const SidesExpected& expected, const ModelConstants& c) {
+    double out = kImpossible;
+    for (int axis = 0; axis < 2; ++axis) {
+        const filters::Pair2 &S = expected.S[axis], &across = expected.S[1 - axis];
+        const double left = y[2 * axis], right = y[2 * axis + 1], size = expected.size[axis];
+        const double d2 = across.squared_distance(y[2 - 2 * axis], y[3 - 2 * axis]);
+        if (d2 > c.cut_gate) continue;
+        const double whole = -0.5 * d2 - 0.5 * log_of(across.determinant()) - 1.5 * filters::kLog2Pi - log_of(size);
+        const auto with = [&](double other, double variance, double inwards) {
+            const double alone = other * other / variance;
+            if (inwards >= size || inwards <= -c.most_uncovered * size || d2 + alone > c.cut_gate) return;
+            const double share = log_of(inwards > 0.0 ? c.cut_share : c.uncovered_share);
+            out = log_add(out, share + whole - 0.5 * alone - 0.5 * log_of(variance));
+        };
+        with(right, S.rr, left);
+        with(left, S.ll, -right);
+    }
+    return out;
+}
+
+// ln p(y) of a pair, or kImpossible where it lies outside every gate.
 inline double sides_log_density(const Sides& box, const SidesExpected& expected, const ScanTerms& terms,
                                 const ModelConstants& c) {
     const auto y = filters::side_innovations(box, expected.box);
     const double d2 = filters::squared_distance(y, expected.S), wide = filters::squared_distance(y, expected.wide);
-    double cut = -1e9;
-    if (c.cut_in_association > 0.0)
-        for (int axis = 0; axis < 2; ++axis) {
-            const filters::Pair2 &S = expected.S[axis], &T = expected.S[1 - axis];
-            const double l = y[2 * axis], r = y[2 * axis + 1], other = T.squared_distance(y[2 - 2 * axis], y[3 - 2 * axis]);
-            if (other > c.cut_gate) continue;
-            const double base = -0.5 * other - 0.5 * log_of(T.determinant()) - filters::kLog2Pi - log_of(expected.size[axis]) - 0.5 * filters::kLog2Pi;
-            if (l > 0.0 && l < expected.size[axis] && r * r / S.rr + other < c.cut_gate) cut = log_add(cut, base - 0.5 * r * r / S.rr - 0.5 * log_of(S.rr));
-            if (r < 0.0 && -r < expected.size[axis] && l * l / S.ll + other < c.cut_gate) cut = log_add(cut, base - 0.5 * l * l / S.ll - 0.5 * log_of(S.ll));
-        }
-    const bool whole = std::min(d2, c.outlier_gate * wide) <= c.gate;
-    if (!whole && cut < -1e8) return -1e9;
+    const double cut = cut_log_density(y, expected, c);
+    double out = cut;
+    if (std::min(d2, c.outlier_gate * wide) > c.gate) return out;
     const double nu = c.degrees_of_freedom;
     const double body = terms.student_constant - 0.5 * expected.log_det - (nu + 4.0) / 2.0 * log1p_of(d2 / nu);
     const double tail = terms.normal_constant - 0.5 * expected.log_det_wide - 0.5 * wide;
-    const double all = whole ? log_add(terms.log_body + body, terms.log_tail + tail) : -1e9;
-    return cut < -1e8 ? all : log_add(all, log_of(c.cut_in_association) + cut);
+    return log_add(out, log_add(terms.log_body + body, terms.log_tail + tail));
 }
 
 // How far a box's left side may lie from the expected one at most.
 inline double reach(const SidesExpected& expected, const ModelConstants& c) {
-    return std::max(c.cut_in_association > 0. ? expected.size[0] : 0., std::sqrt(c.gate * std::max(expected.S[0].ll, expected.wide[0].ll / c.outlier_gate)));
+    const double whole = std::max(expected.S[0].ll, expected.wide[0].ll / c.outlier_gate);
+    return std::max(std::max(1.0, c.most_uncovered) * expected.size[0], std::sqrt(c.gate * whole));
 }
 
 }  // namespace jeat::association

@@ -123,6 +123,24 @@ inline void update_axis(double* mean, double* P, double left, double right, doub
         }
 }
 
+// Where it is likelier that a side has been cut so far and now shows further out than that both sides measure as
+// before, nothing is known of that side: P grows by d^2 along it.
+inline void uncover(double* P, double left, double right, const Pair2& S, double size, const ModelConstants& c) {
+    const double both = -0.5 * S.squared_distance(left, right) - 0.5 * log_of(S.determinant()) - kLog2Pi;
+    const double out[] = {-left, right}, other[] = {right, left}, variance[] = {S.rr, S.ll};
+    for (int side = 0; side < 2; ++side) {
+        if (out[side] <= 0.0 || out[side] >= c.most_uncovered * size) continue;
+        const double alone = -0.5 * square(other[side]) / variance[side] - 0.5 * (log_of(variance[side]) + kLog2Pi) -
+                             log_of(size) + log_of(c.uncovered_share);
+        if (alone <= both) continue;
+        const double along = (side == 0 ? -1.0 : 1.0) / size, V = square(out[side]);
+        P[kPosition * kStates + kPosition] += V / 4.0;
+        P[kPosition * kStates + kLogSize] += V * along / 2.0;
+        P[kLogSize * kStates + kPosition] += V * along / 2.0;
+        P[kLogSize * kStates + kLogSize] += V * square(along);
+    }
+}
+
 // Update a track by a box: heavy tails, and sides that are cut, have less weight.
 inline void update(double* mean, double* covariance, const std::array<double, 4>& y, const SidesExpected& expected,
                    const ModelConstants& c) {
@@ -130,6 +148,7 @@ inline void update(double* mean, double* covariance, const std::array<double, 4>
     for (int axis = 0; axis < 2; ++axis) {
         const double left = y[2 * axis], right = y[2 * axis + 1];
         const auto cut = cut_probabilities(left, right, expected.S[axis], expected.size[axis], c);
+        uncover(covariance + axis * kMatrix, left, right, expected.S[axis], expected.size[axis], c);
         const double R = expected.variance[axis] * (cut[0] + cut[1] > 0.5 ? 1.0 : heavy);
         update_axis(mean + axis * kStates, covariance + axis * kMatrix, left, right, expected.size[axis],
                     R / std::max(1.0 - cut[0], kLeastProbability), R / std::max(1.0 - cut[1], kLeastProbability));

@@ -74,7 +74,7 @@ struct Evidence {
         recent_weight[at] = recent_weight[at] * keep_recent + clock.weight;
         total[at] = total[at] * keep_total + logit * clock.weight;
         total_weight[at] = total_weight[at] * keep_total + clock.weight;
-        const double now = recent[at] / recent_weight[at];
+        const double now = recent_weight[at] > 0.0 ? recent[at] / recent_weight[at] : logit;
         const double fallen = peak[at] - clock.period_s / c.peak_decay_s * std::max(peak[at] - now, 0.0);
         peak[at] = first ? now : std::max(fallen, now);
         gained[row] += std::min(gain, c.most_gain);

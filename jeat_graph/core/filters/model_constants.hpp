@@ -33,8 +33,9 @@ struct Bounds {
     JEAT_ONE(pixel_std) \
     JEAT_ONE(degrees_of_freedom) \
     JEAT_ONE(cut_share) \
-    JEAT_ONE(cut_in_association) \
     JEAT_ONE(cut_gate) \
+    JEAT_ONE(uncovered_share) \
+    JEAT_ONE(most_uncovered) \
     JEAT_ONE(outlier_share) \
     JEAT_ONE(outlier_std) \
     JEAT_ONE(offset_count) \

@@ -202,7 +202,7 @@ private:
             const double start = log_of(p / (1.0 - p)) - clutter, reach = association::reach(expected, c_);
             index.with_left_in(expected.box.left - reach, expected.box.left + reach, [&](std::size_t j) {
                 const double density = association::sides_log_density(boxes_[j], expected, terms, c_);
-                if (density <= -1e8) return;
+                if (density <= association::kImpossible) return;
                 const double gain = start + density + association::score_log_ratio(tracks.real[i], q_[j], c_);
                 if (gain > 0.0) pairs_.push_back({i, j, gain});
             });
