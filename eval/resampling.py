@@ -192,8 +192,8 @@ def _gather(table: Trajectories, row: IntArray, frame: IntArray, age: FloatArray
 def interpolate_to(table: Trajectories, times: FloatArray, *, max_gap_s: float | None = None) -> Resampled:
     """Smoothed trajectories at given times, between the two neighbouring rows of each track.
 
-    Nothing is said before a track's first row or after its last, nor at a time at which others have a row and it
-    has none: then it is known not to be reported. The centre follows the quintic through
+    Nothing is said before a track's first row or after its last, nor at a time at which others have a row and
+    it has none: then it is known not to be reported. The centre follows the quintic through
     position, velocity and acceleration of both rows, which is the mean of the white-jerk motion model
     between two known states (Barfoot, State Estimation for Robotics, ch. 11); a track without known motion
     moves in a straight line. The box keeps its offset from the centre (it may be clipped) and its log size

@@ -148,6 +148,14 @@ def test_rows_further_apart_than_the_bound_are_not_joined_but_count_themselves()
     assert interpolate_to(table, times).frame.tolist() == [0, 1, 2, 3, 4, 5, 6]
 
 
+def test_a_track_without_a_row_where_others_have_one_is_known_not_to_be_there():
+    """Frame 1 has a row of track 2 alone; at frame 2 nobody has one, and track 1 is between its rows."""
+    table = Trajectories.concatenate([curved([0.0, 1.5], 1), curved([0.5], 2)])
+    out = interpolate_to(table, np.array([0.0, 0.5, 1.0, 1.5]))
+    told = sorted(zip(out.frame.tolist(), out.track_id.tolist(), strict=True))
+    assert told == [(0, 1), (1, 2), (2, 1), (3, 1)]
+
+
 def test_a_clipped_box_keeps_its_offset_from_the_centre():
     table = curved([0.0, 1.0], 1)
     moved = dataclasses.replace(table, boxes=table.boxes + np.array([7.0, 0, 0, 0]))
