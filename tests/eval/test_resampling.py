@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.eval.resampling import check_unique, interpolate_to, predict_to
 
 from .data import make_tracks
