@@ -224,6 +224,29 @@ def read_tables(path: Path, **options: Unpack[ReadingOptions]) -> dict[str, Traj
     return {kind: read_trajectories(file, **options) for kind, file in tables_of(path).items()}
 
 
+def recording_span(source: Path, file: Path, table: Trajectories) -> tuple[float, float]:
+    """Return begin and end of a recording (s): of its scans, where a run says them, else of its tracks.
+
+    A result by frame number begins with its first frame, whatever is the first in which it has a track.
+
+    Args:
+        source: run directory, table or result.
+        file: the table of it that was read.
+        table: what stands in that.
+
+    Raises:
+        DataError: `scans.csv` is not valid.
+    """
+    from jeat_graph.io.formats import BY_FRAME, recognise
+
+    scans = read_instants(source)
+    times = table.t if scans is None or not len(scans) else np.concatenate((table.t, scans))
+    if not len(times):
+        return 0.0, 0.0
+    by_frame = len(table) > 0 and recognise(file) in BY_FRAME
+    return 0.0 if by_frame else float(times.min()), float(times.max())
+
+
 def _rate_beside(truth: Path, form: str, any_will_do: bool) -> float:
     """Rate of a truth that counts frames, from `seqinfo.ini`; any, where the run counts frames too."""
     from jeat_graph.io.motchallenge import sequence_info

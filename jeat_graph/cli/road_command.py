@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.road.points_road import follow_points, summarise
     from jeat_graph.road.results import write_result
     from jeat_graph.road.road_page import write_road_page
-    from jeat_graph.road.sources import boxes_of, contact_pixels, only_points, run_table
+    from jeat_graph.road.sources import boxes_of, contact_pixels, only_points, recording_span_of, run_table
     from jeat_graph.road.speeds import ContactConfig
     from jeat_graph.road.traffic import SummaryConfig, count_columns, headway_columns
 
@@ -98,7 +98,8 @@ def run(args: argparse.Namespace) -> int:
             vehicles = follow_points(
                 points, camera, MotionFitConfig(), contact, lambda done, _: _advance(bar, done)
             )
-    result = summarise(vehicles, camera, marks, contact, LaneConfig(), sized)
+    span_s = recording_span_of(args.source)
+    result = summarise(vehicles, camera, marks, contact, LaneConfig(), sized, span_s)
     write_result(result, out)
     traffic = SummaryConfig() if args.interval is None else SummaryConfig(interval_s=args.interval)
     write_columns(count_columns(result, traffic), out / "counts.csv")

@@ -220,16 +220,13 @@ class Duplicates:
         }
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go on from what `state` returned; that of an earlier build has no memory."""
+        """Go on from what `state` returned."""
         self.seen = {
             source: [Numbering(top, set(recent), newest) for top, recent, newest in counts]
             for source, counts in state["seen"].items()
         }
-        self.restarts, self.forgotten = dict(state["restarts"]), state.get("forgotten", 0)
-        self._memory = Memory(whole=False)
-        if "memory" in state:
-            self._memory.set_state(state["memory"])
-        self._forget()
+        self.restarts, self.forgotten = dict(state["restarts"]), state["forgotten"]
+        self._memory.set_state(state["memory"])
 
 
 def _whose(counts: list[Numbering], t: float) -> int:

@@ -9,6 +9,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.eval.load import recording_span
 from jeat_graph.io.trajectories_io import read_trajectories
 from jeat_graph.road.box_rows import BoxConfig
 from jeat_graph.road.boxes_road import TrackBoxes, boxes_of_table
@@ -87,6 +88,19 @@ def boxes_of(
         say(f"{error}; the table's smoothed boxes are used instead, which are less sure")
         return boxes_of_table(table, camera, config)
     return boxes_of_log(log, sensor_errors(settings), table, camera, config)
+
+
+def recording_span_of(source: str | Path) -> tuple[float, float]:
+    """Begin and end (s) of what the road is made from: of a run's scans, else of the table's rows.
+
+    Raises:
+        DataError: the source cannot be read.
+    """
+    path = run_table(source)
+    if not only_points(path):
+        return recording_span(Path(source), path, read_trajectories(path))
+    times = read_points_table(path).t
+    return (float(times.min()), float(times.max())) if len(times) else (0.0, 0.0)
 
 
 def only_points(path: Path) -> bool:

@@ -129,6 +129,10 @@ class InputWatch:
         """Go on by another configuration: of a tracker that has met another sensor."""
         self._config = config
 
+    def told_of_picture(self) -> None:
+        """Say nothing of boxes outside the picture: whoever has the whole recording has counted them."""
+        self._said.add("outside")
+
     def end(self) -> None:
         """Look at nothing any more: for a tracker that goes on, whose first scans were looked at."""
         self._ended = True
