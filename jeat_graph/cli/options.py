@@ -177,13 +177,18 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add_counting(parser)
     add("--input-format", choices=FORMATS, help="format of the input, if it is not recognised")
-    add(
+    add("--images", metavar="FILE", help="COCO data set with the images and times of COCO results")
+    add_columns(parser)
+
+
+def add_columns(parser: argparse.ArgumentParser) -> None:
+    """Declare what the columns of detections mean, and which of them are taken."""
+    parser.add_argument(
         "--score-scale",
         choices=SCORE_SCALES,
         default="unit",
         help="scores are in [0, 1] (unit), percent, or raw scores of any size (logistic)",
     )
-    add("--images", metavar="FILE", help="COCO data set with the images and times of COCO results")
     add_time_unit(parser)
     add_classes(parser, "take detections of these classes only, and those without a class")
 
@@ -199,18 +204,25 @@ def add_classes(parser: argparse.ArgumentParser, text: str) -> None:
     parser.add_argument("--class", dest="classes", nargs="+", action="extend", metavar="NAME", help=text)
 
 
-def reading(args: argparse.Namespace) -> dict[str, Any]:
-    """Return what `add_reading` declared, as `read_detections` takes it."""
+def columns_read(args: argparse.Namespace) -> ReadingOptions:
+    """Return what `add_counting` and `add_columns` declared, as readers take it, but for `--class`."""
     return {
         "rate_hz": args.rate,
-        "fmt": args.input_format,
-        "score_scale": args.score_scale,
-        "images": args.images,
-        "time_unit": args.time_unit,
-        "classes": args.classes,
         "first_frame": args.first_frame,
         "video": args.only_video,
         "class_names": args.class_names,
+        "score_scale": args.score_scale,
+        "time_unit": args.time_unit,
+    }
+
+
+def reading(args: argparse.Namespace) -> dict[str, Any]:
+    """Return what `add_reading` declared, as `read_many` takes it."""
+    return {
+        **columns_read(args),
+        "fmt": args.input_format,
+        "images": args.images,
+        "classes": args.classes,
     }
 
 

@@ -49,6 +49,8 @@ def names_by_number(said: ClassNames | None, beside: str | Path, first: int) -> 
             return None
     elif "," in str(said) and not Path(said).exists():
         return dict(enumerate((name.strip() for name in str(said).split(",")), first))
+    elif not Path(said).exists():
+        raise DataError("no such file; names of classes themselves have commas between them: car,truck", said)
     return _read(Path(said), first)
 
 

@@ -11,7 +11,7 @@ from typing import Any, Unpack
 import numpy as np
 
 from jeat_graph.data.boxes import without_area
-from jeat_graph.data.column_names import BOX, NUMBER_COLUMNS
+from jeat_graph.data.column_names import BOX, DEFAULT_SENSOR, NUMBER_COLUMNS
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_columns import ASIDE
@@ -33,7 +33,6 @@ from jeat_graph.io.rounding import round_decimals
 from jeat_graph.io.table_writer import write_columns
 from jeat_graph.io.tables import read_table
 
-DEFAULT_SENSOR = "rgb"
 _COLUMNS = ("t", "sensor", *BOX, "score")
 _KINDS = {
     **dict.fromkeys((*NUMBER_COLUMNS, "score"), NUMBER),

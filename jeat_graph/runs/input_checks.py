@@ -121,8 +121,8 @@ def _check_picture(detections: Detections, config: Config, names: str) -> list[s
     beyond = float(max((-low).max(), (high - (width, height)).max()))
     found = (
         f"{names}: {count} of {total} box centres lie outside the picture of {width:g} x {height:g} px, "
-        f"up to {beyond:.0f} px beyond its edge (they reach from {low[0]:.0f}, {low[1]:.0f} to {high[0]:.0f}, "
-        f"{high[1]:.0f})"
+        f"up to {beyond:.0f} px beyond its edge (they reach from {low[0]:.0f}, {low[1]:.0f} to "
+        f"{high[0]:.0f}, {high[1]:.0f})"
     )
     if count == total:
         found += ", so that little or nothing can be tracked"

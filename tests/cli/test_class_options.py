@@ -176,7 +176,7 @@ def test_stream_takes_times_in_other_units(monkeypatch, capsys):
 
 
 def test_classes_that_are_no_names_are_one_clear_line(monkeypatch, capsys):
-    for wrong in ('["car", "van"]', '"car"', "[3]"):
+    for wrong in ('["car", "van"]', '"car"', "[[3]]"):
         line = '{"t": 0, "sensor": "rgb", "boxes": [[1, 2, 3, 4]], "scores": [0.9], "classes": ' + wrong
         monkeypatch.setattr("sys.stdin", Lines(line + "}\n"))
         assert main(["stream"]) == 2

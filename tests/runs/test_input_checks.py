@@ -76,7 +76,9 @@ def test_boxes_that_reach_beyond_the_picture_are_told_of_in_one_line(outside):
     rows = Detections.from_rows(t, names, boxes, np.full(100, 0.9), full, None)
     config = load_config("default", ["image.width=640", "image.height=480"])
     (warning,) = check_detections(rows, config, "det")
-    assert f"det: {outside} of 100 box centres lie outside the picture of 640 x 480 px, up to 60 px" in warning
+    assert (
+        f"det: {outside} of 100 box centres lie outside the picture of 640 x 480 px, up to 60 px" in warning
+    )
     assert ("give it: --image WIDTHxHEIGHT (in Python image=)" in warning) == (outside > 50)
     assert ("nothing can be tracked" in warning) == (outside == 100)
 
