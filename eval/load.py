@@ -16,13 +16,13 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.data.notes import note
 from jeat_graph.data.progress import with_progress
 from jeat_graph.data.rates import ANY_RATE_HZ, median_rate_hz
+from jeat_graph.data.tables.frame_filling import check_rate
+from jeat_graph.data.tables.reading import Reading, ReadingOptions
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.pairing import check_lives, check_pair, check_truth
 from jeat_graph.eval.resampling import TIME_TOLERANCE_S, on_the_clock_of
 from jeat_graph.io.beside import check_beside
 from jeat_graph.io.formats import FIRST_OPEN
-from jeat_graph.io.frames import check_rate
-from jeat_graph.io.reading import Reading, ReadingOptions
 from jeat_graph.io.scans_io import read_instants
 from jeat_graph.io.trajectories_io import read_trajectories_counted
 from jeat_graph.io.truth_io import read_truth_counted
@@ -81,8 +81,8 @@ def load_run(
         truth: the truth, in any format that `read_truth` knows.
         classes: classes of objects to be found; others are ignored, and so are tracks that have another
             class. All by default.
-        options: as `io.reading.Reading` has it: `rate_hz` of files that count frames, by default that of the
-            truth; `time_unit` of the truth's column `t` (runs are in seconds); `first_frame` of the run;
+        options: as `tables.reading.Reading` has it: `rate_hz` of files that count frames, by default that of
+            the truth; `time_unit` of the truth's column `t` (runs are in seconds); `first_frame` of the run;
             `video` of both; `class_names` of the run, and of the truth where that has numbers; `image`.
 
     Raises:
@@ -214,7 +214,7 @@ def read_tables(path: Path, **options: Unpack[ReadingOptions]) -> dict[str, Traj
 
     Args:
         path: run directory, table or result.
-        options: what a result does not say itself, as `io.reading.Reading` has it.
+        options: what a result does not say itself, as `tables.reading.Reading` has it.
 
     Raises:
         DataError: as `tables_of`; or a table is not valid.

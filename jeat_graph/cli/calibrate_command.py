@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from jeat_graph.calibration.procedure import Calibration
     from jeat_graph.config.schema import Config
     from jeat_graph.data.detections import Detections
+    from jeat_graph.data.tables.reading import ReadingOptions
     from jeat_graph.data.trajectories import GroundTruth
     from jeat_graph.eval.tables import Cell, Table
-    from jeat_graph.io.reading import ReadingOptions
     from jeat_graph.runs.beside import Facts
 
 WRITES = ("out",)

@@ -15,9 +15,9 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.data.progress import with_progress
 
 if TYPE_CHECKING:
+    from jeat_graph.data.tables.reading import ReadingOptions
     from jeat_graph.data.trajectories import GroundTruth
     from jeat_graph.eval.tables import Table
-    from jeat_graph.io.reading import ReadingOptions
 
 WRITES = ("json",)
 HELP = "Judge a run, a trajectory table, or another tracker's result against ground truth."

@@ -23,12 +23,12 @@ from jeat_graph.config.argument_types import output_rate, picture_size, positive
 from jeat_graph.config.smoothing import ENGINES
 from jeat_graph.data.frame_numbers import FIRST_FRAMES
 from jeat_graph.data.secrets import without_logins
+from jeat_graph.data.tables.frame_filling import SCORE_SCALES
+from jeat_graph.data.tables.reading import ReadingOptions
 from jeat_graph.data.time_units import TIME_UNITS
 from jeat_graph.io.formats import FORMATS
-from jeat_graph.io.reading import ReadingOptions
 
 OUTPUT_FORMATS = ("csv", "parquet", "motchallenge", "kitti")
-SCORE_SCALES = ("unit", "percent", "logistic")
 
 
 class Parser(argparse.ArgumentParser):

@@ -236,7 +236,7 @@ def _ends(
 def _take_all(
     session: Session, args: argparse.Namespace, interrupts: Interrupts, source: Source | None
 ) -> None:
-    from jeat_graph.io.reading import Reading
+    from jeat_graph.data.tables.reading import Reading
     from jeat_graph.io.stream_reading import StreamReading
     from jeat_graph.live.inputs import from_lines, from_source
 

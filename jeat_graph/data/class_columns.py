@@ -60,6 +60,8 @@ def class_column(classes: Any, probability: Any) -> dict[str, Any]:
 
 #: Columns that say a class: its name or number, its number beside a name, and that name.
 CLASS_COLUMNS = ("class", "class_id", "name")
+#: Number of the first name of a list, but for MOTChallenge text.
+LISTS_COUNT_FROM = 0
 _WHOLE = re.compile(r"(-?\d+)(?:\.0*)?")
 
 
@@ -114,3 +116,31 @@ def rows_of_class(classes: TextArray | None, wanted: Iterable[str], *, unknown: 
         )
     chosen = np.isin(classes, names)
     return np.asarray(chosen | (classes == "") if unknown else chosen, dtype=np.bool_)
+
+
+def listed_names(names: Sequence[str] | Mapping[int, str], first: int) -> dict[int, str]:
+    """Return the names of classes by number.
+
+    Args:
+        names: by number, or in order.
+        first: number of the first one of a list.
+    """
+    if isinstance(names, Mapping):
+        return {int(number): str(name) for number, name in names.items()}
+    return dict(enumerate(map(str, names), first))
+
+
+def name_classes(classes: TextArray | None, names: Mapping[int, str] | None) -> TextArray | None:
+    """Give numbers their names; a number without one stays, and so do classes that have names already.
+
+    Args:
+        classes: (N,) classes as the file has them, empty where unknown.
+        names: by number, or None.
+    """
+    if classes is None or names is None:
+        return classes
+    distinct, place = np.unique(classes, return_inverse=True)
+    if not all_numbers(distinct.tolist()):
+        return classes
+    words = [names.get(int(text), text) if text else "" for text in distinct.tolist()]
+    return np.array(words, dtype=np.str_)[place.reshape(-1)]

@@ -13,7 +13,7 @@ from jeat_graph.data.arrays import TextArray
 from jeat_graph.data.column_names import DEFAULT_SENSOR, FRAME_COLUMNS, TIME_COLUMNS
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.scan import Scan
-from jeat_graph.io.headers import is_number
+from jeat_graph.data.tables.spreadsheets import is_number
 from jeat_graph.io.scan_batch import ScanBatch, Trying, in_order, joined
 from jeat_graph.io.scan_rows import csv_batches, csv_columns
 from jeat_graph.io.stream_reading import StreamReading, video_of_picture

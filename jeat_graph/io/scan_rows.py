@@ -22,9 +22,9 @@ from jeat_graph.data.column_names import (
 )
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_columns import ASIDE
+from jeat_graph.data.tables.spreadsheets import unguarded
 from jeat_graph.io.headers import delimiter_of
 from jeat_graph.io.scan_batch import ScanBatch, Trying
-from jeat_graph.io.spreadsheets import unguarded
 from jeat_graph.io.stream_reading import StreamReading, video_of_picture
 from jeat_graph.io.stream_text import decode_line
 

@@ -15,19 +15,18 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import TextArray
-from jeat_graph.data.class_columns import said_classes
+from jeat_graph.data.class_columns import LISTS_COUNT_FROM, name_classes, said_classes
 from jeat_graph.data.column_names import FRAME_COLUMNS, TIME_COLUMNS
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_numbers import first_frame, split_picture_name
 from jeat_graph.data.notes import note
 from jeat_graph.data.scan import Scan, scan_with_area
+from jeat_graph.data.tables.frame_filling import check_rate, scale_scores, score_hint
+from jeat_graph.data.tables.reading import Reading
 from jeat_graph.data.time_text import KNOWN, seconds_of_text
 from jeat_graph.data.time_units import in_seconds
-from jeat_graph.io.class_names import name_classes, names_by_number
-from jeat_graph.io.frames import check_rate, scale_scores, score_hint
-from jeat_graph.io.reading import Reading
+from jeat_graph.io.class_names import names_by_number
 
-_LISTS_COUNT_FROM = 0
 _SCORE_IS_WRONG = "score must be in"
 
 
@@ -52,8 +51,7 @@ class StreamReading:
         self._goes_on = goes_on
         self._first: int | None = None
         self._video: str | None = None
-        said = self.how.class_names
-        self._names = None if said is None else names_by_number(said, "", _LISTS_COUNT_FROM)
+        self._names = names_by_number(self.how.class_names, None, LISTS_COUNT_FROM)
         self._rate_hz = None if self.how.rate_hz is None else check_rate(self.how.rate_hz, "--rate")
 
     def seconds(self, column: str, value: Any) -> float:

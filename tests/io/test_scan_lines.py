@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.tables.reading import Reading
 from jeat_graph.io.detections_io import read_detections
-from jeat_graph.io.reading import Reading
 from jeat_graph.io.scan_lines import batch_of, read_batches
 from jeat_graph.io.stream_reading import StreamReading
 

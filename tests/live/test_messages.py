@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.tables.reading import Reading
 from jeat_graph.io.packing import pack, unpack
-from jeat_graph.io.reading import Reading
 from jeat_graph.io.stream_reading import StreamReading
 from jeat_graph.live.messages import Duplicates, ScanMessage, decode_scans, encode_tracks
 
