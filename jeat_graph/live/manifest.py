@@ -137,7 +137,8 @@ def _reading(said: Mapping[str, str], folder: Path, error: Callable[[str], DataE
         text = said.get(name, "")
         if text:
             listed = name == "classes" and "," in text and not (folder / text).exists()
-            found[key] = text if listed else str(folder / text)
+            # Absolute: a worker of a cluster stands in another folder.
+            found[key] = text if listed else str((folder / text).resolve())
     return found
 
 
