@@ -91,6 +91,18 @@ def add_rate(parser: argparse.ArgumentParser) -> None:
 
 def add_counting(parser: argparse.ArgumentParser) -> None:
     """Declare how files are read that count frames, number classes, or hold several videos."""
+    add_frames(parser)
+    parser.add_argument(
+        "--classes",
+        dest="class_names",
+        metavar="FILE|NAMES",
+        help="names of classes that files number: one a line, YOLO's data.yaml, or with commas between them; "
+        "MOTChallenge text counts from 1, all else from 0 (default: labels.txt or classes.txt beside)",
+    )
+
+
+def add_frames(parser: argparse.ArgumentParser) -> None:
+    """Declare how files are read that count frames, or hold several videos (`frames_read`)."""
     add_rate(parser)
     add = parser.add_argument
     add(
@@ -101,13 +113,6 @@ def add_counting(parser: argparse.ArgumentParser) -> None:
         "else 1; KITTI 0)",
     )
     add("--only-video", metavar="NAME", help="the video to read of a file that holds several")
-    add(
-        "--classes",
-        dest="class_names",
-        metavar="FILE|NAMES",
-        help="names of classes that files number: one a line, YOLO's data.yaml, or with commas between them; "
-        "MOTChallenge text counts from 1, all else from 0 (default: labels.txt or classes.txt beside)",
-    )
 
 
 def add_tables(parser: argparse.ArgumentParser) -> None:
@@ -123,13 +128,12 @@ def add_tables(parser: argparse.ArgumentParser) -> None:
 
 def tables_read(args: argparse.Namespace) -> ReadingOptions:
     """Return what `add_tables` declared, as readers take it."""
-    return {
-        "rate_hz": args.rate,
-        "first_frame": args.first_frame,
-        "video": args.only_video,
-        "class_names": args.class_names,
-        "image": args.image,
-    }
+    return {**frames_read(args), "class_names": args.class_names, "image": args.image}
+
+
+def frames_read(args: argparse.Namespace) -> ReadingOptions:
+    """Return what `add_frames` declared, as readers take it."""
+    return {"rate_hz": args.rate, "first_frame": args.first_frame, "video": args.only_video}
 
 
 def truth_read(args: argparse.Namespace) -> ReadingOptions:

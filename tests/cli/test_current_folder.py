@@ -112,7 +112,8 @@ def test_workers_on_ray_do_not_look_there(trap, recording):
     pytest.importorskip("ray", reason="Ray is not installed")
     folder, mark = trap
     (folder / "many.csv").write_text(MANIFEST.format(det=recording / "detections.csv"))
-    command = ["batch", "many.csv", "--out", "many", "--engine", "ray", "--workers", "1", "--smoother", "none"]
+    on_ray = ["--engine", "ray", "--workers", "1", "--smoother", "none"]
+    command = ["batch", "many.csv", "--out", "many", *on_ray]
     done = subprocess.run(
         [sys.executable, "-P", "-c", RUN],
         cwd=folder,

@@ -1,8 +1,8 @@
 """A picture mirrored gives the same tracks, mirrored: no side of the picture is another than its opposite.
 
-But for one thing, which is a model of the road: where boxes overlap the lower one is the nearer, as on a road
-that is seen from above (`association.boxes.occluded_fraction`). So vehicles that overlap are mirrored from left
-to right only.
+But for one thing, which is a model of the road: where boxes overlap the lower one is the nearer, as on a
+road that is seen from above (`association.boxes.occluded_fraction`). So vehicles that overlap are mirrored
+from left to right only.
 """
 
 from __future__ import annotations

@@ -24,6 +24,7 @@ from jeat_graph.data.frame_numbers import first_frame, split_picture_name
 from jeat_graph.data.notes import note
 from jeat_graph.data.tables.frame_filling import check_rate
 from jeat_graph.data.tables.reading import Reading
+from jeat_graph.data.tables.spreadsheets import is_number
 from jeat_graph.data.time_units import in_seconds
 from jeat_graph.data.videos import choose_video
 
@@ -158,6 +159,8 @@ def _picture_names(table: FileTable, name: str) -> tuple[list[str], list[int]] |
         table.whole(name)
     except DataError:
         texts = [] if table.blank(name).any() else table.values(name)
+        if any(isinstance(text, str) and is_number(text) for text in texts):
+            raise  # numbers, but not all of them whole
         found = [split_picture_name(text) if isinstance(text, str) else None for text in texts]
         there = [one for one in found if one is not None]
         if not there or len(there) < len(found):
