@@ -22,6 +22,7 @@ from jeat_graph.data.column_names import (
 )
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_columns import ASIDE
+from jeat_graph.data.tables.file_table import advice_on
 from jeat_graph.data.tables.spreadsheets import unguarded
 from jeat_graph.io.headers import delimiter_of
 from jeat_graph.io.scan_batch import ScanBatch, Trying
@@ -112,8 +113,10 @@ def _fields(text: str, name: str, number: int, delimiter: str) -> list[str]:
 
 
 def _csv_row(text: str, form: CsvForm, name: str, number: int, how: StreamReading) -> _Row | None:
-    """Read one row; None if it is of a video that is not asked for."""
+    """Read one row; None if it is of a video that is not asked for, or every field is blank."""
     fields, place = _fields(text, name, number, form.delimiter), form.place
+    if not any(fields):
+        return None
     value = {column: unguarded(fields[k]) if k < len(fields) else "" for column, k in place.items()}
     # Each row is checked by itself, so that its line can be named; one without area stays, as a look.
     try:
@@ -163,7 +166,7 @@ def _number(column: str, text: str, comma: bool) -> float:
         return float(text.replace(",", ".") if comma else text)
     except ValueError:
         raise DataError(
-            f"{column} " + (f"must be a number, got {text!r}" if text else "is missing")
+            f"{column} " + (f"must be a number, got {text!r}{advice_on(text)}" if text else "is missing")
         ) from None
 
 

@@ -184,3 +184,18 @@ def test_the_picture_is_as_large_as_a_file_beside_the_recording_says(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         track(tmp_path / "det.txt", image=(1280, 720))
+
+
+def test_a_column_of_several_kinds_is_text_and_what_is_missing_stays_missing():
+    frame = truth_frame(5).assign(label=["car", None, 3, float("nan"), True]).drop(columns="id")
+    assert Detections.from_pandas(frame).classes.tolist() == ["car", "", "3", "", "True"]
+    with pytest.raises(DataError, match="row 0: score must be a number, got 'high'"):
+        Detections.from_pandas(frame.assign(score=["high", 1.0, 0.5, 1, 0]))
+
+
+def test_detections_that_are_given_as_truth_are_asked_about(tmp_path):
+    frame = truth_frame(5).assign(id=-1, time=[0.0, 0.0, 0.1, 0.1, 0.2])
+    frame.to_csv(tmp_path / "gt.csv", index=False)
+    for source in (frame, tmp_path / "gt.csv"):
+        with pytest.raises(DataError, match=r"object -1 is there twice at t = 0; are these detections"):
+            evaluate(Trajectories.empty(), source)

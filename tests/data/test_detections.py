@@ -282,7 +282,7 @@ def test_boxes_without_area_in_a_data_frame_are_left_out_and_counted():
     assert (len(found), found.num_scans, found.dropped) == (1, 2, 1)
 
 
-@pytest.mark.parametrize("unit", ["s", "us", "ns"])
+@pytest.mark.parametrize("unit", ["s", "ms", "us", "ns"])
 def test_dates_and_spans_of_a_data_frame_are_seconds(unit):
     pd = pytest.importorskip("pandas")
     times = 1.7e9 + np.array([0.0, 1.0, 3.0] if unit == "s" else [0.0, 0.25, 1.5])

@@ -266,3 +266,25 @@ def test_a_stream_of_rows_holds_the_scans_of_the_table(tmp_path_factory, rows, c
         assert batch.scans[0].boxes.tolist() == scan.boxes.tolist()
         assert batch.scans[0].scores.tolist() == scan.scores.tolist()
         assert batch.scans[0].classes.tolist() == scan.classes.tolist()
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("sensor,left,top,width,height\n0,1,2,3,4\n", "x:1: .*column t is missing"),
+        ("t,sensor,left,top,width\n0,rgb,1,2,3\n", "x:1: .*column height is missing"),
+        ("t,left,top,width,height\n0,1,2,3,4\n", "x:1: .*column sensor is missing"),
+        ("t,sensor,left,top,width,height\n0,,1,2,3,4\n", "x:2: sensor is missing"),
+        ("t,sensor,left,top,width,height\n,rgb,1,2,3,4\n", "x:2: t is missing"),
+        ("t,sensor,left,top,width,height,score\n0,rgb,1,2,3,4,90%\n", "x:2: .*'90%'; leave the sign away"),
+    ],
+)
+def test_what_a_row_or_a_header_lacks_is_named(text, what):
+    with pytest.raises(DataError, match=what):
+        batches(text)
+
+
+def test_rows_of_which_every_field_is_blank_are_passed_over_as_in_files():
+    rows = "t,sensor,left,top,width,height\n0,rgb,1,2,3,4\n,,,,,\n0,rgb,5,6,7,8\n ,, ,\n"
+    ((scan,), _, _) = batches(rows)[0]
+    assert len(scan) == 2

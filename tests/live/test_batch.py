@@ -249,3 +249,23 @@ def test_a_column_of_reading_that_is_wrong_is_named_with_its_line(column, value,
     (tmp_path / "m.csv").write_text(f"detections,{column}\na.csv,{value}\n")
     with pytest.raises(DataError, match=rf"m\.csv:[12]: {what}"):
         read_manifest(tmp_path / "m.csv")
+
+
+def test_paths_of_a_manifest_are_seen_from_its_folder(tmp_path):
+    folder = tmp_path / "lists"
+    folder.mkdir()
+    (folder / "m.csv").write_text(
+        "detections,config,gt,camera,classes,images\n"
+        "cam=a.csv;b.csv,my.yaml,gt.csv,camera.yaml,names.txt,images.json\n"
+        "c.csv,highway,,,,\n"
+    )
+    first, second = read_manifest(folder / "m.csv")
+    assert first.detections == (f"cam={folder / 'a.csv'}", str(folder / "b.csv"))
+    assert (first.config, first.truth, first.camera) == tuple(
+        str(folder / name) for name in ("my.yaml", "gt.csv", "camera.yaml")
+    )
+    assert first.reading == {
+        "class_names": str(folder / "names.txt"),
+        "images": str(folder / "images.json"),
+    }
+    assert (second.config, second.reading) == ("highway", {})

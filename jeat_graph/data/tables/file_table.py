@@ -282,11 +282,11 @@ class FileTable:
             return DataError(f"column {name} must hold numbers, not {column.type}", self.path)
         good = first_refused(column, lambda part: _cast(part, self._decimal_comma))
         text = column[good].as_py()
-        return self.error(good, f"{name} must be a number, got {text[:40]!r}{_advice(text)}")
+        return self.error(good, f"{name} must be a number, got {text[:40]!r}{advice_on(text)}")
 
 
-def _advice(text: str) -> str:
-    """What to do about a field that is no number, where that can be told."""
+def advice_on(text: str) -> str:
+    """Say what to do about a field that is no number, where that can be told."""
     if re.fullmatch(r"\s*[\d.,]+\s*%\s*", text):
         return "; leave the sign away, and give --score-scale percent"
     return ""

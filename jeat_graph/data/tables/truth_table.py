@@ -95,7 +95,8 @@ def check_unique(
     same = (np.diff(t[order]) == 0) & (np.diff(ids[order]) == 0)
     if same.any():
         row = int(order[1:][same].min())
-        raise error(row, f"object {ids[row]} is there twice at t = {t[row]:g}")
+        hint = "; are these detections, without identities?" if ids[row] < 0 else ""
+        raise error(row, f"object {ids[row]} is there twice at t = {t[row]:g}{hint}")
 
 
 def check_sizes(error: Callable[[int, str], DataError], boxes: FloatArray) -> None:
