@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
 from jeat_graph.api.beside import FUNCTION_GROUP, find
-from jeat_graph.api.sources import PathLike, Run, Tracks, as_list, recording_of, tables_of, truth_of
+from jeat_graph.api.sources import PathLike, Run, Tracks, as_list, as_names, recording_of, tables_of, truth_of
 from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
@@ -108,6 +108,7 @@ def evaluate(
     from jeat_graph.eval.judge import judge_runs, rows_beyond
     from jeat_graph.eval.load import JudgedRun, check_classes, load_run, restrict_classes, restrict_tracks
 
+    classes = None if classes is None else as_names(classes)
     if outside not in ("false", "ignored"):
         raise DataError(f"outside {outside!r}: must be false or ignored")
     if isinstance(tracks, (str, Path)) and isinstance(truth, (str, Path)):

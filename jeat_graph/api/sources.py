@@ -64,7 +64,12 @@ def recording_of(
         DataError: it is none of these, or not valid.
     """
     found = _recording_of(detections, options)
-    return found if classes is None else found.of_class(*classes)
+    return found if classes is None else found.of_class(*as_names(classes))
+
+
+def as_names(classes: Sequence[str] | str) -> list[str]:
+    """Return names of classes, of which one may stand alone."""
+    return [classes] if isinstance(classes, str) else list(classes)
 
 
 def _recording_of(detections: Any, options: ReadingOptions) -> Detections:

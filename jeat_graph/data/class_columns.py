@@ -124,10 +124,16 @@ def listed_names(names: Sequence[str] | Mapping[int, str], first: int) -> dict[i
     Args:
         names: by number, or in order.
         first: number of the first one of a list.
+
+    Raises:
+        DataError: neither.
     """
-    if isinstance(names, Mapping):
-        return {int(number): str(name) for number, name in names.items()}
-    return dict(enumerate(map(str, names), first))
+    try:
+        if isinstance(names, Mapping):
+            return {int(number): str(name) for number, name in names.items()}
+        return dict(enumerate(map(str, names), first))
+    except (TypeError, ValueError):
+        raise DataError(f"class_names are names in order, or by number, not {names!r:.60}") from None
 
 
 def name_classes(classes: TextArray | None, names: Mapping[int, str] | None) -> TextArray | None:

@@ -199,3 +199,17 @@ def test_detections_that_are_given_as_truth_are_asked_about(tmp_path):
     for source in (frame, tmp_path / "gt.csv"):
         with pytest.raises(DataError, match=r"object -1 is there twice at t = 0; are these detections"):
             evaluate(Trajectories.empty(), source)
+
+
+def test_one_class_may_stand_alone_and_what_is_no_list_of_names_is_refused():
+    frame = people_s_rows()
+    alone, listed = (
+        track(frame, image=(1280, 720), classes=one, **OPTIONS).causal for one in ("truck", ["truck"])
+    )
+    assert np.array_equal(alone.mean, listed.mean)
+    assert evaluate(frame, frame, classes="truck", **OPTIONS)["causal"]["MOTA"] == 100.0
+    for wrong in (7, {"x": "car"}):
+        with pytest.raises(DataError, match="class_names are names in order, or by number"):
+            Detections.from_pandas(frame, **(OPTIONS | {"class_names": wrong}))
+    with pytest.raises(DataError, match=r"the frame rate must be a number .Hz., not '20'"):
+        Detections.from_pandas(frame, **(OPTIONS | {"rate_hz": "20"}))

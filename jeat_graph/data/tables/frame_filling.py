@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import SupportsFloat
 
 import numpy as np
 
@@ -22,8 +23,10 @@ def check_rate(rate_hz: float, path: str | Path | None) -> float:
     """Return a frame rate (Hz).
 
     Raises:
-        DataError: it is not positive and finite.
+        DataError: it is no number, or not positive and finite.
     """
+    if not isinstance(rate_hz, SupportsFloat):  # of a user in Python
+        raise DataError(f"the frame rate must be a number (Hz), not {rate_hz!r:.40}", path)
     if not (math.isfinite(rate_hz) and rate_hz > 0):
         raise DataError(f"the frame rate must be positive, got {rate_hz} Hz", path)
     return float(rate_hz)
