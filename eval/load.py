@@ -11,7 +11,7 @@ from typing import Unpack
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.data.class_columns import all_numbers, rows_of_class
+from jeat_graph.data.class_columns import all_numbers, naming_hint, rows_of_class
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.notes import note
 from jeat_graph.data.progress import with_progress
@@ -167,7 +167,10 @@ def check_classes(truths: Sequence[GroundTruth], classes: Sequence[str]) -> None
     """
     there = sorted({str(name) for one in truths if one.classes is not None for name in one.classes})
     if not set(classes) & set(there):
-        raise DataError(f"no object is of class {' or '.join(classes)}; the truth has: {', '.join(there)}")
+        raise DataError(
+            f"no object is of class {' or '.join(classes)}; the truth has: {', '.join(there)}"
+            + naming_hint(there)
+        )
 
 
 def tables_of(path: Path) -> dict[str, Path]:

@@ -54,10 +54,12 @@ def track(
     from jeat_graph.runs.latency import at_measurement
     from jeat_graph.tracking.tracker import Tracker
 
-    recording = recording_of(detections, {**options, "image": image}, classes)
+    recording = recording_of(detections, {**options, "image": image})
     settings = _settings(config, image, detections)
     check_units(recording, settings, "the detections")  # before rates are taken for what they seem
     tracker = Tracker(fit_input(settings, recording)[0])
+    if classes is not None:  # the picture is as large as the boxes of all classes reach
+        recording = recording.of_class(*as_names(classes))
     recording = at_measurement(recording, tracker.config)
     causal = Trajectories.concatenate(list(tracker.run(recording)) or [Trajectories.empty()])
     wanted = tracker.config.smoother.engine != "none"

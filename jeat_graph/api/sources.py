@@ -48,23 +48,26 @@ class Run(NamedTuple):
     record: dict[str, Any]
 
 
-def recording_of(
-    detections: Detections | pd.DataFrame | PathLike,
-    options: ReadingOptions,
-    classes: Sequence[str] | None = None,
-) -> Detections:
+def recording_of(detections: Detections | pd.DataFrame | PathLike, options: ReadingOptions) -> Detections:
     """Return a recording that is given as such, as a data frame, or as a file.
 
     Args:
         detections: it.
         options: how a data frame or file is read.
-        classes: the detections to take, and those without a class; None takes all.
 
     Raises:
         DataError: it is none of these, or not valid.
     """
-    found = _recording_of(detections, options)
-    return found if classes is None else found.of_class(*as_names(classes))
+    if isinstance(detections, (str, Path)):
+        return read_detections(detections, **options)
+    if isinstance(detections, Detections):
+        return detections
+    if hasattr(detections, "columns"):
+        return Detections.from_pandas(detections, **for_frames(options))
+    raise DataError(
+        "detections are Detections, a data frame, or the path of a file (make one of arrays with "
+        f"Detections.from_rows, of several with Detections.concatenate), not {type(detections).__name__}"
+    )
 
 
 def as_names(classes: Sequence[str] | str) -> list[str]:

@@ -91,6 +91,11 @@ def said_classes(found: Mapping[str, TextArray]) -> TextArray | None:
     return np.where(found["name"] == "", numbers, found["name"])
 
 
+def naming_hint(names: Iterable[str]) -> str:
+    """Say what gives classes their names, where all of some are numbers."""
+    return " (--classes FILE names them, in Python class_names=)" if all_numbers(names) else ""
+
+
 def rows_of_class(classes: TextArray | None, wanted: Iterable[str], *, unknown: bool) -> BoolArray:
     """Tell which rows are of one of some classes.
 
@@ -110,9 +115,9 @@ def rows_of_class(classes: TextArray | None, wanted: Iterable[str], *, unknown: 
         raise DataError("there is no class to choose by: no detection has one")
     there = sorted({str(name) for name in np.unique(classes)} - {""})
     if not set(names) & set(there):
-        hint = " (--classes FILE names them, in Python class_names=)" if all_numbers(there) else ""
         raise DataError(
-            f"nothing is of class {' or '.join(names)}; there are: {', '.join(there) or 'none'}{hint}"
+            f"nothing is of class {' or '.join(names)}; there are: {', '.join(there) or 'none'}"
+            + naming_hint(there)
         )
     chosen = np.isin(classes, names)
     return np.asarray(chosen | (classes == "") if unknown else chosen, dtype=np.bool_)

@@ -139,7 +139,7 @@ def read_many(paths: Sequence[str | Path], **options: Any) -> Detections:
                 found[k] = _read_counted(path, name or sensor, fmt, replace(how, first_frame=0))
     parts = [one for one, _ in found]
     whole = parts[0] if len(parts) == 1 else Detections.concatenate(parts)
-    return whole if classes is None else _of_class(whole, classes, split_name(paths[0])[1])
+    return whole if classes is None else of_class_in(whole, classes, split_name(paths[0])[1])
 
 
 def _names_sensors(path: str | Path, fmt: str | None) -> bool:
@@ -150,7 +150,12 @@ def _names_sensors(path: str | Path, fmt: str | None) -> bool:
     )
 
 
-def _of_class(detections: Detections, classes: Sequence[str], path: str | Path) -> Detections:
+def of_class_in(detections: Detections, classes: Sequence[str], path: str | Path) -> Detections:
+    """Keep the detections of some classes, and those of which none is known; errors name the file.
+
+    Raises:
+        DataError: no detection has a class, or none is of one of these.
+    """
     try:
         return detections.of_class(*classes)
     except DataError as error:

@@ -116,6 +116,14 @@ def test_a_class_that_is_not_there_is_named_with_those_that_are():
         check_classes([truth], ["car"])
 
 
+def test_classes_that_are_numbers_are_named_with_what_names_them():
+    truth = make_truth([0.0], [1], BOX[:1], classes=np.array(["3"]))
+    with pytest.raises(
+        DataError, match=r"the truth has: 3 \(--classes FILE names them, in Python class_names=\)"
+    ):
+        check_classes([truth], ["car"])
+
+
 def test_a_truth_without_a_class_that_another_has_is_judged_with_nothing_to_find():
     cars = make_truth([0.0], [1], BOX[:1], classes=np.array(["Car"]))
     vans = make_truth([0.0], [1], BOX[:1], classes=np.array(["Van"]))
