@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
     from jeat_graph.data.errors import DataError
     from jeat_graph.data.trajectories import Trajectories
+    from jeat_graph.io.stream_reading import StreamReading
     from jeat_graph.live.interrupts import Interrupts
     from jeat_graph.live.late import LiveTracker
     from jeat_graph.live.messages import ScanMessage
@@ -238,17 +239,35 @@ def _take_all(
 ) -> None:
     from jeat_graph.data.tables.reading import Reading
     from jeat_graph.io.stream_reading import StreamReading
-    from jeat_graph.live.inputs import from_lines, from_source
+    from jeat_graph.live.inputs import from_lines
 
     bad = _skip(session) if args.on_error == "skip" else None
     # What a broker keeps, or comes after a checkpoint, may be from the middle of a recording.
     goes_on = source is not None or args.checkpoint is not None
     how = StreamReading(Reading(**columns_read(args)), args.classes, goes_on=goes_on)
-    if source is None:
-        lines = interrupts.lines(sys.stdin.buffer)
-        for message, place in from_lines(lines, STDIN, args.joint, bad, how):
-            _take(session, message, place, bad)
-        return
+    try:
+        if source is None:
+            lines = interrupts.lines(sys.stdin.buffer)
+            for message, place in from_lines(lines, STDIN, args.joint, bad, how):
+                _take(session, message, place, bad)
+        else:
+            _take_from(source, session, interrupts, bad, how)
+    finally:
+        unseen = how.never_came()
+        if unseen is not None:
+            _say(f"warning: {unseen}")
+
+
+def _take_from(
+    source: Source,
+    session: Session,
+    interrupts: Interrupts,
+    bad: Callable[[DataError], None] | None,
+    how: StreamReading,
+) -> None:
+    """Take what a broker brings, until a signal comes."""
+    from jeat_graph.live.inputs import from_source
+
     since = 0
     for item in from_source(source, str(source.address), interrupts, bad, how):
         if item is not None:

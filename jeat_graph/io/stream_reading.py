@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import TextArray
-from jeat_graph.data.class_columns import LISTS_COUNT_FROM, name_classes, said_classes
+from jeat_graph.data.class_columns import LISTS_COUNT_FROM, name_classes, naming_hint, said_classes
 from jeat_graph.data.column_names import FRAME_COLUMNS, TIME_COLUMNS
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_numbers import first_frame, split_picture_name
@@ -27,6 +27,8 @@ from jeat_graph.data.time_text import KNOWN, seconds_of_text
 from jeat_graph.data.time_units import in_seconds
 from jeat_graph.io.class_names import names_by_number
 
+# Of more classes than these no more are named.
+_MOST_NAMED = 20
 _SCORE_IS_WRONG = "score must be in"
 
 
@@ -51,6 +53,8 @@ class StreamReading:
         self._goes_on = goes_on
         self._first: int | None = None
         self._video: str | None = None
+        self._told_of_video = False
+        self._found: set[str] = set()  # classes that came, as long as none of those asked for has
         self._names = names_by_number(self.how.class_names, None, LISTS_COUNT_FROM)
         self._rate_hz = None if self.how.rate_hz is None else check_rate(self.how.rate_hz, "--rate")
 
@@ -86,9 +90,11 @@ class StreamReading:
             DataError: it is the second, and none is chosen.
         """
         if self.how.video is not None:
-            if name != str(self.how.video):
-                note(f"what is of video {name!r} is passed over")
-            return name == str(self.how.video)
+            other = name != str(self.how.video)
+            if other and not self._told_of_video:
+                note(f"what is of video {name!r}, or another than {self.how.video}, is passed over")
+            self._told_of_video = self._told_of_video or other
+            return not other
         if self._video is None:
             self._video = name
         if name != self._video:
@@ -133,10 +139,25 @@ class StreamReading:
             raise (error if score is None else DataError(place + score_hint(score))) from None
         return self._of_classes(found), flat
 
+    def never_came(self) -> str | None:
+        """Say that nothing of the classes asked for has come, and what has; None where there is nothing to say.
+
+        Most likely a name is misspelt, or classes are numbers.
+        """
+        there = sorted(self._found - {""})
+        if self._classes is None or not there or set(self._classes) & set(there):
+            return None
+        return (
+            f"nothing was of class {' or '.join(self._classes)}; there were: {', '.join(there)}"
+            + naming_hint(there)
+        )
+
     def _of_classes(self, scan: Scan) -> Scan:
         """Leave out detections of classes that are not asked for."""
         if self._classes is None or scan.classes is None:
             return scan
+        if len(self._found) < _MOST_NAMED:
+            self._found.update(scan.classes.tolist())
         keep = np.isin(scan.classes, [*self._classes, ""])
         looks = None if scan.embeddings is None else scan.embeddings[keep]
         return replace(

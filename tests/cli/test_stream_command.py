@@ -453,3 +453,20 @@ def test_stream_takes_frames_from_where_they_are_said_to_begin(monkeypatch, caps
     code, _, err = stream(text, monkeypatch, capsys)
     assert code == 2
     assert "<stdin>:2: has frame numbers only; give their rate with --rate" in err
+
+
+def test_classes_of_which_nothing_came_are_told_of_at_the_end(monkeypatch, capsys):
+    rows = tables(5)["t"].encode()
+    code, _, err = stream(rows, monkeypatch, capsys, "--class", "car", "bus")
+    assert code == 0
+    assert "warning: nothing was of class car or bus; there were: 1 (--classes FILE names them" in err
+    code, _, err = stream(rows, monkeypatch, capsys, "--class", "car", "--classes", "bus,car")
+    assert (code, "nothing was of class" in err) == (0, False)
+
+
+def test_videos_that_are_passed_over_are_told_of_once(monkeypatch, capsys):
+    rows = "t,sensor,left,top,width,height,video\n" + "".join(f"{k},rgb,1,2,30,40,v{k}\n" for k in range(9))
+    code, out, err = stream(rows, monkeypatch, capsys, "--only-video", "v8")
+    assert code == 0
+    assert len(out.splitlines()) == 1
+    assert err.count("passed over") == 1
