@@ -140,7 +140,7 @@ class StreamReading:
         return self._of_classes(found), flat
 
     def never_came(self) -> str | None:
-        """Say that nothing of the classes asked for has come, and what has; None where there is nothing to say.
+        """Say that nothing of the classes asked for has come, and what has; None where that is not so.
 
         Most likely a name is misspelt, or classes are numbers.
         """
@@ -156,8 +156,8 @@ class StreamReading:
         """Leave out detections of classes that are not asked for."""
         if self._classes is None or scan.classes is None:
             return scan
-        if len(self._found) < _MOST_NAMED:
-            self._found.update(scan.classes.tolist())
+        came = set(scan.classes.tolist())
+        self._found |= came if len(self._found) < _MOST_NAMED else came & set(self._classes)
         keep = np.isin(scan.classes, [*self._classes, ""])
         looks = None if scan.embeddings is None else scan.embeddings[keep]
         return replace(

@@ -288,3 +288,15 @@ def test_rows_of_which_every_field_is_blank_are_passed_over_as_in_files():
     rows = "t,sensor,left,top,width,height\n0,rgb,1,2,3,4\n,,,,,\n0,rgb,5,6,7,8\n ,, ,\n"
     ((scan,), _, _) = batches(rows)[0]
     assert len(scan) == 2
+
+
+@given(st.lists(st.lists(st.integers(0, 60).map(str), max_size=4), max_size=40))
+def test_that_a_class_never_came_is_said_if_and_only_if_it_did_not(scans):
+    how = StreamReading(classes=["7"])
+    lines = [
+        {"t": t, "sensor": "rgb", "boxes": [[1, 2, 3, 4]] * len(names), "classes": names}
+        for t, names in enumerate(scans)
+    ]
+    list(read_batches([json.dumps(line).encode() for line in lines], "x", how=how))
+    came = {name for names in scans for name in names}
+    assert (how.never_came() is not None) == (bool(came) and "7" not in came)
