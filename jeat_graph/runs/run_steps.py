@@ -65,7 +65,6 @@ class RunSteps:
         self._named = detections.classes is not None
         self._smooths = config.smoother.engine != "none"
         self._tracker = Tracker(config, diagnostics=options.diagnostics)
-        self._tracker.told_of_picture()  # by `input_checks`
         self._reported: set[int] = set()
         self._rows = {"causal": 0, "smoothed": 0}
         self._done = 0

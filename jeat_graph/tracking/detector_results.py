@@ -119,10 +119,6 @@ class DetectorResults(SavedTracks):
         watch.know(config)
         vars(self).update(vars(fresh))
 
-    def told_of_picture(self) -> None:
-        """Warn of no boxes outside the picture: those of the whole recording have been counted already."""
-        self._watch.told_of_picture()
-
     def number_on_from(self, identity: int) -> None:
         """Give no track that begins from now on an identity below this."""
         self._next_id = max(self._next_id, identity)
