@@ -81,7 +81,7 @@ def said_classes(found: Mapping[str, TextArray]) -> TextArray | None:
         Classes (N,), numbers without decimals; None where no column says them.
     """
     said = next((found[name] for name in CLASS_COLUMNS[:2] if name in found), None)
-    if said is None or not all_numbers(np.unique(said).tolist()):
+    if said is None or not all_numbers(set(said.tolist())):  # a set takes a fraction of a sort's time
         return said
     names, place = np.unique(said, return_inverse=True)
     whole = [_WHOLE.sub(r"\1", name) for name in names.tolist()]

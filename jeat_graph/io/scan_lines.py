@@ -192,8 +192,9 @@ def _classes_of(item: dict[Any, Any]) -> dict[str, TextArray]:
 
 def _is_class(value: Any) -> bool:
     """Whether a value names a class, numbers it, or says that it is not known."""
-    whole = isinstance(value, int | float) and not isinstance(value, bool) and float(value).is_integer()
-    return value is None or isinstance(value, str) or whole
+    if value is None or isinstance(value, str):
+        return True
+    return isinstance(value, int | float) and not isinstance(value, bool) and float(value).is_integer()
 
 
 def _with_blanks(found: Any) -> Any:

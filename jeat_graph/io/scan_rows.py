@@ -121,7 +121,8 @@ def _csv_row(text: str, form: CsvForm, name: str, number: int, how: StreamReadin
     # Each row is checked by itself, so that its line can be named; one without area stays, as a look.
     try:
         row = _row_of(value, form, how)
-        flat = 0 if row is None else _scan_of_rows([row], number, how).flat
+        # Of classes everything is taken: they would only cost time here.
+        flat = 0 if row is None else _scan_of_rows([row._replace(kinds={})], number, how).flat
     except DataError as error:
         raise DataError(error.message.removeprefix("box 0: "), name, number) from None
     return row._replace(box=None, flat=flat) if row is not None and flat else row
