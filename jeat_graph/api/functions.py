@@ -72,7 +72,8 @@ def _settings(config: Config | PathLike, image: tuple[float, float] | None, *rec
 
     found = as_config(config, image)
     files = [one for one in recordings if isinstance(one, (str, Path))]
-    if image is not None or not files:
+    said = image is not None or (isinstance(config, Config) and found.input.picture == "given")
+    if said or not files:
         return found
     return with_picture(found, (), facts_beside(files))[0]
 

@@ -13,6 +13,7 @@ from jeat_graph import (
     calibrate,
     compare,
     evaluate,
+    load_config,
     read_detections,
     read_run,
     track,
@@ -184,6 +185,7 @@ def test_the_picture_is_as_large_as_a_file_beside_the_recording_says(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         track(tmp_path / "det.txt", image=(1280, 720))
+        track(tmp_path / "det.txt", load_config("default", ["image.width=1280", "image.height=720"]))
 
 
 def test_a_column_of_several_kinds_is_text_and_what_is_missing_stays_missing():
