@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections import Counter
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -68,6 +69,9 @@ def csv_columns(header: str, name: str, at: int) -> CsvForm:
     """
     mark = delimiter_of(header)
     columns = usual_names(_fields(header, name, at, mark), (*_COLUMNS, *_OPTIONAL))
+    twice = next((column for column, count in Counter(columns).items() if count > 1), None)
+    if twice is not None:
+        raise DataError(f"column {twice!r} is there twice", name, at)
     time, sides = standing_in(columns, ["t"])[0], standing_in(columns, BOX)
     needed = [time, *(() if time in FRAME_COLUMNS else ("sensor",)), *sides]
     missing = [column for column in needed if column not in columns]
@@ -94,15 +98,27 @@ def csv_batches(
         if row is None and text != "":
             continue  # it was bad, or of another video
         if rows and (row is None or (row.t, row.sensor) != (rows[0].t, rows[0].sensor)):
-            yield _scan_of_rows(rows, first, how)
+            batch = trying(_scan_that_fits, rows, first, name, how)
             rows = []
+            if batch is not None:
+                yield batch
         if row is None:
             yield None
             continue
         first = first if rows else number
         rows.append(row)
-    if rows:
-        yield _scan_of_rows(rows, first, how)
+    batch = trying(_scan_that_fits, rows, first, name, how) if rows else None
+    if batch is not None:
+        yield batch
+
+
+def _scan_that_fits(rows: list[_Row], first: int, name: str, how: StreamReading) -> ScanBatch:
+    """Make the scan of rows that are good each by itself; errors name the line of the first."""
+    lengths = sorted({len(row.look) for row in rows if row.look is not None})
+    if len(lengths) > 1:
+        what = f"embeddings of one scan must have equally many numbers, not {lengths[0]} and {lengths[1]}"
+        raise DataError(what, name, first)
+    return _scan_of_rows(rows, first, how)
 
 
 def _fields(text: str, name: str, number: int, delimiter: str) -> list[str]:

@@ -21,6 +21,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_numbers import first_frame, split_picture_name
 from jeat_graph.data.notes import note
 from jeat_graph.data.scan import Scan, scan_with_area
+from jeat_graph.data.tables.file_table import LARGEST_EXACT
 from jeat_graph.data.tables.frame_filling import check_rate, scale_scores, score_hint
 from jeat_graph.data.tables.reading import Reading
 from jeat_graph.data.time_text import KNOWN, seconds_of_text
@@ -181,7 +182,7 @@ class StreamReading:
         named = split_picture_name(value) if number is None and isinstance(value, str) else None
         if named is not None:
             frame = named[1]
-        elif number is not None and number.is_integer():
+        elif number is not None and number.is_integer() and abs(number) <= LARGEST_EXACT:
             frame = int(number)
         else:
             raise DataError(f"{column} must be a whole number or a picture's name, got {value!r:.60}")

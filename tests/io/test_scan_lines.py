@@ -120,6 +120,7 @@ def test_times_of_json_are_those_of_tables(said, unit, seconds):
         ({"t": 1, "frame": 1}, {}, "has both t and frame"),
         ({"frame": 3}, {}, "give their rate with --rate"),
         ({"frame": 0.5}, {"rate_hz": 20.0}, "whole number or a picture's name"),
+        ({"frame": 10**30}, {"rate_hz": 20.0}, "whole number or a picture's name"),
         ({"frame": 0}, {"rate_hz": 20.0, "first_frame": 1}, "frames count from 1, got 0"),
         ({"frame": 7}, {"rate_hz": 20.0, "goes_on": True}, "give --first-frame 0 or 1"),
         ({}, {}, "t is missing"),
@@ -276,6 +277,11 @@ def test_a_stream_of_rows_holds_the_scans_of_the_table(tmp_path_factory, rows, c
         ("t,left,top,width,height\n0,1,2,3,4\n", "x:1: .*column sensor is missing"),
         ("t,sensor,left,top,width,height\n0,,1,2,3,4\n", "x:2: sensor is missing"),
         ("t,sensor,left,top,width,height\n,rgb,1,2,3,4\n", "x:2: t is missing"),
+        ("t,t,sensor,left,top,width,height\n0,0,rgb,1,2,3,4\n", "x:1: column 't' is there twice"),
+        (
+            "t,sensor,left,top,width,height,embedding\n0,rgb,1,2,3,4,1 2\n0,rgb,1,2,3,4,1 2 3\n",
+            "x:2: embeddings of one scan must have equally many numbers, not 2 and 3",
+        ),
         ("t,sensor,left,top,width,height,score\n0,rgb,1,2,3,4,90%\n", "x:2: .*'90%'; leave the sign away"),
     ],
 )
@@ -300,3 +306,13 @@ def test_that_a_class_never_came_is_said_if_and_only_if_it_did_not(scans):
     list(read_batches([json.dumps(line).encode() for line in lines], "x", how=how))
     came = {name for names in scans for name in names}
     assert (how.never_came() is not None) == (bool(came) and "7" not in came)
+
+
+def test_a_scan_whose_rows_do_not_fit_is_passed_over_where_errors_are():
+    rows = "t,sensor,left,top,width,height,embedding\n" + "".join(
+        f"{t},rgb,1,2,3,4,{look}\n" for t, look in ((0, "1 2"), (0, "1"), (1, "3"), (2, "1 2"), (2, "1"))
+    )
+    said = []
+    found = batches(rows, bad=lambda error: said.append(error.line))
+    assert [batch.t for batch in found] == [1.0]
+    assert said == [2, 5]

@@ -21,7 +21,8 @@ from jeat_graph.data.tables.spreadsheets import is_number, unguarded
 from jeat_graph.data.tables.vector_columns import read_vectors
 from jeat_graph.data.time_text import all_seconds, looks_like_time
 
-_LARGEST_EXACT = 2.0**53  # beyond it a float cannot tell neighbouring whole numbers apart
+#: Beyond it a float cannot tell neighbouring whole numbers apart.
+LARGEST_EXACT = 2.0**53
 
 
 class FileTable:
@@ -201,7 +202,7 @@ class FileTable:
                 pass
         values = self.number(name, blank_ok=blank_ok)
         values = np.where(is_null, 0.0, values)
-        good = (values == np.rint(values)) & (np.abs(values) <= _LARGEST_EXACT)
+        good = (values == np.rint(values)) & (np.abs(values) <= LARGEST_EXACT)
         if not good.all():
             row = int(np.argmin(good))
             raise self.error(row, f"{name} must be a whole number, got {values[row]:g}")
