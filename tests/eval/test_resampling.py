@@ -162,3 +162,8 @@ def test_a_clipped_box_keeps_its_offset_from_the_centre():
     moved = dataclasses.replace(table, boxes=table.boxes + np.array([7.0, 0, 0, 0]))
     out = interpolate_to(moved, np.array([0.3]))
     np.testing.assert_allclose(out.boxes[:, 0] + 20 - 7, curve(np.array([0.3]))[:, 0], atol=1e-9)
+
+
+def test_between_smoothed_rows_variances_go_over_evenly():
+    table = make_tracks([0.0, 1.0], [1, 1], [[0, 0, 10, 10]] * 2, var=np.repeat([[1.0], [3.0]], 6, axis=1))
+    assert interpolate_to(table, np.array([0.0, 0.25, 1.0])).var[:, 0].tolist() == [1.0, 1.5, 3.0]
