@@ -178,7 +178,8 @@ def track_files(
     detections = at_measurement(detections, config)
     record.timings["read_s"] = round(time.perf_counter() - begin, 4)
     record.counts = {"scans": detections.num_scans, "detections": len(detections)}
-    notice_if_cold()
+    if config.tracker.engine == "compiled":
+        notice_if_cold()
     with directory:
         write_run(detections, config, directory, record, request.options)
     return record

@@ -234,8 +234,7 @@ class ModelTracker:
             JeatGraphError: always.
         """
         raise JeatGraphError(
-            f"engine {self._engine} has no {name} yet: its state is neither saved nor taken back; "
-            "tracker.engine=compiled has it"
+            f"engine {self._engine} has no {name} yet; --set tracker.engine=compiled, or another preset, has it"
         )
 
     def _lag_s(self) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from jeat_graph import Tracker, Trajectories, load_config
+from jeat_graph.cli.main import main
 from jeat_graph.core import _core
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.tracking.model_tracker import ModelTracker
@@ -197,3 +199,33 @@ def test_constants_are_taken_by_name():
     usual = ModelTracker("core", image=(1280, 720))
     rows = [sum(len(made.step(scan)) for scan in moving(10)) for made in (careful, usual)]
     assert rows[0] < rows[1]
+
+
+def test_commands_track_with_it_and_say_nothing_of_a_compiler(tmp_path, capsys):
+    rows = [f"{t},{s},{x},{y},{w},{h},.9" for t, s, boxes, _ in moving(40) for x, y, w, h in boxes]
+    source = tmp_path / "detections.csv"
+    source.write_text("t,sensor,left,top,width,height,score\n" + "\n".join(rows) + "\n")
+    out = tmp_path / "run"
+    assert main(["track", str(source), "--config", "core", "--image", "1280x720", "--out", str(out)]) == 0
+    assert "compile" not in capsys.readouterr().err
+    learnt = json.loads((out / "run.json").read_text())["learnt"]["cam"]
+    assert learnt["p_detect"] > 0.9
+    assert {path.name for path in out.iterdir()} >= {"causal.csv", "smoothed.csv"}
+
+
+@pytest.mark.parametrize("asked", [["--diagnostics"], ["--resume"]])
+def test_what_the_engine_lacks_is_one_line(tmp_path, capsys, asked):
+    source = tmp_path / "detections.csv"
+    source.write_text("t,sensor,left,top,width,height,score\n0,cam,1,2,30,40,.9\n.1,cam,1,2,30,40,.9\n")
+    command = [
+        "track",
+        str(source),
+        "--config",
+        "core",
+        "--image",
+        "1280x720",
+        "--out",
+        str(tmp_path / "run"),
+    ]
+    assert main([*command, *asked]) == 2
+    assert "tracker.engine" in capsys.readouterr().err.splitlines()[-1]
