@@ -233,9 +233,7 @@ class ModelTracker:
         Raises:
             JeatGraphError: always.
         """
-        raise JeatGraphError(
-            f"engine {self._engine} has no {name} yet; --set tracker.engine=compiled, or another preset, has it"
-        )
+        raise JeatGraphError(f"engine {self._engine} has no {name} yet; tracker.engine=compiled has it")
 
     def _lag_s(self) -> float:
         if not self._smooths:
