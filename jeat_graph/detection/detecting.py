@@ -149,6 +149,7 @@ def _frames(request: DetectRequest, stack: ExitStack, say: Callable[[str], objec
     source = stack.enter_context(open_frames(request.frames, request.rate_hz))
     width, height = source.size_px
     say(f"frames: {len(source)} of {width} x {height} px, {request.frames}")
+    say(f"times of the frames: {source.clock}")
     if source.missing:
         say(f"{request.frames}: damaged or cut off: {source.missing} frames cannot be decoded")
     return source
@@ -243,7 +244,8 @@ def _with_note(scans: _Scans, note: Callable[[], str], say: Callable[[str], obje
 def _events(
     request: DetectRequest, source: FrameSource | None, stack: ExitStack, say: Callable[[str], object]
 ) -> _Recording:
-    """Open the events; return them, and width and height of their picture (px)."""
+    """Open the events, `t_offset_us` for the clock of the frames; return them, and their width and height."""
+    from jeat_graph.io.events.frame_clock import FrameClock, events_later_us
     from jeat_graph.io.events.opening import open_events
 
     assert request.events is not None
@@ -251,6 +253,10 @@ def _events(
     reader.labels = False
     width, height = reader.needed_size(beside_px=None if source is None else source.size_px)
     say(f"events: {reader.format_name} of {width} x {height} px, {request.events}")
+    clock = None if source is None else FrameClock(float(source.times_s[0]), source.origin_s)
+    reader.t_offset_us, said = events_later_us(reader.t_offset_us, reader.origin_us, clock)
+    if said:
+        say(f"events: {said}")
     return reader, (width, height)
 
 

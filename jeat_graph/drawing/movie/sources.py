@@ -12,6 +12,7 @@ from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.rates import median_rate_hz
 from jeat_graph.data.steps import check_steps
+from jeat_graph.data.time_text import exact_text
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.drawing.movie.backgrounds import (
     EventBackground,
@@ -91,15 +92,18 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
     Raises:
         DataError: a file is missing or not valid, or nothing lies in the asked times.
     """
+    from jeat_graph.io.events.frame_clock import FrameClock, events_later_us
     from jeat_graph.io.events.stretches import open_stretches
     from jeat_graph.io.scans_io import read_instants
     from jeat_graph.io.truth_io import read_truth
     from jeat_graph.io.video import open_frames
 
     tables, request = _resolve(request)
-    frames = events = None
+    frames = events = clock = None
     if request.frames is not None:
-        frames = VideoBackground(stack.enter_context(open_frames(request.frames, request.frame_rate_hz)))
+        source = stack.enter_context(open_frames(request.frames, request.frame_rate_hz))
+        clock = FrameClock(float(source.times_s[0]), source.origin_s)
+        frames = VideoBackground(source)
     truth = None
     if request.truth is not None:
         how: ReadingOptions = {**request.reading, "first_frame": None}  # it is said of the tracks
@@ -110,6 +114,7 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
         beside = frames.size_px if frames else None
         stretches = open_stretches(request.events, request.event_size_px, request.event_layout, beside)
         stack.callback(stretches.close)
+        stretches.t_offset_us, _ = events_later_us(stretches.t_offset_us, stretches.origin_us, clock)
         events = EventBackground(stretches, window_s)
     times = _times(request, _span(frames, events, tables, truth), frames, rate_hz)
 
@@ -194,15 +199,15 @@ def _times(
     request: Request, span: tuple[float, float], frames: VideoBackground | None, rate_hz: float
 ) -> FloatArray:
     """Times of the pictures (T,), at least one (s)."""
-    lasts = f"; the recording lasts from {span[0]:.10g} s to {span[1]:.10g} s"
+    lasts = f"; the recording lasts from {exact_text(span[0])} s to {exact_text(span[1])} s"
     if request.at_s is not None:
         if not span[0] - _APART_S <= request.at_s <= span[1] + _APART_S:
-            raise DataError(f"there is nothing to draw at {request.at_s:.10g} s{lasts}")
+            raise DataError(f"there is nothing to draw at {exact_text(request.at_s)} s{lasts}")
         return np.array([request.at_s])
     start = span[0] if request.start_s is None else request.start_s
     end = span[1] if request.end_s is None else request.end_s
     if end < start and request.end_s is not None:
-        raise DataError(f"--end {end:.10g} s lies before the start, {start:.10g} s")
+        raise DataError(f"--end {exact_text(end)} s lies before the start, {exact_text(start)} s")
     if frames is not None and request.rate_hz is None:
         times = frames.times_s[(frames.times_s >= start - 1e-6) & (frames.times_s <= end + 1e-6)]
     else:
@@ -211,8 +216,8 @@ def _times(
         times = times[(times >= span[0] - 1e-6) & (times <= span[1] + 1e-6)]
     if not len(times):
         raise DataError(
-            f"there is nothing to draw from {start:.10g} s"
-            + ("" if request.end_s is None else f" to {end:.10g} s")
+            f"there is nothing to draw from {exact_text(start)} s"
+            + ("" if request.end_s is None else f" to {exact_text(end)} s")
             + lasts
         )
     return np.asarray(times, dtype=np.float64)
@@ -244,8 +249,8 @@ def _absent(
         if t.max() < times[0] - _APART_S or t.min() > times[-1] + _APART_S
     }
     lines = [
-        f"{kind} lasts from {t.min():.10g} s to {t.max():.10g} s, the pictures from {times[0]:.10g} s to "
-        f"{times[-1]:.10g} s"
+        f"{kind} lasts from {exact_text(t.min())} s to {exact_text(t.max())} s, the pictures from "
+        f"{exact_text(times[0])} s to {exact_text(times[-1])} s"
         for kind, t in outside.items()
     ]
     if outside and outside.keys() >= tables.keys() and len(times) > 1:
