@@ -44,13 +44,13 @@ def track(
     Raises:
         JeatGraphError: what the detections, the file or the configuration have wrong.
     """
+    from jeat_graph.rig.common_picture import in_common
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.input_checks import check_units
     from jeat_graph.runs.latency import at_measurement
     from jeat_graph.tracking.tracker import Tracker
 
-    recording = recording_of(detections, rate_hz)
-    settings = as_config(config, image)
+    recording, settings, _ = in_common(recording_of(detections, rate_hz), as_config(config, image))
     check_units(recording, settings, "the detections")  # before rates are taken for what they seem
     tracker = Tracker(fit_input(settings, recording)[0])
     recording = at_measurement(recording, tracker.config)
@@ -137,13 +137,14 @@ def compare(
     Raises:
         JeatGraphError: what a file or the configuration has wrong.
     """
+    from jeat_graph.rig.common_picture import in_common
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.latency import at_measurement
     from jeat_graph.runs.measured import compare_run, track_measured
 
-    recording = recording_of(detections, rate_hz)
+    recording, start, _ = in_common(recording_of(detections, rate_hz), as_config(config, image))
     objects = None if truth is None else truth_of(truth, rate_hz)
-    settings = fit_input(as_config(config, image), recording)[0]
+    settings = fit_input(start, recording)[0]
     return compare_run(track_measured(settings, at_measurement(recording, settings)), objects, lags_s)
 
 
@@ -175,20 +176,22 @@ def calibrate(
         JeatGraphError: what a file or the data have wrong.
     """
     from jeat_graph.calibration.procedure import calibrate_with_truth, calibrate_without_truth
+    from jeat_graph.rig.common_picture import in_common, with_ways_of, without_ways
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.latency import at_measurement
 
-    recordings = [recording_of(one, rate_hz) for one in as_list(detections)]
-    start = fit_input(as_config(base, image), *recordings)[0]
+    given = as_config(base, image)
+    recordings = [in_common(recording_of(one, rate_hz), given)[0] for one in as_list(detections)]
+    start = fit_input(without_ways(given), *recordings)[0]
     recordings = [at_measurement(one, start) for one in recordings]
     if truth is None:
-        return calibrate_without_truth(recordings, start).config
+        return with_ways_of(calibrate_without_truth(recordings, start).config, given)
 
     truths = [truth_of(one, rate_hz) for one in as_list(truth)]
     if len(truths) != len(recordings):
         raise DataError(f"{len(recordings)} recordings and {len(truths)} truths given; give one for each")
     pairs = list(zip(recordings, truths, strict=True))
-    return calibrate_with_truth(pairs, start, tuned=tuned).config
+    return with_ways_of(calibrate_with_truth(pairs, start, tuned=tuned).config, given)
 
 
 def simulate(

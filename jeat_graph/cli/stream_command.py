@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jeat_graph.cli.detect_options import add_made_by, made_by
-from jeat_graph.cli.options import add_config, add_image, add_time_unit, overrides
+from jeat_graph.cli.options import add_config, add_image, add_rig, add_time_unit, overrides
 from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import positive
 
@@ -47,6 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add_config(parser)
     add_image(parser)
+    add_rig(parser)
     add_made_by(parser)
     add(
         "--format",
@@ -149,7 +150,7 @@ def _config(args: argparse.Namespace) -> Config:
     from jeat_graph.data.errors import ConfigError
     from jeat_graph.live.transport.ends import check_addresses
 
-    config = load_config(args.config, [*made_by(args, _say), *overrides(args)])
+    config = load_config(args.config, [*made_by(args, _say), *overrides(args)], args.rig)
     if args.checkpoint is not None and config.smoother.worker:
         raise ConfigError("--checkpoint does not go with smoother.worker: its state is in another process")
     if args.every is not None and args.checkpoint is None:

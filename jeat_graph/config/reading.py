@@ -10,10 +10,14 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from jeat_graph.config.rig_file import read_rig
 from jeat_graph.config.schema import Config, InputConfig, SensorConfig
-from jeat_graph.config.section_tree import build, check_keys, parse_change, plain, read_tree
+from jeat_graph.config.section_tree import build, check_keys, merge, parse_change, plain, read_tree
 from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.data.errors import ConfigError
+
+# Sections of a sensor that it need not have.
+_PARTS_OF_SENSOR = ("clock",)
 
 
 def preset_names() -> list[str]:
@@ -22,19 +26,25 @@ def preset_names() -> list[str]:
     return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".yaml"))
 
 
-def load_config(name_or_path: str | Path = "default", overrides: Iterable[str] = ()) -> Config:
-    """Load a preset by name, or a YAML file by path, and apply `key=value` overrides.
+def load_config(
+    name_or_path: str | Path = "default", overrides: Iterable[str] = (), rig: str | Path | None = None
+) -> Config:
+    """Load a preset by name, or a YAML file by path, lay a rig over it, and apply `key=value` overrides.
 
     A file may name a preset as `base`; what it says itself is laid over it.
 
     Args:
         name_or_path: a preset (`default`, `paper`, …) or the path of a YAML file.
         overrides: texts such as `motion.jerk_per_size=4` or `sensors.rgb.rate_hz=30`, or one such text.
+        rig: a file of `register`, with the pictures and clocks of the sensors (`config.rig_file`).
 
     Raises:
         ConfigError: no such preset or file, YAML that cannot be read, unknown key, bad value.
+        DataError: a rig that cannot be read.
     """
     tree = read_tree(str(name_or_path), preset_names(), _preset_text, "preset")
+    if rig is not None:
+        tree = merge(tree, read_rig(rig))
     for text in [overrides] if isinstance(overrides, str) else overrides:
         _apply_override(tree, text)
     _assume(tree, _sensors_of_preset(str(name_or_path)))
@@ -151,6 +161,8 @@ def _apply_override(tree: dict[str, Any], text: str) -> None:
         child = node.get(step)
         if child is None and node is tree:
             child = {}  # a section the preset leaves at its defaults; an unknown one is refused later
+        elif child is None and node is not tree and path[0] == "sensors" and step in _PARTS_OF_SENSOR:
+            child = {}
         elif child is None:
             near = difflib.get_close_matches(step, [str(k) for k in node], 1)
             hint = f"; did you mean {near[0]}?" if near else ""

@@ -166,8 +166,15 @@ def _check_sizes(
         return
     (width, height), (wide, high) = source.size_px, recording[1]
     differ = f"has {width} x {height} px and the events {wide} x {high}"
-    if request.one_picture or request.detector_fused is not None:
-        raise DataError(f"{differ}: both must be of the same pixels", request.frames)
+    if request.detector_fused is not None:
+        raise DataError(f"{differ}: a fused network needs both of the same pixels", request.frames)
+    if request.one_picture:
+        raise DataError(
+            f"{differ}: say how the pictures lie, with --rig RIG.yaml (`jeat-graph register` makes it of "
+            "detections) or, if both look through one lens, "
+            f"--set sensors.{EVENTS_SENSOR}.image=[{wide},{high}]",
+            request.frames,
+        )
     say(f"warning: {request.frames} {differ}: bring the boxes to one picture before they are tracked")
 
 
