@@ -45,12 +45,16 @@ def track(
         JeatGraphError: what the detections, the file or the configuration have wrong.
     """
     from jeat_graph.rig.common_picture import in_common
+    from jeat_graph.runs.clock_pass import find_clocks
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.input_checks import check_units
     from jeat_graph.runs.latency import at_measurement
     from jeat_graph.tracking.tracker import Tracker
 
     recording, settings, _ = in_common(recording_of(detections, rate_hz), as_config(config, image))
+    recording, _, said = find_clocks(recording, settings, "the detections")
+    for line in said:
+        warnings.warn(line, InputWarning, stacklevel=2)
     check_units(recording, settings, "the detections")  # before rates are taken for what they seem
     tracker = Tracker(fit_input(settings, recording)[0])
     recording = at_measurement(recording, tracker.config)

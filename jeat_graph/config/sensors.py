@@ -181,6 +181,12 @@ class InputConfig(Section):
         "a sensor that is not declared is an error, or is declared by what is seen of it; then the rates of "
         "all sensors are those of the recording too",
     )
+    clocks: str = choice(
+        "as_given",
+        ("as_given", "find"),
+        "times are believed, or clocks that differ are found in a pass over the whole recording before it is "
+        "tracked (`rig.agreement`), and brought together where the boxes leave no doubt",
+    )
     slow_scans: str = choice(
         "as_set",
         ("as_set", "bound"),

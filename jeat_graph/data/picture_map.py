@@ -72,7 +72,7 @@ class PictureMap:
             raise DataError("must be finite numbers, the third of the last row not 0")
         full = np.zeros((WITH_PARALLAX - 1, WITH_PARALLAX - 1))
         if covariance is not None:
-            kept = _free(columns)
+            kept = _free(3) if columns == 3 else list(range(WITH_PARALLAX - 1))
             if covariance.shape != (len(kept), len(kept)) or not np.isfinite(covariance).all():
                 raise DataError(f"the covariance must be {len(kept)} x {len(kept)} finite numbers")
             full[np.ix_(kept, kept)] = covariance / matrix[2, 2] ** 2

@@ -154,6 +154,7 @@ def track_files(
     from jeat_graph.io.detections_io import read_many
     from jeat_graph.io.formats import recognise
     from jeat_graph.rig.common_picture import in_common
+    from jeat_graph.runs.clock_pass import find_clocks
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.directory import RunDirectory
     from jeat_graph.runs.input_checks import check_detections, check_units
@@ -174,11 +175,15 @@ def track_files(
     detections, config, notes = in_common(detections, config)
     for note in notes:
         say(note)
+    detections, clocks, notes = find_clocks(detections, config, names)
+    for note in notes:
+        say(note)
     check_units(detections, config, names)  # before rates are taken for what they seem
     config, notes = fit_input(config, detections)
     for note in notes:
         say(note)
-    record = RunRecord(source=request.source(), warnings=check_detections(detections, config, names))
+    source = request.source() | ({"clocks": clocks} if clocks else {})
+    record = RunRecord(source=source, warnings=check_detections(detections, config, names))
     for warning in record.warnings:
         warn(warning)
     detections = at_measurement(detections, config)

@@ -62,6 +62,16 @@ def test_the_uncertainty_of_a_shift_is_that_of_the_points() -> None:
     assert PictureMap.of_numbers(np.eye(3).ravel(), covariance).std_px((640, 480)) == pytest.approx(2.0)
 
 
+def test_covariances_of_both_kinds_of_matrix_mean_the_same() -> None:
+    numbers, covariance = np.eye(3, 4), np.diag(np.arange(1.0, 12.0) * 1e-6)
+    whole = PictureMap.of_numbers(numbers.ravel(), covariance)
+    np.testing.assert_array_equal(whole.covariance, covariance)
+    plane = [0, 1, 2, 4, 5, 6, 8, 9]
+    part = PictureMap.of_numbers(numbers[:, :3].ravel(), covariance[np.ix_(plane, plane)])
+    np.testing.assert_array_equal(part.covariance[np.ix_(plane, plane)], covariance[np.ix_(plane, plane)])
+    assert not part.covariance[3].any()
+
+
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [(np.ones(8), "9 numbers"), (np.zeros(9), "not 0"), (np.ones(9), "cannot be inverted")],
