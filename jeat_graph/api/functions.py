@@ -142,11 +142,15 @@ def compare(
         JeatGraphError: what a file or the configuration has wrong.
     """
     from jeat_graph.rig.common_picture import in_common
+    from jeat_graph.runs.clock_pass import find_clocks
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.latency import at_measurement
     from jeat_graph.runs.measured import compare_run, track_measured
 
     recording, start, _ = in_common(recording_of(detections, rate_hz), as_config(config, image))
+    recording, _, said = find_clocks(recording, start, "the detections")
+    for line in said:
+        warnings.warn(line, InputWarning, stacklevel=2)
     objects = None if truth is None else truth_of(truth, rate_hz)
     settings = fit_input(start, recording)[0]
     return compare_run(track_measured(settings, at_measurement(recording, settings)), objects, lags_s)
@@ -181,12 +185,17 @@ def calibrate(
     """
     from jeat_graph.calibration.procedure import calibrate_with_truth, calibrate_without_truth
     from jeat_graph.rig.common_picture import in_common, with_ways_of, without_ways
+    from jeat_graph.runs.clock_pass import with_clocks
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.latency import at_measurement
 
     given = as_config(base, image)
     recordings = [in_common(recording_of(one, rate_hz), given)[0] for one in as_list(detections)]
-    start = fit_input(without_ways(given), *recordings)[0]
+    names = [f"recording {k + 1}" for k in range(len(recordings))]
+    start, said = with_clocks(recordings, without_ways(given), names)
+    for line in said:
+        warnings.warn(line, InputWarning, stacklevel=2)
+    start = fit_input(start, *recordings)[0]
     recordings = [at_measurement(one, start) for one in recordings]
     if truth is None:
         return with_ways_of(calibrate_without_truth(recordings, start).config, given)

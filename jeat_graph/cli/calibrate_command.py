@@ -53,6 +53,7 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.io.truth_io import read_truth
     from jeat_graph.rig.common_picture import in_common, with_ways_of, without_ways
     from jeat_graph.runs.beside import facts_beside, facts_of_frames
+    from jeat_graph.runs.clock_pass import with_clocks
     from jeat_graph.runs.latency import at_measurement
 
     if args.gt and len(args.gt) != len(args.detections):
@@ -72,7 +73,9 @@ def run(args: argparse.Namespace) -> int:
     read = [in_common(read_many([path], **how), given) for path in args.detections]
     for line in dict.fromkeys(line for _, _, notes in read for line in notes):
         say("calibrate", line)
-    base = without_ways(base)
+    base, lines = with_clocks([one for one, _, _ in read], without_ways(base), args.detections)
+    for line in lines:
+        say("calibrate", line)
     recordings = [at_measurement(one, base) for one, _, _ in read]
     beside = None if args.image else _size_beside(args.detections, shown)
     picture = _picture_from(args, base, beside)

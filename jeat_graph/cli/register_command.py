@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from jeat_graph.cli.options import add_image, add_reading, add_rig, reading
 from jeat_graph.cli.progress import stages
 from jeat_graph.cli.terminal import say
-from jeat_graph.config.argument_types import ArgumentTypeError, picture_size
+from jeat_graph.config.argument_types import picture_size
 from jeat_graph.data.errors import DataError
 
 if TYPE_CHECKING:
@@ -229,5 +229,5 @@ def _short(value: float) -> float:
 def _named_size(text: str) -> tuple[str, tuple[int, int]]:
     name, equals, size = text.partition("=")
     if not equals or not name:
-        raise ArgumentTypeError(f"must read NAME=WIDTHxHEIGHT, say evt=640x480, not {text!r}")
+        raise argparse.ArgumentTypeError(f"must read NAME=WIDTHxHEIGHT, say evt=640x480, not {text!r}")
     return name, picture_size(size)

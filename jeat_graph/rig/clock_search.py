@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.rig.sensor_tracks import STEP_S, SensorTracks
 
 # Sizes are compared at every so many steps; differences of clocks are tried at every so many.
@@ -125,7 +125,7 @@ def _compared(
     return a * logs[1].shape[0] + b, logs[0][a, step] - logs[1][b, step + shift], step
 
 
-def _along(inverse: IntArray, difference: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
+def _along(inverse: IntArray, difference: FloatArray, count: int) -> tuple[BoolArray, FloatArray]:
     """Whether the sizes of pairs go along (P,), and the mean differences of their logarithms (P,)."""
     times = np.bincount(inverse, minlength=count)
     mean = np.bincount(inverse, difference, count) / np.maximum(times, 1)

@@ -154,7 +154,7 @@ def _draw(pairs: TrackPairs, samples: _Samples, moving: IntArray, seed: int) -> 
 def _few(rows: IntArray) -> IntArray:
     if len(rows) <= _TIMES:
         return rows
-    return rows[np.linspace(0, len(rows) - 1, _TIMES).round().astype(int)]
+    return np.asarray(rows[np.linspace(0, len(rows) - 1, _TIMES).round().astype(np.int64)])
 
 
 def _affine(samples: _Samples, rows: IntArray) -> tuple[FloatArray, float] | None:
@@ -171,8 +171,8 @@ def _affine(samples: _Samples, rows: IntArray) -> tuple[FloatArray, float] | Non
     if rank < _AFFINE + 1 or abs(solved[6]) > MOST_DELTA_S:
         return None
     M = solved[:6].reshape(2, 3)
-    M = np.column_stack([M[:, :2] / spread, M[:, 2] - M[:, :2] @ middle / spread])
-    return M, float(solved[6])
+    moved = np.column_stack([M[:, :2] / spread, M[:, 2] - M[:, :2] @ middle / spread])
+    return np.asarray(moved, dtype=np.float64), float(solved[6])
 
 
 def _count(pairs: TrackPairs, samples: _Samples, affine: FloatArray, delta: float) -> int:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jeat_graph.config.sensors import ClockConfig
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.picture_map import PictureMap
 from jeat_graph.filters.motion import process_noise, transition
 from jeat_graph.rig.common_picture import common_time
@@ -241,7 +241,7 @@ def _rows(
 
 
 class _AtTimes(NamedTuple):
-    state: FloatArray
+    state: IntArray
     before: FloatArray
     after: FloatArray
     velocity: FloatArray
@@ -250,7 +250,7 @@ class _AtTimes(NamedTuple):
 
 def _measured(path: _Path, t: FloatArray, z: FloatArray) -> _AtTimes:
     """Rows that give places at times (R,) from the states before and after, scaled; residuals there."""
-    state = np.clip(np.searchsorted(path.t, t) - 1, 0, len(path.t) - 2)
+    state = np.clip(np.searchsorted(path.t, t) - 1, 0, len(path.t) - 2).astype(np.int64)
     span = path.t[state + 1] - path.t[state]
     s = (t - path.t[state]) / span
     place, speed = _quintic(s), _quintic_slope(s)
@@ -310,7 +310,7 @@ def _motion(path: _Path) -> tuple[FloatArray, FloatArray]:
 
 def _units() -> FloatArray:
     """From the scaled states to px and s (6, 6)."""
-    return np.kron(np.eye(2), np.diag(_TAU_S ** -np.array([0.0, 1.0, 2.0])))
+    return np.asarray(np.kron(np.eye(2), np.diag(_TAU_S ** -np.array([0.0, 1.0, 2.0]))), dtype=np.float64)
 
 
 def _unscaled(states: FloatArray) -> FloatArray:
@@ -324,7 +324,7 @@ def _boxes(measured: TrackMeasurements) -> FloatArray:
 def _weight(residual: FloatArray, sigma: float) -> FloatArray:
     """Huber's weights (R,), as factors on rows, of residuals (R, 2) in sizes."""
     far = np.linalg.norm(residual, axis=1) / sigma
-    return np.sqrt(np.minimum(1.0, _HUBER / np.maximum(far, 1e-9)))
+    return np.asarray(np.sqrt(np.minimum(1.0, _HUBER / np.maximum(far, 1e-9))))
 
 
 def _robust(residuals: list[FloatArray]) -> float:

@@ -58,7 +58,7 @@ class SensorTracks:
     @property
     def steps(self) -> int:
         """Number of steps T of the grid."""
-        return self.centre.shape[1]
+        return int(self.centre.shape[1])
 
     @property
     def end_s(self) -> float:

@@ -6,6 +6,8 @@ detector gives its boxes late rather than early.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +30,8 @@ _BETTER, _CLEAR = 0.08, 2.5
 _LEAST_VEHICLES, _SIGNIFICANT = 5, 4.0
 #: Smaller offsets move no box by more than its noise (s).
 LEAST_S = 0.02
+# Lags of one sensor in several recordings are one where they differ by no more (s).
+_SAME_LAG_S = 0.02
 # That much of a recording is looked at for the exact offset (s): a tracker needs a few seconds for it.
 _LOOKED_AT_S = 90.0
 # Sensors contradict each other where each sees so many vehicles drive, most of them where the other one sees
@@ -96,6 +100,45 @@ def find_clocks(
             taken[name] = {"lag_s": round(one.lag_s - earliest, 6), "std_s": round(one.std_s, 6)}
     lines += [_said(name, one["lag_s"], one["std_s"]) for name, one in taken.items()]
     return taken_off(detections, {name: one["lag_s"] for name, one in taken.items()}), taken, lines
+
+
+def with_clocks(
+    recordings: Sequence[Detections], config: Config, names: Sequence[str]
+) -> tuple[Config, list[str]]:
+    """Find the clocks of several recordings of one set of sensors, and write them into a configuration.
+
+    Args:
+        recordings: each with its own times.
+        config: as `find_clocks`.
+        names: what the user calls the recordings.
+
+    Returns:
+        The configuration, with `latency_s` of the sensors that are late in all recordings by the same; and a
+        line for each thing that is to be said.
+
+    Raises:
+        DataError: as `find_clocks`.
+    """
+    found: dict[str, list[float]] = {}
+    lines: list[str] = []
+    for recording, name in zip(recordings, names, strict=True):
+        _, taken, said = find_clocks(recording, config, name)
+        lines += said
+        for sensor in recording.sensors:
+            found.setdefault(sensor, []).append(taken.get(sensor, {}).get("lag_s", 0.0))
+    sensors = dict(config.sensors)
+    for sensor, lags in found.items():
+        if not any(lags):
+            continue
+        if max(lags) - min(lags) > _SAME_LAG_S:
+            lines.append(
+                f"sensor {sensor!r}: its clock is late by {min(lags):.3f} to {max(lags):.3f} s, not by the "
+                "same in all recordings: that is no setting of the sensor, and left out"
+            )
+            continue
+        known = sensors.get(sensor, config.input.undeclared_sensor())
+        sensors[sensor] = replace(known, latency_s=round(float(np.median(lags)), 4))
+    return replace(config, sensors=sensors), lines
 
 
 def _is_set(config: Config, name: str) -> bool:

@@ -144,7 +144,7 @@ def _factors(path: PathRows, number: int) -> list[Any]:
         factors.append(
             make(keys[k], path.motion0[k], keys[k + 1], path.motion1[k], path.motion[k], state_noise)
         )
-    depends = path.shared.any(axis=(1, 2))
+    depends = np.asarray(path.shared.any(axis=(1, 2)))
     for r, k in enumerate(path.state.tolist()):
         rows = (keys[k], path.before[r], keys[k + 1], path.after[r])
         if depends[r]:

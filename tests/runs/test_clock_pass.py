@@ -88,6 +88,15 @@ def test_the_line_stands_on_stderr_and_the_numbers_in_the_record(tmp_path: Path,
     assert record["clocks"]["evt"]["lag_s"] == pytest.approx(0.5, abs=1.5e-3)
 
 
+def test_calibrate_finds_what_the_tracker_would(tmp_path: Path, capsys) -> None:
+    rows(0.5)[0].to_csv(tmp_path / "d.csv", index=False)
+    out = tmp_path / "c.yaml"
+    command = ["calibrate", str(tmp_path / "d.csv"), "--image", "1920x1080", "--out", str(out)]
+    assert main(command) == 0
+    assert load_config(out).sensors["evt"].latency_s == pytest.approx(0.5, abs=2e-3)
+    assert load_config(out).sensors["rgb"].latency_s == pytest.approx(0.0, abs=2e-3)
+
+
 def test_one_clock_is_left_as_it_is() -> None:
     recording = Detections.from_pandas(rows(0.0)[0])
     same, found, lines = find_clocks(recording, FIND, "d.csv")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
+from jeat_graph.config.reading import load_config
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.rates import median_rate_hz
@@ -24,12 +26,16 @@ from jeat_graph.drawing.movie.moments import TRAIL_S, TracksAt, TruthAt
 from jeat_graph.drawing.movie.panels import Movie
 from jeat_graph.io.events.layout import EventLayout
 from jeat_graph.io.reading import ReadingOptions
+from jeat_graph.rig.common_picture import CommonPicture, Way, common_time
 from jeat_graph.runs.directory import RUN_JSON, read_record
 
 #: Names within a simulated data set, as jeat-graph-sehn writes it: its segments, and their files.
 SEGMENTS, EVENTS, TRUTH = "segments", "events.h5", "gt.csv"
 DEFAULT_RATE_HZ = 25.0
 _SAME_SHAPE = 0.01
+_US_PER_S = 1e6
+# The sensors of a rig whose pictures are drawn, by name of the background.
+_SENSORS = {VideoBackground.name: "rgb", EventBackground.name: "evt"}
 # A track is drawn that long after its last row, and a little before its first (s).
 _APART_S = 0.5
 
@@ -57,6 +63,7 @@ class Request:
         reading: what a result or truth does not say itself.
         event_size_px: width and height of the events' picture, where their file does not say.
         event_layout: columns, unit of time and recording, where the file of events leaves that open.
+        rig: pictures and clocks of the sensors; frames are those of `rgb`, events those of `evt`.
     """
 
     run: Path
@@ -77,6 +84,7 @@ class Request:
     reading: ReadingOptions = field(default_factory=ReadingOptions)
     event_size_px: tuple[int, int] | None = None
     event_layout: EventLayout | None = None
+    rig: Path | None = None
 
 
 def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[str]]:
@@ -100,9 +108,12 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
 
     tables, request = _resolve(request)
     frames = events = clock = None
+    ways = _ways(request)
     if request.frames is not None:
         source = stack.enter_context(open_frames(request.frames, request.frame_rate_hz))
         clock = FrameClock(float(source.times_s[0]), source.origin_s)
+        if (own := ways[VideoBackground.name].clock) is not None:
+            source.times_s = common_time(source.times_s, own)
         frames = VideoBackground(source)
     truth = None
     if request.truth is not None:
@@ -115,15 +126,19 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
         stretches = open_stretches(request.events, request.event_size_px, request.event_layout, beside)
         stack.callback(stretches.close)
         stretches.t_offset_us, _ = events_later_us(stretches.t_offset_us, stretches.origin_us, clock)
+        if (own := ways[EventBackground.name].clock) is not None:
+            stretches.t_offset_us -= round(own.offset_s * _US_PER_S)
         events = EventBackground(stretches, window_s)
     times = _times(request, _span(frames, events, tables, truth), frames, rate_hz)
 
     backgrounds: list[FilmBackground] = [one for one in (frames, events) if one is not None]
     configured = _configured_size(request.run)
-    field, warnings = _field(configured, backgrounds, tables, truth)
+    in_common = [one for one in backgrounds if one.name not in ways or ways[one.name].picture is None]
+    field, warnings = _field(configured, in_common, tables, truth)
     if not backgrounds:
         backgrounds.append(PlainBackground((round(field[0]), round(field[1]))))
-    panel = request.size_px or (round(field[0]), round(field[1]))
+    shown_px = field if backgrounds[0] in in_common else backgrounds[0].size_px
+    panel = request.size_px or (round(shown_px[0]), round(shown_px[1]))
     instants = read_instants(request.run) if request.run.is_dir() else None
     shown = {kind: TracksAt(table, times, kind, instants, request.trail_s) for kind, table in tables.items()}
     movie = Movie(
@@ -135,10 +150,19 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
         smoothed=shown.get("smoothed"),
         truth=None if truth is None else TruthAt(truth),
         labels=request.labels,
+        ways=[ways[one.name].picture if one.name in ways else None for one in backgrounds],
     )
     warnings += _absent(frames, tables, truth, times)
     warnings += [f"{request.events}: {note}" for note in ([] if events is None else stretches.notes())]
     return movie, rate_hz, warnings
+
+
+def _ways(request: Request) -> dict[str, Way]:
+    """How pictures and clocks of frames and events lie to those of the tracks, by name of the background."""
+    ways: Mapping[str, Way] = {}
+    if request.rig is not None:
+        ways = CommonPicture.of(load_config("default", rig=request.rig)).ways
+    return {name: ways.get(sensor, Way(None, None, None)) for name, sensor in _SENSORS.items()}
 
 
 def _resolve(request: Request) -> tuple[dict[str, Trajectories], Request]:

@@ -96,8 +96,8 @@ def raw_header(version: str, origin_us: int, size_px: tuple[int, int]) -> bytes:
     """
     width, height = size_px
     name = _VERSIONS[version]
-    lines = (f"evt {version}", f"format {name};height={height};width={width}", f"geometry {width}x{height}")
-    lines += (f"{ORIGIN} {origin_us}",) if origin_us else ()
+    lines = [f"evt {version}", f"format {name};height={height};width={width}", f"geometry {width}x{height}"]
+    lines += [f"{ORIGIN} {origin_us}"] if origin_us else []
     return "".join(f"% {line}\n" for line in (*lines, "end")).encode("ascii")
 
 
