@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import asdict, dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from jeat_graph.config.schema import Config
+from jeat_graph.config.section_tree import build, plain
 from jeat_graph.config.sensors import ClockConfig, SensorConfig
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections, Scan
@@ -108,6 +109,8 @@ class CommonPicture:
         return moved if np.array_equal(t, detections.scan_t) else at_times(moved, t)
 
 
+# What a sensor's configuration says of its way.
+_WAY_KEYS = ("image", "to_picture", "to_picture_cov", "clock")
 _NO_WAY = Way(None, None, None)
 
 
@@ -170,14 +173,41 @@ def without_ways(config: Config) -> Config:
 
 def with_ways_of(config: Config, other: Config) -> Config:
     """Put the sensors' own pictures and clocks of another configuration into one that was found beside it."""
-    names = ("image", "to_picture", "to_picture_cov", "clock")
     sensors = {
-        name: replace(one, **{key: getattr(other.sensors[name], key) for key in names})
+        name: replace(one, **{key: getattr(other.sensors[name], key) for key in _WAY_KEYS})
         if name in other.sensors
         else one
         for name, one in config.sensors.items()
     }
     return replace(config, sensors=sensors)
+
+
+def recorded_ways(config: Config) -> dict[str, dict[str, Any]]:
+    """Return what a configuration says of sensors' own pictures and clocks, as `run.json` keeps it."""
+    found: dict[str, dict[str, Any]] = {}
+    for name in CommonPicture.of(config).ways:
+        one = {key: getattr(config.sensors[name], key) for key in _WAY_KEYS}
+        clock = one["clock"]
+        found[name] = plain({**one, "clock": None if clock is None else asdict(clock)})
+    return found
+
+
+def by_recorded_ways(detections: Detections, config: Config, ways: Mapping[str, Any]) -> Detections:
+    """Bring a recording to the common picture and clock again, as a run did.
+
+    Args:
+        detections: as its files have it.
+        config: of the run, whose sensors have no ways any more.
+        ways: what `recorded_ways` returned then.
+
+    Raises:
+        ConfigError: they are no such ways.
+    """
+    sensors = dict(config.sensors)
+    for name, one in ways.items():
+        sensor = build(SensorConfig, {"rate_hz": sensors[name].rate_hz, **one}, f"ways.{name}.")
+        sensors[name] = replace(sensors[name], **{key: getattr(sensor, key) for key in _WAY_KEYS})
+    return CommonPicture.of(replace(config, sensors=sensors)).detections(detections)
 
 
 def _way(name: str, sensor: SensorConfig, config: Config) -> Way:

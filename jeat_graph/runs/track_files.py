@@ -153,7 +153,7 @@ def track_files(
     """
     from jeat_graph.io.detections_io import read_many
     from jeat_graph.io.formats import recognise
-    from jeat_graph.rig.common_picture import in_common
+    from jeat_graph.rig.common_picture import in_common, recorded_ways
     from jeat_graph.runs.clock_pass import find_clocks
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.directory import RunDirectory
@@ -172,6 +172,7 @@ def track_files(
         say(note)
     detections = read_many(request.detections, **request._reading())
     names = " + ".join(request.files)
+    ways = {name: one for name, one in recorded_ways(config).items() if name in detections.sensors}
     detections, config, notes = in_common(detections, config)
     for note in notes:
         say(note)
@@ -182,7 +183,8 @@ def track_files(
     config, notes = fit_input(config, detections)
     for note in notes:
         say(note)
-    source = request.source() | ({"clocks": clocks} if clocks else {})
+    found = {"ways": ways, "clocks": clocks}
+    source = request.source() | {name: one for name, one in found.items() if one}
     record = RunRecord(source=source, warnings=check_detections(detections, config, names))
     for warning in record.warnings:
         warn(warning)

@@ -17,6 +17,7 @@ from jeat_graph import Detections, Tracker, load_config, track
 from jeat_graph.cli.main import main
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.rig.common_picture import in_common
+from jeat_graph.runs.measured import measured_run
 
 OFFSET_S = 0.25
 RIG = f"""
@@ -78,6 +79,19 @@ def test_track_finds_one_vehicle_where_two_pictures_showed_two(rig: Path, tmp_pa
     assert np.abs(table.x - (240 + 100 * table.t)).max() < 2.0
     record = json.loads((tmp_path / "run" / "run.json").read_text())
     assert record["rig"]["path"] == str(rig)
+
+
+def test_a_run_is_tracked_again_as_it_was(rig: Path, tmp_path: Path) -> None:
+    """What a run took in can be asked for later: ways and clocks stand in its record, not in a file."""
+    rows(True).to_csv(tmp_path / "d.csv", index=False)
+    out = tmp_path / "run"
+    assert main(["track", str(tmp_path / "d.csv"), "--rig", str(rig), "--out", str(out)]) == 0
+    rig.unlink()
+    (tracks,) = measured_run(out).tracks
+    table = pd.read_csv(out / "smoothed.csv")
+    at = np.interp(tracks.data.t[tracks.data.key], table.t, table.x)
+    assert np.abs(tracks.data.z[:, 0] - at).max() < 3.0
+    assert set(tracks.sensor) == {0, 1}
 
 
 def test_the_functions_and_the_tracker_take_own_pictures_too(rig: Path) -> None:

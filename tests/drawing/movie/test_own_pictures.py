@@ -60,6 +60,6 @@ def test_a_film_in_the_sensors_own_picture_and_time(tmp_path: Path) -> None:
     height, width = picture.shape[:2]
     assert (width, height) == (320, 240)
     rows = slice(40, 200)  # above and below there is text
-    lit = np.argwhere(picture[rows].max(axis=2) > 90) + [40, 0]
+    lit = np.argwhere(picture[rows].max(axis=2) > 90) + np.array([40, 0])
     np.testing.assert_allclose(lit.min(axis=0), [50, 50], atol=3)
     np.testing.assert_allclose(lit.max(axis=0), [70, 80], atol=3)
