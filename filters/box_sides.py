@@ -182,6 +182,36 @@ def measured_variance(
     return np.asarray((R * tail)[..., None] / np.maximum(1.0 - cut, _LEAST_PROBABILITY))
 
 
+def uncovered_covariance(
+    covariance: FloatArray, y: FloatArray, S: FloatArray, size: FloatArray, c: ModelConstants
+) -> FloatArray:
+    """Return covariances (N, 2, 5, 5) with what is not known of a side that an occluder has cut so far.
+
+    Where the side shows further out than predicted by d, and that it was cut (prior ε', density 1/w) is
+    likelier than that both sides measure as before, P grows by d² along it: ∂[p, l] = [1/2, ∓1/w].
+
+    Args:
+        covariance: (N, 2, 5, 5) predicted.
+        y: (N, 2, 2) innovations.
+        S: (N, 2, 2, 2) their covariances.
+        size: (N, 2) predicted width and height (px).
+        c: constants.
+    """
+    both = -0.5 * squared_distance(y, S) - 0.5 * np.log(determinant(S)) - _LOG_2PI
+    variance = np.diagonal(S, axis1=2, axis2=3)
+    alone = -0.5 * y**2 / variance - 0.5 * (np.log(variance) + _LOG_2PI)
+    other = alone[..., ::-1] - np.log(size)[..., None] + math.log(c.uncovered_share)
+    out = np.stack([-y[..., 0], y[..., 1]], axis=-1)
+    shows = (out > 0.0) & (out < c.most_uncovered * size[..., None]) & (other > both[..., None])
+    grown = covariance.copy()
+    for side, sign in enumerate((-1.0, 1.0)):
+        along = np.zeros((*size.shape, STATES))
+        along[..., POSITION], along[..., LOG_SIZE] = 0.5, sign / size
+        d2 = np.where(shows[..., side], out[..., side] ** 2, 0.0)
+        grown += d2[..., None, None] * along[..., :, None] * along[..., None, :]
+    return grown
+
+
 def update(
     mean: FloatArray, covariance: FloatArray, y: FloatArray, H: FloatArray, R: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
