@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jeat_graph.config.fields import SMALLEST
 from jeat_graph.config.sensors import ClockConfig
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.picture_map import PictureMap
@@ -80,7 +81,9 @@ class _Unknowns(NamedTuple):
 
     @property
     def clock(self) -> ClockConfig:
-        return ClockConfig(offset_s=self.offset_s, drift_ppm=self.drift_ppm, at_s=self.at_s)
+        return ClockConfig(
+            offset_s=no_smaller(self.offset_s), drift_ppm=no_smaller(self.drift_ppm), at_s=self.at_s
+        )
 
     def moved(self, step: FloatArray) -> _Unknowns:
         numbers = self.matrix.ravel().copy()
@@ -140,6 +143,11 @@ def refine(
         if _largest_move(unknowns.way, scale * solved.shared, paths) < _ENOUGH_PX:
             break
     return _told(unknowns, solved, scale, paths, sigma)
+
+
+def no_smaller(value: float) -> float:
+    """Return a number, 0 where it is nearer to it than a setting may be."""
+    return value if abs(value) > SMALLEST else 0.0
 
 
 def _numbers(unknowns: _Unknowns) -> FloatArray:
@@ -369,11 +377,11 @@ def _told(
         rms.append(float(np.sqrt(np.mean(np.concatenate(px) ** 2))))
     free = len(_FREE)
     clock = ClockConfig(
-        offset_s=unknowns.offset_s,
-        drift_ppm=unknowns.drift_ppm,
+        offset_s=no_smaller(unknowns.offset_s),
+        drift_ppm=no_smaller(unknowns.drift_ppm),
         at_s=unknowns.at_s,
-        offset_std_s=float(np.sqrt(cov[free, free])),
-        drift_std_ppm=float(np.sqrt(cov[free + 1, free + 1])),
+        offset_std_s=no_smaller(float(np.sqrt(cov[free, free]))),
+        drift_std_ppm=no_smaller(float(np.sqrt(cov[free + 1, free + 1]))),
     )
     way = PictureMap(unknowns.matrix, cov[:free, :free])
     return Refined(way, clock, (rms[0], rms[1]), float(np.mean(np.concatenate(size))), len(paths))

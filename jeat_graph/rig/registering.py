@@ -17,7 +17,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.data.picture_map import PictureMap
 from jeat_graph.rig.clock_search import offset_of, rank_offsets
 from jeat_graph.rig.matching import MatchedTracks, match_again, match_at, no_tracks
-from jeat_graph.rig.refining import Refined, refine
+from jeat_graph.rig.refining import Refined, no_smaller, refine
 from jeat_graph.rig.sensor_tracks import SensorTracks, joined
 
 # Rough differences of the clocks that are tried, and rounds of matching and refining.
@@ -154,7 +154,11 @@ def _offset_of_matches(
     order = np.argsort(values)
     middle = float(values[order][np.searchsorted(np.cumsum(weights[order]), 0.5 * weights.sum())])
     std = 1.4826 * float(np.median(np.abs(values - middle))) / np.sqrt(len(values)) * 1.25
-    return ClockConfig(offset_s=best.offset_s + middle, at_s=float(np.median(a_t)), offset_std_s=float(std))
+    return ClockConfig(
+        offset_s=no_smaller(best.offset_s + middle),
+        at_s=float(np.median(a_t)),
+        offset_std_s=no_smaller(float(std)),
+    )
 
 
 def _best(first: SensorTracks, second: SensorTracks, names: tuple[str, str]) -> MatchedTracks:

@@ -163,6 +163,21 @@ def test_a_point_that_does_not_fit_is_named() -> None:
         map_of_points(points, wrong, (640.0, 480.0), "points.csv")
 
 
+def test_the_same_boxes_twice_are_one_picture_and_one_clock(road: Recorded, tmp_path: Path, capsys) -> None:
+    out = tmp_path / "rig.yaml"
+    twice = [f"{name}={road.files[0]}" for name in ("a", "b")]
+    assert (
+        main(["register", *twice, "--image", "640x480", "--sensor-image", "b=640x480", "--out", str(out)])
+        == 0
+    )
+    sensor = load_config(rig=out).sensors["b"]
+    assert sensor.clock is not None
+    assert abs(sensor.clock.offset_s) < 1e-4
+    points = np.array([[100.0, 100.0], [600.0, 400.0]])
+    moved = PictureMap.of_numbers(np.array(sensor.to_picture)).points(points, 30.0)
+    np.testing.assert_allclose(moved, points, atol=0.1)
+
+
 def test_one_sensor_is_no_rig(road: Recorded, tmp_path: Path, capsys) -> None:
     assert main(["register", road.files[0], "--out", str(tmp_path / "r.yaml")]) == 2
     assert "there is one sensor, 'rgb': a rig has two or more" in capsys.readouterr().err
