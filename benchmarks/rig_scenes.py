@@ -112,7 +112,10 @@ class RigScene:
         lasting = rng.normal(size=(len(self.born), 4))
         seen = rng.uniform(size=len(self.born)) < _P_DETECT
         name = ("rgb", "evt")[camera]
-        t, boxes, scores, empty = [], [], [], []
+        t: list[float] = []
+        boxes: list[list[float]] = []
+        scores: list[float] = []
+        empty: list[bool] = []
         for time in times:
             lasting = forget * lasting + np.sqrt(1.0 - forget**2) * rng.normal(size=lasting.shape)
             change = rng.uniform(size=len(seen)) < (1.0 - forget)

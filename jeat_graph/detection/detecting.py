@@ -175,7 +175,7 @@ def _check_sizes(
             f"--set sensors.{EVENTS_SENSOR}.image=[{wide},{high}]",
             request.frames,
         )
-    say(f"warning: {request.frames} {differ}: bring the boxes to one picture before they are tracked")
+    say(f"warning: {request.frames} {differ}: `track` needs to know how they lie (--rig)")
 
 
 def _picture_scans(
