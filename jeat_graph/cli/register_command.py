@@ -16,6 +16,7 @@ from jeat_graph.data.errors import DataError
 if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
     from jeat_graph.data.detections import Detections
+    from jeat_graph.data.picture_map import PictureMap
     from jeat_graph.rig.matching import MatchedTracks
     from jeat_graph.rig.registering import Registration
     from jeat_graph.rig.sensor_tracks import SensorTracks
@@ -59,6 +60,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="corresponding points of two sensors (px): columns such as rgb_x, rgb_y, evt_x, evt_y",
     )
+    add(
+        "--camera",
+        action="append",
+        default=[],
+        type=_named_file,
+        metavar="NAME=CAMERA.yaml",
+        help="calibrated camera of a sensor over the road, one for each of two sensors, in the same axes",
+    )
     add_rig(parser)
     add_reading(parser)
 
@@ -79,6 +88,8 @@ def run(args: argparse.Namespace) -> int:
         raise DataError(
             f"there is one sensor, {reference!r}: a rig has two or more", " + ".join(args.detections)
         )
+    if args.camera and {name for name, _ in args.camera} != set(recording.sensors):
+        raise DataError(f"--camera is needed of each sensor: {', '.join(recording.sensors)}")
     if args.points is not None and len(others) > 1:
         raise DataError("corresponding points are of two sensors, and there are more", args.points)
     sizes = _sizes(args, recording, reference)
@@ -127,7 +138,7 @@ def _sizes(args: argparse.Namespace, recording: Detections, reference: str) -> d
     from jeat_graph.config.reading import load_config
     from jeat_graph.runs.declaring import fit_picture
 
-    given = dict(args.sensor_image)
+    given = {name: _camera_size(file) for name, file in args.camera} | dict(args.sensor_image)
     if args.image is not None:
         given[reference] = args.image
     strange = [name for name in given if name not in recording.sensors]
@@ -171,9 +182,12 @@ def _register(
     from jeat_graph.rig.points import map_of_points, read_points
     from jeat_graph.rig.registering import Registration, clock_by_map, register_by_traffic
 
-    if args.points is None:
+    if args.points is not None:
+        way, lines = map_of_points(*read_points(args.points, names), sizes[0], args.points)
+    elif args.camera:
+        way, lines = _map_of_cameras(dict(args.camera), names)
+    else:
         return register_by_traffic(first, second, names, sizes, _start(known, names[1]))
-    way, lines = map_of_points(*read_points(args.points, names), sizes[0], args.points)
     clock = clock_by_map(first, second, way)
     if clock is None:
         lines.append(
@@ -185,6 +199,22 @@ def _register(
             f"clock {clock.offset_s:.4f} s ± {1e3 * clock.offset_std_s:.1f} ms ahead, by the traffic"
         )
     return Registration(way, clock, [f"{names[1]}: {line}" for line in lines])
+
+
+def _map_of_cameras(cameras: dict[str, str], names: tuple[str, str]) -> tuple[PictureMap, list[str]]:
+    from jeat_graph.road.camera_file import read_camera
+    from jeat_graph.road.camera_map import map_between
+
+    common, own = (read_camera(cameras[name]) for name in names)
+    way, left = map_between(own, common)
+    return way, [f"the cameras' files tell the map, to {left:.2g} px for what stands on the road"]
+
+
+def _camera_size(file: str) -> tuple[int, int]:
+    from jeat_graph.road.camera_file import read_camera
+
+    camera = read_camera(file)
+    return camera.width, camera.height
 
 
 def _start(known: Config | None, name: str) -> MatchedTracks | None:
@@ -231,3 +261,10 @@ def _named_size(text: str) -> tuple[str, tuple[int, int]]:
     if not equals or not name:
         raise argparse.ArgumentTypeError(f"must read NAME=WIDTHxHEIGHT, say evt=640x480, not {text!r}")
     return name, picture_size(size)
+
+
+def _named_file(text: str) -> tuple[str, str]:
+    name, equals, file = text.partition("=")
+    if not equals or not name or not file:
+        raise argparse.ArgumentTypeError(f"must read NAME=FILE, say evt=camera.yaml, not {text!r}")
+    return name, file

@@ -100,3 +100,44 @@ def _normalising(points: FloatArray) -> FloatArray:
     middle = points.mean(axis=0)
     spread = max(float(np.sqrt(((points - middle) ** 2).sum(axis=1).mean() / 2.0)), 1e-9)
     return np.array([[1 / spread, 0, -middle[0] / spread], [0, 1 / spread, -middle[1] / spread], [0, 0, 1.0]])
+
+
+def fit_with_parallax(points: FloatArray, heights: FloatArray, there: FloatArray) -> PictureMap:
+    """Fit a map with parallax: linearly, then by the distances in the other picture.
+
+    Args:
+        points: (N, 2) centres of boxes in one picture (px).
+        heights: (N,) of these boxes (px).
+        there: (N, 2) centres in the other picture (px).
+
+    Raises:
+        DataError: the points do not tell it.
+    """
+    Tp, Tt, tall = _normalising(points), _normalising(there), max(float(heights.mean()), 1e-9)
+    x = np.column_stack([np.column_stack([points, np.ones(len(points))]) @ Tp.T, heights / tall])
+    y = np.column_stack([there, np.ones(len(there))]) @ Tt.T
+    zero = np.zeros_like(x)
+    A = np.concatenate([np.hstack([x, zero, -y[:, :1] * x]), np.hstack([zero, x, -y[:, 1:2] * x])])
+    _, values, rows = np.linalg.svd(A, full_matrices=False)
+    if len(values) < 12 or values[10] < _DETERMINED * values[0]:
+        raise DataError("the boxes tell no map with parallax")
+    to_unit = np.eye(4)
+    to_unit[:3, :3], to_unit[3, 3] = Tp, 1.0 / tall
+    matrix = np.linalg.inv(Tt) @ rows[-1].reshape(3, 4) @ to_unit
+    way = PictureMap(matrix / matrix[2, 2])
+    for _ in range(_ROUNDS):
+        left = (there - way.points(points, heights)).ravel()
+        J = way.jacobian(points, heights).reshape(len(left), -1)
+        size = np.abs(J).max(axis=0)
+        step = np.linalg.lstsq(J / size, left, rcond=None)[0] / size
+        moved = way.matrix.ravel().copy()
+        moved[[k for k in range(12) if k != _ONE]] += step
+        better = PictureMap(moved.reshape(3, 4))
+        if not np.square(there - better.points(points, heights)).sum() < np.square(left).sum():
+            break
+        way = better
+    return way
+
+
+# The place of the number that is 1 among those of a map with parallax.
+_ONE = 10
