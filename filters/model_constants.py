@@ -135,7 +135,7 @@ class ModelConstants:
     degrees_of_freedom: float = 6.0
     cut_share: float = 0.02
     cut_gate: float = 20.0
-    uncovered_share: float = 0.005
+    uncovered_share: float = 0.0002
     most_uncovered: float = 4.0
     outlier_share: float = 0.2
     outlier_std: float = 0.3

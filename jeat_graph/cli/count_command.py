@@ -6,7 +6,7 @@ import argparse
 import dataclasses
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,11 +15,7 @@ from jeat_graph.cli.options import add_classes, add_tables, tables_read
 from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import positive
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.steps import check_steps
 from jeat_graph.eval.counting import Line
-
-if TYPE_CHECKING:
-    from jeat_graph.data.trajectories import Trajectories
 
 WRITES = ("out",)
 HELP = "count vehicles over lines in the picture, by direction, with intervals"
@@ -50,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Count."""
     from jeat_graph.eval import counting
-    from jeat_graph.eval.load import tables_of
+    from jeat_graph.eval.load import recording_span, tables_of
     from jeat_graph.eval.tables import Cell, Table
     from jeat_graph.io.table_writer import write_columns
     from jeat_graph.io.trajectories_io import read_trajectories
@@ -62,15 +58,14 @@ def run(args: argparse.Namespace) -> int:
     tables = tables_of(Path(args.source))
     kind = "smoothed" if "smoothed" in tables else "causal"
     table = read_trajectories(tables[kind], **tables_read(args))
-    first, last = _span(Path(args.source), tables[kind], table)
+    first, last = recording_span(Path(args.source), tables[kind], table)
     if args.classes is not None:
         table = table.of_class(*args.classes, final=True)
     known = table.final_classes()
     found = [c for line in lines for c in counting.crossings(table, line, known)]
     edges = np.array([first, np.nextafter(last, np.inf)])
     if args.interval is not None:
-        check_steps(first, last, 1.0 / args.interval, "intervals", "choose a longer --interval")
-        edges = counting.interval_edges(first, last, args.interval, found)
+        edges = counting.interval_edges(first, last, args.interval, [c.t for c in found])
     counts = counting.count(found, edges, names)
     if args.crossings:
         write_columns(_columns(found, counting.LineCrossing), args.crossings)
@@ -96,22 +91,6 @@ def run(args: argparse.Namespace) -> int:
         if any(np.isnan(c.expected) for c in counts):
             say("count", "no interval: the table has no variances of position (`track` writes them)")
     return 0
-
-
-def _span(source: Path, file: Path, table: Trajectories) -> tuple[float, float]:
-    """Begin and end of a recording (s): of its scans, where the run says them, else of its tracks.
-
-    A result by frame number begins with its first frame, whatever is the first in which it has a track.
-    """
-    from jeat_graph.io.formats import BY_FRAME, recognise
-    from jeat_graph.io.scans_io import read_instants
-
-    scans = read_instants(source)
-    times = table.t if scans is None or not len(scans) else np.concatenate((table.t, scans))
-    if not len(times):
-        return 0.0, 0.0
-    by_frame = len(table) > 0 and recognise(file) in BY_FRAME
-    return 0.0 if by_frame else float(times.min()), float(times.max())
 
 
 def _line(text: str, number: int) -> Line:

@@ -3,8 +3,10 @@
 // Errors are below two units in the last place; tests compare with NumPy's.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 
@@ -14,14 +16,22 @@ inline constexpr double kLog2E = 1.4426950408889634, kPi = 3.141592653589793;
 // ln 2 in two parts, the first with zeros at its end: its product with a whole number is exact.
 inline constexpr double kLn2High = 6.93147180369123816490e-01, kLn2Low = 1.90821492927058770002e-10;
 
+// 1/n, for the series below.
+inline constexpr auto kReciprocals = [] {
+    std::array<double, 26> out{};
+    for (int n = 1; n < 26; ++n) out[static_cast<std::size_t>(n)] = 1.0 / n;
+    return out;
+}();
+
 // e^x = 2^k e^r, |r| <= ln 2 / 2, by Taylor's series.
 inline double exp_of(double x) {
     if (!(x < 709.0)) return x != x ? x : std::numeric_limits<double>::infinity();
     if (x < -708.0) return 0.0;
     const double k = std::nearbyint(x * kLog2E);
     const double r = (x - k * kLn2High) - k * kLn2Low;
-    double sum = 1.0;
-    for (int n = 13; n > 0; --n) sum = 1.0 + r * sum / n;
+    double sum = kReciprocals[13];
+    for (int n = 13; n > 1; --n) sum = kReciprocals[n - 1] * (1.0 + r * sum);
+    sum = 1.0 + r * sum;
     const auto power = static_cast<std::uint64_t>(static_cast<std::int64_t>(k) + 1023) << 52;
     return sum * std::bit_cast<double>(power);
 }
@@ -38,7 +48,7 @@ inline double log_of(double x) {
     }
     const double s = (m - 1.0) / (m + 1.0), s2 = s * s;
     double sum = 0.0;
-    for (int n = 25; n > 1; n -= 2) sum = s2 * (1.0 / n + sum);
+    for (int n = 25; n > 1; n -= 2) sum = s2 * (kReciprocals[n] + sum);
     return k * kLn2High + (k * kLn2Low + 2.0 * (s + s * sum));
 }
 

@@ -3,14 +3,28 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from argparse import ArgumentTypeError
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
+from typing import Any
 
+from jeat_graph.config.argument_types import picture_size
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.frame_numbers import FIRST_FRAMES
+from jeat_graph.data.tables.frame_filling import SCORE_SCALES
+from jeat_graph.data.time_units import TIME_UNITS
+from jeat_graph.io.formats import FORMATS
 
 #: Separates several files, or several settings, in one field.
 SEPARATOR = ";"
 COLUMNS = ("name", "detections", "config", "set", "gt", "rate", "camera")
+#: How the files are read: each column is called as the option of `track` is.
+READING_COLUMNS = (
+    *("first_frame", "only_video", "classes", "class", "time_unit", "score_scale", "input_format", "images"),
+    *("image", "frames"),
+)
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
@@ -26,6 +40,7 @@ class ManifestRow:
         truth: true boxes, or None.
         rate_hz: frame rate of files that count frames, or None.
         camera: the calibrated camera, for speeds on the road, or None.
+        reading: fields of a `TrackRequest` that say how the files are read.
     """
 
     name: str
@@ -35,6 +50,7 @@ class ManifestRow:
     truth: str | None = None
     rate_hz: float | None = None
     camera: str | None = None
+    reading: dict[str, Any] = field(default_factory=dict)
 
 
 def read_manifest(path: str | Path) -> list[ManifestRow]:
@@ -42,8 +58,9 @@ def read_manifest(path: str | Path) -> list[ManifestRow]:
 
     Columns: `detections` (files of the recording, joined by `;`), and, all optional, `name` (default: the
     first file's name without its suffix), `config`, `set` (settings joined by `;`), `gt`, `rate` (Hz),
-    `camera` (YAML file). Paths are relative to the manifest's folder. The files themselves are not looked at
-    here: a recording that cannot be read is that recording's failure, not the batch's.
+    `camera` (YAML file), and `READING_COLUMNS` (several classes joined by `;`). Paths are relative to the
+    manifest's folder. The files themselves are not looked at here: a recording that cannot be read is that
+    recording's failure, not the batch's.
 
     Raises:
         DataError: names the line and what is wrong: an unknown column, a name that is no file name or that
@@ -52,24 +69,26 @@ def read_manifest(path: str | Path) -> list[ManifestRow]:
     from jeat_graph.io.tables import read_table
 
     table = read_table(path, ("detections",))
-    strange = next((name for name in table.names if name not in COLUMNS), None)
+    known = (*COLUMNS, *READING_COLUMNS)
+    strange = next((name for name in table.names if name not in known), None)
     if strange is not None:
-        raise DataError(f"unknown column {strange!r}; a manifest has {', '.join(COLUMNS)}", path, 1)
+        raise DataError(f"unknown column {strange!r}; a manifest has {', '.join(known)}", path, 1)
     folder = Path(path).parent
     rate = table.number("rate", blank_ok=True) if "rate" in table else None
     text = {
         name: table.text(name, blank_ok=name != "detections").tolist()
-        for name in COLUMNS
+        for name in known
         if name in table and name != "rate"
     }
     recordings: list[ManifestRow] = []
     taken: set[str] = set()
     for row in range(len(table)):
-        field = {name: values[row] for name, values in text.items()}
-        files = tuple(_located(item, folder) for item in _parts(field["detections"]))
+        said = {name: values[row] for name, values in text.items()}
+        error = partial(table.error, row)
+        files = tuple(_located(item, folder) for item in _parts(said["detections"]))
         if not files:
             raise table.error(row, "detections is missing")
-        name = field.get("name") or _stem(files[0])
+        name = said.get("name") or _stem(files[0])
         if not _NAME.fullmatch(name):
             raise table.error(row, f"name {name!r} must be letters, digits, dots, dashes or underlines")
         if name in taken:
@@ -82,16 +101,56 @@ def read_manifest(path: str | Path) -> list[ManifestRow]:
             ManifestRow(
                 name=name,
                 detections=files,
-                config=_config(field.get("config", ""), folder),
-                overrides=tuple(_parts(field.get("set", ""))),
-                truth=_located(field["gt"], folder) if field.get("gt") else None,
+                config=_config(said.get("config", ""), folder),
+                overrides=(*_parts(said.get("set", "")), *_picture(said.get("image", ""), error)),
+                truth=_located(said["gt"], folder) if said.get("gt") else None,
                 rate_hz=hz,
-                camera=_located(field["camera"], folder) if field.get("camera") else None,
+                camera=_located(said["camera"], folder) if said.get("camera") else None,
+                reading=_reading(said, folder, error),
             )
         )
     if not recordings:
         raise DataError("names no recording", path)
     return recordings
+
+
+def _reading(said: Mapping[str, str], folder: Path, error: Callable[[str], DataError]) -> dict[str, Any]:
+    """Fields of a `TrackRequest` that a row says, by the columns `READING_COLUMNS`."""
+    found: dict[str, Any] = {}
+    allowed = {
+        "first_frame": tuple(map(str, FIRST_FRAMES)),
+        "time_unit": tuple(TIME_UNITS),
+        "score_scale": SCORE_SCALES,
+        "input_format": FORMATS,
+    }
+    for name, values in allowed.items():
+        text = said.get(name)
+        if text and text not in values:
+            raise error(f"{name} must be {', '.join(values)}, got {text!r}")
+        if text:
+            found[name] = int(text) if name == "first_frame" else text
+    if said.get("only_video"):
+        found["video"] = said["only_video"]
+    if said.get("class"):
+        found["classes"] = tuple(_parts(said["class"]))
+    for name, key in (("classes", "class_names"), ("images", "images"), ("frames", "frames")):
+        text = said.get(name, "")
+        if text:
+            listed = name == "classes" and "," in text and not (folder / text).exists()
+            # Absolute: a worker of a cluster stands in another folder.
+            found[key] = text if listed else str((folder / text).resolve())
+    return found
+
+
+def _picture(text: str, error: Callable[[str], DataError]) -> tuple[str, ...]:
+    """The settings that a picture's size stands for, as `--image` does."""
+    if not text:
+        return ()
+    try:
+        width, height = picture_size(text)
+    except ArgumentTypeError as wrong:
+        raise error(f"image {wrong}") from None
+    return f"image.width={width}", f"image.height={height}"
 
 
 def _parts(field: str) -> list[str]:

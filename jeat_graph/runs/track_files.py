@@ -151,7 +151,7 @@ def track_files(
     Raises:
         JeatGraphError: the configuration or a file is not valid, or they do not fit together.
     """
-    from jeat_graph.io.detections_io import read_many
+    from jeat_graph.io.detections_io import of_class_in, read_many
     from jeat_graph.io.formats import recognise
     from jeat_graph.rig.common_picture import in_common, recorded_ways
     from jeat_graph.runs.clock_pass import find_clocks
@@ -170,7 +170,9 @@ def track_files(
         request = replace(request, image=(config.image.width, config.image.height))
     for note in notes:
         say(note)
-    detections = read_many(request.detections, **request._reading())
+    how = request._reading()
+    classes = how.pop("classes", None)
+    detections = read_many(request.detections, **how)
     names = " + ".join(request.files)
     ways = {name: one for name, one in recorded_ways(config).items() if name in detections.sensors}
     detections, config, notes = in_common(detections, config)
@@ -183,6 +185,8 @@ def track_files(
     config, notes = fit_input(config, detections)
     for note in notes:
         say(note)
+    if classes is not None:  # the picture is as large as the boxes of all classes reach
+        detections = of_class_in(detections, classes, request.files[0])
     found = {"ways": ways, "clocks": clocks}
     source = request.source() | {name: one for name, one in found.items() if one}
     record = RunRecord(source=source, warnings=check_detections(detections, config, names))

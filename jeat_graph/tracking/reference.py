@@ -232,8 +232,8 @@ def update(state: ReferenceState, pairs: AssociatedPairs, c: ModelConstants) -> 
     y, size = seen.y[i, pairs.box], singer.box_size(tracks.mean[i])
     R = box_sides.measured_variance(y, seen.S[i], seen.side_variance[i], size, c)
     mean, covariance = tracks.mean.copy(), tracks.covariance.copy()
-    grown = box_sides.uncovered_covariance(covariance[i], y, seen.S[i], size, c)
-    mean[i], covariance[i] = box_sides.update(mean[i], grown, y, seen.H[i], R)
+    m, P, y = box_sides.uncover(mean[i], covariance[i], y, seen.S[i], c)
+    mean[i], covariance[i] = box_sides.update(m, P, y, box_sides.measurement_matrix(singer.box_size(m)), R)
     state.tracks = replace(tracks, mean=mean, covariance=covariance)
 
 

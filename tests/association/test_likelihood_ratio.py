@@ -86,7 +86,8 @@ def test_outside_the_gates_no_pair_is_made():
     box = np.array([[200.0, 300.0, 300.0, 360.0]])
     mean, P = box_sides.initial_state(box, 2.0 * np.log(0.06), C)
     # Far off; cut to a third from the left; grown on all sides at once.
-    seen = np.concatenate([box + 400.0, box + [[66.0, 0.0, 0.0, 0.0]], box + [[-90.0, -90.0, 90.0, 90.0]]])
+    moved = np.array([[400.0, 400.0, 400.0, 400.0], [66.0, 0.0, 0.0, 0.0], [-90.0, -90.0, 90.0, 90.0]])
+    seen = box + moved
     innovation = box_sides.innovations(mean, P, seen, 2.0 * np.log(0.06), C)
     density = likelihood_ratio.sides_log_density(innovation, np.array([[100.0, 60.0]]), C)
     assert np.isfinite(density).tolist() == [[False, True, False]]

@@ -8,6 +8,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from jeat_graph.io.decoders import quietly
+
 _PARENTS = (b"moov", b"trak", b"mdia", b"minf", b"stbl")
 _TICKS_PER_S = 1000
 _HEADER = 8
@@ -15,7 +17,9 @@ _HEADER = 8
 
 def write_video(path: Path, count: int, rate_hz: float = 30.0, codec: str = "mp4v") -> Path:
     """Write a grey video of `count` pictures of 64 x 48 px at a steady rate."""
-    out = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*codec), rate_hz, (64, 48))
+    code = cv2.VideoWriter.fourcc(*codec)
+    # The first who opens a video sets how much FFmpeg says, for all tests of this process.
+    out = quietly(lambda: cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, rate_hz, (64, 48)))
     for k in range(count):
         out.write(np.full((48, 64, 3), 10 * k % 256, np.uint8))
     out.release()

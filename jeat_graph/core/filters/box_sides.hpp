@@ -124,8 +124,9 @@ inline void update_axis(double* mean, double* P, double left, double right, doub
 }
 
 // Where it is likelier that a side has been cut so far and now shows further out than that both sides measure as
-// before, nothing is known of that side: P grows by d^2 along it.
-inline void uncover(double* P, double left, double right, const Pair2& S, double size, const ModelConstants& c) {
+// before, nothing is known of that side: the state takes it as it is measured, and P grows by d^2 along it.
+inline void uncover(double* mean, double* P, double& left, double& right, const Pair2& S, double size,
+                    const ModelConstants& c) {
     const double both = -0.5 * S.squared_distance(left, right) - 0.5 * log_of(S.determinant()) - kLog2Pi;
     const double out[] = {-left, right}, other[] = {right, left}, variance[] = {S.rr, S.ll};
     for (int side = 0; side < 2; ++side) {
@@ -133,7 +134,11 @@ inline void uncover(double* P, double left, double right, const Pair2& S, double
         const double alone = -0.5 * square(other[side]) / variance[side] - 0.5 * (log_of(variance[side]) + kLog2Pi) -
                              log_of(size) + log_of(c.uncovered_share);
         if (alone <= both) continue;
-        const double along = (side == 0 ? -1.0 : 1.0) / size, V = square(out[side]);
+        const double sign = side == 0 ? -1.0 : 1.0, whole = exp_of(mean[kLogSize]) + out[side];
+        mean[kPosition] += sign * out[side] / 2.0;
+        mean[kLogSize] = log_of(whole);
+        (side == 0 ? left : right) = 0.0;
+        const double along = sign / whole, V = square(out[side]);
         P[kPosition * kStates + kPosition] += V / 4.0;
         P[kPosition * kStates + kLogSize] += V * along / 2.0;
         P[kLogSize * kStates + kPosition] += V * along / 2.0;
@@ -146,12 +151,13 @@ inline void update(double* mean, double* covariance, const std::array<double, 4>
                    const ModelConstants& c) {
     const double heavy = 1.0 / student_weight(squared_distance(y, expected.S), c);
     for (int axis = 0; axis < 2; ++axis) {
-        const double left = y[2 * axis], right = y[2 * axis + 1];
+        double left = y[2 * axis], right = y[2 * axis + 1];
+        double *const m = mean + axis * kStates, *const P = covariance + axis * kMatrix;
         const auto cut = cut_probabilities(left, right, expected.S[axis], expected.size[axis], c);
-        uncover(covariance + axis * kMatrix, left, right, expected.S[axis], expected.size[axis], c);
         const double R = expected.variance[axis] * (cut[0] + cut[1] > 0.5 ? 1.0 : heavy);
-        update_axis(mean + axis * kStates, covariance + axis * kMatrix, left, right, expected.size[axis],
-                    R / std::max(1.0 - cut[0], kLeastProbability), R / std::max(1.0 - cut[1], kLeastProbability));
+        uncover(m, P, left, right, expected.S[axis], expected.size[axis], c);
+        update_axis(m, P, left, right, exp_of(m[kLogSize]), R / std::max(1.0 - cut[0], kLeastProbability),
+                    R / std::max(1.0 - cut[1], kLeastProbability));
     }
 }
 

@@ -14,6 +14,7 @@ from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.rates import median_rate_hz
 from jeat_graph.data.steps import check_steps
+from jeat_graph.data.tables.reading import ReadingOptions
 from jeat_graph.data.time_text import exact_text
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.drawing.movie.backgrounds import (
@@ -25,7 +26,6 @@ from jeat_graph.drawing.movie.backgrounds import (
 from jeat_graph.drawing.movie.moments import TRAIL_S, TracksAt, TruthAt
 from jeat_graph.drawing.movie.panels import Movie
 from jeat_graph.io.events.layout import EventLayout
-from jeat_graph.io.reading import ReadingOptions
 from jeat_graph.rig.common_picture import CommonPicture, Way, common_time
 from jeat_graph.runs.directory import RUN_JSON, read_record
 
