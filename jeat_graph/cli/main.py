@@ -42,6 +42,7 @@ COMMANDS = (
     "render",
     "report",
     "calibrate",
+    "register",
     "camera",
     "road",
 )

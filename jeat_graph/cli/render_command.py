@@ -9,7 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jeat_graph.cli.detect_options import add_event_layout, event_layout
-from jeat_graph.cli.options import add_classes, add_old_name, add_output_rate, add_tables, tables_read
+from jeat_graph.cli.options import (
+    add_classes,
+    add_old_name,
+    add_output_rate,
+    add_rig,
+    add_tables,
+    tables_read,
+)
 from jeat_graph.cli.terminal import warn
 from jeat_graph.config.argument_types import counting, drawn_size, not_negative, positive
 from jeat_graph.data.errors import DataError
@@ -42,6 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_event_layout(parser)
     add("--gt", metavar="FILE", help="truth, drawn as thin outlines")
+    add_rig(parser)
     add(
         "--out",
         required=True,
@@ -108,6 +116,7 @@ def run(args: argparse.Namespace) -> int:
         reading=tables_read(args),
         event_size_px=args.event_size,
         event_layout=event_layout(args),
+        rig=_path(args.rig),
     )
     inputs = [path for path in (request.frames, request.events, request.truth) if path is not None]
     check_keeps(inputs, out)

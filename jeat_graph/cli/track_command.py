@@ -17,6 +17,7 @@ from jeat_graph.cli.options import (
     add_image,
     add_output_rate,
     add_reading,
+    add_rig,
     add_smoother,
     extra_formats,
     overrides,
@@ -51,6 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_config(parser)
     add_image(parser)
+    add_rig(parser)
     add_smoother(parser)
     add_formats(parser)
     add_output_rate(parser, "frames per second of output that counts frames", "--frame-rate")
@@ -109,6 +111,7 @@ def run(args: argparse.Namespace) -> int:
         video=args.only_video,
         class_names=args.class_names,
         frames=args.frames,
+        rig=args.rig,
         options=RunOptions(
             formats=extra_formats(args),
             frame_rate_hz=args.output_rate if args.output_rate is not None else args.rate,
@@ -147,15 +150,24 @@ def _detected(args: argparse.Namespace) -> tuple[tuple[str, ...], tuple[str, ...
     check_folder(out)
     found = out / DETECTIONS
     check_writable(found)
-    request = replace(detect_request(args), one_picture=True)
+    request = replace(detect_request(args), one_picture=not _have_own_pictures(args))
     if args.image is not None and args.frames is not None:
         _check_image(args.image, args.frames)
     # Another configuration, a preset or the user's own, says itself what its sensors are.
     declared = declared_settings(request, _say) if args.config == DEFAULT else []
-    args.image = args.image or picture_of(request)
+    args.image = args.image or (None if args.rig is not None else picture_of(request))
     with hold_made_folder(out):  # detecting takes long; the run directory is held by what tracks
         write_detections(detect_with_bar(request, "track"), found)
     return (str(found),), tuple(declared)
+
+
+def _have_own_pictures(args: argparse.Namespace) -> bool:
+    """Whether the configuration says how the pictures of both cameras lie to each other."""
+    from jeat_graph.config.reading import load_config
+    from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR
+
+    sensors = load_config(args.config, overrides(args), args.rig).sensors
+    return any(name in sensors and sensors[name].image is not None for name in (FRAMES_SENSOR, EVENTS_SENSOR))
 
 
 def _check_image(image: tuple[int, int], frames: str) -> None:
