@@ -10,6 +10,7 @@ from jeat_graph.config.argument_types import finite, picture_size, positive
 
 if TYPE_CHECKING:
     from jeat_graph.detection.detecting import DetectRequest
+    from jeat_graph.detection.settings import DetectionSettings
     from jeat_graph.io.events.layout import EventLayout
 
 #: Units of time of tables of events.
@@ -171,6 +172,32 @@ def _without_input(args: argparse.Namespace) -> list[tuple[str, str]]:
     return [(name, source) for name, (source, file, said) in given.items() if said and file is None]
 
 
+def _looking_for(
+    settings: DetectionSettings, classes: tuple[str, ...], args: argparse.Namespace
+) -> DetectionSettings:
+    """Return the settings with `--class` for each network that looks.
+
+    Raises:
+        ConfigError: no network looks, or a list of settings names classes, too.
+    """
+    from dataclasses import replace
+
+    from jeat_graph.data.errors import ConfigError
+
+    looking = {
+        "model_frames": args.frames is not None and args.detector_frames != "motion",
+        "model_events": args.events is not None and args.detector_events != "motion",
+        "model_fused": args.detector_fused is not None,
+    }
+    if not any(looking.values()):
+        raise ConfigError("--class: what moves has no class; a network knows some (--detector-frames)")
+    named = [name for name, does in looking.items() if does]
+    if any(getattr(settings, name).classes for name in named):
+        raise ConfigError(f"--class and {named[0]}.classes say the same twice: leave one out")
+    chosen = {name: replace(getattr(settings, name), classes=classes) for name in named}
+    return replace(settings, **chosen)
+
+
 def detect_request(args: argparse.Namespace) -> DetectRequest:
     """Return what the arguments ask for.
 
@@ -187,6 +214,8 @@ def detect_request(args: argparse.Namespace) -> DetectRequest:
     for option, source in _without_input(args):
         raise ConfigError(f"{option} says nothing without {source}: give both, or leave it out")
     settings = load_settings(args.detection_config, args.detection_set)
+    if args.classes is not None:
+        settings = _looking_for(settings, tuple(args.classes), args)
     if args.event_rate is not None:
         try:
             settings = replace(settings, events=replace(settings.events, rate_hz=args.event_rate))

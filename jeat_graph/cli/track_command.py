@@ -94,6 +94,7 @@ def run(args: argparse.Namespace) -> int:
         declared = tuple(made_by(args, _say))
     else:
         detections, declared = _detected(args)
+        args.classes = None  # the networks have looked for no others
     request = TrackRequest(
         detections=detections,
         out=args.out,

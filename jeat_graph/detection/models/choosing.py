@@ -88,7 +88,7 @@ def _averaged(
     rows: IntArray,
     average: float,
 ) -> FloatArray:
-    """Return the mean corners (M, 4) of what overlaps each box that stays (rows, (M,)) and is of its class."""
+    """Return the mean corners (M, 4) of what overlaps each box that stays (rows, (M,)), of its class."""
     near = pairwise_iou(boxes[rows].astype(float), boxes.astype(float)) >= average
     weights = (near & (classes[rows][:, None] == classes[None])) * scores
     # Rounding may leave a box a hair short of overlapping itself.

@@ -189,12 +189,12 @@ def _yolox_raw(outputs: Mapping[str, Any], side: tuple[int, int], classes: int |
 def _yolov8(outputs: Mapping[str, Any], side: tuple[int, int], classes: int | None) -> DecodedBoxes:
     rows = _upright(_rows(outputs))
     end = None if classes is None else BOX + classes
-    return _best(_from_centre(rows[:, :BOX]), _squashed(rows[:, BOX:end]), distinct=False)
+    return _best(_from_centre(rows[:, :BOX]), rows[:, BOX:end], distinct=False)
 
 
 def _yolov8_turned(outputs: Mapping[str, Any], side: tuple[int, int], classes: int | None) -> DecodedBoxes:
     rows = _upright(_rows(outputs))
-    return _best(_around_turned(rows[:, :BOX], rows[:, -1]), _squashed(rows[:, BOX:-1]), distinct=False)
+    return _best(_around_turned(rows[:, :BOX], rows[:, -1]), rows[:, BOX:-1], distinct=False)
 
 
 def _end_to_end(outputs: Mapping[str, Any], side: tuple[int, int], classes: int | None) -> DecodedBoxes:
@@ -219,7 +219,7 @@ def _rtdetr(outputs: Mapping[str, Any], side: tuple[int, int], classes: int | No
     labelled = rows.shape[1] == ROW and not (classes == 2 and (numbers % 1.0 != 0.0).any())
     if labelled:
         return _labelled(corners, rows[:, BOX], rows[:, BOX + 1])
-    return _best(corners, _squashed(rows[:, BOX:]), distinct=True)
+    return _best(corners, rows[:, BOX:], distinct=True)
 
 
 def _detr(outputs: Mapping[str, Any], side: tuple[int, int], classes: int | None) -> DecodedBoxes:
@@ -242,10 +242,10 @@ def _boxes(outputs: Mapping[str, Any], side: tuple[int, int], classes: int | Non
 
 
 def _nanodet(outputs: Mapping[str, Any], side: tuple[int, int], classes: int | None) -> DecodedBoxes:
-    arrays = [np.asarray(value, dtype=np.float64)[0] for value in outputs.values()]
+    arrays = [_numbers(value)[0] for value in outputs.values()]
     if len(arrays) == 1:
         bins = next(b for b in _BINS if arrays[0].shape[1] - 4 * b >= 1 and _fits(len(arrays[0]), side))
-        classes, distances = arrays[0][:, : -4 * bins], arrays[0][:, -4 * bins :]
+        of_classes, distances = arrays[0][:, : -4 * bins], arrays[0][:, -4 * bins :]
     else:
         half = len(arrays) // 2
         # Grouped by kind, or in pairs: the two kinds differ in their last side.
@@ -257,15 +257,15 @@ def _nanodet(outputs: Mapping[str, Any], side: tuple[int, int], classes: int | N
         picked = [
             [a for a, d in zip(arrays, is_distance, strict=True) if d is kind] for kind in (False, True)
         ]
-        classes, distances = (np.concatenate(sorted(group, key=len, reverse=True)) for group in picked)
-    strides = _STRIDES if len(classes) == _cell_count(side, _STRIDES) else _MORE_STRIDES
+        of_classes, distances = (np.concatenate(sorted(group, key=len, reverse=True)) for group in picked)
+    strides = _STRIDES if len(of_classes) == _cell_count(side, _STRIDES) else _MORE_STRIDES
     places, steps = cells(side, strides)
     parts = distances.reshape(len(distances), 4, -1)
     shares = np.exp(parts - parts.max(axis=2, keepdims=True))
     reach = (shares * np.arange(parts.shape[2])).sum(axis=2) / shares.sum(axis=2) * steps[:, None]
     centre = (places + 0.5) * steps[:, None]
     corners = np.column_stack([centre - reach[:, :2], centre + reach[:, 2:]])
-    return _best(corners, _squashed(classes), distinct=False)
+    return _best(corners, of_classes, distinct=False)
 
 
 _DECODERS = {
@@ -300,10 +300,16 @@ def _rows(outputs: Mapping[str, Any]) -> FloatArray:
     tables = [value for value in outputs.values() if np.ndim(value) == ROWS]
     if len(tables) != 1:
         raise ValueError("one output of three sides, the first 1, is needed")
-    rows = np.asarray(tables[0], dtype=np.float64)
+    rows = _numbers(tables[0])
     if rows.shape[0] != 1:
         raise ValueError("one output of three sides, the first 1, is needed")
     return np.asarray(rows[0])
+
+
+def _numbers(values: npt.ArrayLike) -> npt.NDArray[Any]:
+    """Return numbers in single or double precision: half is too short for arithmetic on places."""
+    array = np.asarray(values)
+    return array if array.dtype in (np.float32, np.float64) else array.astype(np.float32)
 
 
 def _upright(rows: FloatArray) -> FloatArray:
@@ -322,10 +328,12 @@ def _around_turned(boxes: FloatArray, angles: FloatArray) -> FloatArray:
 def _with_objectness(rows: FloatArray, classes: int | None) -> DecodedBoxes:
     if rows.shape[1] < BOX + 1:
         raise ValueError("a row needs a box and an objectness")
-    objectness = _squashed(rows[:, BOX : BOX + 1])
     of_classes = rows[:, BOX + 1 : None if classes is None else BOX + 1 + classes]
-    scores = objectness * (_squashed(of_classes) if of_classes.shape[1] else 1.0)
-    return _best(_from_centre(rows[:, :BOX]), scores, distinct=False)
+    objectness = _squashed(rows[:, BOX])
+    if not of_classes.shape[1]:
+        return _best(_from_centre(rows[:, :BOX]), objectness[:, None], distinct=False)
+    found = _best(_from_centre(rows[:, :BOX]), of_classes, distinct=False)
+    return found._replace(scores=objectness * found.scores)
 
 
 def _queries(
@@ -343,23 +351,35 @@ def _queries(
     return _from_centre(boxes) * np.array([*side, *side], dtype=np.float64), scores
 
 
-def _from_centre(boxes: FloatArray) -> FloatArray:
+def _from_centre(boxes: npt.NDArray[Any]) -> FloatArray:
+    boxes = boxes.astype(np.float64)
     half = boxes[:, 2:4] / 2.0
     return np.column_stack([boxes[:, :2] - half, boxes[:, :2] + half])
 
 
-def _squashed(values: FloatArray) -> FloatArray:
+def _squashed(values: npt.NDArray[Any]) -> FloatArray:
     """Return probabilities: the values, or their logistic function where they cannot be any."""
-    # Not by their least and greatest: one that is no number would hide all others.
-    if (values < 0.0).any() or (values > 1.0 + 1e-3).any():
-        return np.asarray(1.0 / (1.0 + np.exp(-np.clip(values, -60.0, 60.0))))
-    return values
+    return _logistic(values) if _are_logits(values) else values.astype(np.float64)
 
 
-def _best(corners: FloatArray, scores: FloatArray, *, distinct: bool) -> DecodedBoxes:
-    """Keep the best class of each row."""
+def _are_logits(values: npt.NDArray[Any]) -> bool:
+    """Whether some values are no probabilities."""
+    if not values.size:
+        return False
+    # `fmin` and `fmax` pass over what is no number, which would hide all others.
+    return bool(np.fmin.reduce(values, axis=None) < 0.0 or np.fmax.reduce(values, axis=None) > 1.0 + 1e-3)
+
+
+def _logistic(values: npt.NDArray[Any]) -> FloatArray:
+    return np.asarray(1.0 / (1.0 + np.exp(-np.clip(values.astype(np.float64), -60.0, 60.0))))
+
+
+def _best(corners: FloatArray, scores: npt.NDArray[Any], *, distinct: bool) -> DecodedBoxes:
+    """Keep the best class of each row; of scores that are no probabilities, their logistic function."""
     best = scores.argmax(axis=1)
-    return DecodedBoxes(corners, scores[np.arange(len(scores)), best], best.astype(np.int64), distinct)
+    top = scores[np.arange(len(scores)), best]
+    probable = _logistic(top) if _are_logits(scores) else top.astype(np.float64)
+    return DecodedBoxes(corners, probable, best.astype(np.int64), distinct)
 
 
 def _cell_count(side: tuple[int, int], strides: Sequence[int]) -> int:

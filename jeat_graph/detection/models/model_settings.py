@@ -13,8 +13,8 @@ OWN_OVERLAPS = (0.55, 0.65)
 _OTHERS_OVERLAPS = (0.5, 1.0)
 #: Above this two boxes of different classes are one thing.
 _ACROSS = 0.65
-#: Scores below are left out: of networks that `train` made, whose scores the tracker knows (`*.tracking.yaml`),
-#: and of others by layout: `yolox` and `nanodet` measured on a street, the others as their own tools have it
+#: Scores below are left out: of networks that `train` made, whose scores the tracker knows, and of others by
+#: layout: `yolox` and `nanodet` measured on a street, the others as their own tools have it
 #: (Ultralytics `conf`; RT-DETR and D-FINE draw from .4 to .6).
 _OWN_SCORE, _OTHERS_SCORE = 0.1, 0.25
 _SCORES = {
@@ -137,8 +137,9 @@ class ModelSettings(Section):
     @property
     def open_side(self) -> tuple[int, int]:
         """Width and height where the file leaves them open (px)."""
-        return self.width or _OPEN_SIDE, self.height or _OPEN_SIDE
+        return self.width or OPEN_SIDE, self.height or OPEN_SIDE
 
 
-_OPEN_SIDE = 640
+#: Width and height of an input that its file leaves open (px).
+OPEN_SIDE = 640
 _COLOURS = 3

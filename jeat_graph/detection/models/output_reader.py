@@ -26,7 +26,7 @@ _DENSE = (*_WITH_OBJECTNESS, "yolov8", "yolov8-obb")
 _MOST_WITHOUT = 0.5
 
 
-class Found(NamedTuple):
+class FoundBoxes(NamedTuple):
     """What a network found.
 
     Attributes:
@@ -90,7 +90,7 @@ class OutputReader:
         self._rules = (self._score, overlap, average, settings.overlap_classes, persons(known))
         self.words += export_of(outputs, notes).words
 
-    def read(self, outputs: dict[str, npt.NDArray[Any]]) -> Found:
+    def read(self, outputs: dict[str, npt.NDArray[Any]]) -> FoundBoxes:
         """Return what is to be kept: its corners are in the network's input (px).
 
         Boxes without numbers are left out and counted.
@@ -107,7 +107,7 @@ class OutputReader:
         except DataError as error:
             raise DataError(str(error), self._path) from None
         corners, scores, classes = choose(self._with_numbers(found), self._wanted, *self._rules)
-        return Found(corners, scores, self._named(classes))
+        return FoundBoxes(corners, scores, self._named(classes))
 
     def _named(self, classes: IntArray) -> TextArray | None:
         """Return the names of classes, their numbers where they have none; None where there is but one."""
@@ -141,7 +141,7 @@ class OutputReader:
         return DecodedBoxes(corners[numbers], scores[numbers], classes[numbers], distinct)
 
 
-def scan_within(t: float, sensor: str, found: Found, size_px: tuple[int, int]) -> Scan:
+def scan_within(t: float, sensor: str, found: FoundBoxes, size_px: tuple[int, int]) -> Scan:
     """Return a scan of what of each box lies in the picture; boxes beside it are left out."""
     corners = np.clip(found.corners, 0.0, [*size_px, *size_px])
     inside = (corners[:, 2:] - corners[:, :2] > 0.0).all(axis=1)

@@ -1,4 +1,4 @@
-"""Exports as people have them: one car is one box of class car in the right place, or the file is refused by name.
+"""Exports as people have them: one car is one box of class car in its place, or the file is refused by name.
 
 The picture has 1280 x 720 px; the car lies at left 600, top 300 and is 80 wide and 60 high.
 """
