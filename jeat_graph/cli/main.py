@@ -30,6 +30,7 @@ COMMANDS = (
     "simulate",
     "events",
     "detect",
+    "detectors",
     "train",
     "track",
     "stream",
