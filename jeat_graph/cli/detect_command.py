@@ -19,7 +19,7 @@ from jeat_graph.data.progress import progress_to, refreshing
 
 if TYPE_CHECKING:
     from jeat_graph.data.detections import Detections
-    from jeat_graph.detection.detecting import DetectRequest
+    from jeat_graph.detection.request import DetectRequest
 
 STDOUT = "-"
 #: Decimal places of boxes (px) and of times (s) on stdout.

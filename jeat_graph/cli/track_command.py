@@ -132,6 +132,7 @@ def _detected(args: argparse.Namespace) -> tuple[tuple[str, ...], tuple[str, ...
         The file of detections, which lies in the run directory, and what `default` is told of the networks.
     """
     from jeat_graph.cli.detect_command import detect_with_bar
+    from jeat_graph.detection.automatic import resolved
     from jeat_graph.detection.declared import declared_settings
     from jeat_graph.detection.detecting import picture_of
     from jeat_graph.io.atomic import check_writable
@@ -151,6 +152,7 @@ def _detected(args: argparse.Namespace) -> tuple[tuple[str, ...], tuple[str, ...
     request = replace(detect_request(args), one_picture=True)
     if args.image is not None and args.frames is not None:
         _check_image(args.image, args.frames)
+    request = resolved(request, _say)
     # Another configuration, a preset or the user's own, says itself what its sensors are.
     declared = declared_settings(request, _say) if args.config == DEFAULT else []
     args.image = args.image or picture_of(request)

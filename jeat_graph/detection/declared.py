@@ -21,11 +21,12 @@ from jeat_graph.config.reading import load_config
 from jeat_graph.config.section_tree import build, read_tree
 from jeat_graph.config.sensors import SensorConfig
 from jeat_graph.data.errors import ConfigError, DataError
-from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR, FUSED_SENSOR, DetectRequest
+from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR, FUSED_SENSOR
 from jeat_graph.detection.models.layouts import recognise
 from jeat_graph.detection.models.model_settings import OPEN_SIDE
 from jeat_graph.detection.models.onnx_head import CARD, read_onnx_head
 from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION, network_file
+from jeat_graph.detection.request import DetectRequest
 
 _SUFFIX = ".tracking.yaml"
 _LAYOUTS = Path(__file__).parent / "layouts"

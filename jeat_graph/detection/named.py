@@ -15,6 +15,8 @@ from jeat_graph.detection.network_cache import fetched
 
 #: The detectors without weights.
 MOTION = "motion"
+#: Whichever fits the pictures (`automatic`).
+AUTO = "auto"
 #: What a network looks at.
 FRAMES, EVENTS, FUSED = "frames", "events", "fused"
 _FOLDER = Path(__file__).parent / "weights"
@@ -50,7 +52,7 @@ def network_file(detector: str, kind: str) -> Path:
         return fetched(KNOWN[detector])
     if detector not in known:
         names = list(known) if kind == FUSED else [MOTION, *known]
-        names += list(KNOWN) if kind == FRAMES else []
+        names = [AUTO, *names, *KNOWN] if kind == FRAMES else names
         choice = f"one of {', '.join(names)}, or " if names else ""
         seen = "both sensors" if kind == FUSED else kind
         raise ConfigError(

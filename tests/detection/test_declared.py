@@ -10,7 +10,7 @@ import pytest
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.detection.declared import declared_settings
-from jeat_graph.detection.detecting import DetectRequest
+from jeat_graph.detection.request import DetectRequest
 
 
 @pytest.mark.parametrize("network", ["sehn", "sehn-int8"])
