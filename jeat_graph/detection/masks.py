@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.config.section_tree import read_tree
 from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.detections import Scan
-from jeat_graph.data.errors import ConfigError
+from jeat_graph.data.errors import DataError
 from jeat_graph.io.decoders import RgbImage
+from jeat_graph.io.marks import MASKS, Polygon, polygon_of, read_marks_file
 
-Polygon = tuple[tuple[float, float], ...]
 #: A box is left out if more than this share of it lies in a mask.
 MOST_MASKED = 0.5
-_CORNERS = 3
 _SUFFIXES = (".yaml", ".yml")
-_KEY = "masks"
 _GREY = 114
 
 
@@ -99,42 +95,18 @@ def read_masks(texts: Sequence[str]) -> Masks:
     """Read masks: files `FILE.yaml` with `masks: {name: [[x, y], …]}`, or corners `x1,y1,x2,y2,x3,y3,…` (px).
 
     Raises:
-        ConfigError: names the text or the file, and what is wrong.
+        DataError: names the text or the file, and what is wrong.
     """
     found: list[Polygon] = []
     for text in texts:
         if Path(text).suffix.lower() in _SUFFIXES:
-            found += _from_file(text)
+            found += read_marks_file(text, (MASKS,)).masks.values()
             continue
         try:
             numbers = [float(part) for part in text.split(",")]
         except ValueError:
-            raise ConfigError(
+            raise DataError(
                 f"--mask {text}: must be FILE.yaml, or corners x1,y1,x2,y2,x3,y3,… in px"
             ) from None
-        pairs = [numbers[k : k + 2] for k in range(0, len(numbers), 2)]
-        found.append(_polygon(pairs, f"--mask {text}"))
+        found.append(polygon_of(numbers, f"--mask {text}"))
     return Masks(tuple(found))
-
-
-def _from_file(path: str) -> list[Polygon]:
-    tree = read_tree(path, (), str, "file of masks")
-    masks = tree.get(_KEY)
-    if set(tree) != {_KEY} or not isinstance(masks, Mapping) or not masks:
-        raise ConfigError(f"{path}: must hold `{_KEY}: {{name: [[x, y], …]}}` and nothing else")
-    return [_polygon(corners, f"{path}: {_KEY}.{name}") for name, corners in masks.items()]
-
-
-def _polygon(corners: object, where: str) -> Polygon:
-    wrong = ConfigError(f"{where}: must be {_CORNERS} corners or more, each x and y in px")
-    if not isinstance(corners, Sequence) or isinstance(corners, str):
-        raise wrong
-    found = []
-    for corner in corners:
-        good = isinstance(corner, Sequence) and not isinstance(corner, str) and len(corner) == len("xy")
-        if not good or not all(isinstance(v, int | float) and math.isfinite(v) for v in corner):
-            raise wrong
-        found.append((float(corner[0]), float(corner[1])))
-    if len(found) < _CORNERS:
-        raise wrong
-    return tuple(found)
