@@ -14,12 +14,12 @@ import numpy.typing as npt
 
 from jeat_graph.cli.count_output import clock_s, station_columns, with_clock
 from jeat_graph.cli.options import add_classes, add_tables, tables_read
+from jeat_graph.cli.place_options import add_places, places
 from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import positive
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.steps import check_steps
 from jeat_graph.eval.counting import Count, Line, LineCrossing
-from jeat_graph.eval.zones import Zone
 
 if TYPE_CHECKING:
     from jeat_graph.data.arrays import FloatArray
@@ -33,27 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
     add = parser.add_argument
     add("source", metavar="RUN", help="run directory, trajectory table or result")
-    add(
-        "--line",
-        action="append",
-        default=[],
-        metavar="[NAME=]X1,Y1,X2,Y2",
-        help="a line in px, crossed to its left or right as seen from its first point; may be repeated",
-    )
-    add(
-        "--zone",
-        action="append",
-        default=[],
-        metavar="[NAME=]X1,Y1,X2,Y2,X3,Y3,…",
-        help="a polygon in px, entered (in) and left (out); may be repeated",
-    )
-    add(
-        "--lines",
-        action="append",
-        default=[],
-        metavar="FILE.yaml",
-        help="a file with `lines: {name: [x1, y1, x2, y2]}`, `zones: {name: [[x, y], …]}`, or both",
-    )
+    add_places(parser)
     add(
         "--interval",
         type=positive,
@@ -91,7 +71,9 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.io.table_writer import write_columns
     from jeat_graph.io.trajectories_io import read_trajectories
 
-    lines, zones = _places(args)
+    lines, zones = places(args)
+    if not lines and not zones:
+        raise ConfigError("nothing to count at: give --line, --zone or --lines FILE.yaml")
     names = [place.name for place in (*lines, *zones)]
     if args.road is not None and args.stations is None:
         raise ConfigError("--road says nothing without --stations: give both, or leave it out")
@@ -127,28 +109,6 @@ def run(args: argparse.Namespace) -> int:
     else:
         _show(counts, shown=bool(found) or args.interval is not None)
     return 0
-
-
-def _places(args: argparse.Namespace) -> tuple[list[Line], list[Zone]]:
-    """Return the lines and zones of all options.
-
-    Raises:
-        DataError: there are none, one is none, or two have one name.
-    """
-    from jeat_graph.io.marks import LINES, ZONES, read_marks_file
-
-    lines = [_line(text, k) for k, text in enumerate(args.line, 1)]
-    zones = [_zone(text, k) for k, text in enumerate(args.zone, 1)]
-    for path in args.lines:
-        marks = read_marks_file(path, (LINES, ZONES))
-        lines += [Line(*ends, name) for name, ends in marks.lines.items()]
-        zones += [Zone(name, corners) for name, corners in marks.zones.items()]
-    names = [place.name for place in (*lines, *zones)]
-    if not names:
-        raise ConfigError("nothing to count at: give --line, --zone or --lines FILE.yaml")
-    if len(set(names)) < len(names):
-        raise DataError(f"{max(names, key=names.count)} is the name of two lines or zones")
-    return lines, zones
 
 
 def _edges(interval_s: float | None, span: tuple[float, float], found: list[LineCrossing]) -> FloatArray:
@@ -233,28 +193,6 @@ def _span(source: Path, file: Path, table: Trajectories) -> tuple[float, float]:
         return 0.0, 0.0
     by_frame = len(table) > 0 and recognise(file) in BY_FRAME
     return 0.0 if by_frame else float(times.min()), float(times.max())
-
-
-def _line(text: str, number: int) -> Line:
-    """Read `NAME=x1,y1,x2,y2`; without a name it is `line-1` and so on."""
-    name, equals, ends = text.rpartition("=")
-    try:
-        x1, y1, x2, y2 = (float(part) for part in ends.split(","))
-    except ValueError:
-        raise DataError(f"--line {text}: must read x1,y1,x2,y2 in px, or NAME=x1,y1,x2,y2") from None
-    return Line(x1, y1, x2, y2, name if equals else f"line-{number}")
-
-
-def _zone(text: str, number: int) -> Zone:
-    """Read `NAME=x1,y1,x2,y2,x3,y3,…`; without a name it is `zone-1` and so on."""
-    from jeat_graph.io.marks import polygon_of
-
-    name, equals, corners = text.rpartition("=")
-    try:
-        numbers = [float(part) for part in corners.split(",")]
-    except ValueError:
-        raise DataError(f"--zone {text}: must read x1,y1,x2,y2,x3,y3,… in px, or NAME=…") from None
-    return Zone(name if equals else f"zone-{number}", polygon_of(numbers, f"--zone {text}"))
 
 
 def _columns(rows: list[Any], kind: type) -> dict[str, npt.NDArray[Any]]:

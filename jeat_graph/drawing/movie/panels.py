@@ -9,8 +9,17 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.drawing.movie.backgrounds import FilmBackground
-from jeat_graph.drawing.movie.marks import Canvas, draw_causal, draw_names, draw_smoothed
+from jeat_graph.drawing.movie.captions import Captions
+from jeat_graph.drawing.movie.marks import (
+    Canvas,
+    draw_causal,
+    draw_counters,
+    draw_names,
+    draw_smoothed,
+    draw_totals,
+)
 from jeat_graph.drawing.movie.moments import TracksAt, TruthAt
+from jeat_graph.drawing.movie.totals import Counter
 from jeat_graph.drawing.palette import IGNORED_BOX, TEXT, TRUE_BOX
 from jeat_graph.io.video import RgbImage
 
@@ -41,6 +50,8 @@ class Movie:
     smoothed: TracksAt | None = None
     truth: TruthAt | None = None
     labels: str = "thin"
+    captions: Captions | None = None
+    counters: Sequence[Counter] = ()
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -78,6 +89,7 @@ class Movie:
         return image
 
     def _draw(self, canvas: Canvas, k: int, t: float) -> None:
+        draw_counters(canvas, self.counters)
         if self.causal is not None:
             draw_causal(canvas, self.causal.at(k), trails=self.smoothed is None)
         if self.smoothed is not None:
@@ -89,7 +101,9 @@ class Movie:
                     canvas.thin_box(box, colour)
         named = self.smoothed if self.causal is None else self.causal
         if named is not None:
-            draw_names(canvas, named.at(k), self.labels)  # last, so that no line runs through them
+            # Last, so that no line runs through them.
+            draw_names(canvas, named.at(k), self.labels, self.captions, t)
+        draw_totals(canvas, self.counters, t)
         used = [
             text
             for shown, text in (
