@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
 
 HELP = "track the vehicles in files of detections, or in raw frames and events, and write a run directory"
-#: Within the run directory, where raw recordings were tracked.
-DETECTIONS = "detections.csv"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -132,12 +130,8 @@ def _detected(args: argparse.Namespace) -> tuple[tuple[str, ...], tuple[str, ...
         The file of detections, which lies in the run directory, and what `default` is told of the networks.
     """
     from jeat_graph.cli.detect_command import detect_with_bar
-    from jeat_graph.detection.automatic import resolved
-    from jeat_graph.detection.declared import declared_settings
-    from jeat_graph.detection.detecting import picture_of
+    from jeat_graph.detection.before_tracking import DETECTIONS, detect_before
     from jeat_graph.io.atomic import check_writable
-    from jeat_graph.io.detections_io import write_detections
-    from jeat_graph.io.locking import hold_made_folder
     from jeat_graph.io.outputs import check_folder
 
     if args.frames is None and args.events is None:
@@ -147,18 +141,20 @@ def _detected(args: argparse.Namespace) -> tuple[tuple[str, ...], tuple[str, ...
             raise DataError(f"--{name.replace('_', '-')} is for files of detections; there is none")
     out = Path(args.out)
     check_folder(out)
-    found = out / DETECTIONS
-    check_writable(found)
+    check_writable(out / DETECTIONS)
     request = replace(detect_request(args), one_picture=True)
     if args.image is not None and args.frames is not None:
         _check_image(args.image, args.frames)
-    request = resolved(request, _say)
     # Another configuration, a preset or the user's own, says itself what its sensors are.
-    declared = declared_settings(request, _say) if args.config == DEFAULT else []
-    args.image = args.image or picture_of(request)
-    with hold_made_folder(out):  # detecting takes long; the run directory is held by what tracks
-        write_detections(detect_with_bar(request, "track"), found)
-    return (str(found),), tuple(declared)
+    found = detect_before(
+        request,
+        out,
+        declare=args.config == DEFAULT,
+        say=_say,
+        detect=lambda looked: detect_with_bar(looked, "track"),
+    )
+    args.image = args.image or found.image
+    return (found.path,), found.declared
 
 
 def _check_image(image: tuple[int, int], frames: str) -> None:

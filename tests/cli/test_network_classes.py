@@ -82,6 +82,7 @@ def test_tracking_a_class_that_was_not_seen_gives_no_tracks(street):
 
 def test_what_knows_no_classes_is_not_asked_for_any(street, fails, capsys):
     folder = ("--frames", str(street / "frames"), "--rate", "20", "--out", str(street / "out.csv"))
+    folder += ("--detector-frames", "motion")
     assert "--class: what moves has no class" in fails("detect", *folder, "--class", "car")
     assert main(words(street, "detect", "--class", "lorry")) == 2
     assert "'lorry' is none of the network's" in capsys.readouterr().err
