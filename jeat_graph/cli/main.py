@@ -38,6 +38,8 @@ COMMANDS = (
     "eval",
     "compare",
     "count",
+    "draw",
+    "frame",
     "export",
     "view",
     "render",
