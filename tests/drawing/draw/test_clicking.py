@@ -156,4 +156,3 @@ def test_lines_zones_masks_and_lengths_are_drawn_with_the_mouse(browser, server,
     lengths = read_lengths(tmp_path / "lengths.csv")
     assert lengths.metres.tolist() == [12.5]
     np.testing.assert_allclose(lengths.start, [[320, 400]], atol=1.5)
-    assert server.done

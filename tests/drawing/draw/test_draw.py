@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.client
 import json
 import threading
+import time
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -100,6 +101,14 @@ def server(files):
         thread.join(5)
 
 
+def soon(true):
+    """Whether something becomes true before long."""
+    end = time.monotonic() + 5.0
+    while not true() and time.monotonic() < end:
+        time.sleep(0.01)
+    return true()
+
+
 def ask(server, method, path, body=None, **headers):
     at = urlsplit(server.address)
     link = http.client.HTTPConnection(at.hostname, at.port, timeout=10)
@@ -123,7 +132,7 @@ def test_the_page_saves_and_ends(server, files):
     assert json.loads(ask(server, "GET", f"{server.prefix}marks.json")[1]) == PAGE
     assert not server.done
     assert ask(server, "POST", f"{server.prefix}done", sent[0], **sent[1])[0] == 200
-    assert server.done
+    assert soon(lambda: server.done)
     assert files[0].is_file()
 
 
