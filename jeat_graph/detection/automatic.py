@@ -93,10 +93,13 @@ def resolved(request: DetectRequest, say: Callable[[str], object] = lambda _: No
         frames, times_s = _first(source)
         moving = _moving(frames, times_s, request.settings.frames)
         looks = np.unique(np.linspace(0, len(frames) - 1, min(_LOOKS, len(frames))).round().astype(int))
-        found = [
-            _impression(name, look, accuracy, [(frames[k], moving[k]) for k in looks.tolist()])
-            for name, look, accuracy in _candidates(request.settings, say)
-        ]
+        pictures = [(frames[k], moving[k]) for k in looks.tolist()]
+        found = []
+        for name, look, accuracy in _candidates(request.settings, say):
+            try:
+                found.append(_impression(name, look, accuracy, pictures))
+            except DataError as error:  # a network that does not work here is none
+                say(str(error))
     chosen = choose_among(found, any(len(boxes) for boxes in moving))
     if chosen == MOTION and request.settings.model_frames.classes:
         raise ConfigError(

@@ -95,6 +95,16 @@ def test_one_with_still_and_unsure_boxes_is_not(folder, tmp_path):
     assert "0 % sound" in said[-1]
 
 
+def test_one_that_does_not_work_is_passed_over(folder, tmp_path):
+    pytest.importorskip("onnx", reason="pip install onnx")
+    net(folder / "yolox_tiny.onnx", [[np.nan] * 6])
+    said: list[str] = []
+    frames = pictures(tmp_path / "frames", boxes=True)
+    asked = DetectRequest(frames=frames, rate_hz=10.0, detector_frames=AUTO)
+    assert resolved(asked, said.append).detector_frames == "motion"
+    assert any("gave no numbers" in line for line in said)
+
+
 def test_classes_need_a_network_that_knows_them(tmp_path, fails_late):
     frames = pictures(tmp_path / "frames", boxes=True)
     line = fails_late(

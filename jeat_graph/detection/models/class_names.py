@@ -28,6 +28,7 @@ COCO = re.split(
 _LEFT_OUT = {12, 26, 29, 30, 45, 66, 68, 69, 71, 83}
 _COCO_COUNTS = (91, 92)
 _VEHICLES = {"car", "motorcycle", "motorbike", "bus", "truck", "van", "vehicle", "trailer", "lorry"}
+_ANY = {"vehicle", "vehicles", "object", "item"}
 _PERSONS = {"person", "pedestrian", "rider"}
 #: What stands for every class.
 ALL = "all"
@@ -97,3 +98,13 @@ def wanted_classes(
 def persons(names: Mapping[int, str]) -> frozenset[int]:
     """Return the numbers of the classes that are people: on a vehicle, they are not that vehicle."""
     return frozenset(number for number, name in names.items() if name.lower() in _PERSONS)
+
+
+def says_nothing(names: Mapping[int, str], count: int | None) -> bool:
+    """Whether all boxes of a network are of one class that has no name, or is any vehicle whatever.
+
+    Beside a network that tells cars from trucks it would only outvote it.
+    """
+    if len(names) == 1:
+        return next(iter(names.values())).lower() in _ANY
+    return not names and count == 1

@@ -13,7 +13,13 @@ from jeat_graph.data.arrays import FloatArray, IntArray, TextArray
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError
 from jeat_graph.detection.models.choosing import choose
-from jeat_graph.detection.models.class_names import class_names, known_names, persons, wanted_classes
+from jeat_graph.detection.models.class_names import (
+    class_names,
+    known_names,
+    persons,
+    says_nothing,
+    wanted_classes,
+)
 from jeat_graph.detection.models.exports import BOX, SEGMENT, Export, class_channels, export_of
 from jeat_graph.detection.models.layouts import LAYOUT_NAMES, ROWS, DecodedBoxes, decode, is_raw, recognise
 from jeat_graph.detection.models.model_settings import ModelSettings
@@ -84,8 +90,7 @@ class OutputReader:
         self._path, self._looks, self._looks_without, self.no_numbers = path, 0, 0, 0
         known = known_names(names, count if coco else None)
         self._wanted, self.words = wanted_classes(settings.classes, count if names or coco else None, names)
-        # One class without a name tells nothing.
-        self._names = known if known or count != 1 else None
+        self._names = None if says_nothing(known, count) else known
         overlap, average = settings.overlaps(own=own)
         self._rules = (self._score, overlap, average, settings.overlap_classes, persons(known))
         self.words += export_of(outputs, notes).words

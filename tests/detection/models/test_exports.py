@@ -174,6 +174,14 @@ def test_one_class_without_a_name_has_none(tmp_path):
     assert scan.classes is None
 
 
+def test_one_class_that_is_any_vehicle_says_nothing_and_a_car_does(tmp_path):
+    rows = {"output0": few([*CORNERS, 0.9, 0], 6)}
+    for name, classes in (("vehicle", None), ("car", ["car"])):
+        path = constant_net(tmp_path / "net.onnx", rows, SIDE, notes=notes("detect", {0: name}))
+        scan = ModelPictureDetector(path, settings=ModelSettings(backend="opencv"))(PICTURE, 0.0)
+        assert (None if scan.classes is None else scan.classes.tolist()) == classes
+
+
 def test_scores_for_each_class_beside_boxes_are_read(tmp_path):
     """YOLO-NAS and others: boxes [1, N, 4] and scores [1, N, C] that nobody has suppressed."""
     corners = np.zeros((1, 40, 4))
