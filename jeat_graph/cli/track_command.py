@@ -26,6 +26,7 @@ from jeat_graph.data.errors import DataError
 
 if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
+    from jeat_graph.detection.before_tracking import DetectedFile
 
 HELP = "track the vehicles in files of detections, or in raw frames and events, and write a run directory"
 
@@ -88,10 +89,12 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.runs.track_files import TrackRequest, track_files
 
     detections = tuple(str(item) for item in args.detections)
+    detectors: tuple[str, ...] = ()
     if detections:
         declared = tuple(made_by(args, _say))
     else:
-        detections, declared = _detected(args)
+        found = _detected(args)
+        detections, declared, detectors = (found.path,), found.declared, found.detectors
         args.classes = None  # the networks have looked for no others
     request = TrackRequest(
         detections=detections,
@@ -108,6 +111,7 @@ def run(args: argparse.Namespace) -> int:
         video=args.only_video,
         class_names=args.class_names,
         frames=args.frames,
+        detectors=detectors,
         options=RunOptions(
             formats=extra_formats(args),
             frame_rate_hz=args.output_rate if args.output_rate is not None else args.rate,
@@ -123,12 +127,8 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _detected(args: argparse.Namespace) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Detect in raw recordings.
-
-    Returns:
-        The file of detections, which lies in the run directory, and what `default` is told of the networks.
-    """
+def _detected(args: argparse.Namespace) -> DetectedFile:
+    """Detect in raw recordings; the file of detections lies in the run directory."""
     from jeat_graph.cli.detect_command import detect_with_bar
     from jeat_graph.detection.before_tracking import DETECTIONS, detect_before
     from jeat_graph.io.atomic import check_writable
@@ -154,7 +154,7 @@ def _detected(args: argparse.Namespace) -> tuple[tuple[str, ...], tuple[str, ...
         detect=lambda looked: detect_with_bar(looked, "track"),
     )
     args.image = args.image or found.image
-    return (found.path,), found.declared
+    return found
 
 
 def _check_image(image: tuple[int, int], frames: str) -> None:

@@ -23,11 +23,13 @@ class DetectedFile(NamedTuple):
         path: the file.
         declared: `key=value` settings of the networks that made it.
         image: width and height of the picture (px), where only the events tell it.
+        detectors: what made it, `sensor: name`.
     """
 
     path: str
     declared: tuple[str, ...]
     image: tuple[int, int] | None
+    detectors: tuple[str, ...] = ()
 
 
 def detect_before(
@@ -60,4 +62,4 @@ def detect_before(
     found = out / DETECTIONS
     with hold_made_folder(out):  # detecting takes long; the run directory is held by what tracks
         write_detections(detect_files(request, say) if detect is None else detect(request), found)
-    return DetectedFile(str(found), tuple(declared), image)
+    return DetectedFile(str(found), tuple(declared), image, request.detectors)

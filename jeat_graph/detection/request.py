@@ -57,6 +57,14 @@ class DetectRequest:
             raise ConfigError("--detector-fused takes the place of --detector-frames and --detector-events")
 
     @property
+    def detectors(self) -> tuple[str, ...]:
+        """What looks, `sensor: name`, of networks by file the file's name."""
+        if self.detector_fused is not None:
+            return (f"fused: {Path(self.detector_fused).name}",)
+        looking = (("rgb", self.frames, self.detector_frames), ("evt", self.events, self.detector_events))
+        return tuple(f"{sensor}: {Path(name).name}" for sensor, file, name in looking if file is not None)
+
+    @property
     def files(self) -> list[str]:
         """The inputs, each once."""
         return list(dict.fromkeys(str(path) for path in (self.frames, self.events) if path is not None))

@@ -36,13 +36,20 @@ def with_detections(request: TrackRequest, raw: DetectRequest) -> TrackRequest:
         (out / SOURCE).unlink(missing_ok=True)
         found = detect_before(raw, out, declare=request.config == _DEFAULT)
         with open_atomic(out / SOURCE) as file:
-            json.dump(origin | {"declared": found.declared, "image": found.image}, file)
+            known = {"declared": found.declared, "image": found.image, "detectors": found.detectors}
+            json.dump(origin | known, file)
     picture: tuple[str, ...] = ()
     if found.image is not None:
         picture = (f"image.width={found.image[0]}", f"image.height={found.image[1]}")
     frames = None if raw.frames is None else str(raw.frames)
     overrides = (*found.declared, *picture, *request.overrides)
-    return replace(request, detections=(found.path,), frames=frames, overrides=overrides)
+    return replace(
+        request,
+        detections=(found.path,),
+        frames=frames,
+        overrides=overrides,
+        detectors=found.detectors,
+    )
 
 
 def _origin(raw: DetectRequest, config: str) -> dict[str, Any]:
@@ -76,6 +83,7 @@ def _known(out: Path, origin: dict[str, Any]) -> DetectedFile | None:
             return None
         image = known["image"]
         size = None if image is None else (int(image[0]), int(image[1]))
-        return DetectedFile(str(file), tuple(str(one) for one in known["declared"]), size)
+        declared, detectors = (tuple(map(str, known[key])) for key in ("declared", "detectors"))
+        return DetectedFile(str(file), declared, size, detectors)
     except (ValueError, KeyError, TypeError, RecursionError):
         return None  # damaged: it is made anew

@@ -36,6 +36,7 @@ class TrackRequest:
         class_names: names of classes that files number, as `io.class_names` takes them from a command.
         image: size of the picture (px) for boxes in shares of it; None for that of the configuration.
         frames: pictures that tell the picture's size and the frame rate, or None.
+        detectors: what made the detections, `sensor: name` or a file's name; for the record.
         options: how the run is written.
     """
 
@@ -54,6 +55,7 @@ class TrackRequest:
     class_names: str | None = None
     image: tuple[float, float] | None = None
     frames: str | None = None
+    detectors: tuple[str, ...] = ()
     options: RunOptions = field(default_factory=RunOptions)
 
     @property
@@ -107,6 +109,7 @@ class TrackRequest:
             "inputs": describe_inputs(self.files),
             "reading": {"detections": list(self.detections), **self._reading()},
             **({} if self.images is None else {"images": describe_inputs([self.images])[0]}),
+            **({"detectors": list(self.detectors)} if self.detectors else {}),
         }
 
     def _reading(self) -> dict[str, Any]:

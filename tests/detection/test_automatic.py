@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 
@@ -83,6 +84,14 @@ def test_a_network_of_the_cache_that_sees_what_moves_is_taken(folder, tmp_path, 
     assert "detector: yolox-tiny, by the first 3 s (yolox-tiny 1.0 boxes a picture, 100 % sound" in said
     assert "--detector-frames NAME takes another" in said
     assert set(pd.read_csv(tmp_path / "out.csv")["class"]) == {"car"}
+
+
+def test_a_run_says_what_made_its_detections(folder, tmp_path):
+    frames = pictures(tmp_path / "frames", boxes=True)
+    words = ["--frames", str(frames), "--rate", "10", "--out", str(tmp_path / "run")]
+    assert main(["track", *words]) == 0
+    record = json.loads((tmp_path / "run" / "run.json").read_text())
+    assert record["detectors"] == ["rgb: motion"] or record["detectors"] == ["rgb: sehn"]
 
 
 def test_one_with_still_and_unsure_boxes_is_not(folder, tmp_path):
