@@ -64,8 +64,9 @@ class DrawServer(http.server.ThreadingHTTPServer):
         self.done = False
         try:
             super().__init__((_HOME, port), _Handler)
-        except OSError as error:
-            raise DataError(f"port {port} cannot be opened: {error.strerror}") from None
+        except (OSError, OverflowError) as error:
+            reason = getattr(error, "strerror", None) or "ports are 0 to 65535"
+            raise DataError(f"port {port} cannot be opened: {reason}") from None
         self.hosts = {f"{name}:{self.server_port}" for name in (_HOME, "localhost")}
         self.address = f"http://{_HOME}:{self.server_port}{self.prefix}"
 

@@ -164,6 +164,12 @@ def test_a_file_that_is_no_file_of_marks_is_not_drawn_over(files):
         DrawServer(PICTURE, "x", *files)
 
 
+def test_a_port_that_is_taken_or_none_is_named(server, files):
+    for port, words in ((server.server_port, "in use"), (70_000, "ports are 0 to 65535")):
+        with pytest.raises(DataError, match=f"port {port} cannot be opened: .*{words}"):
+            DrawServer(PICTURE, "x", *files, port)
+
+
 def test_the_command_serves_a_video_until_the_page_is_done(tmp_path, capsys, monkeypatch):
     folder = tmp_path / "frames"
     folder.mkdir()
