@@ -6,8 +6,9 @@ Popoli, *Design and Analysis of Modern Tracking Systems*, ch. 6):
     ln L = ln P_D/(1 − P_D) + ln p(y) + ln p(score | track)/p(score | clutter) − ln κ
 
 p(y) is Student's t of the four sides, or for a share of boxes that cover a part of the object a wide normal
-one; κ is the density of leftover boxes: uniform in place and in ln width, ln height. AssociatedPairs below 0
-are never made, and the assignment whose sum is greatest is taken. N tracks, M boxes.
+one, or where one side is cut that of the other three; κ is the density of leftover boxes: uniform in place
+and in ln width, ln height. Pairs below 0 are never made, and the assignment whose sum is greatest is taken. N
+tracks, M boxes.
 """
 
 from __future__ import annotations
@@ -26,14 +27,14 @@ from jeat_graph.filters.model_constants import ModelConstants
 # may grow.
 _P_DETECT_BOUNDS = (0.01, 0.99)
 _LEAST_POSTERIOR = 0.02
+_LOG_2PI = math.log(2.0 * math.pi)
 
 
-def sides_log_density(
-    innovation: SideInnovations, size: FloatArray, c: ModelConstants
-) -> tuple[FloatArray, FloatArray]:
-    """Return ln p(y) (N, M), and the squared distance (N, M) for the gate.
+def sides_log_density(innovation: SideInnovations, size: FloatArray, c: ModelConstants) -> FloatArray:
+    """Return ln p(y) (N, M), −∞ outside every gate.
 
-    p = (1 − e) t_ν(y; 0, S) + e N(y; 0, S + σ² I), in px⁻⁴, with σ a part of the object's size.
+    p = (1 − e) t_ν(y; 0, S) + e N(y; 0, S + σ² I) + Σ ε N(three sides) / w, in px⁻⁴, with σ a part of the
+    object's size. The sum is over the sides that an occluder may cut: see `cut_log_density`.
 
     Args:
         innovation: of all boxes from all tracks.
@@ -50,8 +51,40 @@ def sides_log_density(
     constant = -SIDES / 2.0 * math.log(2.0 * math.pi)
     tail = constant - 0.5 * _log_determinant(wide)[:, None] - 0.5 * d2_wide
     share = c.outlier_share
-    density = np.logaddexp(math.log1p(-share) + body, math.log(share) + tail)
-    return density, np.minimum(d2, c.outlier_gate * d2_wide)
+    whole = np.logaddexp(math.log1p(-share) + body, math.log(share) + tail)
+    whole[np.minimum(d2, c.outlier_gate * d2_wide) > c.gate] = -np.inf
+    return np.logaddexp(whole, cut_log_density(y, S, size, c))
+
+
+def cut_log_density(y: FloatArray, S: FloatArray, size: FloatArray, c: ModelConstants) -> FloatArray:
+    """Return ln p(y) (N, M) in px⁻⁴ where an occluder cuts one side, or has cut it so far.
+
+    The sum over the sides that it may be.
+
+    A side that is cut now lies inwards anywhere within the object, one that shows again may lie further out
+    by some sizes: density 1/w times the prior of each; the other three are N(0, S), within a gate.
+
+    Args:
+        y: (N, M, 2, 2) innovations by axis and side.
+        S: (N, 2, 2, 2) their covariances.
+        size: (N, 2) predicted width and height (px).
+        c: constants.
+    """
+    out = np.full(y.shape[:2], -np.inf)
+    d2 = squared_distance(y, S[:, None])
+    log_det = np.log(determinant(S))
+    for axis in range(2):
+        across, extent = d2[..., 1 - axis], size[:, None, axis]
+        whole = -0.5 * (across + log_det[:, None, 1 - axis]) - 1.5 * _LOG_2PI - np.log(extent)
+        for cut, inwards in ((0, y[..., axis, 0]), (1, -y[..., axis, 1])):
+            variance = S[:, None, axis, 1 - cut, 1 - cut]
+            alone = y[..., axis, 1 - cut] ** 2 / variance
+            possible = (inwards < extent) & (inwards > -c.most_uncovered * extent)
+            fits = possible & (across + alone <= c.cut_gate)
+            share = np.log(np.where(inwards > 0.0, c.cut_share, c.uncovered_share))
+            term = share + whole - 0.5 * (alone + np.log(variance))
+            out = np.logaddexp(out, np.where(fits, term, -np.inf))
+    return out
 
 
 def score_log_ratio(real: FloatArray, log_odds: FloatArray, c: ModelConstants) -> FloatArray:
@@ -88,25 +121,21 @@ def clutter_log_density(
 
 def pair_log_ratio(
     density: FloatArray,
-    d2: FloatArray,
     p_detect: FloatArray,
     score: FloatArray,
     clutter: FloatArray,
-    c: ModelConstants,
 ) -> FloatArray:
-    """Return ln L (N, M), 0 where it is negative or outside the gate.
+    """Return ln L (N, M), 0 where it is negative.
 
     Args:
-        density: (N, M) ln p(y).
-        d2: (N, M) squared distance for the gate.
+        density: (N, M) ln p(y), −∞ outside the gates.
         p_detect: (N,) probability that the track is visible and detected.
         score: (N, M) ln of the scores' ratio.
         clutter: (N,) ln κ.
-        c: constants.
     """
     p = np.clip(p_detect, *_P_DETECT_BOUNDS)
     ratio = np.log(p / (1.0 - p))[:, None] + density + score - clutter[:, None]
-    return np.where(d2 > c.gate, 0.0, np.maximum(ratio, 0.0))
+    return np.maximum(ratio, 0.0)
 
 
 def assign(ratio: FloatArray) -> tuple[IntArray, IntArray]:

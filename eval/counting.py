@@ -16,6 +16,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.steps import check_steps
 from jeat_graph.data.trajectories import Trajectories
 
 #: Both tails of a 95 % interval together.
@@ -163,7 +164,7 @@ class Count:
     high: int
 
 
-def interval_edges(first: float, last: float, interval_s: float, found: Sequence[LineCrossing]) -> FloatArray:
+def interval_edges(first: float, last: float, interval_s: float, times: Sequence[float]) -> FloatArray:
     """Bounds (K + 1,) of the intervals that a recording is counted in (s): multiples of their length.
 
     So they are those of the clock where times are of a clock, those of `road`, and the same for all cameras.
@@ -172,11 +173,15 @@ def interval_edges(first: float, last: float, interval_s: float, found: Sequence
         first: begin of the recording (s).
         last: its end (s).
         interval_s: length of an interval (s).
-        found: crossings, all of which are to lie in an interval.
+        times: of crossings (s), all of which are to lie in an interval.
+
+    Raises:
+        DataError: there would be too many, which comes from a wrong time.
     """
-    times = [first, *(c.t for c in found)]
-    begin = math.floor(min(times) / interval_s)
-    end = max(math.ceil(last / interval_s), math.floor(max(times) / interval_s) + 1)
+    begin_s, end_s = min([first, *times]), max([first, *times])
+    check_steps(begin_s, max(last, end_s), 1.0 / interval_s, "intervals", "choose a longer --interval")
+    begin = math.floor(begin_s / interval_s)
+    end = max(math.ceil(last / interval_s), math.floor(end_s / interval_s) + 1)
     return np.asarray(interval_s * np.arange(begin, end + 1), dtype=np.float64)
 
 

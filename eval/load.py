@@ -11,18 +11,18 @@ from typing import Unpack
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.data.class_columns import all_numbers, rows_of_class
+from jeat_graph.data.class_columns import all_numbers, naming_hint, rows_of_class
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.notes import note
 from jeat_graph.data.progress import with_progress
 from jeat_graph.data.rates import ANY_RATE_HZ, median_rate_hz
+from jeat_graph.data.tables.frame_filling import check_rate
+from jeat_graph.data.tables.reading import Reading, ReadingOptions
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.pairing import check_lives, check_pair, check_truth
 from jeat_graph.eval.resampling import TIME_TOLERANCE_S, on_the_clock_of
 from jeat_graph.io.beside import check_beside
 from jeat_graph.io.formats import FIRST_OPEN
-from jeat_graph.io.frames import check_rate
-from jeat_graph.io.reading import Reading, ReadingOptions
 from jeat_graph.io.scans_io import read_instants
 from jeat_graph.io.trajectories_io import read_trajectories_counted
 from jeat_graph.io.truth_io import read_truth_counted
@@ -81,8 +81,8 @@ def load_run(
         truth: the truth, in any format that `read_truth` knows.
         classes: classes of objects to be found; others are ignored, and so are tracks that have another
             class. All by default.
-        options: as `io.reading.Reading` has it: `rate_hz` of files that count frames, by default that of the
-            truth; `time_unit` of the truth's column `t` (runs are in seconds); `first_frame` of the run;
+        options: as `tables.reading.Reading` has it: `rate_hz` of files that count frames, by default that of
+            the truth; `time_unit` of the truth's column `t` (runs are in seconds); `first_frame` of the run;
             `video` of both; `class_names` of the run, and of the truth where that has numbers; `image`.
 
     Raises:
@@ -167,7 +167,10 @@ def check_classes(truths: Sequence[GroundTruth], classes: Sequence[str]) -> None
     """
     there = sorted({str(name) for one in truths if one.classes is not None for name in one.classes})
     if not set(classes) & set(there):
-        raise DataError(f"no object is of class {' or '.join(classes)}; the truth has: {', '.join(there)}")
+        raise DataError(
+            f"no object is of class {' or '.join(classes)}; the truth has: {', '.join(there)}"
+            + naming_hint(there)
+        )
 
 
 def tables_of(path: Path) -> dict[str, Path]:
@@ -214,7 +217,7 @@ def read_tables(path: Path, **options: Unpack[ReadingOptions]) -> dict[str, Traj
 
     Args:
         path: run directory, table or result.
-        options: what a result does not say itself, as `io.reading.Reading` has it.
+        options: what a result does not say itself, as `tables.reading.Reading` has it.
 
     Raises:
         DataError: as `tables_of`; or a table is not valid.
@@ -222,6 +225,29 @@ def read_tables(path: Path, **options: Unpack[ReadingOptions]) -> dict[str, Traj
     from jeat_graph.io.trajectories_io import read_trajectories
 
     return {kind: read_trajectories(file, **options) for kind, file in tables_of(path).items()}
+
+
+def recording_span(source: Path, file: Path, table: Trajectories) -> tuple[float, float]:
+    """Return begin and end of a recording (s): of its scans, where a run says them, else of its tracks.
+
+    A result by frame number begins with its first frame, whatever is the first in which it has a track.
+
+    Args:
+        source: run directory, table or result.
+        file: the table of it that was read.
+        table: what stands in that.
+
+    Raises:
+        DataError: `scans.csv` is not valid.
+    """
+    from jeat_graph.io.formats import BY_FRAME, recognise
+
+    scans = read_instants(source)
+    times = table.t if scans is None or not len(scans) else np.concatenate((table.t, scans))
+    if not len(times):
+        return 0.0, 0.0
+    by_frame = len(table) > 0 and recognise(file) in BY_FRAME
+    return 0.0 if by_frame else float(times.min()), float(times.max())
 
 
 def _rate_beside(truth: Path, form: str, any_will_do: bool) -> float:

@@ -192,7 +192,8 @@ def _gather(table: Trajectories, row: IntArray, frame: IntArray, age: FloatArray
 def interpolate_to(table: Trajectories, times: FloatArray, *, max_gap_s: float | None = None) -> Resampled:
     """Smoothed trajectories at given times, between the two neighbouring rows of each track.
 
-    Nothing is said before a track's first row or after its last. The centre follows the quintic through
+    Nothing is said before a track's first row or after its last, nor at a time at which others have a row and
+    it has none: then it is known not to be reported. The centre follows the quintic through
     position, velocity and acceleration of both rows, which is the mean of the white-jerk motion model
     between two known states (Barfoot, State Estimation for Robotics, ch. 11); a track without known motion
     moves in a straight line. The box keeps its offset from the centre (it may be clipped) and its log size
@@ -221,9 +222,10 @@ def interpolate_to(table: Trajectories, times: FloatArray, *, max_gap_s: float |
 
     step = t[after] - t[before]
     into = np.clip(times[frame] - t[before], 0.0, step)
-    ok = np.ones(len(frame), dtype=bool)
+    told = np.abs(moments[np.maximum(now, 0)] - times[frame]) <= TIME_TOLERANCE_S
+    ok = ~told | (into <= TIME_TOLERANCE_S) | (step - into <= TIME_TOLERANCE_S)
     if max_gap_s is not None:
-        ok = (step <= max_gap_s + TIME_TOLERANCE_S) | (into <= TIME_TOLERANCE_S)
+        ok &= (step <= max_gap_s + TIME_TOLERANCE_S) | (into <= TIME_TOLERANCE_S)
     ok_rows = np.flatnonzero(ok)
     ok_rows = ok_rows[np.argsort(frame[ok_rows], kind="stable")]
     frame, before, after = frame[ok_rows], before[ok_rows], after[ok_rows]

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from jeat_graph.data.errors import ConfigError
-from jeat_graph.io.spreadsheets import guarded
+from jeat_graph.data.tables.spreadsheets import guarded
 
 Cell = str | float | int | None
 FORMATS = ("text", "markdown", "csv", "latex", "json")

@@ -182,6 +182,45 @@ def measured_variance(
     return np.asarray((R * tail)[..., None] / np.maximum(1.0 - cut, _LEAST_PROBABILITY))
 
 
+def uncover(
+    mean: FloatArray,
+    covariance: FloatArray,
+    y: FloatArray,
+    S: FloatArray,
+    c: ModelConstants,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return states, covariances and innovations that know nothing of sides which had been cut so far.
+
+    Where a side lies further out than predicted, and that it was cut (prior ε', density 1/w) is likelier than
+    that both sides measure as before, the state takes it as it is measured, d further out, and the covariance
+    becomes P + d² ∂ ∂ᵀ, with ∂[p, l] = [1/2, ∓1/w].
+
+    Args:
+        mean: (N, 2, 5) predicted states.
+        covariance: (N, 2, 5, 5).
+        y: (N, 2, 2) innovations by axis and side.
+        S: (N, 2, 2, 2) their covariances.
+        c: constants.
+    """
+    mean, covariance, left_over, size = mean.copy(), covariance.copy(), y.copy(), box_size(mean)
+    both = -0.5 * squared_distance(y, S) - 0.5 * np.log(determinant(S)) - _LOG_2PI
+    variance = np.diagonal(S, axis1=2, axis2=3)
+    alone = -0.5 * y**2 / variance - 0.5 * (np.log(variance) + _LOG_2PI)
+    other = alone[..., ::-1] - np.log(size)[..., None] + math.log(c.uncovered_share)
+    out = np.stack([-y[..., 0], y[..., 1]], axis=-1)
+    shows = (out > 0.0) & (out < c.most_uncovered * size[..., None]) & (other > both[..., None])
+    for side, sign in enumerate((-1.0, 1.0)):
+        d = np.where(shows[..., side], out[..., side], 0.0)
+        whole = box_size(mean) + d
+        mean[..., POSITION] += sign * d / 2.0
+        mean[..., LOG_SIZE] = np.where(shows[..., side], np.log(whole), mean[..., LOG_SIZE])
+        left_over[..., side] = np.where(shows[..., side], 0.0, y[..., side])
+        along = np.zeros((*size.shape, STATES))
+        along[..., POSITION], along[..., LOG_SIZE] = 0.5, sign / whole
+        covariance += (d**2)[..., None, None] * along[..., :, None] * along[..., None, :]
+    return mean, covariance, left_over
+
+
 def update(
     mean: FloatArray, covariance: FloatArray, y: FloatArray, H: FloatArray, R: FloatArray
 ) -> tuple[FloatArray, FloatArray]:

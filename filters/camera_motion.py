@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jeat_graph.data.arrays import BoolArray, FloatArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.filters.box_sides import side_variance
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.filters.singer import LOG_SIZE, POSITION, box_size
@@ -28,10 +28,17 @@ _LEAST_TRACKS = 2
 
 
 class CameraVariance(NamedTuple):
-    """Variances of the motion between two scans: of shift (sizes²), and of scale."""
+    """Variances of the motion between two scans: of shift (sizes²), and of scale; and the last motion.
+
+    Attributes:
+        shift: (sizes²).
+        scale: without a unit.
+        last: (3,) the last motion, in θ per second.
+    """
 
     shift: float
     scale: float
+    last: FloatArray
 
 
 class CameraMotion(NamedTuple):
@@ -43,7 +50,7 @@ class CameraMotion(NamedTuple):
 
 def initial_variance(c: ModelConstants) -> CameraVariance:
     """Return the variances before anything is learnt."""
-    return CameraVariance(c.camera_shift_std**2, c.camera_scale_std**2)
+    return CameraVariance(c.camera_shift_std**2, c.camera_scale_std**2, np.zeros(3))
 
 
 def estimate(
@@ -52,6 +59,7 @@ def estimate(
     boxes: FloatArray,
     log_variance: float,
     picture: tuple[float, float],
+    dt: float,
     prior: CameraVariance,
     c: ModelConstants,
 ) -> tuple[CameraMotion | None, CameraVariance]:
@@ -63,6 +71,7 @@ def estimate(
         boxes: (M, 4) left, top, right, bottom (px).
         log_variance: ln ρ² of the sensor's sides.
         picture: width and height (px).
+        dt: time since the tracks' last prediction (s).
         prior: learnt variances.
         c: constants.
 
@@ -77,21 +86,24 @@ def estimate(
     S = covariance[..., POSITION, POSITION] + R / 2.0
     S_size = covariance[..., LOG_SIZE, LOG_SIZE] + 2.0 * R / size**2
     y = (boxes[:, :2] + boxes[:, 2:])[None] / 2.0 - mean[:, None, :, POSITION]
-    allowance = min(prior.shift * _PAIRING_DEVIATIONS, _PAIRING_MOST) * scale**2
-    d2 = (y**2 / (S + allowance[:, None])[:, None]).sum(axis=2)
     y_size = np.log(boxes[:, 2:] - boxes[:, :2])[None] - mean[:, None, :, LOG_SIZE]
-    d2 += (y_size**2 / S_size[:, None]).sum(axis=2)
-    box = d2.argmin(axis=1)
-    track = np.arange(len(mean))
-    paired: BoolArray = (d2[track, box] < _GATE) & (d2[:, box].argmin(axis=0) == track)
-    if paired.sum() < _LEAST_TRACKS:
+    d2_size = (y_size**2 / S_size[:, None]).sum(axis=2)
+    allowance = min(prior.shift * _PAIRING_DEVIATIONS, _PAIRING_MOST) * scale**2
+    wide = (S + allowance[:, None])[:, None]
+    centre = mean[:, :, POSITION] - np.array(picture) / 2.0
+    # The camera may have gone on as before: rows of like objects are else taken for their neighbours.
+    again = prior.last[:2] * dt + prior.last[2] * dt * centre
+    track, box = _nearest(y**2 / wide, d2_size)
+    moved = _nearest((y - again[:, None]) ** 2 / wide, d2_size)
+    if len(moved[0]) > len(track):
+        track, box = moved
+    if len(track) < _LEAST_TRACKS:
         return None, prior
-    track, box = track[paired], box[paired]
     place = mean[track][:, :, POSITION] - np.array(picture) / 2.0
     typical = float(np.median(scale[track]))
     precision = 1.0 / np.array([prior.shift * typical**2, prior.shift * typical**2, prior.scale])
     motion = _reweighted_least_squares(y[track, box], S[track], place, precision)
-    return motion, _learnt(prior, motion, typical, c)
+    return motion, _learnt(prior, motion, typical, dt, c)
 
 
 def compensate(
@@ -105,6 +117,20 @@ def compensate(
     mean[:, :, LOG_SIZE] += scale
     covariance[..., POSITION, POSITION] += np.diag(motion.covariance)[:2]
     return mean, covariance
+
+
+def _nearest(d2: FloatArray, d2_size: FloatArray) -> tuple[IntArray, IntArray]:
+    """Return tracks (K,) and boxes (K,) that are each other's nearest, within the gate.
+
+    Args:
+        d2: (N, M, 2) squared distances of the centres by axis.
+        d2_size: (N, M) of the sizes.
+    """
+    near = d2.sum(axis=2)
+    total = np.where(near < _GATE, near + d2_size, np.inf)
+    box, track = total.argmin(axis=1), np.arange(len(total))
+    paired = (total[track, box] < _GATE) & (total[:, box].argmin(axis=0) == track)
+    return track[paired], box[paired]
 
 
 def _reweighted_least_squares(
@@ -126,13 +152,17 @@ def _reweighted_least_squares(
     return CameraMotion(theta, covariance)
 
 
-def _learnt(prior: CameraVariance, motion: CameraMotion, typical: float, c: ModelConstants) -> CameraVariance:
-    """Return the variances after a scan: running means of E[θ²], within their bounds."""
+def _learnt(
+    prior: CameraVariance, motion: CameraMotion, typical: float, dt: float, c: ModelConstants
+) -> CameraVariance:
+    """Return the variances after a scan: running means of E[θ²], within their bounds; and the motion."""
     second = motion.theta**2 + np.diag(motion.covariance)
     keep = c.camera_memory
     shift = keep * prior.shift + (1.0 - keep) * float(second[:2].mean()) / typical**2
     scale = keep * prior.scale + (1.0 - keep) * float(second[2])
     low, high = c.camera_shift_bounds, c.camera_scale_bounds
     return CameraVariance(
-        float(np.clip(shift, low[0] ** 2, low[1] ** 2)), float(np.clip(scale, high[0] ** 2, high[1] ** 2))
+        float(np.clip(shift, low[0] ** 2, low[1] ** 2)),
+        float(np.clip(scale, high[0] ** 2, high[1] ** 2)),
+        motion.theta / dt if dt > 0.0 else prior.last,
     )

@@ -134,7 +134,8 @@ def count_hits(
         keep = math.exp(-clock.period_s / memory)
         total[at] = total[at] * keep + logits * clock.weight
         weight[at] = weight[at] * keep + clock.weight
-    now = new.recent[at] / new.recent_weight[at]
+    weight = new.recent_weight[at]
+    now = np.where(weight > 0.0, new.recent[at] / np.where(weight > 0.0, weight, 1.0), logits)
     fallen = new.peak[at] - clock.period_s / c.peak_decay_s * np.maximum(new.peak[at] - now, 0.0)
     new.peak[at] = np.where(first, now, np.maximum(fallen, now))
     new.gained[rows] += np.minimum(gain, c.most_gain)

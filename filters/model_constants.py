@@ -23,9 +23,10 @@ class ModelConstants:
         growth_noise: that of what drives the rate of ln size (1/s^1.5). Prior.
         position_walk: that of the position's random walk (sizes/√s). Prior.
         size_walk: that of the random walk of ln size (1/√s). Prior.
-        perspective_jerk: jerk that perspective adds, times (growth rate)^2.5 (sizes/s^2.5 at 1/s). A point
-            that nears the camera at constant speed has image coordinates ~ 1/Z, so its jerk grows with that
-            power.
+        most_perspective: largest growth of ln size in a step that perspective is computed for.
+        perspective_jerk: jerk that perspective adds beyond that of constant velocity, times (growth rate)^2.5
+            (sizes/s^2.5 at 1/s): a point that nears the camera has image coordinates ~ 1/Z, so what drives it
+            in space grows with that power.
         fastest_growth: largest growth rate that perspective is computed for (1/s).
         velocity_std, acceleration_std, growth_std: at a birth (sizes/s, sizes/s², 1/s).
         side_std: standard deviation of a measured side (sizes). Prior.
@@ -34,6 +35,9 @@ class ModelConstants:
         pixel_std: part of it that does not shrink with the object (px): boxes in whole pixels.
         degrees_of_freedom: of Student's t of the sides; heavy tails as measured.
         cut_share: prior probability that one given side is cut by an occluder.
+        uncovered_share: prior probability that one given side was cut so far, and now shows further out.
+        most_uncovered: how far out at most (sizes of the part that was known).
+        cut_gate: largest squared Mahalanobis distance of the other three sides (χ² of 3, .9998).
         outlier_share: share of boxes that cover a part of the object, or more than it.
         outlier_std: standard deviation of a side of these (sizes).
         offset_count: pairs of boxes that the prior of two sensors' mean difference counts for.
@@ -94,6 +98,7 @@ class ModelConstants:
         gap_prior_count: gaps that the prior counts for.
         gap_prior_least_s: shortest u of the prior (s).
         gap_overlap: IoU with the predicted box from which on a gap ended well.
+        sure: posterior at the end of a track from which on it tells what the track has been all along.
         longest_gap_s: a track that nobody has seen for so long ends (s).
         camera_shift_std, camera_scale_std: of common shift (sizes) and scale between two scans. Prior.
         camera_shift_bounds, camera_scale_bounds: of the learnt values.
@@ -117,17 +122,21 @@ class ModelConstants:
     growth_noise: float = 0.5
     position_walk: float = 0.05
     size_walk: float = 0.05
-    perspective_jerk: float = 10.0
+    most_perspective: float = 0.4
+    perspective_jerk: float = 2.0
     fastest_growth: float = 4.0
-    velocity_std: float = 1.5
-    acceleration_std: float = 1.0
+    velocity_std: float = 3.0
+    acceleration_std: float = 0.5
     growth_std: float = 0.3
 
-    side_std: float = 0.06
+    side_std: float = 0.09
     side_std_bounds: tuple[float, float] = (0.02, 0.4)
     pixel_std: float = 0.5
     degrees_of_freedom: float = 6.0
     cut_share: float = 0.02
+    cut_gate: float = 20.0
+    uncovered_share: float = 0.0002
+    most_uncovered: float = 4.0
     outlier_share: float = 0.2
     outlier_std: float = 0.3
 
@@ -136,7 +145,7 @@ class ModelConstants:
     offset_age_s: float = 0.011
 
     gate: float = 60.0
-    outlier_gate: float = 3.0
+    outlier_gate: float = 6.0
     clutter_size_area: float = 2.0
     clutter_memory: float = 0.98
     clutter_prior: float = 0.5
@@ -193,13 +202,14 @@ class ModelConstants:
     indifference_bounds: tuple[float, float] = (-1.0, 3.0)
 
     visible_to_hidden: float = 0.3
-    hidden_to_visible: float = 1.0
+    hidden_to_visible: float = 2.0
     visible_to_gone: float = 0.1
     hidden_to_gone: float = 0.3
-    gap_prior_s: float = 0.4
+    gap_prior_s: float = 0.3
     gap_prior_count: float = 4.0
     gap_prior_least_s: float = 0.02
     gap_overlap: float = 0.5
+    sure: float = 0.9
     longest_gap_s: float = 3.0
 
     camera_shift_std: float = 0.05
@@ -209,7 +219,7 @@ class ModelConstants:
     camera_memory: float = 0.97
 
     report: float = 0.5
-    inside_share: float = 0.4
+    inside_share: float = 0.8
     rival: float = 0.3
     rival_age_s: float = 0.3
     doubtful_gap_s: float = 1.0

@@ -82,8 +82,9 @@ def count_repetition(
         has_after = np.zeros(len(last.boxes), dtype=np.bool_)
         if len(boxes) and len(last.boxes):
             overlap = intersection_over_union(last.boxes, boxes)
-            i, j = linear_sum_assignment(-overlap)
-            same = overlap[i, j] >= c.repeat_overlap
+            possible = np.where(overlap >= c.repeat_overlap, overlap, 0.0)
+            i, j = linear_sum_assignment(-possible)
+            same = possible[i, j] > 0.0
             has_after[i[same]], had_before[j[same]] = True, True
         if len(last.boxes) and counts.scans > 1:
             kernel = _kernel(last.logits)

@@ -9,7 +9,9 @@ State of one axis: [p, v, a, l, r]: position (px), velocity (px/s), acceleration
 (Singer, *Estimating optimal tracking filter performance for manned maneuvering targets*, 1970; Särkkä and
 Solin, *Applied Stochastic Differential Equations*, ch. 6). The random walks of position and size stand for
 what a detector's boxes do that lasts and is no motion. For τ → ∞ and σ_p = 0 the first three are the paper's
-constant acceleration driven by white jerk (eq. 2). Arrays hold all tracks: mean (N, 2, 5), covariance (N, 2,
+constant acceleration driven by white jerk (eq. 2). On top of that a point that moves at constant velocity in
+space has the image x = X/Z, so with g = −Ż/Z, the growth rate of its size, ẍ = 2 g ẋ and ġ = g²: see
+`in_perspective`. Arrays hold all tracks: mean (N, 2, 5), covariance (N, 2,
 5, 5); the axes are independent.
 """
 
@@ -31,6 +33,8 @@ POSITION, VELOCITY, ACCELERATION, LOG_SIZE, GROWTH, STATES = range(6)
 _LONGEST_STEP_S = 1.0
 # Steps are taken in whole microseconds: what follows depends on time differences, not on the clock's origin.
 _TICKS_PER_S = 1e6
+# Less growth in one step has no effect.
+_LEAST_PERSPECTIVE = 1e-6
 # Image coordinates go as 1/Z: p⃛ = 6 p (Ż/Z)³, and half of a power less is what a root spectral density has.
 _PERSPECTIVE_POWER = 2.5
 
@@ -129,8 +133,36 @@ def process_covariance(
     return np.asarray(out[:, None])
 
 
+def in_perspective(F: FloatArray, mean: FloatArray, dt: float, c: ModelConstants) -> FloatArray:
+    """Return the transitions (N, 1, 5, 5) of tracks that keep their velocity in space, both axes alike.
+
+    With g the mean growth rate of both axes, v̇ = 2 g v and ġ = g² have the solutions v e^(2 g Δ) and
+    g / (1 − g Δ); position and ln size follow by their integrals. g counts as known.
+
+    Args:
+        F: (5, 5) transition of a track that does not grow.
+        mean: (N, 2, 5) states before the step.
+        dt: length of the step (s).
+        c: constants.
+    """
+    x = np.clip(mean[:, :, GROWTH].mean(axis=1) * dt, -c.most_perspective, c.most_perspective)
+    x = np.where(np.abs(x) < _LEAST_PERSPECTIVE, 0.0, x)
+    divisor = np.where(x == 0.0, 1.0, x)
+    out = np.repeat(F[None, None], len(mean), axis=0)
+    out[:, 0, POSITION, VELOCITY] *= np.where(x == 0.0, 1.0, (np.exp(2.0 * x) - 1.0) / (2.0 * divisor))
+    out[:, 0, VELOCITY, VELOCITY] *= np.exp(2.0 * x)
+    out[:, 0, LOG_SIZE, GROWTH] *= np.where(x == 0.0, 1.0, -np.log(1.0 - x) / divisor)
+    out[:, 0, GROWTH, GROWTH] *= 1.0 / (1.0 - x)
+    return out
+
+
 def predict(
-    mean: FloatArray, covariance: FloatArray, step: Discretised, q: ProcessNoise, c: ModelConstants
+    mean: FloatArray,
+    covariance: FloatArray,
+    step: Discretised,
+    F: FloatArray,
+    q: ProcessNoise,
+    c: ModelConstants,
 ) -> tuple[FloatArray, FloatArray]:
     """Predict all tracks over a step: m⁻ = F m, P⁻ = F P Fᵀ + Q.
 
@@ -138,13 +170,14 @@ def predict(
         mean: (N, 2, 5).
         covariance: (N, 2, 5, 5).
         step: the model over that time.
+        F: (N, 1, 5, 5) transitions of the tracks, of `in_perspective`.
         q: densities of the process noise.
         c: constants.
     """
-    predicted = mean @ step.F.T
+    predicted = (F @ mean[..., None])[..., 0]
     growth = np.abs(predicted[:, :, GROWTH]).mean(axis=1)
     Q = process_covariance(object_size(mean), growth, step, q, c)
-    return predicted, step.F @ covariance @ step.F.T + Q
+    return predicted, F @ covariance @ F.transpose(0, 1, 3, 2) + Q
 
 
 def box_size(mean: FloatArray) -> FloatArray:

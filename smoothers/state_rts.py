@@ -22,7 +22,7 @@ class FilterRecord(NamedTuple):
 
     Attributes:
         track_id: (N,) identities, ascending.
-        F: (D, D) transition from the record before.
+        F: (N, 1, D, D) transitions from the record before.
         predicted_mean: (N, A, D) before the update, of axes A and states D.
         predicted_covariance: (N, A, D, D).
         mean: (N, A, D) after it.
@@ -78,9 +78,7 @@ def smooth(records: Sequence[FilterRecord]) -> Iterator[tuple[int, FloatArray, F
                 now.track_id, later.track_id, assume_unique=True, return_indices=True
             )
             if len(here):
-                chosen = FilterRecord(
-                    later.track_id[there], later.F, *(column[there] for column in later[2:])
-                )
+                chosen = FilterRecord(*(column[there] for column in later))
                 mean[here], covariance[here] = rts_step(
                     mean[here], covariance[here], chosen, next_mean[there], next_covariance[there]
                 )

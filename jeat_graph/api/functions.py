@@ -6,14 +6,15 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 from jeat_graph.api.beside import FUNCTION_GROUP, find
-from jeat_graph.api.sources import PathLike, Run, Tracks, as_list, recording_of, tables_of, truth_of
+from jeat_graph.api.sources import PathLike, Run, Tracks, as_list, as_names, recording_of, tables_of, truth_of
 from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError, InputWarning
+from jeat_graph.data.tables.reading import ReadingOptions, TableOptions
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 
 if TYPE_CHECKING:
@@ -27,7 +28,8 @@ def track(
     config: Config | PathLike = "default",
     *,
     image: tuple[float, float] | None = None,
-    rate_hz: float | None = None,
+    classes: Sequence[str] | None = None,
+    **options: Unpack[TableOptions],
 ) -> Tracks:
     """Track a recording from beginning to end.
 
@@ -35,8 +37,11 @@ def track(
         detections: the recording, a data frame that `Detections.from_pandas` takes, or a file that
             `read_detections` knows.
         config: a configuration, the name of a preset, or a YAML file.
-        image: width and height of the picture (px), if not those of the configuration.
-        rate_hz: frames per second (Hz), for a data frame or a file that counts frames.
+        image: width and height of the picture (px), if not those of the configuration or of a file beside the
+            recording (`seqinfo.ini`).
+        classes: the detections to take, and those without a class; None takes all.
+        options: how a data frame or file is read, as `tables.reading.Reading` has it: `rate_hz` (Hz) and
+            `first_frame` where it counts frames, `time_unit`, `video`, `class_names`, `score_scale` …
 
     Returns:
         The causal table, and the smoothed one unless the configuration asks for no smoother.
@@ -49,14 +54,28 @@ def track(
     from jeat_graph.runs.latency import at_measurement
     from jeat_graph.tracking.tracker import Tracker
 
-    recording = recording_of(detections, rate_hz)
-    settings = as_config(config, image)
+    recording = recording_of(detections, {**options, "image": image})
+    settings = _settings(config, image, detections)
     check_units(recording, settings, "the detections")  # before rates are taken for what they seem
     tracker = Tracker(fit_input(settings, recording)[0])
+    if classes is not None:  # the picture is as large as the boxes of all classes reach
+        recording = recording.of_class(*as_names(classes))
     recording = at_measurement(recording, tracker.config)
     causal = Trajectories.concatenate(list(tracker.run(recording)) or [Trajectories.empty()])
     wanted = tracker.config.smoother.engine != "none"
     return Tracks(causal, tracker.finish() if wanted else None)
+
+
+def _settings(config: Config | PathLike, image: tuple[float, float] | None, *recordings: object) -> Config:
+    """Return a configuration with the picture's size as it is given, or as a file beside recordings says."""
+    from jeat_graph.runs.beside import facts_beside, with_picture
+
+    found = as_config(config, image)
+    files = [one for one in recordings if isinstance(one, (str, Path))]
+    said = image is not None or (isinstance(config, Config) and found.input.picture == "given")
+    if said or not files:
+        return found
+    return with_picture(found, (), facts_beside(files))[0]
 
 
 def evaluate(
@@ -66,20 +85,22 @@ def evaluate(
     kind: str = "causal",
     classes: Sequence[str] | None = None,
     outside: str = "false",
-    rate_hz: float | None = None,
+    **options: Unpack[ReadingOptions],
 ) -> dict[str, dict[str, float | int]]:
     """Judge tracks against truth.
 
     Args:
-        tracks: a table, also as a data frame, both tables of `track` or `read_run`, or a path that
-            `jeat-graph eval` takes.
+        tracks: a table, also as a data frame (another tracker's result too), both tables of `track` or
+            `read_run`, or a path that `jeat-graph eval` takes.
         truth: the truth, a data frame with its columns, or a file that `read_truth` knows.
         kind: what a table alone is: `causal` or `smoothed`.
         classes: classes of objects to be found; others are ignored, and so are tracks that have another
             class. All by default.
         outside: `false` if rows before the first and after the last time of the truth are false, which a
             warning names; `ignored` if they are not to be looked at.
-        rate_hz: frames per second (Hz), for data frames and files that count frames.
+        options: how data frames and files are read, as `tables.reading.Reading` has it: `rate_hz` (Hz),
+            `first_frame` of tracks that count frames (of the truth, where these are no file or data frame),
+            `time_unit` of the truth, `video`, `class_names` …
 
     Returns:
         By kind of table, MOTA, HOTA, IDF1 and so on by name, as `eval --json` writes them.
@@ -90,16 +111,17 @@ def evaluate(
     from jeat_graph.eval.judge import judge_runs, rows_beyond
     from jeat_graph.eval.load import JudgedRun, check_classes, load_run, restrict_classes, restrict_tracks
 
+    classes = None if classes is None else as_names(classes)
     if outside not in ("false", "ignored"):
         raise DataError(f"outside {outside!r}: must be false or ignored")
-    if isinstance(tracks, (str, Path)):
-        if not isinstance(truth, (str, Path)):
-            raise DataError("a run that is given as a path needs its truth as a path too")
-        run = load_run(tracks, truth, rate_hz=rate_hz, classes=classes)
+    if isinstance(tracks, (str, Path)) and isinstance(truth, (str, Path)):
+        run = load_run(tracks, truth, classes=classes, **options)
         if classes is not None:
             check_classes([run.truth], classes)
     else:
-        tables, objects = tables_of(tracks, kind), truth_of(truth, rate_hz)
+        of_tracks, of_truth = _of_each(tracks, options)
+        given = read_run(tracks, **of_tracks) if isinstance(tracks, (str, Path)) else tracks
+        tables, objects = tables_of(given, kind, of_tracks), truth_of(truth, of_truth)
         if classes is not None:
             objects = restrict_classes(objects, classes)
             check_classes([objects], classes)
@@ -111,6 +133,13 @@ def evaluate(
     return {name: one.as_dict() for name, one in judged.items()}
 
 
+def _of_each(tracks: object, options: ReadingOptions) -> tuple[ReadingOptions, ReadingOptions]:
+    """Return the options of tracks and of truth: `first_frame` is that of tracks that are read."""
+    if isinstance(tracks, (str, Path)) or hasattr(tracks, "columns"):
+        return {**options, "time_unit": "s"}, {**options, "first_frame": None}
+    return options, options
+
+
 def compare(
     detections: Detections | pd.DataFrame | PathLike,
     config: Config | PathLike = "default",
@@ -118,7 +147,7 @@ def compare(
     *,
     lags_s: Sequence[float] | None = None,
     image: tuple[float, float] | None = None,
-    rate_hz: float | None = None,
+    **options: Unpack[TableOptions],
 ) -> Comparison:
     """Compare the filter with smoothers of several lags on one recording.
 
@@ -128,8 +157,8 @@ def compare(
         truth: truth, a data frame or its file. Without motion in it positions alone are judged, by the
             centres of its boxes; without truth only consistency.
         lags_s: lags (s); 0 is the filter.
-        image: width and height of the picture (px), if not those of the configuration.
-        rate_hz: frames per second (Hz), for data frames and files that count frames.
+        image: width and height of the picture (px), as for `track`.
+        options: how data frames and files are read, as for `track`.
 
     Returns:
         Tables to read (`.tables`) and all figures by name (`.values`).
@@ -141,9 +170,10 @@ def compare(
     from jeat_graph.runs.latency import at_measurement
     from jeat_graph.runs.measured import compare_run, track_measured
 
-    recording = recording_of(detections, rate_hz)
-    objects = None if truth is None else truth_of(truth, rate_hz)
-    settings = fit_input(as_config(config, image), recording)[0]
+    how: ReadingOptions = {**options, "image": image}
+    recording = recording_of(detections, how)
+    objects = None if truth is None else truth_of(truth, how)
+    settings = fit_input(_settings(config, image, detections), recording)[0]
     return compare_run(track_measured(settings, at_measurement(recording, settings)), objects, lags_s)
 
 
@@ -154,7 +184,7 @@ def calibrate(
     *,
     image: tuple[float, float] | None = None,
     tuned: bool = True,
-    rate_hz: float | None = None,
+    **options: Unpack[TableOptions],
 ) -> Config:
     """Estimate a configuration from recordings.
 
@@ -163,10 +193,10 @@ def calibrate(
         truth: the truth of each; without it only sensors, their rates and their clocks are found and, of
             several sensors, what tracking taught of them (`sensors.NAME.learnt`).
         base: where all that is not estimated comes from.
-        image: width and height of the picture (px), if not those of `base`.
+        image: width and height of the picture (px), if not those of `base` or of a file beside.
         tuned: with truth, also choose by tracking the recordings what matched detections cannot tell; takes
             minutes where all else takes seconds.
-        rate_hz: frames per second (Hz), for data frames and files that count frames.
+        options: how data frames and files are read, as for `track`.
 
     Returns:
         The configuration; `save_config` writes it.
@@ -178,13 +208,14 @@ def calibrate(
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.latency import at_measurement
 
-    recordings = [recording_of(one, rate_hz) for one in as_list(detections)]
-    start = fit_input(as_config(base, image), *recordings)[0]
+    how: ReadingOptions = {**options, "image": image}
+    recordings = [recording_of(one, how) for one in as_list(detections)]
+    start = fit_input(_settings(base, image, *as_list(detections)), *recordings)[0]
     recordings = [at_measurement(one, start) for one in recordings]
     if truth is None:
         return calibrate_without_truth(recordings, start).config
 
-    truths = [truth_of(one, rate_hz) for one in as_list(truth)]
+    truths = [truth_of(one, how) for one in as_list(truth)]
     if len(truths) != len(recordings):
         raise DataError(f"{len(recordings)} recordings and {len(truths)} truths given; give one for each")
     pairs = list(zip(recordings, truths, strict=True))
@@ -210,12 +241,13 @@ def simulate(
     return recording
 
 
-def read_run(path: PathLike, *, rate_hz: float | None = None) -> Run:
+def read_run(path: PathLike, **options: Unpack[ReadingOptions]) -> Run:
     """Read a run directory, or a single table of one.
 
     Args:
         path: run directory, trajectory table, or a MOTChallenge or KITTI result.
-        rate_hz: frames per second (Hz), for a result that counts frames.
+        options: how a result is read, as `tables.reading.Reading` has it: `rate_hz` (Hz) and
+            `first_frame` where it counts frames, `video`, `class_names`, `image` …
 
     Raises:
         DataError: there is no run, or a file of it is not valid.
@@ -225,7 +257,7 @@ def read_run(path: PathLike, *, rate_hz: float | None = None) -> Run:
     from jeat_graph.runs.directory import read_record
 
     folder = Path(path)
-    tables = read_tables(folder, rate_hz=rate_hz)
+    tables = read_tables(folder, **options)
     if "causal" in tables:
         tables["causal"] = replace(tables["causal"], instants=read_instants(folder))
     return Run(tables.get("causal"), tables.get("smoothed"), read_record(folder))

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
+from jeat_graph.data.class_columns import LISTS_COUNT_FROM
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
+from jeat_graph.io.class_names import names_by_number
 from jeat_graph.io.detections_io import read_detections
 from jeat_graph.io.truth_io import read_truth
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from jeat_graph.data.tables.reading import ReadingOptions
 
 PathLike: TypeAlias = str | Path
 
@@ -43,44 +48,68 @@ class Run(NamedTuple):
     record: dict[str, Any]
 
 
-def recording_of(detections: Detections | pd.DataFrame | PathLike, rate_hz: float | None) -> Detections:
+def recording_of(detections: Detections | pd.DataFrame | PathLike, options: ReadingOptions) -> Detections:
     """Return a recording that is given as such, as a data frame, or as a file.
+
+    Args:
+        detections: it.
+        options: how a data frame or file is read.
 
     Raises:
         DataError: it is none of these, or not valid.
     """
     if isinstance(detections, (str, Path)):
-        return read_detections(detections, rate_hz=rate_hz)
+        return read_detections(detections, **options)
     if isinstance(detections, Detections):
         return detections
     if hasattr(detections, "columns"):
-        return Detections.from_pandas(detections, rate_hz=rate_hz)
+        return Detections.from_pandas(detections, **for_frames(options))
     raise DataError(
         "detections are Detections, a data frame, or the path of a file (make one of arrays with "
         f"Detections.from_rows, of several with Detections.concatenate), not {type(detections).__name__}"
     )
 
 
-def truth_of(truth: GroundTruth | pd.DataFrame | PathLike, rate_hz: float | None) -> GroundTruth:
+def as_names(classes: Sequence[str] | str) -> list[str]:
+    """Return names of classes, of which one may stand alone."""
+    return [classes] if isinstance(classes, str) else list(classes)
+
+
+def _recording_of(detections: Any, options: ReadingOptions) -> Detections:
+    if isinstance(detections, (str, Path)):
+        return read_detections(detections, **options)
+    if isinstance(detections, Detections):
+        return detections
+    if hasattr(detections, "columns"):
+        return Detections.from_pandas(detections, **for_frames(options))
+    raise DataError(
+        "detections are Detections, a data frame, or the path of a file (make one of arrays with "
+        f"Detections.from_rows, of several with Detections.concatenate), not {type(detections).__name__}"
+    )
+
+
+def truth_of(truth: GroundTruth | pd.DataFrame | PathLike, options: ReadingOptions) -> GroundTruth:
     """Return truth that is given as such, as a data frame, or as a file.
 
     Raises:
         DataError: it is none of these, or not valid.
     """
     if isinstance(truth, (str, Path)):
-        return read_truth(truth, rate_hz=rate_hz)
+        return read_truth(truth, **options)
     if isinstance(truth, GroundTruth):
         return truth
     if hasattr(truth, "columns"):
         from jeat_graph.data.truth_frames import truth_of_frame
 
-        return truth_of_frame(truth, rate_hz=rate_hz)
+        return truth_of_frame(truth, **for_frames(options))
     raise DataError(
         f"truth is a GroundTruth, a data frame, or the path of a file, not {type(truth).__name__}"
     )
 
 
-def tables_of(tracks: Trajectories | Tracks | Run | pd.DataFrame, kind: str) -> dict[str, Trajectories]:
+def tables_of(
+    tracks: Trajectories | Tracks | Run | pd.DataFrame, kind: str, options: ReadingOptions
+) -> dict[str, Trajectories]:
     """Return tables by kind; `kind` says what a table alone is.
 
     Raises:
@@ -94,11 +123,19 @@ def tables_of(tracks: Trajectories | Tracks | Run | pd.DataFrame, kind: str) -> 
     if isinstance(tracks, Trajectories):
         return {kind: tracks}
     if hasattr(tracks, "columns"):
-        return {kind: Trajectories.from_pandas(tracks)}
+        return {kind: Trajectories.from_pandas(tracks, **for_frames(options))}
     raise DataError(
         "tracks are what track or read_run gives, a table of it, a data frame of one, or a path, "
         f"not {type(tracks).__name__}"
     )
+
+
+def for_frames(options: ReadingOptions) -> ReadingOptions:
+    """Return options with the names of classes read from their file, if they stand in one."""
+    said = options.get("class_names")
+    if said is None:
+        return options
+    return {**options, "class_names": names_by_number(said, None, LISTS_COUNT_FROM)}
 
 
 def as_list(values: Any) -> list[Any]:

@@ -3,11 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import fields, is_dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
+from jeat_graph.config.fields import SMALLEST
 from jeat_graph.config.schema import Config
 
 _DIGITS = 4
+_Section = TypeVar("_Section")
+
+
+def with_estimates(section: _Section, **values: Any) -> _Section:
+    """Replace fields of a section by estimates.
+
+    Of data without any noise an estimate may be closer to 0 than a setting may be: then it is 0.
+    """
+    return replace(section, **{name: _or_zero(value) for name, value in values.items()})  # type: ignore[type-var]
+
+
+def _or_zero(value: Any) -> Any:
+    if isinstance(value, float):
+        return 0.0 if abs(value) < SMALLEST else value
+    return tuple(map(_or_zero, value)) if isinstance(value, tuple) else value
 
 
 def rounded(config: Config, digits: int = _DIGITS) -> Config:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +9,7 @@ from scipy.optimize import isotonic_regression, minimize, minimize_scalar
 
 from jeat_graph.calibration.matches import SensorMatches
 from jeat_graph.calibration.memory import fit_memory
+from jeat_graph.calibration.rounding import with_estimates
 from jeat_graph.calibration.score_noise import factors, fit_score_noise
 from jeat_graph.config.schema import SensorConfig
 from jeat_graph.data.arrays import BoolArray, FloatArray
@@ -56,7 +56,7 @@ def calibrate_sensor(matches: SensorMatches, known: SensorConfig) -> SensorConfi
     p_detect, blind = fit_detection(matches.seen, matches.speed, matches.visible)
     precision = np.clip((correct + 0.5) / (len(matches.correct) + 1.0), 0.001, 0.999)
     false = ~matches.correct
-    return replace(
+    return with_estimates(
         known,
         sigma_px=noise.sigma_px,
         rho_x=noise.rho[0],

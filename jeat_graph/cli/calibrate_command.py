@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from jeat_graph.calibration.procedure import Calibration
     from jeat_graph.config.schema import Config
     from jeat_graph.data.detections import Detections
+    from jeat_graph.data.tables.reading import ReadingOptions
     from jeat_graph.data.trajectories import GroundTruth
     from jeat_graph.eval.tables import Cell, Table
-    from jeat_graph.io.reading import ReadingOptions
     from jeat_graph.runs.beside import Facts
 
 WRITES = ("out",)
@@ -28,7 +28,12 @@ HELP = "Estimate sensors and motion from recordings, with or without truth, and 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     add = parser.add_argument
-    add("detections", nargs="+", metavar="DETECTIONS", help="one file a recording; all are pooled")
+    add(
+        "detections",
+        nargs="+",
+        metavar="DETECTIONS",
+        help="one file a recording; all are pooled; NAME=path names a sensor",
+    )
     add("--gt", nargs="+", action="extend", metavar="FILE", help="truth of each recording, in the same order")
     add("--out", required=True, metavar="CONFIG.yaml", help="the configuration to write")
     add_config(parser, settings=False)
@@ -48,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.config.reading import load_config
     from jeat_graph.io.atomic import check_writable
     from jeat_graph.io.config_io import save_config
-    from jeat_graph.io.detections_io import read_many
+    from jeat_graph.io.detections_io import read_many, split_name
     from jeat_graph.io.truth_io import read_truth
     from jeat_graph.runs.beside import facts_beside, facts_of_frames
     from jeat_graph.runs.latency import at_measurement
@@ -62,11 +67,12 @@ def run(args: argparse.Namespace) -> int:
     check_writable(args.out)
     base = load_config(args.config)
     shown = None if args.frames is None else facts_of_frames(args.frames)
-    if shown is not None and args.rate is None and not any(facts_beside([path]) for path in args.detections):
+    files = [str(split_name(item)[1]) for item in args.detections]
+    if shown is not None and args.rate is None and not any(facts_beside([path]) for path in files):
         args.rate = shown.rate_hz
     how = {**reading(args), "image": args.image or (None if shown is None else shown.size_px)}
     recordings = [at_measurement(read_many([path], **how), base) for path in args.detections]
-    beside = None if args.image else _size_beside(args.detections, shown)
+    beside = None if args.image else _size_beside(files, shown)
     picture = _picture_from(args, base, beside)
     base = with_image(base, recordings, args.image or (None if beside is None else beside.size_px))
     if args.gt:
@@ -212,9 +218,11 @@ def _say_lags(found: Calibration, beside: str) -> None:
 
 def describe(args: argparse.Namespace, picture: str, found: Calibration) -> str:
     """Comment at the head of the file: where each part comes from."""
+    from jeat_graph.io.detections_io import split_name
     from jeat_graph.version import __version__
 
-    names = ", ".join(Path(p).parent.name + "/" + Path(p).name for p in args.detections)
+    files = [Path(split_name(item)[1]) for item in args.detections]
+    names = ", ".join(f"{path.parent.name}/{path.name}" for path in files)
     lines = [f"Made by jeat-graph calibrate {__version__} from {len(args.detections)} recording(s):", names]
     if args.gt:
         base = [choice.part for choice in found.parts if not choice.kept]

@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from jeat_graph.cli.options import add_frames, frames_read
 from jeat_graph.cli.progress import stages
 from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import picture_size
@@ -18,15 +19,15 @@ HELP = "calibrate a camera over a road from lengths, points and the vehicles' tr
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
-    add = actions.add_parser(
-        "calibrate", help="find the camera that all the evidence agrees with"
-    ).add_argument
+    finding = actions.add_parser("calibrate", help="find the camera that all the evidence agrees with")
+    add = finding.add_argument
     add(
         "--run",
         dest="tracks",
         metavar="RUN",
-        help="run directory, trajectory table, or table of t, track_id, x, y",
+        help="run directory, trajectory table, another tracker's result, or table of t, track_id, x, y",
     )
+    add_frames(finding)
     add("--lengths", metavar="FILE", help="measured lengths: x1, y1, x2, y2 (px), metres, along or across")
     add("--points", metavar="FILE", help="surveyed points: x, y (px), east, north (m)")
     add(
@@ -54,6 +55,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _calibrate(args: argparse.Namespace) -> int:
+    from jeat_graph.data.tables.reading import ReadingOptions
     from jeat_graph.road.calibrate import calibrate
     from jeat_graph.road.camera_file import read_camera, write_camera
     from jeat_graph.road.evidence import CalibrationConfig, thin
@@ -90,8 +92,9 @@ def _calibrate(args: argparse.Namespace) -> int:
         )
     tracks = None
     if args.tracks is not None:
-        table = contact_pixels(args.tracks)
-        tracks = thin(table.t, table.track_id, table.pixels, config, size, box_sides(args.tracks))
+        how: ReadingOptions = {**frames_read(args), "image": size}
+        table, sides = contact_pixels(args.tracks, **how), box_sides(args.tracks, **how)
+        tracks = thin(table.t, table.track_id, table.pixels, config, size, sides)
         if not len(tracks):
             say("camera", f"{args.tracks}: no track is long enough to help")
             tracks = None

@@ -9,6 +9,7 @@ from jeat_graph.cli.options import add_tables, truth_read
 from jeat_graph.cli.progress import stages
 from jeat_graph.cli.terminal import warn
 from jeat_graph.config.argument_types import not_negative
+from jeat_graph.data.errors import DataError
 
 WRITES_INTO = ("out",)
 HELP = "compare filter and smoothers on a run: errors, error against lag, consistency; tables and pictures"
@@ -64,6 +65,8 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.runs.measured import compare_run, measured_run
 
     folder = Path(args.run_directory)
+    if folder.is_file():
+        raise DataError("is a table: compare needs the directory of a run, for its measurements", folder)
     out = folder if args.out is None else Path(args.out)
     check_writable(out / "compare.json")
     truth = None

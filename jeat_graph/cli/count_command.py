@@ -18,7 +18,6 @@ from jeat_graph.cli.place_options import add_places, places
 from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import positive
 from jeat_graph.data.errors import ConfigError, DataError
-from jeat_graph.data.steps import check_steps
 from jeat_graph.eval.counting import Count, Line, LineCrossing
 
 if TYPE_CHECKING:
@@ -66,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Count."""
     from jeat_graph.eval import counting
-    from jeat_graph.eval.load import tables_of
+    from jeat_graph.eval.load import recording_span, tables_of
     from jeat_graph.eval.zones import zone_crossings
     from jeat_graph.io.table_writer import write_columns
     from jeat_graph.io.trajectories_io import read_trajectories
@@ -81,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
     tables = tables_of(Path(args.source))
     kind = "smoothed" if "smoothed" in tables else "causal"
     table = read_trajectories(tables[kind], **tables_read(args))
-    first, last = _span(Path(args.source), tables[kind], table)
+    first, last = recording_span(Path(args.source), tables[kind], table)
     if args.classes is not None:
         table = table.of_class(*args.classes, final=True)
     known = table.final_classes()
@@ -117,8 +116,7 @@ def _edges(interval_s: float | None, span: tuple[float, float], found: list[Line
     first, last = span
     if interval_s is None:
         return np.array([first, np.nextafter(last, np.inf)])
-    check_steps(first, last, 1.0 / interval_s, "intervals", "choose a longer --interval")
-    edges: FloatArray = interval_edges(first, last, interval_s, found)
+    edges: FloatArray = interval_edges(first, last, interval_s, [c.t for c in found])
     return edges
 
 
@@ -177,22 +175,6 @@ def _show(counts: list[Count], *, shown: bool) -> None:
     print(Table.from_records(records).render() if shown else "no track crosses a line")
     if any(np.isnan(c.expected) for c in counts):
         say("count", "no interval: the table has no variances of position (`track` writes them)")
-
-
-def _span(source: Path, file: Path, table: Trajectories) -> tuple[float, float]:
-    """Begin and end of a recording (s): of its scans, where the run says them, else of its tracks.
-
-    A result by frame number begins with its first frame, whatever is the first in which it has a track.
-    """
-    from jeat_graph.io.formats import BY_FRAME, recognise
-    from jeat_graph.io.scans_io import read_instants
-
-    scans = read_instants(source)
-    times = table.t if scans is None or not len(scans) else np.concatenate((table.t, scans))
-    if not len(times):
-        return 0.0, 0.0
-    by_frame = len(table) > 0 and recognise(file) in BY_FRAME
-    return 0.0 if by_frame else float(times.min()), float(times.max())
 
 
 def _columns(rows: list[Any], kind: type) -> dict[str, npt.NDArray[Any]]:

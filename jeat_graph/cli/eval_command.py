@@ -15,9 +15,9 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.data.progress import with_progress
 
 if TYPE_CHECKING:
+    from jeat_graph.data.tables.reading import ReadingOptions
     from jeat_graph.data.trajectories import GroundTruth
     from jeat_graph.eval.tables import Table
-    from jeat_graph.io.reading import ReadingOptions
 
 WRITES = ("json",)
 HELP = "Judge a run, a trajectory table, or another tracker's result against ground truth."
@@ -136,12 +136,12 @@ def _detections(
 ) -> tuple[Table, dict[str, dict[str, float | int]]]:
     from jeat_graph.eval.detection_ap import detection_ap
     from jeat_graph.eval.tables import Cell, Table
-    from jeat_graph.io.detections_io import read_detections
+    from jeat_graph.io.detections_io import read_many
 
     if len(args.detections) != len(truths):
         raise DataError(f"{len(truths)} RUN and {len(args.detections)} --detections given; give one for each")
     how: ReadingOptions = {**truth_read(args), "time_unit": args.time_unit}
-    detections = [read_detections(path, **how) for path in args.detections]
+    detections = [read_many([path], **how) for path in args.detections]
     found = detection_ap(list(zip(truths, detections, strict=True)))
     values = {sensor: one.as_dict() for sensor, one in found.items()}
     records: list[dict[str, Cell]] = [{"sensor": sensor, **one} for sensor, one in values.items()]

@@ -23,12 +23,12 @@ from jeat_graph.config.argument_types import output_rate, picture_size, positive
 from jeat_graph.config.smoothing import ENGINES
 from jeat_graph.data.frame_numbers import FIRST_FRAMES
 from jeat_graph.data.secrets import without_logins
+from jeat_graph.data.tables.frame_filling import SCORE_SCALES
+from jeat_graph.data.tables.reading import ReadingOptions
 from jeat_graph.data.time_units import TIME_UNITS
 from jeat_graph.io.formats import FORMATS
-from jeat_graph.io.reading import ReadingOptions
 
 OUTPUT_FORMATS = ("csv", "parquet", "motchallenge", "kitti")
-SCORE_SCALES = ("unit", "percent", "logistic")
 
 
 class Parser(argparse.ArgumentParser):
@@ -91,6 +91,18 @@ def add_rate(parser: argparse.ArgumentParser) -> None:
 
 def add_counting(parser: argparse.ArgumentParser) -> None:
     """Declare how files are read that count frames, number classes, or hold several videos."""
+    add_frames(parser)
+    parser.add_argument(
+        "--classes",
+        dest="class_names",
+        metavar="FILE|NAMES",
+        help="names of classes that files number: one a line, YOLO's data.yaml, or with commas between them; "
+        "MOTChallenge text counts from 1, all else from 0 (default: labels.txt or classes.txt beside)",
+    )
+
+
+def add_frames(parser: argparse.ArgumentParser) -> None:
+    """Declare how files are read that count frames, or hold several videos (`frames_read`)."""
     add_rate(parser)
     add = parser.add_argument
     add(
@@ -101,13 +113,6 @@ def add_counting(parser: argparse.ArgumentParser) -> None:
         "else 1; KITTI 0)",
     )
     add("--only-video", metavar="NAME", help="the video to read of a file that holds several")
-    add(
-        "--classes",
-        dest="class_names",
-        metavar="FILE|NAMES",
-        help="names of classes that files number: one a line, YOLO's data.yaml, or with commas between them; "
-        "MOTChallenge text counts from 1, all else from 0 (default: labels.txt or classes.txt beside)",
-    )
 
 
 def add_tables(parser: argparse.ArgumentParser) -> None:
@@ -123,13 +128,12 @@ def add_tables(parser: argparse.ArgumentParser) -> None:
 
 def tables_read(args: argparse.Namespace) -> ReadingOptions:
     """Return what `add_tables` declared, as readers take it."""
-    return {
-        "rate_hz": args.rate,
-        "first_frame": args.first_frame,
-        "video": args.only_video,
-        "class_names": args.class_names,
-        "image": args.image,
-    }
+    return {**frames_read(args), "class_names": args.class_names, "image": args.image}
+
+
+def frames_read(args: argparse.Namespace) -> ReadingOptions:
+    """Return what `add_frames` declared, as readers take it."""
+    return {"rate_hz": args.rate, "first_frame": args.first_frame, "video": args.only_video}
 
 
 def truth_read(args: argparse.Namespace) -> ReadingOptions:
@@ -177,13 +181,18 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add_counting(parser)
     add("--input-format", choices=FORMATS, help="format of the input, if it is not recognised")
-    add(
+    add("--images", metavar="FILE", help="COCO data set with the images and times of COCO results")
+    add_columns(parser)
+
+
+def add_columns(parser: argparse.ArgumentParser) -> None:
+    """Declare what the columns of detections mean, and which of them are taken."""
+    parser.add_argument(
         "--score-scale",
         choices=SCORE_SCALES,
         default="unit",
         help="scores are in [0, 1] (unit), percent, or raw scores of any size (logistic)",
     )
-    add("--images", metavar="FILE", help="COCO data set with the images and times of COCO results")
     add_time_unit(parser)
     add_classes(parser, "take detections of these classes only, and those without a class")
 
@@ -199,18 +208,25 @@ def add_classes(parser: argparse.ArgumentParser, text: str) -> None:
     parser.add_argument("--class", dest="classes", nargs="+", action="extend", metavar="NAME", help=text)
 
 
-def reading(args: argparse.Namespace) -> dict[str, Any]:
-    """Return what `add_reading` declared, as `read_detections` takes it."""
+def columns_read(args: argparse.Namespace) -> ReadingOptions:
+    """Return what `add_counting` and `add_columns` declared, as readers take it, but for `--class`."""
     return {
         "rate_hz": args.rate,
-        "fmt": args.input_format,
-        "score_scale": args.score_scale,
-        "images": args.images,
-        "time_unit": args.time_unit,
-        "classes": args.classes,
         "first_frame": args.first_frame,
         "video": args.only_video,
         "class_names": args.class_names,
+        "score_scale": args.score_scale,
+        "time_unit": args.time_unit,
+    }
+
+
+def reading(args: argparse.Namespace) -> dict[str, Any]:
+    """Return what `add_reading` declared, as `read_many` takes it."""
+    return {
+        **columns_read(args),
+        "fmt": args.input_format,
+        "images": args.images,
+        "classes": args.classes,
     }
 
 

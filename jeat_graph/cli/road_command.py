@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from jeat_graph.cli.options import add_frames, frames_read
 from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import positive
 from jeat_graph.data.errors import DataError
@@ -19,7 +20,11 @@ HELP = "metres, km/h and lanes on the road, each with its uncertainty"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     add = parser.add_argument
-    add("source", metavar="RUN|TABLE", help="run directory, trajectory table, or table of t, track_id, x, y")
+    add(
+        "source",
+        metavar="RUN|TABLE",
+        help="run directory, trajectory table, another tracker's result, or table of t, track_id, x, y",
+    )
     add("--camera", required=True, metavar="CAMERA.yaml", help="the calibrated camera")
     add(
         "--lines",
@@ -44,6 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="spline",
         help="what fits boxes: our own compiled solver, or the same as a factor graph in GTSAM (spline)",
     )
+    add_frames(parser)
     add("--interval", type=positive, metavar="S", help="length of an interval of counts.csv (300)")
     add(
         "--out",
@@ -55,6 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fit the vehicles and write the tables."""
+    from jeat_graph.data.tables.reading import ReadingOptions
     from jeat_graph.io.outputs import check_folder
     from jeat_graph.io.table_writer import write_columns
     from jeat_graph.road.box_rows import BoxConfig
@@ -67,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.road.points_road import follow_points, summarise
     from jeat_graph.road.results import write_result
     from jeat_graph.road.road_page import write_road_page
-    from jeat_graph.road.sources import boxes_of, contact_pixels, only_points, run_table
+    from jeat_graph.road.sources import boxes_of, contact_pixels, only_points, recording_span_of, run_table
     from jeat_graph.road.speeds import ContactConfig
     from jeat_graph.road.traffic import SummaryConfig, count_columns, headway_columns
 
@@ -79,10 +86,11 @@ def run(args: argparse.Namespace) -> int:
     if args.contact_height is not None:
         contact = ContactConfig(height_m=args.contact_height[0], height_sd_m=args.contact_height[1])
     table = run_table(args.source)
+    how: ReadingOptions = {**frames_read(args), "image": (camera.width, camera.height)}
     if args.contact == "cuboid" or (args.contact is None and not only_points(table)):
         if only_points(table):
             raise DataError("has points only, no boxes: --contact cuboid needs boxes, use center", table)
-        seen = boxes_of(args.source, camera, BoxConfig(), partial(say, "road"), sys.stderr.isatty())
+        seen = boxes_of(args.source, camera, BoxConfig(), partial(say, "road"), sys.stderr.isatty(), **how)
         total = len(seen)
         with _bar(total) as bar:
             sized = follow_boxes(
@@ -91,14 +99,15 @@ def run(args: argparse.Namespace) -> int:
         contact = ContactConfig(0.0, 0.0, 0.0)
         vehicles = [one.vehicle for one in sized]
     else:
-        points = contact_pixels(args.source, args.contact)
+        points = contact_pixels(args.source, args.contact, **how)
         total = len(points.tracks())
         sized = []
         with _bar(total) as bar:
             vehicles = follow_points(
                 points, camera, MotionFitConfig(), contact, lambda done, _: _advance(bar, done)
             )
-    result = summarise(vehicles, camera, marks, contact, LaneConfig(), sized)
+    span_s = recording_span_of(args.source, **how)
+    result = summarise(vehicles, camera, marks, contact, LaneConfig(), sized, span_s)
     write_result(result, out)
     traffic = SummaryConfig() if args.interval is None else SummaryConfig(interval_s=args.interval)
     write_columns(count_columns(result, traffic), out / "counts.csv")

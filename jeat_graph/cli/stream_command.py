@@ -12,7 +12,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jeat_graph.cli.detect_options import add_made_by, made_by
-from jeat_graph.cli.options import add_config, add_image, add_time_unit, overrides
+from jeat_graph.cli.options import (
+    add_columns,
+    add_config,
+    add_counting,
+    add_image,
+    columns_read,
+    overrides,
+)
 from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import positive
 
@@ -20,6 +27,7 @@ if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
     from jeat_graph.data.errors import DataError
     from jeat_graph.data.trajectories import Trajectories
+    from jeat_graph.io.stream_reading import StreamReading
     from jeat_graph.live.interrupts import Interrupts
     from jeat_graph.live.late import LiveTracker
     from jeat_graph.live.messages import ScanMessage
@@ -40,7 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.description = HELP + (
         '. A scan is {"t": 0.05, "sensor": "rgb", "boxes": [[left, top, width, height], …], "scores": [s, …]}'
-        ' on a line of its own, with "classes": [name, …] if they are known; a list of such scans of one time'
+        ' on a line of its own; without "scores" each is 1; "classes": [name, …] or "class_id": [number, …]'
+        " may follow; t is a number, a date or a time code; a list of such scans of one time"
         " on one line is taken jointly. CSV has a header and the columns of `track`; its scans are complete "
         "when another time, or an empty line, arrives."
     )
@@ -62,7 +71,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--sink", metavar="URL", help="send tracks to mqtt://, nats:// or kafka://host/topic, not stdout")
     add("--encoding", choices=("json", "msgpack"), default="json", help="of messages to --sink")
-    add_time_unit(parser)
+    add_counting(parser)
+    add_columns(parser)
     add(
         "--joint",
         action="store_true",
@@ -227,18 +237,41 @@ def _ends(
 def _take_all(
     session: Session, args: argparse.Namespace, interrupts: Interrupts, source: Source | None
 ) -> None:
-    from jeat_graph.live.inputs import from_lines, from_source
+    from jeat_graph.data.tables.reading import Reading
+    from jeat_graph.io.stream_reading import StreamReading
+    from jeat_graph.live.inputs import from_lines
 
     bad = _skip(session) if args.on_error == "skip" else None
-    if source is None:
-        lines = interrupts.lines(sys.stdin.buffer)
-        for message, place in from_lines(lines, STDIN, args.joint, bad):
-            _take(session, message, place, bad, args.time_unit)
-        return
+    # What a broker keeps, or comes after a checkpoint, may be from the middle of a recording.
+    goes_on = source is not None or args.checkpoint is not None
+    how = StreamReading(Reading(**columns_read(args)), args.classes, goes_on=goes_on)
+    try:
+        if source is None:
+            lines = interrupts.lines(sys.stdin.buffer)
+            for message, place in from_lines(lines, STDIN, args.joint, bad, how):
+                _take(session, message, place, bad)
+        else:
+            _take_from(source, session, interrupts, bad, how)
+    finally:
+        unseen = how.never_came()
+        if unseen is not None:
+            _say(f"warning: {unseen}")
+
+
+def _take_from(
+    source: Source,
+    session: Session,
+    interrupts: Interrupts,
+    bad: Callable[[DataError], None] | None,
+    how: StreamReading,
+) -> None:
+    """Take what a broker brings, until a signal comes."""
+    from jeat_graph.live.inputs import from_source
+
     since = 0
-    for item in from_source(source, str(source.address), interrupts, bad):
+    for item in from_source(source, str(source.address), interrupts, bad, how):
         if item is not None:
-            _take(session, *item, bad, args.time_unit)
+            _take(session, *item, bad)
             since += 1
         if since and (item is None or since >= _COMMIT_PART * source.most_open):
             session.save()
@@ -246,18 +279,13 @@ def _take_all(
 
 
 def _take(
-    session: Session,
-    message: ScanMessage,
-    place: str,
-    bad: Callable[[DataError], None] | None,
-    unit: str,
+    session: Session, message: ScanMessage, place: str, bad: Callable[[DataError], None] | None
 ) -> None:
     """Take a message; errors get the place where it came from."""
     from jeat_graph.data.errors import DataError, TimeOrderError, UnknownSensorError
-    from jeat_graph.live.inputs import in_seconds
 
     try:
-        session.accept(in_seconds(message, unit), place)
+        session.accept(message, place)
     except (DataError, UnknownSensorError, TimeOrderError) as error:
         if isinstance(error, DataError) and error.path is not None:
             raise  # of a file that is written, not of the message

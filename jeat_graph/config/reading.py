@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from jeat_graph.config.schema import Config, InputConfig, SensorConfig
-from jeat_graph.config.section_tree import build, check_keys, parse_change, plain, read_tree
-from jeat_graph.config.yaml_text import load_yaml
+from jeat_graph.config.section_tree import build, check_keys, merged, parse_change, plain, read_layers
 from jeat_graph.data.errors import ConfigError
 
 
@@ -34,10 +33,13 @@ def load_config(name_or_path: str | Path = "default", overrides: Iterable[str] =
     Raises:
         ConfigError: no such preset or file, YAML that cannot be read, unknown key, bad value.
     """
-    tree = read_tree(str(name_or_path), preset_names(), _preset_text, "preset")
+    presets = preset_names()
+    layers = read_layers(str(name_or_path), presets, _preset_text, "preset")
+    tree = merged([layer for _, layer in layers])
     for text in [overrides] if isinstance(overrides, str) else overrides:
         _apply_override(tree, text)
-    _assume(tree, _sensors_of_preset(str(name_or_path)))
+    preset = merged([layer for source, layer in layers if source in presets])
+    _assume(tree, set(preset.get("sensors", {})))
     return config_from_dict(tree)
 
 
@@ -112,16 +114,6 @@ def _assume(tree: dict[str, Any], known: set[str]) -> None:
             name: {**assumed, **value} if name not in known and isinstance(value, dict) else value
             for name, value in sensors.items()
         }
-
-
-def _sensors_of_preset(source: str) -> set[str]:
-    """Names of the sensors of a preset, or of the one that a file is laid over."""
-    while source not in preset_names():
-        base = load_yaml(Path(source).read_text(encoding="utf-8")).get("base")
-        if base is None:
-            return set()
-        source = str(base)
-    return set(read_tree(source, preset_names(), _preset_text, "preset").get("sensors", {}))
 
 
 def config_to_dict(config: Config) -> dict[str, Any]:

@@ -28,6 +28,7 @@ from jeat_graph.config.live import LiveConfig
 from jeat_graph.config.output import OutputConfig
 from jeat_graph.config.sensors import InputConfig, SensorConfig
 from jeat_graph.config.smoothing import SmootherConfig
+from jeat_graph.config.tracker import TrackerConfig
 from jeat_graph.data.errors import ConfigError
 
 __all__ = [
@@ -67,6 +68,7 @@ class Config:
     birth: BirthConfig = field(default_factory=BirthConfig)
     merge: MergeConfig = field(default_factory=MergeConfig)
     output: OutputConfig = field(default_factory=OutputConfig)
+    tracker: TrackerConfig = field(default_factory=TrackerConfig, metadata={"kernels": False})
     smoother: SmootherConfig = field(default_factory=SmootherConfig, metadata={"kernels": False})
     live: LiveConfig = field(default_factory=LiveConfig, metadata={"kernels": False})
 

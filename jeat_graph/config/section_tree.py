@@ -22,25 +22,56 @@ from jeat_graph.data.errors import ConfigError
 _TYPES: dict[type[Any], dict[str, Any]] = {}
 
 
-def read_tree(
-    source: str, names: Sequence[str], text_of: Callable[[str], str], kind: str, seen: tuple[str, ...] = ()
-) -> dict[str, Any]:
+def read_tree(source: str, names: Sequence[str], text_of: Callable[[str], str], kind: str) -> dict[str, Any]:
     """Read a named tree, or one from a file, laid over the one it names as `base`.
+
+    Args and errors are those of `read_layers`.
+    """
+    return merged([tree for _, tree in read_layers(source, names, text_of, kind)])
+
+
+def merged(trees: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Lay trees over each other, the first one lowest."""
+    out: dict[str, Any] = {}
+    for tree in trees:
+        out = merge(out, tree)
+    return out
+
+
+def read_layers(
+    source: str, names: Sequence[str], text_of: Callable[[str], str], kind: str
+) -> list[tuple[str, dict[str, Any]]]:
+    """Read a named tree, or one from a file, and those that it stands on by naming a `base`, each once.
 
     Args:
         source: a name, or the path of a YAML file.
         names: the names there are.
         text_of: gives the YAML text of a name.
         kind: what a name stands for, in messages.
-        seen: sources on the way here; one that comes again is an error.
+
+    Returns:
+        Source and tree of each, the lowest first.
 
     Raises:
         ConfigError: no such name or file, YAML that cannot be read, a base that leads back to itself.
     """
-    if source in seen:
-        raise ConfigError(f"{source}: `base` leads back to itself")
-    if len(seen) > _MOST_BASES:
-        raise ConfigError(f"{source}: more than {_MOST_BASES} files, each the `base` of the one before")
+    layers: list[tuple[str, dict[str, Any]]] = []
+    base: str | None = source
+    while base is not None:
+        if base in [seen for seen, _ in layers]:
+            raise ConfigError(f"{base}: `base` leads back to itself")
+        if len(layers) > _MOST_BASES:
+            raise ConfigError(f"{base}: more than {_MOST_BASES} files, each the `base` of the one before")
+        source, tree = base, _read_one(base, names, text_of, kind)
+        base = tree.pop("base", None)
+        if base is not None and not isinstance(base, str):
+            raise ConfigError(f"{source}: `base` must be the name of a {kind} or file")
+        layers.append((source, tree))
+    return layers[::-1]
+
+
+def _read_one(source: str, names: Sequence[str], text_of: Callable[[str], str], kind: str) -> dict[str, Any]:
+    """Read one tree as it is written."""
     if source in names:
         text = text_of(source)
     else:
@@ -65,12 +96,7 @@ def read_tree(
         raise ConfigError(f"{place}: not valid YAML: {getattr(error, 'problem', None) or error}") from None
     if not isinstance(tree, dict):
         raise ConfigError(f"{source}: must hold `key: value` lines")
-    base = tree.pop("base", None)
-    if base is None:
-        return tree
-    if not isinstance(base, str):
-        raise ConfigError(f"{source}: `base` must be the name of a {kind} or file")
-    return merge(read_tree(base, names, text_of, kind, (*seen, source)), tree)
+    return tree
 
 
 @functools.cache

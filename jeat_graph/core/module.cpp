@@ -12,6 +12,9 @@ void bind(nb::module_& module);
 namespace jeat::io {
 void bind(nb::module_& module);
 }
+namespace jeat::tracking {
+void bind(nb::module_& module);
+}
 
 NB_MODULE(_core, module) {
     module.doc() = "The compiled part of jeat-graph; its submodules have the names of the package's folders.";
@@ -21,4 +24,6 @@ NB_MODULE(_core, module) {
     jeat::events::bind(events);
     auto io = module.def_submodule("io", "Kernels of jeat_graph.io.");
     jeat::io::bind(io);
+    auto tracking = module.def_submodule("tracking", "The tracker's step.");
+    jeat::tracking::bind(tracking);
 }

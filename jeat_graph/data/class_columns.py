@@ -60,6 +60,8 @@ def class_column(classes: Any, probability: Any) -> dict[str, Any]:
 
 #: Columns that say a class: its name or number, its number beside a name, and that name.
 CLASS_COLUMNS = ("class", "class_id", "name")
+#: Number of the first name of a list, but for MOTChallenge text.
+LISTS_COUNT_FROM = 0
 _WHOLE = re.compile(r"(-?\d+)(?:\.0*)?")
 
 
@@ -79,7 +81,7 @@ def said_classes(found: Mapping[str, TextArray]) -> TextArray | None:
         Classes (N,), numbers without decimals; None where no column says them.
     """
     said = next((found[name] for name in CLASS_COLUMNS[:2] if name in found), None)
-    if said is None or not all_numbers(np.unique(said).tolist()):
+    if said is None or not all_numbers(set(said.tolist())):  # a set takes a fraction of a sort's time
         return said
     names, place = np.unique(said, return_inverse=True)
     whole = [_WHOLE.sub(r"\1", name) for name in names.tolist()]
@@ -87,6 +89,11 @@ def said_classes(found: Mapping[str, TextArray]) -> TextArray | None:
     if "name" not in found:
         return numbers
     return np.where(found["name"] == "", numbers, found["name"])
+
+
+def naming_hint(names: Iterable[str]) -> str:
+    """Say what gives classes their names, where all of some are numbers."""
+    return " (--classes FILE names them, in Python class_names=)" if all_numbers(names) else ""
 
 
 def rows_of_class(classes: TextArray | None, wanted: Iterable[str], *, unknown: bool) -> BoolArray:
@@ -108,9 +115,43 @@ def rows_of_class(classes: TextArray | None, wanted: Iterable[str], *, unknown: 
         raise DataError("there is no class to choose by: no detection has one")
     there = sorted({str(name) for name in np.unique(classes)} - {""})
     if not set(names) & set(there):
-        hint = " (--classes FILE names them, in Python class_names=)" if all_numbers(there) else ""
         raise DataError(
-            f"nothing is of class {' or '.join(names)}; there are: {', '.join(there) or 'none'}{hint}"
+            f"nothing is of class {' or '.join(names)}; there are: {', '.join(there) or 'none'}"
+            + naming_hint(there)
         )
     chosen = np.isin(classes, names)
     return np.asarray(chosen | (classes == "") if unknown else chosen, dtype=np.bool_)
+
+
+def listed_names(names: Sequence[str] | Mapping[int, str], first: int) -> dict[int, str]:
+    """Return the names of classes by number.
+
+    Args:
+        names: by number, or in order.
+        first: number of the first one of a list.
+
+    Raises:
+        DataError: neither.
+    """
+    try:
+        if isinstance(names, Mapping):
+            return {int(number): str(name) for number, name in names.items()}
+        return dict(enumerate(map(str, names), first))
+    except (TypeError, ValueError):
+        raise DataError(f"class_names are names in order, or by number, not {names!r:.60}") from None
+
+
+def name_classes(classes: TextArray | None, names: Mapping[int, str] | None) -> TextArray | None:
+    """Give numbers their names; a number without one stays, and so do classes that have names already.
+
+    Args:
+        classes: (N,) classes as the file has them, empty where unknown.
+        names: by number, or None.
+    """
+    if classes is None or names is None:
+        return classes
+    distinct, place = np.unique(classes, return_inverse=True)
+    if not all_numbers(distinct.tolist()):
+        return classes
+    words = [names.get(int(text), text) if text else "" for text in distinct.tolist()]
+    return np.array(words, dtype=np.str_)[place.reshape(-1)]

@@ -34,6 +34,12 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
 }
 #: Sides of a box, in the order of arrays (M, 4).
 BOX = ("left", "top", "width", "height")
+#: Columns of motion: the centre with velocity and acceleration (px, px/s, px/s²), and their variances.
+MEAN = ("x", "y", "vx", "vy", "ax", "ay")
+VAR = tuple(f"var_{name}" for name in MEAN)
+SIZE_VAR = ("var_width", "var_height")
+#: The sensor of tables that count frames and name none.
+DEFAULT_SENSOR = "rgb"
 #: Columns that may stand for `t`, with their units.
 TIME_COLUMNS = {"t_ms": "ms", "t_us": "us", "t_ns": "ns"}
 #: Columns of times and boxes that hold numbers, by any of their names.

@@ -3,25 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, TextArray
-from jeat_graph.data.boxes import without_area
-from jeat_graph.data.column_names import BOX
-from jeat_graph.data.embeddings import EmbeddingArray, embeddings_of_objects
-from jeat_graph.data.errors import DataError
-from jeat_graph.data.frame_columns import (
-    ASIDE,
-    boxes_of_columns,
-    check_one_video,
-    classes_of_columns,
-    named_columns,
-    numbers_of,
-    times_of_columns,
-)
+from jeat_graph.data.column_names import BOX, DEFAULT_SENSOR
+from jeat_graph.data.embeddings import EmbeddingArray
 from jeat_graph.data.interop import boxes_of
+from jeat_graph.data.tables.detection_table import OPTIONAL, REQUIRED, DetectionRows, rows_of_detections
+from jeat_graph.data.tables.frame_table import table_of_frame
+from jeat_graph.data.tables.reading import Reading, ReadingOptions
 from jeat_graph.data.to_supervision import supervision_of
 
 if TYPE_CHECKING:
@@ -48,6 +40,10 @@ class DetectionViews:
         def from_rows(*columns: Any) -> Detections:
             """Group rows into scans."""
 
+        @staticmethod
+        def from_table(rows: DetectionRows) -> Detections:
+            """Group the rows of a table into scans."""
+
     def to_pandas(self) -> pd.DataFrame:
         """Return a data frame with the columns of `detections.csv`: one row a detection or empty scan."""
         import pandas as pd
@@ -65,40 +61,26 @@ class DetectionViews:
 
     @classmethod
     def from_pandas(
-        cls, frame: pd.DataFrame, sensor: str = "rgb", *, time_unit: str = "s", rate_hz: float | None = None
+        cls, frame: pd.DataFrame, sensor: str = DEFAULT_SENSOR, **options: Unpack[ReadingOptions]
     ) -> Detections:
-        """Read a data frame, one row a detection; columns may go by the other names that files may have.
+        """Read a data frame as `read_detections` reads a file of the same columns.
 
         Args:
-            frame: `t` (s, or dates or spans of time); `left, top, width, height`, or `left, top, right,
-                bottom`, or `x1, y1, x2, y2` and so on (px); `score` (1 where there is none), `sensor`,
-                `class` and `embedding` (an array of numbers each) where there are such. A row without a box
-                is a scan that found nothing; a box without area is left out, and counted in `dropped`.
+            frame: one row a detection, with the columns and other names that files may have: `t` (s, dates or
+                spans of time) or frame numbers; `left, top, width, height`, or `left, top, right, bottom`, or
+                `x1, y1, x2, y2` and so on (px); `score` (1 where there is no such column), `sensor`, `class`
+                and `embedding` (an array of numbers each) where there are such. A row without a box is a scan
+                that found nothing; a box without area is left out, and counted in `dropped`.
             sensor: name of the sensor where the frame has no such column.
-            time_unit: unit of a column `t` of numbers: `s`, `ms`, `us` or `ns`.
-            rate_hz: frames per second (Hz), for a frame with frame numbers in place of times; these count
-                from 0 where there is a frame 0, else from 1.
+            options: what the frame does not say itself, as `tables.reading.Reading` has it.
 
         Raises:
-            DataError: a column is missing, or a row is no detection; the message names it.
+            DataError: a column is missing, or a row (from 0) is no detection; the message names it.
         """
-        if not hasattr(frame, "columns"):
-            raise DataError(f"detections are read from a data frame, not from {type(frame).__name__}")
-        c = named_columns(frame, ("t", *BOX), ("sensor", "score", "embedding", *ASIDE), "detections")
-        check_one_video(c)
-        box = boxes_of_columns(c)
-        empty = np.isnan(box).all(axis=1)
-        flat = without_area(box)
-        found = cls.from_rows(
-            times_of_columns(c, time_unit, rate_hz),
-            [sensor] * len(box) if "sensor" not in c else [str(name) for name in c["sensor"]],
-            box,
-            numbers_of(c["score"], "score") if "score" in c else np.ones(len(box)),
-            empty | flat,
-            classes_of_columns(c, len(box)),
-            embeddings_of_objects(list(c["embedding"])) if "embedding" in c else None,
+        table, how = table_of_frame(frame, REQUIRED, OPTIONAL, "detections"), Reading(**options)
+        return cls.from_table(
+            rows_of_detections(table, how, how.listed_classes(), None if "sensor" in table else sensor)
         )
-        return replace(found, dropped=int(flat.sum()))
 
     @classmethod
     def from_supervision(cls, source: Any, *, t: float, sensor: str = "rgb") -> Detections:

@@ -16,6 +16,7 @@ from jeat_graph.data.embeddings import EmbeddingArray, join_embeddings, spread_e
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.grouping import group_rows
 from jeat_graph.data.scan import Scan, trusted_scan
+from jeat_graph.data.tables.detection_table import DetectionRows
 
 __all__ = ["Detections", "Scan"]
 
@@ -124,6 +125,19 @@ class Detections(DetectionViews):
             classes=None if classes is None else classes[rows],
             embeddings=None if embeddings is None else embeddings[rows],
         )
+
+    @staticmethod
+    def from_table(rows: DetectionRows) -> Detections:
+        """Group the rows of a table, which are known to be good, into scans."""
+        found = Detections.from_checked(
+            rows.t,
+            rows.sensors,
+            rows.code,
+            (rows.boxes, rows.scores, rows.classes),
+            rows.empty,
+            rows.embeddings,
+        )
+        return replace(found, dropped=rows.dropped)
 
     @staticmethod
     def from_scans(scans: Iterable[Scan]) -> Detections:

@@ -62,23 +62,6 @@ def find_bad_embedding(values: FloatArray) -> int | None:
     return None if good.all() else int(np.argmin(good))
 
 
-def embeddings_of_objects(column: Sequence[object]) -> npt.NDArray[np.float64] | None:
-    """Return the vectors (R, E) of a data frame's column, NaN where None, NaN or nothing stands; or None.
-
-    Raises:
-        DataError: vectors of several lengths, or what is none.
-    """
-    rows = [np.atleast_1d(np.asarray(np.nan if one is None else one, dtype=np.float64)) for one in column]
-    there = [row.ndim == 1 and len(row) > 0 and not np.isnan(row).all() for row in rows]
-    lengths = {len(row) for row, known in zip(rows, there, strict=True) if known}
-    if len(lengths) > 1 or any(row.ndim > 1 for row in rows):
-        raise DataError("embeddings must be vectors of equally many numbers")
-    if not lengths:
-        return None
-    none = np.full(lengths.pop(), np.nan)
-    return np.stack([row if known else none for row, known in zip(rows, there, strict=True)])
-
-
 def missing_embeddings(count: int, numbers: int) -> EmbeddingArray:
     """Return embeddings (M, E) of detections that have none."""
     return np.full((count, numbers), np.nan, dtype=np.float32)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,11 +12,8 @@ from jeat_graph.data.arrays import FloatArray, TextArray
 from jeat_graph.data.box_text import KNOWN, sides_of
 from jeat_graph.data.boxes import class_texts
 from jeat_graph.data.class_columns import CLASS_COLUMNS, said_classes
-from jeat_graph.data.column_names import BOX, BOX_TEXT, TIME_COLUMNS, sides_to_boxes, standing_in, usual_names
+from jeat_graph.data.column_names import BOX, BOX_TEXT, sides_to_boxes, standing_in, usual_names
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.frame_numbers import first_frame
-from jeat_graph.data.time_units import in_seconds
-from jeat_graph.data.videos import choose_video
 
 #: Columns that say classes, and which video a row is of.
 ASIDE = (*CLASS_COLUMNS, "video")
@@ -30,7 +26,7 @@ KNOWN_BOXES = (
 
 def has_columns(source: Any) -> bool:
     """Whether this is a table whose columns have names; those that are only numbered do not."""
-    return hasattr(source, "columns") and any(isinstance(name, str) for name in _labels(source))
+    return hasattr(source, "columns") and any(isinstance(name, str) for name in labels_of(source))
 
 
 def named_columns(table: Any, needed: Sequence[str], optional: Sequence[str], what: str) -> dict[str, Any]:
@@ -45,7 +41,7 @@ def named_columns(table: Any, needed: Sequence[str], optional: Sequence[str], wh
     Raises:
         DataError: a column is missing or there twice; the message says which names are known.
     """
-    labels = _labels(table)
+    labels = labels_of(table)
     names = usual_names([str(label) for label in labels], [*needed, *optional])
     twice = next((name for name, count in Counter(names).items() if count > 1), None)
     if twice is not None:
@@ -88,44 +84,6 @@ def classes_of_columns(columns: Mapping[str, Any], count: int) -> TextArray | No
     return said_classes(found)
 
 
-def check_one_video(columns: Mapping[str, Any]) -> None:
-    """Refuse rows of several videos, which would be laid over each other.
-
-    Raises:
-        DataError: names some of them.
-    """
-    if "video" in columns:
-        choose_video(sorted({str(name) for name in columns["video"]}), None)
-
-
-def times_of_columns(columns: Mapping[str, Any], unit: str, rate_hz: float | None) -> FloatArray:
-    """Return times (R,) in seconds of columns from `named_columns`.
-
-    Args:
-        columns: with `t` (numbers, dates or spans of time), one that names its unit, or frame numbers.
-        unit: of the column `t` where it holds numbers.
-        rate_hz: frames per second; frames count from 0 where there is a frame 0, else from 1
-            (`frame_numbers`).
-
-    Raises:
-        DataError: a column that holds none of these, another unit than its own, or frames without a rate.
-        ConfigError: a unit that is not known.
-    """
-    name = standing_in(list(columns), ["t"])[0]
-    times = seconds_of(columns[name])
-    if times is not None:
-        return times
-    numbers = numbers_of(columns[name], name, "times in seconds, or dates (pandas.to_datetime makes them)")
-    if name == "frame":
-        if rate_hz is None or not (math.isfinite(rate_hz) and rate_hz > 0.0):
-            raise DataError("there are frame numbers only; give their rate (Hz) as rate_hz")
-        return np.asarray((numbers - first_frame(numbers)) / rate_hz)
-    own = TIME_COLUMNS.get(name, unit)
-    if unit not in ("s", own):
-        raise DataError(f"column {name!r} is in {own}, but time_unit says {unit}; leave it out")
-    return in_seconds(numbers, own)
-
-
 def _boxes_in_one_field(column: Any) -> FloatArray:
     """Boxes (M, 4) of a column of corners by name; NaN where there is none."""
     boxes = np.full((len(column), 4), np.nan)
@@ -137,20 +95,6 @@ def _boxes_in_one_field(column: Any) -> FloatArray:
             raise DataError(f"row {row}: box must be {KNOWN}, not {str(value)[:40]!r}")
         boxes[row] = sides
     return sides_to_boxes(("left", "top", "right", "bottom"), boxes)
-
-
-def seconds_of(times: Any) -> FloatArray | None:
-    """Return a column (N,) of dates (those without a zone are UTC) since 1970, or of spans, in seconds.
-
-    None where the column holds neither.
-    """
-    if hasattr(times, "dt") and getattr(times.dt, "tz", None) is not None:
-        times = times.dt.tz_convert("UTC").dt.tz_localize(None)
-    column = np.asarray(times)
-    if column.dtype.kind not in "mM":
-        return None
-    since = column - np.datetime64(0, "s") if column.dtype.kind == "M" else column
-    return np.where(np.isnat(since), np.nan, since / np.timedelta64(1, "s"))
 
 
 def numbers_of(column: Any, name: str, what: str = "numbers") -> FloatArray:
@@ -166,6 +110,7 @@ def numbers_of(column: Any, name: str, what: str = "numbers") -> FloatArray:
         raise DataError(f"column {name!r} must hold {what}, not {str(first)[:40]!r}") from None
 
 
-def _labels(table: Any) -> list[Any]:
+def labels_of(table: Any) -> list[Any]:
+    """Return what the columns of a data frame are called, in their order."""
     arrow = type(table).__module__.partition(".")[0] == "pyarrow"  # its `columns` are the columns themselves
     return list(table.column_names if arrow else table.columns)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,10 +17,6 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, TextArray
 from jeat_graph.data.boxes import class_texts, detached, without_area
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_columns import detector_columns, has_columns
-
-if TYPE_CHECKING:
-    import pandas as pd
-
 
 #: How arrays of boxes may be given: corner and size, two corners, or centre and size (px).
 FORMATS = ("ltwh", "xyxy", "xywh")
@@ -263,21 +259,3 @@ def _scores(values: npt.ArrayLike) -> FloatArray:
 
 def _array(values: Any) -> FloatArray:
     return np.asarray(detached(values), dtype=np.float64)
-
-
-def columns_of(table: pd.DataFrame, needed: tuple[str, ...], what: str) -> dict[str, npt.NDArray[Any]]:
-    """Columns of a data frame by name.
-
-    Args:
-        table: the data frame.
-        needed: columns that must be there.
-        what: what the table is to be, for the message.
-
-    Raises:
-        DataError: a column is missing; the message names it and those that are there.
-    """
-    missing = [name for name in needed if name not in table.columns]
-    if missing:
-        there = ", ".join(str(name) for name in table.columns)
-        raise DataError(f"{what} need the column {missing[0]}; the table has {there}")
-    return {str(name): table[name].to_numpy() for name in table.columns}

@@ -4,24 +4,23 @@ from __future__ import annotations
 
 import html
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray, IntArray, TextArray
-from jeat_graph.data.class_columns import class_column, rows_of_class
-from jeat_graph.data.column_names import BOX
+from jeat_graph.data.class_columns import rows_of_class
+from jeat_graph.data.column_names import BOX, MEAN, SIZE_VAR, VAR
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.interop import columns_of, to_xyxy
+from jeat_graph.data.interop import to_xyxy
+from jeat_graph.data.tables.reading import Reading, ReadingOptions
+from jeat_graph.data.tables.trajectory_table import fields_of_frame
 from jeat_graph.data.to_supervision import OwnDetections, supervision_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
-MEAN = ("x", "y", "vx", "vy", "ax", "ay")
-VAR = tuple(f"var_{name}" for name in MEAN)
-SIZE_VAR = ("var_width", "var_height")
 _SHOWN_ROWS = 8
 
 
@@ -119,35 +118,19 @@ class TrajectoryViews:
         return pd.DataFrame(columns)
 
     @classmethod
-    def from_pandas(cls, frame: pd.DataFrame) -> Self:
-        """Read a data frame with the columns of `causal.csv`, such as `to_pandas` gives.
+    def from_pandas(cls, frame: pd.DataFrame, **options: Unpack[ReadingOptions]) -> Self:
+        """Read a data frame as `read_trajectories` reads a file of the same columns.
+
+        Args:
+            frame: the columns of `causal.csv`, such as `to_pandas` gives; or another tracker's result: `t` or
+                frame numbers, `track_id` and a box, which may go by the other names that files may have.
+            options: what a result does not say itself, as `tables.reading.Reading` has it.
 
         Raises:
-            DataError: a column is missing, or a sensor is named that cannot be.
+            DataError: a column is missing, or a row (from 0) is no track, or there twice.
         """
-        c = columns_of(frame, ("t", "track_id", *BOX, "existence", *MEAN, *VAR, "sensors"), "trajectories")
-        texts = [str(text) if isinstance(text, str) else "" for text in c["sensors"]]
-        names = sorted({name for text in texts for name in text.split("|") if name})
-        if len(names) > 63:
-            raise DataError("a table names at most 63 sensors")
-        bit = {name: 1 << k for k, name in enumerate(names)}
-        used = [sum(bit[name] for name in text.split("|") if name) for text in texts]
-
-        def stack(columns: tuple[str, ...]) -> FloatArray:
-            return np.column_stack([np.asarray(c[name], dtype=np.float64) for name in columns])
-
-        return cls(  # type: ignore[call-arg]  # the fields are those of Trajectories
-            t=np.asarray(c["t"], dtype=np.float64),
-            track_id=np.asarray(c["track_id"], dtype=np.int64),
-            boxes=stack(BOX),
-            existence=np.asarray(c["existence"], dtype=np.float64),
-            mean=stack(MEAN),
-            var=stack(VAR),
-            used=np.array(used, dtype=np.int64),
-            sensors=tuple(names),
-            size_var=stack(SIZE_VAR) if all(name in c for name in SIZE_VAR) else None,
-            **class_column(c.get("class"), c.get("class_probability")),
-        )
+        how = Reading(**options)
+        return cls(**fields_of_frame(frame, how, how.listed_classes()))
 
     def to_supervision(self, *, own: bool = True) -> Any:
         """Return `supervision.Detections` with `tracker_id`, for its annotators.

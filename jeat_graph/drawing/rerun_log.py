@@ -42,12 +42,18 @@ def log_run(tables: Mapping[str, Trajectories], name: str, path: str | Path | No
         path: a file `.rrd`; None to open the viewer.
 
     Raises:
-        DataError: rerun is not installed.
+        DataError: rerun is not installed, or has no viewer here.
     """
     rr = rerun_module()
     if path is None:
         stream = rr.RecordingStream("jeat-graph", recording_id=name)
-        stream.spawn()
+        try:
+            stream.spawn()
+        except RuntimeError as error:  # its first line says what is missing, the others how to get it
+            what = str(error).splitlines()[0]
+            raise DataError(
+                f"the viewer of rerun cannot be opened ({what}); `export --to rerun` writes a file for it"
+            ) from None
         _log(rr, stream, tables)
         stream.flush()
         return

@@ -10,18 +10,16 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, TextArray
+from jeat_graph.data.class_columns import LISTS_COUNT_FROM, name_classes
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_numbers import first_frame
 from jeat_graph.data.notes import note
+from jeat_graph.data.tables.frame_filling import check_rate, fill_frames, gap_times
+from jeat_graph.data.tables.reading import Reading
 from jeat_graph.io import coco, kitti, motchallenge, prophesee
-from jeat_graph.io.class_names import name_classes, names_by_number
-from jeat_graph.io.frames import check_rate, fill_frames, gap_times
+from jeat_graph.io.class_names import names_by_number
 from jeat_graph.io.plain_text import frames_of
-from jeat_graph.io.reading import Reading
 from jeat_graph.io.yolo_labels import read_labels
-
-# Lists of class names of these formats count from here.
-_FIRST_CLASS = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +127,7 @@ def _kitti(path: str | Path, how: Reading) -> FileBoxes:
 def _prophesee(path: str | Path, how: Reading) -> FileBoxes:
     table = prophesee.read_array(path)
     t = prophesee.times_of(table)
-    names = names_by_number(how.class_names, path, _FIRST_CLASS)
+    names = names_by_number(how.class_names, path, LISTS_COUNT_FROM)
 
     def recorded() -> FloatArray:
         gaps = np.zeros(0) if how.rate_hz is None else gap_times(t, how.rate_hz, path)
@@ -185,6 +183,6 @@ def _yolo(path: str | Path, how: Reading) -> FileBoxes:
         scores=labels.scores,
         ids=labels.ids,
         classes=name_classes(
-            labels.kind.astype(np.str_), names_by_number(how.class_names, path, _FIRST_CLASS)
+            labels.kind.astype(np.str_), names_by_number(how.class_names, path, LISTS_COUNT_FROM)
         ),
     )

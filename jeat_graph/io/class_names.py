@@ -7,14 +7,12 @@ for everything else; a mapping in YAML says the numbers itself.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
-import numpy as np
-
-from jeat_graph.data.arrays import TextArray
-from jeat_graph.data.class_columns import all_numbers
+from jeat_graph.data.class_columns import listed_names
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.limits import check_file
 
@@ -27,45 +25,33 @@ _YAML = (".yaml", ".yml")
 _LARGEST = 1 << 20
 
 
-def names_by_number(said: ClassNames | None, beside: str | Path, first: int) -> dict[int, str] | None:
+def names_by_number(said: ClassNames | None, beside: str | Path | None, first: int) -> dict[int, str] | None:
     """Return the names of classes by number; None where nobody says them.
 
     Args:
         said: what the user gives: names in order, by number, or a file of them.
-        beside: the file with the numbers; without `said` a list is looked for in its folder.
+        beside: the file with the numbers, if there is one; without `said` a list is looked for in its folder.
         first: number of the first name of a list.
 
     Raises:
         DataError: a list that cannot be read.
     """
-    if isinstance(said, Mapping):
-        return {int(number): str(name) for number, name in said.items()}
     if said is not None and not isinstance(said, str | Path):
-        return dict(enumerate(map(str, said), first))
+        return listed_names(said, first)
     if said is None:
-        folder = Path(beside) if Path(beside).is_dir() else Path(beside).parent
-        said = next((folder / name for name in LISTS if (folder / name).is_file()), None)
-        if said is None or Path(said) == Path(beside):
-            return None
-    elif "," in str(said) and not Path(said).exists():
+        said = None if beside is None else _list_beside(Path(beside))
+        return None if said is None else _read(Path(said), first)
+    if os.path.exists(said):  # unlike Path's, it takes any text, however long
+        return _read(Path(said), first)
+    if "," in str(said):
         return dict(enumerate((name.strip() for name in str(said).split(",")), first))
-    return _read(Path(said), first)
+    raise DataError("no such file; names of classes themselves have commas between them: car,truck", said)
 
 
-def name_classes(classes: TextArray | None, names: Mapping[int, str] | None) -> TextArray | None:
-    """Give numbers their names; a number without one stays, and so do classes that have names already.
-
-    Args:
-        classes: (N,) classes as the file has them, empty where unknown.
-        names: by number, or None.
-    """
-    if classes is None or names is None:
-        return classes
-    distinct, place = np.unique(classes, return_inverse=True)
-    if not all_numbers(distinct.tolist()):
-        return classes
-    words = [names.get(int(text), text) if text else "" for text in distinct.tolist()]
-    return np.array(words, dtype=np.str_)[place.reshape(-1)]
+def _list_beside(path: Path) -> Path | None:
+    folder = path if path.is_dir() else path.parent
+    found = next((folder / name for name in LISTS if (folder / name).is_file()), None)
+    return None if found == path else found
 
 
 def lines_of_names(text: str) -> list[str]:

@@ -15,15 +15,16 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, TextArray
+from jeat_graph.data.class_columns import name_classes
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_numbers import first_frame
-from jeat_graph.io.class_names import name_classes, names_by_number
+from jeat_graph.data.tables.frame_filling import check_rate
+from jeat_graph.data.tables.reading import Reading
+from jeat_graph.io.class_names import names_by_number
 from jeat_graph.io.coco_columns import Entries, read_entries
 from jeat_graph.io.coco_entries import WANTED, one_by_one
 from jeat_graph.io.coco_images import Images, read_images
 from jeat_graph.io.csv_text import read_text
-from jeat_graph.io.frames import check_rate
-from jeat_graph.io.reading import Reading
 
 _FIRST_CATEGORY = 0
 

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
-from jeat_graph.io.arrow_arrays import to_numpy
+from jeat_graph.data.tables.arrow_arrays import to_numpy
 
 _LIST = re.compile(rb"[ \t\r\n]*\[[ \t\r\n]*(?=\{)")
 _NAMED_LIST = re.compile(rb'"annotations"[ \t\r\n]*:[ \t\r\n]*\[[ \t\r\n]*(?=\{)')

@@ -10,10 +10,10 @@ import numpy as np
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_numbers import first_frame
+from jeat_graph.data.tables.frame_filling import check_rate
+from jeat_graph.data.tables.reading import Reading
 from jeat_graph.data.videos import choose_video
 from jeat_graph.io.coco_entries import finite_number
-from jeat_graph.io.frames import check_rate
-from jeat_graph.io.reading import Reading
 
 
 class Images(NamedTuple):

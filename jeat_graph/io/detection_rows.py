@@ -1,4 +1,4 @@
-"""Rows of a table of detections: those without a box, boxes without area, embeddings; checked, made scans."""
+"""Boxes of one sensor, from a format without a table, made scans."""
 
 from __future__ import annotations
 
@@ -8,42 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.data.arrays import BoolArray, FloatArray
-from jeat_graph.data.boxes import find_bad_row, without_area
-from jeat_graph.data.column_names import BOX, standing_in
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.boxes import without_area
 from jeat_graph.data.detections import Detections
-from jeat_graph.data.embeddings import EmbeddingArray, find_bad_embedding, unit_embeddings
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.file_table import FileTable
-from jeat_graph.io.frames import score_hint
-
-
-def read_embeddings(table: FileTable) -> EmbeddingArray | None:
-    """What the rows (R, E) look like; None where no row says it."""
-    vectors = table.vectors("embedding")
-    bad = find_bad_embedding(vectors)
-    if bad is not None:
-        raise table.error(bad, "embedding must be finite and not all zero")
-    found = unit_embeddings(vectors, len(vectors))
-    return None if np.isnan(found).all() else found
-
-
-def rows_without_box(table: FileTable) -> BoolArray:
-    """Which rows (R,) only say that a scan took place; a row with part of a box is an error."""
-    values = [*standing_in(table.names, BOX), *(name for name in ("score",) if name in table)]
-    return table.bare(values, "a scan that found nothing has only t and sensor")
-
-
-def check_rows(
-    boxes: FloatArray, scores: FloatArray, passed_over: BoolArray, error: Callable[[int, str], DataError]
-) -> None:
-    """Refuse the first row that is no detection, at its place in the file, but for those passed over."""
-    index = np.flatnonzero(~passed_over) if passed_over.any() else None
-    bad = find_bad_row(boxes, scores) if index is None else find_bad_row(boxes[index], scores[index])
-    if bad is not None:
-        row = bad[0] if index is None else int(index[bad[0]])
-        what = score_hint(float(scores[row])) if bad[1].startswith("score") else bad[1]
-        raise error(row, what)
+from jeat_graph.data.tables.detection_table import check_rows
 
 
 def assemble(

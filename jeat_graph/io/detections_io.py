@@ -10,30 +10,25 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from jeat_graph.data.boxes import without_area
-from jeat_graph.data.column_names import BOX, NUMBER_COLUMNS
+from jeat_graph.data.class_columns import LISTS_COUNT_FROM
+from jeat_graph.data.column_names import BOX, DEFAULT_SENSOR, NUMBER_COLUMNS
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_columns import ASIDE
 from jeat_graph.data.notes import note
+from jeat_graph.data.tables.detection_table import OPTIONAL, rows_of_detections
+from jeat_graph.data.tables.file_table import FileTable
+from jeat_graph.data.tables.frame_filling import scale_scores
+from jeat_graph.data.tables.reading import Reading, ReadingOptions
 from jeat_graph.io.box_rows import read_rows
-from jeat_graph.io.column_names import boxes_of, classes_of, of_one_video, times_of
+from jeat_graph.io.class_names import names_by_number
 from jeat_graph.io.csv_text import NUMBER, WORD
-from jeat_graph.io.detection_rows import (
-    assemble,
-    check_rows,
-    read_embeddings,
-    rows_without_box,
-)
-from jeat_graph.io.file_table import FileTable
+from jeat_graph.io.detection_rows import assemble
 from jeat_graph.io.formats import counts_frames, known_columns, recognise
-from jeat_graph.io.frames import check_rate, fill_frames, scale_scores
-from jeat_graph.io.reading import Reading, ReadingOptions
 from jeat_graph.io.rounding import round_decimals
 from jeat_graph.io.table_writer import write_columns
 from jeat_graph.io.tables import read_table
 
-DEFAULT_SENSOR = "rgb"
 _COLUMNS = ("t", "sensor", *BOX, "score")
 _KINDS = {
     **dict.fromkeys((*NUMBER_COLUMNS, "score"), NUMBER),
@@ -75,8 +70,9 @@ def read_detections(
         sensor: the sensor's name where the format has none (default `rgb`); renames the one sensor of a CSV
             or Parquet file, or names it if the file has no such column.
         fmt: the format, if it should not be recognised from the file.
-        options: what the file does not say itself, as `io.reading.Reading` has it: `rate_hz`, `time_unit`,
-            `first_frame`, `video`, `class_names`, `image`, `score_scale`, `fill_empty`, `images`.
+        options: what the file does not say itself, as `tables.reading.Reading` has it: `rate_hz`,
+            `time_unit`, `first_frame`, `video`, `class_names`, `image`, `score_scale`, `fill_empty`,
+            `images`.
 
     Raises:
         DataError: names the file, the line or row, and what is wrong.
@@ -143,7 +139,7 @@ def read_many(paths: Sequence[str | Path], **options: Any) -> Detections:
                 found[k] = _read_counted(path, name or sensor, fmt, replace(how, first_frame=0))
     parts = [one for one, _ in found]
     whole = parts[0] if len(parts) == 1 else Detections.concatenate(parts)
-    return whole if classes is None else _of_class(whole, classes, split_name(paths[0])[1])
+    return whole if classes is None else of_class_in(whole, classes, split_name(paths[0])[1])
 
 
 def _names_sensors(path: str | Path, fmt: str | None) -> bool:
@@ -154,7 +150,12 @@ def _names_sensors(path: str | Path, fmt: str | None) -> bool:
     )
 
 
-def _of_class(detections: Detections, classes: Sequence[str], path: str | Path) -> Detections:
+def of_class_in(detections: Detections, classes: Sequence[str], path: str | Path) -> Detections:
+    """Keep the detections of some classes, and those of which none is known; errors name the file.
+
+    Raises:
+        DataError: no detection has a class, or none is of one of these.
+    """
     try:
         return detections.of_class(*classes)
     except DataError as error:
@@ -193,46 +194,19 @@ def write_detections(detections: Detections, path: str | Path, decimals: int | N
 
 def _read_contract(path: str | Path, sensor: str | None, how: Reading) -> tuple[Detections, int | None]:
     table = _table_of(path, sensor)
-    table = of_one_video(table, how)
-    times = times_of(table, how)
-    t = times.t
-    if sensor is None and "sensor" not in table:
-        sensor = DEFAULT_SENSOR
-    names, code = [""], np.zeros(len(t), dtype=np.int64)
-    if "sensor" in table:
-        names, code = table.words("sensor", blank_ok=sensor is not None)
-    if sensor is not None:
-        if len(names) > 1:
-            raise DataError(f"holds the sensors {', '.join(names)}; none can be renamed to {sensor}", path)
-        names = [sensor] if len(t) else []
-    empty = rows_without_box(table)
-    boxes = boxes_of(table)
-    scores = table.number("score", blank_ok=True) if "score" in table else np.where(empty, np.nan, 1.0)
-    scores = scale_scores(scores, how.score_scale, path) if "score" in table else scores
-    classes = classes_of(table, how)
-    looks = read_embeddings(table) if "embedding" in table else None
-    flat = without_area(boxes) & ~empty
-    check_rows(boxes, scores, empty | flat, table.error)
-    if times.frames is not None and "sensor" not in table and not empty.any() and how.fill_empty and len(t):
-        rate = check_rate(how.rate_hz or 0.0, path)
-        missing = np.setdiff1d((fill_frames(times.frames, path) - (times.first or 0)) / rate, t)
-        if looks is None and len(missing):
-            return assemble(t, names[0], boxes, scores, classes, missing, table.error), times.first
+    names = names_by_number(how.class_names, path, LISTS_COUNT_FROM)
+    rows = rows_of_detections(table, how, names, sensor)
     del table  # the file's own columns are in the way of what is to come
-    found = Detections.from_checked(t, names, code, (boxes, scores, classes), empty | flat, looks)
-    return replace(found, dropped=int(flat.sum())), times.first
+    return Detections.from_table(rows), rows.first
 
 
 def _table_of(path: str | Path, sensor: str | None) -> FileTable:
     """Read a table; one that counts frames may lack the column `sensor`, as other formats do."""
-    required = [
-        name for name in _COLUMNS if name != "score" and not (name == "sensor" and sensor is not None)
-    ]
-    optional = ("score", "sensor", "embedding", *ASIDE)
+    required = ["t", *(() if sensor is not None else ("sensor",)), *BOX]
     if sensor is None and counts_frames(path, "csv"):
         required.remove("sensor")
     try:
-        return read_table(path, required, optional, short=("t", "sensor"), aliases=True, kinds=_KINDS)
+        return read_table(path, required, OPTIONAL, short=("t", "sensor"), aliases=True, kinds=_KINDS)
     except DataError as error:
         if error.message.startswith("column 'sensor' is missing;"):
             raise DataError(

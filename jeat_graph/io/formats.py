@@ -8,8 +8,9 @@ from pathlib import Path
 
 from jeat_graph.data.column_names import FRAME_COLUMNS, standing_in, usual_names
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.tables.spreadsheets import is_number
 from jeat_graph.io.csv_text import first_bytes, read_bytes
-from jeat_graph.io.headers import is_number, split_header
+from jeat_graph.io.headers import split_header
 from jeat_graph.io.limits import check_file
 from jeat_graph.io.not_tables import XML
 from jeat_graph.io.yolo_labels import is_label_folder

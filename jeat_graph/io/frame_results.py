@@ -10,9 +10,9 @@ import numpy as np
 from jeat_graph.data.arrays import IntArray, TextArray
 from jeat_graph.data.column_names import BOX
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.tables.frame_filling import check_rate
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io import kitti, motchallenge
-from jeat_graph.io.frames import check_rate
 from jeat_graph.io.rounding import round_decimals
 from jeat_graph.io.table_writer import write_columns
 from jeat_graph.io.trajectories_io import EXISTENCE_DECIMALS, PX_DECIMALS

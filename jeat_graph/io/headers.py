@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.tables.spreadsheets import is_number
 
 _MOST_COLUMNS = 10_000
 # Columns that people's tables may well have others beside which are called much alike.
@@ -103,12 +104,3 @@ def _nearest(name: str, options: Sequence[str], cutoff: float) -> str | None:
     lower = {option.lower(): option for option in options}
     near = difflib.get_close_matches(name.lower(), lower, 1, cutoff)
     return lower[near[0]] if near else None
-
-
-def is_number(text: str) -> bool:
-    """Tell whether a text is a number."""
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

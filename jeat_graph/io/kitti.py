@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.io.file_table import FileTable
+from jeat_graph.data.tables.file_table import FileTable
 from jeat_graph.io.plain_text import read_plain
 
 FIRST_FRAME = 0

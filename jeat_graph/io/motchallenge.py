@@ -19,10 +19,11 @@ from typing import NamedTuple
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.class_columns import name_classes
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.class_names import ClassNames, lines_of_names, name_classes, names_by_number
-from jeat_graph.io.file_table import FileTable
-from jeat_graph.io.frames import check_rate
+from jeat_graph.data.tables.file_table import FileTable
+from jeat_graph.data.tables.frame_filling import check_rate
+from jeat_graph.io.class_names import ClassNames, lines_of_names, names_by_number
 from jeat_graph.io.plain_text import read_plain
 from jeat_graph.io.zipped import LABELS, MEMBER, read_member
 
@@ -100,7 +101,9 @@ def class_names(
         return np.zeros(0, dtype=np.str_) if not len(table) else None
     distinct, index = np.unique(table.whole(column), return_inverse=True)
     texts = np.array(["" if number < 0 else str(number) for number in distinct], dtype=np.str_)
-    names = names_by_number(said, table.path, _FIRST_CLASS) or _names_in_zip(table.path)
+    names = names_by_number(said, table.path, _FIRST_CLASS)
+    if names is None and table.path is not None:
+        names = _names_in_zip(table.path)
     if names is None and challenge:
         names = dict(enumerate(CHALLENGE, _FIRST_CLASS))
     return name_classes(texts[index.reshape(-1)], names)

@@ -5,6 +5,7 @@ from __future__ import annotations
 _EVENTS = "is a file of events, no table; `detect` and `track` take it as --events"
 _VIDEO = "is a video, no table; `detect` and `track` take it as --frames"
 _PICTURE = "is a picture, no table; `detect` and `track` take a folder of them as --frames"
+_PICKLE = "is a pickle, which can run programs and is not read; save it as Parquet or CSV"
 #: What is said of XML, which annotation tools write in many forms.
 XML = (
     "is XML (Pascal VOC, or CVAT's own), which is not read: export it as MOT 1.1, COCO or YOLO from the "
@@ -17,6 +18,9 @@ _STARTS = {
     b"BZh": "is compressed with bzip2; unpack it",
     b"\xfd7zXZ": "is compressed with xz; unpack it",
     b"\x28\xb5\x2f\xfd": "is compressed with zstd; unpack it",
+    b"ARROW1": "is an Arrow or Feather file; save it as Parquet or CSV",
+    b"\x80\x04": _PICKLE,
+    b"\x80\x05": _PICKLE,
     b"\x89HDF": "is an HDF5 file, not text; if it holds events, `detect` and `track` take it as --events",
     b"#!AER-DAT": _EVENTS,
     b"#ROSBAG": _EVENTS,

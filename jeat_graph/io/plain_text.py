@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.tables.file_table import FileTable
 from jeat_graph.io.csv_text import CsvBody, read_text
-from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.tables import table_of
 
 _NO_COMMA_AT_END = re.compile(rb"[^,\r\n](?:[\r\n]|\Z)")
@@ -72,29 +71,3 @@ def frames_of(table: FileTable, first: int) -> IntArray:
         row = int(np.argmax(frame < first))
         raise table.error(row, f"frames count from {first}, got {frame[row]}")
     return frame
-
-
-class _CanSayWhere(Protocol):
-    """What can make an error that names the place of a row (from 0) in its file."""
-
-    @property
-    def error(self) -> Callable[[int, str], DataError]:
-        """Makes the error from the row and a message."""
-
-
-def check_sizes(table: _CanSayWhere, boxes: FloatArray) -> None:
-    """Check that widths and heights are positive.
-
-    Args:
-        table: where the boxes are from.
-        boxes: (R, 4) left, top, width, height (px).
-
-    Raises:
-        DataError: names the first line or row with a width or height that is not positive.
-    """
-    bad = ~(boxes[:, 2:] > 0).all(axis=1)
-    if bad.any():
-        row = int(np.argmax(bad))
-        raise table.error(
-            row, f"width and height must be positive, got {boxes[row, 2]:g} x {boxes[row, 3]:g}"
-        )

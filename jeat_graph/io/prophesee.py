@@ -15,8 +15,8 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.tables.file_table import FileTable
 from jeat_graph.io.csv_text import read_bytes
-from jeat_graph.io.file_table import FileTable
 
 _ALIASES = {"ts": "t", "confidence": "class_confidence"}
 _US_PER_S = 1e6

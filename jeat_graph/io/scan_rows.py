@@ -3,21 +3,36 @@
 from __future__ import annotations
 
 import csv
+from collections import Counter
 from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from jeat_graph.data.column_names import BOX, TIME_COLUMNS, sides_to_boxes, standing_in, usual_names
+from jeat_graph.data.arrays import TextArray
+from jeat_graph.data.box_text import KNOWN, sides_of
+from jeat_graph.data.class_columns import CLASS_COLUMNS
+from jeat_graph.data.column_names import (
+    BOX,
+    BOX_TEXT,
+    DEFAULT_SENSOR,
+    FRAME_COLUMNS,
+    sides_to_boxes,
+    standing_in,
+    usual_names,
+)
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.scan import scan_with_area
+from jeat_graph.data.frame_columns import ASIDE
+from jeat_graph.data.tables.file_table import advice_on
+from jeat_graph.data.tables.spreadsheets import unguarded
 from jeat_graph.io.headers import delimiter_of
 from jeat_graph.io.scan_batch import ScanBatch, Trying
-from jeat_graph.io.spreadsheets import unguarded
+from jeat_graph.io.stream_reading import StreamReading, video_of_picture
 from jeat_graph.io.stream_text import decode_line
 
-_COLUMNS = ("t", "sensor", "left", "top", "width", "height", "score")
-_CLASS = "class"  # a column that may be there
+_COLUMNS = ("t", "sensor", *BOX)
+_OPTIONAL = ("score", "embedding", *ASIDE)
+_CORNERS = ("left", "top", "right", "bottom")
 
 
 class _Row(NamedTuple):
@@ -25,7 +40,8 @@ class _Row(NamedTuple):
     sensor: str
     box: list[float] | None
     score: float
-    kind: str | None
+    kinds: dict[str, str]
+    look: list[float] | None
     flat: int
 
 
@@ -34,58 +50,75 @@ class CsvForm(NamedTuple):
 
     Attributes:
         place: of each column that is read, by name.
+        time: name of the column of times or frames.
         sides: names of the four columns of a box, as `standing_in` gives them.
         delimiter: between two fields.
     """
 
     place: dict[str, int]
+    time: str
     sides: list[str]
     delimiter: str
 
 
 def csv_columns(header: str, name: str, at: int) -> CsvForm:
-    """Read a header; columns may go by the names that files may have for them.
+    """Read a header; columns may go by the names that files may have for them, or be stood in for.
 
     Raises:
         DataError: a column is missing.
     """
     mark = delimiter_of(header)
-    columns = usual_names(_fields(header, name, at, mark), (*_COLUMNS, _CLASS))
-    sides = standing_in(columns, BOX)
-    needed = ["t", "sensor", *sides, "score"]
+    columns = usual_names(_fields(header, name, at, mark), (*_COLUMNS, *_OPTIONAL))
+    twice = next((column for column, count in Counter(columns).items() if count > 1), None)
+    if twice is not None:
+        raise DataError(f"column {twice!r} is there twice", name, at)
+    time, sides = standing_in(columns, ["t"])[0], standing_in(columns, BOX)
+    needed = [time, *(() if time in FRAME_COLUMNS else ("sensor",)), *sides]
     missing = [column for column in needed if column not in columns]
     if missing:
-        unit = next((TIME_COLUMNS[column] for column in columns if column in TIME_COLUMNS), None)
-        hint = (
-            f"; name the column of times t, and give --time-unit {unit}" if missing[0] == "t" and unit else ""
-        )
-        what = f"column {missing[0]} is missing{hint}"
+        what = f"column {missing[0]} is missing"
         raise DataError(f"the first line must be a scan as JSON or a header of CSV; {what}", name, at)
-    known = [*needed, _CLASS] if _CLASS in columns else needed
-    return CsvForm({column: columns.index(column) for column in known}, sides, mark)
+    known = [column for column in (*needed, "sensor", *_OPTIONAL) if column in columns]
+    return CsvForm({column: columns.index(column) for column in known}, time, sides, mark)
 
 
 def csv_batches(
-    form: CsvForm, numbered: Iterator[tuple[int, bytes]], name: str, trying: Trying
+    form: CsvForm,
+    numbered: Iterator[tuple[int, bytes]],
+    name: str,
+    trying: Trying,
+    how: StreamReading,
 ) -> Iterator[ScanBatch | None]:
     """Yield a batch of one scan for each run of rows of one sensor and time, None where a line is empty."""
     rows: list[_Row] = []
     first = 0
     for number, line in numbered:
         text = trying(decode_line, line, name, number)
-        row = trying(_csv_row, text, form, name, number) if text else None
+        row = trying(_csv_row, text, form, name, number, how) if text else None
         if row is None and text != "":
-            continue  # it was bad
+            continue  # it was bad, or of another video
         if rows and (row is None or (row.t, row.sensor) != (rows[0].t, rows[0].sensor)):
-            yield _scan_of_rows(rows, first)
+            batch = trying(_scan_that_fits, rows, first, name, how)
             rows = []
+            if batch is not None:
+                yield batch
         if row is None:
             yield None
             continue
         first = first if rows else number
         rows.append(row)
-    if rows:
-        yield _scan_of_rows(rows, first)
+    batch = trying(_scan_that_fits, rows, first, name, how) if rows else None
+    if batch is not None:
+        yield batch
+
+
+def _scan_that_fits(rows: list[_Row], first: int, name: str, how: StreamReading) -> ScanBatch:
+    """Make the scan of rows that are good each by itself; errors name the line of the first."""
+    lengths = sorted({len(row.look) for row in rows if row.look is not None})
+    if len(lengths) > 1:
+        what = f"embeddings of one scan must have equally many numbers, not {lengths[0]} and {lengths[1]}"
+        raise DataError(what, name, first)
+    return _scan_of_rows(rows, first, how)
 
 
 def _fields(text: str, name: str, number: int, delimiter: str) -> list[str]:
@@ -95,35 +128,72 @@ def _fields(text: str, name: str, number: int, delimiter: str) -> list[str]:
         raise DataError(f"cannot be read as CSV: {error}", name, number) from None
 
 
-def _csv_row(text: str, form: CsvForm, name: str, number: int) -> _Row:
+def _csv_row(text: str, form: CsvForm, name: str, number: int, how: StreamReading) -> _Row | None:
+    """Read one row; None if it is of a video that is not asked for, or every field is blank."""
     fields, place = _fields(text, name, number, form.delimiter), form.place
+    if not any(fields):
+        return None
     value = {column: unguarded(fields[k]) if k < len(fields) else "" for column, k in place.items()}
-    if not value["sensor"]:
-        raise DataError("sensor is missing", name, number)
-    numbers = ["t", *form.sides, "score"]
-    empty = not any(value[column] for column in numbers[1:])
-    found: dict[str, float] = {}
-    for column in numbers[:1] if empty else numbers:
-        try:
-            found[column] = float(value[column].replace(",", ".") if form.delimiter == ";" else value[column])
-        except ValueError:
-            what = f"must be a number, got {value[column]!r}" if value[column] else "is missing"
-            raise DataError(f"{column} {what}", name, number) from None
-    box = None
-    if not empty:
-        box = sides_to_boxes(form.sides, np.array([[found[column] for column in form.sides]]))[0].tolist()
     # Each row is checked by itself, so that its line can be named; one without area stays, as a look.
-    row = _Row(found["t"], value["sensor"], box, found.get("score", 0.0), value.get(_CLASS), 0)
     try:
-        flat = _scan_of_rows([row], number).flat
+        row = _row_of(value, form, how)
+        # Of classes everything is taken: they would only cost time here.
+        flat = 0 if row is None else _scan_of_rows([row._replace(kinds={})], number, how).flat
     except DataError as error:
         raise DataError(error.message.removeprefix("box 0: "), name, number) from None
-    return row._replace(box=None, flat=flat) if flat else row
+    return row._replace(box=None, flat=flat) if row is not None and flat else row
 
 
-def _scan_of_rows(rows: list[_Row], line: int) -> ScanBatch:
+def _row_of(value: dict[str, str], form: CsvForm, how: StreamReading) -> _Row | None:
+    sensor = value.get("sensor", DEFAULT_SENSOR)
+    if not sensor:
+        raise DataError("sensor is missing")
+    if not value[form.time]:
+        raise DataError(f"{form.time} is missing")
+    comma = form.delimiter == ";"
+    time = value[form.time].replace(",", ".") if comma else value[form.time]
+    video = value.get("video", video_of_picture(form.time, time))
+    if video is not None and not how.takes_video(video):
+        return None
+    t = how.seconds(form.time, time)
+    numbers = [*dict.fromkeys(form.sides), *(("score",) if "score" in value else ())]
+    box, score = None, 1.0
+    if any(value[column] for column in numbers):
+        score = _number("score", value["score"], comma) if "score" in value else score
+        box = _box_of(value, form, comma)
+    words = value.get("embedding", "").split()
+    look = [_number("embedding", word, comma) for word in words] if words and box is not None else None
+    kinds = {name: value[name] for name in CLASS_COLUMNS if name in value}
+    return _Row(t, sensor, box, score, kinds, look, 0)
+
+
+def _box_of(value: dict[str, str], form: CsvForm, comma: bool) -> list[float]:
+    """Left, top, width, height (px) of a row."""
+    if BOX_TEXT in form.sides:
+        sides = sides_of(value[BOX_TEXT])
+        if sides is None:
+            raise DataError(f"box must be {KNOWN}, got {value[BOX_TEXT][:40]!r}")
+        return [float(side) for side in sides_to_boxes(_CORNERS, np.array([sides]))[0]]
+    found = [_number(column, value[column], comma) for column in form.sides]
+    return [float(side) for side in sides_to_boxes(form.sides, np.array([found]))[0]]
+
+
+def _number(column: str, text: str, comma: bool) -> float:
+    try:
+        return float(text.replace(",", ".") if comma else text)
+    except ValueError:
+        raise DataError(
+            f"{column} " + (f"must be a number, got {text!r}{advice_on(text)}" if text else "is missing")
+        ) from None
+
+
+def _scan_of_rows(rows: list[_Row], line: int, how: StreamReading) -> ScanBatch:
     found = [row for row in rows if row.box is not None]
     boxes, scores = np.array([row.box for row in found]), [row.score for row in found]
-    kinds = None if rows[0].kind is None else np.array([row.kind for row in found], dtype=np.str_)
-    scan, flat = scan_with_area(rows[0].t, rows[0].sensor, boxes, scores, kinds)
+    kinds: dict[str, TextArray] = {
+        column: np.array([row.kinds[column] for row in found], dtype=np.str_) for column in rows[0].kinds
+    }
+    numbers = next((len(row.look) for row in found if row.look is not None), 0)
+    looks = [[np.nan] * numbers if row.look is None else row.look for row in found] if numbers else None
+    scan, flat = how.scan(rows[0].t, rows[0].sensor, boxes, scores, kinds, looks)
     return ScanBatch([scan], [line], flat + sum(row.flat for row in rows))

@@ -9,12 +9,12 @@ from typing import Any
 import numpy.typing as npt
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.arrow_arrays import from_numpy
+from jeat_graph.data.tables.arrow_arrays import from_numpy
+from jeat_graph.data.tables.spreadsheets import guarded_column
+from jeat_graph.data.tables.vector_columns import lists_as_text
 from jeat_graph.io.atomic import atomic_path
 from jeat_graph.io.piecewise import PiecewiseWriter
-from jeat_graph.io.spreadsheets import guarded_column
 from jeat_graph.io.tables import PARQUET_SUFFIXES
-from jeat_graph.io.vector_columns import lists_as_text
 
 # Rows kept in memory, and a Parquet row group. Fixed, because the bytes of a Parquet file depend on it.
 _CHUNK_ROWS = 1 << 16

@@ -10,9 +10,9 @@ import numpy as np
 
 from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.column_names import standing_in, usual_names
-from jeat_graph.io.arrow_arrays import from_numpy, to_numpy
+from jeat_graph.data.tables.arrow_arrays import from_numpy, to_numpy
+from jeat_graph.data.tables.file_table import FileTable
 from jeat_graph.io.csv_text import TEXT, CsvBody, read_text
-from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.headers import check_names, split_header
 from jeat_graph.io.parquet_columns import read_columns
 

@@ -41,6 +41,6 @@ def unit_question(step: float) -> str:
     unit = likely_unit(step)
     guess = "are the times in seconds?"
     if unit:
-        python = f"in Python time_unit={unit!r} of read_detections or Detections.from_pandas"
+        python = f"in Python time_unit={unit!r}"
         guess = f"are the times in {unit}? (--time-unit {unit}; {python})"
     return f"median step {step:.6g} s: {guess}"

@@ -7,16 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from jeat_graph.data.column_names import SIZE_VAR
+from jeat_graph.data.tables.trajectory_table import COLUMNS, RUN_CLASSES
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.table_writer import csv_lines
-from jeat_graph.io.trajectories_io import (
-    CLASS_COLUMNS,
-    COLUMNS,
-    EXISTENCE_DECIMALS,
-    SIZE_COLUMNS,
-    rounded,
-    table_columns,
-)
+from jeat_graph.io.trajectories_io import EXISTENCE_DECIMALS, rounded, table_columns
 
 _ENCODER = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"), check_circular=False)
 
@@ -66,7 +61,7 @@ def _nulls(values: list[float]) -> list[float | None]:
 
 def csv_header(classes: bool = False) -> str:
     """Return the first line of a causal table, with or without the columns of classes."""
-    return ",".join((*COLUMNS, *(CLASS_COLUMNS if classes else ()), *SIZE_COLUMNS)) + "\n"
+    return ",".join((*COLUMNS, *(RUN_CLASSES if classes else ()), *SIZE_VAR)) + "\n"
 
 
 def csv_rows(table: Trajectories, classes: bool = False) -> str:

@@ -6,46 +6,46 @@ variances to six significant digits, in CSV and Parquet alike; the same table gi
 
 from __future__ import annotations
 
-import graphlib
-from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Unpack
 
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.data.class_columns import class_column, unknown_classes
-from jeat_graph.data.column_names import BOX, standing_in
+from jeat_graph.data.class_columns import unknown_classes
+from jeat_graph.data.column_names import BOX, MEAN, SIZE_VAR, VAR
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.tables.reading import Reading, ReadingOptions
+from jeat_graph.data.tables.trajectory_table import (
+    COLUMNS,
+    JOINT,
+    MORE_COLUMNS,
+    NO_IDENTITIES,
+    RESULT_COLUMNS,
+    RUN_CLASSES,
+    bare_fields,
+    check_tracks,
+    is_result,
+    run_fields,
+)
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.data.views import MEAN, SIZE_VAR, VAR
 from jeat_graph.io.box_rows import FileBoxes, read_rows
-from jeat_graph.io.file_table import FileTable
 from jeat_graph.io.formats import known_columns, recognise
 from jeat_graph.io.piecewise import PiecewiseWriter
-from jeat_graph.io.reading import Reading, ReadingOptions
-from jeat_graph.io.result_tables import NO_IDENTITIES, RESULT_COLUMNS, read_result_table
+from jeat_graph.io.result_tables import read_result_table
 from jeat_graph.io.rounding import round_decimals, round_significant
 from jeat_graph.io.table_writer import TableWriter
 from jeat_graph.io.tables import read_table
 
-#: Columns that a table must have; those behind them where the detections have classes; the last ones, which
-#: older tables lack.
-COLUMNS = ("t", "track_id", *BOX, "existence", *MEAN, *VAR, "sensors")
-CLASS_COLUMNS = ("class", "class_probability")
-SIZE_COLUMNS = SIZE_VAR
 #: Decimals that boxes, motion, and probabilities are written with.
 PX_DECIMALS = 3
 EXISTENCE_DECIMALS = 6
 _VAR_DIGITS = 6
 _SCALE = np.repeat([10.0**PX_DECIMALS, 10.0**EXISTENCE_DECIMALS], [10, 1])
-_JOINT = "|"
 _TABLES = ("csv", "parquet")
 # A file of white space only is no larger.
 _BLANK_BYTES = 100
 _FLUSH_ROWS = 8192
-_MOST_SENSORS = 63  # bits of `Trajectories.used`
 
 
 class TrajectoryWriter(PiecewiseWriter):
@@ -81,9 +81,9 @@ class TrajectoryWriter(PiecewiseWriter):
         """
         if self._pending and self._pending[0].sensors != table.sensors:
             self._flush()
-        joint = next((name for name in table.sensors if _JOINT in name), None)
+        joint = next((name for name in table.sensors if JOINT in name), None)
         if joint is not None:
-            raise DataError(f"the name of sensor {joint!r} must not hold {_JOINT!r}")
+            raise DataError(f"the name of sensor {joint!r} must not hold {JOINT!r}")
         self._pending.append(Trajectories.concatenate([table]))
         self._rows += len(table)
         if self._rows >= _FLUSH_ROWS or len(self._pending) >= _FLUSH_ROWS:
@@ -114,8 +114,8 @@ def table_columns(table: Trajectories, classes: bool | None = None) -> dict[str,
         names, share = unknown_classes(len(table))
         if table.classes is not None and table.class_probability is not None:
             names, share = table.classes, table.class_probability
-        columns |= {"class": names, "class_probability": round_decimals(share, EXISTENCE_DECIMALS)}
-    columns |= {name: size_var[:, k] for k, name in enumerate(SIZE_COLUMNS)}
+        columns |= dict(zip(RUN_CLASSES, (names, round_decimals(share, EXISTENCE_DECIMALS)), strict=True))
+    columns |= {name: size_var[:, k] for k, name in enumerate(SIZE_VAR)}
     return columns
 
 
@@ -151,8 +151,8 @@ def read_trajectories(
     Args:
         path: the file, or the folder of YOLO's labels.
         fmt: the format, if it should not be recognised from the file.
-        options: what a result does not say itself, as `io.reading.Reading` has it: `rate_hz`, `first_frame`,
-            `video`, `class_names`, `image`, `time_unit`.
+        options: what a result does not say itself, as `tables.reading.Reading` has it: `rate_hz`,
+            `first_frame`, `video`, `class_names`, `image`, `time_unit`.
 
     Raises:
         DataError: names the file, the line or row, and what is wrong, such as a track twice at one time.
@@ -168,109 +168,22 @@ def read_trajectories_counted(
     if kind in _TABLES:
         if Path(path).stat().st_size < _BLANK_BYTES and not Path(path).read_bytes().strip():
             return Trajectories.empty(), None
-        if not _is_result(path):
-            table = read_table(path, COLUMNS, (*CLASS_COLUMNS, *SIZE_COLUMNS))
-            found = _read_contract(table)
-            _check(table, found)
-            return found, None
+        if not is_result(known_columns(path, RESULT_COLUMNS)):
+            table = read_table(path, COLUMNS, MORE_COLUMNS)
+            fields = run_fields(table)
+            check_tracks(table.error, fields)
+            return Trajectories(**fields), None
     rows = read_rows(path, kind, how) if kind not in _TABLES else read_result_table(path, how)
-    found = _without_motion(rows, path)
-    _check(rows, found)
-    return found, rows.first
+    fields = _without_motion(rows, path)
+    check_tracks(rows.error, fields)
+    return Trajectories(**fields), rows.first
 
 
-def _is_result(path: str | Path) -> bool:
-    """Whether a table is another tracker's: it has boxes, and nothing that only our own tables have."""
-    names = known_columns(path, RESULT_COLUMNS)
-    boxes = set(standing_in(names, BOX)) <= set(names)
-    return boxes and not {"existence", "sensors", *VAR} & set(names)
-
-
-def _read_contract(table: FileTable) -> Trajectories:
-    text = table.text("sensors", blank_ok=True)
-    distinct, index = np.unique(text, return_inverse=True)
-    sensors = _sensor_order(distinct.tolist())
-    if len(sensors) > _MOST_SENSORS:
-        raise DataError(f"names {len(sensors)} sensors; at most {_MOST_SENSORS} can be kept", table.path)
-    bit = {name: 1 << k for k, name in enumerate(sensors)}
-    mask = [sum(bit[name] for name in set(words.split(_JOINT)) if name) for words in distinct.tolist()]
-    stated = all(name in table for name in SIZE_COLUMNS)
-    return Trajectories(
-        t=table.number("t"),
-        track_id=table.whole("track_id"),
-        boxes=_stack(table, BOX),
-        existence=table.number("existence"),
-        mean=_stack(table, MEAN),
-        var=_variances(table, VAR),
-        size_var=_variances(table, SIZE_COLUMNS) if stated else np.full((len(table), 2), np.nan),
-        used=np.asarray(mask, dtype=np.int64)[index.reshape(-1)],
-        sensors=sensors,
-        **_classes_of(table),
-    )
-
-
-def _variances(table: FileTable, names: tuple[str, ...]) -> FloatArray:
-    return np.stack([table.number(name, blank_ok=True, nan_ok=True) for name in names], axis=1)
-
-
-def _classes_of(table: FileTable) -> dict[str, Any]:
-    if "class" not in table:
-        return {}
-    share = None
-    if "class_probability" in table:
-        share = table.number("class_probability", blank_ok=True, nan_ok=True)
-    return class_column(table.text("class", blank_ok=True), share)
-
-
-def _sensor_order(texts: Iterable[str]) -> tuple[str, ...]:
-    """Find an order of the sensors that agrees with each text, so that writing gives the same texts again."""
-    after: dict[str, set[str]] = {}
-    for text in texts:
-        names = [name for name in text.split(_JOINT) if name]
-        for k, name in enumerate(names):
-            after.setdefault(name, set()).update(names[k - 1 : k])
-    ordered = {name: sorted(after[name]) for name in sorted(after)}
-    try:
-        return tuple(graphlib.TopologicalSorter(ordered).static_order())
-    except graphlib.CycleError:
-        return tuple(ordered)
-
-
-def _without_motion(rows: FileBoxes, path: str | Path) -> Trajectories:
+def _without_motion(rows: FileBoxes, path: str | Path) -> dict[str, Any]:
+    """Fields of tracks of which a file of boxes says no more than these."""
     n = len(rows.t)
     if n and (rows.ids is None or (n > 1 and (rows.ids < 0).all())):
         raise DataError(NO_IDENTITIES, path)
     ids = np.zeros(0, dtype=np.int64) if rows.ids is None else rows.ids
-    existence = np.ones(n) if rows.scores is None else rows.scores
-    mean = np.zeros((n, 6))
-    mean[:, :2] = rows.boxes[:, :2] + rows.boxes[:, 2:] / 2
-    found = Trajectories(
-        t=rows.t,
-        track_id=ids,
-        boxes=rows.boxes,
-        existence=np.where((existence >= 0) & (existence <= 1), existence, 1.0),
-        mean=mean,
-        var=np.full((n, 6), np.nan),
-        used=np.zeros(n, dtype=np.int64),
-    )
-    return replace(found, **class_column(rows.classes, None))
-
-
-def _stack(table: FileTable, names: Iterable[str]) -> FloatArray:
-    return np.stack([table.number(name) for name in names], axis=1)
-
-
-def _check(table: FileTable | FileBoxes, found: Trajectories) -> None:
-    negative = (found.boxes[:, 2:] < 0).any(axis=1)
-    if negative.any():
-        row = int(np.argmax(negative))
-        raise table.error(row, f"width and height must not be negative, got {found.boxes[row, 2:].tolist()}")
-    outside = (found.existence < 0) | (found.existence > 1)
-    if outside.any():
-        row = int(np.argmax(outside))
-        raise table.error(row, f"existence must be in [0, 1], got {found.existence[row]:g}")
-    order = np.lexsort((np.arange(len(found)), found.track_id, found.t))
-    same = (np.diff(found.t[order]) == 0) & (np.diff(found.track_id[order]) == 0)
-    if same.any():
-        row = int(order[1:][same].min())
-        raise table.error(row, f"track {found.track_id[row]} is there twice at t = {found.t[row]:g}")
+    scores = np.ones(n) if rows.scores is None else rows.scores
+    return bare_fields(rows.t, ids, rows.boxes, scores, rows.classes)

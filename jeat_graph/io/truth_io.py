@@ -7,24 +7,25 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
-from jeat_graph.data.column_names import BOX, standing_in
+from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.class_columns import LISTS_COUNT_FROM
+from jeat_graph.data.column_names import BOX
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.frame_columns import ASIDE
+from jeat_graph.data.tables.reading import Reading, ReadingOptions
+from jeat_graph.data.tables.truth_table import (
+    MOTION,
+    OPTIONAL,
+    REQUIRED,
+    check_sizes,
+    check_unique,
+    truth_of_table,
+)
 from jeat_graph.data.trajectories import GroundTruth
-from jeat_graph.io.box_rows import FileBoxes, read_rows
-from jeat_graph.io.column_names import boxes_of, classes_of, of_one_video, times_of
-from jeat_graph.io.file_table import FileTable
+from jeat_graph.io.box_rows import read_rows
+from jeat_graph.io.class_names import names_by_number
 from jeat_graph.io.formats import recognise
-from jeat_graph.io.plain_text import check_sizes
-from jeat_graph.io.reading import Reading, ReadingOptions
 from jeat_graph.io.table_writer import write_columns
 from jeat_graph.io.tables import read_table
-
-_REQUIRED = ("t", "object_id", *BOX)
-_MOTION = ("x", "y", "vx", "vy", "ax", "ay")
-_OPTIONAL = (*_MOTION, "ignore", "distance", *ASIDE)
-_TRUTH_WORDS = {"": False, "0": False, "1": True, "false": False, "true": True}
 
 
 def read_truth(path: str | Path, *, fmt: str | None = None, **options: Unpack[ReadingOptions]) -> GroundTruth:
@@ -53,7 +54,7 @@ def read_truth(path: str | Path, *, fmt: str | None = None, **options: Unpack[Re
     Args:
         path: the file.
         fmt: the format, if it should not be recognised from the file.
-        options: what the file does not say itself, as `io.reading.Reading` has it.
+        options: what the file does not say itself, as `tables.reading.Reading` has it.
 
     Raises:
         DataError: names the file, the line or row, and what is wrong, such as an object twice at one time.
@@ -78,8 +79,8 @@ def read_truth_counted(path: str | Path, fmt: str | None, how: Reading) -> tuple
     if negative.any():
         row = int(np.argmax(negative))
         raise rows.error(row, f"truth needs an id, got {ids[row]}; are these detections?")
-    check_sizes(rows, rows.boxes)
-    _check_unique(rows, rows.t, ids, ignore)
+    check_sizes(rows.error, rows.boxes)
+    check_unique(rows.error, rows.t, ids, ignore)
     truth = GroundTruth(
         t=rows.t,
         object_id=ids,
@@ -113,7 +114,7 @@ def write_truth(truth: GroundTruth, path: str | Path) -> None:
     columns: dict[str, Any] = {"t": t[order], "object_id": whole(truth.object_id)}
     columns |= {name: numbers(truth.boxes[:, k]) for k, name in enumerate(BOX)}
     if truth.motion is not None:
-        columns |= {name: numbers(truth.motion[:, k]) for k, name in enumerate(_MOTION)}
+        columns |= {name: numbers(truth.motion[:, k]) for k, name in enumerate(MOTION)}
     if truth.classes is not None:
         columns["class"] = np.concatenate([truth.classes, np.zeros(len(bare), dtype="U1")])[order]
     columns["ignore"] = whole(truth.ignore.astype(np.int64))
@@ -123,58 +124,5 @@ def write_truth(truth: GroundTruth, path: str | Path) -> None:
 
 
 def _read_contract(path: str | Path, how: Reading) -> tuple[GroundTruth, int | None]:
-    table = of_one_video(read_table(path, _REQUIRED, _OPTIONAL, short=("t",), aliases=True), how)
-    times = times_of(table, how)
-    all_t = times.t
-    values = standing_in(table.names, _REQUIRED[1:])
-    bare = table.bare(values, "a frame without objects has only t")
-    rows = np.flatnonzero(~bare)
-    boxes = boxes_of(table)
-    check_sizes(table, np.where(bare[:, None], 1.0, boxes))
-    ids, ignore = table.whole("object_id", blank_ok=True), _ignore_flags(table)
-    _check_unique(table, all_t, ids, ignore | bare)
-    motion: FloatArray | None = None
-    if any(name in table for name in _MOTION):
-        motion = np.full((len(all_t), 6), np.nan)
-        motion[:, :2] = boxes[:, :2] + boxes[:, 2:] / 2
-        for k, name in enumerate(_MOTION):
-            if name in table:
-                motion[:, k] = table.number(name, blank_ok=True, nan_ok=True)
-    distance = table.number("distance", blank_ok=True, nan_ok=True)[rows] if "distance" in table else None
-    classes = classes_of(table, how)
-    if classes is None and "class" in table:
-        classes = np.zeros(len(all_t), dtype="U1")
-    truth = GroundTruth(
-        t=all_t[rows],
-        object_id=ids[rows],
-        boxes=np.ascontiguousarray(boxes[rows]),
-        motion=None if motion is None else motion[rows],
-        ignore=ignore[rows],
-        classes=None if classes is None else classes[rows],
-        distance=distance,
-        frames=np.unique(all_t),
-    )
-    return truth, times.first
-
-
-def _ignore_flags(table: FileTable) -> BoolArray:
-    """Read `ignore` (R,): 1 or true, 0 or false or blank."""
-    if "ignore" not in table:
-        return np.zeros(len(table), dtype=bool)
-    words = np.char.lower(table.text("ignore", blank_ok=True))
-    distinct, index = np.unique(words, return_inverse=True)
-    flags = [_TRUTH_WORDS.get(word.removesuffix(".0")) for word in distinct.tolist()]
-    if None in flags:
-        row = int(np.argmax(index.reshape(-1) == flags.index(None)))
-        raise table.error(row, f"ignore must be 0 or 1, got {str(words[row])!r}")
-    return np.asarray(flags, dtype=bool)[index.reshape(-1)]
-
-
-def _check_unique(table: FileTable | FileBoxes, t: FloatArray, ids: IntArray, exempt: BoolArray) -> None:
-    """Refuse an object that is there twice at one time, unless it is one that is not judged."""
-    rows = np.flatnonzero(~exempt)
-    order = rows[np.lexsort((rows, ids[rows], t[rows]))]
-    same = (np.diff(t[order]) == 0) & (np.diff(ids[order]) == 0)
-    if same.any():
-        row = int(order[1:][same].min())
-        raise table.error(row, f"object {ids[row]} is there twice at t = {t[row]:g}")
+    table = read_table(path, REQUIRED, OPTIONAL, short=("t",), aliases=True)
+    return truth_of_table(table, how, names_by_number(how.class_names, path, LISTS_COUNT_FROM))

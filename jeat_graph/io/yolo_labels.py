@@ -16,11 +16,11 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_numbers import split_picture_name
+from jeat_graph.data.tables.reading import Reading
+from jeat_graph.data.tables.spreadsheets import is_number
 from jeat_graph.data.videos import choose_video
 from jeat_graph.io.class_names import LISTS
 from jeat_graph.io.csv_text import read_text
-from jeat_graph.io.headers import is_number
-from jeat_graph.io.reading import Reading
 
 _FEWEST, _MOST = 5, 7
 _OTHER_FILES = frozenset((*LISTS, "train.txt", "val.txt", "test.txt", "readme.txt"))

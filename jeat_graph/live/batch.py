@@ -20,6 +20,7 @@ from jeat_graph.runs.run_options import RunOptions
 from jeat_graph.runs.track_files import TrackRequest
 
 if TYPE_CHECKING:
+    from jeat_graph.data.tables.reading import ReadingOptions
     from jeat_graph.eval.judge import Judgement
     from jeat_graph.eval.load import JudgedRun
 
@@ -112,8 +113,8 @@ def _job(recording: ManifestRow, folder: Path, options: BatchOptions) -> Job:
         config=str(Path(config).resolve()) if Path(config).is_file() else config,
         overrides=(*options.overrides, *recording.overrides),
         rate_hz=recording.rate_hz if detections else None,
-        frames=_path(recording.frames) if detections else None,
         options=options.options,
+        **recording.reading,
     )
     camera = None if recording.camera is None else str(Path(recording.camera).resolve())
     return Job(recording.name, request, camera, None if detections else _raw(recording))
@@ -191,14 +192,20 @@ def _with_truth(
     for recording, outcome in zip(recordings, outcomes, strict=True):
         if recording.truth is not None and outcome.status != FAILED:
             try:
-                runs[recording.name] = load_run(
-                    folder / RUNS / recording.name, recording.truth, rate_hz=recording.rate_hz
-                )
+                how: ReadingOptions = {"rate_hz": recording.rate_hz, **_of_truth(recording)}
+                runs[recording.name] = load_run(folder / RUNS / recording.name, recording.truth, **how)
             except (JeatGraphError, OSError) as error:
                 text = "tracked, but not judged: " + " ".join(str(error).split())
                 outcome = Outcome(outcome.name, FAILED, outcome.counts, outcome.warnings, text)
         out.append(outcome)
     return runs, out
+
+
+def _of_truth(recording: ManifestRow) -> ReadingOptions:
+    """How the truth is read: with the unit of times, the video and the names of classes of the detections."""
+    said = recording.reading
+    how: ReadingOptions = {"video": said.get("video"), "class_names": said.get("class_names")}
+    return {**how, "time_unit": said["time_unit"]} if "time_unit" in said else how
 
 
 def _judge(runs: dict[str, JudgedRun]) -> tuple[dict[str, Judgement], dict[str, dict[str, float]]]:

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
 from typing import Any, TypeVar
 
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.data.extras import install
-from jeat_graph.data.processes import SafePool, end_with_parent
+from jeat_graph.data.processes import SafePool, end_with_parent, safe_start
 
 ENGINES = ("local", "ray")
 _Job = TypeVar("_Job")
 _Result = TypeVar("_Result")
+#: Where the package itself lies, so that modules are looked for there already.
+_PACKAGES = Path(__file__).parents[2]
 _WAIT_S = 0.5  # between looks at whether an interrupt has come
 
 
@@ -132,7 +136,9 @@ def run_on_ray(
     began = not ray.is_initialized()
     if began:
         try:
-            ray.init(address=address, **options)
+            # Ray has its workers look for modules in the folder that it is started in, where users' data lie.
+            with safe_start(), contextlib.chdir(_PACKAGES):
+                ray.init(address=address, **options)
         except (ConnectionError, OSError, ValueError) as error:
             raise JeatGraphError(f"no Ray cluster at {address}: {error}") from None
     try:

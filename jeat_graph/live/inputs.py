@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 
-import numpy as np
-
-from jeat_graph.data import time_units
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.scan_lines import read_batches
+from jeat_graph.io.stream_reading import StreamReading
 from jeat_graph.live.interrupts import Interrupts
 from jeat_graph.live.messages import ScanMessage, decode_scans
 from jeat_graph.live.transport.ends import Source
@@ -17,19 +14,12 @@ from jeat_graph.live.transport.ends import Source
 _WAIT_S = 0.2
 
 
-def in_seconds(message: ScanMessage, unit: str) -> ScanMessage:
-    """Return a message whose times are of a unit (`data.time_units`) with times in seconds."""
-    if unit == "s":
-        return message
-    scans = [
-        replace(scan, t=float(time_units.in_seconds(np.array([scan.t]), unit)[0]))
-        for scan in message.batch.scans
-    ]
-    return message._replace(batch=message.batch._replace(scans=scans))
-
-
 def from_lines(
-    lines: Iterator[bytes], name: str, joint: bool, bad: Callable[[DataError], None] | None
+    lines: Iterator[bytes],
+    name: str,
+    joint: bool,
+    bad: Callable[[DataError], None] | None,
+    how: StreamReading,
 ) -> Iterator[tuple[ScanMessage, str]]:
     """Yield the scans of a text stream and their places.
 
@@ -38,21 +28,27 @@ def from_lines(
         name: name of the stream, for messages.
         joint: hold scans back until a later time is seen.
         bad: takes the error of a line that cannot be read, which is passed over; None raises it.
+        how: what the lines do not say themselves.
     """
-    for batch in read_batches(lines, name, joint=joint, ordered=False, bad=bad):
+    for batch in read_batches(lines, name, joint=joint, ordered=False, bad=bad, how=how):
         yield ScanMessage(batch, "", None), f"{name}:{batch.lines[0]}: "
 
 
 def from_source(
-    source: Source, name: str, interrupts: Interrupts, bad: Callable[[DataError], None] | None
+    source: Source,
+    name: str,
+    interrupts: Interrupts,
+    bad: Callable[[DataError], None] | None,
+    how: StreamReading,
 ) -> Iterator[tuple[ScanMessage, str] | None]:
-    """Yield the messages of a broker and their places; None where none came for a while, or one was bad.
+    """Yield the messages of a broker and their places; None where none came for a while, or one is left out.
 
     Args:
         source: the source.
         name: its address, for messages.
         interrupts: ends it.
         bad: takes the error of a message that cannot be read, which is passed over; None raises it.
+        how: what the messages do not say themselves.
     """
     number = 0
     while interrupts.seen is None:
@@ -62,11 +58,11 @@ def from_source(
             continue
         number += 1
         try:
-            message = decode_scans(payload, name, number)
+            message = decode_scans(payload, name, number, how)
         except DataError as error:
             if bad is None:
                 raise
             bad(error)
             yield None
             continue
-        yield message, f"{name}:{number}: "
+        yield None if message is None else (message, f"{name}:{number}: ")

@@ -219,7 +219,7 @@ class LiveTracker(MetSensors):
             live._newest = state["newest"]
             live.lateness.set_state(state["lateness"])
             live._rewinding.set_state(state["rewinding"])
-            live._base.set_state(state["base"], live.tracker.time)
+            live._base.set_state(state["base"])
             live._repetition.set_state(state["base"], live.tracker.time)
             return live, state["more"]
 

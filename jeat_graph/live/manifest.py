@@ -3,30 +3,32 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from argparse import ArgumentTypeError
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
+from typing import Any
 
+from jeat_graph.config.argument_types import picture_size
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.frame_numbers import FIRST_FRAMES
+from jeat_graph.data.tables.frame_filling import SCORE_SCALES
+from jeat_graph.data.time_units import TIME_UNITS
+from jeat_graph.io.formats import FORMATS
 
 #: Separates several files, or several settings, in one field.
 SEPARATOR = ";"
-COLUMNS = (
-    "name",
-    "detections",
-    "frames",
-    "events",
-    "detector_frames",
-    "detector_events",
-    "class",
-    "mask",
-    "config",
-    "set",
-    "gt",
-    "rate",
-    "camera",
-)
+COLUMNS = ("name", "detections", "config", "set", "gt", "rate", "camera")
+#: How vehicles are found where there are no detections.
+RAW_COLUMNS = ("events", "detector_frames", "detector_events", "mask")
 _INPUTS = ("detections", "frames", "events")
-_OF_RAW = ("detector_frames", "detector_events", "class", "mask")
+#: How the files are read: each column is called as the option of `track` is.
+READING_COLUMNS = (
+    *("first_frame", "only_video", "classes", "class", "time_unit", "score_scale", "input_format", "images"),
+    *("image", "frames"),
+)
+_READ_RAW = ("frames", "class", "image")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
@@ -43,8 +45,9 @@ class ManifestRow:
         truth: true boxes, or None.
         rate_hz: frame rate of files that count frames, or None.
         camera: the calibrated camera, for speeds on the road, or None.
-        frames: a video or a folder of pictures, or None.
-        events: a file of events, or None.
+        reading: fields of a `TrackRequest` that say how the files are read.
+        frames: a video or a folder of pictures to look in, or None.
+        events: a file of events to look in, or None.
         detector_frames: what finds vehicles in the frames, or None for `auto`.
         detector_events: what finds them in the events, or None for `motion`.
         classes: that the network looks for; none for vehicles.
@@ -58,6 +61,7 @@ class ManifestRow:
     truth: str | None = None
     rate_hz: float | None = None
     camera: str | None = None
+    reading: dict[str, Any] = field(default_factory=dict)
     frames: str | None = None
     events: str | None = None
     detector_frames: str | None = None
@@ -71,8 +75,8 @@ def read_manifest(path: str | Path) -> list[ManifestRow]:
 
     Columns: `detections` (files of the recording, joined by `;`), or `frames`, `events` or both, in which
     vehicles are to be found; and, all optional, `name` (default: the first file's name without its suffix),
-    `config`, `set` (settings joined by `;`), `gt`, `rate` (Hz), `camera` (YAML file), and for frames and
-    events `detector_frames`, `detector_events`, `class` and `mask` (joined by `;`). Paths are relative to the
+    `config`, `set` (settings joined by `;`), `gt`, `rate` (Hz), `camera` (YAML file), `READING_COLUMNS`
+    (several classes joined by `;`), and without detections `RAW_COLUMNS`. Paths are relative to the
     manifest's folder. The files themselves are not looked at here: a recording that cannot be read is that
     recording's failure, not the batch's.
 
@@ -82,31 +86,28 @@ def read_manifest(path: str | Path) -> list[ManifestRow]:
     """
     from jeat_graph.io.tables import read_table
 
-    table = read_table(path, (), optional=COLUMNS)
-    strange = next((name for name in table.names if name not in COLUMNS), None)
+    known = (*COLUMNS, *READING_COLUMNS, *RAW_COLUMNS)
+    table = read_table(path, (), optional=known)
+    strange = next((name for name in table.names if name not in known), None)
     if strange is not None:
-        raise DataError(f"unknown column {strange!r}; a manifest has {', '.join(COLUMNS)}", path, 1)
+        raise DataError(f"unknown column {strange!r}; a manifest has {', '.join(known)}", path, 1)
     if not set(_INPUTS) & set(table.names):
         raise DataError(f"has none of the columns {', '.join(_INPUTS)}", path, 1)
     folder = Path(path).parent
     rate = table.number("rate", blank_ok=True) if "rate" in table else None
     text = {
-        name: table.text(name, blank_ok=True).tolist() for name in COLUMNS if name in table and name != "rate"
+        name: table.text(name, blank_ok=True).tolist() for name in known if name in table and name != "rate"
     }
     recordings: list[ManifestRow] = []
     taken: set[str] = set()
     for row in range(len(table)):
-        field = {name: values[row] for name, values in text.items()}
-        files = tuple(_located(item, folder) for item in _parts(field.get("detections", "")))
-        raw = {key: _located(field[key], folder) if field.get(key) else None for key in _INPUTS[1:]}
-        first = (*files, *(one for one in raw.values() if one is not None))
+        said = {name: values[row] for name, values in text.items()}
+        error = partial(table.error, row)
+        files = tuple(_located(item, folder) for item in _parts(said.get("detections", "")))
+        first = [said[key] for key in _INPUTS if said.get(key)]
         if not first:
             raise table.error(row, f"{', '.join(key for key in _INPUTS if key in table)} is missing")
-        wrong = [key for key in _OF_RAW if field.get(key)]
-        if files and (wrong or raw["events"] is not None):
-            what = "events" if raw["events"] is not None else wrong[0]
-            raise table.error(row, f"{what} is for recordings without detections")
-        name = field.get("name") or _stem(first[0])
+        name = said.get("name") or _stem(files[0] if files else first[0])
         if not _NAME.fullmatch(name):
             raise table.error(row, f"name {name!r} must be letters, digits, dots, dashes or underlines")
         if name in taken:
@@ -119,22 +120,77 @@ def read_manifest(path: str | Path) -> list[ManifestRow]:
             ManifestRow(
                 name=name,
                 detections=files,
-                config=_config(field.get("config", ""), folder),
-                overrides=tuple(_parts(field.get("set", ""))),
-                truth=_located(field["gt"], folder) if field.get("gt") else None,
+                config=_config(said.get("config", ""), folder),
+                overrides=(*_parts(said.get("set", "")), *_picture(said.get("image", ""), error)),
+                truth=_located(said["gt"], folder) if said.get("gt") else None,
                 rate_hz=hz,
-                camera=_located(field["camera"], folder) if field.get("camera") else None,
-                frames=raw["frames"],
-                events=raw["events"],
-                detector_frames=_network(field.get("detector_frames", ""), folder),
-                detector_events=_network(field.get("detector_events", ""), folder),
-                classes=tuple(_parts(field.get("class", ""))),
-                masks=tuple(_config(one, folder) or one for one in _parts(field.get("mask", ""))),
+                camera=_located(said["camera"], folder) if said.get("camera") else None,
+                **({"reading": _reading(said, folder, error)} if files else _raw(said, folder, error)),
             )
         )
     if not recordings:
         raise DataError("names no recording", path)
     return recordings
+
+
+def _raw(said: Mapping[str, str], folder: Path, error: Callable[[str], DataError]) -> dict[str, Any]:
+    """Fields of a row without detections: where they come from, and by what."""
+    strange = next((key for key in READING_COLUMNS if said.get(key) and key not in _READ_RAW), None)
+    if strange is not None:
+        raise error(f"{strange} is for recordings with detections")
+    return {
+        **{key: _located(said[key], folder) for key in _INPUTS[1:] if said.get(key)},
+        **{key: _network(said.get(key, ""), folder) for key in ("detector_frames", "detector_events")},
+        "classes": tuple(_parts(said.get("class", ""))),
+        "masks": tuple(_config(one, folder) or one for one in _parts(said.get("mask", ""))),
+    }
+
+
+def _network(text: str, folder: Path) -> str | None:
+    """A detector's name as it is; the path of a file as seen from the manifest's folder."""
+    return (str(folder / text) if text.endswith(".onnx") else text) or None
+
+
+def _reading(said: Mapping[str, str], folder: Path, error: Callable[[str], DataError]) -> dict[str, Any]:
+    """Fields of a `TrackRequest` that a row says, by the columns `READING_COLUMNS`."""
+    strange = next((key for key in RAW_COLUMNS if said.get(key)), None)
+    if strange is not None:
+        raise error(f"{strange} is for recordings without detections")
+    found: dict[str, Any] = {}
+    allowed = {
+        "first_frame": tuple(map(str, FIRST_FRAMES)),
+        "time_unit": tuple(TIME_UNITS),
+        "score_scale": SCORE_SCALES,
+        "input_format": FORMATS,
+    }
+    for name, values in allowed.items():
+        text = said.get(name)
+        if text and text not in values:
+            raise error(f"{name} must be {', '.join(values)}, got {text!r}")
+        if text:
+            found[name] = int(text) if name == "first_frame" else text
+    if said.get("only_video"):
+        found["video"] = said["only_video"]
+    if said.get("class"):
+        found["classes"] = tuple(_parts(said["class"]))
+    for name, key in (("classes", "class_names"), ("images", "images"), ("frames", "frames")):
+        text = said.get(name, "")
+        if text:
+            listed = name == "classes" and "," in text and not (folder / text).exists()
+            # Absolute: a worker of a cluster stands in another folder.
+            found[key] = text if listed else str((folder / text).resolve())
+    return found
+
+
+def _picture(text: str, error: Callable[[str], DataError]) -> tuple[str, ...]:
+    """The settings that a picture's size stands for, as `--image` does."""
+    if not text:
+        return ()
+    try:
+        width, height = picture_size(text)
+    except ArgumentTypeError as wrong:
+        raise error(f"image {wrong}") from None
+    return f"image.width={width}", f"image.height={height}"
 
 
 def _parts(field: str) -> list[str]:
@@ -147,11 +203,6 @@ def _located(item: str, folder: Path) -> str:
     if match is None or (folder / item).exists():
         return str(folder / item)
     return f"{match[1]}={folder / match[2]}"
-
-
-def _network(text: str, folder: Path) -> str | None:
-    """A detector's name as it is; the path of a file as seen from the manifest's folder."""
-    return (str(folder / text) if text.endswith(".onnx") else text) or None
 
 
 def _stem(item: str) -> str:

@@ -20,12 +20,15 @@ from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.data.extras import install
 from jeat_graph.io.scan_batch import ScanBatch
 from jeat_graph.io.scan_lines import batch_of
+from jeat_graph.io.stream_reading import StreamReading
 from jeat_graph.live.memory import Memory, fingerprint
 
 VERSION = 1
 #: Of the name of a source; numbers of messages are below `MOST_SEQ`.
 MOST_CHARACTERS, MOST_SEQ = 256, 1 << 63
 _KEYS = ("v", "source", "seq", "scans")
+# MessagePack has times of its own, which its package gives in seconds since 1970 when told so.
+_TIMESTAMP_S = 1
 _FIRST_OF_TEXT = b" \t\r\n{[\xef"
 
 
@@ -43,13 +46,16 @@ class ScanMessage(NamedTuple):
     seq: int | None
 
 
-def decode_scans(payload: bytes, name: str, number: int) -> ScanMessage:
-    """Read a message of scans, of either encoding.
+def decode_scans(
+    payload: bytes, name: str, number: int, how: StreamReading | None = None
+) -> ScanMessage | None:
+    """Read a message of scans, of either encoding; None where all are of a video that is not asked for.
 
     Args:
         payload: the message.
         name: where it came from, for messages.
         number: its number there, from 1.
+        how: what the scans do not say themselves.
 
     Raises:
         DataError: what is wrong.
@@ -73,7 +79,8 @@ def decode_scans(payload: bytes, name: str, number: int) -> ScanMessage:
         content = content["scans"]
         if not isinstance(content, list):
             raise DataError("scans must be a list", name, number)
-    return ScanMessage(batch_of(content, name, number), source, seq)
+    batch = batch_of(content, name, number, how)
+    return None if batch is None else ScanMessage(batch, source, seq)
 
 
 def encode_tracks(line: str, seq: int, answered: ScanMessage | None, encoding: str = "json") -> bytes:
@@ -102,7 +109,7 @@ def _load(payload: bytes, name: str, number: int) -> Any:
             what = error.msg if isinstance(error, json.JSONDecodeError) else str(error)
             raise DataError(f"is not JSON: {what}", name, number) from None
     try:
-        content = _msgpack().unpackb(payload, strict_map_key=True)
+        content = _msgpack().unpackb(payload, strict_map_key=True, timestamp=_TIMESTAMP_S)
     except (ValueError, RecursionError) as error:
         raise DataError(f"is neither JSON nor MessagePack: {error}", name, number) from None
     scans = content.get("scans", [content]) if isinstance(content, dict) else content
@@ -220,16 +227,13 @@ class Duplicates:
         }
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go on from what `state` returned; that of an earlier build has no memory."""
+        """Go on from what `state` returned."""
         self.seen = {
             source: [Numbering(top, set(recent), newest) for top, recent, newest in counts]
             for source, counts in state["seen"].items()
         }
-        self.restarts, self.forgotten = dict(state["restarts"]), state.get("forgotten", 0)
-        self._memory = Memory(whole=False)
-        if "memory" in state:
-            self._memory.set_state(state["memory"])
-        self._forget()
+        self.restarts, self.forgotten = dict(state["restarts"]), state["forgotten"]
+        self._memory.set_state(state["memory"])
 
 
 def _whose(counts: list[Numbering], t: float) -> int:

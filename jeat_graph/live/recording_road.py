@@ -85,7 +85,7 @@ def _write_road(run: Path, camera_file: str) -> int:
     from jeat_graph.road.points_road import summarise
     from jeat_graph.road.results import write_result
     from jeat_graph.road.road_page import write_road_page
-    from jeat_graph.road.sources import boxes_of
+    from jeat_graph.road.sources import boxes_of, recording_span_of
     from jeat_graph.road.speeds import ContactConfig
     from jeat_graph.road.traffic import SummaryConfig, count_columns, headway_columns
 
@@ -93,7 +93,8 @@ def _write_road(run: Path, camera_file: str) -> int:
     sized = follow_boxes(boxes_of(run, camera, BoxConfig()), camera, CuboidConfig())
     vehicles = [one.vehicle for one in sized]
     marks = RoadMarks({}, {})
-    result = summarise(vehicles, camera, marks, ContactConfig(0.0, 0.0, 0.0), LaneConfig(), sized)
+    contact = ContactConfig(0.0, 0.0, 0.0)
+    result = summarise(vehicles, camera, marks, contact, LaneConfig(), sized, recording_span_of(run))
     write_result(result, out)
     write_columns(count_columns(result, traffic), out / "counts.csv")
     write_columns(headway_columns(result, traffic), out / "headways.csv")

@@ -95,7 +95,7 @@ class Repetition:
         return {"first": self.first, "memory": self._memory.state()}
 
     def set_state(self, state: dict[str, Any], now: float | None) -> None:
-        """Go on from what `state` returned; in a state of an earlier build there is no memory.
+        """Go on from what `state` returned.
 
         Args:
             state: it.
@@ -103,6 +103,4 @@ class Repetition:
         """
         self.first, self.until = state["first"], now
         self._kept = len(self._base.row)
-        self._memory = Memory(whole=False)
-        if "memory" in state:
-            self._memory.set_state(state["memory"])
+        self._memory.set_state(state["memory"])

@@ -17,6 +17,7 @@ from jeat_graph.live.late import LiveTracker
 from jeat_graph.live.messages import Duplicates, ScanMessage
 from jeat_graph.live.told import Told
 from jeat_graph.live.transport.patience import UnconfirmedError
+from jeat_graph.tracking.checkpoint import refusing_damage
 from jeat_graph.version import __version__
 
 #: Smoothed rows are fetched, and the sensors judged, at one arrival in so many.
@@ -89,17 +90,17 @@ class Session:
         self.live, self.ends = live, ends
         self._checkpoint, self._every_s = checkpoint, every_s
         kept = more or {}
-        self.count: int = kept.get("count", 0)
-        self.bad: int = kept.get("bad", 0)
-        self.duplicates: int = kept.get("duplicates", 0)
-        self.flat: int = kept.get("flat", 0)
-        self._too_large_before: int = kept.get("too_large", 0)
-        self._seen = Duplicates()
-        if "seen" in kept:
-            self._seen.set_state(kept["seen"])
-        self._health = SensorHealth(live.tracker.config)
-        self._health.last = kept.get("last", {})
-        self._health.silent, self._health.rubbish = kept.get("silent", []), kept.get("rubbish", [])
+        self._seen, self._health = Duplicates(), SensorHealth(live.tracker.config)
+        with refusing_damage(checkpoint or "checkpoint"):
+            self.count: int = kept.get("count", 0)
+            self.bad: int = kept.get("bad", 0)
+            self.duplicates: int = kept.get("duplicates", 0)
+            self.flat: int = kept.get("flat", 0)
+            self._too_large_before: int = kept.get("too_large", 0)
+            if "seen" in kept:
+                self._seen.set_state(kept["seen"])
+            self._health.last = kept.get("last", {})
+            self._health.silent, self._health.rubbish = kept.get("silent", []), kept.get("rubbish", [])
         self._told = Told(ends.warn, live.tracker.config.live.jump_s)
         self._owed = False  # the tracker has taken a scan whose answer has not gone out
         self._unconfirmed = ""  # or why the last answers may not have arrived

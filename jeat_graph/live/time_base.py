@@ -187,25 +187,9 @@ class TimeBase:
             "leap": self.leap,
         }
 
-    def set_state(self, state: dict[str, Any], now: float | None) -> None:
-        """Go on from what `state` returned.
-
-        A state of an earlier build has scans that wait (`held`) and pauses, believed jumps among them.
-
-        Args:
-            state: it.
-            now: the newest time then (s).
-        """
-        self._messages = state.get("messages", _MOST)
-        if "row" in state:
-            self.row = [Witness(t, list(sensors), list(scans)) for t, sensors, scans in state["row"]]
-            self._pauses.extend(state["pauses"])
-            self.leap = None if state["leap"] is None else tuple(state["leap"])
-            return
-        self.row = [Witness(scan.t, [scan.sensor], [scan]) for scan in state["held"]]
-        after = now
-        for pause in reversed(state["pauses"]):
-            if pause > _FARTHEST_S and after is not None and self.leap is None:
-                self.leap = (after - pause, after)
-            after = None if after is None else after - pause
-        self._pauses.extend(pause for pause in state["pauses"] if pause <= _FARTHEST_S)
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go on from what `state` returned."""
+        self.row = [Witness(t, list(sensors), list(scans)) for t, sensors, scans in state["row"]]
+        self._pauses.extend(state["pauses"])
+        self._messages = state["messages"]
+        self.leap = None if state["leap"] is None else tuple(state["leap"])

@@ -61,12 +61,14 @@ def summarise(
     contact: ContactConfig,
     lane_config: LaneConfig,
     sized: Sequence[SizedVehicle] = (),
+    span_s: tuple[float, float] | None = None,
 ) -> RoadResult:
     """Speeds, lanes and crossings of fitted vehicles.
 
     A vehicle's speed is its mean between the first and the last line that it crosses, where lines are given
     and it crosses two; otherwise over all of its track that the fit believes. Where no line is given,
-    crossings are those of a line across the road where most vehicles come by (`MIDDLE`).
+    crossings are those of a line across the road where most vehicles come by (`MIDDLE`). `span_s` says when
+    the recording began and ended (s), for the intervals in which nobody came by.
     """
     middle = np.array([v.fit.at(np.array(np.mean(v.fit.window())))[0] for v in vehicles], dtype=np.float64)
     lanes = given_lanes(marks.lanes) if marks.lanes else find_lanes(middle, lane_config)
@@ -91,4 +93,6 @@ def summarise(
         lane_names=[str(name) for name in lanes.of(middle)] if len(middle) else [],
         lanes=lanes,
         crossings=crossings,
+        lines=sorted(ends),
+        span_s=span_s,
     )

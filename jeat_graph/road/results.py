@@ -48,6 +48,8 @@ class RoadResult:
         lane_names: the lanes that they were in most.
         lanes: the lanes.
         crossings: line, place of the vehicle in `vehicles`, and the crossing.
+        lines: names of all lines, those too that nobody crosses.
+        span_s: begin and end of the recording (s); None where only the crossings tell.
     """
 
     vehicles: Sequence[Vehicle]
@@ -57,6 +59,8 @@ class RoadResult:
     lane_names: Sequence[str]
     lanes: Lanes
     crossings: Sequence[tuple[str, int, Crossing]]
+    lines: Sequence[str] = ()
+    span_s: tuple[float, float] | None = None
 
 
 def road_columns(vehicle: Vehicle, size: Size) -> dict[str, npt.NDArray[Any]]:

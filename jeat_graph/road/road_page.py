@@ -124,8 +124,10 @@ def _drawings(result: RoadResult) -> str:
 
 def _counts(result: RoadResult, config: SummaryConfig) -> str:
     columns = count_columns(result, config)
-    if not len(columns["line"]):
+    busy = columns["count"] > 0  # the file has the intervals in which nobody came by too
+    if not busy.any():
         return ""
+    columns = {name: values[busy] for name, values in columns.items()}
     shown = ("line", "t_start", "lane", "class", "count", "per_hour", "mean_kmh", "p85_kmh")
     digits = {"t_start": 0, "per_hour": 0, "mean_kmh": 1, "p85_kmh": 1}
     table = _table({name: columns[name] for name in shown}, "Counts at each line", digits)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import groupby, pairwise, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.eval.counting import interval_edges
 from jeat_graph.io.rounding import round_decimals
 from jeat_graph.road.crossings import Crossing
 from jeat_graph.road.results import RoadResult
@@ -59,20 +60,32 @@ def passages(result: RoadResult) -> list[Passage]:
 
 
 def count_columns(result: RoadResult, config: SummaryConfig) -> dict[str, npt.NDArray[Any]]:
-    """Rows of `counts.csv`: line, lane (or all) and class (or all) in each interval with any vehicle.
+    """Rows of `counts.csv`: line, lane (or all) and class (or all) in each interval of the recording.
+
+    Every combination of line, lane and class that occurs has a row in every interval, also where nobody came
+    by; so has every line, with all lanes and classes. The intervals are those of `jeat-graph count`.
 
     The intervals of the speeds are for the vehicles that were there: by noise of each and by the calibration,
     which is wrong for all of them alike.
     """
-    groups: dict[tuple[str, int, str, str], list[Passage]] = {}
-    for one in passages(result):
+    groups: dict[tuple[str, str, str], dict[int, list[Passage]]]
+    groups = {(line, ALL, ALL): {} for line in result.lines}
+    found = passages(result)
+    for one in found:
         k = math.floor(one.crossing.t / config.interval_s)
         kind = result.classes[one.vehicle]
         for lane in dict.fromkeys((ALL, one.lane or ALL)):
             for name in dict.fromkeys((ALL, kind or ALL)):
-                groups.setdefault((one.line, k, lane, name), []).append(one)
-    order = sorted(groups, key=lambda key: (key[0], key[1], key[2] != ALL, key[2], key[3] != ALL, key[3]))
-    rows = [_count_row(key, groups[key], config) for key in order]
+                groups.setdefault((one.line, lane, name), {}).setdefault(k, []).append(one)
+    times = [one.crossing.t for one in found]
+    span = result.span_s if result.span_s is not None or not times else (min(times), max(times))
+    edges = [] if span is None else interval_edges(*span, config.interval_s, times).tolist()
+    order = sorted(groups, key=lambda key: (key[0], key[1] != ALL, key[1], key[2] != ALL, key[2]))
+    rows = [
+        _count_row(key, k, groups[key].get(k, []), config)
+        for _, keys in groupby(order, key=lambda key: key[0])
+        for k, key in product((round(edge / config.interval_s) for edge in edges[:-1]), list(keys))
+    ]
     text = ("line", "lane", "class")
     names = ("t_start", "t_end", "count", "per_hour", *_SPEEDS)
     return {
@@ -90,9 +103,9 @@ _SPEEDS = ("mean_kmh", "mean_low_kmh", "mean_high_kmh", "p85_kmh", "p85_low_kmh"
 
 
 def _count_row(
-    key: tuple[str, int, str, str], group: Sequence[Passage], config: SummaryConfig
+    key: tuple[str, str, str], k: int, group: Sequence[Passage], config: SummaryConfig
 ) -> dict[str, Any]:
-    line, k, lane, kind = key
+    line, lane, kind = key
     start = k * config.interval_s
     return {
         "line": line,
@@ -107,12 +120,14 @@ def _count_row(
 
 
 def speed_summary(speeds: Sequence[Any], config: SummaryConfig) -> tuple[float, ...]:
-    """Mean and 85th percentile of speeds (km/h), each with the ends of its 95 % interval.
+    """Mean and 85th percentile of speeds (km/h), each with the ends of its 95 % interval; NaN of no speed.
 
     Args:
         speeds: `Speed`s, whose calibration part is common to all.
         config: how many draws of the errors there are; they are the same ones every time.
     """
+    if not speeds:
+        return (math.nan,) * len(_SPEEDS)
     kmh, noise, common = (
         np.array([getattr(s, name) for s in speeds]) for name in ("kmh", "noise_kmh", "calibration_kmh")
     )

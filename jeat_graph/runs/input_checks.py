@@ -15,8 +15,8 @@ from jeat_graph.runs.clocks import check_clocks, wrong_times
 from jeat_graph.runs.declaring import LEAST_SCANS, scan_rate_hz
 from jeat_graph.tracking.input_watch import CORNERS, SHARES, look_like_corners, look_like_shares
 
-# Detectors guess what the picture cuts off, so that a tenth or two of the centres may lie outside. Where most
-# of them do, the picture is another.
+# Detectors guess what the picture cuts off, so that a tenth or two of the centres may lie outside. Where more
+# of them do, the picture is most likely another.
 MOST_OUTSIDE = 0.5
 # So many outside are worth a question, whether they are corners taken for sizes.
 MANY_OUTSIDE = 0.05
@@ -36,8 +36,8 @@ def check_detections(detections: Detections, config: Config, names: str = "the d
         Warnings, each one line.
 
     Raises:
-        DataError: there is no scan at all, the times are not in seconds, most of the boxes lie outside a
-            picture of this size, or sensors have different clocks.
+        DataError: there is no scan at all, the times are not in seconds, the boxes are shares of the picture
+            or two corners each, or sensors have different clocks.
         UnknownSensorError: a sensor that the configuration does not declare.
     """
     if not detections.num_scans:
@@ -115,15 +115,19 @@ def _check_picture(detections: Detections, config: Config, names: str) -> list[s
     count, total = int(outside.sum()), len(boxes)
     if not count:
         return []
-    low, high = centre.min(axis=0), centre.max(axis=0)
-    found = (
-        f"{names}: {count} of {total} box centres lie outside the picture of {width:g} x {height:g} px "
-        f"(they reach from {low[0]:.0f}, {low[1]:.0f} to {high[0]:.0f}, {high[1]:.0f})"
-    )
     if count > MANY_OUTSIDE * total and look_like_corners(boxes, width, height):
         raise DataError(f"{names}: {CORNERS}")
+    low, high = centre.min(axis=0), centre.max(axis=0)
+    beyond = float(max((-low).max(), (high - (width, height)).max()))
+    found = (
+        f"{names}: {count} of {total} box centres lie outside the picture of {width:g} x {height:g} px, "
+        f"up to {beyond:.0f} px beyond its edge (they reach from {low[0]:.0f}, {low[1]:.0f} to "
+        f"{high[0]:.0f}, {high[1]:.0f})"
+    )
+    if count == total:
+        found += ", so that little or nothing can be tracked"
     if count > MOST_OUTSIDE * total:
-        raise DataError(f"{found}; give the picture's size: --image WIDTHxHEIGHT")
+        found += "; if the picture has another size, give it: --image WIDTHxHEIGHT (in Python image=)"
     return [found]
 
 

@@ -12,10 +12,10 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.diagnostics import Diagnostics
 from jeat_graph.data.progress import progress_span
+from jeat_graph.data.tables.reading import ReadingOptions
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.eval.judge import Judgement
 from jeat_graph.io.beside import check_beside
-from jeat_graph.io.reading import ReadingOptions
 from jeat_graph.runs.directory import DIAGNOSTICS, read_record
 
 

@@ -70,7 +70,11 @@ class RunSteps:
         self._done = 0
         self._unfinished: UnfinishedRun | None = None
         saved = None
-        if len(self._instants) > STEPS_PER_SAVE and not config.smoother.worker:
+        if options.resume and not self._tracker.can_save:
+            raise ConfigError(
+                f"--resume does not go with tracker.engine={config.tracker.engine}: it is not saved"
+            )
+        if len(self._instants) > STEPS_PER_SAVE and not config.smoother.worker and self._tracker.can_save:
             self._unfinished = UnfinishedRun(run.folder / RESUME, self._identity())
             saved = self._unfinished.load() if options.resume else None
         self._kept: ConfirmedMeasurements | None = None

@@ -148,7 +148,7 @@ def track_files(
     Raises:
         JeatGraphError: the configuration or a file is not valid, or they do not fit together.
     """
-    from jeat_graph.io.detections_io import read_many
+    from jeat_graph.io.detections_io import of_class_in, read_many
     from jeat_graph.io.formats import recognise
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.directory import RunDirectory
@@ -165,19 +165,24 @@ def track_files(
         request = replace(request, image=(config.image.width, config.image.height))
     for note in notes:
         say(note)
-    detections = read_many(request.detections, **request._reading())
+    how = request._reading()
+    classes = how.pop("classes", None)
+    detections = read_many(request.detections, **how)
     names = " + ".join(request.files)
     check_units(detections, config, names)  # before rates are taken for what they seem
     config, notes = fit_input(config, detections)
     for note in notes:
         say(note)
+    if classes is not None:  # the picture is as large as the boxes of all classes reach
+        detections = of_class_in(detections, classes, request.files[0])
     record = RunRecord(source=request.source(), warnings=check_detections(detections, config, names))
     for warning in record.warnings:
         warn(warning)
     detections = at_measurement(detections, config)
     record.timings["read_s"] = round(time.perf_counter() - begin, 4)
     record.counts = {"scans": detections.num_scans, "detections": len(detections)}
-    notice_if_cold()
+    if config.tracker.engine == "compiled":
+        notice_if_cold()
     with directory:
         write_run(detections, config, directory, record, request.options)
     return record

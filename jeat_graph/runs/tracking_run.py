@@ -16,6 +16,7 @@ from jeat_graph.io.scans_io import SCANS, write_scans
 from jeat_graph.runs.directory import RUN_JSON, SUFFIXES, RunDirectory
 from jeat_graph.runs.run_options import RunOptions, RunRecord
 from jeat_graph.runs.run_steps import RunSteps
+from jeat_graph.tracking.input_watch import outside_counted
 from jeat_graph.version import __version__
 
 
@@ -38,7 +39,8 @@ def write_run(
         DataError: a time that a format cannot express.
         OtherRunError: what was broken off in the folder is another run.
     """
-    instants = RunSteps(detections, config, run, record, options).take_all()
+    with outside_counted():  # by `input_checks`
+        instants = RunSteps(detections, config, run, record, options).take_all()
     write_scans(detections, run.path(SCANS))
     rate_hz = _frame_rate(detections, config, options)
     _write_at_frames(run, "causal", instants, rate_hz, options.formats)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 
 import numpy as np
 
@@ -29,6 +31,7 @@ _LARGEST_SHARE = 1.5
 _FOLLOWS = 0.5
 
 
+_counted: ContextVar[bool] = ContextVar("outside_counted", default=False)
 #: What is said of boxes that are no left, top, width, height.
 CORNERS = (
     "boxes look like x1, y1, x2, y2, taken for left, top, width, height: name the columns so, or convert "
@@ -78,6 +81,16 @@ SHARES = "all boxes lie in [0, 1]: they must be in px, not in shares of the pict
 def look_like_shares(boxes: FloatArray) -> bool:
     """Whether boxes (M, 4) are most likely in shares of the picture: all lie in its first px."""
     return len(boxes) > 0 and float((boxes[:, :2] + boxes[:, 2:]).max()) <= _LARGEST_SHARE
+
+
+@contextmanager
+def outside_counted() -> Iterator[None]:
+    """Within this a recording is tracked whose boxes outside the picture have been told of already."""
+    token = _counted.set(True)
+    try:
+        yield
+    finally:
+        _counted.reset(token)
 
 
 class InputWatch:
@@ -153,7 +166,7 @@ class InputWatch:
         else:
             centre = boxes[:, :2] + 0.5 * boxes[:, 2:]
             outside = int(((centre < 0.0) | (centre > (width, height))).any(axis=1).sum())
-            if outside > _MOST_OUTSIDE * len(boxes):
+            if outside > _MOST_OUTSIDE * len(boxes) and not _counted.get():
                 self._say(
                     "outside",
                     f"{outside} of the first {len(boxes)} box centres lie outside the picture of {width:g} x "

@@ -93,9 +93,10 @@ def step(state: ReferenceState, t: float, scans: Sequence[SensorScan], c: ModelC
     for place in order_of_scans(state, scans):
         given = scans[place]
         clock = look(state, t, given, c)
+        dt = 0.0 if state.t is None else t - state.t
         transition = predict(state, t, c)
         scan = correct_boxes(state, given, c)
-        follow_camera(state, scan, c)
+        follow_camera(state, scan, dt, c)
         before = state.tracks
         pairs = associate(state, scan, c)
         count_gaps(state, scan, pairs, c)
@@ -141,16 +142,17 @@ def look(state: ReferenceState, t: float, scan: SensorScan, c: ModelConstants) -
 
 
 def predict(state: ReferenceState, t: float, c: ModelConstants) -> FloatArray:
-    """Predict states and presence to a time; return the transition (5, 5)."""
+    """Predict states and presence to a time; return the transitions (N, 1, 5, 5) of the tracks."""
     dt = 0.0 if state.t is None else t - state.t
     state.t = t
     model = singer.discretise(dt, c)
     tracks = state.tracks
+    F = singer.in_perspective(model.F, tracks.mean, dt, c)
     if dt > 0.0 and len(tracks):
-        mean, covariance = singer.predict(tracks.mean, tracks.covariance, model, state.process_noise, c)
+        mean, covariance = singer.predict(tracks.mean, tracks.covariance, model, F, state.process_noise, c)
         presence = visibility.predict(tracks.presence, dt, c)
         state.tracks = replace(tracks, mean=mean, covariance=covariance, presence=presence)
-    return model.F
+    return F
 
 
 def correct_boxes(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> SensorScan:
@@ -159,13 +161,13 @@ def correct_boxes(state: ReferenceState, scan: SensorScan, c: ModelConstants) ->
     return scan._replace(boxes=sensor_offsets.corrected(scan.boxes, offset))
 
 
-def follow_camera(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> None:
-    """Estimate what shift and scale all tracks have in common, and take them along."""
+def follow_camera(state: ReferenceState, scan: SensorScan, dt: float, c: ModelConstants) -> None:
+    """Estimate what shift and scale all tracks have in common over `dt` seconds, and take them along."""
     tracks, noise = state.tracks, float(state.log_side_variance[scan.sensor])
     recent = state.time - tracks.evidence.last_s < _CAMERA_AGE_S
     sure = (tracks.real > c.report) & (tracks.evidence.detections > _CAMERA_DETECTIONS) & recent
     seen = tracks.mean[sure], tracks.covariance[sure], scan.boxes
-    motion, state.camera = camera_motion.estimate(*seen, noise, state.picture, state.camera, c)
+    motion, state.camera = camera_motion.estimate(*seen, noise, state.picture, dt, state.camera, c)
     if motion is not None:
         mean, covariance = camera_motion.compensate(tracks.mean, tracks.covariance, motion, state.picture)
         state.tracks = replace(tracks, mean=mean, covariance=covariance)
@@ -182,11 +184,11 @@ def associate(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> Ass
     noise = float(state.log_side_variance[k])
     innovation = box_sides.innovations(tracks.mean, tracks.covariance, scan.boxes, noise, c)
     size = singer.box_size(tracks.mean)
-    density, d2 = likelihood_ratio.sides_log_density(innovation, size, c)
+    density = likelihood_ratio.sides_log_density(innovation, size, c)
     score = likelihood_ratio.score_log_ratio(tracks.real, state.sensors.indifference[k] + scan.logits, c)
     clutter = likelihood_ratio.clutter_log_density(size, float(state.leftovers[k]), state.picture, c)
     present = tracks.presence[:, VISIBLE] * p_detect
-    ratio = likelihood_ratio.pair_log_ratio(density, d2, present, score, clutter, c)
+    ratio = likelihood_ratio.pair_log_ratio(density, present, score, clutter)
     track, box = likelihood_ratio.assign(ratio)
     return AssociatedPairs(track, box, ratio[track, box], p_detect, innovation)
 
@@ -230,7 +232,8 @@ def update(state: ReferenceState, pairs: AssociatedPairs, c: ModelConstants) -> 
     y, size = seen.y[i, pairs.box], singer.box_size(tracks.mean[i])
     R = box_sides.measured_variance(y, seen.S[i], seen.side_variance[i], size, c)
     mean, covariance = tracks.mean.copy(), tracks.covariance.copy()
-    mean[i], covariance[i] = box_sides.update(mean[i], covariance[i], y, seen.H[i], R)
+    m, P, y = box_sides.uncover(mean[i], covariance[i], y, seen.S[i], c)
+    mean[i], covariance[i] = box_sides.update(m, P, y, box_sides.measurement_matrix(singer.box_size(m)), R)
     state.tracks = replace(tracks, mean=mean, covariance=covariance)
 
 
@@ -289,6 +292,8 @@ def taker_of(state: ReferenceState, pairs: AssociatedPairs, free: IntArray) -> I
 def record(before: ReferenceTracks, after: ReferenceTracks, F: FloatArray) -> FilterRecord:
     """Return what the smoother needs of an update; of a track that begins, no prediction is ever asked."""
     n = len(before)
+    born = np.broadcast_to(np.eye(singer.STATES), (len(after) - n, 1, singer.STATES, singer.STATES))
+    F = np.concatenate([F, born])
     mean = np.concatenate([before.mean, after.mean[n:]])
     covariance = np.concatenate([before.covariance, after.covariance[n:]])
     return FilterRecord(after.track_id, F, mean, covariance, after.mean, after.covariance)

@@ -50,7 +50,7 @@ class Tracker(ChosenEngine, DetectorResults):
     Args:
         config: sensors and settings, from `load_config`; or the name of a preset, or of a YAML file.
         image: width and height of the picture (px), also as "1920x1080", if not those of the configuration.
-        engine: "compiled", or "reference": the model to read, in NumPy (`reference_tracker`).
+        engine: "compiled", "core" or "reference" (`ModelTracker`), if not that of the configuration.
         diagnostics: take down how well each detection fitted its track, for `last_updates`.
 
     Example:
@@ -67,9 +67,9 @@ class Tracker(ChosenEngine, DetectorResults):
         *,
         image: tuple[float, float] | str | None = None,
         diagnostics: bool = False,
-        engine: str = "compiled",
+        engine: str | None = None,
     ) -> None:
-        config = as_config(config, image)
+        config = as_config(self._chosen, image)
         super().__init__(config)
         self.config = config
         self._diagnostics = diagnostics

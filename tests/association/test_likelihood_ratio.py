@@ -43,14 +43,14 @@ def test_assignment_is_the_best_of_all(seed, shape, share):
     assert ratio[track, box].sum() == pytest.approx(best_sum(ratio))
 
 
-def test_the_density_is_a_mixture_of_t_and_normal():
+def test_the_density_is_a_mixture_of_t_and_normal_and_cut_sides():
     boxes = np.array(
         [[200.0, 300.0, 300.0, 360.0], [203.0, 297.0, 306.0, 365.0], [230.0, 300.0, 300.0, 360.0]]
     )
     mean, P = box_sides.initial_state(boxes[:1], 2.0 * np.log(0.06), C)
     seen = box_sides.innovations(mean, P, boxes, 2.0 * np.log(0.06), C)
     size = np.array([[100.0, 60.0]])
-    got, _ = likelihood_ratio.sides_log_density(seen, size, C)
+    got = likelihood_ratio.sides_log_density(seen, size, C)
     S = np.zeros((4, 4))
     S[:2, :2], S[2:, 2:] = seen.S[0]
     wide = S + C.outlier_std**2 * 6000.0 * np.eye(4)
@@ -60,6 +60,12 @@ def test_the_density_is_a_mixture_of_t_and_normal():
         multivariate_normal(np.zeros(4), wide),
     )
     want = (1 - C.outlier_share) * t.pdf(y) + C.outlier_share * normal.pdf(y)
+    for side, inwards in enumerate((1.0, -1.0, 1.0, -1.0)):
+        rest = [k for k in range(4) if k != side]
+        extent = size[0, side // 2]
+        three = multivariate_normal(np.zeros(3), S[np.ix_(rest, rest)])
+        share = np.where(inwards * y[:, side] > 0.0, C.cut_share, C.uncovered_share)
+        want += share * three.pdf(y[:, rest]) / extent * (np.abs(y[:, side]) < extent)
     np.testing.assert_allclose(got[0], np.log(want), rtol=1e-9)
 
 
@@ -76,9 +82,18 @@ def test_a_box_in_doubt_fits_a_track_in_doubt():
     assert ratio[1, 1] > ratio[1, 0]
 
 
-def test_outside_the_gate_no_pair_is_made():
-    density, d2 = np.zeros((1, 2)), np.array([[C.gate - 1.0, C.gate + 1.0]])
-    ratio = likelihood_ratio.pair_log_ratio(density, d2, np.array([0.5]), density, np.array([-8.0]), C)
+def test_outside_the_gates_no_pair_is_made():
+    box = np.array([[200.0, 300.0, 300.0, 360.0]])
+    mean, P = box_sides.initial_state(box, 2.0 * np.log(0.06), C)
+    # Far off; cut to a third from the left; grown on all sides at once.
+    moved = np.array([[400.0, 400.0, 400.0, 400.0], [66.0, 0.0, 0.0, 0.0], [-90.0, -90.0, 90.0, 90.0]])
+    seen = box + moved
+    innovation = box_sides.innovations(mean, P, seen, 2.0 * np.log(0.06), C)
+    density = likelihood_ratio.sides_log_density(innovation, np.array([[100.0, 60.0]]), C)
+    assert np.isfinite(density).tolist() == [[False, True, False]]
+    ratio = likelihood_ratio.pair_log_ratio(
+        np.array([[0.0, -np.inf]]), np.array([0.5]), np.zeros((1, 2)), np.array([-8.0])
+    )
     np.testing.assert_allclose(ratio, [[8.0, 0.0]])
     track, box = likelihood_ratio.assign(ratio)
     assert (track.tolist(), box.tolist()) == ([0], [0])

@@ -146,3 +146,9 @@ def test_size_of_the_picture_must_read_width_x_height(files, tmp_path):
     with pytest.raises(SystemExit) as stop:
         main(["calibrate", files[0][0], "--image", "large", "--out", str(tmp_path / "x.yaml")])
     assert stop.value.code == 2
+
+
+def test_boxes_that_are_those_of_the_truth_to_the_last_digit_calibrate_too(files, tmp_path):
+    truth, out = files[0][1], tmp_path / "config.yaml"
+    assert main(["calibrate", f"rgb={truth}", "--gt", truth, "--no-tune", "--out", str(out)]) == 0
+    assert load_config(out).sensors["rgb"].rho_x == 0.0

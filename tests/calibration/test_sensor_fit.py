@@ -5,7 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from jeat_graph.calibration.rounding import with_estimates
 from jeat_graph.calibration.sensor import fit_detection, fit_noise, fit_precision, robust_std
+from jeat_graph.config.schema import SensorConfig
 
 
 @pytest.mark.parametrize(("sigma", "rho"), [(0.6, 0.03), (3.0, 0.01), (1.0, 0.1)])
@@ -72,3 +74,9 @@ def test_precision_curve_is_always_valid_in_a_configuration(rows):
     knots = fit_precision(score, correct)
     SensorConfig(score_precision=knots)
     assert all(0.0 < p < 1.0 for _, p in knots)
+
+
+def test_boxes_without_any_noise_calibrate_a_sensor():
+    """What has no error has estimates that are closer to 0 than a setting may be: they are 0."""
+    section = with_estimates(SensorConfig(rate_hz=20.0), rho_x=6e-29, rho_y=0.02, bias=(1e-30, 0.0, 0.5, 0.0))
+    assert (section.rho_x, section.rho_y, section.bias) == (0.0, 0.02, (0.0, 0.0, 0.5, 0.0))

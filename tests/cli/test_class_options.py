@@ -176,10 +176,24 @@ def test_stream_takes_times_in_other_units(monkeypatch, capsys):
 
 
 def test_classes_that_are_no_names_are_one_clear_line(monkeypatch, capsys):
-    for wrong in ('["car", "van"]', '"car"', "[3]"):
+    for wrong in ('["car", "van"]', '"car"', "[[3]]"):
         line = '{"t": 0, "sensor": "rgb", "boxes": [[1, 2, 3, 4]], "scores": [0.9], "classes": ' + wrong
         monkeypatch.setattr("sys.stdin", Lines(line + "}\n"))
         assert main(["stream"]) == 2
         error = capsys.readouterr().err
         assert "classes" in error
         assert "<stdin>:1" in error
+
+
+def test_the_picture_is_as_large_as_the_boxes_of_all_classes_reach(tmp_path):
+    rows = [
+        f"{k / 20},rgb,{left},100,60,40,.9,{name}"
+        for k in range(30)
+        for left, name in ((90, "car"), (900, "bus"))
+    ]
+    path = tmp_path / "d.csv"
+    path.write_text("t,sensor,left,top,width,height,score,class\n" + "\n".join(rows) + "\n")
+    assert main(["track", str(path), "--class", "car", "--out", str(tmp_path / "run")]) == 0
+    record = json.loads((tmp_path / "run" / "run.json").read_text())
+    assert record["config"]["image"]["width"] == 960
+    assert record["counts"]["detections"] == 30

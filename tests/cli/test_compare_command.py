@@ -132,3 +132,10 @@ def test_boxes_without_velocities_give_errors_of_positions(folder, small_plots, 
     assert values["errors"]["full"]["velocity_rmse"] is None
     for name in ("trajectories", "error-over-time", "rmse-against-lag"):
         assert (out / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_table_alone_is_no_run(folder, capsys):
+    table = folder / "run" / "causal.csv"
+    assert main(["compare", str(table)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "causal.csv: is a table: compare needs the directory of a run" in line

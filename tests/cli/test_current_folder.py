@@ -105,3 +105,26 @@ def test_python_m_does_not_look_there_either(trap, recording):
         check=False,
     )
     assert (done.returncode, mark.exists()) == (0, False), done.stderr
+
+
+@pytest.mark.slow
+def test_workers_on_ray_do_not_look_there(trap, recording):
+    """Ray gives the folder that it is started in to its workers, as a place to look for modules."""
+    pytest.importorskip("ray", reason="Ray is not installed")
+    folder, mark = trap
+    (folder / "many.csv").write_text(MANIFEST.format(det=recording / "detections.csv"))
+    on_ray = ["--engine", "ray", "--workers", "1", "--smoother", "none"]
+    command = ["batch", "many.csv", "--out", "many", *on_ray]
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", RUN],
+        cwd=folder,
+        input=json.dumps(command),
+        capture_output=True,
+        text=True,
+        env=environment(),
+        timeout=300,
+        check=False,
+    )
+    assert not mark.exists(), mark.read_text()
+    assert '["batch", 0]' in done.stdout, done.stderr
+    assert (folder / "many" / "runs" / "b" / "causal.csv").is_file()

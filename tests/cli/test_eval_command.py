@@ -132,6 +132,17 @@ def test_breakdown_and_detections_are_added_when_asked_for(run, truth, tmp_path,
     assert result["detections"]["rgb"]["AP"] == 100.0
 
 
+def test_detections_that_name_no_sensor_are_named_as_for_track(run, truth, tmp_path, capsys):
+    detections = tmp_path / "detections.csv"
+    head, *rows = truth.read_text().splitlines()
+    detections.write_text("\n".join([head, *rows]) + "\n")  # no sensor
+    assert main(["eval", str(run), "--gt", str(truth), "--detections", str(detections), "--json", "-"]) == 2
+    assert "NAME=path" in capsys.readouterr().err
+    named = ["--detections", f"cam={detections}"]
+    assert main(["eval", str(run), "--gt", str(truth), *named, "--json", "-"]) == 0
+    assert json.loads(capsys.readouterr().out)["detections"]["cam"]["AP"] == 100.0
+
+
 def test_truth_and_detections_may_be_in_another_unit_of_time(run, truth, tmp_path, capsys):
     detections = tmp_path / "detections.csv"
     rows = [f"{t:.2f},rgb,{100 * t:.3f},0,40,20,0.9" for t in times()]

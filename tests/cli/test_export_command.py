@@ -105,3 +105,15 @@ def test_what_is_missing_is_one_clear_line(run, tmp_path, capsys, more, what):
     assert what in error
     assert error.count("\n") == 1
     assert not out.exists()
+
+
+def test_a_viewer_that_is_not_there_is_one_line(run, monkeypatch, capsys):
+    rerun = pytest.importorskip("rerun", reason="the extra rerun is not installed")
+
+    def spawn(_):
+        raise RuntimeError("Failed to find the viewer.\n\nMany lines of advice.\n")
+
+    monkeypatch.setattr(rerun.RecordingStream, "spawn", spawn)
+    assert main(["view", str(run)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "(Failed to find the viewer.); `export --to rerun` writes a file for it" in line

@@ -226,6 +226,26 @@ class TestQuiet:
         assert json.loads(capsys.readouterr().out)["causal"]["FN"] == 2 * FRAMES
         assert main(["count", str(run), "--line", "180,0,180,720"]) == 0
 
+    def test_truth_of_every_second_frame_is_as_good(self, tmp_path, truth, capsys):
+        head, *rows = truth.read_text().splitlines()
+        sparse = tmp_path / "sparse.csv"
+        sparse.write_text("\n".join([head, *(row for k, row in enumerate(rows) if k // 2 % 2 == 0)]) + "\n")
+        (tmp_path / "r.txt").write_text(mot())
+        command = ["eval", str(tmp_path / "r.txt"), "--gt", str(sparse), "--json", "-", "--rate"]
+        assert main([*command, str(HZ)]) == 0
+        assert json.loads(capsys.readouterr().out)["causal"]["MOTA"] == 100.0
+        assert main([*command, "33"]) == 2
+        assert "--rate 33 does not fit the truth, whose rate is 10 Hz" in capsys.readouterr().err
+
+    def test_a_result_that_would_end_after_its_truth_counts_from_1(self, tmp_path, capsys):
+        head = "frame,track_id,left,top,width,height\n"
+        for name, first in (("gt.csv", 0), ("result.csv", 1)):
+            rows = [f"{k + first},1,{left(k, 1)},300,90,60\n" for k in range(FRAMES)]
+            (tmp_path / name).write_text(head + "".join(rows))
+        result, truth = (str(tmp_path / name) for name in ("result.csv", "gt.csv"))
+        assert main(["eval", result, "--gt", truth, "--rate", str(HZ), "--json", "-"]) == 0
+        assert json.loads(capsys.readouterr().out)["causal"]["MOTA"] == 100.0
+
     def test_classes_of_which_one_sequence_has_none_are_no_slip(self, tmp_path, truth, capsys):
         """Lorries alone in one sequence, cars in the other."""
         rows = truth.read_text().splitlines()

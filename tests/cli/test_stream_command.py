@@ -194,7 +194,7 @@ def test_no_input_is_no_error(monkeypatch, capsys):
         ("[]", "at least one"),
         ("3", "is not JSON|an object such as|is missing"),
         ('["a"]', "an object such as"),
-        ('{"t": 1, "sensor": "rgb", "boxes": []}', "scores is missing"),
+        ('{"t": 1, "sensor": "rgb", "scores": []}', "boxes is missing"),
         ('{"t": 1, "sensor": "rgb", "boxes": [], "score": []}', "unknown key 'score'"),
         ('{"t": "1", "sensor": "rgb", "boxes": [], "scores": []}', "t must be a number"),
         ('{"t": NaN, "sensor": "rgb", "boxes": [], "scores": []}', "must be finite"),
@@ -407,3 +407,66 @@ def test_a_reader_that_goes_away_ends_it_cleanly(start):
             pass
         assert process.wait(PATIENCE_S) == 0
         assert b"Traceback" not in process.stderr.read()
+
+
+def tables(count: int = 40) -> dict[str, str]:
+    """One recording as people have it: by times, dates, frame numbers and names of pictures."""
+    rows = [f"{100 + 4 * k},200,{160 + 4 * k},240,1,3" for k in range(count)]
+    columns = "x1,y1,x2,y2,class_id,tracker_id"
+    when = {
+        "t": [f"{k / 20}" for k in range(count)],
+        "timestamp": [f"1970-01-01T00:00:{k / 20:05.2f}Z" for k in range(count)],
+        "frame": [f"{k + 1}" for k in range(count)],
+        "image_name": [f"street/{k + 1:06d}.jpg" for k in range(count)],
+    }
+    return {
+        name: f"{name},sensor,{columns}\n"
+        + "".join(f"{t},rgb,{row}\n" for t, row in zip(values, rows, strict=True))
+        for name, values in when.items()
+    }
+
+
+@pytest.mark.parametrize("form", ["t", "timestamp", "frame", "image_name"])
+def test_stream_takes_what_track_takes_from_tables(form, tmp_path, monkeypatch, capsys):
+    """The causal rows of `track` are the oracle."""
+    path = tmp_path / "detections.csv"
+    path.write_text(tables()[form])
+    how = ["--rate", "20", "--classes", "car,truck", "--image", "1280x720"]
+    assert main(["track", str(path), "--out", str(tmp_path / "run"), *how]) == 0
+    capsys.readouterr()
+    settings = ["--set", "sensors.rgb.rate_hz=20", "--format", "csv"]
+    code, out, _ = stream(path.read_bytes(), monkeypatch, capsys, *how, *settings)
+    assert code == 0
+    (tmp_path / "stream.csv").write_text(out)
+    found = read_trajectories(tmp_path / "stream.csv")
+    wanted = read_trajectories(tmp_path / "run" / "causal.csv")
+    assert found.t.tolist() == wanted.t.tolist()
+    assert found.boxes == pytest.approx(wanted.boxes, abs=0.5)
+    assert set(found.classes) == set(wanted.classes) == {"truck"}
+
+
+def test_stream_takes_frames_from_where_they_are_said_to_begin(monkeypatch, capsys):
+    text = tables(5)["frame"].encode()
+    code, out, _ = stream(text, monkeypatch, capsys, "--rate", "20", "--first-frame", "0")
+    assert code == 0
+    assert json.loads(out.splitlines()[0])["t"] == 0.05
+    code, _, err = stream(text, monkeypatch, capsys)
+    assert code == 2
+    assert "<stdin>:2: has frame numbers only; give their rate with --rate" in err
+
+
+def test_classes_of_which_nothing_came_are_told_of_at_the_end(monkeypatch, capsys):
+    rows = tables(5)["t"].encode()
+    code, _, err = stream(rows, monkeypatch, capsys, "--class", "car", "bus")
+    assert code == 0
+    assert "warning: nothing was of class car or bus; there were: 1 (--classes FILE names them" in err
+    code, _, err = stream(rows, monkeypatch, capsys, "--class", "car", "--classes", "bus,car")
+    assert (code, "nothing was of class" in err) == (0, False)
+
+
+def test_videos_that_are_passed_over_are_told_of_once(monkeypatch, capsys):
+    rows = "t,sensor,left,top,width,height,video\n" + "".join(f"{k},rgb,1,2,30,40,v{k}\n" for k in range(9))
+    code, out, err = stream(rows, monkeypatch, capsys, "--only-video", "v8")
+    assert code == 0
+    assert len(out.splitlines()) == 1
+    assert err.count("passed over") == 1

@@ -1,6 +1,7 @@
 """Configurations: read, overridden, refused with a useful sentence, written back."""
 
 import dataclasses
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -277,3 +278,23 @@ def test_what_is_said_of_the_picture_beside_its_size_leaves_the_size_to_be_seen(
 def test_a_setting_of_a_sensor_that_is_not_declared_says_how_to_declare_it():
     with pytest.raises(ConfigError, match="'cam' is not declared; declare it as a whole"):
         load_config("default", ["sensors.cam.latency_s=0.1"])
+
+
+def test_a_file_and_each_base_of_it_is_read_once(tmp_path, monkeypatch):
+    write(tmp_path, "base: highway\nsensors: {radar: {rate_hz: 10}}\n", "middle.yaml")
+    top = write(tmp_path, f"base: {tmp_path / 'middle.yaml'}\nimage: {{width: 640}}\n", "top.yaml")
+    read = []
+    read_text = Path.read_text
+
+    def counted(path, *args, **kwargs):
+        read.append(path.name)
+        return read_text(path, *args, **kwargs)
+
+    monkeypatch.setattr(Path, "read_text", counted)
+    config = load_config(top)
+    assert [name for name in read if name.endswith(".yaml") and name != "highway.yaml"] == [
+        "top.yaml",
+        "middle.yaml",
+    ]
+    assert config.image.width == 640
+    assert {"rgb", "evt", "radar"} == set(config.sensors)

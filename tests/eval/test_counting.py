@@ -61,6 +61,12 @@ def test_a_track_that_ends_on_the_line_is_a_half():
     assert doubtful.probability == pytest.approx(0.7)
 
 
+def test_what_is_not_sure_before_the_line_after_it_and_of_the_track_is_multiplied():
+    half_a_sigma = 0.6914624612740131  # of a standard normal below 0.5
+    (one,) = crossings(table([[(30.0, 49.0), (30.0, 52.0)]], std=2.0, existence=0.8), ACROSS)
+    assert one.probability == pytest.approx(0.8 * half_a_sigma * 0.8413447460685429)
+
+
 def test_counts_by_interval_and_direction():
     paths = [[(30.0, y) for y in range(0, 101, 20)]] * 3 + [[(60.0, y) for y in range(100, -1, -20)]]
     counts = count(crossings(table(paths), ACROSS), np.array([0.0, 0.2, 1.0]))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+from jeat_graph.eval.matching import match
 from jeat_graph.eval.metrics import evaluate
 
 from .data import make_tracks, make_truth, tud_pair
@@ -45,3 +47,9 @@ def test_nothing_is_printed(capsys):
     evaluate([(make_truth([0.0], [1], box), make_tracks([0.0], [1], box))])
     out = capsys.readouterr()
     assert (out.out, out.err) == ("", "")
+
+
+@pytest.mark.parametrize(("iou", "threshold"), [(0.5, 0.5), (0.3 - 5e-17, 0.3), (1.0, 1.0)])
+def test_an_overlap_of_just_the_threshold_is_a_match(iou, threshold):
+    assert match(np.array([[iou]]), threshold).tolist() == [0]
+    assert match(np.array([[iou - 1e-9]]), threshold).tolist() == [-1]

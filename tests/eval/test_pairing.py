@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -27,8 +29,15 @@ def test_no_common_timestamps():
 
 @pytest.mark.parametrize("factor", [1000.0, 20.0, 1e6, 1e-3])
 def test_different_units_of_time(factor):
-    with pytest.raises(DataError, match="different units of time"):
+    with pytest.raises(DataError, match=re.escape(f"tracks last {factor:.3g} times as long as the truth")):
         judge(make_truth(T, [1] * 100, BOX), make_tracks(T * factor, [1] * 100, BOX))
+
+
+@pytest.mark.parametrize(("frames", "instants"), [(3, 3), (3, 100), (100, 3)])
+def test_three_frames_tell_their_unit(frames, instants):
+    truth = make_truth(T[:frames], [1] * frames, BOX[:frames])
+    with pytest.raises(DataError, match="different units of time"):
+        judge(truth, make_tracks(T[:instants] * 1e6, [1] * instants, BOX[:instants]))
 
 
 def test_different_units_of_time_at_different_rates():
@@ -104,6 +113,14 @@ def test_a_class_that_is_not_there_is_named_with_those_that_are():
     truth = make_truth([0.0, 0.0], [1, 2], BOX[:2], classes=np.array(["Car", "Van"]))
     assert restrict_classes(truth, ["Van"]).ignore.tolist() == [True, False]
     with pytest.raises(DataError, match="the truth has: Car, Van"):
+        check_classes([truth], ["car"])
+
+
+def test_classes_that_are_numbers_are_named_with_what_names_them():
+    truth = make_truth([0.0], [1], BOX[:1], classes=np.array(["3"]))
+    with pytest.raises(
+        DataError, match=r"the truth has: 3 \(--classes FILE names them, in Python class_names=\)"
+    ):
         check_classes([truth], ["car"])
 
 

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.eval.resampling import check_unique, interpolate_to, predict_to
 
 from .data import make_tracks
@@ -148,8 +149,21 @@ def test_rows_further_apart_than_the_bound_are_not_joined_but_count_themselves()
     assert interpolate_to(table, times).frame.tolist() == [0, 1, 2, 3, 4, 5, 6]
 
 
+def test_a_track_without_a_row_where_others_have_one_is_known_not_to_be_there():
+    """Frame 1 has a row of track 2 alone; at frame 2 nobody has one, and track 1 is between its rows."""
+    table = Trajectories.concatenate([curved([0.0, 1.5], 1), curved([0.5], 2)])
+    out = interpolate_to(table, np.array([0.0, 0.5, 1.0, 1.5]))
+    told = sorted(zip(out.frame.tolist(), out.track_id.tolist(), strict=True))
+    assert told == [(0, 1), (1, 2), (2, 1), (3, 1)]
+
+
 def test_a_clipped_box_keeps_its_offset_from_the_centre():
     table = curved([0.0, 1.0], 1)
     moved = dataclasses.replace(table, boxes=table.boxes + np.array([7.0, 0, 0, 0]))
     out = interpolate_to(moved, np.array([0.3]))
     np.testing.assert_allclose(out.boxes[:, 0] + 20 - 7, curve(np.array([0.3]))[:, 0], atol=1e-9)
+
+
+def test_between_smoothed_rows_variances_go_over_evenly():
+    table = make_tracks([0.0, 1.0], [1, 1], [[0, 0, 10, 10]] * 2, var=np.repeat([[1.0], [3.0]], 6, axis=1))
+    assert interpolate_to(table, np.array([0.0, 0.25, 1.0])).var[:, 0].tolist() == [1.0, 1.5, 3.0]

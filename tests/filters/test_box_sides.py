@@ -21,11 +21,13 @@ def tracked(box=BOX, seconds=0.04, times=30):
     mean, covariance = box_sides.initial_state(box, LOG_VARIANCE, C)
     step, q = singer.discretise(seconds, C), singer.initial_process_noise(C)
     for _ in range(times):
-        mean, covariance = singer.predict(mean, covariance, step, q, C)
+        F = singer.in_perspective(step.F, mean, seconds, C)
+        mean, covariance = singer.predict(mean, covariance, step, F, q, C)
         seen = box_sides.innovations(mean, covariance, box, LOG_VARIANCE, C)
         R = np.repeat(seen.side_variance[..., None], 2, axis=2)
         mean, covariance = box_sides.update(mean, covariance, seen.y[:, 0], seen.H, R)
-    return singer.predict(mean, covariance, step, q, C)
+    F = singer.in_perspective(step.F, mean, seconds, C)
+    return singer.predict(mean, covariance, step, F, q, C)
 
 
 def test_measurement_matrix_is_the_derivative_of_the_sides():
@@ -99,6 +101,27 @@ def test_a_cut_side_is_told_and_hardly_measures(side, left_over):
     R = box_sides.measured_variance(y, seen.S, seen.side_variance, size, C)
     after, _ = box_sides.update(mean, covariance, y, seen.H, R)
     np.testing.assert_allclose(box_sides.corners(after), BOX, atol=0.06 * extent)
+
+
+def test_a_side_that_shows_again_is_taken_as_it_is_measured():
+    """A track that knows 40 % of an object, and then its whole box: what was hidden counts as unknown."""
+    part = BOX.copy()
+    part[0, 2] = part[0, 0] + 40.0
+    mean, covariance = tracked(part)
+    seen = box_sides.innovations(mean, covariance, BOX, LOG_VARIANCE, C)
+    y, size = seen.y[:, 0], singer.box_size(mean)
+    got, grown, rest = box_sides.uncover(mean, covariance, y, seen.S, C)
+    want = box_sides.corners(mean)
+    want[0, 2] = BOX[0, 2]
+    np.testing.assert_allclose(box_sides.corners(got), want)
+    along = np.zeros(5)
+    along[singer.POSITION], along[singer.LOG_SIZE] = 0.5, 1.0 / singer.box_size(got)[0, 0]
+    np.testing.assert_allclose(grown[0, 0] - covariance[0, 0], y[0, 0, 1] ** 2 * np.outer(along, along))
+    np.testing.assert_array_equal(grown[0, 1], covariance[0, 1])
+    assert rest[0, 0].tolist() == [y[0, 0, 0], 0.0]
+    R = box_sides.measured_variance(y, seen.S, seen.side_variance, size, C)
+    after, _ = box_sides.update(got, grown, rest, box_sides.measurement_matrix(singer.box_size(got)), R)
+    np.testing.assert_allclose(box_sides.corners(after), BOX, atol=2.0)
 
 
 def test_a_box_that_grows_outwards_is_not_cut():

@@ -124,11 +124,14 @@ def test_the_cameras_shift_and_scale_are_found_in_spite_of_a_stray(theta):
     moved[0] += 25.0
     half = 30.0 * (1.0 + theta[2])
     seen = np.concatenate([moved - half, moved + half], axis=1)
-    prior = camera_motion.CameraVariance(0.04, 1e-3)
-    motion, learnt = camera_motion.estimate(mean, covariance, seen, 2.0 * np.log(0.03), picture, prior, C)
+    prior = camera_motion.CameraVariance(0.04, 1e-3, np.zeros(3))
+    motion, learnt = camera_motion.estimate(
+        mean, covariance, seen, 2.0 * np.log(0.03), picture, 0.1, prior, C
+    )
     assert motion is not None
     np.testing.assert_allclose(motion.theta / [0.6, 0.6, 1e-3], theta / np.array([0.6, 0.6, 1e-3]), atol=1.0)
-    assert learnt != prior
+    assert learnt.shift != prior.shift
+    np.testing.assert_allclose(learnt.last, motion.theta / 0.1)
     after, _ = camera_motion.compensate(mean, covariance, motion, picture)
     np.testing.assert_allclose(after[1:, :, singer.POSITION], moved[1:], atol=1.5)
 
@@ -136,6 +139,23 @@ def test_the_cameras_shift_and_scale_are_found_in_spite_of_a_stray(theta):
 def test_one_track_tells_nothing_of_the_camera():
     mean, covariance = box_sides.initial_state(np.array([[0.0, 0.0, 9.0, 9.0]]), -5.0, C)
     prior = camera_motion.initial_variance(C)
-    motion, learnt = camera_motion.estimate(mean, covariance, np.ones((0, 4)), -5.0, (100.0, 100.0), prior, C)
+    motion, learnt = camera_motion.estimate(
+        mean, covariance, np.ones((0, 4)), -5.0, (100.0, 100.0), 0.1, prior, C
+    )
     assert motion is None
     assert learnt == prior
+
+
+def test_a_row_of_like_objects_is_not_taken_for_its_neighbours_when_the_camera_goes_on():
+    """Parked cars 40 px apart, and a camera that pans by 36 px a scan: the nearest box is a neighbour's."""
+    left = np.arange(8)[:, None] * 40.0 + 200.0
+    boxes = np.concatenate([left, np.full((8, 1), 100.0), left + 30.0, np.full((8, 1), 120.0)], axis=1)
+    mean, covariance = box_sides.initial_state(boxes, 2.0 * np.log(0.03), C)
+    seen = boxes + np.array([36.0, 0.0, 36.0, 0.0])
+    picture = (640.0, 240.0)
+    lost = camera_motion.CameraVariance(0.04, 1e-6, np.zeros(3))
+    goes_on = lost._replace(last=np.array([360.0, 0.0, 0.0]))
+    for prior, shift in ((lost, -4.0), (goes_on, 36.0)):
+        motion, _ = camera_motion.estimate(mean, covariance, seen, 2.0 * np.log(0.03), picture, 0.1, prior, C)
+        assert motion is not None
+        np.testing.assert_allclose(motion.theta[0], shift, atol=3.0)

@@ -78,4 +78,27 @@ def test_noise_grows_with_size_and_with_perspective():
     small, large = singer.process_covariance(np.array([10.0, 20.0]), np.zeros(2), step, q, C)
     assert large[0, 1, 1] == pytest.approx(4.0 * small[0, 1, 1])
     calm, near = singer.process_covariance(np.array([10.0, 10.0]), np.array([0.0, 1.0]), step, q, C)
-    assert near[0, 2, 2] / calm[0, 2, 2] == pytest.approx((2.0 + 10.0) ** 2 / 2.0**2)
+    assert near[0, 2, 2] / calm[0, 2, 2] == pytest.approx((1.0 + C.perspective_jerk / C.jerk) ** 2)
+
+
+@pytest.mark.parametrize("growth", [-1.5, -0.2, 0.0, 1e-9, 0.3, 2.0])
+def test_constant_velocity_in_space_is_predicted_exactly(growth):
+    """A pinhole camera: x = X/Z, size = 1/Z; with nothing that decays the image after a step is exact."""
+    c = replace(C, velocity_time_s=1e9, acceleration_time_s=1e9, growth_time_s=1e9)
+    dt, Z, X, Y = 0.15, 20.0, 3.0, -1.5
+    speed = np.array([0.7, 0.2, -growth * Z])  # dX/dt, dY/dt, dZ/dt: g = -Z'/Z
+    mean = np.zeros((1, 2, 5))
+    for axis, place in enumerate((X, Y)):
+        mean[0, axis] = place / Z, (speed[axis] - place / Z * speed[2]) / Z, 0.0, np.log(1.0 / Z), growth
+    F = singer.in_perspective(singer.discretise(dt, c).F, mean, dt, c)
+    got = (F @ mean[..., None])[..., 0]
+    later = Z + speed[2] * dt
+    for axis, place in enumerate((X, Y)):
+        x = (place + speed[axis] * dt) / later
+        v = (speed[axis] - x * speed[2]) / later
+        want = x, v, 0.0, np.log(1.0 / later), -speed[2] / later
+        # Position is integrated with the growth rate of the step's beginning: exact to its third order.
+        tolerance = abs(mean[0, axis, 1]) * dt * (growth * dt) ** 2
+        assert got[0, axis, 0] == pytest.approx(want[0], abs=tolerance + 1e-9)
+        assert got[0, axis, 1] == pytest.approx(want[1], rel=3.0 * (growth * dt) ** 2 + 1e-7)
+        np.testing.assert_allclose(got[0, axis, 3:], want[3:], rtol=1e-7, atol=1e-9)

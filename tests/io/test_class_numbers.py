@@ -69,6 +69,8 @@ def test_a_list_that_cannot_be_read_is_named(write):
     path = write("result.txt", TRACKER)
     with pytest.raises(DataError, match=r"nowhere\.txt: no such file"):
         read_detections(path, rate_hz=20, class_names="nowhere.txt")
+    with pytest.raises(DataError, match=r"car: no such file; names of classes themselves have commas"):
+        read_detections(path, rate_hz=20, class_names="car")
     with pytest.raises(DataError, match=r"data\.yaml: must hold `names`"):
         read_detections(path, rate_hz=20, class_names=write("data.yaml", "nc: 3\n"))
     with pytest.raises(DataError, match=r"data\.yaml: is not YAML"):

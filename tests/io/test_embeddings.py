@@ -127,5 +127,5 @@ def test_data_frames_say_in_many_ways_that_there_is_none(none):
     frame["embedding"] = [none] * count
     assert Detections.from_pandas(frame).embeddings is None
     frame["embedding"] = [np.ones(2)] + [np.ones(3)] * (count - 1)
-    with pytest.raises(DataError, match="equally many numbers"):
+    with pytest.raises(DataError, match="row 1: embedding has 3 numbers where"):
         Detections.from_pandas(frame)

@@ -94,3 +94,15 @@ def test_compressed_events_are_to_be_unpacked(tmp_path):
     (tmp_path / "night.raw.gz").write_bytes(b"\x1f\x8b\x08" + bytes(20))
     with pytest.raises(DataError, match=r"is compressed with gzip; unpack it first$"):
         open_events(tmp_path / "night.raw.gz")
+
+
+@pytest.mark.parametrize(
+    ("write", "what"),
+    [("to_feather", "is an Arrow or Feather file"), ("to_pickle", "is a pickle, which can run programs")],
+)
+def test_what_pandas_writes_elsewhere_is_named(tmp_path, write, what):
+    pd = pytest.importorskip("pandas")
+    path = tmp_path / "table.bin"
+    getattr(pd.DataFrame({"t": [0.0], "sensor": ["rgb"]}), write)(path)
+    with pytest.raises(DataError, match=rf"table\.bin: {what}"):
+        read_detections(path)

@@ -151,3 +151,11 @@ def test_a_step_too_long_or_too_short_for_a_camera_asks_for_the_unit(step, words
     question = unit_question(step)
     assert words in question
     assert (question == "") == (words == "")
+
+
+@pytest.mark.parametrize("frames", [("0", "0.5"), ("1", "two_2.png"), ("1e0", "1.25")])
+def test_a_frame_number_that_is_not_whole_is_no_name_of_a_picture(tmp_path, frames):
+    path = tmp_path / "d.csv"
+    path.write_text("frame,left,top,width,height\n" + "".join(f"{one},1,2,3,4\n" for one in frames))
+    with pytest.raises(DataError, match=r"d\.csv:3: frame must be"):
+        read_detections(path, rate_hz=20.0)

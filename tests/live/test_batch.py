@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from jeat_graph.cli.main import main
+from jeat_graph.data.errors import DataError
 from jeat_graph.live.engines import run_local
 from jeat_graph.live.manifest import read_manifest
 
@@ -280,7 +281,8 @@ def test_a_video_that_is_not_there_fails_alone(tmp_path, capsys):
     [
         ("name,rate\na,20\n", "has none of the columns detections, frames, events"),
         ("name,detections,frames\na,,\n", ":2: detections, frames is missing"),
-        ("name,detections,class\na,b.csv,car\n", ":2: class is for recordings without detections"),
+        ("name,detections,mask\na,b.csv,m.yaml\n", ":2: mask is for recordings without detections"),
+        ("name,frames,time_unit\na,b.mp4,ms\n", ":2: time_unit is for recordings with detections"),
         ("name,detections,events\na,b.csv,e.raw\n", ":2: events is for recordings without detections"),
     ],
 )
@@ -288,3 +290,63 @@ def test_what_a_row_begins_with_is_plain(text, message, tmp_path, capsys):
     (tmp_path / "m.csv").write_text(text)
     assert main(["batch", str(tmp_path / "m.csv"), "--out", str(tmp_path / "out")]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_how_files_are_read_is_said_by_columns_called_as_the_options_of_track(tmp_path, capsys):
+    rows = "".join(
+        f"{video},{k},{100 + 4 * k + 300 * (video == 'b')},200,60,40,{90 - k},{k % 2}\n"
+        for video in "ab"
+        for k in range(30)
+    )
+    (tmp_path / "det.csv").write_text("video,frame,left,top,width,height,score,class\n" + rows)
+    (tmp_path / "names.txt").write_text("car\nbus\n")
+    said = {"rate": "20", "only_video": "b", "classes": "names.txt", "class": "car;bus", "first_frame": "0"}
+    said |= {"score_scale": "percent", "input_format": "csv", "image": "1280x720"}
+    manifest, out = tmp_path / "m.csv", tmp_path / "out"
+    manifest.write_text(f"detections,{','.join(said)}\ndet.csv,{','.join(said.values())}\n")
+    assert main(["batch", str(manifest), "--out", str(out), "--workers", "1"]) == 0
+    said |= {"classes": str(tmp_path / "names.txt")}
+    options = [w for name, value in said.items() for w in (f"--{name.replace('_', '-')}", *value.split(";"))]
+    assert main(["track", str(tmp_path / "det.csv"), "--out", str(tmp_path / "run"), *options]) == 0
+    for name in TABLES:
+        assert (out / "runs" / "det" / name).read_bytes() == (tmp_path / "run" / name).read_bytes()
+    assert b"car" in (out / "runs" / "det" / "causal.csv").read_bytes()
+    assert main(["batch", str(manifest), "--out", str(out), "--workers", "1"]) == 0
+    assert "0 tracked, 1 kept" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "what"),
+    [
+        ("first_frame", "2", "first_frame must be 0, 1, got '2'"),
+        ("time_unit", "h", "time_unit must be s, ms, us, ns, got 'h'"),
+        ("score_scale", "of ten", "score_scale must be unit"),
+        ("input_format", "xml", "input_format must be csv"),
+        ("image", "large", "image must read WIDTHxHEIGHT"),
+        ("video", "a", "unknown column 'video'"),
+    ],
+)
+def test_a_column_of_reading_that_is_wrong_is_named_with_its_line(column, value, what, tmp_path):
+    (tmp_path / "m.csv").write_text(f"detections,{column}\na.csv,{value}\n")
+    with pytest.raises(DataError, match=rf"m\.csv:[12]: {what}"):
+        read_manifest(tmp_path / "m.csv")
+
+
+def test_paths_of_a_manifest_are_seen_from_its_folder(tmp_path):
+    folder = tmp_path / "lists"
+    folder.mkdir()
+    (folder / "m.csv").write_text(
+        "detections,config,gt,camera,classes,images\n"
+        "cam=a.csv;b.csv,my.yaml,gt.csv,camera.yaml,names.txt,images.json\n"
+        "c.csv,highway,,,,\n"
+    )
+    first, second = read_manifest(folder / "m.csv")
+    assert first.detections == (f"cam={folder / 'a.csv'}", str(folder / "b.csv"))
+    assert (first.config, first.truth, first.camera) == tuple(
+        str(folder / name) for name in ("my.yaml", "gt.csv", "camera.yaml")
+    )
+    assert first.reading == {
+        "class_names": str(folder / "names.txt"),
+        "images": str(folder / "images.json"),
+    }
+    assert (second.config, second.reading) == ("highway", {})

@@ -12,6 +12,8 @@ from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.live.late import LiveTracker
+from jeat_graph.live.repetition import Repetition
+from jeat_graph.live.time_base import TimeBase
 from jeat_graph.tracking.tracker import Tracker
 from jeat_graph_sehn.simulation.scenario import load_scenario
 from jeat_graph_sehn.simulation.simulate import record
@@ -245,3 +247,15 @@ def test_a_checkpoint_of_twenty_vehicles_is_small_and_costs_little(late, tmp_pat
     # others at work the caches are cold, which arrays feel and a sum does not: the short form allows twice.
     most_s = 0.005 if full else 0.01
     assert min(took) <= most_s * max(1.0, min(adding) / 0.001)
+
+
+def test_after_a_restart_three_scans_that_never_came_say_that_the_input_is_another():
+    def scan(t, left):
+        return Scan(t, "rgb", np.array([[left, 100.0, 40.0, 30.0]]), np.array([0.9]))
+
+    before = Repetition(TimeBase(5.0), whole=True)
+    before.note([scan(0.05 * k, 100.0 + k) for k in range(21)])
+    again = Repetition(TimeBase(5.0), whole=False)
+    again.set_state(before.state(), 1.0)
+    new = [again.sort([scan(0.3 + 0.05 * k, 900.0)], lambda _: True)[1] for k in range(4)]
+    assert list(map(len, new)) == [0, 0, 1, 1]

@@ -11,7 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.tables.reading import Reading
 from jeat_graph.io.packing import pack, unpack
+from jeat_graph.io.stream_reading import StreamReading
 from jeat_graph.live.messages import Duplicates, ScanMessage, decode_scans, encode_tracks
 
 SCAN = {"t": 0.5, "sensor": "rgb", "boxes": [[1.0, 2.0, 3.0, 4.0]], "scores": [0.5]}
@@ -164,3 +166,17 @@ def test_what_a_source_is_called_and_how_far_it_counts_is_bounded():
         with pytest.raises(DataError, match=r"source must be|seq must be") as error:
             decoded({"v": 1, "source": "a", "seq": 1, "scans": [SCAN]} | wrong)
         assert len(str(error.value)) < 200
+
+
+def test_messages_of_brokers_are_read_as_lines_are():
+    """Dates, numbers of classes, no scores; and the times that MessagePack has of its own."""
+    msgpack = pytest.importorskip("msgpack", reason="MessagePack is not installed")
+    how = StreamReading(Reading(class_names={2: "car"}, video="street"))
+    scan = {"t": "1970-01-01T00:00:01.5Z", "sensor": "rgb", "boxes": [[1, 2, 3, 4]], "class_id": [2]}
+    whole = {"v": 1, "source": "a", "seq": 1, "scans": [scan | {"tracker_id": [8]}]}
+    packed = msgpack.packb({"v": 1, "scans": [scan | {"t": msgpack.Timestamp(1, 500_000_000)}]})
+    for payload in (json.dumps(whole).encode(), msgpack.packb(whole), packed):
+        (found,) = decode_scans(payload, "topic", 1, how).batch.scans
+        assert (found.t, found.scores.tolist(), found.classes.tolist()) == (1.5, [1.0], ["car"])
+    other = json.dumps(whole | {"scans": [scan | {"video": "yard"}]}).encode()
+    assert decode_scans(other, "topic", 1, how) is None

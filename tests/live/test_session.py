@@ -8,6 +8,7 @@ import json
 import pytest
 
 from jeat_graph.config.reading import load_config
+from jeat_graph.data.errors import DataError
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.live.messages import decode_scans
 from jeat_graph.live.session import Ends, Session
@@ -167,3 +168,10 @@ def test_an_answer_that_a_reader_who_has_gone_did_not_take_is_in_no_checkpoint(t
         session.accept(messages[7])
     session.save()
     assert not path.exists()
+
+
+@pytest.mark.parametrize("kept", [{"seen": {}}, {"seen": None}, {"seen": {"seen": {"a": [[1]]}}}])
+def test_what_a_damaged_checkpoint_keeps_is_refused_in_one_line(kept, tmp_path):
+    path = tmp_path / "state.npz"
+    with pytest.raises(DataError, match=r"state\.npz: is damaged"):
+        Session(LiveTracker(Tracker(CONFIG)), Ends(lambda *_: None), path, more=kept)

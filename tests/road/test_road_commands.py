@@ -12,7 +12,7 @@ import pytest
 from road_scenes import HEIGHT, WIDTH, camera, drives, lengths, see
 
 from jeat_graph.cli.main import main
-from jeat_graph.road.camera_file import read_camera
+from jeat_graph.road.camera_file import read_camera, write_camera
 
 BRNO = Path(__file__).parents[3] / "shared" / "data" / "brno"
 
@@ -154,6 +154,46 @@ def test_the_size_of_the_picture_comes_from_the_run_or_has_to_be_given(
     assert f"picture of {WIDTH} x {HEIGHT} px, as {run} says" in capsys.readouterr().err
     camera = read_camera(cam)
     assert (camera.width, camera.height) == (WIDTH, HEIGHT)
+
+
+def test_results_of_other_trackers_are_taken_in_every_format(tmp_path: Path, capsys) -> None:
+    """A vehicle that drives away, in four formats: the same road, and the counts of `count`'s intervals."""
+    cam, folder = tmp_path / "camera.yaml", tmp_path / "labels"
+    write_camera(camera(), cam)
+    k = np.arange(60)
+    ground = see(camera(), np.stack([np.full(60, 4.0), 20.0 + 0.4 * k], axis=1))
+    near = see(camera(), np.stack([np.full(60, 5.8), 20.0 + 0.4 * k], axis=1))
+    width = np.abs(near[:, 0] - ground[:, 0])
+    box = np.stack([ground[:, 0], ground[:, 1] - width, width, width], axis=1)
+    (tmp_path / "mot.txt").write_text(
+        "".join(
+            f"{n + 1},7,{a:.3f},{b:.3f},{c:.3f},{d:.3f},1,-1,-1,-1\n" for n, (a, b, c, d) in enumerate(box)
+        )
+    )
+    rows = [f"{n},7,{a:.3f},{b:.3f},{a + c:.3f},{b + d:.3f}" for n, (a, b, c, d) in enumerate(box)]
+    (tmp_path / "frames.csv").write_text("frame,track_id,x1,y1,x2,y2\n" + "\n".join(rows) + "\n")
+    folder.mkdir()
+    size = np.array([WIDTH, HEIGHT])
+    for n, one in enumerate(box):
+        line = [*((one[:2] + one[2:] / 2) / size), *(one[2:] / size)]
+        (folder / f"road_{n}.txt").write_text("0 " + " ".join(f"{v:.9f}" for v in line) + " 0.9 7\n")
+    tables = []
+    for source in ("mot.txt", "frames.csv", "labels"):
+        command = ["road", str(tmp_path / source), "--camera", str(cam), "--out", str(tmp_path / "out")]
+        assert main(command) == 2
+        assert "--rate" in capsys.readouterr().err
+        assert main([*command, "--rate", "20", "--interval", "1", "--contact", "bottom"]) == 0
+        tables.append([row["speed_kmh"] for row in _rows(tmp_path / "out" / "speeds.csv")])
+        counts = _rows(tmp_path / "out" / "counts.csv")
+        starts = [row["t_start"] for row in counts if row["lane"] == row["class"] == "all"]
+        assert list(map(float, starts)) == [0.0, 1.0, 2.0]
+    assert len(tables[0]) == 1
+    assert tables[0] == tables[1]
+    assert float(tables[2][0]) == pytest.approx(float(tables[0][0]), abs=0.1)
+    # A camera without covariance is not sharpened; by then the tracks have been read.
+    calibrating = ["camera", "calibrate", "--run", str(folder), "--camera", str(cam)]
+    assert main([*calibrating, "--rate", "20", "--out", str(tmp_path / "sharper.yaml")]) == 2
+    assert "has no covariance" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -63,10 +64,29 @@ def test_counts_by_lane_class_and_interval() -> None:
     ]
     assert ("slow", "car", 0.0, 4) in rows
     assert ("all", "all", 30.0, 2) in rows
-    assert ("slow", "all", 30.0, 2) not in rows
+    assert ("slow", "all", 30.0, 0) in rows
     slow = (columns["lane"] == "slow") & (columns["class"] == "all")
     assert columns["mean_kmh"][slow][0] == pytest.approx(3.6 * 21.5, abs=0.01)
     assert columns["per_hour"][slow][0] == pytest.approx(480.0)
+
+
+def test_intervals_in_which_nobody_came_by_have_rows_without_speeds() -> None:
+    columns = count_columns(replace(_result(), span_s=(-5.0, 125.0)), SummaryConfig(interval_s=30.0))
+    whole = (columns["lane"] == "all") & (columns["class"] == "all")
+    assert columns["t_start"][whole].tolist() == [-30.0, 0.0, 30.0, 60.0, 90.0, 120.0]
+    assert columns["count"][whole].tolist() == [0, 4, 2, 0, 0, 0]
+    assert columns["per_hour"][whole].tolist() == [0.0, 480.0, 240.0, 0.0, 0.0, 0.0]
+    assert np.isnan(columns["mean_kmh"][whole]).tolist() == [True, False, False, True, True, True]
+    keys = list(zip(*(columns[name].tolist() for name in ("lane", "class", "t_start")), strict=True))
+    assert len(keys) == len(set(keys)) == 6 * 6  # all, slow and fast lanes, cars and all classes, by interval
+
+
+def test_a_line_that_nobody_crosses_is_counted_too() -> None:
+    result = replace(_result(), lines=("aside", "middle"), span_s=(0.0, 60.0))
+    columns = count_columns(result, SummaryConfig(interval_s=30.0))
+    aside = columns["line"] == "aside"
+    assert columns["count"][aside].tolist() == [0, 0]
+    assert columns["lane"][aside].tolist() == ["all", "all"]
 
 
 def test_headways_are_from_front_to_front_and_gaps_from_rear_to_front() -> None:

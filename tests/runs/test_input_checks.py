@@ -66,8 +66,8 @@ def test_corners_taken_for_sizes_are_named_before_the_size_of_the_picture():
         check_detections(rows, config, "det")
 
 
-@pytest.mark.parametrize("outside", [1, 7, 19, 45])
-def test_boxes_that_reach_beyond_the_picture_are_told_of_and_tracked(outside):
+@pytest.mark.parametrize("outside", [1, 7, 19, 45, 51, 99, 100])
+def test_boxes_that_reach_beyond_the_picture_are_told_of_in_one_line(outside):
     """Detectors such as YOLOX guess what the picture cuts off: up to a fifth of their centres lie outside."""
     x = np.full(100, 600.0)
     x[:outside] = -90.0
@@ -76,17 +76,23 @@ def test_boxes_that_reach_beyond_the_picture_are_told_of_and_tracked(outside):
     rows = Detections.from_rows(t, names, boxes, np.full(100, 0.9), full, None)
     config = load_config("default", ["image.width=640", "image.height=480"])
     (warning,) = check_detections(rows, config, "det")
-    assert f"{outside} of 100 box centres lie outside the picture of 640 x 480 px" in warning
-
-
-def test_a_recording_of_another_picture_is_refused():
-    rows = Detections.from_rows(
-        *(np.arange(20) * 0.05, np.full(20, "rgb"), np.tile([900.0, 500.0, 60.0, 40.0], (20, 1))),
-        *(np.full(20, 0.9), np.zeros(20, dtype=bool), None),
+    assert (
+        f"det: {outside} of 100 box centres lie outside the picture of 640 x 480 px, up to 60 px" in warning
     )
-    config = load_config("default", ["image.width=640", "image.height=480"])
-    with pytest.raises(DataError, match=r"20 of 20 box centres lie outside .*; give the picture's size"):
-        check_detections(rows, config, "det")
+    assert ("give it: --image WIDTHxHEIGHT (in Python image=)" in warning) == (outside > 50)
+    assert ("nothing can be tracked" in warning) == (outside == 100)
+
+
+@pytest.mark.parametrize("size", [("--image", "640x480"), ("--config", "highway")], ids=["given", "preset"])
+def test_a_recording_of_another_picture_is_tracked_and_said_to_be_one_once(tmp_path, capsys, size):
+    path = tmp_path / "far.csv"
+    rows = [f"{k / 20},rgb,{1600 + k},800,60,40,.9" for k in range(40)]
+    path.write_text("t,sensor,left,top,width,height,score\n" + "\n".join(rows) + "\n")
+    assert main(["track", str(path), "--out", str(tmp_path / "run"), *size]) == 0
+    (line,) = [text for text in capsys.readouterr().err.splitlines() if "outside" in text]
+    assert "far.csv: 40 of 40 box centres lie outside" in line
+    assert "--image WIDTHxHEIGHT" in line
+    assert (tmp_path / "run" / "causal.csv").is_file()
 
 
 def test_a_recording_of_which_next_to_nothing_is_tracked_is_told_of(tmp_path, capsys):

@@ -52,7 +52,7 @@ def test_smoothed_states_are_the_least_squares_solution():
         )
         mean, P = means[0, 0], covariances[0, 0]
         states = (before[0][None, None], before[1][None, None], means, covariances)
-        records.append(FilterRecord(np.array([1]), model.F, *states))
+        records.append(FilterRecord(np.array([1]), model.F[None, None], *states))
     want_mean, want_covariance = dense_solve(prior, [m.F for m in models], shifts, noises, H, R, z)
     for k, got, covariance in smooth(records):
         scale = np.sqrt(np.diag(want_covariance[k]))
@@ -63,12 +63,12 @@ def test_smoothed_states_are_the_least_squares_solution():
 
 
 def test_tracks_come_and_go():
-    one, F = np.eye(5)[None, None], np.eye(5)
+    one = np.eye(5)[None, None]
 
     def record(ids):
         n = len(ids)
         mean, P = np.zeros((n, 1, 5)) + np.array(ids)[:, None, None], np.repeat(one, n, axis=0)
-        return FilterRecord(np.array(ids), F, mean, 2.0 * P, mean, P)
+        return FilterRecord(np.array(ids), P, mean, 2.0 * P, mean, P)
 
     out = {k: (mean, P) for k, mean, P in smooth([record([1]), record([1, 2]), record([2, 5]), record([])])}
     np.testing.assert_allclose(out[1][0][:, 0, 0], [1.0, 2.0])

@@ -12,6 +12,7 @@ from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.rates import median_rate_hz
 from jeat_graph.data.steps import check_steps
+from jeat_graph.data.tables.reading import ReadingOptions
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.drawing.movie.backgrounds import (
     EventBackground,
@@ -26,7 +27,6 @@ from jeat_graph.drawing.movie.totals import counters
 from jeat_graph.eval.counting import Line
 from jeat_graph.eval.zones import Zone
 from jeat_graph.io.events.layout import EventLayout
-from jeat_graph.io.reading import ReadingOptions
 from jeat_graph.runs.directory import ROAD_CAUSAL, ROAD_SMOOTHED, RUN_JSON, read_record
 
 #: Names within a simulated data set, as jeat-graph-sehn writes it: its segments, and their files.

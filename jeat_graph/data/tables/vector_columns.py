@@ -9,7 +9,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.arrow_arrays import first_refused, to_numpy
+from jeat_graph.data.tables.arrow_arrays import first_refused, to_numpy
 
 
 def read_vectors(column: Any, fault: Callable[[int, str], DataError]) -> FloatArray:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.frames import fill_frames, gap_times
+from jeat_graph.data.tables.frame_filling import fill_frames, gap_times
 
 
 @given(st.sets(st.integers(1, 40), max_size=9), st.integers(0, 60))

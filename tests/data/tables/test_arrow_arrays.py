@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.arrow_arrays import from_numpy, to_numpy
+from jeat_graph.data.tables.arrow_arrays import from_numpy, to_numpy
 
 KINDS = st.sampled_from(["<f8", "<f4", "<i8", "<i4", "<u1", "?"])
 SOME = KINDS.flatmap(lambda kind: arrays.arrays(kind, st.integers(0, 40)))

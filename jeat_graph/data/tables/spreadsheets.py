@@ -20,12 +20,12 @@ _IS_GUARDED = re.compile("'" + _FORMULA[1:])
 
 def guarded(text: str) -> str:
     """Return a text as it stands in a CSV file."""
-    return "'" + text if _IS_FORMULA.match(text) and not _is_number(text) else text
+    return "'" + text if _IS_FORMULA.match(text) and not is_number(text) else text
 
 
 def unguarded(text: str) -> str:
     """Return a text as it was before `guarded`."""
-    return text[1:] if _IS_GUARDED.match(text) and not _is_number(text[1:]) else text
+    return text[1:] if _IS_GUARDED.match(text) and not is_number(text[1:]) else text
 
 
 def guarded_column(column: Any) -> Any:
@@ -39,8 +39,8 @@ def guarded_column(column: Any) -> Any:
     return pa.chunked_array([pa.array(texts, column.type)])
 
 
-def _is_number(text: str) -> bool:
-    """Whether a text is a number, such as -1, which is no formula."""
+def is_number(text: str) -> bool:
+    """Tell whether a text is a number; one such as -1 is no formula."""
     try:
         float(text)
     except ValueError:

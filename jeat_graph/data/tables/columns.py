@@ -1,7 +1,8 @@
-"""Times, boxes, classes and videos of a file's table, by whichever of their names its columns go."""
+"""Times, boxes, classes and videos of a table, by whichever of their names its columns go."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray, TextArray
 from jeat_graph.data.box_text import KNOWN, sides_of
-from jeat_graph.data.class_columns import CLASS_COLUMNS, said_classes
+from jeat_graph.data.class_columns import CLASS_COLUMNS, name_classes, said_classes
 from jeat_graph.data.column_names import (
     BOX,
     BOX_TEXT,
@@ -21,16 +22,14 @@ from jeat_graph.data.column_names import (
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_numbers import first_frame, split_picture_name
 from jeat_graph.data.notes import note
+from jeat_graph.data.tables.frame_filling import check_rate
+from jeat_graph.data.tables.reading import Reading
+from jeat_graph.data.tables.spreadsheets import is_number
 from jeat_graph.data.time_units import in_seconds
 from jeat_graph.data.videos import choose_video
-from jeat_graph.io.class_names import name_classes, names_by_number
-from jeat_graph.io.frames import check_rate
-from jeat_graph.io.reading import Reading
 
 if TYPE_CHECKING:
-    from jeat_graph.io.file_table import FileTable
-
-_LISTS_COUNT_FROM = 0
+    from jeat_graph.data.tables.file_table import FileTable
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,17 +82,12 @@ def times_of(table: FileTable, how: Reading) -> Times:
     name, unit = standing_in(table.names, ["t"])[0], how.time_unit
     if name in TIME_COLUMNS:
         if unit not in ("s", TIME_COLUMNS[name]):
-            raise DataError(
-                f"column {name!r} is in {TIME_COLUMNS[name]}, but --time-unit says {unit}; leave it out",
-                table.path,
-            )
+            raise _another_unit(table, f"column {name!r} is in {TIME_COLUMNS[name]}", unit)
         return Times(in_seconds(table.number(name), TIME_COLUMNS[name]))
     if name not in FRAME_COLUMNS:
         numbers, seconds = table.times(name, how.rate_hz)
         if seconds and unit != "s":
-            raise DataError(
-                f"column {name!r} holds dates, but --time-unit says {unit}; leave it out", table.path
-            )
+            raise _another_unit(table, f"column {name!r} holds dates", unit)
         return Times(numbers if seconds else in_seconds(numbers, unit))
     frames = _frame_numbers(table, name)
     first = first_frame(frames, how.first_frame)
@@ -107,7 +101,7 @@ def times_of(table: FileTable, how: Reading) -> Times:
             )
         return Times(np.zeros(0), frames, first)
     if how.first_frame is None and first and len(frames):
-        note(f"{table.path}: frames count from 1, for there is no frame 0 (--first-frame 0 says otherwise)")
+        note(f"{table.title}: frames count from 1, for there is no frame 0 (--first-frame 0 says otherwise)")
     return Times(np.asarray((frames - first) / check_rate(how.rate_hz, table.path)), frames, first)
 
 
@@ -131,17 +125,24 @@ def boxes_of(table: FileTable) -> FloatArray:
     return sides_to_boxes(names, boxes)
 
 
-def classes_of(table: FileTable, how: Reading) -> TextArray | None:
+def classes_of(table: FileTable, names: Mapping[int, str] | None) -> TextArray | None:
     """Return the classes (R,) of a table's rows, empty where unknown; None where no row has one.
 
-    Raises:
-        DataError: a list of names that cannot be read.
+    Args:
+        table: maybe with columns that say classes.
+        names: of classes by number, for a table that numbers them; or None.
     """
     found = {name: table.text(name, blank_ok=True) for name in CLASS_COLUMNS if name in table}
     classes = said_classes(found)
     if classes is None or not (classes != "").any():
         return None
-    return name_classes(classes, names_by_number(how.class_names, table.path, _LISTS_COUNT_FROM))
+    return name_classes(classes, names)
+
+
+def _another_unit(table: FileTable, found: str, unit: str) -> DataError:
+    """The error of times that have a unit themselves, and get another one from the user."""
+    said = "time_unit" if table.path is None else "--time-unit"
+    return DataError(f"{found}, but {said} says {unit}; leave it out", table.path)
 
 
 def _frame_numbers(table: FileTable, name: str) -> IntArray:
@@ -158,6 +159,8 @@ def _picture_names(table: FileTable, name: str) -> tuple[list[str], list[int]] |
         table.whole(name)
     except DataError:
         texts = [] if table.blank(name).any() else table.values(name)
+        if any(isinstance(text, str) and is_number(text) for text in texts):
+            raise  # numbers, but not all of them whole
         found = [split_picture_name(text) if isinstance(text, str) else None for text in texts]
         there = [one for one in found if one is not None]
         if not there or len(there) < len(found):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import SupportsFloat
 
 import numpy as np
 
@@ -14,20 +15,24 @@ from jeat_graph.data.errors import DataError
 _MOST_FILLED = 5_000_000
 # So many frames share a step by chance in one case of 2^9 at most.
 _ENOUGH_FOR_A_STEP = 10
+#: What scores may be (`scale_scores`).
+SCORE_SCALES = ("unit", "percent", "logistic")
 
 
-def check_rate(rate_hz: float, path: str | Path) -> float:
+def check_rate(rate_hz: float, path: str | Path | None) -> float:
     """Return a frame rate (Hz).
 
     Raises:
-        DataError: it is not positive and finite.
+        DataError: it is no number, or not positive and finite.
     """
+    if not isinstance(rate_hz, SupportsFloat):  # of a user in Python
+        raise DataError(f"the frame rate must be a number (Hz), not {rate_hz!r:.40}", path)
     if not (math.isfinite(rate_hz) and rate_hz > 0):
         raise DataError(f"the frame rate must be positive, got {rate_hz} Hz", path)
     return float(rate_hz)
 
 
-def fill_frames(frames: IntArray, path: str | Path, last: int | None = None) -> IntArray:
+def fill_frames(frames: IntArray, path: str | Path | None, last: int | None = None) -> IntArray:
     """Return all frames from the first to the last, also those in which nothing was found.
 
     Where at least ten frames occur and all of them are n, 2n, 3n, … apart, every n-th frame counts: the
@@ -35,7 +40,7 @@ def fill_frames(frames: IntArray, path: str | Path, last: int | None = None) -> 
 
     Args:
         frames: (R,) frame numbers that occur, in any order, several times or not.
-        path: the file, for messages.
+        path: the file, for messages, if there is one.
         last: the recording's last frame, if it is known; the first one is then taken to be 1.
 
     Returns:
@@ -60,7 +65,7 @@ def fill_frames(frames: IntArray, path: str | Path, last: int | None = None) -> 
     return np.arange(first, end + 1, step, dtype=np.int64)
 
 
-def gap_times(times: FloatArray, rate_hz: float, path: str | Path) -> FloatArray:
+def gap_times(times: FloatArray, rate_hz: float, path: str | Path | None) -> FloatArray:
     """Return the times of scans that are missing between the first and the last, by the sensor's rate.
 
     A gap of about n periods gets n - 1 times, evenly spaced, so that jitter and drift do no harm.
@@ -68,7 +73,7 @@ def gap_times(times: FloatArray, rate_hz: float, path: str | Path) -> FloatArray
     Args:
         times: (R,) times that occur (s), in any order.
         rate_hz: rate of the scans (Hz).
-        path: the file, for messages.
+        path: the file, for messages, if there is one.
 
     Raises:
         DataError: the gaps are too wide to be those of a recording.
@@ -88,13 +93,13 @@ def gap_times(times: FloatArray, rate_hz: float, path: str | Path) -> FloatArray
     return np.asarray(seen[which] + gaps[which] * nth / (count[which] + 1), dtype=np.float64)
 
 
-def scale_scores(scores: FloatArray, how: str, path: str | Path) -> FloatArray:
+def scale_scores(scores: FloatArray, how: str, path: str | Path | None) -> FloatArray:
     """Bring scores (R,) to [0, 1].
 
     Args:
         scores: as the file has them.
         how: `unit` (as they are), `percent` (0…100), or `logistic` (any number s becomes 1/(1 + exp(-s))).
-        path: the file, for messages.
+        path: the file, for messages, if there is one.
 
     Raises:
         DataError: `how` is none of these.

@@ -1,4 +1,4 @@
-"""Columns of a file by name, with errors that name the line or the row.
+"""Columns of a file or a data frame by name, with errors that name the line or the row.
 
 A `FileTable` keeps its columns as they came and converts one when it is asked for, so that each reader says
 in one place which columns it needs, of which kind, and what may be blank.
@@ -16,37 +16,40 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.tables.arrow_arrays import first_refused, from_numpy, to_numpy
+from jeat_graph.data.tables.spreadsheets import is_number, unguarded
+from jeat_graph.data.tables.vector_columns import read_vectors
 from jeat_graph.data.time_text import all_seconds, looks_like_time
-from jeat_graph.io.arrow_arrays import first_refused, from_numpy, to_numpy
-from jeat_graph.io.headers import is_number
-from jeat_graph.io.spreadsheets import unguarded
-from jeat_graph.io.vector_columns import read_vectors
 
-_LARGEST_EXACT = 2.0**53  # beyond it a float cannot tell neighbouring whole numbers apart
+#: Beyond it a float cannot tell neighbouring whole numbers apart.
+LARGEST_EXACT = 2.0**53
 
 
 class FileTable:
-    """Columns of one file by name.
+    """Columns of one file, or of a data frame, by name.
 
     Args:
-        path: the file, for messages.
+        path: the file, for messages; None of a data frame.
         columns: Arrow arrays of equal length by name; null where a field is blank.
         line_of: gives the file's line number of a row, or None where a file has rows but no lines.
         decimal_comma: whether numbers may be written `1,5`, as they are where `;` stands between fields.
+        first_row: number of the first row in messages: 1 of a file that has no lines, 0 of a data frame.
     """
 
     def __init__(
         self,
-        path: Path,
+        path: Path | None,
         columns: dict[str, Any],
         line_of: Callable[[int], int] | None = None,
         *,
         decimal_comma: bool = False,
+        first_row: int = 1,
     ) -> None:
         self.path = path
         self._columns = columns
         self._line_of = line_of
         self._decimal_comma = decimal_comma
+        self._first_row = first_row
         self._row_of: Callable[[int], int] = int
 
     def __len__(self) -> int:
@@ -60,10 +63,15 @@ class FileTable:
         """Names of the columns, in the file's order."""
         return list(self._columns)
 
+    @property
+    def title(self) -> str:
+        """What the table is called in notes: the file, or `the table`."""
+        return "the table" if self.path is None else str(self.path)
+
     def error(self, row: int, message: str) -> DataError:
-        """Make an error that points at a row (from 0): by line number (CSV), else as `row N` from 1."""
+        """Make an error that points at a row (from 0): by line number (CSV), else as `row N`."""
         if self._line_of is None:
-            return DataError(f"row {self._row_of(int(row)) + 1}: {message}", self.path)
+            return DataError(f"row {self._row_of(int(row)) + self._first_row}: {message}", self.path)
         return DataError(message, self.path, self._line_of(int(row)))
 
     def blank(self, name: str) -> BoolArray:
@@ -102,7 +110,7 @@ class FileTable:
 
         # Parquet has rows but no lines; those of a part are counted in the whole.
         own = line if line_of is not None else None
-        part = FileTable(self.path, taken, own, decimal_comma=self._decimal_comma)
+        part = FileTable(self.path, taken, own, decimal_comma=self._decimal_comma, first_row=self._first_row)
         part._row_of = lambda row: self._row_of(int(rows[row]))
         return part
 
@@ -194,7 +202,7 @@ class FileTable:
                 pass
         values = self.number(name, blank_ok=blank_ok)
         values = np.where(is_null, 0.0, values)
-        good = (values == np.rint(values)) & (np.abs(values) <= _LARGEST_EXACT)
+        good = (values == np.rint(values)) & (np.abs(values) <= LARGEST_EXACT)
         if not good.all():
             row = int(np.argmin(good))
             raise self.error(row, f"{name} must be a whole number, got {values[row]:g}")
@@ -275,11 +283,11 @@ class FileTable:
             return DataError(f"column {name} must hold numbers, not {column.type}", self.path)
         good = first_refused(column, lambda part: _cast(part, self._decimal_comma))
         text = column[good].as_py()
-        return self.error(good, f"{name} must be a number, got {text[:40]!r}{_advice(text)}")
+        return self.error(good, f"{name} must be a number, got {text[:40]!r}{advice_on(text)}")
 
 
-def _advice(text: str) -> str:
-    """What to do about a field that is no number, where that can be told."""
+def advice_on(text: str) -> str:
+    """Say what to do about a field that is no number, where that can be told."""
     if re.fullmatch(r"\s*[\d.,]+\s*%\s*", text):
         return "; leave the sign away, and give --score-scale percent"
     return ""
@@ -292,6 +300,8 @@ def _cast(column: Any, decimal_comma: bool = False) -> Any:
 
     if decimal_comma:
         column = compute.replace_substring(column, ",", ".")
+    if pa.types.is_integer(column.type):
+        return column.cast(pa.float64(), safe=False)  # times in ns since 1970 are beyond exact floats
     try:
         return column.cast(pa.float64())
     except pa.ArrowInvalid:

@@ -7,19 +7,27 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypedDict
 
+from jeat_graph.data.class_columns import LISTS_COUNT_FROM, listed_names
+from jeat_graph.data.errors import DataError
 
-class ReadingOptions(TypedDict, total=False):
-    """The fields of `Reading` as keywords; see there."""
+
+class TableOptions(TypedDict, total=False):
+    """The fields of `Reading` as keywords, but for `image`, which a configuration has too; see there."""
 
     rate_hz: float | None
     time_unit: str
     first_frame: int | None
     video: str | int | None
     class_names: str | Path | Sequence[str] | Mapping[int, str] | None
-    image: tuple[float, float] | None
     score_scale: str
     fill_empty: bool
     images: str | Path | None
+
+
+class ReadingOptions(TableOptions, total=False):
+    """The fields of `Reading` as keywords; see there."""
+
+    image: tuple[float, float] | None
 
 
 @dataclass(frozen=True)
@@ -31,7 +39,8 @@ class Reading:
         time_unit: unit of the column `t` where it holds numbers: `s`, `ms`, `us` or `ns`.
         first_frame: number of a recording's first frame, 0 or 1; None for the rule of `data.frame_numbers`.
         video: name or number of the one that is read of a file's several videos.
-        class_names: names of classes that a file says by number (`io.class_names`).
+        class_names: names of classes that a file says by number (`io.class_names`): a list, a mapping, names
+            with commas between them, or a file.
         image: width and height of the picture (px), for boxes in shares of it.
         score_scale: `unit` if scores are in [0, 1], `percent`, or `logistic` for raw scores of any size.
         fill_empty: whether frames without boxes are empty scans rather than no scans.
@@ -47,3 +56,18 @@ class Reading:
     score_scale: str = "unit"
     fill_empty: bool = True
     images: str | Path | None = None
+
+    def listed_classes(self) -> dict[int, str] | None:
+        """Return the names of classes by number, for a table that is no file; None where nobody says them.
+
+        Raises:
+            DataError: they stand in a file, which is read elsewhere (`io.class_names`).
+        """
+        said = self.class_names
+        if isinstance(said, str) and "," in said:
+            said = [name.strip() for name in said.split(",")]
+        if isinstance(said, str | Path):
+            raise DataError(
+                "names of classes are a list or a mapping here; jeat_graph.track reads files of them"
+            )
+        return None if said is None else listed_names(said, LISTS_COUNT_FROM)

@@ -1,0 +1,84 @@
+// Which track a box belongs to: a log likelihood ratio for each pair; the formulas are in
+// association/likelihood_ratio.py.
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "association/assignment.hpp"
+#include "filters/box_sides.hpp"
+
+namespace jeat::association {
+
+using filters::ModelConstants;
+using filters::Sides;
+using filters::SidesExpected;
+
+inline constexpr double kLeastPDetect = 0.01, kMostPDetect = 0.99, kLeastPosterior = 0.02;
+
+// What holds for all pairs of one scan.
+struct ScanTerms {
+    double student_constant, normal_constant, log_body, log_tail, log_clutter;
+
+    ScanTerms(double leftovers, double picture_area, const ModelConstants& c) {
+        const double nu = c.degrees_of_freedom;
+        student_constant = log_gamma((nu + 4.0) / 2.0) - log_gamma(nu / 2.0) - 2.0 * log_of(nu * kPi);
+        normal_constant = -2.0 * filters::kLog2Pi;
+        log_body = log1p_of(-c.outlier_share);
+        log_tail = log_of(c.outlier_share);
+        log_clutter = log_of((leftovers + c.clutter_prior) / (picture_area * c.clutter_size_area));
+    }
+};
+
+// ln of the scores' likelihood ratio of a track to clutter; q is the box's probability by score.
+inline double score_log_ratio(double real, double q, const ModelConstants& c) {
+    const double r = std::max(real, kLeastPosterior), clutter = c.clutter_precision;
+    const double of_track = r * q + (1.0 - r) * (1.0 - q) + c.score_floor;
+    const double of_clutter = clutter * q + (1.0 - clutter) * (1.0 - q) + c.score_floor;
+    return log_of(of_track / of_clutter);
+}
+
+inline constexpr double kImpossible = -1e9;
+
+// ln p(y) where an occluder cuts one side, or has cut it so far, and the other three fit.
+inline double cut_log_density(const std::array<double, 4>& y, const SidesExpected& expected, const ModelConstants& c) {
+    double out = kImpossible;
+    for (int axis = 0; axis < 2; ++axis) {
+        const filters::Pair2 &S = expected.S[axis], &across = expected.S[1 - axis];
+        const double left = y[2 * axis], right = y[2 * axis + 1], size = expected.size[axis];
+        const double d2 = across.squared_distance(y[2 - 2 * axis], y[3 - 2 * axis]);
+        if (d2 > c.cut_gate) continue;
+        const double whole = -0.5 * d2 - 0.5 * log_of(across.determinant()) - 1.5 * filters::kLog2Pi - log_of(size);
+        const auto with = [&](double other, double variance, double inwards) {
+            const double alone = other * other / variance;
+            if (inwards >= size || inwards <= -c.most_uncovered * size || d2 + alone > c.cut_gate) return;
+            const double share = log_of(inwards > 0.0 ? c.cut_share : c.uncovered_share);
+            out = log_add(out, share + whole - 0.5 * alone - 0.5 * log_of(variance));
+        };
+        with(right, S.rr, left);
+        with(left, S.ll, -right);
+    }
+    return out;
+}
+
+// ln p(y) of a pair, or kImpossible where it lies outside every gate.
+inline double sides_log_density(const Sides& box, const SidesExpected& expected, const ScanTerms& terms,
+                                const ModelConstants& c) {
+    const auto y = filters::side_innovations(box, expected.box);
+    const double d2 = filters::squared_distance(y, expected.S), wide = filters::squared_distance(y, expected.wide);
+    const double cut = cut_log_density(y, expected, c);
+    double out = cut;
+    if (std::min(d2, c.outlier_gate * wide) > c.gate) return out;
+    const double nu = c.degrees_of_freedom;
+    const double body = terms.student_constant - 0.5 * expected.log_det - (nu + 4.0) / 2.0 * log1p_of(d2 / nu);
+    const double tail = terms.normal_constant - 0.5 * expected.log_det_wide - 0.5 * wide;
+    return log_add(out, log_add(terms.log_body + body, terms.log_tail + tail));
+}
+
+// How far a box's left side may lie from the expected one at most.
+inline double reach(const SidesExpected& expected, const ModelConstants& c) {
+    const double whole = std::max(expected.S[0].ll, expected.wide[0].ll / c.outlier_gate);
+    return std::max(std::max(1.0, c.most_uncovered) * expected.size[0], std::sqrt(c.gate * whole));
+}
+
+}  // namespace jeat::association

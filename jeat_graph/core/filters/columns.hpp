@@ -1,0 +1,41 @@
+// Tables of columns of one length, one row a track: what all of them can do.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+namespace jeat::filters {
+
+// A table has a method `columns(visit)` that calls visit(name, column, width) for each column, where width is the
+// number of elements in a row.
+
+template <class Table> void append_rows(Table& table, std::size_t old_rows, std::size_t more) {
+    table.columns([&](const char*, auto& column, std::size_t width) { column.resize((old_rows + more) * width); });
+}
+
+// Keep the rows that are marked, in order.
+template <class Table> void keep_rows(Table& table, const std::vector<std::uint8_t>& kept) {
+    table.columns([&](const char*, auto& column, std::size_t width) {
+        std::size_t to = 0;
+        for (std::size_t from = 0; from < kept.size(); ++from) {
+            if (!kept[from]) continue;
+            if (to != from)
+                std::copy(column.begin() + from * width, column.begin() + (from + 1) * width, column.begin() + to * width);
+            ++to;
+        }
+        column.resize(to * width);
+    });
+}
+
+// One column more of each sensor, of zeros.
+template <class T> void widen_rows(std::vector<T>& column, std::size_t rows, std::size_t sensors, std::size_t each) {
+    std::vector<T> wide(rows * (sensors + 1) * each, T{});
+    for (std::size_t r = 0; r < rows; ++r)
+        std::copy(column.begin() + r * sensors * each, column.begin() + (r + 1) * sensors * each,
+                  wide.begin() + r * (sensors + 1) * each);
+    column = std::move(wide);
+}
+
+}  // namespace jeat::filters

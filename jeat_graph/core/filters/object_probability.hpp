@@ -1,0 +1,166 @@
+// What a track is: the posterior over its hypotheses; the formulas are in filters/object_probability.py.
+#pragma once
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "filters/evidence.hpp"
+#include "math.hpp"
+
+namespace jeat::filters {
+
+inline constexpr double kLeastApart = 1e-3, kLeastSum = 1e-9, kMostLogOdds = 30.0;
+inline constexpr int kRounds = 2;
+inline constexpr double kLeastMisses = 0.2, kLeastLooks = 1.0;
+
+struct SensorBelief {
+    std::vector<double> p_detect, unseen, indifference, prior_odds;
+    double noise_share;
+
+    void widen(const ModelConstants& c) {
+        p_detect.push_back(c.p_detect);
+        unseen.push_back(c.unseen_share);
+        indifference.push_back(0.0);
+        prior_odds.push_back(0.0);
+    }
+};
+
+// What one track is; of each sensor the probability that it never sees it.
+struct Posterior {
+    double log_odds, noise;
+    std::vector<double> unseen;
+};
+
+class PosteriorRule {
+public:
+    PosteriorRule(const SensorBelief& sensors, const ModelConstants& c)
+        : sensors_(sensors), c_(c), seen_(sensors.p_detect.size()), shared_(seen_.size()), scores_(seen_.size()) {
+        for (const double p : sensors.p_detect) {
+            a_.push_back(p * c.p_detect_strength);
+            b_.push_back((1.0 - p) * c.p_detect_strength);
+            log_beta_.push_back(log_beta(a_.back(), b_.back()));
+        }
+        for (const double g : sensors.unseen) {
+            log_unseen_.push_back(log_of(g));
+            log_not_unseen_.push_back(log1p_of(-g));
+        }
+        log_chance_ = log_of(c.chance_hit);
+        log_no_chance_ = log1p_of(-c.chance_hit);
+        log_shared_ = log_of(c.shared_false);
+        log_not_shared_ = log1p_of(-c.shared_false);
+        log_gamma_strength_ = log_gamma(c.p_detect_strength);
+        noise_odds_ = log_of(sensors.noise_share / (1.0 - sensors.noise_share));
+        out_.unseen.resize(seen_.size());
+    }
+
+    const Posterior& operator()(const Evidence& e, std::size_t row) {
+        const std::size_t S = e.sensors, first = row * S;
+        double real = 0.0, others = 0.0, priors = 0.0, best_score = -kMostLogOdds;
+        bool any = false;
+        for (std::size_t s = 0; s < S; ++s) {
+            const double h = e.hits[first + s], m = e.misses[first + s];
+            seen_[s] = log_beta(a_[s] + h, b_[s] + m) - log_beta_[s];
+            const double chance = h * log_chance_ + m * log_no_chance_;
+            const double never = log_unseen_[s] + chance;
+            const double object = log_add(never, log_not_unseen_[s] + seen_[s]);
+            out_.unseen[s] = exp_of(never - object);
+            shared_[s] = log_add(log_not_shared_ + chance, log_shared_ + seen_[s]);
+            const bool found = e.found[first + s];
+            scores_[s] = found ? sensors_.indifference[s] + score(e, first + s) : 0.0;
+            best_score = any ? std::max(best_score, scores_[s]) : scores_[s];
+            any = true;
+            real += object + scores_[s];
+            if (found) shared_[s] += sensors_.prior_odds[s], priors += sensors_.prior_odds[s];
+            others += shared_[s];
+        }
+        const double doubt = 1.0 / (1.0 + exp_of(clamp(best_score - c_.duplicate_log_odds, -kMostLogOdds, kMostLogOdds)));
+        real += c_.duplicate_weight * doubt * log_of(std::max(1.0 - e.overlap[row], kLeastApart));
+        double false_object = -std::numeric_limits<double>::infinity();
+        for (std::size_t s = 0; s < S; ++s)
+            if (e.found[first + s]) false_object = log_add(false_object, others - shared_[s] + seen_[s]);
+        const double noise = noise_odds_ - e.gained[row] + priors - sensors_.prior_odds[e.owner[row]];
+        const double not_real = log_add(false_object, noise);
+        out_.log_odds = real - not_real;
+        out_.noise = exp_of(noise - not_real);
+        return out_;
+    }
+
+private:
+    double score(const Evidence& e, std::size_t at) const {
+        const double mean = e.total[at] / std::max(e.total_weight[at], kLeastSum);
+        return c_.peak_share * e.peak[at] + (1.0 - c_.peak_share) * mean;
+    }
+
+    const SensorBelief& sensors_;
+    const ModelConstants& c_;
+    std::vector<double> a_, b_, log_beta_, log_unseen_, log_not_unseen_, seen_, shared_, scores_;
+    double log_chance_, log_no_chance_, log_shared_, log_not_shared_, log_gamma_strength_, noise_odds_;
+    Posterior out_;
+};
+
+// Sums over tracks from which the sensors are learnt.
+struct SensorSums {
+    std::vector<double> hits, looks, unseen, seeable, real, not_real;
+    double noise = 0.0, not_object = 0.0;
+
+    explicit SensorSums(std::size_t S)
+        : hits(S, 0.0), looks(S, 0.0), unseen(S, 0.0), seeable(S, 0.0), real(S, 0.0), not_real(S, 0.0) {}
+
+    void add(const Evidence& e, PosteriorRule& rule, const ModelConstants& c) {
+        for (std::size_t row = 0; row < e.size(); ++row) {
+            const Posterior& belief = rule(e, row);
+            const double p = expit(belief.log_odds);
+            double missed = 0.0;
+            const double trust = clamp(e.detections[row] / c.weight_hits, c.weight_bounds.low, c.weight_bounds.high);
+            for (std::size_t s = 0; s < e.sensors; ++s) {
+                const std::size_t at = row * e.sensors + s;
+                const double h = e.hits[at], n = h + e.misses[at];
+                missed += e.misses[at];
+                const double weight = p * (1.0 - belief.unseen[s]) * std::min(1.0, c.looks_count / std::max(n, kLeastSum));
+                hits[s] += weight * h;
+                looks[s] += weight * n;
+                if (n > kLeastLooks) {
+                    unseen[s] += p * belief.unseen[s];
+                    seeable[s] += p;
+                }
+                if (e.found[at]) {
+                    real[s] += trust * p;
+                    not_real[s] += trust * (1.0 - p);
+                }
+            }
+            const bool grown = e.last_s[row] > e.born_s[row] || e.gained[row] > 0.0;
+            if (grown || missed > kLeastMisses) {
+                noise += (1.0 - p) * belief.noise;
+                not_object += 1.0 - p;
+            }
+        }
+    }
+};
+
+inline double beta_share(double hits, double of, double prior, double count) {
+    return (hits + count * prior) / (of + count);
+}
+
+inline void learn_sensors(const Evidence& ended, const Evidence& living, SensorBelief& sensors, const ModelConstants& c) {
+    if (ended.size() + living.size() == 0) return;
+    for (int round = 0; round < kRounds; ++round) {
+        PosteriorRule rule(sensors, c);
+        SensorSums sums(sensors.p_detect.size());
+        sums.add(ended, rule, c);
+        sums.add(living, rule, c);
+        SensorBelief next = sensors;
+        for (std::size_t s = 0; s < sensors.p_detect.size(); ++s) {
+            next.p_detect[s] = clamp(beta_share(sums.hits[s], sums.looks[s], c.p_detect, c.p_detect_count),
+                                     c.p_detect_bounds.low, c.p_detect_bounds.high);
+            next.unseen[s] = clamp(beta_share(sums.unseen[s], sums.seeable[s], c.unseen_share, c.sensor_count),
+                                   c.unseen_bounds.low, c.unseen_bounds.high);
+            next.prior_odds[s] = log_of((sums.real[s] + c.sensor_count) / (sums.not_real[s] + c.sensor_count));
+        }
+        next.noise_share = clamp(beta_share(sums.noise, sums.not_object, c.noise_share, c.sensor_count),
+                                 c.noise_bounds.low, c.noise_bounds.high);
+        sensors = next;
+    }
+}
+
+}  // namespace jeat::filters

@@ -1,0 +1,83 @@
+// At which score a sensor's box is as likely real as not; the formulas are in filters/score_calibration.py.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "association/assignment.hpp"
+#include "filters/boxes.hpp"
+#include "filters/model_constants.hpp"
+
+namespace jeat::filters {
+
+inline constexpr int kScoreBins = 47;
+inline constexpr double kFirstLogit = -4.5, kLogitStep = 0.25, kBandwidth = 0.35, kBestCount = 5.0;
+
+struct RepeatCounts {
+    std::array<double, kScoreBins> boxes{}, repeated{};
+    std::int64_t scans = 0;
+    std::vector<Sides> last_boxes;
+    std::vector<double> last_logits;
+    std::vector<std::uint8_t> last_had_before;
+    bool has_last = false;
+
+    void count(const std::vector<Sides>& now, const std::vector<double>& logits, const ModelConstants& c) {
+        std::vector<std::uint8_t> had_before(now.size(), 0), has_after(last_boxes.size(), 0);
+        if (has_last && !now.empty() && !last_boxes.empty()) {
+            const ByLeft index(now);
+            std::vector<association::Pair> pairs;
+            for (std::size_t i = 0; i < last_boxes.size(); ++i)
+                index.near(last_boxes[i], [&](std::size_t j) {
+                    const double overlap = intersection_over_union(last_boxes[i], now[j]);
+                    if (overlap >= c.repeat_overlap) pairs.push_back({i, j, overlap});
+                });
+            association::Assignment assignment;
+            for (const std::size_t k : assignment.solve(pairs, last_boxes.size(), now.size()))
+                has_after[pairs[k].row] = had_before[pairs[k].column] = 1;
+        }
+        if (has_last && scans > 1) {
+            for (std::size_t i = 0; i < last_boxes.size(); ++i) {
+                const bool again = has_after[i] && last_had_before[i];
+                for (int g = 0; g < kScoreBins; ++g) {
+                    const double distance = (kFirstLogit + g * kLogitStep - last_logits[i]) / kBandwidth;
+                    if (std::abs(distance) > 8.0) continue;  // less than 1e-13 of the whole
+                    const double share = exp_of(-0.5 * distance * distance) * (kLogitStep / kBandwidth / std::sqrt(2.0 * kPi));
+                    boxes[g] += share;
+                    if (again) repeated[g] += share;
+                }
+            }
+        }
+        scans += 1;
+        last_boxes = now;
+        last_logits = logits;
+        last_had_before = std::move(had_before);
+        has_last = true;
+    }
+
+    double half_as_many(const ModelConstants& c) const {
+        double total = 0.0;
+        for (const double b : boxes) total += b;
+        if (total <= 0.0) return 0.0;
+        double above = 0.0, best = 0.0, best_repeated = 0.0;
+        for (int g = kScoreBins - 1; g >= 0; --g) {
+            above += boxes[g];
+            if (g < kScoreBins - 1 && above > c.best_share * total) break;
+            best += boxes[g];
+            best_repeated += repeated[g];
+        }
+        const double top = (best_repeated + kBestCount * c.repeat_share) / (best + kBestCount);
+        for (int g = kScoreBins - 1; g >= 0; --g) {
+            const double share = (repeated[g] + c.repeat_count * c.repeat_share * top) / (boxes[g] + c.repeat_count) / top;
+            if (share < 0.5) return kFirstLogit + g * kLogitStep;
+        }
+        return kFirstLogit;
+    }
+
+    double indifference(const ModelConstants& c) const {
+        const double z = clamp(half_as_many(c), c.indifference_bounds.low, c.indifference_bounds.high);
+        return -(c.indifference_offset + c.indifference_slope * z);
+    }
+};
+
+}  // namespace jeat::filters

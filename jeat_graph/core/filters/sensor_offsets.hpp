@@ -1,0 +1,87 @@
+// What the boxes of two detectors differ by; the formulas are in filters/sensor_offsets.py.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "filters/boxes.hpp"
+#include "filters/model_constants.hpp"
+#include "math.hpp"
+
+namespace jeat::filters {
+
+struct OffsetSums {
+    std::size_t sensors = 0;
+    std::vector<double> weight, total;  // (S, S), (S, S, 4)
+
+    void widen() {
+        OffsetSums wide;
+        wide.sensors = sensors + 1;
+        wide.weight.assign(wide.sensors * wide.sensors, 0.0);
+        wide.total.assign(wide.weight.size() * 4, 0.0);
+        for (std::size_t i = 0; i < sensors; ++i)
+            for (std::size_t j = 0; j < sensors; ++j) {
+                wide.weight[i * wide.sensors + j] = weight[i * sensors + j];
+                for (int k = 0; k < 4; ++k)
+                    wide.total[(i * wide.sensors + j) * 4 + k] = total[(i * sensors + j) * 4 + k];
+            }
+        *this = std::move(wide);
+    }
+
+    // The mean difference of two sensors so far.
+    std::array<double, 4> mean(std::size_t i, std::size_t j, const ModelConstants& c) const {
+        const std::size_t at = i * sensors + j;
+        std::array<double, 4> out;
+        for (int k = 0; k < 4; ++k) out[k] = total[at * 4 + k] / (weight[at] + c.offset_count);
+        return out;
+    }
+
+    void count(std::size_t i, std::size_t j, const std::array<double, 4>& d, const std::array<double, 4>& expected,
+               const ModelConstants& c) {
+        double far = 0.0;
+        for (int k = 0; k < 4; ++k) far = std::max(far, std::abs(d[k] - expected[k]));
+        const double share = std::min(1.0, c.offset_clip / std::max(far, 1e-12));
+        const std::size_t at = i * sensors + j, back = j * sensors + i;
+        weight[at] += share;
+        weight[back] += share;
+        for (int k = 0; k < 4; ++k) {
+            total[at * 4 + k] += share * d[k];
+            total[back * 4 + k] -= share * d[k];
+        }
+    }
+
+    // By how much a sensor's boxes are off the common frame.
+    std::array<double, 4> offset(std::size_t i, const std::vector<double>& log_side_variance,
+                                 const ModelConstants& c) const {
+        double whole = 0.0;
+        std::array<double, 4> out{};
+        std::vector<double> precision(sensors, 0.0);
+        for (std::size_t j = 0; j < sensors; ++j) {
+            double compared = 0.0;
+            for (std::size_t k = 0; k < sensors; ++k) compared += weight[j * sensors + k];
+            precision[j] = compared > 0.0 ? exp_of(-log_side_variance[j]) : 0.0;
+            whole += precision[j];
+        }
+        for (std::size_t j = 0; j < sensors; ++j) {
+            const auto d = mean(i, j, c);
+            for (int k = 0; k < 4; ++k) out[k] += d[k] * (precision[j] / std::max(whole, 1e-12));
+        }
+        return out;
+    }
+};
+
+inline std::array<double, 4> difference(const Sides& a, const Sides& b, double moved_x, double moved_y) {
+    return {((a.left + a.right - b.left - b.right) / 2.0 - moved_x) / std::sqrt(a.width() * b.width()),
+            ((a.top + a.bottom - b.top - b.bottom) / 2.0 - moved_y) / std::sqrt(a.height() * b.height()),
+            log_of(a.width() / b.width()), log_of(a.height() / b.height())};
+}
+
+inline Sides corrected(const Sides& box, const std::array<double, 4>& offset) {
+    const double x = (box.left + box.right) / 2.0 - offset[0] * box.width();
+    const double y = (box.top + box.bottom) / 2.0 - offset[1] * box.height();
+    const double w = box.width() * exp_of(-offset[2]) / 2.0, h = box.height() * exp_of(-offset[3]) / 2.0;
+    return {x - w, y - h, x + w, y + h};
+}
+
+}  // namespace jeat::filters

@@ -1,0 +1,174 @@
+// Singer's motion model of one axis, [p, v, a, l, r]; the formulas are in filters/singer.py.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "filters/model_constants.hpp"
+#include "math.hpp"
+
+namespace jeat::filters {
+
+inline constexpr int kStates = 5, kPosition = 0, kVelocity = 1, kAcceleration = 2, kLogSize = 3, kGrowth = 4;
+// The state of a track: two axes; its covariance: one matrix for each, row by row.
+inline constexpr int kMean = 2 * kStates, kMatrix = kStates * kStates, kCovariance = 2 * kMatrix;
+
+// Less growth in a step has no effect.
+inline constexpr double kLeastPerspective = 1e-6;
+
+using Matrix = std::array<double, kMatrix>;
+
+// Natural logarithms of the spectral densities.
+struct ProcessNoise {
+    double jerk, growth, position, size;
+};
+
+// The model over one step, and the covariance by each noise of unit density.
+struct Discretised {
+    Matrix F, jerk, growth, position, size;
+};
+
+namespace detail {
+
+template <int N> std::array<double, N * N> product(const std::array<double, N * N>& a, const std::array<double, N * N>& b) {
+    std::array<double, N * N> out{};
+    for (int i = 0; i < N; ++i)
+        for (int k = 0; k < N; ++k)
+            for (int j = 0; j < N; ++j) out[i * N + j] += a[i * N + k] * b[k * N + j];
+    return out;
+}
+
+template <int N> std::array<double, N * N> transposed(const std::array<double, N * N>& a) {
+    std::array<double, N * N> out;
+    for (int i = 0; i < N; ++i)
+        for (int j = 0; j < N; ++j) out[j * N + i] = a[i * N + j];
+    return out;
+}
+
+// Σ_k (A h)^k / k! for short steps, N x N.
+inline constexpr int kTerms = 9;
+template <int N> std::array<double, N * N> short_exponential(const std::array<double, N * N>& A, double h) {
+    std::array<double, N * N> term{}, sum{};
+    for (int i = 0; i < N; ++i) term[i * N + i] = sum[i * N + i] = 1.0;
+    for (int k = 1; k <= kTerms; ++k) {
+        term = product<N>(term, A);
+        for (int i = 0; i < N * N; ++i) term[i] *= h / k, sum[i] += term[i];
+    }
+    return sum;
+}
+
+// How often a step is halved until the series converges.
+inline int halvings(double dt, double fastest) {
+    int n = 0;
+    for (double h = dt * fastest; h > 0.1; h /= 2.0) ++n;
+    return n;
+}
+
+}  // namespace detail
+
+// exp(A t) of a small matrix whose entries are at most `fastest`.
+template <int N> std::array<double, N * N> exponential(const std::array<double, N * N>& A, double t, double fastest) {
+    const int n = detail::halvings(t, fastest);
+    auto out = detail::short_exponential<N>(A, std::ldexp(t, -n));
+    for (int k = 0; k < n; ++k) out = detail::product<N>(out, out);
+    return out;
+}
+
+// Transition and the integrals of e^(As) L e^(A's), by series over a short step and doubling: Q(2h) = Q + F Q F'.
+inline Discretised discretise(double dt, const ModelConstants& c) {
+    using namespace detail;
+    Matrix A{};
+    A[kPosition * kStates + kVelocity] = A[kVelocity * kStates + kAcceleration] = A[kLogSize * kStates + kGrowth] = 1.0;
+    A[kVelocity * kStates + kVelocity] = -1.0 / c.velocity_time_s;
+    A[kAcceleration * kStates + kAcceleration] = -1.0 / c.acceleration_time_s;
+    A[kGrowth * kStates + kGrowth] = -1.0 / c.growth_time_s;
+    double fastest = 1.0;
+    for (const double a : A) fastest = std::max(fastest, std::abs(a));
+    const int n = halvings(dt, fastest);
+    const double h = std::ldexp(dt, -n);
+    Discretised out;
+    out.F = short_exponential<kStates>(A, h);
+    const Matrix At = transposed<kStates>(A);
+    const int driven[] = {kAcceleration, kGrowth, kPosition, kLogSize};
+    Matrix* const noises[] = {&out.jerk, &out.growth, &out.position, &out.size};
+    for (int i = 0; i < 4; ++i) {
+        // dQ/dt = A Q + Q A' + L: its derivatives at 0 are X_1 = L, X_{k+1} = A X_k + X_k A'.
+        Matrix term{}, Q{};
+        term[driven[i] * kStates + driven[i]] = 1.0;
+        double factor = h;
+        for (int k = 1; k <= kTerms + 4; ++k) {
+            for (int j = 0; j < kMatrix; ++j) Q[j] += term[j] * factor;
+            const Matrix left = product<kStates>(A, term), right = product<kStates>(term, At);
+            for (int j = 0; j < kMatrix; ++j) term[j] = left[j] + right[j];
+            factor *= h / (k + 1);
+        }
+        *noises[i] = Q;
+    }
+    for (int k = 0; k < n; ++k) {
+        const Matrix Ft = transposed<kStates>(out.F);
+        for (Matrix* const Q : noises) {
+            const Matrix moved = product<kStates>(product<kStates>(out.F, *Q), Ft);
+            for (int j = 0; j < kMatrix; ++j) (*Q)[j] += moved[j];
+        }
+        out.F = product<kStates>(out.F, out.F);
+    }
+    return out;
+}
+
+inline double object_size(const double* mean) { return exp_of(0.5 * (mean[kLogSize] + mean[kStates + kLogSize])); }
+
+// The transition of a track that moves at constant speed in space: a = 2 g v, dg/dt = g^2 (g the rate of ln size).
+inline Matrix in_perspective(const Matrix& F, const double* mean, double dt, const ModelConstants& c) {
+    Matrix out = F;
+    const double g = 0.5 * (mean[kGrowth] + mean[kStates + kGrowth]);
+    const double x = clamp(g * dt, -c.most_perspective, c.most_perspective);
+    if (std::abs(x) < kLeastPerspective) return out;
+    const double faster = exp_of(2.0 * x), further = (faster - 1.0) / (2.0 * x);
+    const double growing = 1.0 / (1.0 - x), grown = -log_of(1.0 - x) / x;
+    out[kPosition * kStates + kVelocity] *= further;
+    out[kVelocity * kStates + kVelocity] *= faster;
+    out[kLogSize * kStates + kGrowth] *= grown;
+    out[kGrowth * kStates + kGrowth] *= growing;
+    return out;
+}
+
+// m <- F m, P <- F P F' + Q.
+inline void predict(double* mean, double* covariance, const Discretised& general, double dt, const ProcessNoise& q,
+                    const ModelConstants& c) {
+    Discretised step = general;
+    step.F = in_perspective(general.F, mean, dt, c);
+    const double size = object_size(mean);
+    std::array<double, kMean> predicted{};
+    for (int axis = 0; axis < 2; ++axis)
+        for (int i = 0; i < kStates; ++i)
+            for (int j = i; j < kStates; ++j)
+                predicted[axis * kStates + i] += step.F[i * kStates + j] * mean[axis * kStates + j];
+    const double growth = 0.5 * (std::abs(predicted[kGrowth]) + std::abs(predicted[kStates + kGrowth]));
+    const double g = std::min(growth, c.fastest_growth);
+    const double jerk = exp_of(q.jerk / 2.0) + c.perspective_jerk * g * g * std::sqrt(g);
+    const double by_jerk = square(jerk * size), by_walk = exp_of(q.position) * square(size);
+    const double by_growth = exp_of(q.growth), by_size = exp_of(q.size);
+    for (int axis = 0; axis < 2; ++axis) {
+        double* const P = covariance + axis * kMatrix;
+        Matrix FP{};
+        for (int i = 0; i < kStates; ++i)
+            for (int k = i; k < kStates; ++k) {
+                const double f = step.F[i * kStates + k];
+                if (f == 0.0) continue;
+                for (int j = 0; j < kStates; ++j) FP[i * kStates + j] += f * P[k * kStates + j];
+            }
+        for (int i = 0; i < kStates; ++i)
+            for (int j = i; j < kStates; ++j) {
+                double sum = 0.0;
+                for (int k = j; k < kStates; ++k) sum += FP[i * kStates + k] * step.F[j * kStates + k];
+                const int at = i * kStates + j;
+                sum += by_jerk * step.jerk[at] + by_growth * step.growth[at] + by_size * step.size[at] +
+                       by_walk * step.position[at];
+                P[at] = P[j * kStates + i] = sum;
+            }
+    }
+    std::copy(predicted.begin(), predicted.end(), mean);
+}
+
+}  // namespace jeat::filters

@@ -1,0 +1,164 @@
+// What the filter did to every living track, and the smoothed rows that follow from it.
+//
+// A track's rows are final when it has ended, or with a finite lag when so much time has followed: then the window of
+// two lags is smoothed and its older half is given out. So memory does not grow with time.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "filters/gap_survival.hpp"
+#include "filters/singer.hpp"
+#include "smoothers/state_rts.hpp"
+
+namespace jeat::smoothers {
+
+using filters::GapCounts;
+using filters::kCovariance;
+using filters::kMean;
+using filters::ModelConstants;
+
+// Rows of a table, in columns.
+struct Rows {
+    std::vector<double> t, mean, variance, real;
+    std::vector<std::int64_t> track_id, used;
+
+    std::size_t size() const { return track_id.size(); }
+    void clear() {
+        t.clear(), mean.clear(), variance.clear(), real.clear();
+        track_id.clear(), used.clear();
+    }
+    void add(double at, std::int64_t id, const double* state, const double* covariance, double probability,
+             std::int64_t sensors) {
+        t.push_back(at);
+        track_id.push_back(id);
+        real.push_back(probability);
+        used.push_back(sensors);
+        mean.insert(mean.end(), state, state + kMean);
+        for (int axis = 0; axis < 2; ++axis)
+            for (int k = 0; k < kStates; ++k) variance.push_back(covariance[axis * kMatrix + k * kStates + k]);
+    }
+};
+
+// One update of one track.
+struct Entry {
+    double t, dt;       // time, and since the last update (s)
+    double real = 0.0;  // posterior after the step, where this was its last update
+    std::int64_t used = 0;
+    bool last_of_step = false;
+    std::array<double, kMean> predicted_mean, mean;
+    std::array<double, kCovariance> predicted_covariance, covariance;
+};
+
+struct History {
+    std::int64_t track_id = 0;
+    double last_seen = -std::numeric_limits<double>::infinity();  // before the first entry (s)
+    std::vector<Entry> entries;
+};
+
+class Histories {
+public:
+    explicit Histories(double lag_s) : lag_s_(lag_s) {}
+
+    std::vector<History>& living() { return living_; }
+    Rows& rows() { return rows_; }
+
+    // Give out what has become final while tracks live on.
+    void advance(double now, const GapCounts& gaps, const ModelConstants& c) {
+        if (!std::isfinite(lag_s_)) return;
+        for (History& history : living_)
+            if (!history.entries.empty() && history.entries.front().t < now - 2.0 * lag_s_)
+                give_out(history, now - lag_s_, gaps, c, rows_, true);
+    }
+
+    // Give out the rows of tracks that end, and forget them.
+    void end(const std::vector<std::uint8_t>& kept, const GapCounts& gaps, const ModelConstants& c) {
+        std::size_t to = 0;
+        for (std::size_t i = 0; i < living_.size(); ++i) {
+            if (kept[i]) {
+                if (to != i) std::swap(living_[to], living_[i]);
+                ++to;
+            } else {
+                give_out(living_[i], std::numeric_limits<double>::infinity(), gaps, c, rows_, true);
+            }
+        }
+        living_.resize(to);
+    }
+
+    // Rows of living tracks as of now; they stay.
+    Rows preview(const GapCounts& gaps, const ModelConstants& c) {
+        Rows out = rows_;
+        for (History& history : living_)
+            give_out(history, std::numeric_limits<double>::infinity(), gaps, c, out, false);
+        return out;
+    }
+
+private:
+    void give_out(History& history, double until, const GapCounts& gaps, const ModelConstants& c, Rows& out,
+                  bool forget) {
+        std::vector<Entry>& entries = history.entries;
+        const std::size_t n = entries.size();
+        if (n == 0) return;
+        mean_.resize(n);
+        covariance_.resize(n);
+        mean_[n - 1] = entries[n - 1].mean;
+        covariance_[n - 1] = entries[n - 1].covariance;
+        for (std::size_t k = n - 1; k-- > 0;) {
+            const Entry &now = entries[k], &later = entries[k + 1];
+            mean_[k] = now.mean;
+            covariance_[k] = now.covariance;
+            const Matrix F = filters::in_perspective(transition(later.dt, c), now.mean.data(), later.dt, c);
+            for (int axis = 0; axis < 2; ++axis) {
+                const int m = axis * kStates, p = axis * kMatrix;
+                rts_axis(&mean_[k][m], &covariance_[k][p], F, &later.predicted_mean[m], &later.predicted_covariance[p],
+                         &mean_[k + 1][m], &covariance_[k + 1][p]);
+            }
+        }
+        // What it turned out to be counts where that is sure; while nobody sees it, its gap must be one that ends well.
+        double final_real = 0.0, next_seen = std::numeric_limits<double>::infinity();
+        until_seen_.assign(n, 0.0);
+        for (std::size_t k = n; k-- > 0;) {
+            if (entries[k].used && entries[k].last_of_step) {
+                if (!std::isfinite(next_seen)) final_real = entries[k].real;
+                next_seen = entries[k].t;
+            }
+            until_seen_[k] = next_seen - entries[k].t;
+        }
+        std::size_t given = 0;
+        double last_seen = history.last_seen;
+        for (; given < n && entries[given].t <= until; ++given) {
+            const Entry& e = entries[given];
+            if (!e.last_of_step) continue;
+            if (e.used) last_seen = e.t;
+            double real = final_real > c.sure ? std::max(e.real, final_real) : e.real;
+            if (!std::isfinite(until_seen_[given])) continue;  // not seen again
+            if (!e.used) real *= gaps.survival(std::min(e.t - last_seen, until_seen_[given]), c);
+            if (real > c.report)
+                out.add(e.t, history.track_id, mean_[given].data(), covariance_[given].data(), real, e.used);
+        }
+        if (!forget) return;
+        history.last_seen = last_seen;
+        entries.erase(entries.begin(), entries.begin() + static_cast<std::ptrdiff_t>(given));
+    }
+
+    const Matrix& transition(double dt, const ModelConstants& c) {
+        if (dt != dt_) {
+            dt_ = dt;
+            F_ = filters::discretise(dt, c).F;
+        }
+        return F_;
+    }
+
+    double lag_s_, dt_ = -1.0;
+    Matrix F_{};
+    std::vector<History> living_;
+    Rows rows_;
+    std::vector<std::array<double, kMean>> mean_;
+    std::vector<std::array<double, kCovariance>> covariance_;
+    std::vector<double> until_seen_;
+};
+
+}  // namespace jeat::smoothers

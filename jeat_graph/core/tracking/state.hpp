@@ -1,0 +1,119 @@
+// State of the tracker: the tracks in columns, and what is learnt of sensors and scene.
+//
+// Behind each part stands the stage of step.hpp that writes it.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "filters/box_sides.hpp"
+#include "filters/camera_motion.hpp"
+#include "filters/columns.hpp"
+#include "filters/evidence.hpp"
+#include "filters/gap_survival.hpp"
+#include "filters/object_probability.hpp"
+#include "filters/score_calibration.hpp"
+#include "filters/sensor_offsets.hpp"
+#include "filters/visibility.hpp"
+
+namespace jeat::tracking {
+
+using namespace jeat::filters;
+
+// All living tracks, in ascending order of identity; see ReferenceTracks for what the columns are.
+struct Tracks {
+    std::vector<std::int64_t> track_id, used;
+    std::vector<double> mean, covariance;      // predict, follow_camera, update
+    std::vector<double> presence;              // predict, count_hits_and_misses
+    std::vector<double> recent_hits, recent_misses;
+    std::vector<Sides> last_box;               // compare_sensors
+    std::vector<double> last_box_s;
+    std::vector<double> innovation;            // learn_noise
+    std::vector<std::uint8_t> has_innovation;
+    std::vector<double> real, log_odds;        // judge
+    Evidence evidence;                         // count_hits_and_misses, compare_overlaps
+
+    std::size_t size() const { return track_id.size(); }
+    double* mean_of(std::size_t row) { return mean.data() + row * kMean; }
+    double* covariance_of(std::size_t row) { return covariance.data() + row * kCovariance; }
+
+    template <class Visit> void own_columns(Visit visit) {
+        const std::size_t S = evidence.sensors;
+        visit("track_id", track_id, 1);
+        visit("used", used, 1);
+        visit("mean", mean, kMean);
+        visit("covariance", covariance, kCovariance);
+        visit("presence", presence, kPresences);
+        visit("recent_hits", recent_hits, S);
+        visit("recent_misses", recent_misses, S);
+        visit("last_box", last_box, S);
+        visit("last_box_s", last_box_s, S);
+        visit("innovation", innovation, 4);
+        visit("has_innovation", has_innovation, 1);
+        visit("real", real, 1);
+        visit("log_odds", log_odds, 1);
+    }
+    template <class Visit> void columns(Visit visit) {
+        own_columns(visit);
+        evidence.columns(visit);
+    }
+
+    void widen() {
+        const std::size_t rows = size(), S = evidence.sensors;
+        widen_rows(recent_hits, rows, S, 1);
+        widen_rows(recent_misses, rows, S, 1);
+        widen_rows(last_box, rows, S, 1);
+        widen_rows(last_box_s, rows, S, 1);
+        evidence.widen();
+    }
+};
+
+// One sensor, beside what SensorBelief and OffsetSums have of it.
+struct Sensor {
+    double leftovers;                                             // count_clutter
+    double period_s = std::numeric_limits<double>::quiet_NaN();   // look
+    double last_look_s = std::numeric_limits<double>::quiet_NaN();
+    RepeatCounts repetition;                                      // look
+};
+
+struct State {
+    ModelConstants constants;
+    Tracks tracks;
+    double t = 0.0;                 // predict
+    bool started = false;
+    std::int64_t next_id = 1;       // begin_tracks
+    double width = 1.0, height = 1.0;  // look, where the picture is not known
+    bool picture_known = false;
+    ProcessNoise process_noise;     // learn_noise
+    CameraVariance camera;          // follow_camera
+    GapCounts gaps;                 // count_gaps, end_tracks
+    SensorBelief belief;            // learn
+    OffsetSums offsets;             // compare_sensors
+    std::vector<double> log_side_variance;  // learn_noise
+    std::vector<Sensor> sensors;
+    Evidence ended;                 // end_tracks
+    double learnt_s = -std::numeric_limits<double>::infinity();
+
+    explicit State(const ModelConstants& c) : constants(c) {
+        process_noise = {2.0 * log_of(c.jerk), 2.0 * log_of(c.growth_noise), 2.0 * log_of(c.position_walk),
+                         2.0 * log_of(c.size_walk)};
+        camera.shift = square(c.camera_shift_std);
+        camera.scale = square(c.camera_scale_std);
+        belief.noise_share = c.noise_share;
+    }
+
+    void declare_sensor() {
+        belief.widen(constants);
+        tracks.widen();
+        ended.widen();
+        offsets.widen();
+        log_side_variance.push_back(2.0 * log_of(constants.side_std));
+        Sensor sensor;
+        sensor.leftovers = constants.first_leftovers;
+        sensors.push_back(std::move(sensor));
+    }
+};
+
+}  // namespace jeat::tracking

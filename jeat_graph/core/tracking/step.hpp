@@ -1,0 +1,439 @@
+// One step: predict, correct boxes, follow the camera, associate, update, hits and misses, births, compare sensors,
+// posterior, learn, report, end. Every stage writes what is behind its name in state.hpp; the definition, stage by
+// stage, is jeat_graph/tracking/reference.py.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <numeric>
+#include <vector>
+
+#include "association/assignment.hpp"
+#include "association/likelihood_ratio.hpp"
+#include "filters/noise_learning.hpp"
+#include "smoothers/histories.hpp"
+#include "tracking/state.hpp"
+
+namespace jeat::tracking {
+
+inline constexpr double kPeriodMemory = 0.9, kGapPeriods = 1.5, kLongestPeriodS = 0.1;
+inline constexpr double kCameraDetections = 2.0, kCameraAgeS = 0.5, kSameTimeS = 1e-6, kDue = 0.9;
+
+using smoothers::Histories;
+
+// One look of a sensor.
+struct Scan {
+    std::size_t sensor = 0;
+    std::vector<Sides> boxes;
+    std::vector<double> logits;
+    std::vector<std::int64_t> takers;  // written: the track that each box went to
+};
+
+class Step {
+public:
+    explicit Step(State& state) : s_(state), c_(state.constants) {}
+
+    // Take in all scans of one time, at most one of each sensor; `reported` is written.
+    void run(double t, std::vector<Scan>& scans, std::vector<std::uint8_t>& reported, Histories* histories) {
+        std::fill(s_.tracks.used.begin(), s_.tracks.used.end(), 0);
+        for (const std::size_t place : order_of(scans)) {
+            Scan& scan = scans[place];
+            const ScanClock clock = look(t, scan);
+            predict(t);
+            correct_boxes(scan);
+            follow_camera(scan);
+            if (histories) write_predictions(*histories);
+            associate(scan);
+            count_gaps(scan);
+            learn_noise(scan, clock);
+            update(scan);
+            count_hits_and_misses(scan, clock);
+            count_clutter(scan);
+            begin_tracks(scan, clock);
+            compare_sensors(scan);
+            if (histories) write_updates(*histories);
+        }
+        compare_overlaps();
+        judge();
+        learn(t);
+        report(reported);
+        if (!histories) return;
+        for (std::size_t i = 0; i < s_.tracks.size(); ++i) {
+            smoothers::Entry& entry = histories->living()[i].entries.back();
+            entry.real = s_.tracks.real[i];
+            entry.used = s_.tracks.used[i];
+            entry.last_of_step = true;
+        }
+        histories->advance(t, s_.gaps, c_);
+    }
+
+    // End the tracks that are false, gone, outside, or unseen for too long; their evidence stays.
+    void end_tracks(Histories* histories) {
+        Tracks& tracks = s_.tracks;
+        std::vector<std::uint8_t> ends(tracks.size()), kept(tracks.size());
+        bool any = false;
+        for (std::size_t i = 0; i < tracks.size(); ++i) {
+            const double gap = unseen_for(i), real = tracks.real[i];
+            ends[i] = gap > c_.longest_gap_s || (real < c_.report && gap > c_.doubtful_gap_s) ||
+                      (real < c_.false_posterior && gap > c_.false_gap_s) ||
+                      1.0 - tracks.presence[i * kPresences + kGone] < c_.least_presence ||
+                      (gap > c_.outside_gap_s && share_inside(i) < c_.outside_share);
+            kept[i] = !ends[i];
+            if (!ends[i]) continue;
+            any = true;
+            if (real > c_.report) s_.gaps.count_loss();
+        }
+        if (!any) return;
+        s_.ended.append(tracks.evidence, ends);
+        if (const auto most = static_cast<std::size_t>(c_.remembered_tracks); s_.ended.size() > most) {
+            std::vector<std::uint8_t> last(s_.ended.size(), 1);
+            std::fill(last.begin(), last.end() - static_cast<std::ptrdiff_t>(most), 0);
+            keep_rows(s_.ended, last);
+        }
+        if (histories) histories->end(kept, s_.gaps, c_);
+        keep_rows(tracks, kept);
+    }
+
+private:
+    std::vector<std::size_t> order_of(const std::vector<Scan>& scans) const {
+        std::vector<std::size_t> order(scans.size());
+        std::iota(order.begin(), order.end(), std::size_t{0});
+        std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+            const double va = s_.log_side_variance[scans[a].sensor], vb = s_.log_side_variance[scans[b].sensor];
+            if (va != vb) return va < vb;
+            if (scans[a].logits != scans[b].logits) return scans[a].logits < scans[b].logits;
+            for (std::size_t k = 0; k < scans[a].boxes.size(); ++k) {
+                const Sides &x = scans[a].boxes[k], &y = scans[b].boxes[k];
+                const double left[] = {x.left, x.top, x.right, x.bottom}, right[] = {y.left, y.top, y.right, y.bottom};
+                for (int i = 0; i < 4; ++i)
+                    if (left[i] != right[i]) return left[i] < right[i];
+            }
+            return a < b;
+        });
+        return order;
+    }
+
+    ScanClock look(double t, const Scan& scan) {
+        Sensor& sensor = s_.sensors[scan.sensor];
+        if (!s_.picture_known) {
+            for (const Sides& box : scan.boxes) {
+                s_.width = std::max(s_.width, box.right);
+                s_.height = std::max(s_.height, box.bottom);
+            }
+        }
+        if (!std::isnan(sensor.last_look_s)) {
+            const double since = t - sensor.last_look_s;
+            sensor.period_s = std::isnan(sensor.period_s)
+                                  ? since
+                                  : kPeriodMemory * sensor.period_s + (1.0 - kPeriodMemory) * since;
+        }
+        sensor.last_look_s = t;
+        sensor.repetition.count(scan.boxes, scan.logits, c_);
+        s_.belief.indifference[scan.sensor] = sensor.repetition.indifference(c_);
+        const double period = std::isnan(sensor.period_s) ? c_.first_period_s : sensor.period_s;
+        return {t, period, std::min(1.0, period / c_.correlation_time_s)};
+    }
+
+    void predict(double t) {
+        const double dt = s_.started ? t - s_.t : 0.0;
+        s_.t = t;
+        s_.started = true;
+        const auto ticks = static_cast<std::int64_t>(std::nearbyint(dt * 1e6));
+        if (ticks != ticks_) {
+            ticks_ = ticks;
+            step_ = discretise(static_cast<double>(ticks) / 1e6, c_);
+            presence_step_ = presence_transition(static_cast<double>(ticks) / 1e6, c_);
+        }
+        if (dt <= 0.0) return;
+        Tracks& tracks = s_.tracks;
+        for (std::size_t i = 0; i < tracks.size(); ++i) {
+            filters::predict(tracks.mean_of(i), tracks.covariance_of(i), step_, dt, s_.process_noise, c_);
+            predict_presence(tracks.presence.data() + i * kPresences, presence_step_);
+        }
+    }
+
+    void correct_boxes(const Scan& scan) {
+        const auto offset = s_.offsets.offset(scan.sensor, s_.log_side_variance, c_);
+        boxes_.clear();
+        for (const Sides& box : scan.boxes) boxes_.push_back(corrected(box, offset));
+    }
+
+    void follow_camera(const Scan& scan) {
+        Tracks& tracks = s_.tracks;
+        const double noise = s_.log_side_variance[scan.sensor];
+        camera_tracks_.clear();
+        for (std::size_t i = 0; i < tracks.size(); ++i) {
+            if (!(tracks.real[i] > c_.report) || !(tracks.evidence.detections[i] > kCameraDetections) ||
+                !(unseen_for(i) < kCameraAgeS))
+                continue;
+            const double *m = tracks.mean_of(i), *P = tracks.covariance_of(i);
+            const double w = exp_of(m[kLogSize]), h = exp_of(m[kStates + kLogSize]), both = std::sqrt(w * h);
+            const double Rw = side_variance(w, both, noise, c_), Rh = side_variance(h, both, noise, c_);
+            const int l = kLogSize * kStates + kLogSize;
+            camera_tracks_.push_back({m[kPosition], m[kStates + kPosition], w, h, both, P[0] + Rw / 2.0,
+                                      P[kMatrix] + Rh / 2.0, P[l] + 2.0 * Rw / (w * w), P[kMatrix + l] + 2.0 * Rh / (h * h)});
+        }
+        const CameraMotion motion = estimate_camera(camera_tracks_, boxes_, s_.width, s_.height, static_cast<double>(ticks_) / 1e6, s_.camera, c_);
+        if (!motion.known) return;
+        for (std::size_t i = 0; i < tracks.size(); ++i)
+            compensate(tracks.mean_of(i), tracks.covariance_of(i), motion, s_.width, s_.height);
+    }
+
+    void associate(const Scan& scan) {
+        Tracks& tracks = s_.tracks;
+        const std::size_t n = tracks.size(), S = s_.sensors.size(), k = scan.sensor;
+        const double noise = s_.log_side_variance[k];
+        expected_.resize(n);
+        p_detect_.resize(n);
+        q_.resize(boxes_.size());
+        for (std::size_t j = 0; j < boxes_.size(); ++j) q_[j] = expit(s_.belief.indifference[k] + scan.logits[j]);
+        const association::ScanTerms terms(s_.sensors[k].leftovers, s_.width * s_.height, c_);
+        const ByLeft index(boxes_);
+        pairs_.clear();
+        for (std::size_t i = 0; i < n; ++i) {
+            const double hits = tracks.recent_hits[i * S + k], misses = tracks.recent_misses[i * S + k];
+            p_detect_[i] = clamp((s_.belief.p_detect[k] * c_.p_detect_strength + hits) / (c_.p_detect_strength + hits + misses),
+                                 c_.track_p_detect_bounds.low, c_.track_p_detect_bounds.high);
+            expected_[i] = expected_sides(tracks.mean_of(i), tracks.covariance_of(i), noise, c_);
+            const SidesExpected& expected = expected_[i];
+            const double p = clamp(tracks.presence[i * kPresences + kVisible] * p_detect_[i],
+                                   association::kLeastPDetect, association::kMostPDetect);
+            const double clutter = terms.log_clutter - log_of(expected.size[0] * expected.size[1]);
+            const double start = log_of(p / (1.0 - p)) - clutter, reach = association::reach(expected, c_);
+            index.with_left_in(expected.box.left - reach, expected.box.left + reach, [&](std::size_t j) {
+                const double density = association::sides_log_density(boxes_[j], expected, terms, c_);
+                if (density <= association::kImpossible) return;
+                const double gain = start + density + association::score_log_ratio(tracks.real[i], q_[j], c_);
+                if (gain > 0.0) pairs_.push_back({i, j, gain});
+            });
+        }
+        made_ = assignment_.solve(pairs_, n, boxes_.size());
+    }
+
+    void count_gaps(const Scan&) {
+        Tracks& tracks = s_.tracks;
+        double period = kLongestPeriodS;
+        for (const Sensor& sensor : s_.sensors)
+            if (!std::isnan(sensor.period_s)) period = std::min(period, sensor.period_s);
+        for (const std::size_t k : made_) {
+            const std::size_t i = pairs_[k].row;
+            const double gap = unseen_for(i);
+            if (!(tracks.real[i] > c_.report) || !(gap > kGapPeriods * period)) continue;
+            s_.gaps.count_end(gap, intersection_over_union(expected_[i].box, boxes_[pairs_[k].column]) >= c_.gap_overlap);
+        }
+    }
+
+    void learn_noise(const Scan& scan, const ScanClock& clock) {
+        Tracks& tracks = s_.tracks;
+        InnovationSums sums;
+        for (const std::size_t k : made_) {
+            const std::size_t i = pairs_[k].row;
+            const auto y = side_innovations(boxes_[pairs_[k].column], expected_[i].box);
+            const Innovation e = normalised_innovation(y, expected_[i], c_);
+            double* const before = tracks.innovation.data() + i * 4;
+            if (tracks.evidence.detections[i] > c_.noise_hits && tracks.real[i] > c_.report)
+                sums.add(e, before, tracks.has_innovation[i], c_);
+            std::copy(e.begin(), e.end(), before);
+            tracks.has_innovation[i] = 1;
+        }
+        filters::learn_noise(sums, clock.period_s, s_.log_side_variance[scan.sensor], s_.process_noise, c_);
+    }
+
+    void update(const Scan&) {
+        Tracks& tracks = s_.tracks;
+        for (const std::size_t k : made_) {
+            const std::size_t i = pairs_[k].row;
+            const auto y = side_innovations(boxes_[pairs_[k].column], expected_[i].box);
+            filters::update(tracks.mean_of(i), tracks.covariance_of(i), y, expected_[i], c_);
+        }
+    }
+
+    void count_hits_and_misses(const Scan& scan, const ScanClock& clock) {
+        Tracks& tracks = s_.tracks;
+        const std::size_t n = tracks.size(), S = s_.sensors.size(), k = scan.sensor;
+        taken_by_.assign(boxes_.size(), n);
+        pair_of_.assign(n, pairs_.size());
+        for (const std::size_t p : made_) {
+            taken_by_[pairs_[p].column] = pairs_[p].row;
+            pair_of_[pairs_[p].row] = p;
+        }
+        const double keep = exp_of(-clock.weight * c_.correlation_time_s / c_.track_p_detect_memory_s);
+        for (std::size_t i = 0; i < n; ++i) {
+            double* const presence = tracks.presence.data() + i * kPresences;
+            double &hits = tracks.recent_hits[i * S + k], &misses = tracks.recent_misses[i * S + k];
+            hits *= keep;
+            misses *= keep;
+            if (pair_of_[i] == pairs_.size()) {
+                const double visible = presence[kVisible];
+                miss_presence(presence, p_detect_[i]);
+                tracks.evidence.count_miss(i, k, visible, clock.weight);
+                misses += clock.weight * visible;
+            } else {
+                const association::Pair& pair = pairs_[pair_of_[i]];
+                see_presence(presence);
+                tracks.evidence.count_hit(i, k, scan.logits[pair.column], pair.gain, clock, c_);
+                hits += clock.weight;
+                tracks.used[i] |= std::int64_t{1} << k;
+            }
+        }
+    }
+
+    void count_clutter(const Scan& scan) {
+        free_.clear();
+        for (std::size_t j = 0; j < boxes_.size(); ++j)
+            if (taken_by_[j] == s_.tracks.size()) free_.push_back(j);
+        double& mean = s_.sensors[scan.sensor].leftovers;
+        mean = c_.clutter_memory * mean + (1.0 - c_.clutter_memory) * static_cast<double>(free_.size());
+    }
+
+    void begin_tracks(Scan& scan, const ScanClock& clock) {
+        Tracks& tracks = s_.tracks;
+        const std::size_t n = tracks.size(), k = scan.sensor;
+        rivals_.clear();
+        for (std::size_t i = 0; i < n; ++i)
+            if (tracks.real[i] > c_.rival && unseen_for(i) < c_.rival_age_s) rivals_.push_back(corners(tracks.mean_of(i)));
+        const ByLeft rivals(rivals_);
+        free_boxes_.clear();
+        for (const std::size_t j : free_) free_boxes_.push_back(boxes_[j]);
+        const ByLeft among(free_boxes_);
+        append_rows(tracks, n, free_.size());
+        for (std::size_t f = 0; f < free_.size(); ++f) {
+            const std::size_t row = n + f, j = free_[f];
+            double overlap = 0.0;
+            rivals.near(boxes_[j], [&](std::size_t r) {
+                overlap = std::max(overlap, intersection_over_union(boxes_[j], rivals_[r]));
+            });
+            among.near(boxes_[j], [&](std::size_t g) {
+                if (scan.logits[free_[g]] > scan.logits[j])
+                    overlap = std::max(overlap, intersection_over_union(boxes_[j], free_boxes_[g]));
+            });
+            initial_state(boxes_[j], s_.log_side_variance[k], c_, tracks.mean_of(row), tracks.covariance_of(row));
+            tracks.track_id[row] = s_.next_id++;
+            tracks.used[row] = std::int64_t{1} << k;
+            see_presence(tracks.presence.data() + row * kPresences);
+            tracks.evidence.begin(row, clock.t, k, scan.logits[j], overlap, clock.weight);
+            taken_by_[j] = row;
+        }
+        scan.takers.resize(boxes_.size());
+        for (std::size_t j = 0; j < boxes_.size(); ++j) scan.takers[j] = tracks.track_id[taken_by_[j]];
+    }
+
+    void compare_sensors(const Scan& scan) {
+        Tracks& tracks = s_.tracks;
+        const std::size_t S = s_.sensors.size(), k = scan.sensor;
+        for (std::size_t other = 0; other < S; ++other) {
+            if (other == k) continue;
+            const auto expected = s_.offsets.mean(k, other, c_);
+            for (std::size_t j = 0; j < scan.boxes.size(); ++j) {
+                const std::size_t i = taken_by_[j];
+                const Sides& before = tracks.last_box[i * S + other];
+                const double age = s_.t - tracks.last_box_s[i * S + other];
+                if (!(before.right > before.left) || age > c_.offset_age_s || !(tracks.real[i] > c_.report)) continue;
+                const double* const m = tracks.mean_of(i);
+                s_.offsets.count(k, other,
+                                 difference(scan.boxes[j], before, m[kVelocity] * age, m[kStates + kVelocity] * age),
+                                 expected, c_);
+            }
+        }
+        for (std::size_t j = 0; j < scan.boxes.size(); ++j) {
+            tracks.last_box[taken_by_[j] * S + k] = scan.boxes[j];
+            tracks.last_box_s[taken_by_[j] * S + k] = s_.t;
+        }
+    }
+
+    // Keep of each track that was found now the least overlap ever with a better one.
+    void compare_overlaps() {
+        Tracks& tracks = s_.tracks;
+        tracks_boxes_.resize(tracks.size());
+        for (std::size_t i = 0; i < tracks.size(); ++i) tracks_boxes_[i] = corners(tracks.mean_of(i));
+        const ByLeft index(tracks_boxes_);
+        for (std::size_t i = 0; i < tracks.size(); ++i) {
+            if (!(unseen_for(i) < kSameTimeS) || tracks.evidence.overlap[i] == 0.0) continue;
+            double most = 0.0;
+            index.near(tracks_boxes_[i], [&](std::size_t j) {
+                if (tracks.log_odds[j] > tracks.log_odds[i] && tracks.evidence.detections[j] >= tracks.evidence.detections[i])
+                    most = std::max(most, intersection_over_union(tracks_boxes_[i], tracks_boxes_[j]));
+            });
+            tracks.evidence.overlap[i] = std::min(tracks.evidence.overlap[i], most);
+        }
+    }
+
+    void judge() {
+        Tracks& tracks = s_.tracks;
+        PosteriorRule rule(s_.belief, c_);
+        for (std::size_t i = 0; i < tracks.size(); ++i) {
+            tracks.log_odds[i] = rule(tracks.evidence, i).log_odds;
+            tracks.real[i] = expit(tracks.log_odds[i]);
+        }
+    }
+
+    void learn(double t) {
+        if (t - s_.learnt_s < c_.learn_period_s) return;
+        s_.learnt_s = t;
+        learn_sensors(s_.ended, s_.tracks.evidence, s_.belief, c_);
+    }
+
+    void report(std::vector<std::uint8_t>& reported) {
+        Tracks& tracks = s_.tracks;
+        double period = std::numeric_limits<double>::infinity();
+        for (const Sensor& sensor : s_.sensors)
+            if (sensor.period_s > 0.0) period = std::min(period, sensor.period_s);
+        reported.resize(tracks.size());
+        for (std::size_t i = 0; i < tracks.size(); ++i) {
+            const double gap = unseen_for(i);
+            const bool due = !(gap <= kSameTimeS || gap < kDue * period);
+            const double survival = due ? s_.gaps.survival(gap, c_) : 1.0;
+            reported[i] = tracks.real[i] * survival > c_.report &&
+                          (gap < kSameTimeS || share_inside(i) > c_.inside_share);
+        }
+    }
+
+    void write_predictions(Histories& histories) {
+        Tracks& tracks = s_.tracks;
+        for (std::size_t i = 0; i < tracks.size(); ++i) {
+            smoothers::Entry& entry = histories.living()[i].entries.emplace_back();
+            entry.t = s_.t;
+            entry.dt = static_cast<double>(ticks_) / 1e6;
+            std::copy_n(tracks.mean_of(i), kMean, entry.predicted_mean.begin());
+            std::copy_n(tracks.covariance_of(i), kCovariance, entry.predicted_covariance.begin());
+        }
+    }
+    void write_updates(Histories& histories) {
+        Tracks& tracks = s_.tracks;
+        auto& living = histories.living();
+        for (std::size_t i = 0; i < tracks.size(); ++i) {
+            if (i == living.size()) {
+                living.emplace_back().track_id = tracks.track_id[i];
+                smoothers::Entry& first = living[i].entries.emplace_back();
+                first.t = s_.t;
+                first.dt = 0.0;
+                std::copy_n(tracks.mean_of(i), kMean, first.predicted_mean.begin());
+                std::copy_n(tracks.covariance_of(i), kCovariance, first.predicted_covariance.begin());
+            }
+            smoothers::Entry& entry = living[i].entries.back();
+            std::copy_n(tracks.mean_of(i), kMean, entry.mean.begin());
+            std::copy_n(tracks.covariance_of(i), kCovariance, entry.covariance.begin());
+        }
+    }
+
+    double unseen_for(std::size_t row) const { return s_.t - s_.tracks.evidence.last_s[row]; }
+    double share_inside(std::size_t row) {
+        const Sides box = corners(s_.tracks.mean_of(row));
+        return intersection(box, {0.0, 0.0, s_.width, s_.height}) / std::max(box.area(), kLeastArea);
+    }
+
+    State& s_;
+    const ModelConstants& c_;
+    std::int64_t ticks_ = -1;
+    Discretised step_{};
+    PresenceTransition presence_step_{};
+    association::Assignment assignment_;
+    std::vector<association::Pair> pairs_;
+    std::vector<std::size_t> made_, free_, taken_by_, pair_of_;
+    std::vector<SidesExpected> expected_;
+    std::vector<double> p_detect_, q_;
+    std::vector<Sides> boxes_, rivals_, free_boxes_, tracks_boxes_;
+    std::vector<CameraTrack> camera_tracks_;
+};
+
+}  // namespace jeat::tracking

@@ -1,0 +1,1 @@
+"""Tables of detections, truth and results, from files with columns or data frames."""

@@ -1,0 +1,231 @@
+"""The core's step against the reference in NumPy: the same tracks, step by step, over drawn streams."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from jeat_graph import Tracker, Trajectories, load_config
+from jeat_graph.cli.main import main
+from jeat_graph.core import _core
+from jeat_graph.filters.model_constants import ModelConstants
+from jeat_graph.tracking.model_tracker import ModelTracker
+from jeat_graph.tracking.reference_model import ReferenceModel
+
+#: Where doubles of one order of operations differ from those of another, by condition.
+_RELATIVE = 1e-8
+
+
+def drawn_stream(seed, sensors, times):
+    """Scans of any sensors: objects that move, clutter, second boxes, empty scans, a camera that shakes."""
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(0, 25))
+    place, speed = rng.uniform(0, 1500, (count, 2)), rng.normal(0, 120, (count, 2))
+    size = rng.uniform(10, 150, (count, 2))
+    rate, noise, p_detect = rng.uniform(5, 60), rng.uniform(0, 0.08, sensors), rng.uniform(0.3, 1, sensors)
+    clutter, shift = (
+        rng.uniform(0, 4, sensors),
+        rng.normal(0, rng.choice([0.0, 6.0]), (times, 2)).cumsum(axis=0),
+    )
+    t = rng.uniform(-5, 1e4)
+    for k in range(times):
+        t += rng.choice(
+            [0.0, 1.0 / rate, 1.0 / rate, 3.0 / rate, 40.0 / rate], p=[0.05, 0.4, 0.4, 0.13, 0.02]
+        )
+        looks = rng.random(sensors) < 0.7
+        looks[rng.integers(sensors)] = True
+        looking = np.flatnonzero(looks)
+        boxes, numbers = [], []
+        for s in looking:
+            seen = rng.random(count) < p_detect[s]
+            wide = size[seen] * np.exp(rng.normal(0, noise[s], (seen.sum(), 2)))
+            corner = (place + speed * k / rate + shift[k])[seen] - wide / 2
+            corner += rng.normal(0, noise[s], corner.shape) * size[seen]
+            stray = rng.uniform(0, 1500, (rng.poisson(clutter[s]), 2))
+            one = np.concatenate([corner, corner + wide], axis=1)
+            one = np.concatenate([one, np.concatenate([stray, stray + 40], axis=1), one[: count // 4] + 6.0])
+            boxes.append(one)
+            numbers.append(len(one))
+        together = np.concatenate([*boxes, np.zeros((0, 4))])
+        logits = rng.normal(1, 2, len(together))
+        yield float(t), looking.astype(np.int64), np.array(numbers, dtype=np.int64), together, logits
+
+
+def models(lag_s, known):
+    made = [
+        make(ModelConstants(), 1600.0, 1200.0, known, lag_s)
+        for make in (_core.tracking.Model, ReferenceModel)
+    ]
+    return made
+
+
+def assert_alike(one, other, what, atol=_RELATIVE):
+    """Assert that two tables (t, id, mean, variance, posterior, sensors) have the same rows."""
+    for k in (0, 1, 5):
+        np.testing.assert_array_equal(one[k], other[k], err_msg=what)
+    scale = np.sqrt(other[3])
+    np.testing.assert_allclose((one[2] - other[2]) / scale, 0.0, atol=atol, err_msg=what)
+    np.testing.assert_allclose(one[3], other[3], rtol=atol, err_msg=what)
+    np.testing.assert_allclose(one[4], other[4], atol=_RELATIVE, err_msg=what)
+
+
+@settings(max_examples=120)
+@given(seed=st.integers(0, 10**6), sensors=st.integers(1, 4), known=st.booleans())
+def test_every_step_is_the_references(seed, sensors, known):
+    core, reference = models(-1.0, known)
+    for _ in range(sensors):
+        core.declare_sensor()
+        reference.declare_sensor()
+    for k, scans in enumerate(drawn_stream(seed, sensors, 25)):
+        core.take(*scans)
+        reference.take(*scans)
+        assert_alike(core.rows(), reference.rows(), f"step {k}")
+        np.testing.assert_array_equal(core.takers(), reference.takers())
+        np.testing.assert_array_equal(core.living(), reference.living())
+        assert core.size() == reference.size()
+    ours, theirs = core.learnt(), reference.learnt()
+    assert ours.keys() == theirs.keys()
+    for name, value in theirs.items():
+        np.testing.assert_allclose(ours[name], value, rtol=_RELATIVE, atol=_RELATIVE, err_msg=name)
+
+
+@settings(max_examples=15)
+@given(seed=st.integers(0, 10**6))
+def test_whole_tracks_are_smoothed_as_by_the_reference(seed):
+    core, reference = models(np.inf, True)
+    for model in (core, reference):
+        model.declare_sensor()
+        model.declare_sensor()
+        for scans in drawn_stream(seed, 2, 40):
+            model.take(*scans)
+    ours, theirs = sorted_rows(core.finish()), sorted_rows(reference.finish())
+    # How gaps end is known as of a track's end in the one, and as of the very end in the other: they may
+    # differ in the rows that no sensor saw.
+    seen_ours, seen_theirs = ([column[rows[5] != 0] for column in rows] for rows in (ours, theirs))
+    # A pass backwards solves with covariances whose condition is 1e10 and more after long gaps.
+    assert_alike(seen_ours, seen_theirs, "smoothed", atol=1e-4)
+
+
+def sorted_rows(rows):
+    order = np.lexsort((rows[1], rows[0]))
+    return [column[order] for column in rows]
+
+
+def test_a_sensor_may_come_later():
+    core, reference = models(-1.0, True)
+    for model in (core, reference):
+        model.declare_sensor()
+    scans = list(drawn_stream(3, 1, 10))
+    for k, scan in enumerate(scans):
+        if k == 5:
+            core.declare_sensor()
+            reference.declare_sensor()
+        core.take(*scan)
+        reference.take(*scan)
+        assert_alike(core.rows(), reference.rows(), f"step {k}")
+
+
+def test_what_does_not_fit_is_refused_and_not_read():
+    core, _ = models(-1.0, True)
+    core.declare_sensor()
+    none, one = np.zeros(0, np.int64), np.ones(1, np.int64)
+    with pytest.raises(ValueError, match="no such sensor"):
+        core.take(0.0, one, one, np.zeros((1, 4)), np.zeros(1))
+    with pytest.raises(ValueError, match="different lengths"):
+        core.take(0.0, none, one, np.zeros((1, 4)), np.zeros(1))
+    with pytest.raises(ValueError, match="fewer boxes"):
+        core.take(0.0, 0 * one, 5 * one, np.zeros((1, 4)), np.zeros(1))
+    with pytest.raises(ValueError, match="more boxes"):
+        core.take(0.0, 0 * one, 0 * one, np.zeros((1, 4)), np.zeros(1))
+    with pytest.raises(TypeError):
+        core.take(0.0, 0 * one, one, np.zeros((1, 4), np.float32), np.zeros(1))
+
+
+# As a tracker.
+
+
+def moving(times=200, period=0.05):
+    rng = np.random.default_rng(2)
+    for k in range(times):
+        t = k * period
+        boxes = [[100 + 80 * t, 200, 60, 40], [900 - 50 * t, 500, 90, 60], [400, 300 + 20 * t, 50, 50]]
+        yield t, "cam", np.array(boxes) + rng.normal(0, 1, (3, 4)), [0.9, 0.8, 0.85]
+
+
+def test_rows_with_a_lag_are_final_when_they_are_given_and_near_those_of_whole_tracks():
+    config = load_config("core", ["smoother.lag_s=1"])
+    whole = Tracker(load_config("core", ["smoother.engine=rts"]), image=(1280, 720))
+    live, parts = Tracker(config, image=(1280, 720)), []
+    for scan in moving():
+        live.step(scan)
+        whole.step(scan)
+        parts.append(live.drain_smoothed())
+        if len(parts[-1]):
+            assert parts[-1].t.max() <= scan[0] - 1.0
+    assert sum(map(len, parts)) > 400
+    lagged = Trajectories.concatenate([*parts, live.finish()])
+    full = whole.finish()
+    order = np.lexsort((lagged.track_id, lagged.t))
+    lagged = lagged.take(order)
+    np.testing.assert_array_equal(lagged.t, full.t)
+    np.testing.assert_array_equal(lagged.track_id, full.track_id)
+    assert np.abs(lagged.boxes - full.boxes).max() < 1.0
+
+
+def test_memory_of_a_fixed_lag_does_not_grow_with_time():
+    live = Tracker(load_config("core", ["smoother.lag_s=.5"]), image=(1280, 720))
+    sizes = []
+    for scan in moving(600):
+        live.step(scan)
+        live.drain_smoothed()
+        sizes.append(len(live.smoothed()))  # what is not final yet: two lags of three tracks at 20 Hz
+    assert max(sizes[100:]) <= 3 * (2 * 0.5 * 20 + 2)
+
+
+def test_the_configuration_chooses_the_engine_and_whoever_makes_the_tracker_has_the_last_word():
+    assert isinstance(Tracker("core"), ModelTracker)
+    assert isinstance(Tracker(load_config("default", ["tracker.engine=reference"])), ModelTracker)
+    assert not isinstance(Tracker("core", engine="compiled"), ModelTracker)
+
+
+def test_constants_are_taken_by_name():
+    doubled = replace(ModelConstants(), report=0.999)
+    careful = ModelTracker("core", constants=doubled, image=(1280, 720))
+    usual = ModelTracker("core", image=(1280, 720))
+    rows = [sum(len(made.step(scan)) for scan in moving(10)) for made in (careful, usual)]
+    assert rows[0] < rows[1]
+
+
+def test_commands_track_with_it_and_say_nothing_of_a_compiler(tmp_path, capsys):
+    rows = [f"{t},{s},{x},{y},{w},{h},.9" for t, s, boxes, _ in moving(40) for x, y, w, h in boxes]
+    source = tmp_path / "detections.csv"
+    source.write_text("t,sensor,left,top,width,height,score\n" + "\n".join(rows) + "\n")
+    out = tmp_path / "run"
+    assert main(["track", str(source), "--config", "core", "--image", "1280x720", "--out", str(out)]) == 0
+    assert "compile" not in capsys.readouterr().err
+    learnt = json.loads((out / "run.json").read_text())["learnt"]["cam"]
+    assert learnt["p_detect"] > 0.9
+    assert {path.name for path in out.iterdir()} >= {"causal.csv", "smoothed.csv"}
+
+
+@pytest.mark.parametrize("asked", [["--diagnostics"], ["--resume"]])
+def test_what_the_engine_lacks_is_one_line(tmp_path, capsys, asked):
+    source = tmp_path / "detections.csv"
+    source.write_text("t,sensor,left,top,width,height,score\n0,cam,1,2,30,40,.9\n.1,cam,1,2,30,40,.9\n")
+    command = [
+        "track",
+        str(source),
+        "--config",
+        "core",
+        "--image",
+        "1280x720",
+        "--out",
+        str(tmp_path / "run"),
+    ]
+    assert main([*command, *asked]) == 2
+    assert "tracker.engine" in capsys.readouterr().err.splitlines()[-1]
