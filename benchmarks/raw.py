@@ -21,7 +21,8 @@ from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.detection.declared import declared_settings
-from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR, FUSED_SENSOR, DetectRequest
+from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR, FUSED_SENSOR
+from jeat_graph.detection.request import DetectRequest
 
 if TYPE_CHECKING:
     from jeat_graph.config.schema import Config

@@ -10,8 +10,9 @@ from typing import Any
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.trajectories import GroundTruth
-from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR, FUSED_SENSOR, DetectRequest
+from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR, FUSED_SENSOR
 from jeat_graph.detection.named import MOTION, network_file
+from jeat_graph.detection.request import DetectRequest
 from jeat_graph.detection.settings import DetectionSettings
 from jeat_graph.io.hashing import sha256_of
 

@@ -185,19 +185,34 @@ def interval_edges(first: float, last: float, interval_s: float, times: Sequence
     return np.asarray(interval_s * np.arange(begin, end + 1), dtype=np.float64)
 
 
-def count(found: Sequence[LineCrossing], edges: FloatArray, lines: Sequence[str] = ()) -> list[Count]:
+def count(
+    found: Sequence[LineCrossing],
+    edges: FloatArray,
+    lines: Sequence[str] = (),
+    *,
+    zones: Sequence[str] = (),
+    complete: bool = False,
+) -> list[Count]:
     """Count crossings by line, direction, class and interval.
 
     Args:
         found: the crossings.
         edges: (K + 1,) ascending bounds of K intervals (s); what lies outside is not counted.
         lines: names of all lines; one that nobody crosses has counts of 0 in both directions.
+        zones: names of all zones, likewise; their directions are `in` and `out`.
+        complete: whether each line and zone has both directions of every class that occurs anywhere.
 
     Returns:
         One entry for every combination that occurs and every interval, by line, direction, class and time.
     """
     crossed = {c.line for c in found}
-    none = {(name, way, "") for name in lines if name not in crossed for way in ("left", "right")}
+    ways = [(name, way) for name in lines for way in ("left", "right")]
+    ways += [(name, way) for name in zones for way in ("in", "out")]
+    classes = {c.vehicle_class for c in found} or {""}
+    if complete:
+        none = {(name, way, kind) for name, way in ways for kind in classes}
+    else:
+        none = {(name, way, "") for name, way in ways if name not in crossed}
     groups = sorted({(c.line, c.direction, c.vehicle_class) for c in found} | none)
     counts = []
     for line, direction, name in groups:

@@ -18,8 +18,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "manifest",
         metavar="MANIFEST",
-        help="CSV or Parquet, one recording a row: detections (files joined by ;) and, optional, name, "
-        "config, set (settings joined by ;), gt, rate, camera; paths as seen from the manifest's folder",
+        help="CSV or Parquet, one recording a row: detections (files joined by ;), or frames, events or both "
+        "to detect in, and, optional, name, config, set (settings joined by ;), gt, rate, camera, "
+        "detector_frames, detector_events, class, mask; paths as seen from the manifest's folder",
     )
     add(
         "--out",

@@ -1,60 +1,82 @@
-"""`jeat-graph count`: how many vehicles crossed a line in the picture, by direction, class and interval."""
+"""`jeat-graph count`: how many vehicles crossed lines and zones, by direction, class and interval."""
 
 from __future__ import annotations
 
 import argparse
 import dataclasses
 import sys
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from jeat_graph.cli.count_output import clock_s, station_columns, with_clock
 from jeat_graph.cli.options import add_classes, add_tables, tables_read
+from jeat_graph.cli.place_options import add_places, places
 from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import positive
-from jeat_graph.data.errors import DataError
-from jeat_graph.eval.counting import Line
+from jeat_graph.data.errors import ConfigError, DataError
+from jeat_graph.eval.counting import Count, Line, LineCrossing
 
-WRITES = ("out",)
-HELP = "count vehicles over lines in the picture, by direction, with intervals"
+if TYPE_CHECKING:
+    from jeat_graph.data.arrays import FloatArray
+    from jeat_graph.data.trajectories import Trajectories
+
+WRITES = ("out", "od", "stations", "crossings")
+HELP = "count vehicles over lines and zones in the picture, by direction, class and interval"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("source", metavar="RUN", help="run directory, trajectory table or result")
-    parser.add_argument(
-        "--line",
-        action="append",
-        required=True,
-        metavar="[NAME=]X1,Y1,X2,Y2",
-        help="a line in px, crossed to its left or right as seen from its first point; may be repeated",
-    )
-    parser.add_argument(
+    add = parser.add_argument
+    add("source", metavar="RUN", help="run directory, trajectory table or result")
+    add_places(parser)
+    add(
         "--interval",
         type=positive,
         metavar="S",
         help="length of one interval, which begin at its multiples (default: one for all)",
     )
+    add(
+        "--begin",
+        metavar="DATE",
+        help="date and time of the recording's time 0, say 2026-11-27T07:30:00: intervals are of that clock",
+    )
+    add(
+        "--complete",
+        action="store_true",
+        help="rows for every class in every direction of every line and zone, those of nobody included",
+    )
     add_classes(parser, "count vehicles of these classes only (a track's class is the one it ends with)")
     add_tables(parser)
-    parser.add_argument("--out", metavar="FILE", help="write the counts as CSV (default: print a table)")
-    parser.add_argument("--crossings", metavar="FILE", help="also write every crossing as CSV")
+    add("--out", metavar="FILE", help="write the counts as CSV (default: print a table)")
+    add("--crossings", metavar="FILE", help="also write every crossing as CSV")
+    add("--od", metavar="FILE", help="also write who went from which line or zone to which, as CSV")
+    add(
+        "--stations",
+        metavar="FILE",
+        help="also write flow, occupancy, headway and speed of each line and interval, as CSV",
+    )
+    add("--road", metavar="DIR", help="what `road` wrote with the same lines: lanes and speeds of --stations")
 
 
 def run(args: argparse.Namespace) -> int:
     """Count."""
     from jeat_graph.eval import counting
     from jeat_graph.eval.load import recording_span, tables_of
-    from jeat_graph.eval.tables import Cell, Table
+    from jeat_graph.eval.zones import zone_crossings
     from jeat_graph.io.table_writer import write_columns
     from jeat_graph.io.trajectories_io import read_trajectories
 
-    lines = [_line(text, k) for k, text in enumerate(args.line, 1)]
-    names = [line.name for line in lines]
-    if len(set(names)) < len(names):
-        raise DataError(f"--line: {max(names, key=names.count)} is the name of two lines")
+    lines, zones = places(args)
+    if not lines and not zones:
+        raise ConfigError("nothing to count at: give --line, --zone or --lines FILE.yaml")
+    names = [place.name for place in (*lines, *zones)]
+    if args.road is not None and args.stations is None:
+        raise ConfigError("--road says nothing without --stations: give both, or leave it out")
+    later_s = clock_s(args.begin)
     tables = tables_of(Path(args.source))
     kind = "smoothed" if "smoothed" in tables else "causal"
     table = read_trajectories(tables[kind], **tables_read(args))
@@ -62,45 +84,97 @@ def run(args: argparse.Namespace) -> int:
     if args.classes is not None:
         table = table.of_class(*args.classes, final=True)
     known = table.final_classes()
-    found = [c for line in lines for c in counting.crossings(table, line, known)]
-    edges = np.array([first, np.nextafter(last, np.inf)])
-    if args.interval is not None:
-        edges = counting.interval_edges(first, last, args.interval, [c.t for c in found])
-    counts = counting.count(found, edges, names)
+    at_lines = [c for line in lines for c in counting.crossings(table, line, known)]
+    at_zones = [c for zone in zones for c in zone_crossings(table, zone, known)]
+    found = [replace(c, t=c.t + later_s) for c in (*at_lines, *at_zones)]
+    span = first + later_s, last + later_s
+    edges = _edges(args.interval, span, found)
+    counts = counting.count(
+        found,
+        edges,
+        [line.name for line in lines],
+        zones=[zone.name for zone in zones],
+        complete=args.complete,
+    )
     if args.crossings:
-        write_columns(_columns(found, counting.LineCrossing), args.crossings)
+        write_columns(with_clock(_columns(found, LineCrossing), args.begin), args.crossings)
+    if args.od:
+        _write_od(found, edges, names, args)
+    if args.stations:
+        _write_stations(table, lines, at_lines, edges, span, later_s, args)
     if args.out:
-        write_columns(_columns(counts, counting.Count), args.out)
+        write_columns(with_clock(_columns(counts, Count), args.begin), args.out)
         print(f"wrote {args.out}: {len(found)} crossings ({kind} tracks)", file=sys.stderr)
     else:
-        classes = any(c.vehicle_class for c in counts)
-        records: list[dict[str, Cell]] = [
-            {
-                "line": c.line,
-                "direction": c.direction,
-                **({"class": c.vehicle_class} if classes else {}),
-                "from (s)": round(c.t_from, 3),
-                "to (s)": round(c.t_to, 3),
-                "vehicles": c.count,
-                "95 %": None if np.isnan(c.expected) else f"{c.low} … {c.high}",
-            }
-            for c in counts
-        ]
-        shown = found or args.interval is not None
-        print(Table.from_records(records).render() if shown else "no track crosses a line")
-        if any(np.isnan(c.expected) for c in counts):
-            say("count", "no interval: the table has no variances of position (`track` writes them)")
+        _show(counts, shown=bool(found) or args.interval is not None)
     return 0
 
 
-def _line(text: str, number: int) -> Line:
-    """Read `NAME=x1,y1,x2,y2`; without a name it is `line-1` and so on."""
-    name, equals, ends = text.rpartition("=")
-    try:
-        x1, y1, x2, y2 = (float(part) for part in ends.split(","))
-    except ValueError:
-        raise DataError(f"--line {text}: must read x1,y1,x2,y2 in px, or NAME=x1,y1,x2,y2") from None
-    return Line(x1, y1, x2, y2, name if equals else f"line-{number}")
+def _edges(interval_s: float | None, span: tuple[float, float], found: list[LineCrossing]) -> FloatArray:
+    from jeat_graph.eval.counting import interval_edges
+
+    first, last = span
+    if interval_s is None:
+        return np.array([first, np.nextafter(last, np.inf)])
+    edges: FloatArray = interval_edges(first, last, interval_s, [c.t for c in found])
+    return edges
+
+
+def _write_od(
+    found: list[LineCrossing], edges: FloatArray, names: list[str], args: argparse.Namespace
+) -> None:
+    from jeat_graph.eval.zones import OdCount, journeys, od_table
+    from jeat_graph.io.table_writer import write_columns
+
+    if len(names) < 2:
+        raise DataError("--od needs two lines or zones at least")
+    rows = od_table(journeys(found), edges, names)
+    write_columns(with_clock(_columns(rows, OdCount), args.begin), args.od)
+
+
+def _write_stations(
+    table: Trajectories,
+    lines: list[Line],
+    at_lines: list[LineCrossing],
+    edges: FloatArray,
+    span: tuple[float, float],
+    later_s: float,
+    args: argparse.Namespace,
+) -> None:
+    from jeat_graph.cli.count_output import on_road
+    from jeat_graph.eval.stations import covered_s, stations
+    from jeat_graph.io.table_writer import write_columns
+
+    if not lines:
+        raise DataError("--stations is of lines: give --line, or --lines FILE.yaml with some")
+    by_name = {line.name: line for line in lines}
+    covers = [covered_s(table, by_name[c.line], c) for c in at_lines]
+    lanes, speeds = (None, None) if args.road is None else on_road(Path(args.road), at_lines)
+    later = [replace(c, t=c.t + later_s) for c in at_lines]
+    records = stations(later, covers, list(by_name), edges, span, lanes, speeds)
+    write_columns(with_clock(station_columns(records), args.begin), args.stations)
+
+
+def _show(counts: list[Count], *, shown: bool) -> None:
+    """Print the counts as a table."""
+    from jeat_graph.eval.tables import Cell, Table
+
+    classes = any(c.vehicle_class for c in counts)
+    records: list[dict[str, Cell]] = [
+        {
+            "line": c.line,
+            "direction": c.direction,
+            **({"class": c.vehicle_class} if classes else {}),
+            "from (s)": round(c.t_from, 3),
+            "to (s)": round(c.t_to, 3),
+            "vehicles": c.count,
+            "95 %": None if np.isnan(c.expected) else f"{c.low} … {c.high}",
+        }
+        for c in counts
+    ]
+    print(Table.from_records(records).render() if shown else "no track crosses a line")
+    if any(np.isnan(c.expected) for c in counts):
+        say("count", "no interval: the table has no variances of position (`track` writes them)")
 
 
 def _columns(rows: list[Any], kind: type) -> dict[str, npt.NDArray[Any]]:

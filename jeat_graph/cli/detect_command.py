@@ -7,19 +7,19 @@ import json
 import sys
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from jeat_graph.cli.detect_options import add_detecting, detect_request
-from jeat_graph.cli.options import add_rate
+from jeat_graph.cli.options import add_classes, add_rate
 from jeat_graph.cli.terminal import say
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.progress import progress_to, refreshing
 
 if TYPE_CHECKING:
     from jeat_graph.data.detections import Detections
-    from jeat_graph.detection.detecting import DetectRequest
+    from jeat_graph.detection.request import DetectRequest
 
 STDOUT = "-"
 #: Decimal places of boxes (px) and of times (s) on stdout.
@@ -34,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--frames", metavar="VIDEO|DIR|AEDAT4", help="a video, a folder of pictures, or an AEDAT4 file")
     add("--events", metavar="FILE", help="a file of events, in any of the formats of `events info`")
     add_detecting(parser)
+    add_classes(parser, "look for these classes only: names or numbers of the network's; all: every one")
     add_rate(parser)
     add(
         "--out",
@@ -63,6 +64,9 @@ def run(args: argparse.Namespace) -> int:
     for k, name in enumerate(found.sensors):
         of_sensor = found.scan_sensor == k
         print(f"{name}: {int(boxes[of_sensor].sum())} boxes in {int(of_sensor.sum())} scans")
+    if found.classes is not None:
+        names, count = np.unique(found.classes[found.classes != ""], return_counts=True)
+        print("classes:", ", ".join(f"{name} {n}" for name, n in zip(names, count, strict=True)) or "none")
     print(f"wrote {out}")
     return 0
 
@@ -73,8 +77,10 @@ def _to_stdout(request: DetectRequest) -> int:
 
     for scan in detect_scans(request, partial(say, "detect")):
         boxes = np.round(scan.boxes, _PLACES).tolist()
-        line = {"t": round(scan.t, _TIME_PLACES), "sensor": scan.sensor, "boxes": boxes}
+        line: dict[str, Any] = {"t": round(scan.t, _TIME_PLACES), "sensor": scan.sensor, "boxes": boxes}
         line["scores"] = np.round(scan.scores, _PLACES + 1).tolist()
+        if scan.classes is not None:
+            line["classes"] = scan.classes.tolist()
         sys.stdout.write(json.dumps(line) + "\n")
         sys.stdout.flush()
     return 0

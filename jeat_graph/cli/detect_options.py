@@ -9,13 +9,18 @@ from typing import TYPE_CHECKING
 from jeat_graph.config.argument_types import finite, picture_size, positive
 
 if TYPE_CHECKING:
-    from jeat_graph.detection.detecting import DetectRequest
+    from jeat_graph.detection.request import DetectRequest
+    from jeat_graph.detection.settings import DetectionSettings
     from jeat_graph.io.events.layout import EventLayout
 
 #: Units of time of tables of events.
 UNITS = ("s", "ms", "us", "ns")
 #: The preset of who names none.
 DEFAULT = "default"
+#: What is no network, or not one that is known before the pictures are.
+_NO_NETWORK = ("motion", "auto")
+#: `--mask none`.
+_NO_MASK = "none"
 
 
 def add_detecting(parser: argparse._ActionsContainer) -> None:
@@ -23,10 +28,11 @@ def add_detecting(parser: argparse._ActionsContainer) -> None:
     add = parser.add_argument
     add(
         "--detector-frames",
-        default="motion",
+        default="auto",
         metavar="NAME|FILE.onnx",
-        help="what finds vehicles in frames: motion (default; what moves before a camera that stands "
-        "still), a network that comes with the package, or a network's file",
+        help="what finds vehicles in frames: auto (default; what on this machine fits the first seconds), "
+        "motion (what moves before a camera that stands still), a network's name (`jeat-graph detectors`) or "
+        "file",
     )
     add(
         "--detector-events",
@@ -52,6 +58,15 @@ def add_detecting(parser: argparse._ActionsContainer) -> None:
         default=[],
         metavar="KEY=VALUE",
         help="change one of these settings, say model_frames.layout=yolov8; may be given many times",
+    )
+    add(
+        "--mask",
+        dest="masks",
+        action="append",
+        default=[],
+        metavar="FILE.yaml|X1,Y1,X2,Y2,…",
+        help="leave out boxes that lie mostly in a polygon (px): its corners, or a file with `masks: {name: "
+        "[[x, y], …]}`; may be given many times; none: not even a burnt-in clock",
     )
     add(
         "--event-rate",
@@ -135,7 +150,7 @@ def made_by(args: argparse.Namespace, say: Callable[[str], object]) -> list[str]
     """
     options = {"rgb": "frames", "evt": "events", "fused": "fused"}
     given = {sensor: getattr(args, f"detector_{option}") for sensor, option in options.items()}
-    networks = {sensor: network for sensor, network in given.items() if network not in (None, "motion")}
+    networks = {sensor: one for sensor, one in given.items() if one is not None and one not in _NO_NETWORK}
     if not networks:
         return []
     from jeat_graph.data.errors import ConfigError
@@ -159,7 +174,7 @@ def _without_input(args: argparse.Namespace) -> list[tuple[str, str]]:
     if args.detector_fused is not None or (args.frames is None and args.events is None):
         return []
     given = {
-        "--detector-frames": ("--frames", args.frames, args.detector_frames != "motion"),
+        "--detector-frames": ("--frames", args.frames, args.detector_frames not in _NO_NETWORK),
         "--detector-events": ("--events", args.events, args.detector_events != "motion"),
         "--event-rate": ("--events", args.events, args.event_rate is not None),
         "--event-size": ("--events", args.events, args.event_size is not None),
@@ -169,6 +184,32 @@ def _without_input(args: argparse.Namespace) -> list[tuple[str, str]]:
         "--event-delay": ("--events", args.events, args.event_delay != 0.0),
     }
     return [(name, source) for name, (source, file, said) in given.items() if said and file is None]
+
+
+def _looking_for(
+    settings: DetectionSettings, classes: tuple[str, ...], args: argparse.Namespace
+) -> DetectionSettings:
+    """Return the settings with `--class` for each network that looks.
+
+    Raises:
+        ConfigError: no network looks, or a list of settings names classes, too.
+    """
+    from dataclasses import replace
+
+    from jeat_graph.data.errors import ConfigError
+
+    looking = {
+        "model_frames": args.frames is not None and args.detector_frames != "motion",
+        "model_events": args.events is not None and args.detector_events != "motion",
+        "model_fused": args.detector_fused is not None,
+    }
+    if not any(looking.values()):
+        raise ConfigError("--class: what moves has no class; a network knows some (--detector-frames)")
+    named = [name for name, does in looking.items() if does]
+    if any(getattr(settings, name).classes for name in named):
+        raise ConfigError(f"--class and {named[0]}.classes say the same twice: leave one out")
+    chosen = {name: replace(getattr(settings, name), classes=classes) for name in named}
+    return replace(settings, **chosen)
 
 
 def detect_request(args: argparse.Namespace) -> DetectRequest:
@@ -181,12 +222,17 @@ def detect_request(args: argparse.Namespace) -> DetectRequest:
     from dataclasses import replace
 
     from jeat_graph.data.errors import ConfigError
-    from jeat_graph.detection.detecting import DetectRequest
+    from jeat_graph.detection.masks import read_masks
+    from jeat_graph.detection.request import DetectRequest
     from jeat_graph.detection.settings import load_settings
 
     for option, source in _without_input(args):
         raise ConfigError(f"{option} says nothing without {source}: give both, or leave it out")
+    if _NO_MASK in args.masks and len(args.masks) > 1:
+        raise ConfigError("--mask none goes with no other --mask")
     settings = load_settings(args.detection_config, args.detection_set)
+    if args.classes is not None:
+        settings = _looking_for(settings, tuple(args.classes), args)
     if args.event_rate is not None:
         try:
             settings = replace(settings, events=replace(settings.events, rate_hz=args.event_rate))
@@ -203,4 +249,6 @@ def detect_request(args: argparse.Namespace) -> DetectRequest:
         event_layout=event_layout(args),
         events_later_s=args.event_delay,
         settings=settings,
+        masks=read_masks([text for text in args.masks if text != _NO_MASK]),
+        find_clock=_NO_MASK not in args.masks,
     )

@@ -17,10 +17,12 @@ from jeat_graph.cli.options import (
     add_tables,
     tables_read,
 )
+from jeat_graph.cli.place_options import add_places, places
 from jeat_graph.cli.terminal import warn
 from jeat_graph.config.argument_types import counting, drawn_size, not_negative, positive
 from jeat_graph.data.errors import DataError
-from jeat_graph.drawing.movie.film import CODECS
+from jeat_graph.drawing.movie.captions import PARTS
+from jeat_graph.drawing.movie.film import AUTO, CODECS, KINDS
 from jeat_graph.drawing.movie.moments import TRAIL_S
 
 if TYPE_CHECKING:
@@ -37,9 +39,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     # Not `run`: that name is taken by the function that the entry point calls.
     add(
         "run_directory",
+        nargs="?",
         metavar="RUN",
         help="run directory or table of tracks; or a simulated segment, which brings its own frames, events "
-        "and truth",
+        "and truth; without: a film of the frames or events alone",
     )
     add("--frames", metavar="VIDEO|DIR", help="video, folder of pictures or AEDAT4 file to draw on")
     add(
@@ -48,6 +51,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="events (every format of `events info`) to draw on; beside the frames if both",
     )
     add_event_layout(parser)
+    add_places(parser)
+    add(
+        "--show",
+        nargs="+",
+        choices=PARTS,
+        metavar="PART",
+        help=f"what stands beside a track: {', '.join(PARTS)} (default: all that is known)",
+    )
+    add("--road", metavar="DIR", help="speeds from what `road` wrote (default: the run's tables of the road)")
+    add(
+        "--codec",
+        choices=KINDS,
+        default=AUTO,
+        help="of films in .mp4: h264 (by the FFmpeg of this machine), vp9, or auto (default): h264 if it can",
+    )
     add("--gt", metavar="FILE", help="truth, drawn as thin outlines")
     add_rig(parser)
     add(
@@ -97,8 +115,11 @@ def run(args: argparse.Namespace) -> int:
     out = Path(args.out)
     one = args.at is not None or args.strip is not None
     _check_out(out, one)
+    lines, zones = places(args)
+    if (lines or zones) and args.run_directory is None:
+        raise DataError("lines and zones count tracks: give a RUN")
     request = Request(
-        run=Path(args.run_directory),
+        run=_path(args.run_directory),
         frames=_path(args.frames),
         events=_path(args.events),
         truth=_path(args.gt),
@@ -117,6 +138,9 @@ def run(args: argparse.Namespace) -> int:
         event_size_px=args.event_size,
         event_layout=event_layout(args),
         rig=_path(args.rig),
+        captions=PARTS if args.show is None else tuple(args.show),
+        road=_path(args.road),
+        places=(*lines, *zones),
     )
     inputs = [path for path in (request.frames, request.events, request.truth) if path is not None]
     check_keeps(inputs, out)
@@ -127,7 +151,7 @@ def run(args: argparse.Namespace) -> int:
         if one:
             write_png(out, movie.strip(args.strip or 1))
         else:
-            _write_movie(movie, rate_hz, out)
+            _write_movie(movie, rate_hz, out, args.codec)
     count, (width, height) = min(len(movie.times), args.strip or len(movie.times)), movie.size_px
     if args.rate is not None and not _counted(request):
         warn(
@@ -147,13 +171,13 @@ def _counted(request: Request) -> bool:
     return request.frames is not None or any(map(counts_frames, files))
 
 
-def _write_movie(movie: Movie, rate_hz: float, out: Path) -> None:
+def _write_movie(movie: Movie, rate_hz: float, out: Path, kind: str) -> None:
     from tqdm import tqdm
 
     from jeat_graph.drawing.movie.film import MovieWriter
 
     hidden = not sys.stderr.isatty()
-    with MovieWriter(out, movie.size_px, rate_hz) as writer:
+    with MovieWriter(out, movie.size_px, rate_hz, kind) as writer:
         for k in tqdm(range(len(movie.times)), desc="render", unit="frame", disable=hidden, leave=False):
             writer.append(movie.picture(k))
 

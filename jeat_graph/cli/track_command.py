@@ -27,10 +27,9 @@ from jeat_graph.data.errors import DataError
 
 if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
+    from jeat_graph.detection.before_tracking import DetectedFile
 
 HELP = "track the vehicles in files of detections, or in raw frames and events, and write a run directory"
-#: Within the run directory, where raw recordings were tracked.
-DETECTIONS = "detections.csv"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -92,10 +91,13 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.runs.track_files import TrackRequest, track_files
 
     detections = tuple(str(item) for item in args.detections)
+    detectors: tuple[str, ...] = ()
     if detections:
         declared = tuple(made_by(args, _say))
     else:
-        detections, declared = _detected(args)
+        found = _detected(args)
+        detections, declared, detectors = (found.path,), found.declared, found.detectors
+        args.classes = None  # the networks have looked for no others
     request = TrackRequest(
         detections=detections,
         out=args.out,
@@ -112,6 +114,7 @@ def run(args: argparse.Namespace) -> int:
         class_names=args.class_names,
         frames=args.frames,
         rig=args.rig,
+        detectors=detectors,
         options=RunOptions(
             formats=extra_formats(args),
             frame_rate_hz=args.output_rate if args.output_rate is not None else args.rate,
@@ -127,18 +130,11 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _detected(args: argparse.Namespace) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Detect in raw recordings.
-
-    Returns:
-        The file of detections, which lies in the run directory, and what `default` is told of the networks.
-    """
+def _detected(args: argparse.Namespace) -> DetectedFile:
+    """Detect in raw recordings; the file of detections lies in the run directory."""
     from jeat_graph.cli.detect_command import detect_with_bar
-    from jeat_graph.detection.declared import declared_settings
-    from jeat_graph.detection.detecting import picture_of
+    from jeat_graph.detection.before_tracking import DETECTIONS, detect_before
     from jeat_graph.io.atomic import check_writable
-    from jeat_graph.io.detections_io import write_detections
-    from jeat_graph.io.locking import hold_made_folder
     from jeat_graph.io.outputs import check_folder
 
     if args.frames is None and args.events is None:
@@ -148,17 +144,20 @@ def _detected(args: argparse.Namespace) -> tuple[tuple[str, ...], tuple[str, ...
             raise DataError(f"--{name.replace('_', '-')} is for files of detections; there is none")
     out = Path(args.out)
     check_folder(out)
-    found = out / DETECTIONS
-    check_writable(found)
+    check_writable(out / DETECTIONS)
     request = replace(detect_request(args), one_picture=not _have_own_pictures(args))
     if args.image is not None and args.frames is not None:
         _check_image(args.image, args.frames)
     # Another configuration, a preset or the user's own, says itself what its sensors are.
-    declared = declared_settings(request, _say) if args.config == DEFAULT else []
-    args.image = args.image or (None if args.rig is not None else picture_of(request))
-    with hold_made_folder(out):  # detecting takes long; the run directory is held by what tracks
-        write_detections(detect_with_bar(request, "track"), found)
-    return (str(found),), tuple(declared)
+    found = detect_before(
+        request,
+        out,
+        declare=args.config == DEFAULT,
+        say=_say,
+        detect=lambda looked: detect_with_bar(looked, "track"),
+    )
+    args.image = args.image or (None if args.rig is not None else found.image)
+    return found
 
 
 def _have_own_pictures(args: argparse.Namespace) -> bool:

@@ -5,24 +5,32 @@ configuration) and, if wanted, `birth: {max_overlap: …}`, `merge: {apart_overl
 `output: {position_scale: …, lasting_error: …}`, `smoother: {max_gap_s: …}`, `lifecycle: {least_move: …}`,
 `together: {SENSOR: {…}}`, keys of this sensor where that one looks too, and `beside: SENSOR`: without that
 sensor only what its scores say of boxes and of tracks counts, and the sections `merge`, `output` and
-`smoother`.
+`smoother`. A network without such a file has that of its layout, `layouts/LAYOUT.tracking.yaml`, if any.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 
 from jeat_graph.config.fields import LARGEST, Section, number
 from jeat_graph.config.reading import load_config
 from jeat_graph.config.section_tree import build, read_tree
 from jeat_graph.config.sensors import SensorConfig
-from jeat_graph.data.errors import ConfigError
-from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR, FUSED_SENSOR, DetectRequest
+from jeat_graph.data.errors import ConfigError, DataError
+from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR, FUSED_SENSOR
+from jeat_graph.detection.models.layouts import recognise
+from jeat_graph.detection.models.model_settings import OPEN_SIDE
+from jeat_graph.detection.models.onnx_head import CARD, read_onnx_head
 from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION, network_file
+from jeat_graph.detection.request import DetectRequest
 
 _SUFFIX = ".tracking.yaml"
+_LAYOUTS = Path(__file__).parent / "layouts"
+_RAW = "-raw"
 # What scores say of how exact boxes are, and how tracks fit, was measured of each sensor alone.
 _ALWAYS = ("score_noise", "score_fit")
 # Which of two files' values counts outside of the sensors. Without the sensor that a file names under
@@ -107,6 +115,21 @@ def declared_settings(request: DetectRequest, say: Callable[[str], object] = lam
     return declared_of({sensor: by for sensor, by in looking.items() if by is not None}, say)
 
 
+def _of_layout(network: Path, sensor: str) -> Path | None:
+    """Return the file of what networks of pictures with outputs of a layout are like, if there is one."""
+    if sensor != FRAMES_SENSOR or not network.is_file():
+        return None
+    with suppress(DataError):  # said where the network is opened
+        head = read_onnx_head(network)
+        shape = head.inputs[0].shape
+        if CARD in head.notes or len(shape) != len("NCHW"):
+            return None
+        layout = recognise(head.outputs, (shape[3] or OPEN_SIDE, shape[2] or OPEN_SIDE), head.notes) or ""
+        path = _LAYOUTS / f"{layout.removesuffix(_RAW)}{_SUFFIX}"
+        return path if path.is_file() else None
+    return None
+
+
 def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lambda _: None) -> list[str]:
     """Return the same of detectors whose boxes come from elsewhere, from a file or a pipe.
 
@@ -123,8 +146,9 @@ def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lam
         if detector == MOTION:
             continue
         network = network_file(detector, _KINDS[sensor])
-        path = network.with_name(network.name.removesuffix(network.suffix) + _SUFFIX)
-        if not path.is_file():
+        beside = network.with_name(network.name.removesuffix(network.suffix) + _SUFFIX)
+        path = beside if beside.is_file() else _of_layout(network, sensor)
+        if path is None:
             continue
         tree = read_tree(str(path), (), str, "file of what a network's boxes are like")
         try:

@@ -5,26 +5,28 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable, Generator, Iterator
 from contextlib import ExitStack, closing
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from jeat_graph.data.detections import Detections, Scan
-from jeat_graph.data.errors import ConfigError, DataError
+from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.data.progress import with_progress
 from jeat_graph.detection.ahead import Ahead
+from jeat_graph.detection.automatic import resolved
 from jeat_graph.detection.binned import BinnedDetector, Signal
+from jeat_graph.detection.burnt_in import find_clock
 from jeat_graph.detection.event_detector import EventDetector
+from jeat_graph.detection.masks import MaskedPicture
 from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION, network_file
 from jeat_graph.detection.opencv_threads import one_thread
 from jeat_graph.detection.picture_detector import PictureDetector
-from jeat_graph.detection.settings import BESIDE_RATE_HZ, DetectionSettings
+from jeat_graph.detection.request import DetectRequest
+from jeat_graph.detection.settings import BESIDE_RATE_HZ
 
 if TYPE_CHECKING:
-    from jeat_graph.io.events.layout import EventLayout
     from jeat_graph.io.events.reader import EventReader
     from jeat_graph.io.video import FrameSource
 
@@ -32,51 +34,11 @@ if TYPE_CHECKING:
 
 FRAMES_SENSOR, EVENTS_SENSOR, FUSED_SENSOR = "rgb", "evt", "fused"
 _US_PER_S = 1e6
+#: A burnt-in clock is looked for in so much of a recording (s).
+_CLOCK_S = 3.2
 #: Pieces of a file of events that are read ahead.
 _PIECES_AHEAD = 2
 _Scans = Generator[Scan, None, None]
-
-
-@dataclass(frozen=True)
-class DetectRequest:
-    """What shall be looked for, and where.
-
-    Attributes:
-        frames: a video, a folder of pictures, or an AEDAT 4 file; or None.
-        events: a file of events; or None.
-        detector_frames: `motion`, a network that comes with the package, or an ONNX file.
-        detector_events: the same.
-        detector_fused: a network that looks at both at once, instead of the other two; or None.
-        rate_hz: frames per second where neither the video nor a table beside it says.
-        event_size_px: width and height of the event camera's picture, where the file does not say.
-        event_layout: columns, unit of time and recording, where the file of events leaves that open.
-        events_later_s: what to add to the times of the events for the clock of the frames (s).
-        one_picture: whether pictures and events must be of the same pixels, as who tracks them needs.
-        settings: of the detectors.
-    """
-
-    frames: str | Path | None = None
-    events: str | Path | None = None
-    detector_frames: str = MOTION
-    detector_events: str = MOTION
-    detector_fused: str | None = None
-    rate_hz: float | None = None
-    event_size_px: tuple[int, int] | None = None
-    event_layout: EventLayout | None = None
-    events_later_s: float = 0.0
-    one_picture: bool = False
-    settings: DetectionSettings = field(default_factory=DetectionSettings)
-
-    def __post_init__(self) -> None:
-        if self.frames is None and self.events is None:
-            raise ConfigError("nothing to detect in: give --frames, --events or both")
-        if self.detector_fused is not None and {self.detector_frames, self.detector_events} != {MOTION}:
-            raise ConfigError("--detector-fused takes the place of --detector-frames and --detector-events")
-
-    @property
-    def files(self) -> list[str]:
-        """The inputs, each once."""
-        return list(dict.fromkeys(str(path) for path in (self.frames, self.events) if path is not None))
 
 
 def detect_scans(
@@ -95,6 +57,7 @@ def detect_scans(
         ConfigError: an extra package is needed.
         DataError: a file cannot be read, or does not say what is needed.
     """
+    request = resolved(request, say)
     with ExitStack() as stack:
         source = None if request.frames is None else _frames(request, stack, say)
         recording = None if request.events is None else _events(request, source, stack, say)
@@ -110,9 +73,31 @@ def detect_scans(
         coming: list[Iterator[Scan]] = [
             stack.enter_context(closing(Ahead(stream) if len(streams) > 1 else stream)) for stream in streams
         ]
+        masked = _masked(request, source, recording, say)
         for scan in heapq.merge(*coming, key=lambda scan: scan.t):
             on_time(scan.t)
-            yield scan
+            mask = masked.get(scan.sensor)
+            yield scan if mask is None else mask.scan(scan)
+
+
+def _masked(
+    request: DetectRequest,
+    source: FrameSource | None,
+    recording: _Recording | None,
+    say: Callable[[str], object],
+) -> dict[str, MaskedPicture]:
+    """Return the masks of each sensor whose picture they are of."""
+    if not request.masks:
+        return {}
+    if source is None:
+        assert recording is not None
+        size_px, sensors = recording[1], [EVENTS_SENSOR, FUSED_SENSOR]
+    elif recording is None or source.size_px == recording[1]:
+        size_px, sensors = source.size_px, [FRAMES_SENSOR, EVENTS_SENSOR, FUSED_SENSOR]
+    else:
+        say("warning: --mask is of the frames: the events, which are of another size, are not masked")
+        size_px, sensors = source.size_px, [FRAMES_SENSOR]
+    return dict.fromkeys(sensors, request.masks.on(size_px))
 
 
 def picture_of(request: DetectRequest) -> tuple[int, int] | None:
@@ -190,23 +175,46 @@ def _picture_scans(
         found = (model(frame, t) for t, frame in with_progress(source, len(source)))
         return _with_note(found, model.note, say)
     stack.enter_context(one_thread())
-    return _moving(source, request)
+    return _moving(source, request, _quiet_parts(source, request, say))
 
 
-def _moving(source: FrameSource, request: DetectRequest) -> _Scans:
+def _quiet_parts(
+    source: FrameSource, request: DetectRequest, say: Callable[[str], object]
+) -> MaskedPicture | None:
+    """Return the masks with a burnt-in clock, if there is one, in which nothing is to move."""
+    import cv2
+
+    masks = request.masks
+    if request.find_clock:
+        count = int(np.searchsorted(source.times_s, source.times_s[0] + _CLOCK_S, side="right"))
+        greys = [
+            np.asarray(cv2.cvtColor(source.frame(k), cv2.COLOR_RGB2GRAY), dtype=np.uint8)
+            for k in range(count)
+        ]
+        clock = find_clock(greys, source.times_s[:count])
+        if clock is not None:
+            left, top, width, height = clock
+            say(f"a burnt-in clock, {width} x {height} px at {left}, {top}, is masked (--mask none: not)")
+            masks = masks.with_box(*clock)
+    return masks.on(source.size_px) if masks else None
+
+
+def _moving(source: FrameSource, request: DetectRequest, quiet: MaskedPicture | None) -> _Scans:
     """Yield what differs from the background, which is made when the first scan is asked for.
 
     By whoever asks: a thread, while another already looks at the events.
     """
     detector = PictureDetector(FRAMES_SENSOR, request.settings.frames)
-    _prime(detector, source, request)
+    _prime(detector, source, request, quiet)
     for t, frame in with_progress(source, len(source)):
-        scan = detector(frame, t)
+        scan = detector(frame if quiet is None else quiet.painted(frame), t)
         if scan is not None:
             yield scan
 
 
-def _prime(detector: PictureDetector, source: FrameSource, request: DetectRequest) -> None:
+def _prime(
+    detector: PictureDetector, source: FrameSource, request: DetectRequest, quiet: MaskedPicture | None
+) -> None:
     """Take the background from the first seconds before the first picture is looked at."""
     settings = request.settings.frames
     end_s = source.times_s[0] + settings.warm_up_s
@@ -214,7 +222,8 @@ def _prime(detector: PictureDetector, source: FrameSource, request: DetectReques
     chosen = np.unique(np.linspace(0, count - 1, min(settings.samples, count)).round().astype(int))
     if len(chosen) < 3:
         raise DataError("has fewer than three frames: what moves cannot be told", request.frames)
-    detector.prime([source.frame(int(k)) for k in chosen])
+    frames = [source.frame(int(k)) for k in chosen]
+    detector.prime(frames if quiet is None else [quiet.painted(frame) for frame in frames])
 
 
 def _fused_scans(

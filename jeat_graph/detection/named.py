@@ -1,8 +1,8 @@
-"""Networks that come with the package, by the names that `--detector-frames` and its like take.
+"""Networks by the names that `--detector-frames` and its like take: of the package, and of other people.
 
 A network NAME for pictures is `weights/NAME-frames.onnx`, one for events `weights/NAME-events.onnx`, one for
 both at once `weights/NAME-fused.onnx`. What it was trained on, by which command, and how good it is stands in
-the file (`card`).
+the file (`card`). Of other people's networks for pictures (`known_networks`) the files are fetched once.
 """
 
 from __future__ import annotations
@@ -10,9 +10,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from jeat_graph.data.errors import ConfigError
+from jeat_graph.detection.known_networks import KNOWN
+from jeat_graph.detection.network_cache import fetched
 
 #: The detectors without weights.
 MOTION = "motion"
+#: Whichever fits the pictures (`automatic`).
+AUTO = "auto"
 #: What a network looks at.
 FRAMES, EVENTS, FUSED = "frames", "events", "fused"
 _FOLDER = Path(__file__).parent / "weights"
@@ -38,13 +42,17 @@ def network_file(detector: str, kind: str) -> Path:
 
     Raises:
         ConfigError: a name that is not known.
+        DataError: the file of a known network is neither here nor to be had.
     """
     path = Path(detector)
     if path.suffix.lower() == _ONNX or len(path.parts) > 1 or path.is_file():
         return path
     known = networks(kind)
+    if kind == FRAMES and detector in KNOWN:
+        return fetched(KNOWN[detector])
     if detector not in known:
         names = list(known) if kind == FUSED else [MOTION, *known]
+        names = [AUTO, *names, *KNOWN] if kind == FRAMES else names
         choice = f"one of {', '.join(names)}, or " if names else ""
         seen = "both sensors" if kind == FUSED else kind
         raise ConfigError(

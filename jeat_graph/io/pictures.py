@@ -75,8 +75,22 @@ def finish_video(video: Any, path: Path, shown: Path, count: int) -> None:
         DataError: it has fewer.
     """
     quietly(video.release)
+    check_frames(path, shown, count)
+    if path.suffix.lower() == ".webm":
+        settle_webm(path)
+
+
+def check_frames(path: Path, shown: Path, count: int) -> None:
+    """Read a video again, and count its pictures.
+
+    Args:
+        path: the file.
+        shown: its name in messages.
+        count: number of pictures that it should have.
+
+    Raises:
+        DataError: it has fewer.
+    """
     there = count_frames(path)
     if there != count:
         raise DataError(f"only {there} of {count} pictures could be written; is the disk full?", shown)
-    if path.suffix.lower() == ".webm":
-        settle_webm(path)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.data.processes import available_cores
+from jeat_graph.detection.named import AUTO, MOTION
+from jeat_graph.detection.request import DetectRequest
 from jeat_graph.io.locking import hold_lock_file
 from jeat_graph.io.outputs import check_folder
 from jeat_graph.live.engines import ENGINES, run_local, run_on_ray
@@ -110,12 +112,39 @@ def _job(recording: ManifestRow, folder: Path, options: BatchOptions) -> Job:
         out=str((folder / RUNS / recording.name).resolve()),
         config=str(Path(config).resolve()) if Path(config).is_file() else config,
         overrides=(*options.overrides, *recording.overrides),
-        rate_hz=recording.rate_hz,
+        rate_hz=recording.rate_hz if detections else None,
         options=options.options,
         **recording.reading,
     )
     camera = None if recording.camera is None else str(Path(recording.camera).resolve())
-    return Job(recording.name, request, camera)
+    return Job(recording.name, request, camera, None if detections else _raw(recording))
+
+
+def _raw(recording: ManifestRow) -> DetectRequest:
+    """Return where the detections of a recording come from that begins with pictures or events."""
+    from jeat_graph.detection.masks import read_masks
+    from jeat_graph.detection.settings import DetectionSettings
+
+    network = DetectionSettings().model_frames
+    return DetectRequest(
+        frames=_path(recording.frames),
+        events=_path(recording.events),
+        detector_frames=_network(recording.detector_frames, AUTO),
+        detector_events=_network(recording.detector_events, MOTION),
+        rate_hz=recording.rate_hz,
+        one_picture=True,
+        settings=DetectionSettings(model_frames=replace(network, classes=recording.classes)),
+        masks=read_masks(recording.masks),
+    )
+
+
+def _path(path: str | None) -> str | None:
+    return None if path is None else str(Path(path).resolve())
+
+
+def _network(name: str | None, usual: str) -> str:
+    """Return a detector's name as it is, and a network's file as an absolute path."""
+    return usual if name is None else str(Path(name).resolve()) if name.endswith(".onnx") else name
 
 
 def _absolute(item: str) -> str:

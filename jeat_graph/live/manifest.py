@@ -20,11 +20,15 @@ from jeat_graph.io.formats import FORMATS
 #: Separates several files, or several settings, in one field.
 SEPARATOR = ";"
 COLUMNS = ("name", "detections", "config", "set", "gt", "rate", "camera")
+#: How vehicles are found where there are no detections.
+RAW_COLUMNS = ("events", "detector_frames", "detector_events", "mask")
+_INPUTS = ("detections", "frames", "events")
 #: How the files are read: each column is called as the option of `track` is.
 READING_COLUMNS = (
     *("first_frame", "only_video", "classes", "class", "time_unit", "score_scale", "input_format", "images"),
     *("image", "frames"),
 )
+_READ_RAW = ("frames", "class", "image")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
@@ -34,13 +38,20 @@ class ManifestRow:
 
     Attributes:
         name: what the recording, and its run directory, is called; no two have one name.
-        detections: files of one scene, say one a sensor; `NAME=path` names a sensor.
+        detections: files of one scene, say one a sensor; `NAME=path` names a sensor; none where they are to
+            be made of `frames` and `events`.
         config: preset or YAML file, None for that of the whole batch.
         overrides: `key=value` settings of this recording.
         truth: true boxes, or None.
         rate_hz: frame rate of files that count frames, or None.
         camera: the calibrated camera, for speeds on the road, or None.
         reading: fields of a `TrackRequest` that say how the files are read.
+        frames: a video or a folder of pictures to look in, or None.
+        events: a file of events to look in, or None.
+        detector_frames: what finds vehicles in the frames, or None for `auto`.
+        detector_events: what finds them in the events, or None for `motion`.
+        classes: that the network looks for; none for vehicles.
+        masks: where no vehicles are looked for, as `--mask` takes them.
     """
 
     name: str
@@ -51,14 +62,21 @@ class ManifestRow:
     rate_hz: float | None = None
     camera: str | None = None
     reading: dict[str, Any] = field(default_factory=dict)
+    frames: str | None = None
+    events: str | None = None
+    detector_frames: str | None = None
+    detector_events: str | None = None
+    classes: tuple[str, ...] = ()
+    masks: tuple[str, ...] = ()
 
 
 def read_manifest(path: str | Path) -> list[ManifestRow]:
     """Read a manifest, CSV or Parquet.
 
-    Columns: `detections` (files of the recording, joined by `;`), and, all optional, `name` (default: the
-    first file's name without its suffix), `config`, `set` (settings joined by `;`), `gt`, `rate` (Hz),
-    `camera` (YAML file), and `READING_COLUMNS` (several classes joined by `;`). Paths are relative to the
+    Columns: `detections` (files of the recording, joined by `;`), or `frames`, `events` or both, in which
+    vehicles are to be found; and, all optional, `name` (default: the first file's name without its suffix),
+    `config`, `set` (settings joined by `;`), `gt`, `rate` (Hz), `camera` (YAML file), `READING_COLUMNS`
+    (several classes joined by `;`), and without detections `RAW_COLUMNS`. Paths are relative to the
     manifest's folder. The files themselves are not looked at here: a recording that cannot be read is that
     recording's failure, not the batch's.
 
@@ -68,27 +86,28 @@ def read_manifest(path: str | Path) -> list[ManifestRow]:
     """
     from jeat_graph.io.tables import read_table
 
-    table = read_table(path, ("detections",))
-    known = (*COLUMNS, *READING_COLUMNS)
+    known = (*COLUMNS, *READING_COLUMNS, *RAW_COLUMNS)
+    table = read_table(path, (), optional=known)
     strange = next((name for name in table.names if name not in known), None)
     if strange is not None:
         raise DataError(f"unknown column {strange!r}; a manifest has {', '.join(known)}", path, 1)
+    if not set(_INPUTS) & set(table.names):
+        raise DataError(f"has none of the columns {', '.join(_INPUTS)}", path, 1)
     folder = Path(path).parent
     rate = table.number("rate", blank_ok=True) if "rate" in table else None
     text = {
-        name: table.text(name, blank_ok=name != "detections").tolist()
-        for name in known
-        if name in table and name != "rate"
+        name: table.text(name, blank_ok=True).tolist() for name in known if name in table and name != "rate"
     }
     recordings: list[ManifestRow] = []
     taken: set[str] = set()
     for row in range(len(table)):
         said = {name: values[row] for name, values in text.items()}
         error = partial(table.error, row)
-        files = tuple(_located(item, folder) for item in _parts(said["detections"]))
-        if not files:
-            raise table.error(row, "detections is missing")
-        name = said.get("name") or _stem(files[0])
+        files = tuple(_located(item, folder) for item in _parts(said.get("detections", "")))
+        first = [said[key] for key in _INPUTS if said.get(key)]
+        if not first:
+            raise table.error(row, f"{', '.join(key for key in _INPUTS if key in table)} is missing")
+        name = said.get("name") or _stem(files[0] if files else first[0])
         if not _NAME.fullmatch(name):
             raise table.error(row, f"name {name!r} must be letters, digits, dots, dashes or underlines")
         if name in taken:
@@ -106,7 +125,7 @@ def read_manifest(path: str | Path) -> list[ManifestRow]:
                 truth=_located(said["gt"], folder) if said.get("gt") else None,
                 rate_hz=hz,
                 camera=_located(said["camera"], folder) if said.get("camera") else None,
-                reading=_reading(said, folder, error),
+                **({"reading": _reading(said, folder, error)} if files else _raw(said, folder, error)),
             )
         )
     if not recordings:
@@ -114,8 +133,29 @@ def read_manifest(path: str | Path) -> list[ManifestRow]:
     return recordings
 
 
+def _raw(said: Mapping[str, str], folder: Path, error: Callable[[str], DataError]) -> dict[str, Any]:
+    """Fields of a row without detections: where they come from, and by what."""
+    strange = next((key for key in READING_COLUMNS if said.get(key) and key not in _READ_RAW), None)
+    if strange is not None:
+        raise error(f"{strange} is for recordings with detections")
+    return {
+        **{key: _located(said[key], folder) for key in _INPUTS[1:] if said.get(key)},
+        **{key: _network(said.get(key, ""), folder) for key in ("detector_frames", "detector_events")},
+        "classes": tuple(_parts(said.get("class", ""))),
+        "masks": tuple(_config(one, folder) or one for one in _parts(said.get("mask", ""))),
+    }
+
+
+def _network(text: str, folder: Path) -> str | None:
+    """A detector's name as it is; the path of a file as seen from the manifest's folder."""
+    return (str(folder / text) if text.endswith(".onnx") else text) or None
+
+
 def _reading(said: Mapping[str, str], folder: Path, error: Callable[[str], DataError]) -> dict[str, Any]:
     """Fields of a `TrackRequest` that a row says, by the columns `READING_COLUMNS`."""
+    strange = next((key for key in RAW_COLUMNS if said.get(key)), None)
+    if strange is not None:
+        raise error(f"{strange} is for recordings without detections")
     found: dict[str, Any] = {}
     allowed = {
         "first_frame": tuple(map(str, FIRST_FRAMES)),

@@ -11,6 +11,8 @@ from typing import Any
 
 from jeat_graph.data.errors import JeatGraphError, OtherRunError
 from jeat_graph.data.secrets import without_logins
+from jeat_graph.detection.request import DetectRequest
+from jeat_graph.live.recording_raw import with_detections
 from jeat_graph.live.recording_road import drive_on_road, known_vehicles, run_tables
 from jeat_graph.runs.directory import read_record
 from jeat_graph.runs.track_files import TrackRequest
@@ -28,11 +30,13 @@ class Job:
         name: the recording's name.
         request: what to track, and where to.
         camera: file of the calibrated camera, or None.
+        raw: where detections come from, if the request has none.
     """
 
     name: str
     request: TrackRequest
     camera: str | None = None
+    raw: DetectRequest | None = None
 
 
 @dataclass(frozen=True)
@@ -65,6 +69,8 @@ def run_job(job: Job) -> Outcome:
     """
     try:
         out = Path(job.request.out)
+        if job.raw is not None:
+            job = replace(job, request=with_detections(job.request, job.raw))
         vehicles = None if job.camera is None else known_vehicles(out, job.camera)
         known = _finished(job.request)
         if known is not None and (job.camera is None or vehicles is not None):

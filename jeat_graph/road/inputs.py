@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import yaml
 
-from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.csv_text import read_text
+from jeat_graph.io.marks import LANES, LINES, read_marks_file
 from jeat_graph.io.tables import read_table
 from jeat_graph.road.evidence import Lengths, Points
 
@@ -92,10 +89,6 @@ def read_surveyed_points(path: str | Path) -> Points:
     return Points(pixels, places)
 
 
-# No place in a picture or on a road is farther (px, m).
-_LARGEST = 1e15
-
-
 class RoadMarks(NamedTuple):
     """What somebody drew for the road.
 
@@ -109,41 +102,10 @@ class RoadMarks(NamedTuple):
 
 
 def read_marks(path: str | Path) -> RoadMarks:
-    """Read `lines: {name: [x1, y1, x2, y2]}` in px and, if given, `lanes: {name: [left, right]}` in m.
+    """Read lines and lanes of a file of marks (`io.marks`).
 
     Raises:
         DataError: names the key that is unknown or has other than finite numbers.
     """
-    try:
-        tree = load_yaml(read_text(path).decode("utf-8", errors="replace"))
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = None if mark is None else mark.line + 1
-        problem = getattr(error, "problem", None) or error
-        raise DataError(f"is not valid YAML: {problem}", path, line) from None
-    if not isinstance(tree, Mapping) or not set(tree) <= {"lines", "lanes"} or not tree:
-        raise DataError(
-            "must hold lines: {name: [x1, y1, x2, y2]}, and may hold lanes: {name: [left, right]}", path
-        )
-    lines, lanes = (_rows(tree.get(key) or {}, n, key, path) for key, n in (("lines", 4), ("lanes", 2)))
-    for name, (x1, y1, x2, y2) in lines.items():
-        if (x1, y1) == (x2, y2):
-            raise DataError(f"lines: {name}: both ends are the same point", path)
-    for name, (left, right) in lanes.items():
-        if not left < right:
-            raise DataError(f"lanes: {name}: the left edge must be less than the right one", path)
-    return RoadMarks(lines, lanes)
-
-
-def _rows(given: Any, count: int, key: str, path: str | Path) -> dict[str, Any]:
-    if not isinstance(given, Mapping):
-        raise DataError(f"{key} must name each of them, such as {key}: {{first: [...]}}", path)
-    rows = {}
-    for name, values in given.items():
-        good = isinstance(values, list) and len(values) == count
-        if not good or not all(
-            isinstance(v, int | float) and not isinstance(v, bool) and abs(v) <= _LARGEST for v in values
-        ):
-            raise DataError(f"{key}: {name}: must be {count} numbers, got {str(values)[:80]}", path)
-        rows[str(name)] = tuple(float(v) for v in values)
-    return rows
+    marks = read_marks_file(path, (LINES, LANES))
+    return RoadMarks(marks.lines, marks.lanes)

@@ -37,6 +37,7 @@ class TrackRequest:
         image: size of the picture (px) for boxes in shares of it; None for that of the configuration.
         frames: pictures that tell the picture's size and the frame rate, or None.
         rig: file with the pictures and clocks of the sensors, or None.
+        detectors: what made the detections, `sensor: name` or a file's name; for the record.
         options: how the run is written.
     """
 
@@ -56,6 +57,7 @@ class TrackRequest:
     image: tuple[float, float] | None = None
     frames: str | None = None
     rig: str | None = None
+    detectors: tuple[str, ...] = ()
     options: RunOptions = field(default_factory=RunOptions)
 
     @property
@@ -113,6 +115,7 @@ class TrackRequest:
             "reading": {"detections": list(self.detections), **self._reading()},
             **({} if self.images is None else {"images": describe_inputs([self.images])[0]}),
             **({} if self.rig is None else {"rig": describe_inputs([self.rig])[0]}),
+            **({"detectors": list(self.detectors)} if self.detectors else {}),
         }
 
     def _reading(self) -> dict[str, Any]:

@@ -120,3 +120,99 @@ def test_a_line_that_nobody_crosses_counts_none_in_both_directions(tmp_path):
     other = found[found.line == "other"]
     assert other.direction.tolist() == ["left", "left", "right", "right"]
     assert other["count"].tolist() == [0, 0, 0, 0]
+
+
+MARKS = "lines: {gate: [0, 50, 100, 50]}\nzones: {below: [[0, 60], [100, 60], [100, 120], [0, 120]]}\n"
+
+
+def test_lines_and_zones_come_from_one_file(run, tmp_path):
+    (tmp_path / "marks.yaml").write_text(MARKS + "masks: {sky: [[0, 0], [9, 0], [9, 9]]}\n")
+    out, od = tmp_path / "counts.csv", tmp_path / "od.csv"
+    words = ["count", str(run), "--lines", str(tmp_path / "marks.yaml"), "--out", str(out), "--od", str(od)]
+    assert main(words) == 0
+    counts = pd.read_csv(out).set_index(["line", "direction"])["count"]
+    assert counts.to_dict() == {
+        ("gate", "left"): 1,
+        ("gate", "right"): 2,
+        ("below", "in"): 2,
+        ("below", "out"): 1,
+    }
+    ways = pd.read_csv(od, keep_default_na=False)
+    assert ways.set_index(["origin", "destination"])["count"].to_dict() == {
+        ("gate", "gate"): 0,
+        ("gate", "below"): 2,
+        ("gate", ""): 0,
+        ("below", "gate"): 1,
+        ("below", "below"): 0,
+        ("below", ""): 0,
+    }
+
+
+def test_a_zone_is_given_by_its_corners(run, tmp_path):
+    out = tmp_path / "counts.csv"
+    assert main(["count", str(run), "--zone", "0,60,100,60,100,120,0,120", "--out", str(out)]) == 0
+    assert pd.read_csv(out).set_index("direction")["count"].to_dict() == {"in": 2, "out": 1}
+
+
+def test_complete_counts_have_every_direction_and_interval(tmp_path):
+    found = counted(late_run(tmp_path), tmp_path, "--interval", "15", "--complete")
+    assert found.direction.tolist() == ["left"] * 4 + ["right"] * 4
+    assert found["count"].tolist() == [0, 0, 0, 0, 1, 0, 1, 0]
+
+
+def test_intervals_are_of_the_clock_that_is_given(tmp_path):
+    found = counted(late_run(tmp_path), tmp_path, "--interval", "30", "--begin", "2026-11-27T07:29:50")
+    assert found.begin.tolist() == [
+        "2026-11-27T07:29:30",
+        "2026-11-27T07:30:00",
+        "2026-11-27T07:30:30",
+    ]
+    assert found["count"].tolist() == [0, 2, 0]  # at 07:30:03.2 and 07:30:24.4
+    assert found.t_from.tolist()[1] % 30 == 0
+
+
+def test_stations_have_a_record_of_each_direction_and_interval(run, tmp_path):
+    out = tmp_path / "stations.csv"
+    words = ["count", str(run), "--line", "gate=0,50,100,50", "--interval", "1", "--stations", str(out)]
+    assert main(words) == 0
+    rows = pd.read_csv(out).set_index(["direction", "t_from"])
+    assert rows.loc[("right", 0.0), "flow"] == 2
+    assert rows.loc[("left", 0.0), "flow"] == 1
+    # Boxes of 10 px at 100 px/s, two of them at .5 and .8 s.
+    assert rows.loc[("right", 0.0), "occupancy"] == pytest.approx(20.0)
+    assert rows.loc[("right", 0.0), "headway_s"] == pytest.approx(0.3)
+
+
+def test_lanes_and_speeds_come_from_what_road_wrote(run, tmp_path):
+    road, out = tmp_path / "road", tmp_path / "stations.csv"
+    road.mkdir()
+    (road / "crossings.csv").write_text(
+        "track_id,line,t,lane,speed_kmh\n1,gate,0.5,lane-1,50\n2,gate,0.8,,\n"
+    )
+    words = ["count", str(run), "--line", "gate=0,50,100,50", "--stations", str(out), "--road", str(road)]
+    assert main(words) == 0
+    rows = pd.read_csv(out).query("direction == 'right'").set_index("lane")
+    assert rows.loc["lane-1", "speed_kmh"] == 50.0
+    assert rows.loc["lane-1", "flow"] == 1
+    assert rows.flow.tolist() == [1, 1]
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ([], "nothing to count at: give --line, --zone or --lines"),
+        (["--zone", "1,2,3,4"], "must be 3 corners or more"),
+        (["--zone", "a=1,2,x"], "must read x1,y1"),
+        (["--line", "a=0,0,1,1", "--zone", "a=0,0,1,1,2,0"], "a is the name of two lines or zones"),
+        (["--line", "0,0,1,1", "--begin", "yesterday"], "--begin yesterday: must be a date and time"),
+        (["--line", "0,0,1,1", "--od", "od.csv"], "--od needs two lines or zones"),
+        (["--zone", "0,0,1,1,2,0", "--stations", "s.csv"], "--stations is of lines"),
+        (["--line", "0,0,1,1", "--road", "road"], "--road says nothing without --stations"),
+        (["--lines", "marks.yaml"], "marks.yaml: must hold lines: {name: [x1, y1, x2, y2]} or zones"),
+    ],
+)
+def test_what_cannot_be_counted_is_one_clear_line(run, tmp_path, monkeypatch, fails, more, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "marks.yaml").write_text("masks: {sky: [[0, 0], [9, 0], [9, 9]]}\n")
+    assert words in fails("count", str(run), *more)
+    assert not list(tmp_path.glob("o*.csv"))

@@ -27,7 +27,7 @@ for line in sys.stdin.read().splitlines():
     print(json.dumps([json.loads(line)[0], code]), flush=True)
 """
 MANIFEST = "name,detections\na,{det}\nb,{det}\n"
-NO_PICTURES = ["detect", "train", "render", "view", "camera", "calibrate", "register"]
+NO_PICTURES = ["detect", "train", "render", "frame", "draw", "view", "camera", "calibrate", "register"]
 SERVED_ELSEWHERE = {"demo"}  # simulates, tracks, judges and draws, as others do here
 
 
@@ -67,6 +67,7 @@ def test_every_command_from_a_folder_of_strange_modules(trap, recording):
         ["events", "info", "run/run.json"],
         ["stream", "--help"],
         ["road", "run", "--camera", "none.yaml", "--out", "road"],
+        ["detectors", "--no-speed"],
         *([name, "--help"] for name in NO_PICTURES),
     ]
     assert {command[0] for command in commands} | SERVED_ELSEWHERE == set(COMMANDS)

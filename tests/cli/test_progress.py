@@ -21,7 +21,8 @@ from jeat_graph.cli.terminal import in_good_order
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.events import EventArray
 from jeat_graph.data.progress import progress_to, with_progress, write_line
-from jeat_graph.detection.detecting import DetectRequest, detect_files
+from jeat_graph.detection.detecting import detect_files
+from jeat_graph.detection.request import DetectRequest
 from jeat_graph.detection.summary import summarise
 from jeat_graph.drawing.page.document import render_page
 from jeat_graph.eval.compare import compare

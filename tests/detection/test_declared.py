@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.detection.declared import declared_settings
-from jeat_graph.detection.detecting import DetectRequest
+from jeat_graph.detection.request import DetectRequest
 
 
 @pytest.mark.parametrize("network", ["sehn", "sehn-int8"])
@@ -109,3 +110,19 @@ def test_a_network_of_both_sensors_is_declared_beside_what_any_sensor_is_taken_f
     # What the user says of it counts more.
     settings = [*declared_settings(request), "sensors.fused.p_detect=0.6"]
     assert load_config("default", settings).sensors["fused"].p_detect == 0.6
+
+
+def test_a_network_without_a_file_of_its_own_has_that_of_its_layout(tmp_path):
+    """What was measured of YOLOX's boxes holds for every YOLOX; a file beside the network goes before it."""
+    pytest.importorskip("onnx", reason="pip install onnx")
+    from .models.tiny import constant_net
+
+    def of(outputs):
+        net = constant_net(tmp_path / "net.onnx", {"output": outputs}, (128, 96))
+        return declared_settings(DetectRequest(frames="a", detector_frames=str(net)))
+
+    cells = 16 * 12 + 8 * 6 + 4 * 3
+    assert "sensors.rgb.rho_y=0.074" in of(np.ones((1, cells, 85)))
+    assert of(np.ones((1, 84, cells))) == []
+    (tmp_path / "net.tracking.yaml").write_text("sensor: {rho_y: 0.05}\n")
+    assert of(np.ones((1, cells, 85))) == ["sensors.rgb.rho_y=0.05"]

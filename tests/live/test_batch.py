@@ -211,6 +211,87 @@ def test_on_ray_a_killed_worker_costs_nothing_and_the_bytes_are_those_of_a_serie
     assert_same_tables(path, out / "runs", tmp_path / "series")
 
 
+def street(folder, count=30):
+    """A video's pictures in which a dark block moves; returns the folder."""
+    import cv2
+    import numpy as np
+
+    rng = np.random.default_rng(0)
+    background = rng.normal(110, 2, (96, 128, 3)).clip(0, 255).astype(np.uint8)
+    folder.mkdir()
+    for k in range(count):
+        picture = background.copy()
+        picture[40:60, 10 + 2 * k : 40 + 2 * k] = 20
+        cv2.imwrite(str(folder / f"{k:03d}.png"), picture)
+    return folder
+
+
+def test_a_batch_over_videos_makes_the_runs_of_track(tmp_path, capsys):
+    street(tmp_path / "a")
+    street(tmp_path / "b", 20)
+    path, out = tmp_path / "m.csv", tmp_path / "out"
+    path.write_text(
+        'name,frames,rate,detector_frames,mask\none,a,20,motion,\ntwo,b,20,motion,"0,0,128,0,128,96,0,96"\n'
+    )
+    assert main(["batch", str(path), "--out", str(out), "--workers", "1"]) == 0
+    assert "2 recordings: 2 tracked, 0 kept, 0 failed" in capsys.readouterr().out
+    words = ["--frames", str(tmp_path / "a"), "--rate", "20", "--detector-frames", "motion"]
+    assert main(["track", *words, "--out", str(tmp_path / "alone")]) == 0
+    for name in ("detections.csv", *TABLES):
+        assert (out / "runs" / "one" / name).read_bytes() == (tmp_path / "alone" / name).read_bytes()
+    assert [row["detections"] == "0" for row in rows_of(out)] == [False, True]  # the second is all masked
+    capsys.readouterr()
+    assert main(["batch", str(path), "--out", str(out), "--workers", "1"]) == 0
+    assert "0 tracked, 2 kept" in capsys.readouterr().out
+
+
+def test_pictures_are_looked_at_again_only_where_something_has_changed(tmp_path):
+    street(tmp_path / "a")
+    path, out = tmp_path / "m.csv", tmp_path / "out"
+    path.write_text("name,frames,rate,detector_frames\none,a,20,motion\n")
+    command = ["batch", str(path), "--out", str(out), "--workers", "1"]
+    found = out / "runs" / "one" / "detections.csv"
+
+    def looked_at():
+        before = found.stat().st_mtime_ns
+        assert main(command) == 0
+        return found.stat().st_mtime_ns != before
+
+    assert main(command) == 0
+    assert not looked_at()
+    path.write_text("name,frames,rate,detector_frames,set\none,a,20,motion,output.min_existence=0.3\n")
+    assert not looked_at()  # another tracker, the same detections
+    path.write_text('name,frames,rate,detector_frames,mask\none,a,20,motion,"0,0,9,0,9,9"\n')
+    assert looked_at()
+    (tmp_path / "a" / "029.png").unlink()
+    assert looked_at()
+
+
+def test_a_video_that_is_not_there_fails_alone(tmp_path, capsys):
+    street(tmp_path / "a")
+    path, out = tmp_path / "m.csv", tmp_path / "out"
+    path.write_text("frames,rate,detector_frames\na,20,motion\nabsent.mp4,20,motion\n")
+    assert main(["batch", str(path), "--out", str(out), "--workers", "1"]) == 1
+    assert "absent: " in capsys.readouterr().err
+    assert [row["status"] for row in rows_of(out)] == ["done", "failed"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("name,rate\na,20\n", "has none of the columns detections, frames, events"),
+        ("name,detections,frames\na,,\n", ":2: detections, frames is missing"),
+        ("name,detections,mask\na,b.csv,m.yaml\n", ":2: mask is for recordings without detections"),
+        ("name,frames,time_unit\na,b.mp4,ms\n", ":2: time_unit is for recordings with detections"),
+        ("name,detections,events\na,b.csv,e.raw\n", ":2: events is for recordings without detections"),
+    ],
+)
+def test_what_a_row_begins_with_is_plain(text, message, tmp_path, capsys):
+    (tmp_path / "m.csv").write_text(text)
+    assert main(["batch", str(tmp_path / "m.csv"), "--out", str(tmp_path / "out")]) == 2
+    assert message in capsys.readouterr().err
+
+
 def test_how_files_are_read_is_said_by_columns_called_as_the_options_of_track(tmp_path, capsys):
     rows = "".join(
         f"{video},{k},{100 + 4 * k + 300 * (video == 'b')},200,60,40,{90 - k},{k % 2}\n"

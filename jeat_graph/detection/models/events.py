@@ -132,8 +132,9 @@ class ModelEventDetector(BinnedDetector):
             inputs[given.name] = self._state.get(given.name, empty)
         outputs = self._engine.run(inputs)
         self._state = {given.name: outputs[returned] for given, returned in self._memory}
-        corners, scores = self._outputs.read({name: outputs[name] for name in self._read})
-        return scan_within(t, self.sensor, self._places.back(corners), scores, self.size_px)
+        found = self._outputs.read({name: outputs[name] for name in self._read})
+        placed = found._replace(corners=self._places.back(found.corners))
+        return scan_within(t, self.sensor, placed, self.size_px)
 
 
 def _scaled(scale: float) -> str:

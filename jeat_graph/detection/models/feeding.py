@@ -65,7 +65,7 @@ def usual_feed(layout: str, settings: ModelSettings) -> Feed:
     """
     plain = layout in ("yolox", "yolox-raw", "nanodet")
     fit = {"yolox": "letterbox", "yolox-raw": "letterbox", "nanodet": "stretch"}
-    fit |= {"detr": "stretch", "detr-softmax": "stretch", "boxes": "stretch"}
+    fit |= {"detr": "stretch", "detr-softmax": "stretch", "boxes": "stretch", "rtdetr": "stretch"}
     mean: tuple[float, ...] = (0.0, 0.0, 0.0)
     std: tuple[float, ...] = (1.0, 1.0, 1.0)
     scale = 1.0 if plain else 1.0 / 255.0

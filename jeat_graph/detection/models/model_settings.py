@@ -10,14 +10,32 @@ from jeat_graph.data.errors import ConfigError
 #: Overlap (IoU) above which one of two boxes goes, and from which on boxes are averaged: of networks that
 #: `train` made (chosen on two of theirs, of pictures and of events, in seeds 1001 and 3001), and of others.
 OWN_OVERLAPS = (0.55, 0.65)
-_OTHERS_OVERLAPS = (0.65, 1.0)
+_OTHERS_OVERLAPS = (0.5, 1.0)
+#: Above this two boxes of different classes are one thing.
+_ACROSS = 0.65
+#: Scores below are left out: of networks that `train` made, whose scores the tracker knows, and of others by
+#: layout: `yolox` and `nanodet` measured on a street, the others as their own tools have it
+#: (Ultralytics `conf`; RT-DETR and D-FINE draw from .4 to .6).
+_OWN_SCORE, _OTHERS_SCORE = 0.1, 0.25
+_SCORES = {
+    "yolox": 0.5,
+    "yolox-raw": 0.5,
+    "nanodet": 0.4,
+    "rtdetr": 0.4,
+    "detr": 0.4,
+    "detr-softmax": 0.5,
+    "boxes": 0.4,
+}
 LAYOUTS = (
     "auto",
     "yolox",
     "yolox-raw",
     "yolov5",
     "yolov8",
+    "yolov8-obb",
     "end-to-end",
+    "end-to-end-obb",
+    "rtdetr",
     "detr",
     "detr-softmax",
     "boxes",
@@ -51,11 +69,26 @@ class ModelSettings(Section):
     width: int = number(0, "px", "of the network's input where its file leaves it open; 0: 640", 0, 8192)
     height: int = number(0, "px", "of the network's input where its file leaves it open; 0: 640", 0, 8192)
     classes: tuple[str, ...] = ()
-    score: float = number(0.1, "1", "detections below are left out; the tracker weighs the others", 0.0, 1.0)
+    score: float | None = number(
+        None,
+        "1",
+        "detections below are left out; null: as fits the layout, .1 for files of `train`",
+        0.0,
+        1.0,
+    )
     overlap: float | None = number(
         None,
         "1",
-        "of two boxes that overlap by more (IoU) the better stays; null: .55 for files of `train`, else .65",
+        "of two boxes of a class that overlap by more (IoU) the better stays; null: .55 for files of "
+        "`train`, else .5",
+        0.0,
+        1.0,
+    )
+    overlap_classes: float = number(
+        _ACROSS,
+        "1",
+        "of two boxes of different classes that overlap by more the better stays; people stay beside what "
+        "they ride",
         0.0,
         1.0,
     )
@@ -95,11 +128,18 @@ class ModelSettings(Section):
             average if self.average is None else self.average,
         )
 
+    def least_score(self, layout: str, *, own: bool) -> float:
+        """Return `score` of a network that `train` made, or of another with outputs of a layout."""
+        if self.score is not None:
+            return self.score
+        return _OWN_SCORE if own else _SCORES.get(layout, _OTHERS_SCORE)
+
     @property
     def open_side(self) -> tuple[int, int]:
         """Width and height where the file leaves them open (px)."""
-        return self.width or _OPEN_SIDE, self.height or _OPEN_SIDE
+        return self.width or OPEN_SIDE, self.height or OPEN_SIDE
 
 
-_OPEN_SIDE = 640
+#: Width and height of an input that its file leaves open (px).
+OPEN_SIDE = 640
 _COLOURS = 3

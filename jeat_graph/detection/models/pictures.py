@@ -71,9 +71,10 @@ class ModelPictureDetector:
         inputs: dict[str, Any] = {self._picture.name: values.astype(self._picture.kind)}
         if self._sizes is not None:
             inputs[self._sizes.name] = np.array([[width, height]], dtype=_SIZES)
-        corners, scores = self._outputs.read(self._engine.run(inputs))
-        corners = corners if self._sizes is not None else at.back(corners)
-        return scan_within(t, self.sensor, corners, scores, (width, height))
+        found = self._outputs.read(self._engine.run(inputs))
+        if self._sizes is None:
+            found = found._replace(corners=at.back(found.corners))
+        return scan_within(t, self.sensor, found, (width, height))
 
     def note(self) -> str:
         """Say what was wrong with the network's outputs so far; empty if nothing was."""
@@ -87,4 +88,7 @@ def _inputs(inputs: tuple[Port, ...], path: Path) -> tuple[Port, Port | None]:
     if len(pictures) != 1 or len(pictures) + len(sizes) != len(inputs):
         shapes = ", ".join(f"{port.name} {list(port.shape)}" for port in inputs)
         raise DataError(f"takes {shapes}; a detector of pictures takes one, [1, 3, height, width]", path)
+    batch = pictures[0].shape[0]
+    if batch not in (None, 1):
+        raise DataError(f"takes {batch} pictures at once; export it for one (batch=1)", path)
     return pictures[0], sizes[0] if sizes else None

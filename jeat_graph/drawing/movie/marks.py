@@ -7,14 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.drawing.movie.captions import Captions
 from jeat_graph.drawing.movie.lettering import Letters, Place, letters, paint, room_for
 from jeat_graph.drawing.movie.moments import Marks
+from jeat_graph.drawing.movie.totals import COUNTER_RGB, Counter
 from jeat_graph.drawing.palette import RIM, Rgb, track_rgb
 from jeat_graph.io.video import RgbImage
 
 SIGMAS = 2.0
 #: Size of a track's number, of OpenCV's font in a picture 720 px high.
 NAME_SIZE = 0.42
+#: The same of what a line has counted.
+COUNTER_SIZE = 0.6
 _SHIFT = 4  # OpenCV takes coordinates in sixteenths of a pixel
 #: Lightness of the smoothed tracks' colours.
 PALE = 0.82
@@ -28,11 +32,16 @@ class Canvas:
     Args:
         image: (H, W, 3) uint8, drawn into.
         scale: pixels of the picture for one of the tracks' coordinates, x and y.
+
+    Attributes:
+        image: as given.
+        scale: as given, (2,).
+        unit: thickness of lines and size of text go with it.
     """
 
     def __init__(self, image: RgbImage, scale: tuple[float, float]) -> None:
         self.image = image
-        self._scale = np.array(scale)
+        self.scale = self._scale = np.array(scale)
         self.unit = max(float(image.shape[0]) / 720.0, 0.75)  # thickness of lines and size of text go with it
 
     def solid_box(self, box: FloatArray, colour: Rgb, thickness: float) -> None:
@@ -44,6 +53,12 @@ class Canvas:
     def thin_box(self, box: FloatArray, colour: Rgb) -> None:
         """Draw a box (4,) with the thinnest line."""
         self._polyline(self._corners(box), colour, 1, closed=True)
+
+    def outline(self, corners: FloatArray, colour: Rgb, thickness: float, *, closed: bool) -> None:
+        """Draw a line through corners (C, 2) px on a dark rim."""
+        points = np.asarray(corners) * self._scale
+        for tint, width in ((RIM, self._width(thickness) + 2), (colour, self._width(thickness))):
+            self._polyline(points, tint, width, closed=closed)
 
     def dashed_box(self, box: FloatArray, colour: Rgb, thickness: float) -> None:
         """Draw a box (4,) with a broken line."""
@@ -170,10 +185,32 @@ def draw_smoothed(canvas: Canvas, marks: Marks) -> None:
         canvas.dashed_box(marks.boxes[k], colour, 1.6)
 
 
-def draw_names(canvas: Canvas, marks: Marks, labels: str) -> None:
-    """Write the tracks' numbers: `all`, `thin` (as far as there is room) or `none`."""
+def draw_names(canvas: Canvas, marks: Marks, labels: str, captions: Captions | None, t: float) -> None:
+    """Write what stands beside the tracks: `all`, `thin` (as far as there is room) or `none`.
+
+    Args:
+        canvas: where to.
+        marks: the tracks.
+        labels: how many of them.
+        captions: what; None: their numbers.
+        t: the time (s).
+    """
     if labels == "none" or not len(marks.track_id):
         return
     ids = marks.track_id.tolist()
     colours = [track_rgb(track_id, PALE) for track_id in ids]
-    canvas.names(marks.boxes, [str(track_id) for track_id in ids], colours, thin=labels == "thin")
+    texts = [str(one) if captions is None else captions.of(one, t) for one in ids]
+    canvas.names(marks.boxes, texts, colours, thin=labels == "thin")
+
+
+def draw_counters(canvas: Canvas, counters: Sequence[Counter]) -> None:
+    """Draw lines and zones."""
+    for counter in counters:
+        canvas.outline(counter.corners, COUNTER_RGB, 1.8, closed=counter.closed)
+
+
+def draw_totals(canvas: Canvas, counters: Sequence[Counter], t: float) -> None:
+    """Write how many have crossed each line and zone so far (t: s)."""
+    for counter in counters:
+        middle = counter.corners.mean(axis=0) * canvas.scale
+        canvas.text(counter.text(t), (float(middle[0]), float(middle[1])), COUNTER_RGB, COUNTER_SIZE)

@@ -10,8 +10,17 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.picture_map import PictureMap
 from jeat_graph.drawing.movie.backgrounds import FilmBackground
-from jeat_graph.drawing.movie.marks import Canvas, draw_causal, draw_names, draw_smoothed
+from jeat_graph.drawing.movie.captions import Captions
+from jeat_graph.drawing.movie.marks import (
+    Canvas,
+    draw_causal,
+    draw_counters,
+    draw_names,
+    draw_smoothed,
+    draw_totals,
+)
 from jeat_graph.drawing.movie.moments import TracksAt, TruthAt, back_in
+from jeat_graph.drawing.movie.totals import Counter
 from jeat_graph.drawing.palette import IGNORED_BOX, TEXT, TRUE_BOX
 from jeat_graph.io.video import RgbImage
 
@@ -45,6 +54,8 @@ class Movie:
     truth: TruthAt | None = None
     labels: str = "thin"
     ways: Sequence[PictureMap | None] = ()
+    captions: Captions | None = None
+    counters: Sequence[Counter] = ()
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -85,6 +96,8 @@ class Movie:
         return image
 
     def _draw(self, canvas: Canvas, way: PictureMap | None, k: int, t: float) -> None:
+        if way is None:  # lines and zones are drawn in the common picture alone
+            draw_counters(canvas, self.counters)
         if self.causal is not None:
             draw_causal(canvas, back_in(self.causal.at(k), way), trails=self.smoothed is None)
         if self.smoothed is not None:
@@ -96,9 +109,10 @@ class Movie:
                     canvas.thin_box(box, colour)
         named = self.smoothed if self.causal is None else self.causal
         if named is not None:
-            draw_names(
-                canvas, back_in(named.at(k), way), self.labels
-            )  # last, so that no line runs through them
+            # Last, so that no line runs through them.
+            draw_names(canvas, back_in(named.at(k), way), self.labels, self.captions, t)
+        if way is None:
+            draw_totals(canvas, self.counters, t)
         used = [
             text
             for shown, text in (

@@ -23,11 +23,15 @@ from jeat_graph.drawing.movie.backgrounds import (
     PlainBackground,
     VideoBackground,
 )
+from jeat_graph.drawing.movie.captions import PARTS, Captions, read_speeds
 from jeat_graph.drawing.movie.moments import TRAIL_S, TracksAt, TruthAt
 from jeat_graph.drawing.movie.panels import Movie
+from jeat_graph.drawing.movie.totals import counters
+from jeat_graph.eval.counting import Line
+from jeat_graph.eval.zones import Zone
 from jeat_graph.io.events.layout import EventLayout
 from jeat_graph.rig.common_picture import CommonPicture, Way, common_time
-from jeat_graph.runs.directory import RUN_JSON, read_record
+from jeat_graph.runs.directory import ROAD_CAUSAL, ROAD_SMOOTHED, RUN_JSON, read_record
 
 #: Names within a simulated data set, as jeat-graph-sehn writes it: its segments, and their files.
 SEGMENTS, EVENTS, TRUTH = "segments", "events.h5", "gt.csv"
@@ -36,6 +40,8 @@ _SAME_SHAPE = 0.01
 _US_PER_S = 1e6
 # The sensors of a rig whose pictures are drawn, by name of the background.
 _SENSORS = {VideoBackground.name: "rgb", EventBackground.name: "evt"}
+#: What `road` writes into a folder.
+_ROAD = "road.csv"
 # A track is drawn that long after its last row, and a little before its first (s).
 _APART_S = 0.5
 
@@ -64,9 +70,12 @@ class Request:
         event_size_px: width and height of the events' picture, where their file does not say.
         event_layout: columns, unit of time and recording, where the file of events leaves that open.
         rig: pictures and clocks of the sensors; frames are those of `rgb`, events those of `evt`.
+        captions: what stands beside a track, of `captions.PARTS`; by default all that is known.
+        road: a folder that `road` wrote, for speeds; by default the run's own tables of the road.
+        places: lines and zones to count at.
     """
 
-    run: Path
+    run: Path | None = None
     frames: Path | None = None
     events: Path | None = None
     truth: Path | None = None
@@ -85,6 +94,9 @@ class Request:
     event_size_px: tuple[int, int] | None = None
     event_layout: EventLayout | None = None
     rig: Path | None = None
+    captions: tuple[str, ...] = PARTS
+    road: Path | None = None
+    places: tuple[Line | Zone, ...] = ()
 
 
 def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[str]]:
@@ -139,7 +151,7 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
         backgrounds.append(PlainBackground((round(field[0]), round(field[1]))))
     shown_px = field if backgrounds[0] in in_common else backgrounds[0].size_px
     panel = request.size_px or (round(shown_px[0]), round(shown_px[1]))
-    instants = read_instants(request.run) if request.run.is_dir() else None
+    instants = read_instants(request.run) if request.run is not None and request.run.is_dir() else None
     shown = {kind: TracksAt(table, times, kind, instants, request.trail_s) for kind, table in tables.items()}
     movie = Movie(
         times=times,
@@ -151,6 +163,8 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
         truth=None if truth is None else TruthAt(truth),
         labels=request.labels,
         ways=[ways[one.name].picture if one.name in ways else None for one in backgrounds],
+        captions=_captions(request, tables),
+        counters=counters(request.places, tables.get("smoothed", tables.get("causal"))),
     )
     warnings += _absent(frames, tables, truth, times)
     warnings += [f"{request.events}: {note}" for note in ([] if events is None else stretches.notes())]
@@ -171,6 +185,10 @@ def _resolve(request: Request) -> tuple[dict[str, Trajectories], Request]:
     from jeat_graph.io.trajectories_io import read_trajectories
 
     run = request.run
+    if run is None:
+        if request.frames is None and request.events is None:
+            raise DataError("there is nothing to draw: give a RUN, --frames or --events")
+        return {}, request
     if run.is_dir() and (run / SEGMENTS).is_dir():
         raise DataError(f"is a whole data set; give one of its segments, such as {SEGMENTS}/000000", run)
     own = run.is_dir() and (run / TRUTH).is_file() and ((run / EVENTS).is_file() or _has_frames(run))
@@ -282,10 +300,25 @@ def _absent(
     return warnings + lines
 
 
-def _configured_size(run: Path) -> tuple[float, float] | None:
+def _captions(request: Request, tables: dict[str, Trajectories]) -> Captions | None:
+    """Return what stands beside the tracks: beside the causal ones where these are drawn."""
+    if not tables:
+        return None
+    kind = "causal" if "causal" in tables else "smoothed"
+    names = {"causal": (ROAD_CAUSAL,), "smoothed": (ROAD_SMOOTHED,)}[kind]
+    files = [request.run / name for name in names] if request.run is not None else []
+    if request.road is not None:
+        files = [request.road / name for name in (*names, _ROAD)]
+    found = next((file for file in files if file.is_file()), None)
+    if found is None and request.road is not None:
+        raise DataError(f"has no {_ROAD} as `road` writes it", request.road)
+    return Captions(tables[kind], request.captions, None if found is None else read_speeds(found))
+
+
+def _configured_size(run: Path | None) -> tuple[float, float] | None:
     """Picture that a run was configured for, None if it does not say."""
-    record = read_record(run)
-    if not record:
+    record = None if run is None else read_record(run)
+    if run is None or not record:
         return None
     try:
         image = record["config"]["image"]

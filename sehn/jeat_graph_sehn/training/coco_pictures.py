@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.detection.models.choosing import wanted_classes
+from jeat_graph.detection.models.class_names import wanted_classes
 from jeat_graph.io.decoders import RgbImage
 from jeat_graph.io.limits import check_file
 from jeat_graph.io.picture_file import read_picture

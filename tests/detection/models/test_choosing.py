@@ -72,11 +72,80 @@ def test_boxes_with_independent_errors_come_nearer_to_the_truth():
 def test_what_is_distinct_is_left_as_it_is():
     corners = [[0, 0, 10, 10], [1, 0, 11, 10]]
     found, scores, _ = choose(decoded(corners, [0.5, 0.9], distinct=True), None, 0.1, 0.55, 0.65)
-    np.testing.assert_array_equal(found, corners)
-    np.testing.assert_array_equal(scores, [0.5, 0.9])
+    np.testing.assert_array_equal(found, corners[::-1])  # the best first
+    np.testing.assert_array_equal(scores, [0.9, 0.5])
 
 
-def test_networks_of_others_are_read_as_they_were_and_settings_win():
-    assert ModelSettings().overlaps(own=False) == (0.65, 1.0)
+CAR, TRUCK, PERSON, BICYCLE = 2, 7, 0, 1
+
+
+def of_classes(*rows, distinct=False):
+    """Boxes of rows (left, top, right, bottom, score, class)."""
+    table = np.array(rows, dtype=float)
+    return DecodedBoxes(table[:, :4], table[:, 4], table[:, 5].astype(np.int64), distinct)
+
+
+@pytest.mark.parametrize("distinct", [False, True])
+def test_one_thing_by_two_names_is_one_box_of_the_better_name(distinct):
+    """Networks without suppression give one box twice, too, with the two classes that fit best."""
+    found = of_classes((0, 0, 100, 60, 0.6, CAR), (2, 1, 101, 60, 0.7, TRUCK), distinct=distinct)
+    _, scores, classes = choose(found, None, 0.1, 0.5, across=0.65)
+    assert (scores.tolist(), classes.tolist()) == ([0.7], [TRUCK])
+
+
+def test_a_better_box_of_a_class_that_nobody_wants_still_says_what_the_thing_is():
+    found = of_classes((0, 0, 40, 60, 0.5, 3), (1, 0, 40, 61, 0.6, BICYCLE))
+    assert len(choose(found, frozenset({CAR, 3}), 0.1, 0.5, across=0.65)[0]) == 0
+
+
+def test_two_of_different_classes_that_hide_each_other_stay_two():
+    """An IoU of .55: of one class it would be one vehicle, of two it is a car before a truck."""
+    found = of_classes((0, 0, 100, 60, 0.6, CAR), (0, 0, 100, 109, 0.7, TRUCK))
+    assert len(choose(found, None, 0.1, 0.5, across=0.65)[0]) == 2
+    both_cars = found._replace(classes=np.array([CAR, CAR]))
+    assert len(choose(both_cars, None, 0.1, 0.5, across=0.65)[0]) == 1
+
+
+def test_a_rider_is_not_the_bicycle():
+    found = of_classes((0, 0, 40, 100, 0.9, PERSON), (0, 5, 40, 100, 0.6, BICYCLE))
+    assert len(choose(found, None, 0.1, 0.5, across=0.65, apart=frozenset({PERSON}))[0]) == 2
+
+
+def test_only_boxes_of_its_own_class_move_a_box():
+    found = of_classes((0, 0, 100, 60, 0.6, CAR), (0, 0, 100, 80, 0.6, TRUCK), (0, 2, 100, 62, 0.6, CAR))
+    corners, _, classes = choose(found, None, 0.1, 0.55, 0.65, across=0.9)
+    np.testing.assert_allclose(corners[classes == CAR], [[0, 1, 100, 61]])
+
+
+@given(st.integers(0, 10**6))
+def test_what_stays_never_is_one_thing_twice(seed):
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(1, 40))
+    middle, half = rng.uniform(0, 60, (count, 2)), rng.uniform(5, 30, (count, 2))
+    found = DecodedBoxes(
+        np.column_stack([middle - half, middle + half]),
+        rng.uniform(0, 1, count),
+        rng.integers(0, 4, count),
+        False,
+    )
+    corners, scores, classes = choose(found, None, 0.2, 0.5, across=0.65, apart=frozenset({PERSON}))
+    assert (np.diff(scores) <= 0.0).all()
+    for a in range(len(scores)):
+        for b in range(a):
+            same = classes[a] == classes[b]
+            if same or PERSON not in (classes[a], classes[b]):
+                assert iou(corners[a], corners[b]) <= (0.5 if same else 0.65) + 1e-6
+
+
+def test_networks_of_others_are_read_as_fits_them_and_settings_win():
+    assert ModelSettings().overlaps(own=False) == (0.5, 1.0)
     assert ModelSettings().overlaps(own=True) == (0.55, 0.65)
     assert ModelSettings(overlap=0.4, average=0.9).overlaps(own=True) == (0.4, 0.9)
+
+
+def test_the_least_score_fits_the_layout_unless_it_is_said():
+    settings = ModelSettings()
+    assert settings.least_score("yolov8", own=True) == 0.1
+    found = {name: settings.least_score(name, own=False) for name in ("yolox", "nanodet", "yolov8", "boxes")}
+    assert found == {"yolox": 0.5, "nanodet": 0.4, "yolov8": 0.25, "boxes": 0.4}
+    assert ModelSettings(score=0.05).least_score("yolox", own=False) == 0.05

@@ -10,9 +10,10 @@ import pytest
 from jeat_graph.cli.main import main
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.events import EventArray
-from jeat_graph.detection.detecting import DetectRequest, detect_files
+from jeat_graph.detection.detecting import detect_files
 from jeat_graph.detection.models.events import ModelEventDetector
 from jeat_graph.detection.models.fused import FusedDetector
+from jeat_graph.detection.request import DetectRequest
 from jeat_graph.detection.settings import EventSettings
 from jeat_graph.io.detections_io import read_detections
 from jeat_graph.io.events_dsec_writer import EventWriter

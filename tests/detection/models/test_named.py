@@ -22,7 +22,7 @@ def test_files_are_files(tmp_path):
 
 
 def test_a_name_that_is_not_known_is_told_what_is():
-    with pytest.raises(ConfigError, match=r"'sehm' is no detector of frames: it is one of motion"):
+    with pytest.raises(ConfigError, match=r"'sehm' is no detector of frames: it is one of auto, motion"):
         network_file("sehm", "frames")
 
 

@@ -94,7 +94,12 @@ def outputs(layout: str, rng) -> dict[str, np.ndarray]:
         },
         "yolov5": lambda: {"o": np.concatenate([centres, logits(1, CELLS, 6)], axis=2)},
         "yolov8": lambda: {"o": np.concatenate([centres, logits(1, CELLS, 5)], axis=2)},
+        "yolov8-obb": lambda: {
+            "o": np.concatenate([centres, logits(1, CELLS, 5), logits(1, CELLS, 1)], axis=2)
+        },
         "end-to-end": lambda: {"o": np.array(ROWS * 3)[None]},
+        "end-to-end-obb": lambda: {"o": np.array([[*row, 0.3] for row in ROWS * 3])[None]},
+        "rtdetr": lambda: {"o": np.concatenate([boxes, logits(1, 30, 5)], axis=2)},
         "detr": lambda: {"logits": logits(1, 30, 5), "pred_boxes": boxes},
         "detr-softmax": lambda: {"logits": logits(1, 30, 5), "pred_boxes": boxes},
         "boxes": lambda: {

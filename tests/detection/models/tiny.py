@@ -7,7 +7,7 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 
 
-def constant_net(path, outputs, side, channels=3, notes=None):
+def constant_net(path, outputs, side, channels=3, notes=None, batch=1):
     """A network whose outputs are arrays by name; they hang on the input by a factor of 0."""
     width, height = side
     nodes = [
@@ -24,7 +24,7 @@ def constant_net(path, outputs, side, channels=3, notes=None):
         values.append(numpy_helper.from_array(array.astype(np.float32), f"{name}_value"))
         nodes.append(helper.make_node("Add", [f"{name}_value", "nothing"], [name]))
         ports.append(helper.make_tensor_value_info(name, TensorProto.FLOAT, list(array.shape)))
-    given = helper.make_tensor_value_info("images", TensorProto.FLOAT, [1, channels, height, width])
+    given = helper.make_tensor_value_info("images", TensorProto.FLOAT, [batch, channels, height, width])
     return _save(path, helper.make_graph(nodes, "tiny", [given], ports, values), notes)
 
 

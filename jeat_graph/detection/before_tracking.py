@@ -1,0 +1,65 @@
+"""Raw pictures and events become a file of detections in the run directory: what tracking begins with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from jeat_graph.data.detections import Detections
+from jeat_graph.detection.automatic import resolved
+from jeat_graph.detection.declared import declared_settings
+from jeat_graph.detection.detecting import detect_files, picture_of
+from jeat_graph.detection.request import DetectRequest
+
+#: Within the run directory, where raw recordings were tracked.
+DETECTIONS = "detections.csv"
+
+
+class DetectedFile(NamedTuple):
+    """A file of detections, and what the tracker is told of it.
+
+    Attributes:
+        path: the file.
+        declared: `key=value` settings of the networks that made it.
+        image: width and height of the picture (px), where only the events tell it.
+        detectors: what made it, `sensor: name`.
+    """
+
+    path: str
+    declared: tuple[str, ...]
+    image: tuple[int, int] | None
+    detectors: tuple[str, ...] = ()
+
+
+def detect_before(
+    request: DetectRequest,
+    out: Path,
+    *,
+    declare: bool,
+    say: Callable[[str], object] = lambda _: None,
+    detect: Callable[[DetectRequest], Detections] | None = None,
+) -> DetectedFile:
+    """Detect, and write `detections.csv` into a run directory.
+
+    Args:
+        request: what to look for, and where.
+        out: the run directory.
+        declare: whether the tracker is told what is known of the networks, as `default` is.
+        say: called with each thing that was found out.
+        detect: looks; by default `detect_files`.
+
+    Raises:
+        ConfigError: a detector or a setting that is not known.
+        DataError: a file cannot be read or written.
+    """
+    from jeat_graph.io.detections_io import write_detections
+    from jeat_graph.io.locking import hold_made_folder
+
+    request = resolved(request, say)
+    declared = declared_settings(request, say) if declare else []
+    image = picture_of(request)
+    found = out / DETECTIONS
+    with hold_made_folder(out):  # detecting takes long; the run directory is held by what tracks
+        write_detections(detect_files(request, say) if detect is None else detect(request), found)
+    return DetectedFile(str(found), tuple(declared), image, request.detectors)

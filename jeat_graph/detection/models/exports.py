@@ -1,0 +1,110 @@
+"""What the notes of a file say of its outputs: the task of an Ultralytics export, and what else a row holds.
+
+==========  ================================================  ==============================================
+`task`      a row of the dense output                         read as
+==========  ================================================  ==============================================
+`detect`    box, a score for each class                       boxes
+`segment`   the same, then factors of a mask (32)             its boxes
+`pose`      the same, then the key points                     its boxes
+`obb`       the same, then the angle of the box (rad)         the upright boxes around the turned ones
+`classify`  a score for each class of the whole picture       refused: it has no boxes
+==========  ================================================  ==============================================
+
+Rows of exports that suppress by themselves are a box, its score, its class, and then the same.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from jeat_graph.data.errors import DataError
+from jeat_graph.detection.models.class_names import class_names
+from jeat_graph.detection.models.onnx_head import Port
+
+DETECT, SEGMENT, POSE, TURNED = "detect", "segment", "pose", "obb"
+_TASKS = (DETECT, SEGMENT, POSE, TURNED)
+#: Numbers of a box, and of a row of an export that suppresses by itself.
+BOX, ROW = 4, 6
+_MASK_FACTORS = 32
+# Key points of COCO's people, each with two coordinates and whether it is seen; one class.
+_PEOPLE_POINTS = 17 * 3
+
+
+class Export(NamedTuple):
+    """What a file says of its outputs.
+
+    Attributes:
+        task: one of this module's table.
+        classes: how many classes it names; None where it names none.
+        more: numbers behind the class scores of a row; None where nobody knows.
+        rtdetr: whether it is Ultralytics' RT-DETR, whose boxes are centres and sizes in shares.
+    """
+
+    task: str
+    classes: int | None
+    more: int | None
+    rtdetr: bool
+
+    @property
+    def words(self) -> str:
+        """Say of which task the boxes are, where it is not the usual one."""
+        read = {SEGMENT: "boxes of masks", POSE: "boxes of poses", TURNED: "upright boxes around turned ones"}
+        return f" ({read[self.task]})" if self.task in read else ""
+
+
+def export_of(outputs: Sequence[Port], notes: Mapping[str, str]) -> Export:
+    """Return what the notes, and outputs beside the boxes, say.
+
+    Args:
+        outputs: what the file says of them.
+        notes: of the file.
+
+    Raises:
+        DataError: its task gives no boxes.
+    """
+    task = notes.get("task", "").strip().lower()
+    if task and task not in _TASKS:
+        raise DataError(f"is an export of the task {task!r}, which gives no boxes; export a detector")
+    names = class_names(notes)
+    points = _points(notes)
+    masks = next((port.shape[1] for port in outputs if len(port.shape) == BOX), None)
+    if not task:
+        task = POSE if points else SEGMENT if masks else DETECT
+    more = {DETECT: 0, TURNED: 1, SEGMENT: masks or _MASK_FACTORS, POSE: points or _PEOPLE_POINTS}[task]
+    said = f"{notes.get('head', '')} {notes.get('description', '')}".lower().replace("-", "")
+    return Export(task, len(names) or None, more, "rtdetr" in said)
+
+
+def class_channels(channels: int, export: Export) -> int:
+    """Return how many numbers of a row of a dense output are scores of classes.
+
+    Args:
+        channels: numbers of a row.
+        export: what the file says.
+
+    Raises:
+        DataError: what the file says of its classes and of its outputs does not go together.
+    """
+    count = channels - BOX - (export.more or 0)
+    if export.classes is None and export.task == DETECT and channels == BOX + 1 + _PEOPLE_POINTS:
+        raise DataError(
+            f"has {channels} numbers a row and no notes: those of a pose of one class, or 52 classes; say "
+            "layout: yolov8 for the latter"
+        )
+    if count < 1 or (export.classes is not None and export.classes != count):
+        named = "" if export.classes is None else f" and names {export.classes} classes"
+        raise DataError(
+            f"has {channels} numbers a row{named}: not what an export of the task {export.task!r} has"
+        )
+    return count
+
+
+def _points(notes: Mapping[str, str]) -> int:
+    """Return how many numbers the key points of a row are; 0 where the file says nothing of any."""
+    try:
+        return math.prod(int(side) for side in ast.literal_eval(notes.get("kpt_shape", "")))
+    except (ValueError, SyntaxError, TypeError):
+        return 0

@@ -1,0 +1,89 @@
+"""What stands beside the boxes of a film: number, class and speed of a track."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from jeat_graph.data.arrays import FloatArray, IntArray, TextArray
+from jeat_graph.data.trajectories import Trajectories
+
+#: What a caption may hold, in its order.
+NUMBER, CLASS, SPEED = "id", "class", "speed"
+PARTS = (CLASS, NUMBER, SPEED)
+_TOLERANCE_S = 1e-6
+#: A speed is of so much before or after (s).
+_REACH_S = 0.5
+
+
+class Captions:
+    """Captions of tracks by time.
+
+    Args:
+        table: the tracks, of which the classes are taken.
+        parts: which of `PARTS` are written.
+        speeds: time (N,) in s, track (N,) and speed (N,) in km/h, or None where no road says them.
+    """
+
+    def __init__(
+        self,
+        table: Trajectories,
+        parts: tuple[str, ...],
+        speeds: tuple[FloatArray, IntArray, FloatArray] | None = None,
+    ) -> None:
+        self._parts = parts
+        named = None if table.classes is None else table.classes
+        self._classes = {} if named is None else _by_track(table.t, table.track_id, named)
+        self._speeds = {} if speeds is None else _by_track(*speeds)
+
+    def of(self, track_id: int, t: float) -> str:
+        """Return the caption of a track at a time (s): its class is the one that it was last said to have."""
+        texts = []
+        if CLASS in self._parts and track_id in self._classes:
+            times, names = self._classes[track_id]
+            at = max(int(np.searchsorted(times, t + _TOLERANCE_S, side="right")) - 1, 0)
+            texts.append(str(names[at]))
+        if NUMBER in self._parts:
+            texts.append(f"#{track_id}" if any(texts) else str(track_id))
+        caption = " ".join(text for text in texts if text)
+        if SPEED in self._parts and track_id in self._speeds:
+            speed = _near(*self._speeds[track_id], t)
+            if not math.isnan(speed):
+                return f"{caption}: {speed:.0f} km/h" if caption else f"{speed:.0f} km/h"
+        return caption
+
+
+def read_speeds(path: Path) -> tuple[FloatArray, IntArray, FloatArray]:
+    """Read time (s), track and speed (km/h) of a table of the road (`road.csv`, `road_causal.csv`, …).
+
+    Raises:
+        DataError: it is none.
+    """
+    from jeat_graph.io.tables import read_table
+
+    table = read_table(path, ("t", "track_id", "speed_kmh"))
+    speed = table.number("speed_kmh", blank_ok=True, nan_ok=True)
+    return table.number("t"), table.whole("track_id"), speed
+
+
+def _by_track(
+    t: FloatArray, track_id: IntArray, values: FloatArray | TextArray
+) -> Mapping[int, tuple[FloatArray, FloatArray | TextArray]]:
+    """Return times and values of each track, in order of time."""
+    order = np.lexsort((t, track_id))
+    ids = track_id[order]
+    if not len(ids):
+        return {}
+    begins = np.flatnonzero(np.diff(ids, prepend=ids[0] - 1))
+    return {
+        int(ids[begin]): (t[rows], values[rows])
+        for begin, rows in zip(begins, np.split(order, begins[1:]), strict=True)
+    }
+
+
+def _near(times: FloatArray, values: FloatArray | TextArray, t: float) -> float:
+    nearest = int(np.abs(times - t).argmin())
+    return float(values[nearest]) if abs(times[nearest] - t) <= _REACH_S else math.nan
