@@ -27,6 +27,7 @@ _KINDS = {
     "speed": "time per step, against others",
     "endurance": "a day of input through the live path: memory, latency and counts, hour by hour",
     "worlds": "what nets that were trained on varied or on one fixed world find in worlds they never saw",
+    "rigs": "pictures and clocks of two cameras brought together by the traffic they saw",
     "events": "noise of the event cameras, what tames it, and what vehicles give",
 }
 

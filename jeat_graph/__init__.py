@@ -14,6 +14,7 @@ from jeat_graph.version import __version__
 
 if TYPE_CHECKING:
     from jeat_graph.api.functions import calibrate, compare, evaluate, read_run, simulate, track
+    from jeat_graph.api.graphs import factor_graph
     from jeat_graph.config.reading import load_config
     from jeat_graph.config.schema import Config
     from jeat_graph.data.detections import Detections, Scan
@@ -37,6 +38,7 @@ _HOMES = {
     "calibrate": "api.functions",
     "compare": "api.functions",
     "evaluate": "api.functions",
+    "factor_graph": "api.graphs",
     "load_config": "config.reading",
     "read_detections": "io.detections_io",
     "read_run": "api.functions",
@@ -58,6 +60,7 @@ __all__ = [
     "calibrate",
     "compare",
     "evaluate",
+    "factor_graph",
     "load_config",
     "read_detections",
     "read_run",

@@ -26,6 +26,7 @@ LAYERS = (
     ("data",),
     ("config", "configs"),
     ("io",),
+    ("rig",),
     ("tracking",),
     ("eval",),
     ("runs",),

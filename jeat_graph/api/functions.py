@@ -49,13 +49,18 @@ def track(
     Raises:
         JeatGraphError: what the detections, the file or the configuration have wrong.
     """
+    from jeat_graph.rig.common_picture import in_common
+    from jeat_graph.runs.clock_pass import find_clocks
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.input_checks import check_units
     from jeat_graph.runs.latency import at_measurement
     from jeat_graph.tracking.tracker import Tracker
 
     recording = recording_of(detections, {**options, "image": image})
-    settings = _settings(config, image, detections)
+    recording, settings, _ = in_common(recording, _settings(config, image, detections))
+    recording, _, said = find_clocks(recording, settings, "the detections")
+    for line in said:
+        warnings.warn(line, InputWarning, stacklevel=2)
     check_units(recording, settings, "the detections")  # before rates are taken for what they seem
     tracker = Tracker(fit_input(settings, recording)[0])
     if classes is not None:  # the picture is as large as the boxes of all classes reach
@@ -166,14 +171,20 @@ def compare(
     Raises:
         JeatGraphError: what a file or the configuration has wrong.
     """
+    from jeat_graph.rig.common_picture import in_common
+    from jeat_graph.runs.clock_pass import find_clocks
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.latency import at_measurement
     from jeat_graph.runs.measured import compare_run, track_measured
 
     how: ReadingOptions = {**options, "image": image}
     recording = recording_of(detections, how)
+    recording, start, _ = in_common(recording, _settings(config, image, detections))
+    recording, _, said = find_clocks(recording, start, "the detections")
+    for line in said:
+        warnings.warn(line, InputWarning, stacklevel=2)
     objects = None if truth is None else truth_of(truth, how)
-    settings = fit_input(_settings(config, image, detections), recording)[0]
+    settings = fit_input(start, recording)[0]
     return compare_run(track_measured(settings, at_measurement(recording, settings)), objects, lags_s)
 
 
@@ -205,21 +216,28 @@ def calibrate(
         JeatGraphError: what a file or the data have wrong.
     """
     from jeat_graph.calibration.procedure import calibrate_with_truth, calibrate_without_truth
+    from jeat_graph.rig.common_picture import in_common, with_ways_of, without_ways
+    from jeat_graph.runs.clock_pass import with_clocks
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.latency import at_measurement
 
     how: ReadingOptions = {**options, "image": image}
-    recordings = [recording_of(one, how) for one in as_list(detections)]
-    start = fit_input(_settings(base, image, *as_list(detections)), *recordings)[0]
+    given = _settings(base, image, *as_list(detections))
+    recordings = [in_common(recording_of(one, how), given)[0] for one in as_list(detections)]
+    names = [f"recording {k + 1}" for k in range(len(recordings))]
+    start, said = with_clocks(recordings, without_ways(given), names)
+    for line in said:
+        warnings.warn(line, InputWarning, stacklevel=2)
+    start = fit_input(start, *recordings)[0]
     recordings = [at_measurement(one, start) for one in recordings]
     if truth is None:
-        return calibrate_without_truth(recordings, start).config
+        return with_ways_of(calibrate_without_truth(recordings, start).config, given)
 
     truths = [truth_of(one, how) for one in as_list(truth)]
     if len(truths) != len(recordings):
         raise DataError(f"{len(recordings)} recordings and {len(truths)} truths given; give one for each")
     pairs = list(zip(recordings, truths, strict=True))
-    return calibrate_with_truth(pairs, start, tuned=tuned).config
+    return with_ways_of(calibrate_with_truth(pairs, start, tuned=tuned).config, given)
 
 
 def simulate(

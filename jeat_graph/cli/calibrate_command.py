@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jeat_graph.cli.options import add_config, add_image, add_reading, reading, truth_read
+from jeat_graph.cli.options import add_config, add_image, add_reading, add_rig, reading, truth_read
 from jeat_graph.cli.progress import stages
 from jeat_graph.cli.terminal import say
 from jeat_graph.data.errors import ConfigError, DataError
@@ -38,6 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--out", required=True, metavar="CONFIG.yaml", help="the configuration to write")
     add_config(parser, settings=False)
     add_image(parser)
+    add_rig(parser)
     add_reading(parser)
     add(
         "--frames",
@@ -50,12 +51,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Calibrate, write the configuration, and print what was estimated."""
     from jeat_graph.calibration.rounding import rounded
-    from jeat_graph.config.reading import load_config
+    from jeat_graph.config.reading import as_config, load_config
     from jeat_graph.io.atomic import check_writable
     from jeat_graph.io.config_io import save_config
     from jeat_graph.io.detections_io import read_many, split_name
     from jeat_graph.io.truth_io import read_truth
+    from jeat_graph.rig.common_picture import in_common, with_ways_of, without_ways
     from jeat_graph.runs.beside import facts_beside, facts_of_frames
+    from jeat_graph.runs.clock_pass import with_clocks
     from jeat_graph.runs.latency import at_measurement
 
     if args.gt and len(args.gt) != len(args.detections):
@@ -65,13 +68,21 @@ def run(args: argparse.Namespace) -> int:
     if Path(args.out).suffix not in (".yaml", ".yml"):
         raise ConfigError(f"--out {args.out}: the name of a configuration must end in .yaml")
     check_writable(args.out)
-    base = load_config(args.config)
+    given = base = load_config(args.config, rig=args.rig)
+    if args.image is not None:
+        given = as_config(base, args.image)
     shown = None if args.frames is None else facts_of_frames(args.frames)
     files = [str(split_name(item)[1]) for item in args.detections]
     if shown is not None and args.rate is None and not any(facts_beside([path]) for path in files):
         args.rate = shown.rate_hz
     how = {**reading(args), "image": args.image or (None if shown is None else shown.size_px)}
-    recordings = [at_measurement(read_many([path], **how), base) for path in args.detections]
+    read = [in_common(read_many([path], **how), given) for path in args.detections]
+    for line in dict.fromkeys(line for _, _, notes in read for line in notes):
+        say("calibrate", line)
+    base, lines = with_clocks([one for one, _, _ in read], without_ways(base), args.detections)
+    for line in lines:
+        say("calibrate", line)
+    recordings = [at_measurement(one, base) for one, _, _ in read]
     beside = None if args.image else _size_beside(files, shown)
     picture = _picture_from(args, base, beside)
     base = with_image(base, recordings, args.image or (None if beside is None else beside.size_px))
@@ -85,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         found = _without_truth(recordings, base)
     _say_lags(found, "the truth" if args.gt else "the sensor that sees most")
-    config = rounded(found.config)
+    config = with_ways_of(rounded(found.config), given)
     save_config(config, args.out, comment=describe(args, picture, found))
     sys.stdout.write("\n".join(table.render("text") for table in summary(config, found)))
     print(f"written: {args.out}", file=sys.stderr)

@@ -45,6 +45,7 @@ COMMANDS = (
     "render",
     "report",
     "calibrate",
+    "register",
     "camera",
     "road",
 )

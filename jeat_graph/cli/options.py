@@ -77,6 +77,15 @@ def add_image(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_rig(parser: argparse.ArgumentParser) -> None:
+    """Declare `--rig`."""
+    parser.add_argument(
+        "--rig",
+        metavar="RIG.yaml",
+        help="the pictures and clocks of several sensors, as `jeat-graph register` writes them",
+    )
+
+
 def image_overrides(size: tuple[int, int] | None) -> list[str]:
     """Return the settings that `--image` stands for."""
     return [] if size is None else [f"image.width={size[0]}", f"image.height={size[1]}"]

@@ -9,7 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jeat_graph.cli.detect_options import add_event_layout, event_layout
-from jeat_graph.cli.options import add_classes, add_old_name, add_output_rate, add_tables, tables_read
+from jeat_graph.cli.options import (
+    add_classes,
+    add_old_name,
+    add_output_rate,
+    add_rig,
+    add_tables,
+    tables_read,
+)
 from jeat_graph.cli.place_options import add_places, places
 from jeat_graph.cli.terminal import warn
 from jeat_graph.config.argument_types import counting, drawn_size, not_negative, positive
@@ -60,6 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of films in .mp4: h264 (by the FFmpeg of this machine), vp9, or auto (default): h264 if it can",
     )
     add("--gt", metavar="FILE", help="truth, drawn as thin outlines")
+    add_rig(parser)
     add(
         "--out",
         required=True,
@@ -132,6 +140,7 @@ def run(args: argparse.Namespace) -> int:
         captions=PARTS if args.show is None else tuple(args.show),
         road=_path(args.road),
         places=(*lines, *zones),
+        rig=_path(args.rig),
     )
     inputs = [path for path in (request.frames, request.events, request.truth) if path is not None]
     check_keeps(inputs, out)

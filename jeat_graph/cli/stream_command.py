@@ -17,6 +17,7 @@ from jeat_graph.cli.options import (
     add_config,
     add_counting,
     add_image,
+    add_rig,
     columns_read,
     overrides,
 )
@@ -56,6 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add_config(parser)
     add_image(parser)
+    add_rig(parser)
     add_made_by(parser)
     add(
         "--format",
@@ -159,7 +161,7 @@ def _config(args: argparse.Namespace) -> Config:
     from jeat_graph.data.errors import ConfigError
     from jeat_graph.live.transport.ends import check_addresses
 
-    config = load_config(args.config, [*made_by(args, _say), *overrides(args)])
+    config = load_config(args.config, [*made_by(args, _say), *overrides(args)], args.rig)
     if args.checkpoint is not None and config.smoother.worker:
         raise ConfigError("--checkpoint does not go with smoother.worker: its state is in another process")
     if args.every is not None and args.checkpoint is None:

@@ -17,6 +17,7 @@ from jeat_graph.cli.options import (
     add_image,
     add_output_rate,
     add_reading,
+    add_rig,
     add_smoother,
     extra_formats,
     overrides,
@@ -50,6 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_config(parser)
     add_image(parser)
+    add_rig(parser)
     add_smoother(parser)
     add_formats(parser)
     add_output_rate(parser, "frames per second of output that counts frames", "--frame-rate")
@@ -112,6 +114,7 @@ def run(args: argparse.Namespace) -> int:
         class_names=args.class_names,
         frames=args.frames,
         detectors=detectors,
+        rig=args.rig,
         options=RunOptions(
             formats=extra_formats(args),
             frame_rate_hz=args.output_rate if args.output_rate is not None else args.rate,
@@ -142,7 +145,7 @@ def _detected(args: argparse.Namespace) -> DetectedFile:
     out = Path(args.out)
     check_folder(out)
     check_writable(out / DETECTIONS)
-    request = replace(detect_request(args), one_picture=True)
+    request = replace(detect_request(args), one_picture=not _have_own_pictures(args))
     if args.image is not None and args.frames is not None:
         _check_image(args.image, args.frames)
     # Another configuration, a preset or the user's own, says itself what its sensors are.
@@ -153,8 +156,17 @@ def _detected(args: argparse.Namespace) -> DetectedFile:
         say=_say,
         detect=lambda looked: detect_with_bar(looked, "track"),
     )
-    args.image = args.image or found.image
+    args.image = args.image or (None if args.rig is not None else found.image)
     return found
+
+
+def _have_own_pictures(args: argparse.Namespace) -> bool:
+    """Whether the configuration says how the pictures of both cameras lie to each other."""
+    from jeat_graph.config.reading import load_config
+    from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR
+
+    sensors = load_config(args.config, overrides(args), args.rig).sensors
+    return any(name in sensors and sensors[name].image is not None for name in (FRAMES_SENSOR, EVENTS_SENSOR))
 
 
 def _check_image(image: tuple[int, int], frames: str) -> None:

@@ -10,9 +10,21 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from jeat_graph.config.rig_file import read_rig
 from jeat_graph.config.schema import Config, InputConfig, SensorConfig
-from jeat_graph.config.section_tree import build, check_keys, merged, parse_change, plain, read_layers
+from jeat_graph.config.section_tree import (
+    build,
+    check_keys,
+    merge,
+    merged,
+    parse_change,
+    plain,
+    read_layers,
+)
 from jeat_graph.data.errors import ConfigError
+
+# Sections of a sensor that it need not have.
+_PARTS_OF_SENSOR = ("clock",)
 
 
 def preset_names() -> list[str]:
@@ -21,21 +33,27 @@ def preset_names() -> list[str]:
     return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".yaml"))
 
 
-def load_config(name_or_path: str | Path = "default", overrides: Iterable[str] = ()) -> Config:
-    """Load a preset by name, or a YAML file by path, and apply `key=value` overrides.
+def load_config(
+    name_or_path: str | Path = "default", overrides: Iterable[str] = (), rig: str | Path | None = None
+) -> Config:
+    """Load a preset by name, or a YAML file by path, lay a rig over it, and apply `key=value` overrides.
 
     A file may name a preset as `base`; what it says itself is laid over it.
 
     Args:
         name_or_path: a preset (`default`, `paper`, …) or the path of a YAML file.
         overrides: texts such as `motion.jerk_per_size=4` or `sensors.rgb.rate_hz=30`, or one such text.
+        rig: a file of `register`, with the pictures and clocks of the sensors (`config.rig_file`).
 
     Raises:
         ConfigError: no such preset or file, YAML that cannot be read, unknown key, bad value.
+        DataError: a rig that cannot be read.
     """
     presets = preset_names()
     layers = read_layers(str(name_or_path), presets, _preset_text, "preset")
     tree = merged([layer for _, layer in layers])
+    if rig is not None:
+        tree = merge(tree, read_rig(rig))
     for text in [overrides] if isinstance(overrides, str) else overrides:
         _apply_override(tree, text)
     preset = merged([layer for source, layer in layers if source in presets])
@@ -143,6 +161,8 @@ def _apply_override(tree: dict[str, Any], text: str) -> None:
         child = node.get(step)
         if child is None and node is tree:
             child = {}  # a section the preset leaves at its defaults; an unknown one is refused later
+        elif child is None and node is not tree and path[0] == "sensors" and step in _PARTS_OF_SENSOR:
+            child = {}
         elif child is None:
             near = difflib.get_close_matches(step, [str(k) for k in node], 1)
             hint = f"; did you mean {near[0]}?" if near else ""

@@ -11,8 +11,21 @@ from jeat_graph.data.errors import ConfigError
 
 #: A score never says that a box is more exact, or less, than this against what its sensor's usually are.
 LEAST_FACTOR, MOST_FACTOR = 0.1, 10.0
+# Numbers of a homography, and of one with parallax.
+_MATRICES = (9, 12)
 # What scores mean where nobody says so: the precision itself.
 _ANY_SCORES = ((0.0, 0.02), (1.0, 0.98))
+
+
+@dataclass(frozen=True)
+class ClockConfig(Section):
+    """How a sensor's times become those of the common clock: t − offset_s − drift · (t − at_s)."""
+
+    offset_s: float = number(0.0, "s", "what its times are later than the common ones, at at_s", low=-LARGEST)
+    drift_ppm: float = number(0.0, "1e-6", "by how much its clock is too fast", low=-1e5, high=1e5)
+    at_s: float = number(0.0, "s", "its time at which the offset holds", low=-LARGEST)
+    offset_std_s: float = number(0.0, "s", "standard deviation of the offset")
+    drift_std_ppm: float = number(0.0, "1e-6", "standard deviation of the drift")
 
 
 @dataclass(frozen=True)
@@ -92,6 +105,27 @@ class SensorConfig(Section):
         "are early",
         low=-LARGEST,
     )
+    image: tuple[float, float] | None = field(
+        default=None,
+        metadata={
+            "doc": "width and height (px) of its own picture, where that is another than the common one, "
+            "`image`; its boxes are in it, and go to the common one by `to_picture`"
+        },
+    )
+    to_picture: tuple[float, ...] = field(
+        default=(),
+        metadata={
+            "doc": "matrix, row by row, from its own picture to the common one: 9 numbers (a homography) or "
+            "12 (with parallax, see `register`); none: by the pictures' sizes, which must be of one shape"
+        },
+    )
+    to_picture_cov: tuple[float, ...] = field(
+        default=(),
+        metadata={"doc": "covariance of its numbers but the one that is 1, row by row: 64 or 121 numbers"},
+    )
+    clock: ClockConfig | None = field(
+        default=None, metadata={"doc": "offset and drift of its clock against the common one"}
+    )
     late_s: float | None = number(
         None, "s", "how late its scans may come in live use, if not as live.late_s says"
     )
@@ -115,6 +149,7 @@ class SensorConfig(Section):
             rising = all(b[0] > a[0] and b[1] >= a[1] for a, b in itertools.pairwise(knots))
             if not (inside and rising):
                 raise ConfigError(f"{name}: scores must rise, {what} must not fall, all in [0, 1]")
+        self._check_picture()
         factors = self.score_noise
         inside = all(0 <= s <= 1 and LEAST_FACTOR <= f <= MOST_FACTOR for s, f in factors)
         falling = all(b[0] > a[0] and b[1] <= a[1] for a, b in itertools.pairwise(factors))
@@ -123,6 +158,17 @@ class SensorConfig(Section):
                 "score_noise: scores must rise in [0, 1], factors must not rise, "
                 f"from {MOST_FACTOR:g} to {LEAST_FACTOR:g}"
             )
+
+    def _check_picture(self) -> None:
+        if self.image is not None and not all(1.0 <= side <= LARGEST for side in self.image):
+            raise ConfigError(f"image: {list(self.image)} must be a width and a height in px")
+        count, free = len(self.to_picture), len(self.to_picture_cov)
+        if count not in (0, *_MATRICES):
+            raise ConfigError(f"to_picture: must have 9 or 12 numbers, or none, not {count}")
+        if count and self.image is None:
+            raise ConfigError("to_picture: needs `image`, the size of the sensor's own picture")
+        if free and (not count or free != (count - 1) ** 2):
+            raise ConfigError(f"to_picture_cov: must have {max(count - 1, 0)} rows and columns")
 
 
 @dataclass(frozen=True)
@@ -134,6 +180,12 @@ class InputConfig(Section):
         ("refuse", "declare"),
         "a sensor that is not declared is an error, or is declared by what is seen of it; then the rates of "
         "all sensors are those of the recording too",
+    )
+    clocks: str = choice(
+        "as_given",
+        ("as_given", "find"),
+        "times are believed, or clocks that differ are found in a pass over the whole recording before it is "
+        "tracked (`rig.agreement`), and brought together where the boxes leave no doubt",
     )
     slow_scans: str = choice(
         "as_set",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.time_text import exact_text
 
 #: Rows, pictures or intervals, one a step of time: days at any usual rate.
 MOST_STEPS = 10_000_000
@@ -25,7 +26,8 @@ def check_steps(start_s: float, end_s: float, rate_hz: float, what: str, mend: s
     # Numbers that are neither large nor small, infinities among them, are refused too.
     if not steps <= MOST_STEPS:
         raise DataError(
-            f"from {start_s:.10g} to {end_s:.10g} s are {(end_s - start_s) / 3600.0:.6g} h, and at "
-            f"{rate_hz:.6g} Hz {steps:.6g} {what}, more than {MOST_STEPS}: is one of the times wrong?"
+            f"from {exact_text(start_s)} to {exact_text(end_s)} s are "
+            f"{(end_s - start_s) / 3600.0:.6g} h, "
+            f"and at {rate_hz:.6g} Hz {steps:.6g} {what}, more than {MOST_STEPS}: is one of the times wrong?"
             + (f" Or {mend}" if mend else "")
         )

@@ -19,6 +19,9 @@ _FRACTION = re.compile(r"([T ]\d\d:\d\d:\d\d)[.,](\d+)")
 # Hours, minutes and seconds with a fraction, or with the number of the frame within the second.
 _CODE = re.compile(r"(?:(\d+):)?([0-5]?\d):([0-5]?\d)(?:[.,](\d+)|[:;](\d+))?$")
 _MINUTE_S, _HOUR_S = 60, 3600
+_NS_DECIMALS = 9
+# Beyond this a number has no digits behind the point (s).
+_LARGEST_S = 1e15
 
 #: What is read as a time that is no number, for messages.
 KNOWN = "a number, a date such as 2026-05-01T12:00:00.04, or a time code such as 00:01:02.5"
@@ -60,6 +63,16 @@ def _date(text: str) -> float | None:
     moment = moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment
     whole = (moment - _EPOCH) // timedelta(seconds=1)
     return float(whole + Decimal(f"0.{fraction[2]}")) if fraction else float(whole)
+
+
+def exact_text(t_s: float) -> str:
+    """Return a time (s) as text from which the same number is read, to the nanosecond.
+
+    What is given as advice must work when it is typed in, for seconds since 1970 too.
+    """
+    if not abs(t_s) < _LARGEST_S:
+        return repr(float(t_s))
+    return np.format_float_positional(round(t_s, _NS_DECIMALS), trim="-")
 
 
 def looks_like_time(text: str) -> bool:

@@ -134,6 +134,7 @@ def _frames(request: DetectRequest, stack: ExitStack, say: Callable[[str], objec
     source = stack.enter_context(open_frames(request.frames, request.rate_hz))
     width, height = source.size_px
     say(f"frames: {len(source)} of {width} x {height} px, {request.frames}")
+    say(f"times of the frames: {source.clock}")
     if source.missing:
         say(f"{request.frames}: damaged or cut off: {source.missing} frames cannot be decoded")
     return source
@@ -150,9 +151,16 @@ def _check_sizes(
         return
     (width, height), (wide, high) = source.size_px, recording[1]
     differ = f"has {width} x {height} px and the events {wide} x {high}"
-    if request.one_picture or request.detector_fused is not None:
-        raise DataError(f"{differ}: both must be of the same pixels", request.frames)
-    say(f"warning: {request.frames} {differ}: bring the boxes to one picture before they are tracked")
+    if request.detector_fused is not None:
+        raise DataError(f"{differ}: a fused network needs both of the same pixels", request.frames)
+    if request.one_picture:
+        raise DataError(
+            f"{differ}: say how the pictures lie, with --rig RIG.yaml (`jeat-graph register` makes it of "
+            "detections) or, if both look through one lens, "
+            f"--set sensors.{EVENTS_SENSOR}.image=[{wide},{high}]",
+            request.frames,
+        )
+    say(f"warning: {request.frames} {differ}: `track` needs to know how they lie (--rig)")
 
 
 def _picture_scans(
@@ -252,7 +260,8 @@ def _with_note(scans: _Scans, note: Callable[[], str], say: Callable[[str], obje
 def _events(
     request: DetectRequest, source: FrameSource | None, stack: ExitStack, say: Callable[[str], object]
 ) -> _Recording:
-    """Open the events; return them, and width and height of their picture (px)."""
+    """Open the events, `t_offset_us` for the clock of the frames; return them, and their width and height."""
+    from jeat_graph.io.events.frame_clock import FrameClock, events_later_us
     from jeat_graph.io.events.opening import open_events
 
     assert request.events is not None
@@ -260,6 +269,10 @@ def _events(
     reader.labels = False
     width, height = reader.needed_size(beside_px=None if source is None else source.size_px)
     say(f"events: {reader.format_name} of {width} x {height} px, {request.events}")
+    clock = None if source is None else FrameClock(float(source.times_s[0]), source.origin_s)
+    reader.t_offset_us, said = events_later_us(reader.t_offset_us, reader.origin_us, clock)
+    if said:
+        say(f"events: {said}")
     return reader, (width, height)
 
 

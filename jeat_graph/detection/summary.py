@@ -32,7 +32,7 @@ class EventSummary(NamedTuple):
         hot_pixels: pixels that were hot at the end of the recording.
         hottest_hz: rate of the pixel with most events (Hz).
         notes: what was wrong with the file, one line each.
-        origin_s: time 0 on the clock of the file (s), where its times are from 1970 on.
+        origin_s: time 0 on the clock of the file (s), where it says one.
     """
 
     format_name: str
@@ -118,7 +118,7 @@ def summarise(reader: EventReader, advance: Callable[[int], object] = lambda _: 
         hot_pixels=int(noise.hot.sum()),
         hottest_hz=float(counts.max()) * per_second,
         notes=reader.damage.notes(),
-        origin_s=reader.origin_us / _US_PER_S,
+        origin_s=(reader.origin_us + reader.t_offset_us) / _US_PER_S,
     )
 
 

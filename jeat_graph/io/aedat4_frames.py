@@ -56,6 +56,10 @@ class Aedat4Decoder(Decoder):
                 raise DataError("times of frames do not ascend", self._path)
         return self._times
 
+    def origin_s(self) -> float:
+        """Return the time of the first frame or event on the clock of the file (s, since 1970)."""
+        return self._origin_us / _US_PER_S
+
     def count(self) -> int:
         """Return the number of frames."""
         return len(self.times_s())

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.limits import check_file
 from jeat_graph.io.not_tables import HEAD_BYTES, what_it_is
@@ -18,6 +18,7 @@ from jeat_graph.io.picture_file import read_picture
 
 RgbImage = npt.NDArray[np.uint8]
 
+_MS_PER_S = 1e3
 _PICTURES = (".png", ".jpg", ".jpeg")
 #: Videos whose header says how many frames there are; Matroska has only an estimate from its length.
 _COUNTED = (".mp4", ".mov", ".m4v", ".avi")
@@ -46,6 +47,14 @@ class Decoder:
         """Return the time of each frame (s), where the file itself has them."""
         return None
 
+    def stamps_s(self) -> FloatArray | None:
+        """Return the time stamp of each frame (s), None where there are none that ascend."""
+        return None
+
+    def origin_s(self) -> float:
+        """Return time 0 on the clock of the file (s, since 1970), 0 where nothing was taken off."""
+        return 0.0
+
     def bgr(self, index: int) -> RgbImage:
         """Return a frame (H, W, 3): blue, green, red."""
         raise NotImplementedError
@@ -67,6 +76,15 @@ class PictureDecoder(Decoder):
         for file in self._files:
             if not file.is_file():
                 check_file(file)  # says what it is: a folder, a pipe, a link to nothing
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the pictures, in their order."""
+        return [file.name for file in self._files]
+
+    def reorder(self, order: IntArray) -> None:
+        """Put the pictures in another order: (F,) which of them comes at each place."""
+        self._files = [self._files[k] for k in order]
 
     def count(self) -> int:
         """Return the number of frames."""
@@ -107,19 +125,28 @@ class VideoDecoder(Decoder):
             raise DataError(f"is not a video that can be read{_hint(path)}", path)
         self._next = 0
         self._count: int | None = None
+        self._stamps: FloatArray = np.zeros(0)
 
     def count(self) -> int:
         """Number of frames, by decoding headers only; the container's own count is an estimate at times."""
         if self._count is None:
+            import cv2
+
             self._rewind()
-            n = 0
+            stamps_ms = []
             while self._capture.grab():
-                n += 1
-            self._count = n
+                stamps_ms.append(self._capture.get(cv2.CAP_PROP_POS_MSEC))
+            self._stamps = np.array(stamps_ms) / _MS_PER_S
+            self._count = n = len(stamps_ms)
             self._rewind()
             if not n:
                 raise DataError("holds no frame that can be read", self._path)
         return self._count
+
+    def stamps_s(self) -> FloatArray | None:
+        """Return the time stamp of each frame (s), None where there are none that ascend."""
+        self.count()
+        return self._stamps if bool((np.diff(self._stamps) > 0).all()) and len(self._stamps) > 1 else None
 
     def announced(self) -> int:
         """Return the number of frames that the header announces, 0 where it has none."""

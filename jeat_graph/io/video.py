@@ -6,7 +6,7 @@
 `png`         folder `frames/` of `000000.png`, …        bit for bit, readable by everything
 ============  =========================================  ====================================================
 
-`frames.csv` beside them (`index,t_us`) holds the time of each frame.
+`frames.csv` beside them (`index,t_us`) holds the time of each frame; `io.frame_times` says what else may.
 FFV1 stands in AVI because Matroska files carry a random number and no two of them are equal.
 """
 
@@ -19,18 +19,34 @@ from typing import Self
 
 import numpy as np
 
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.rates import median_rate_hz
 from jeat_graph.io.decoders import Decoder, PictureDecoder, RgbImage, VideoDecoder, quietly
+from jeat_graph.io.frame_times import (
+    FRAME_TIMES,
+    check_of_this_video,
+    listed_names,
+    read_frame_times,
+    read_times_s,
+    settled_stamps,
+    table_beside,
+    times_in_names,
+)
 
-__all__ = ["FRAME_TIMES", "VIDEO_FILES", "FrameSource", "RgbImage", "open_frames", "quietly"]
+__all__ = [
+    "FRAME_TIMES",
+    "VIDEO_FILES",
+    "FrameSource",
+    "RgbImage",
+    "open_frames",
+    "quietly",
+    "read_frame_times",
+]
 
 VIDEO_FILES = {"mp4": "frames.mp4", "webm": "frames.webm", "lossless": "frames.avi", "png": "frames"}
-FRAME_TIMES = "frames.csv"
-#: Files in which DSEC lists the times of a folder of pictures (µs).
-DSEC_TIMES = ("timestamps.txt", "image_timestamps.txt")
-_US_PER_S = 1e6
+# Frames of a video that come at one rate: its slowest and fastest steps differ by less than this factor.
+_STEADY = 1.1
 _KEPT_FRAMES = 32  # decoded frames that a reader keeps, for steps backwards
 
 
@@ -42,9 +58,13 @@ class FrameSource:
         times_s: (F,) time of each frame (s), ascending.
         size_px: width and height.
         missing: frames that the file announces but that cannot be decoded: it is damaged or cut off.
+        clock: where the times come from, for messages.
+        origin_s: time 0 on the clock of the file (s, since 1970), 0 where the file's times are as they stand.
     """
 
     missing = 0
+    clock = ""
+    origin_s = 0.0
 
     def __init__(self, path: Path, times_s: FloatArray, size_px: tuple[int, int], decode: Decoder) -> None:
         self.path = path
@@ -98,16 +118,16 @@ class FrameSource:
 def open_frames(path: str | Path, rate_hz: float | None = None) -> FrameSource:
     """Open a video file, a folder of pictures, or a folder that holds one of them under its name above.
 
-    An AEDAT 4 file has frames with times of their own. Else times come from `frames.csv`, in the folder or
-    beside it or beside the video, or from DSEC's `timestamps.txt` in or above the folder; without them they
-    are index / rate, by `rate_hz` or by what the video declares.
+    An AEDAT 4 file has frames with times of their own. Else times come from a list in or above the folder or
+    beside the video, from the names of pictures, or from the video's own time stamps (`io.frame_times`);
+    without them, or where `rate_hz` is given, they are index / rate.
 
     Args:
         path: the video or folder. Pictures are `.png` or `.jpg`, in natural order (2 before 10).
-        rate_hz: frames per second where there is no `frames.csv`; for a video the default is its own rate.
+        rate_hz: frames per second, for files whose own times are wrong or missing.
 
     Raises:
-        DataError: nothing there, nothing to be read, no rate known, or `frames.csv` of another length.
+        DataError: nothing there, nothing to be read, no rate known, or a list of times that does not fit.
     """
     place = Path(path)
     if place.is_dir():
@@ -120,23 +140,11 @@ def open_frames(path: str | Path, rate_hz: float | None = None) -> FrameSource:
     else:
         raise DataError("no such video or folder of pictures", place)
     try:
-        own = decode.times_s()
-        table = None if own is not None else _times_beside(place)
-        count = decode.count()
-        if own is not None:
-            times = own
-        elif table is not None and rate_hz is None:
-            times = read_frame_times(table) / _US_PER_S
-            if len(times) != count:
-                raise DataError(f"has {count} frames, but {table} has {len(times)}", place)
-        else:
-            rate = rate_hz or decode.rate_hz()
-            if rate is None or not 0.0 < rate < float("inf"):
-                raise DataError(f"no {FRAME_TIMES} beside it; give the frame rate with --rate", place)
-            times = np.arange(count) / rate
+        times, clock = _times(place, decode, rate_hz)
         first = decode.bgr(0)
         source = FrameSource(place, times, (first.shape[1], first.shape[0]), decode)
-        source.missing = max(decode.announced() - count, 0)
+        source.clock, source.origin_s = clock, decode.origin_s()
+        source.missing = max(decode.announced() - len(source), 0)
         return source
     except BaseException:
         decode.close()
@@ -159,14 +167,70 @@ def peek(path: str | Path) -> tuple[tuple[int, int], float | None]:
     decode: Decoder = PictureDecoder(place) if place.is_dir() else _decoder(place)
     try:
         height, width = decode.bgr(0).shape[:2]
-        own = decode.times_s()
-        if own is not None:
-            return (width, height), median_rate_hz(own)
-        table = _times_beside(place)
-        rate = decode.rate_hz() if table is None else median_rate_hz(read_frame_times(table) / _US_PER_S)
-        return (width, height), rate
+        try:
+            times, _ = _times(place, decode, None)
+        except _NoTimesError:
+            return (width, height), None
+        return (width, height), median_rate_hz(times)
     finally:
         decode.close()
+
+
+class _NoTimesError(DataError):
+    """Nothing says when the frames were taken."""
+
+
+def _times(place: Path, decode: Decoder, rate_hz: float | None) -> tuple[FloatArray, str]:
+    """Return the time of each frame (s), and where it comes from; pictures are put in the order of theirs."""
+    own = decode.times_s()
+    if own is not None:
+        return own, "as the file has them"
+    count = decode.count()
+    declared = decode.rate_hz()
+    if rate_hz is not None:
+        return np.arange(count) / rate_hz, f"number divided by {rate_hz:g} Hz, as you say"
+    stamps = settled_stamps(decode.stamps_s(), declared)
+    table = table_beside(place)
+    if table is not None and table.name.endswith(FRAME_TIMES):
+        return _of_table(place, table, count, stamps), f"by {table}"
+    if isinstance(decode, PictureDecoder):
+        named = listed_names(place, decode.names)
+        if named is None and table is None:
+            named = times_in_names([Path(name).stem for name in decode.names])
+        if named is not None:
+            decode.reorder(named.order)
+            return (
+                named.times_s,
+                f"as {named.origin} say" if " " in named.origin else f"as {named.origin} says",
+            )
+    if table is not None:
+        return _of_table(place, table, count, stamps), f"by {table}"
+    if stamps is not None:
+        return stamps, f"time stamps of the video, {_spread(stamps)}"
+    if declared is None or not 0.0 < declared < float("inf"):
+        raise _NoTimesError(f"no {FRAME_TIMES} beside it; give the frame rate with --rate", place)
+    return np.arange(count) / declared, (
+        f"number divided by {declared:g} Hz: the video has no time stamps, only a declared rate; if that is "
+        "wrong, give --rate"
+    )
+
+
+def _of_table(place: Path, table: Path, count: int, stamps: FloatArray | None) -> FloatArray:
+    times = read_times_s(table)
+    if len(times) != count:
+        raise DataError(f"has {count} frames, but {table} has {len(times)}", place)
+    check_of_this_video(table, times, stamps, place)
+    return times
+
+
+def _spread(times: FloatArray) -> str:
+    """Say how many frames a second there are: one number, or from the slowest to the fastest."""
+    if len(times) < 2:
+        return "one frame"
+    slow, fast = 1.0 / np.quantile(np.diff(times), (0.98, 0.02))
+    if fast < _STEADY * slow:
+        return f"{len(times[1:]) / (times[-1] - times[0]):.4g} a second"
+    return f"{slow:.3g} to {fast:.3g} a second"
 
 
 def _decoder(place: Path) -> Decoder:
@@ -174,16 +238,6 @@ def _decoder(place: Path) -> Decoder:
     from jeat_graph.io.aedat4_frames import Aedat4Decoder, is_aedat4
 
     return Aedat4Decoder(place) if is_aedat4(place) else VideoDecoder(place)
-
-
-def _times_beside(place: Path) -> Path | None:
-    """Find `frames.csv`, or DSEC's list of times, in a folder of pictures, or beside it or a video."""
-    folders = (place, place.parent)
-    known = [folder / FRAME_TIMES for folder in folders]
-    if place.is_dir():
-        # DSEC has its pictures in images/left/rectified and their times in images.
-        known += [folder / name for folder in (*folders, place.parent.parent) for name in DSEC_TIMES]
-    return next((file for file in known if file.is_file()), None)
 
 
 def count_frames(path: str | Path) -> int:
@@ -198,27 +252,3 @@ def count_frames(path: str | Path) -> int:
         return 0
     finally:
         decode.close()
-
-
-def read_frame_times(path: str | Path) -> IntArray:
-    """Read the times (F,) of `frames.csv`, or of DSEC's `timestamps.txt` with one a line (µs).
-
-    Raises:
-        DataError: not such a table, or times that do not ascend.
-    """
-    from jeat_graph.io.plain_text import read_plain
-    from jeat_graph.io.tables import read_table
-
-    if Path(path).suffix == ".txt":
-        lines = read_plain(path, {1: ("t_us",)}, "timestamps.txt")
-        t_us = lines.whole("t_us")
-        bad = np.diff(t_us) <= 0
-        if bad.any():
-            raise lines.error(1 + int(np.argmax(bad)), "times must ascend")
-        return t_us
-    table = read_table(path, ("index", "t_us"))
-    t_us = table.whole("t_us")
-    bad = np.diff(t_us) <= 0
-    if bad.any():
-        raise table.error(1 + int(np.argmax(bad)), "t_us must ascend")
-    return t_us

@@ -25,6 +25,7 @@ from jeat_graph.live.met_sensors import MetSensors
 from jeat_graph.live.repetition import Repetition
 from jeat_graph.live.rewinding import Rewinding, TakenStep
 from jeat_graph.live.time_base import Decision, TimeBase
+from jeat_graph.rig.common_picture import CommonPicture
 from jeat_graph.tracking.checkpoint import load_state, refusing_damage, save_state
 from jeat_graph.tracking.first_sight import ToldSoFar
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
@@ -73,6 +74,7 @@ class LiveTracker(MetSensors):
         self._due: list[StepRecord | None] = []
         # Of a tracker that has taken scans: to before its time nobody can go back.
         self._begun = -math.inf if tracker.time is None else tracker.time, self._newest
+        self._common = CommonPicture.of(config)
         self._latency = {name: sensor.latency_s for name, sensor in config.sensors.items()}
         self._late_s = {name: most_late_s(config, name) for name in config.sensors}
         self._keep_s = max(self._late_s.values()) + 2.0 * _ROUNDING_S if policy == REWIND else 0.0
@@ -100,7 +102,8 @@ class LiveTracker(MetSensors):
         """Take in one scan, or several of one time, which have just arrived.
 
         Args:
-            scans: as `Tracker.step`; their times are the measurement's own, but for the sensor's `latency_s`.
+            scans: as `Tracker.step`; their times are the measurement's own, but for the sensor's `latency_s`
+                and `clock`.
 
         Raises:
             DataError, UnknownSensorError: as `Tracker.step`; the state is as before.
@@ -108,7 +111,7 @@ class LiveTracker(MetSensors):
         """
         given = as_scans(scans)
         self.meet(given)
-        batch = [self._corrected(scan) for scan in given]
+        batch = [self._corrected(self._common.scan(scan)) for scan in given]
         for scan in batch:
             sensor_index(scan.sensor, self.tracker.sensor_names)  # refused before anything is done
         self.measured = []

@@ -7,6 +7,7 @@ import numpy as np
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.time_text import exact_text
 
 # Sensors that take turns leave a gap of about the length of what they show; where it is so many times as
 # long, and longer than changing over takes (s), their clocks are two.
@@ -44,14 +45,14 @@ def check_clocks(detections: Detections, config: Config, names: str) -> list[str
             continue
         shown = (before[1] - before[0]) + (after[1] - after[0])
         seen = (
-            f"{names}: sensor {after[2]!r} looks from {after[0]:.10g} to {after[1]:.10g} s, "
-            f"{before[2]!r} from {before[0]:.10g} to {before[1]:.10g} s"
+            f"{names}: sensor {after[2]!r} looks from {exact_text(after[0])} to {exact_text(after[1])} s, "
+            f"{before[2]!r} from {exact_text(before[0])} to {exact_text(before[1])} s"
         )
         if gap > max(_GAP_FACTOR * shown, _LEAST_GAP_S):
             later = late.get(after[2], 0.0) + after[0] - before[0]
             raise DataError(
                 f"{seen}: they have different clocks; take the difference off, if both began together "
-                f"--set sensors.{after[2]}.latency_s={later:.10g}, or leave one of them out"
+                f"--set sensors.{after[2]}.latency_s={exact_text(later)}, or leave one of them out"
             )
         warnings.append(f"{seen}: they never look at one time; have they one clock?")
     return warnings
@@ -77,8 +78,7 @@ def wrong_times(detections: Detections, names: str) -> list[str]:
     few = times[: k + 1] if k + 1 < len(times) - k - 1 else times[k + 1 :]
     whose = ", ".join(repr(name) for name, clock in clocks.items() if np.isin(few, clock).any())
     return [
-        f"{names}: nothing for {steps[k] / 3600.0:.6g} h, from t = {start:.10g} to {end:.10g} s, which is "
-        f"nearly all of the recording: is a time of sensor {whose} wrong (t = {few[0]:.10g}"
-        + (f" to {few[-1]:.10g}" if len(few) > 1 else "")
-        + " s)?"
+        f"{names}: nothing for {steps[k] / 3600.0:.6g} h, from t = {exact_text(start)} to "
+        f"{exact_text(end)} s, which is nearly all of the recording: is a time of sensor {whose} "
+        f"wrong (t = {exact_text(few[0])}" + (f" to {exact_text(few[-1])}" if len(few) > 1 else "") + " s)?"
     ]

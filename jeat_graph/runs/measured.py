@@ -12,15 +12,16 @@ from jeat_graph.config.reading import config_from_dict
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, RecordArray
 from jeat_graph.data.detections import Detections
-from jeat_graph.data.errors import DataError
+from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.measured_track import MeasuredTrack
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.io.beside import check_beside
 from jeat_graph.io.hashing import sha256_of
 from jeat_graph.io.scans_io import read_instants
+from jeat_graph.rig.common_picture import by_recorded_ways
 from jeat_graph.runs.directory import MEASUREMENTS, RUN_JSON, read_record
 from jeat_graph.runs.inputs import find_input
-from jeat_graph.runs.latency import at_measurement
+from jeat_graph.runs.latency import at_measurement, taken_off
 
 if TYPE_CHECKING:
     from jeat_graph.eval.compare import Comparison
@@ -224,6 +225,8 @@ def recorded_inputs(
             raise DataError("list of images is not there any more, or has changed", reading["images"])
         reading["images"] = str(images)
     try:
-        return config, at_measurement(read_many(found, **reading), config)
-    except TypeError:  # settings that no reader has, or of another kind
+        detections = by_recorded_ways(read_many(found, **reading), config, record.get("ways", {}))
+        clocks = {name: float(one["lag_s"]) for name, one in record.get("clocks", {}).items()}
+        return config, at_measurement(taken_off(detections, clocks), config)
+    except (TypeError, KeyError, ConfigError):  # settings that no reader has, or of another kind
         raise DataError(_NO_RECORD, path) from None

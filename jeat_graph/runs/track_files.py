@@ -37,6 +37,7 @@ class TrackRequest:
         image: size of the picture (px) for boxes in shares of it; None for that of the configuration.
         frames: pictures that tell the picture's size and the frame rate, or None.
         detectors: what made the detections, `sensor: name` or a file's name; for the record.
+        rig: file with the pictures and clocks of the sensors, or None.
         options: how the run is written.
     """
 
@@ -56,6 +57,7 @@ class TrackRequest:
     image: tuple[float, float] | None = None
     frames: str | None = None
     detectors: tuple[str, ...] = ()
+    rig: str | None = None
     options: RunOptions = field(default_factory=RunOptions)
 
     @property
@@ -91,7 +93,10 @@ class TrackRequest:
         """
         from jeat_graph.config.reading import load_config
 
-        return with_picture(load_config(self.config, self.overrides), self.overrides, self.with_facts()[1])
+        config = load_config(self.config, self.overrides, self.rig)
+        if self.rig is not None and config.input.picture == "given":
+            return config, []  # the frames are one sensor's picture
+        return with_picture(config, self.overrides, self.with_facts()[1])
 
     def load_config(self) -> Config:
         """Return the configuration as `configured` does, alone."""
@@ -110,6 +115,7 @@ class TrackRequest:
             "reading": {"detections": list(self.detections), **self._reading()},
             **({} if self.images is None else {"images": describe_inputs([self.images])[0]}),
             **({"detectors": list(self.detectors)} if self.detectors else {}),
+            **({} if self.rig is None else {"rig": describe_inputs([self.rig])[0]}),
         }
 
     def _reading(self) -> dict[str, Any]:
@@ -150,6 +156,8 @@ def track_files(
     """
     from jeat_graph.io.detections_io import of_class_in, read_many
     from jeat_graph.io.formats import recognise
+    from jeat_graph.rig.common_picture import in_common, recorded_ways
+    from jeat_graph.runs.clock_pass import find_clocks
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.directory import RunDirectory
     from jeat_graph.runs.input_checks import check_detections, check_units
@@ -169,13 +177,22 @@ def track_files(
     classes = how.pop("classes", None)
     detections = read_many(request.detections, **how)
     names = " + ".join(request.files)
+    ways = {name: one for name, one in recorded_ways(config).items() if name in detections.sensors}
+    detections, config, notes = in_common(detections, config)
+    for note in notes:
+        say(note)
+    detections, clocks, notes = find_clocks(detections, config, names)
+    for note in notes:
+        say(note)
     check_units(detections, config, names)  # before rates are taken for what they seem
     config, notes = fit_input(config, detections)
     for note in notes:
         say(note)
     if classes is not None:  # the picture is as large as the boxes of all classes reach
         detections = of_class_in(detections, classes, request.files[0])
-    record = RunRecord(source=request.source(), warnings=check_detections(detections, config, names))
+    found = {"ways": ways, "clocks": clocks}
+    source = request.source() | {name: one for name, one in found.items() if one}
+    record = RunRecord(source=source, warnings=check_detections(detections, config, names))
     for warning in record.warnings:
         warn(warning)
     detections = at_measurement(detections, config)

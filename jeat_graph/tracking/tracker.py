@@ -19,6 +19,7 @@ from jeat_graph.data.embeddings import EmbeddingArray
 from jeat_graph.data.errors import JeatGraphError, TimeOrderError
 from jeat_graph.data.scan import time_of
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.rig.common_picture import CommonPicture, with_map_noise
 from jeat_graph.tracking.appearance import Compared, Looks, compare, embeddings_of, remember
 from jeat_graph.tracking.classes import ClassTally, check_names, count_votes, number_classes
 from jeat_graph.tracking.compaction import allocate, grow
@@ -73,7 +74,8 @@ class Tracker(ChosenEngine, DetectorResults):
         super().__init__(config)
         self.config = config
         self._diagnostics = diagnostics
-        self._model = kernel_model(config)
+        self._common = CommonPicture.of(config)
+        self._model = kernel_model(with_map_noise(config) if self._common.ways else config)
         sensors = self._model.sensors
         choices = config.motion.densities, config.size.densities
         num_errors = len(sensors.correlation_time_s)
@@ -117,7 +119,8 @@ class Tracker(ChosenEngine, DetectorResults):
         Args:
             scans: a `Scan` or a tuple (t, sensor, boxes (M, 4), scores (M,)), also with names of classes (M,)
                 and embeddings (M, E) behind, or a sequence of these. A scan that found nothing (M = 0) is
-                information too.
+                information too. Boxes of a sensor that has a picture of its own (`sensors.NAME.image`) are in
+                that picture; times are the common clock's, whatever `latency_s` and `clock` say.
 
         Returns:
             The tracks that are reported now, one row each.
@@ -132,7 +135,7 @@ class Tracker(ChosenEngine, DetectorResults):
         batch = as_scans(scans)
         if not self._finished:
             self.meet(batch)
-        self.hand_over(self._take_in(batch))
+        self.hand_over(self._take_in([self._common.boxes(scan) for scan in batch]))
         self._told.note("step", batch, sum(map(len, batch)))
         return self.causal()
 

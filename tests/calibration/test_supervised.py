@@ -12,6 +12,7 @@ from jeat_graph.calibration.supervised import calibrate
 from jeat_graph.config.learnt import LearntConfig
 from jeat_graph.config.reading import load_config
 from jeat_graph.config.schema import SensorConfig
+from jeat_graph.config.sensors import ClockConfig
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
@@ -81,6 +82,13 @@ def test_each_field_of_a_sensor_is_estimated_or_else_the_bases(recordings):
     kept = {"tempering": 0.35, "disagreement": 3.0, "latency_s": 0.01, "late_s": 0.2, "least_overlap": 0.4}
     # Found by tracking, not of detections.
     tracked = {"score_fit": ((0.0, 0.1), (1.0, 0.9)), "learnt": LearntConfig(vain=0.3)}
+    # How its picture and clock lie to the common ones, which recordings here are in.
+    kept |= {
+        "image": (640.0, 480.0),
+        "to_picture": (1.0, 0.0, 5.0, 0.0, 1.0, 5.0, 0.0, 0.0, 1.0),
+        "to_picture_cov": tuple(np.eye(8).ravel().tolist()),
+        "clock": ClockConfig(offset_s=0.1),
+    }
     kept |= tracked
     estimated = {
         "rate_hz": 17.0,

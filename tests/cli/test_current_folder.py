@@ -27,7 +27,7 @@ for line in sys.stdin.read().splitlines():
     print(json.dumps([json.loads(line)[0], code]), flush=True)
 """
 MANIFEST = "name,detections\na,{det}\nb,{det}\n"
-NO_PICTURES = ["detect", "train", "render", "frame", "draw", "view", "camera", "calibrate"]
+NO_PICTURES = ["detect", "train", "render", "frame", "draw", "view", "camera", "calibrate", "register"]
 SERVED_ELSEWHERE = {"demo"}  # simulates, tracks, judges and draws, as others do here
 
 

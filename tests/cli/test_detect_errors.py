@@ -52,10 +52,10 @@ def refused(capsys, arguments):
 def test_cameras_of_different_pixels_are_not_tracked_together(recording, capsys):
     write_events(recording / "other.raw", (WIDE, HIGH + 2), 0.4)
     line = refused(capsys, command(recording, name="track", events="other.raw"))
-    assert "64 x 48 px and the events 64 x 50: both must be of the same pixels" in line
+    assert "64 x 48 px and the events 64 x 50: say how the pictures lie, with --rig RIG.yaml" in line
     assert not list(recording.glob("out*"))
     assert main(command(recording, events="other.raw")) == 0
-    assert "bring the boxes to one picture" in capsys.readouterr().err
+    assert "`track` needs to know how they lie (--rig)" in capsys.readouterr().err
 
 
 def test_events_that_give_no_scan_are_named_beside_pictures(recording, capsys):

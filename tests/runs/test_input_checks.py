@@ -132,6 +132,13 @@ def test_sensors_of_different_clocks_are_refused_and_the_setting_that_is_named_m
     assert main(["track", path, "--out", str(tmp_path / "run"), "--set", setting]) == 0
 
 
+def test_advice_is_never_rounded(tmp_path, capsys):
+    """Seconds since 1970 with microseconds have sixteen digits; the setting must have them all."""
+    path = written(tmp_path, two_sensors(1606500000.123456, 0.0))
+    assert main(["track", path, "--out", str(tmp_path / "run")]) == 2
+    assert "--set sensors.rgb.latency_s=1606500000.123456," in capsys.readouterr().err
+
+
 def test_sensors_that_took_turns_are_only_warned_of(tmp_path, capsys):
     path = written(tmp_path, two_sensors(0.0, 3.0))
     assert main(["track", path, "--out", str(tmp_path / "run")]) == 0

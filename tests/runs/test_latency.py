@@ -92,13 +92,21 @@ def test_the_commands_take_it_off(recorded, tmp_path):
 
 
 def test_a_late_detector_is_named(recorded, tmp_path, capsys):
-    """Known and not set it is said, with how to set it; set, nothing is said."""
+    """Not set it is taken off; left as it is it is said, with how to set it; set, nothing is said."""
     write_detections(delayed(recorded[0], 0.1), tmp_path / "late.csv")
-    for setting, said in ((), True), (("--set", "sensors.rgb.latency_s=0.1"), False):
-        run = tmp_path / f"run-{said}"
+    as_given, known = ("--set", "input.clocks=as_given"), ("--set", "sensors.rgb.latency_s=0.1")
+    for name, setting, taken, said in (
+        ("found", (), True, False),
+        ("given", as_given, False, True),
+        ("set", known, False, False),
+    ):
+        run = tmp_path / name
         assert main(["track", str(tmp_path / "late.csv"), "--out", str(run), *setting]) == 0
-        warned = "\n".join(json.loads((run / "run.json").read_text())["warnings"])
-        for text in (capsys.readouterr().err, warned):
+        record = json.loads((run / "run.json").read_text())
+        shown, warned = capsys.readouterr().err, "\n".join(record["warnings"])
+        assert ("which is taken off" in shown) == taken
+        assert ("rgb" in record.get("clocks", {})) == taken
+        for text in (shown, warned):
             assert ("sensor rgb: its boxes are 0.0" in text) == said
             assert ("sensors.rgb.latency_s=" in text) == said
 

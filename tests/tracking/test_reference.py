@@ -263,7 +263,7 @@ def test_twice_the_same_input_gives_the_same_bytes():
     assert made.finish().mean.tobytes() == again.finish().mean.tobytes()
 
 
-@settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     seed=st.integers(0, 1000),
     gaps=st.lists(st.sampled_from([0.0, 1e-4, 0.02, 0.3, 2.0, 50.0]), min_size=5, max_size=20),

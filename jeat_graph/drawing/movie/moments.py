@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.picture_map import PictureMap
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.resampling import Resampled, interpolate_to, predict_to
 
@@ -33,6 +34,29 @@ class Marks:
     centre: FloatArray
     sigma: FloatArray
     trails: Sequence[FloatArray]
+
+
+def back_in(marks: Marks, way: PictureMap | None) -> Marks:
+    """Return the tracks that a sensor can see, as they lie in its own picture; all of them without a way."""
+    if way is None or not len(marks.boxes):
+        return marks
+    own, seen = way.back(marks.boxes)
+    rows = np.flatnonzero(seen)
+    sides = marks.boxes[rows, 2:]
+    trails = []
+    for k in rows.tolist():
+        trail = marks.trails[k]
+        # A trail's points have no size: that of the box now.
+        size = np.broadcast_to(marks.boxes[k, 2:], trail.shape)
+        points, good = way.back(np.concatenate([trail - 0.5 * size, size], axis=1))
+        trails.append((points[:, :2] + 0.5 * points[:, 2:])[good])
+    return Marks(
+        track_id=marks.track_id[rows],
+        boxes=own[rows],
+        centre=own[rows, :2] + 0.5 * own[rows, 2:],
+        sigma=marks.sigma[rows] * own[rows, 2:] / sides,
+        trails=trails,
+    )
 
 
 class TracksAt:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.picture_map import PictureMap
 from jeat_graph.drawing.movie.backgrounds import FilmBackground
 from jeat_graph.drawing.movie.captions import Captions
 from jeat_graph.drawing.movie.marks import (
@@ -18,7 +19,7 @@ from jeat_graph.drawing.movie.marks import (
     draw_smoothed,
     draw_totals,
 )
-from jeat_graph.drawing.movie.moments import TracksAt, TruthAt
+from jeat_graph.drawing.movie.moments import TracksAt, TruthAt, back_in
 from jeat_graph.drawing.movie.totals import Counter
 from jeat_graph.drawing.palette import IGNORED_BOX, TEXT, TRUE_BOX
 from jeat_graph.io.video import RgbImage
@@ -38,6 +39,8 @@ class Movie:
         causal: tracks, or None.
         smoothed: tracks, or None.
         truth: true boxes, or None.
+        ways: from the picture of each background to the one that the tracks' coordinates belong to; None
+            where it is the same, and for all where nothing is said.
         labels: which tracks have their number beside them: `all`, `thin` (as far as there is room, large
             boxes first) or `none`.
     """
@@ -52,6 +55,7 @@ class Movie:
     labels: str = "thin"
     captions: Captions | None = None
     counters: Sequence[Counter] = ()
+    ways: Sequence[PictureMap | None] = ()
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -60,7 +64,10 @@ class Movie:
 
     def picture(self, k: int) -> RgbImage:
         """Draw time number `k`: (H, W, 3) uint8."""
-        panels = [self._panel(background, k) for background in self.backgrounds]
+        ways = self.ways or [None] * len(self.backgrounds)
+        panels = [
+            self._panel(background, way, k) for background, way in zip(self.backgrounds, ways, strict=True)
+        ]
         return panels[0] if len(panels) == 1 else np.concatenate(panels, axis=1)
 
     def strip(self, count: int) -> RgbImage:
@@ -68,7 +75,7 @@ class Movie:
         chosen = np.unique(np.linspace(0, len(self.times) - 1, count).round().astype(int))
         return np.concatenate([self.picture(k) for k in chosen.tolist()])
 
-    def _panel(self, background: FilmBackground, k: int) -> RgbImage:
+    def _panel(self, background: FilmBackground, way: PictureMap | None, k: int) -> RgbImage:
         import cv2
 
         t = float(self.times[k])
@@ -79,31 +86,33 @@ class Movie:
             smaller = image.shape[1] > self.panel_px[0]
             how = cv2.INTER_AREA if smaller else cv2.INTER_LINEAR
             image = np.asarray(cv2.resize(image, self.panel_px, interpolation=how), dtype=np.uint8)
-        scale = (self.panel_px[0] / self.field_px[0], self.panel_px[1] / self.field_px[1])
-        canvas = Canvas(image, scale)
-        self._draw(canvas, k, t)
+        width, height = self.field_px if way is None else background.size_px
+        canvas = Canvas(image, (self.panel_px[0] / width, self.panel_px[1] / height))
+        self._draw(canvas, way, k, t)
         edge = _MARGIN_PX * canvas.unit
         canvas.text(f"t = {t:.3f} s", (edge, image.shape[0] - edge), TEXT, 0.6)
         if background.name:
             canvas.text(background.name, (edge, 2.6 * edge), TEXT, 0.6)
         return image
 
-    def _draw(self, canvas: Canvas, k: int, t: float) -> None:
-        draw_counters(canvas, self.counters)
+    def _draw(self, canvas: Canvas, way: PictureMap | None, k: int, t: float) -> None:
+        # Lines and zones lie in the common picture.
+        here = self.counters if way is None else ()
+        draw_counters(canvas, here)
         if self.causal is not None:
-            draw_causal(canvas, self.causal.at(k), trails=self.smoothed is None)
+            draw_causal(canvas, back_in(self.causal.at(k), way), trails=self.smoothed is None)
         if self.smoothed is not None:
-            draw_smoothed(canvas, self.smoothed.at(k))
+            draw_smoothed(canvas, back_in(self.smoothed.at(k), way))
         if self.truth is not None:
             asked_for, ignored = self.truth.at(t)
             for boxes, colour in ((ignored, IGNORED_BOX), (asked_for, TRUE_BOX)):
-                for box in boxes:
+                for box in boxes if way is None else _seen(way, boxes):
                     canvas.thin_box(box, colour)
         named = self.smoothed if self.causal is None else self.causal
         if named is not None:
             # Last, so that no line runs through them.
-            draw_names(canvas, named.at(k), self.labels, self.captions, t)
-        draw_totals(canvas, self.counters, t)
+            draw_names(canvas, back_in(named.at(k), way), self.labels, self.captions, t)
+        draw_totals(canvas, here, t)
         used = [
             text
             for shown, text in (
@@ -116,3 +125,8 @@ class Movie:
         if used:
             height, width = canvas.image.shape[:2]
             canvas.text(", ".join(used), (width, height - _MARGIN_PX * canvas.unit), TEXT, 0.42)
+
+
+def _seen(way: PictureMap, boxes: FloatArray) -> FloatArray:
+    own, seen = way.back(boxes)
+    return own[seen]

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
+from jeat_graph.config.reading import load_config
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.rates import median_rate_hz
 from jeat_graph.data.steps import check_steps
 from jeat_graph.data.tables.reading import ReadingOptions
+from jeat_graph.data.time_text import exact_text
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.drawing.movie.backgrounds import (
     EventBackground,
@@ -27,6 +30,7 @@ from jeat_graph.drawing.movie.totals import counters
 from jeat_graph.eval.counting import Line
 from jeat_graph.eval.zones import Zone
 from jeat_graph.io.events.layout import EventLayout
+from jeat_graph.rig.common_picture import CommonPicture, Way, common_time
 from jeat_graph.runs.directory import ROAD_CAUSAL, ROAD_SMOOTHED, RUN_JSON, read_record
 
 #: Names within a simulated data set, as jeat-graph-sehn writes it: its segments, and their files.
@@ -35,6 +39,9 @@ DEFAULT_RATE_HZ = 25.0
 _SAME_SHAPE = 0.01
 #: What `road` writes into a folder.
 _ROAD = "road.csv"
+_US_PER_S = 1e6
+# The sensors of a rig whose pictures are drawn, by name of the background.
+_SENSORS = {VideoBackground.name: "rgb", EventBackground.name: "evt"}
 # A track is drawn that long after its last row, and a little before its first (s).
 _APART_S = 0.5
 
@@ -65,6 +72,7 @@ class Request:
         captions: what stands beside a track, of `captions.PARTS`; by default all that is known.
         road: a folder that `road` wrote, for speeds; by default the run's own tables of the road.
         places: lines and zones to count at.
+        rig: pictures and clocks of the sensors; frames are those of `rgb`, events those of `evt`.
     """
 
     run: Path | None = None
@@ -88,6 +96,7 @@ class Request:
     captions: tuple[str, ...] = PARTS
     road: Path | None = None
     places: tuple[Line | Zone, ...] = ()
+    rig: Path | None = None
 
 
 def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[str]]:
@@ -103,15 +112,21 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
     Raises:
         DataError: a file is missing or not valid, or nothing lies in the asked times.
     """
+    from jeat_graph.io.events.frame_clock import FrameClock, events_later_us
     from jeat_graph.io.events.stretches import open_stretches
     from jeat_graph.io.scans_io import read_instants
     from jeat_graph.io.truth_io import read_truth
     from jeat_graph.io.video import open_frames
 
     tables, request = _resolve(request)
-    frames = events = None
+    frames = events = clock = None
+    ways = _ways(request)
     if request.frames is not None:
-        frames = VideoBackground(stack.enter_context(open_frames(request.frames, request.frame_rate_hz)))
+        source = stack.enter_context(open_frames(request.frames, request.frame_rate_hz))
+        clock = FrameClock(float(source.times_s[0]), source.origin_s)
+        if (own := ways[VideoBackground.name].clock) is not None:
+            source.times_s = common_time(source.times_s, own)
+        frames = VideoBackground(source)
     truth = None
     if request.truth is not None:
         how: ReadingOptions = {**request.reading, "first_frame": None}  # it is said of the tracks
@@ -122,15 +137,20 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
         beside = frames.size_px if frames else None
         stretches = open_stretches(request.events, request.event_size_px, request.event_layout, beside)
         stack.callback(stretches.close)
+        stretches.t_offset_us, _ = events_later_us(stretches.t_offset_us, stretches.origin_us, clock)
+        if (own := ways[EventBackground.name].clock) is not None:
+            stretches.t_offset_us -= round(own.offset_s * _US_PER_S)
         events = EventBackground(stretches, window_s)
     times = _times(request, _span(frames, events, tables, truth), frames, rate_hz)
 
     backgrounds: list[FilmBackground] = [one for one in (frames, events) if one is not None]
     configured = _configured_size(request.run)
-    field, warnings = _field(configured, backgrounds, tables, truth)
+    in_common = [one for one in backgrounds if one.name not in ways or ways[one.name].picture is None]
+    field, warnings = _field(configured, in_common, tables, truth)
     if not backgrounds:
         backgrounds.append(PlainBackground((round(field[0]), round(field[1]))))
-    panel = request.size_px or (round(field[0]), round(field[1]))
+    shown_px = field if backgrounds[0] in in_common else backgrounds[0].size_px
+    panel = request.size_px or (round(shown_px[0]), round(shown_px[1]))
     instants = read_instants(request.run) if request.run is not None and request.run.is_dir() else None
     shown = {kind: TracksAt(table, times, kind, instants, request.trail_s) for kind, table in tables.items()}
     movie = Movie(
@@ -144,10 +164,19 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
         labels=request.labels,
         captions=_captions(request, tables),
         counters=counters(request.places, tables.get("smoothed", tables.get("causal"))),
+        ways=[ways[one.name].picture if one.name in ways else None for one in backgrounds],
     )
     warnings += _absent(frames, tables, truth, times)
     warnings += [f"{request.events}: {note}" for note in ([] if events is None else stretches.notes())]
     return movie, rate_hz, warnings
+
+
+def _ways(request: Request) -> dict[str, Way]:
+    """How pictures and clocks of frames and events lie to those of the tracks, by name of the background."""
+    ways: Mapping[str, Way] = {}
+    if request.rig is not None:
+        ways = CommonPicture.of(load_config("default", rig=request.rig)).ways
+    return {name: ways.get(sensor, Way(None, None, None)) for name, sensor in _SENSORS.items()}
 
 
 def _resolve(request: Request) -> tuple[dict[str, Trajectories], Request]:
@@ -212,15 +241,15 @@ def _times(
     request: Request, span: tuple[float, float], frames: VideoBackground | None, rate_hz: float
 ) -> FloatArray:
     """Times of the pictures (T,), at least one (s)."""
-    lasts = f"; the recording lasts from {span[0]:.10g} s to {span[1]:.10g} s"
+    lasts = f"; the recording lasts from {exact_text(span[0])} s to {exact_text(span[1])} s"
     if request.at_s is not None:
         if not span[0] - _APART_S <= request.at_s <= span[1] + _APART_S:
-            raise DataError(f"there is nothing to draw at {request.at_s:.10g} s{lasts}")
+            raise DataError(f"there is nothing to draw at {exact_text(request.at_s)} s{lasts}")
         return np.array([request.at_s])
     start = span[0] if request.start_s is None else request.start_s
     end = span[1] if request.end_s is None else request.end_s
     if end < start and request.end_s is not None:
-        raise DataError(f"--end {end:.10g} s lies before the start, {start:.10g} s")
+        raise DataError(f"--end {exact_text(end)} s lies before the start, {exact_text(start)} s")
     if frames is not None and request.rate_hz is None:
         times = frames.times_s[(frames.times_s >= start - 1e-6) & (frames.times_s <= end + 1e-6)]
     else:
@@ -229,8 +258,8 @@ def _times(
         times = times[(times >= span[0] - 1e-6) & (times <= span[1] + 1e-6)]
     if not len(times):
         raise DataError(
-            f"there is nothing to draw from {start:.10g} s"
-            + ("" if request.end_s is None else f" to {end:.10g} s")
+            f"there is nothing to draw from {exact_text(start)} s"
+            + ("" if request.end_s is None else f" to {exact_text(end)} s")
             + lasts
         )
     return np.asarray(times, dtype=np.float64)
@@ -262,8 +291,8 @@ def _absent(
         if t.max() < times[0] - _APART_S or t.min() > times[-1] + _APART_S
     }
     lines = [
-        f"{kind} lasts from {t.min():.10g} s to {t.max():.10g} s, the pictures from {times[0]:.10g} s to "
-        f"{times[-1]:.10g} s"
+        f"{kind} lasts from {exact_text(t.min())} s to {exact_text(t.max())} s, the pictures from "
+        f"{exact_text(times[0])} s to {exact_text(times[-1])} s"
         for kind, t in outside.items()
     ]
     if outside and outside.keys() >= tables.keys() and len(times) > 1:

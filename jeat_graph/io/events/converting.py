@@ -15,14 +15,14 @@ WRITTEN = {"evt3": ".raw", "evt2": ".raw", "dat": ".dat", "hdf5": ".h5"}
 SUFFIXES = {".raw": "evt3", ".dat": "dat", ".h5": "hdf5", ".hdf5": "hdf5"}
 
 
-def event_writer(path: Path, fmt: str | None, size_px: tuple[int, int], t_offset_us: int = 0) -> Any:
+def event_writer(path: Path, fmt: str | None, size_px: tuple[int, int], origin_us: int = 0) -> Any:
     """Return the writer of a format, to be entered.
 
     Args:
         path: the file to be.
         fmt: one of `WRITTEN`; None chooses by the suffix.
         size_px: width and height of the picture.
-        t_offset_us: what leads to the clock of other files (µs); only HDF5 can say it.
+        origin_us: time 0 on the clock of the recording (µs): `t_offset` of HDF5, a line of other headers.
 
     Raises:
         DataError: the suffix tells no format, or not this one.
@@ -39,8 +39,8 @@ def event_writer(path: Path, fmt: str | None, size_px: tuple[int, int], t_offset
     if WRITTEN[name] != WRITTEN[SUFFIXES[suffix]]:
         raise DataError(f"{name} is written to files that end in {WRITTEN[name]}", path)
     if name == "hdf5":
-        return EventWriter(path, size_px, t_offset_us=t_offset_us)
-    return {"evt2": Evt2Writer, "evt3": Evt3Writer, "dat": DatWriter}[name](path, size_px)
+        return EventWriter(path, size_px, t_offset_us=origin_us)
+    return {"evt2": Evt2Writer, "evt3": Evt3Writer, "dat": DatWriter}[name](path, size_px, origin_us)
 
 
 def convert(
@@ -51,8 +51,9 @@ def convert(
 ) -> int:
     """Write the events of a reader into another file.
 
-    Times are those of the file. `t_offset_us` is kept in HDF5; other formats cannot say it, and a note of
-    `reader.damage` then says so. Triggers and labels are left behind.
+    Times are those that the reader gives; what leads from them to the clock of the recording is kept, as
+    `t_offset` in HDF5 and in a line `% t_offset` of the headers of RAW and DAT. Triggers and labels are left
+    behind.
 
     Args:
         reader: what to read.
@@ -67,13 +68,8 @@ def convert(
         DataError: nothing says the size of the picture, or something cannot be read or written.
     """
     count = 0
-    offset_us = reader.t_offset_us
-    if offset_us and SUFFIXES.get(path.suffix.lower()) != "hdf5":
-        reader.damage.clock = (
-            f"t_offset of {offset_us} µs, which leads to the clock of the frames, is left behind: "
-            f"{path.suffix} cannot say it"
-        )
-    with event_writer(path, fmt, reader.needed_size("--size"), offset_us) as writer:
+    origin_us = reader.t_offset_us + reader.origin_us
+    with event_writer(path, fmt, reader.needed_size("--size"), origin_us) as writer:
         for piece in reader.pieces():
             writer.append(EventArray.trusted(piece.t_us, piece.x, piece.y, piece.polarity))
             count += len(piece)

@@ -15,6 +15,6 @@ from jeat_graph.io.events.word_writer import Layout, WordWriter
 class Evt2Writer(WordWriter):
     """Writes EVT 2.0; gaps of more than 4 h 46 min lose that much."""
 
-    def __init__(self, path: str | Path, size_px: tuple[int, int]) -> None:
-        layout = Layout(partial(raw_header, "2.0"), np.uint32, 1 << 11, events.encode_evt2)
+    def __init__(self, path: str | Path, size_px: tuple[int, int], origin_us: int = 0) -> None:
+        layout = Layout(partial(raw_header, "2.0", origin_us), np.uint32, 1 << 11, events.encode_evt2)
         super().__init__(path, size_px, layout)

@@ -15,6 +15,6 @@ from jeat_graph.io.events.word_writer import Layout, WordWriter
 class Evt3Writer(WordWriter):
     """Writes EVT 3.0."""
 
-    def __init__(self, path: str | Path, size_px: tuple[int, int]) -> None:
-        layout = Layout(partial(raw_header, "3.0"), np.uint16, 1 << 11, events.encode_evt3)
+    def __init__(self, path: str | Path, size_px: tuple[int, int], origin_us: int = 0) -> None:
+        layout = Layout(partial(raw_header, "3.0", origin_us), np.uint16, 1 << 11, events.encode_evt3)
         super().__init__(path, size_px, layout)

@@ -230,4 +230,6 @@ def _divided_unit(t: npt.NDArray[Any], hz_px: dict[str, float]) -> str | None:
         return "s" if hz_px["s"] >= _LEAST_HZ_PX else None
     if hz_px["s"] < _LOW_HZ_PX <= hz_px["ms"]:
         return "ms"
-    return "s" if hz_px["s"] <= _HIGH_HZ_PX < hz_px["ms"] else None
+    # Of a few ticks of the clock the rate is not known well enough to tell.
+    told = hz_px["s"] <= _HIGH_HZ_PX < hz_px["ms"] and len(np.unique(t)) >= _LEAST_TIMES
+    return "s" if told else None

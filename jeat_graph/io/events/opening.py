@@ -5,11 +5,14 @@ from __future__ import annotations
 import re
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.events.layout import EventLayout
 from jeat_graph.io.events.reader import EventReader
+
+if TYPE_CHECKING:
+    from jeat_graph.io.events.raw_header import RawHeader
 
 #: What is read, for messages and help.
 FORMATS = (
@@ -144,15 +147,22 @@ def _open_table(
 
 def _open_prophesee(place: Path, file: BinaryIO, size_px: tuple[int, int] | None) -> EventReader:
     """Open RAW or DAT: both begin with lines of `%`."""
+    from jeat_graph.io.events.raw_header import origin_of, read_raw_header
+    from jeat_graph.io.events.reader import agreed_size
+
+    header = read_raw_header(file, place)
+    reader = _reader_of(place, file, header, agreed_size(size_px, header.size_px, place))
+    reader.t_offset_us = origin_of(header, place)
+    return reader
+
+
+def _reader_of(place: Path, file: BinaryIO, header: RawHeader, size: tuple[int, int] | None) -> EventReader:
+    """Choose the decoder by the header."""
     from jeat_graph.io.events.dat import DatReader
     from jeat_graph.io.events.evt2 import Evt2Reader
     from jeat_graph.io.events.evt3 import Evt3Reader
     from jeat_graph.io.events.evt21 import Evt21Reader
-    from jeat_graph.io.events.raw_header import read_raw_header
-    from jeat_graph.io.events.reader import agreed_size
 
-    header = read_raw_header(file, place)
-    size = agreed_size(size_px, header.size_px, place)
     if header.encoding == "EVT2":
         return Evt2Reader(place, file, size)
     if header.encoding == "EVT3":

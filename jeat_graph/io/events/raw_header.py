@@ -8,6 +8,9 @@ from typing import BinaryIO, NamedTuple
 
 from jeat_graph.data.errors import DataError
 
+#: The key of a line that says time 0 on the clock of the recording (µs), as `t_offset` of HDF5 does: ours;
+#: other programs pass it over.
+ORIGIN = "t_offset"
 _MOST_LINES = 10_000
 _MOST_LINE_BYTES = 1 << 12
 _MOST_PX = 1 << 14
@@ -69,11 +72,32 @@ def read_raw_header(file: BinaryIO, path: Path) -> RawHeader:
     return RawHeader(encoding, _size(keys, options, path), options, keys, "\n".join(lines))
 
 
-def raw_header(version: str, size_px: tuple[int, int]) -> bytes:
-    """Return the header of a file of EVT `version`, 2.0 or 3.0."""
+def origin_of(header: RawHeader, path: Path) -> int:
+    """Return time 0 on the clock of the recording (µs), 0 where the header does not say.
+
+    Raises:
+        DataError: it says something that is no whole number.
+    """
+    text = header.keys.get(ORIGIN, "0").strip()
+    if not re.fullmatch(r"-?\d{1,18}", text):
+        raise DataError(
+            f"its header says {ORIGIN} {text[:40]!r}, which is no whole number of microseconds", path
+        )
+    return int(text)
+
+
+def raw_header(version: str, origin_us: int, size_px: tuple[int, int]) -> bytes:
+    """Return the header of a file of EVT `version`, 2.0 or 3.0.
+
+    Args:
+        version: of EVT.
+        origin_us: time 0 on the clock of the recording (µs), which a line `% t_offset` keeps; 0: no line.
+        size_px: width and height of the picture.
+    """
     width, height = size_px
     name = _VERSIONS[version]
-    lines = (f"evt {version}", f"format {name};height={height};width={width}", f"geometry {width}x{height}")
+    lines = [f"evt {version}", f"format {name};height={height};width={width}", f"geometry {width}x{height}"]
+    lines += [f"{ORIGIN} {origin_us}"] if origin_us else []
     return "".join(f"% {line}\n" for line in (*lines, "end")).encode("ascii")
 
 

@@ -22,7 +22,11 @@ class Stretches(Protocol):
         size_px: width and height of the picture.
         duration_us: time of the last event + 1, or longer if the file says so (µs).
         t_offset_us: what to add to the events' times for the clock of frames (µs).
+        origin_us: time 0 on the clock that the file gives times by (µs).
     """
+
+    t_offset_us: int
+    origin_us: int
 
     @property
     def size_px(self) -> tuple[int, int] | None:
@@ -31,10 +35,6 @@ class Stretches(Protocol):
     @property
     def duration_us(self) -> int:
         """Time of the last event + 1 (µs)."""
-
-    @property
-    def t_offset_us(self) -> int:
-        """What to add to the events' times (µs)."""
 
     def between(self, start_us: int, end_us: int) -> EventArray:
         """Return the events with `start_us` <= t < `end_us`."""
@@ -53,6 +53,8 @@ class IndexedStretches(EventFile):
     Raises:
         DataError: it cannot be read.
     """
+
+    origin_us = 0
 
     def __init__(self, path: Path, size_px: tuple[int, int] | None = None) -> None:
         super().__init__(path)
@@ -108,6 +110,7 @@ class ForwardStretches:
         self.size_px = self._reader.needed_size(beside_px=beside_px)
         self._assumed = self._reader.damage.assumed
         self.t_offset_us = self._reader.t_offset_us
+        self.origin_us = self._reader.origin_us
 
     def __enter__(self) -> Self:
         return self

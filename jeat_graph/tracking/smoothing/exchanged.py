@@ -11,6 +11,7 @@ from jeat_graph.data.arrays import FloatArray, RecordArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.progress import with_progress
 from jeat_graph.data.steps import check_steps
+from jeat_graph.data.time_text import exact_text
 from jeat_graph.smoothers.exchanging import TwoSided, exchange_gains
 from jeat_graph.smoothers.measurements import concatenate_measurements
 from jeat_graph.tracking.smoothing.encounters import encounters
@@ -72,7 +73,9 @@ def _check_times(rows: Sequence[RecordArray]) -> None:
         start, end = float(one["t"][0]), float(one["t"][-1])
         check_steps(start, end, _LOOKS_HZ, "looks at a track", "leave it out: smoother.exchange_share=0")
         if max(abs(start), abs(end)) > _FARTHEST_S:
-            raise DataError(f"a track lasts from {start:.10g} to {end:.10g} s: is one of its times wrong?")
+            raise DataError(
+                f"a track lasts from {exact_text(start)} to {exact_text(end)} s: is one of its times wrong?"
+            )
 
 
 class _Sides:

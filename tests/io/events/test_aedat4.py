@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
+from jeat_graph import read_detections
+from jeat_graph.cli.main import main
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.io.events.opening import open_events
+from jeat_graph.io.video import open_frames
 
 pytest.importorskip("aedat", reason="pip install 'aedat>=2.2,<3'")
 
@@ -74,6 +78,37 @@ def test_a_cut_off_recording_is_read_up_to_there(tmp_path):
     events, reader = read(path)
     assert 0 < len(events) < 78_830
     assert any("damaged packet" in note for note in reader.damage.notes())
+
+
+@street
+@pytest.mark.parametrize("name", ["e.raw", "e.dat", "e.h5"])
+def test_its_clock_survives_conversion(tmp_path, capsys, name):
+    _, reader = read(STREET)
+    assert main(["events", "convert", str(STREET), str(tmp_path / name)]) == 0
+    with open_events(tmp_path / name) as converted:
+        assert converted.t_offset_us == reader.origin_us
+    assert main(["events", "info", str(tmp_path / name)]) == 0
+    assert f"clock: time 0 is {reader.origin_us / 1e6:.6f} s of the file's clock" in capsys.readouterr().out
+
+
+@street
+def test_pictures_with_times_since_1970_are_put_on_its_clock(tmp_path, capsys):
+    folder = tmp_path / "frames"
+    folder.mkdir()
+    with open_frames(STREET) as frames:
+        for t, picture in frames:
+            name = f"{round((t + frames.origin_s) * 1e6)}.png"
+            cv2.imwrite(str(folder / name), picture[..., ::-1])
+    tables = []
+    for pictures in (STREET, folder):
+        out = tmp_path / f"{pictures.name}.csv"
+        command = ["detect", "--frames", str(pictures), "--events", str(STREET), "--out", str(out)]
+        assert main(command) == 0
+        tables.append(read_detections(out))
+    assert "frames and events count from 1970" in capsys.readouterr().err
+    # Scans of events come at multiples of their step on either clock, so they differ by less than one.
+    first = [one.sensor_times("evt")[0] - one.sensor_times("rgb")[0] for one in tables]
+    assert abs(first[0] - first[1]) < 0.02
 
 
 def test_text_that_claims_to_be_one_is_refused(tmp_path):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from jeat_graph.data.errors import ConfigError
@@ -67,6 +67,7 @@ def test_the_unit_of_a_usual_recording_is_told(size, hz_px, unit, start_s, seed)
     assert unit_of(t, x, y) == unit
 
 
+@example(size=(1280, 720), hz_px=407.0, unit="ms", seed=0)
 @settings(max_examples=80, deadline=None)
 @given(
     size=cameras,

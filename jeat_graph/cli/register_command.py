@@ -1,0 +1,270 @@
+"""`jeat-graph register`: the pictures and clocks of several sensors brought together, from what they saw."""
+
+from __future__ import annotations
+
+import argparse
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jeat_graph.cli.options import add_image, add_reading, add_rig, reading
+from jeat_graph.cli.progress import stages
+from jeat_graph.cli.terminal import say
+from jeat_graph.config.argument_types import picture_size
+from jeat_graph.data.errors import DataError
+
+if TYPE_CHECKING:
+    from jeat_graph.config.schema import Config
+    from jeat_graph.data.detections import Detections
+    from jeat_graph.data.picture_map import PictureMap
+    from jeat_graph.rig.matching import MatchedTracks
+    from jeat_graph.rig.registering import Registration
+    from jeat_graph.rig.sensor_tracks import SensorTracks
+
+WRITES = ("out",)
+HELP = (
+    "find how the pictures and clocks of two or more sensors lie to each other, from the traffic they saw or "
+    "from corresponding points, and write a rig for track, stream and calibrate"
+)
+_say = partial(say, "register")
+#: Digits of what is written: boxes are good to a hundredth of a pixel, clocks to a microsecond.
+_DIGITS, _TIME_PLACES = 9, 6
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add = parser.add_argument
+    add(
+        "detections",
+        nargs="+",
+        metavar="DETECTIONS",
+        help="files of detections, one a sensor or with several; each in its sensor's own picture and clock",
+    )
+    add("--out", required=True, metavar="RIG.yaml", help="the rig to write")
+    add(
+        "--reference",
+        metavar="NAME",
+        help="sensor whose picture and clock are the common ones (default: the first file's)",
+    )
+    add_image(parser)
+    add(
+        "--sensor-image",
+        action="append",
+        default=[],
+        type=_named_size,
+        metavar="NAME=WxH",
+        help="size of another sensor's picture (default: as far as its boxes reach)",
+    )
+    add(
+        "--points",
+        metavar="FILE",
+        help="corresponding points of two sensors (px): columns such as rgb_x, rgb_y, evt_x, evt_y",
+    )
+    add(
+        "--camera",
+        action="append",
+        default=[],
+        type=_named_file,
+        metavar="NAME=CAMERA.yaml",
+        help="calibrated camera of a sensor over the road, one for each of two sensors, in the same axes",
+    )
+    add_rig(parser)
+    add_reading(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Register every other sensor with the reference, and write the rig if all of it is known."""
+    from jeat_graph.config.rig_file import rig_text
+    from jeat_graph.io.atomic import check_writable, open_atomic
+    from jeat_graph.io.detections_io import read_many
+
+    if Path(args.out).suffix not in (".yaml", ".yml"):
+        raise DataError("the name of a rig must end in .yaml", args.out)
+    check_writable(args.out)
+    recording = read_many(args.detections, **{**reading(args), "image": None})
+    reference = _reference(args, recording)
+    others = [name for name in recording.sensors if name != reference]
+    if not others:
+        raise DataError(
+            f"there is one sensor, {reference!r}: a rig has two or more", " + ".join(args.detections)
+        )
+    if args.camera and {name for name, _ in args.camera} != set(recording.sensors):
+        raise DataError(f"--camera is needed of each sensor: {', '.join(recording.sensors)}")
+    if args.points is not None and len(others) > 1:
+        raise DataError("corresponding points are of two sensors, and there are more", args.points)
+    sizes = _sizes(args, recording, reference)
+    known = _known(args)
+    with stages("register", 2 * len(others) + 1) as stage:
+        stage(f"tracking {reference}")
+        first = _tracks(recording, reference, sizes[reference])
+        found: dict[str, Registration] = {}
+        for name in others:
+            stage(f"tracking {name}")
+            second = _tracks(recording, name, sizes[name])
+            stage(f"registering {name}")
+            pair = (sizes[reference], sizes[name])
+            found[name] = _register(args, first, second, (reference, name), pair, known)
+    for one in found.values():
+        for line in one.lines:
+            _say(line)
+    width, height = sizes[reference]
+    sensors: dict[str, dict[str, Any]] = {reference: {"image": [width, height], "to_picture": "none"}}
+    sensors |= {name: _entry(one, sizes[name]) for name, one in found.items()}
+    notes = [
+        f"made by jeat-graph register of {' + '.join(args.detections)}",
+        *(line for one in found.values() for line in one.lines),
+    ]
+    with open_atomic(args.out) as file:
+        file.write(rig_text((width, height), sensors, notes))
+    print(f"wrote {args.out}")
+    return 0
+
+
+def _reference(args: argparse.Namespace, recording: Detections) -> str:
+    from jeat_graph.io.detections_io import read_many
+
+    if args.reference is not None:
+        if args.reference not in recording.sensors:
+            raise DataError(f"--reference {args.reference}: there are {', '.join(recording.sensors)}")
+        return str(args.reference)
+    if len(args.detections) == 1:
+        return recording.sensors[-1] if "rgb" not in recording.sensors else "rgb"
+    first = read_many(args.detections[:1], **{**reading(args), "image": None})
+    return first.sensors[-1] if "rgb" not in first.sensors else "rgb"
+
+
+def _sizes(args: argparse.Namespace, recording: Detections, reference: str) -> dict[str, tuple[int, int]]:
+    """Width and height of each sensor's picture, given or as far as its boxes reach."""
+    from jeat_graph.config.reading import load_config
+    from jeat_graph.runs.declaring import fit_picture
+
+    given = {name: _camera_size(file) for name, file in args.camera} | dict(args.sensor_image)
+    if args.image is not None:
+        given[reference] = args.image
+    strange = [name for name in given if name not in recording.sensors]
+    if strange:
+        raise DataError(f"--sensor-image {strange[0]}: there are {', '.join(recording.sensors)}")
+    out = {}
+    for name in recording.sensors:
+        if name in given:
+            out[name] = given[name]
+            continue
+        image = fit_picture(load_config("default"), [recording.select(name)]).image
+        out[name] = (round(image.width), round(image.height))
+        option = "--image " if name == reference else f"--sensor-image {name}="
+        _say(
+            f"sensor {name!r}: the picture is taken for {out[name][0]} x {out[name][1]} px, as far as its "
+            f"boxes reach ({option}WxH says otherwise)"
+        )
+    return out
+
+
+def _known(args: argparse.Namespace) -> Config | None:
+    from jeat_graph.config.reading import load_config
+
+    return None if args.rig is None else load_config("default", rig=args.rig)
+
+
+def _tracks(recording: Detections, name: str, size: tuple[int, int]) -> SensorTracks:
+    from jeat_graph.runs.own_tracks import own_tracks
+
+    return own_tracks(recording.select(name), size)
+
+
+def _register(
+    args: argparse.Namespace,
+    first: SensorTracks,
+    second: SensorTracks,
+    names: tuple[str, str],
+    sizes: tuple[tuple[int, int], tuple[int, int]],
+    known: Config | None,
+) -> Registration:
+    from jeat_graph.rig.points import map_of_points, read_points
+    from jeat_graph.rig.registering import Registration, clock_by_map, register_by_traffic
+
+    if args.points is not None:
+        way, lines = map_of_points(*read_points(args.points, names), sizes[0], args.points)
+    elif args.camera:
+        way, lines = _map_of_cameras(dict(args.camera), names)
+    else:
+        return register_by_traffic(first, second, names, sizes, _start(known, names[1]))
+    clock = clock_by_map(first, second, way)
+    if clock is None:
+        lines.append(
+            f"the traffic does not tell the clock of {names[1]}: its times are left as they are; if they are "
+            "not the common ones, write offset_s into the rig"
+        )
+    else:
+        lines.append(
+            f"clock {clock.offset_s:.4f} s ± {1e3 * clock.offset_std_s:.1f} ms ahead, by the traffic"
+        )
+    return Registration(way, clock, [f"{names[1]}: {line}" for line in lines])
+
+
+def _map_of_cameras(cameras: dict[str, str], names: tuple[str, str]) -> tuple[PictureMap, list[str]]:
+    from jeat_graph.road.camera_file import read_camera
+    from jeat_graph.road.camera_map import map_between
+
+    common, own = (read_camera(cameras[name]) for name in names)
+    way, left = map_between(own, common)
+    return way, [f"the cameras' files tell the map, to {left:.2g} px for what stands on the road"]
+
+
+def _camera_size(file: str) -> tuple[int, int]:
+    from jeat_graph.road.camera_file import read_camera
+
+    camera = read_camera(file)
+    return camera.width, camera.height
+
+
+def _start(known: Config | None, name: str) -> MatchedTracks | None:
+    """What an earlier rig says of a sensor, to begin with."""
+    from jeat_graph.rig.common_picture import CommonPicture
+    from jeat_graph.rig.matching import MatchedTracks, no_tracks
+
+    if known is None or name not in known.sensors:
+        return None
+    way = CommonPicture.of(known).ways.get(name)
+    if way is None or way.picture is None:
+        return None
+    offset = 0.0 if way.clock is None else way.clock.offset_s
+    return MatchedTracks(no_tracks(), no_tracks(), way.picture, offset, 0)
+
+
+def _entry(found: Registration, size: tuple[int, int]) -> dict[str, Any]:
+    """What a rig says of a sensor."""
+    columns = 4 if found.way.parallax else 3
+    kept = [k for k in range(11) if columns == 4 or k not in (3, 7, 10)]
+    covariance = found.way.covariance[kept][:, kept]
+    out: dict[str, Any] = {
+        "image": list(size),
+        "to_picture": [[_short(v) for v in row[:columns]] for row in found.way.matrix],
+        "covariance": [[_short(v) for v in row] for row in covariance],
+    }
+    if found.clock is not None:
+        out |= {
+            "offset_s": round(found.clock.offset_s, _TIME_PLACES),
+            "offset_std_s": round(found.clock.offset_std_s, _TIME_PLACES),
+            "drift_ppm": round(found.clock.drift_ppm, 3),
+            "drift_std_ppm": round(found.clock.drift_std_ppm, 3),
+            "at_s": round(found.clock.at_s, _TIME_PLACES),
+        }
+    return out
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.{_DIGITS}g}")
+
+
+def _named_size(text: str) -> tuple[str, tuple[int, int]]:
+    name, equals, size = text.partition("=")
+    if not equals or not name:
+        raise argparse.ArgumentTypeError(f"must read NAME=WIDTHxHEIGHT, say evt=640x480, not {text!r}")
+    return name, picture_size(size)
+
+
+def _named_file(text: str) -> tuple[str, str]:
+    name, equals, file = text.partition("=")
+    if not equals or not name or not file:
+        raise argparse.ArgumentTypeError(f"must read NAME=FILE, say evt=camera.yaml, not {text!r}")
+    return name, file

@@ -1,0 +1,35 @@
+"""The tracks that one sensor alone gives: what clocks and pictures of several sensors are compared by."""
+
+from __future__ import annotations
+
+import warnings
+
+from jeat_graph.config.reading import as_config, load_config
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.rig.sensor_tracks import SensorTracks, sensor_tracks
+from jeat_graph.runs.declaring import fit_input
+from jeat_graph.tracking.tracker import Tracker
+
+
+def own_tracks(detections: Detections, size_px: tuple[float, float] | None = None) -> SensorTracks:
+    """Track one sensor alone, by the preset `default`, and put its smoothed tracks on a grid.
+
+    Args:
+        detections: of one sensor, in its own picture and on its own clock.
+        size_px: width and height of its picture; by default as far as its boxes reach.
+    """
+    config = fit_input(as_config(load_config("default"), size_px), detections)[0]
+    tracker = Tracker(config)
+    parts: list[Trajectories] = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of what is odd in the input the caller has told
+        for k, _ in enumerate(tracker.run(detections)):
+            if k % _STEPS_PER_DRAIN == 0:
+                parts.append(tracker.drain_smoothed())
+        parts.append(tracker.finish())
+    table = Trajectories.concatenate(parts)
+    return sensor_tracks(table.t, table.track_id, table.boxes, detections)
+
+
+_STEPS_PER_DRAIN = 256
