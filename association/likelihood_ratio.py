@@ -53,7 +53,7 @@ def sides_log_density(innovation: SideInnovations, size: FloatArray, c: ModelCon
     share = c.outlier_share
     whole = np.logaddexp(math.log1p(-share) + body, math.log(share) + tail)
     whole[np.minimum(d2, c.outlier_gate * d2_wide) > c.gate] = -np.inf
-    return np.logaddexp(whole, cut_log_density(y, S, size, c))
+    return np.asarray(np.logaddexp(whole, cut_log_density(y, S, size, c)))
 
 
 def cut_log_density(y: FloatArray, S: FloatArray, size: FloatArray, c: ModelConstants) -> FloatArray:

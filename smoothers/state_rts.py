@@ -78,7 +78,14 @@ def smooth(records: Sequence[FilterRecord]) -> Iterator[tuple[int, FloatArray, F
                 now.track_id, later.track_id, assume_unique=True, return_indices=True
             )
             if len(here):
-                chosen = FilterRecord(*(column[there] for column in later))
+                chosen = FilterRecord(
+                    later.track_id[there],
+                    later.F[there],
+                    later.predicted_mean[there],
+                    later.predicted_covariance[there],
+                    later.mean[there],
+                    later.covariance[there],
+                )
                 mean[here], covariance[here] = rts_step(
                     mean[here], covariance[here], chosen, next_mean[there], next_covariance[there]
                 )

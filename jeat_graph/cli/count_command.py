@@ -73,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
     lines, zones = places(args)
     if not lines and not zones:
         raise ConfigError("nothing to count at: give --line, --zone or --lines FILE.yaml")
-    names = [place.name for place in (*lines, *zones)]
+    names = [line.name for line in lines] + [zone.name for zone in zones]
     if args.road is not None and args.stations is None:
         raise ConfigError("--road says nothing without --stations: give both, or leave it out")
     later_s = clock_s(args.begin)

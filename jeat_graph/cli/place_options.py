@@ -49,7 +49,7 @@ def places(args: argparse.Namespace) -> tuple[list[Line], list[Zone]]:
         marks = read_marks_file(path, (LINES, ZONES))
         lines += [Line(*ends, name) for name, ends in marks.lines.items()]
         zones += [Zone(name, corners) for name, corners in marks.zones.items()]
-    names = [place.name for place in (*lines, *zones)]
+    names = [line.name for line in lines] + [zone.name for zone in zones]
     if len(set(names)) < len(names):
         raise DataError(f"{max(names, key=names.count)} is the name of two lines or zones")
     return lines, zones

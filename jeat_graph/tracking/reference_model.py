@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -157,7 +157,7 @@ class ReferenceModel:
         """Return the smoothed rows of all tracks."""
         return self.smoothed()
 
-    def learnt(self) -> Mapping[str, object]:
+    def learnt(self) -> Mapping[str, Any]:
         """Return what is believed of the sensors and the scene, by name."""
         state = self._state
         return {

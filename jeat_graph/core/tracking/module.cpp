@@ -1,4 +1,6 @@
 // Binds the tracker's step.
+#include <nanobind/stl/tuple.h>
+
 #include "arrays.hpp"
 #include "smoothers/histories.hpp"
 #include "tracking/step.hpp"
@@ -8,6 +10,9 @@ namespace jeat::tracking {
 namespace {
 
 using smoothers::Rows;
+// Time, identity, mean, variance, posterior, sensors.
+using Table = std::tuple<Out<double>, Out<std::int64_t>, Out2<double>, Out2<double>, Out<double>, Out<std::int64_t>>;
+using Named = nb::typed<nb::dict, nb::str, nb::any>;
 
 template <class T> Buffer<T> copied(const std::vector<T>& source) {
     Buffer<T> out(source.size());
@@ -64,25 +69,25 @@ public:
         step_.end_tracks(histories);
     }
 
-    nb::tuple rows() const { return table(rows_); }
+    Table rows() const { return table(rows_); }
     Out<std::int64_t> takers() const { return array_of(takers_); }
     Out<std::int64_t> living() const { return array_of(living_); }
     std::size_t size() const { return state_.tracks.size(); }
     std::int64_t born() const { return state_.next_id - 1; }
 
-    nb::tuple smoothed() { return table(histories_.preview(state_.gaps, state_.constants)); }
-    nb::tuple drain() {
-        nb::tuple out = table(histories_.rows());
+    Table smoothed() { return table(histories_.preview(state_.gaps, state_.constants)); }
+    Table drain() {
+        Table out = table(histories_.rows());
         histories_.rows().clear();
         return out;
     }
-    nb::tuple finish() {
+    Table finish() {
         histories_.end(std::vector<std::uint8_t>(histories_.living().size(), 0), state_.gaps, state_.constants);
         return drain();
     }
 
-    nb::dict learnt() const {
-        nb::dict out;
+    Named learnt() const {
+        Named out;
         out["p_detect"] = array_of(state_.belief.p_detect);
         out["unseen"] = array_of(state_.belief.unseen);
         out["indifference"] = array_of(state_.belief.indifference);
@@ -98,8 +103,8 @@ public:
     }
 
     // The tracks as they are now, column by column, for tests: (N, width) each.
-    nb::dict tracks() {
-        nb::dict out;
+    Named tracks() {
+        Named out;
         state_.tracks.columns([&](const char* name, const auto& column, std::size_t width) {
             using Column = std::remove_cvref_t<decltype(column)>;
             if constexpr (!std::is_same_v<Column, std::vector<Sides>>) out[name] = array_of(column, width);
@@ -108,8 +113,8 @@ public:
     }
 
 private:
-    static nb::tuple table(const Rows& rows) {
-        return nb::make_tuple(array_of(rows.t), array_of(rows.track_id), array_of(rows.mean, kMean),
+    static Table table(const Rows& rows) {
+        return std::make_tuple(array_of(rows.t), array_of(rows.track_id), array_of(rows.mean, kMean),
                               array_of(rows.variance, kMean), array_of(rows.real), array_of(rows.used));
     }
 
