@@ -40,6 +40,7 @@ PUBLIC = {
     "jeat_graph.data.progress",
     "jeat_graph.data.trajectories",
     "jeat_graph.detection.models.choosing",
+    "jeat_graph.detection.models.class_names",
     "jeat_graph.detection.models.event_places",
     "jeat_graph.detection.models.feeding",
     "jeat_graph.detection.models.layouts",

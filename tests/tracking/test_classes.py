@@ -10,7 +10,8 @@ import pytest
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.trajectories_io import CLASS_COLUMNS, read_trajectories, write_trajectories
+from jeat_graph.data.tables.trajectory_table import RUN_CLASSES
+from jeat_graph.io.trajectories_io import read_trajectories, write_trajectories
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.tracking.classes import MOST_CLASSES
 from jeat_graph.tracking.tracker import Tracker
@@ -104,8 +105,8 @@ def test_without_classes_every_byte_is_as_it_was_and_with_them_all_else_is(tmp_p
             texts.append(path.read_text().splitlines())
     for plain, named in zip(texts[:2], texts[2:], strict=True):
         rows = [line.split(",") for line in named]
-        place = rows[0].index(CLASS_COLUMNS[0])
-        assert rows[0][place : place + 2] == list(CLASS_COLUMNS)
+        place = rows[0].index(RUN_CLASSES[0])
+        assert rows[0][place : place + 2] == list(RUN_CLASSES)
         assert plain == [",".join(row[:place] + row[place + 2 :]) for row in rows]
 
 
