@@ -214,7 +214,9 @@ def _whole_unit(t: npt.NDArray[Any], hz_px: dict[str, float], likely: str | None
     Times that are all thousands come from a clock of µs, in ns, or from a simulator that steps by ms, in µs:
     the rate tells them apart, but for rates that either may have.
     """
-    thousands = bool((np.mod(t, _THOUSAND) == 0).all()) and len(np.unique(t)) >= _LEAST_TIMES
+    thousands = bool((np.mod(t, _THOUSAND) == 0).all())
+    if thousands and len(np.unique(t)) < _LEAST_TIMES:
+        return likely  # of a few ticks the rate is not known well enough
     if thousands and hz_px["us"] < _LOW_HZ_PX <= hz_px["ns"]:
         return "ns"
     if thousands and hz_px["ns"] <= _HIGH_HZ_PX:
@@ -230,6 +232,6 @@ def _divided_unit(t: npt.NDArray[Any], hz_px: dict[str, float]) -> str | None:
         return "s" if hz_px["s"] >= _LEAST_HZ_PX else None
     if hz_px["s"] < _LOW_HZ_PX <= hz_px["ms"]:
         return "ms"
-    # Of a few ticks of the clock the rate is not known well enough to tell.
+    # Of a few ticks of the clock the rate is not known well enough.
     told = hz_px["s"] <= _HIGH_HZ_PX < hz_px["ms"] and len(np.unique(t)) >= _LEAST_TIMES
     return "s" if told else None

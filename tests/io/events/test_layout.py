@@ -68,6 +68,7 @@ def test_the_unit_of_a_usual_recording_is_told(size, hz_px, unit, start_s, seed)
 
 
 @example(size=(1280, 720), hz_px=407.0, unit="ms", seed=0)
+@example(size=(1280, 720), hz_px=326.0, unit="ns", seed=0)
 @settings(max_examples=80, deadline=None)
 @given(
     size=cameras,
