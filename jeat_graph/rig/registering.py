@@ -29,9 +29,10 @@ LEAST_VEHICLES = 8
 _LEAST_SHARE, _MOST_SECOND = 0.5, 0.75
 # Offsets that differ by more are others (s).
 _OTHER_S = 0.35
-# How uncertain a result may be: boxes, as a share of their size; the clock (s).
-_MOST_SIZES, _MOST_CLOCK_S = 0.25, 0.02
-# Vehicles whose paths lie within so many widths of each other drive in one lane.
+# How uncertain a result may be: boxes, as a share of their size; the clock (s). Several lanes tell the map to
+# .02 to .06 sizes; one lane says that it tells it to .2 to .4, and is off by more.
+_MOST_SIZES, _MOST_CLOCK_S = 0.12, 0.02
+# Vehicles whose paths lie within so many sizes of each other drive in one lane (.2 to .5; 5 to 6 in several).
 _ONE_LANE, _LANE_QUANTILES = 1.5, (0.05, 0.95)
 
 
@@ -199,14 +200,14 @@ def _check_certainty(
     names: tuple[str, str],
     own: tuple[float, float],
 ) -> None:
+    if _in_one_lane(second, matched):
+        raise _untold(
+            names,
+            "all vehicles that both see drive in one lane, which tells nothing of what is beside it: "
+            "record where they drive in several, or give --points",
+        )
     std = refined.way.std_px(own)
     if std > _MOST_SIZES * refined.sizes_px:
-        if _in_one_lane(second, matched):
-            raise _untold(
-                names,
-                "all vehicles that both see drive in one lane, which tells nothing of what is beside it: "
-                "record where they drive in several, or give --points",
-            )
         raise _untold(
             names,
             f"it tells the map to ± {std:.0f} px only: record longer, or give corresponding points with "
