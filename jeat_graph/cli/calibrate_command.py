@@ -69,6 +69,11 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(f"--out {args.out}: the name of a configuration must end in .yaml")
     check_writable(args.out)
     given = base = load_config(args.config, rig=args.rig)
+    if base.tracker.engine != "compiled":
+        raise ConfigError(
+            f"tracker.engine={base.tracker.engine} learns what it needs while it tracks: there is nothing to "
+            "calibrate; take another --config"
+        )
     if args.image is not None:
         given = as_config(base, args.image)
     shown = None if args.frames is None else facts_of_frames(args.frames)

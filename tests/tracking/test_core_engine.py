@@ -229,3 +229,18 @@ def test_what_the_engine_lacks_is_one_line(tmp_path, capsys, asked):
     ]
     assert main([*command, *asked]) == 2
     assert "tracker.engine" in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_batch_tracks_with_it_and_calibrate_says_that_there_is_nothing_to_calibrate(tmp_path, capsys):
+    rows = [f"{t},{s},{x},{y},{w},{h},.9" for t, s, boxes, _ in moving(20) for x, y, w, h in boxes]
+    source = tmp_path / "detections.csv"
+    source.write_text("t,sensor,left,top,width,height,score\n" + "\n".join(rows) + "\n")
+    manifest = tmp_path / "manifest.csv"
+    manifest.write_text(f"name,detections\none,{source}\n")
+    how = ["--config", "core", "--image", "1280x720"]
+    assert main(["batch", str(manifest), *how, "--out", str(tmp_path / "runs")]) == 0
+    assert (tmp_path / "runs" / "runs" / "one" / "causal.csv").is_file()
+    capsys.readouterr()
+    assert main(["calibrate", str(source), *how, "--out", str(tmp_path / "found.yaml")]) == 2
+    assert "nothing to calibrate" in capsys.readouterr().err.splitlines()[-1]
+    assert not (tmp_path / "found.yaml").exists()
