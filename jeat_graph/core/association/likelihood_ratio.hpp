@@ -30,12 +30,9 @@ struct ScanTerms {
     }
 };
 
-// ln of the scores' likelihood ratio of a track to clutter; q is the box's probability by score.
-inline double score_log_ratio(double real, double q, const ModelConstants& c) {
-    const double r = std::max(real, kLeastPosterior), clutter = c.clutter_precision;
-    const double of_track = r * q + (1.0 - r) * (1.0 - q) + c.score_floor;
-    const double of_clutter = clutter * q + (1.0 - clutter) * (1.0 - q) + c.score_floor;
-    return log_of(of_track / of_clutter);
+// The likelihood of a score of what is real with r; q is the box's probability of being real by its score.
+inline double score_likelihood(double r, double q, const ModelConstants& c) {
+    return r * q + (1.0 - r) * (1.0 - q) + c.score_floor;
 }
 
 inline constexpr double kImpossible = -1e9;

@@ -33,15 +33,16 @@ struct SidesExpected {
     double log_det, log_det_wide;          // over both axes
 };
 
-inline double side_variance(double size, double both, double log_variance, const ModelConstants& c) {
-    return exp_of(log_variance) * square(0.5 * both + 0.5 * size) + square(c.pixel_std);
+// rho^2 of the sensor, its variance in sizes^2.
+inline double side_variance(double size, double both, double rho2, const ModelConstants& c) {
+    return rho2 * square(0.5 * both + 0.5 * size) + square(c.pixel_std);
 }
 
-inline SidesExpected expected_sides(const double* mean, const double* covariance, double log_variance,
+inline SidesExpected expected_sides(const double* mean, const double* covariance, double rho2,
                                     const ModelConstants& c) {
     SidesExpected out;
-    out.box = corners(mean);
     out.size = {exp_of(mean[kLogSize]), exp_of(mean[kStates + kLogSize])};
+    out.box = corners(mean, out.size[0], out.size[1]);
     const double area = out.size[0] * out.size[1], both = std::sqrt(area);
     const double extra = square(c.outlier_std) * area;
     out.log_det = out.log_det_wide = 0.0;
@@ -49,7 +50,7 @@ inline SidesExpected expected_sides(const double* mean, const double* covariance
         const double* const P = covariance + axis * kMatrix;
         const double w = out.size[axis], a = P[kPosition * kStates + kPosition];
         const double b = w * P[kPosition * kStates + kLogSize], d = w * w / 4.0 * P[kLogSize * kStates + kLogSize];
-        const double R = side_variance(w, both, log_variance, c);
+        const double R = side_variance(w, both, rho2, c);
         out.variance[axis] = R;
         out.S[axis] = {a - b + d + R, a - d, a + b + d + R};
         out.wide[axis] = out.S[axis].plus(extra, extra);
@@ -162,14 +163,14 @@ inline void update(double* mean, double* covariance, const std::array<double, 4>
 }
 
 // The state of a track that begins at a box.
-inline void initial_state(const Sides& box, double log_variance, const ModelConstants& c, double* mean,
+inline void initial_state(const Sides& box, double rho2, const ModelConstants& c, double* mean,
                           double* covariance) {
     std::fill(mean, mean + kMean, 0.0);
     std::fill(covariance, covariance + kCovariance, 0.0);
     const double size[] = {box.width(), box.height()}, both = std::sqrt(size[0] * size[1]);
     const double centre[] = {(box.left + box.right) / 2.0, (box.top + box.bottom) / 2.0};
     for (int axis = 0; axis < 2; ++axis) {
-        const double R = side_variance(size[axis], both, log_variance, c);
+        const double R = side_variance(size[axis], both, rho2, c);
         mean[axis * kStates + kPosition] = centre[axis];
         mean[axis * kStates + kLogSize] = log_of(size[axis]);
         const double variance[] = {R / 2.0, square(c.velocity_std * both), square(c.acceleration_std * both),

@@ -30,11 +30,13 @@ inline double intersection_over_union(const Sides& a, const Sides& b) {
     return common / std::max(a.area() + b.area() - common, kLeastArea);
 }
 
-// The box of a state.
-inline Sides corners(const double* mean) {
-    const double w = exp_of(mean[kLogSize]), h = exp_of(mean[kStates + kLogSize]);
+// The box of a state, whose width and height may be known already.
+inline Sides corners(const double* mean, double w, double h) {
     const double x = mean[kPosition], y = mean[kStates + kPosition];
     return {x - w / 2.0, y - h / 2.0, x + w / 2.0, y + h / 2.0};
+}
+inline Sides corners(const double* mean) {
+    return corners(mean, exp_of(mean[kLogSize]), exp_of(mean[kStates + kLogSize]));
 }
 
 // Boxes by their left sides: which of them may reach into an interval, without a look at the rest.

@@ -1,9 +1,9 @@
 // Tables of columns of one length, one row a track: what all of them can do.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <vector>
 
 namespace jeat::filters {

@@ -1,6 +1,7 @@
 // What is counted of a track by every sensor; the formulas are in filters/evidence.py.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -12,6 +13,11 @@ namespace jeat::filters {
 
 struct ScanClock {
     double t, period_s, weight;
+    double keep_recent, keep_total;  // share of the sums of logits that a scan keeps
+
+    ScanClock(double t, double period_s, const ModelConstants& c)
+        : t(t), period_s(period_s), weight(std::min(1.0, period_s / c.correlation_time_s)),
+          keep_recent(exp_of(-period_s / c.smoothing_s)), keep_total(exp_of(-period_s / c.mean_memory_s)) {}
 };
 
 struct Evidence {
@@ -68,12 +74,10 @@ struct Evidence {
         const bool first = hits[at] <= 0.0 && owner[row] != static_cast<std::int64_t>(sensor);
         hits[at] += clock.weight;
         found[at] = 1;
-        const double keep_recent = exp_of(-clock.period_s / c.smoothing_s);
-        const double keep_total = exp_of(-clock.period_s / c.mean_memory_s);
-        recent[at] = recent[at] * keep_recent + logit * clock.weight;
-        recent_weight[at] = recent_weight[at] * keep_recent + clock.weight;
-        total[at] = total[at] * keep_total + logit * clock.weight;
-        total_weight[at] = total_weight[at] * keep_total + clock.weight;
+        recent[at] = recent[at] * clock.keep_recent + logit * clock.weight;
+        recent_weight[at] = recent_weight[at] * clock.keep_recent + clock.weight;
+        total[at] = total[at] * clock.keep_total + logit * clock.weight;
+        total_weight[at] = total_weight[at] * clock.keep_total + clock.weight;
         const double now = recent_weight[at] > 0.0 ? recent[at] / recent_weight[at] : logit;
         const double fallen = peak[at] - clock.period_s / c.peak_decay_s * std::max(peak[at] - now, 0.0);
         peak[at] = first ? now : std::max(fallen, now);

@@ -49,15 +49,13 @@ public:
         log_no_chance_ = log1p_of(-c.chance_hit);
         log_shared_ = log_of(c.shared_false);
         log_not_shared_ = log1p_of(-c.shared_false);
-        log_gamma_strength_ = log_gamma(c.p_detect_strength);
         noise_odds_ = log_of(sensors.noise_share / (1.0 - sensors.noise_share));
         out_.unseen.resize(seen_.size());
     }
 
     const Posterior& operator()(const Evidence& e, std::size_t row) {
         const std::size_t S = e.sensors, first = row * S;
-        double real = 0.0, others = 0.0, priors = 0.0, best_score = -kMostLogOdds;
-        bool any = false;
+        double real = 0.0, others = 0.0, priors = 0.0, best_score = -std::numeric_limits<double>::infinity();
         for (std::size_t s = 0; s < S; ++s) {
             const double h = e.hits[first + s], m = e.misses[first + s];
             seen_[s] = log_beta(a_[s] + h, b_[s] + m) - log_beta_[s];
@@ -68,8 +66,7 @@ public:
             shared_[s] = log_add(log_not_shared_ + chance, log_shared_ + seen_[s]);
             const bool found = e.found[first + s];
             scores_[s] = found ? sensors_.indifference[s] + score(e, first + s) : 0.0;
-            best_score = any ? std::max(best_score, scores_[s]) : scores_[s];
-            any = true;
+            best_score = std::max(best_score, scores_[s]);
             real += object + scores_[s];
             if (found) shared_[s] += sensors_.prior_odds[s], priors += sensors_.prior_odds[s];
             others += shared_[s];
@@ -95,7 +92,7 @@ private:
     const SensorBelief& sensors_;
     const ModelConstants& c_;
     std::vector<double> a_, b_, log_beta_, log_unseen_, log_not_unseen_, seen_, shared_, scores_;
-    double log_chance_, log_no_chance_, log_shared_, log_not_shared_, log_gamma_strength_, noise_odds_;
+    double log_chance_, log_no_chance_, log_shared_, log_not_shared_, noise_odds_;
     Posterior out_;
 };
 

@@ -133,37 +133,43 @@ inline Matrix in_perspective(const Matrix& F, const double* mean, double dt, con
     return out;
 }
 
+// The densities themselves, but of the jerk the root.
+struct Densities {
+    double root_jerk, growth, position, size;
+
+    explicit Densities(const ProcessNoise& q)
+        : root_jerk(exp_of(q.jerk / 2.0)), growth(exp_of(q.growth)), position(exp_of(q.position)), size(exp_of(q.size)) {}
+};
+
 // m <- F m, P <- F P F' + Q.
-inline void predict(double* mean, double* covariance, const Discretised& general, double dt, const ProcessNoise& q,
+inline void predict(double* mean, double* covariance, const Discretised& step, double dt, const Densities& q,
                     const ModelConstants& c) {
-    Discretised step = general;
-    step.F = in_perspective(general.F, mean, dt, c);
+    const Matrix F = in_perspective(step.F, mean, dt, c);
     const double size = object_size(mean);
     std::array<double, kMean> predicted{};
     for (int axis = 0; axis < 2; ++axis)
         for (int i = 0; i < kStates; ++i)
             for (int j = i; j < kStates; ++j)
-                predicted[axis * kStates + i] += step.F[i * kStates + j] * mean[axis * kStates + j];
+                predicted[axis * kStates + i] += F[i * kStates + j] * mean[axis * kStates + j];
     const double growth = 0.5 * (std::abs(predicted[kGrowth]) + std::abs(predicted[kStates + kGrowth]));
     const double g = std::min(growth, c.fastest_growth);
-    const double jerk = exp_of(q.jerk / 2.0) + c.perspective_jerk * g * g * std::sqrt(g);
-    const double by_jerk = square(jerk * size), by_walk = exp_of(q.position) * square(size);
-    const double by_growth = exp_of(q.growth), by_size = exp_of(q.size);
+    const double jerk = q.root_jerk + c.perspective_jerk * g * g * std::sqrt(g);
+    const double by_jerk = square(jerk * size), by_walk = q.position * square(size);
     for (int axis = 0; axis < 2; ++axis) {
         double* const P = covariance + axis * kMatrix;
         Matrix FP{};
         for (int i = 0; i < kStates; ++i)
             for (int k = i; k < kStates; ++k) {
-                const double f = step.F[i * kStates + k];
+                const double f = F[i * kStates + k];
                 if (f == 0.0) continue;
                 for (int j = 0; j < kStates; ++j) FP[i * kStates + j] += f * P[k * kStates + j];
             }
         for (int i = 0; i < kStates; ++i)
             for (int j = i; j < kStates; ++j) {
                 double sum = 0.0;
-                for (int k = j; k < kStates; ++k) sum += FP[i * kStates + k] * step.F[j * kStates + k];
+                for (int k = j; k < kStates; ++k) sum += FP[i * kStates + k] * F[j * kStates + k];
                 const int at = i * kStates + j;
-                sum += by_jerk * step.jerk[at] + by_growth * step.growth[at] + by_size * step.size[at] +
+                sum += by_jerk * step.jerk[at] + q.growth * step.growth[at] + q.size * step.size[at] +
                        by_walk * step.position[at];
                 P[at] = P[j * kStates + i] = sum;
             }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <numeric>
 #include <vector>
@@ -44,9 +45,9 @@ public:
             follow_camera(scan);
             if (histories) write_predictions(*histories);
             associate(scan);
-            count_gaps(scan);
+            count_gaps();
             learn_noise(scan, clock);
-            update(scan);
+            update();
             count_hits_and_misses(scan, clock);
             count_clutter(scan);
             begin_tracks(scan, clock);
@@ -131,7 +132,7 @@ private:
         sensor.repetition.count(scan.boxes, scan.logits, c_);
         s_.belief.indifference[scan.sensor] = sensor.repetition.indifference(c_);
         const double period = std::isnan(sensor.period_s) ? c_.first_period_s : sensor.period_s;
-        return {t, period, std::min(1.0, period / c_.correlation_time_s)};
+        return {t, period, c_};
     }
 
     void predict(double t) {
@@ -145,9 +146,10 @@ private:
             presence_step_ = presence_transition(static_cast<double>(ticks) / 1e6, c_);
         }
         if (dt <= 0.0) return;
+        const Densities densities(s_.process_noise);
         Tracks& tracks = s_.tracks;
         for (std::size_t i = 0; i < tracks.size(); ++i) {
-            filters::predict(tracks.mean_of(i), tracks.covariance_of(i), step_, dt, s_.process_noise, c_);
+            filters::predict(tracks.mean_of(i), tracks.covariance_of(i), step_, dt, densities, c_);
             predict_presence(tracks.presence.data() + i * kPresences, presence_step_);
         }
     }
@@ -160,7 +162,7 @@ private:
 
     void follow_camera(const Scan& scan) {
         Tracks& tracks = s_.tracks;
-        const double noise = s_.log_side_variance[scan.sensor];
+        const double rho2 = exp_of(s_.log_side_variance[scan.sensor]);
         camera_tracks_.clear();
         for (std::size_t i = 0; i < tracks.size(); ++i) {
             if (!(tracks.real[i] > c_.report) || !(tracks.evidence.detections[i] > kCameraDetections) ||
@@ -168,7 +170,7 @@ private:
                 continue;
             const double *m = tracks.mean_of(i), *P = tracks.covariance_of(i);
             const double w = exp_of(m[kLogSize]), h = exp_of(m[kStates + kLogSize]), both = std::sqrt(w * h);
-            const double Rw = side_variance(w, both, noise, c_), Rh = side_variance(h, both, noise, c_);
+            const double Rw = side_variance(w, both, rho2, c_), Rh = side_variance(h, both, rho2, c_);
             const int l = kLogSize * kStates + kLogSize;
             camera_tracks_.push_back({m[kPosition], m[kStates + kPosition], w, h, both, P[0] + Rw / 2.0,
                                       P[kMatrix] + Rh / 2.0, P[l] + 2.0 * Rw / (w * w), P[kMatrix + l] + 2.0 * Rh / (h * h)});
@@ -182,11 +184,15 @@ private:
     void associate(const Scan& scan) {
         Tracks& tracks = s_.tracks;
         const std::size_t n = tracks.size(), S = s_.sensors.size(), k = scan.sensor;
-        const double noise = s_.log_side_variance[k];
+        const double rho2 = exp_of(s_.log_side_variance[k]);
         expected_.resize(n);
         p_detect_.resize(n);
         q_.resize(boxes_.size());
-        for (std::size_t j = 0; j < boxes_.size(); ++j) q_[j] = expit(s_.belief.indifference[k] + scan.logits[j]);
+        of_clutter_.resize(boxes_.size());
+        for (std::size_t j = 0; j < boxes_.size(); ++j) {
+            q_[j] = expit(s_.belief.indifference[k] + scan.logits[j]);
+            of_clutter_[j] = association::score_likelihood(c_.clutter_precision, q_[j], c_);
+        }
         const association::ScanTerms terms(s_.sensors[k].leftovers, s_.width * s_.height, c_);
         const ByLeft index(boxes_);
         pairs_.clear();
@@ -194,23 +200,25 @@ private:
             const double hits = tracks.recent_hits[i * S + k], misses = tracks.recent_misses[i * S + k];
             p_detect_[i] = clamp((s_.belief.p_detect[k] * c_.p_detect_strength + hits) / (c_.p_detect_strength + hits + misses),
                                  c_.track_p_detect_bounds.low, c_.track_p_detect_bounds.high);
-            expected_[i] = expected_sides(tracks.mean_of(i), tracks.covariance_of(i), noise, c_);
+            expected_[i] = expected_sides(tracks.mean_of(i), tracks.covariance_of(i), rho2, c_);
             const SidesExpected& expected = expected_[i];
             const double p = clamp(tracks.presence[i * kPresences + kVisible] * p_detect_[i],
                                    association::kLeastPDetect, association::kMostPDetect);
             const double clutter = terms.log_clutter - log_of(expected.size[0] * expected.size[1]);
+            const double real = std::max(tracks.real[i], association::kLeastPosterior);
             const double start = log_of(p / (1.0 - p)) - clutter, reach = association::reach(expected, c_);
             index.with_left_in(expected.box.left - reach, expected.box.left + reach, [&](std::size_t j) {
                 const double density = association::sides_log_density(boxes_[j], expected, terms, c_);
                 if (density <= association::kImpossible) return;
-                const double gain = start + density + association::score_log_ratio(tracks.real[i], q_[j], c_);
+                const double of_track = association::score_likelihood(real, q_[j], c_);
+                const double gain = start + density + log_of(of_track / of_clutter_[j]);
                 if (gain > 0.0) pairs_.push_back({i, j, gain});
             });
         }
         made_ = assignment_.solve(pairs_, n, boxes_.size());
     }
 
-    void count_gaps(const Scan&) {
+    void count_gaps() {
         Tracks& tracks = s_.tracks;
         double period = kLongestPeriodS;
         for (const Sensor& sensor : s_.sensors)
@@ -226,9 +234,10 @@ private:
     void learn_noise(const Scan& scan, const ScanClock& clock) {
         Tracks& tracks = s_.tracks;
         InnovationSums sums;
+        innovations_.clear();
         for (const std::size_t k : made_) {
             const std::size_t i = pairs_[k].row;
-            const auto y = side_innovations(boxes_[pairs_[k].column], expected_[i].box);
+            const auto& y = innovations_.emplace_back(side_innovations(boxes_[pairs_[k].column], expected_[i].box));
             const Innovation e = normalised_innovation(y, expected_[i], c_);
             double* const before = tracks.innovation.data() + i * 4;
             if (tracks.evidence.detections[i] > c_.noise_hits && tracks.real[i] > c_.report)
@@ -239,12 +248,11 @@ private:
         filters::learn_noise(sums, clock.period_s, s_.log_side_variance[scan.sensor], s_.process_noise, c_);
     }
 
-    void update(const Scan&) {
+    void update() {
         Tracks& tracks = s_.tracks;
-        for (const std::size_t k : made_) {
-            const std::size_t i = pairs_[k].row;
-            const auto y = side_innovations(boxes_[pairs_[k].column], expected_[i].box);
-            filters::update(tracks.mean_of(i), tracks.covariance_of(i), y, expected_[i], c_);
+        for (std::size_t m = 0; m < made_.size(); ++m) {
+            const std::size_t i = pairs_[made_[m]].row;
+            filters::update(tracks.mean_of(i), tracks.covariance_of(i), innovations_[m], expected_[i], c_);
         }
     }
 
@@ -297,6 +305,7 @@ private:
         for (const std::size_t j : free_) free_boxes_.push_back(boxes_[j]);
         const ByLeft among(free_boxes_);
         append_rows(tracks, n, free_.size());
+        const double rho2 = exp_of(s_.log_side_variance[k]);
         for (std::size_t f = 0; f < free_.size(); ++f) {
             const std::size_t row = n + f, j = free_[f];
             double overlap = 0.0;
@@ -307,7 +316,7 @@ private:
                 if (scan.logits[free_[g]] > scan.logits[j])
                     overlap = std::max(overlap, intersection_over_union(boxes_[j], free_boxes_[g]));
             });
-            initial_state(boxes_[j], s_.log_side_variance[k], c_, tracks.mean_of(row), tracks.covariance_of(row));
+            initial_state(boxes_[j], rho2, c_, tracks.mean_of(row), tracks.covariance_of(row));
             tracks.track_id[row] = s_.next_id++;
             tracks.used[row] = std::int64_t{1} << k;
             see_presence(tracks.presence.data() + row * kPresences);
@@ -431,7 +440,8 @@ private:
     std::vector<association::Pair> pairs_;
     std::vector<std::size_t> made_, free_, taken_by_, pair_of_;
     std::vector<SidesExpected> expected_;
-    std::vector<double> p_detect_, q_;
+    std::vector<double> p_detect_, q_, of_clutter_;
+    std::vector<std::array<double, 4>> innovations_;  // of the pairs that are made
     std::vector<Sides> boxes_, rivals_, free_boxes_, tracks_boxes_;
     std::vector<CameraTrack> camera_tracks_;
 };
