@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jeat_graph.association.overlap import pairwise_iou
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.detections import Detections
 
@@ -128,7 +129,7 @@ def _measurements(t: FloatArray, boxes: FloatArray, detections: Detections) -> T
         found = detections.boxes[detections.scan_start[scan] : detections.scan_start[scan + 1]]
         if not len(found):
             continue
-        overlap = _iou(found, boxes[k])
+        overlap = pairwise_iou(found, boxes[k : k + 1])[:, 0]
         best = int(overlap.argmax())
         if overlap[best] >= _SAME_IOU:
             times.append(t[k])
@@ -150,13 +151,6 @@ def _measurements(t: FloatArray, boxes: FloatArray, detections: Detections) -> T
     at = np.column_stack([np.interp(middle, t, axis) for axis in smooth.T])
     left = np.column_stack([mean(axis) for axis in (centre - path).T])
     return TrackMeasurements(middle, at + left, np.column_stack([mean(axis) for axis in size.T]))
-
-
-def _iou(boxes: FloatArray, one: FloatArray) -> FloatArray:
-    low = np.maximum(boxes[:, :2], one[:2])
-    high = np.minimum(boxes[:, :2] + boxes[:, 2:], one[:2] + one[2:])
-    both = np.clip(high - low, 0.0, None).prod(axis=1)
-    return np.asarray(both / (boxes[:, 2:].prod(axis=1) + one[2:].prod() - both))
 
 
 def joined(tracks: Sequence[TrackMeasurements]) -> FloatArray:
