@@ -75,19 +75,6 @@ def as_names(classes: Sequence[str] | str) -> list[str]:
     return [classes] if isinstance(classes, str) else list(classes)
 
 
-def _recording_of(detections: Any, options: ReadingOptions) -> Detections:
-    if isinstance(detections, (str, Path)):
-        return read_detections(detections, **options)
-    if isinstance(detections, Detections):
-        return detections
-    if hasattr(detections, "columns"):
-        return Detections.from_pandas(detections, **for_frames(options))
-    raise DataError(
-        "detections are Detections, a data frame, or the path of a file (make one of arrays with "
-        f"Detections.from_rows, of several with Detections.concatenate), not {type(detections).__name__}"
-    )
-
-
 def truth_of(truth: GroundTruth | pd.DataFrame | PathLike, options: ReadingOptions) -> GroundTruth:
     """Return truth that is given as such, as a data frame, or as a file.
 

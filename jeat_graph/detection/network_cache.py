@@ -2,7 +2,7 @@
 
 They lie in `jeat-graph/networks` of the user's cache (`XDG_CACHE_HOME`, else `~/.cache`), or where
 `JEAT_GRAPH_NETWORKS` says. `JEAT_GRAPH_MIRROR` is the address of a folder that has the same files.
-A file whose SHA-256 nobody has pinned is taken once; what it was then is kept beside it (`FILE.sha256`).
+A file without a pinned SHA-256 is trusted at its first use; its hash is kept beside it (`FILE.sha256`).
 """
 
 from __future__ import annotations

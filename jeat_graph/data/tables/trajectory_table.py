@@ -98,7 +98,7 @@ def rows_of_result(table: FileTable, how: Reading, names: Mapping[int, str] | No
 def bare_fields(
     t: FloatArray, ids: IntArray, boxes: FloatArray, scores: FloatArray, classes: TextArray | None
 ) -> dict[str, Any]:
-    """Return the fields of `Trajectories` of which nothing is known but boxes.
+    """Return the fields of `Trajectories` for tracks that come as boxes alone, without motion or variances.
 
     The mean is the box's centre at rest, the variances are NaN. A score in [0, 1] is the existence, any other
     counts as 1.
