@@ -226,7 +226,7 @@ def describe(args: argparse.Namespace, picture: str, found: Calibration) -> str:
     if args.gt:
         lines.append("rates, clocks and what scores mean (even_score): from detections matched with the truth.")
     else:
-        lines.append("which sensors there are, their rates and their clocks: from the recordings.")
+        lines.append("which sensors there are, their rates and their clocks: from the recordings, without truth.")
     lines += [f"image: from {picture}; all else from the base configuration {Path(args.config).name}."]
     return "\n".join(lines)
 

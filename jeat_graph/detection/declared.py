@@ -1,31 +1,23 @@
 """What the tracker is told of a network: a file beside it, which holds what was measured of its boxes.
 
 Beside `NAME.onnx` it is `NAME.tracking.yaml`, with the section `sensor` (keys as of `sensors.NAME` in a
-configuration: `kind`, `even_score`). A network without such a file has that of its layout,
-`layouts/LAYOUT.tracking.yaml`, if any.
+configuration: `kind`, `even_score`).
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from jeat_graph.config.section_tree import build, read_tree
 from jeat_graph.config.sensors import SensorConfig
-from jeat_graph.data.errors import ConfigError, DataError
+from jeat_graph.data.errors import ConfigError
 from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR, FUSED_SENSOR
-from jeat_graph.detection.models.layouts import recognise
-from jeat_graph.detection.models.model_settings import OPEN_SIDE
-from jeat_graph.detection.models.onnx_head import CARD, read_onnx_head
 from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION, network_file
 from jeat_graph.detection.request import DetectRequest
 
 _SUFFIX = ".tracking.yaml"
-_LAYOUTS = Path(__file__).parent / "layouts"
-_RAW = "-raw"
 _KINDS = {FRAMES_SENSOR: FRAMES, EVENTS_SENSOR: EVENTS, FUSED_SENSOR: FUSED}
 
 
@@ -55,21 +47,6 @@ def declared_settings(request: DetectRequest, say: Callable[[str], object] = lam
     return declared_of({sensor: by for sensor, by in looking.items() if by is not None}, say)
 
 
-def _of_layout(network: Path, sensor: str) -> Path | None:
-    """Return the file of what networks of pictures with outputs of a layout are like, if there is one."""
-    if sensor != FRAMES_SENSOR or not network.is_file():
-        return None
-    with suppress(DataError):  # said where the network is opened
-        head = read_onnx_head(network)
-        shape = head.inputs[0].shape
-        if CARD in head.notes or len(shape) != len("NCHW"):
-            return None
-        layout = recognise(head.outputs, (shape[3] or OPEN_SIDE, shape[2] or OPEN_SIDE), head.notes) or ""
-        path = _LAYOUTS / f"{layout.removesuffix(_RAW)}{_SUFFIX}"
-        return path if path.is_file() else None
-    return None
-
-
 def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lambda _: None) -> list[str]:
     """Return the same of detectors whose boxes come from elsewhere, from a file or a pipe.
 
@@ -86,14 +63,13 @@ def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lam
             continue
         network = network_file(detector, _KINDS[sensor])
         beside = network.with_name(network.name.removesuffix(network.suffix) + _SUFFIX)
-        path = beside if beside.is_file() else _of_layout(network, sensor)
-        if path is None:
+        if not beside.is_file():
             continue
-        tree = read_tree(str(path), (), str, "file of what a network's boxes are like")
+        tree = read_tree(str(beside), (), str, "file of what a network's boxes are like")
         try:
             build(_Declared, tree, "")
         except ConfigError as error:
-            raise ConfigError(f"{path}: {error}") from None
+            raise ConfigError(f"{beside}: {error}") from None
         found.append(f"sensors.{sensor}={json.dumps(tree.get('sensor', {}))}")
-        say(f"sensor {sensor!r}: its boxes are taken for what {path.name} says (any other --config: not)")
+        say(f"sensor {sensor!r}: its boxes are taken for what {beside.name} says (any other --config: not)")
     return found
