@@ -36,6 +36,7 @@ COMMANDS = (
     "eval",
     "compare",
     "count",
+    "explain",
     "draw",
     "frame",
     "export",

@@ -56,7 +56,7 @@ def measured_run(folder: Path, moved: list[str] | None = None, *, progress: bool
     Raises:
         DataError: there is no run, or a file of it, or an input, is missing or has changed since.
     """
-    record = _complete_record(folder)
+    record = complete_record(folder)
     if moved is None and MEASUREMENTS in record["files"]:
         return _kept(folder, record)
     config, detections = recorded_inputs(folder, record, moved)
@@ -114,7 +114,7 @@ def measurement_rows(folder: Path, *, progress: bool = False) -> tuple[RecordArr
     from jeat_graph.io.measurements_io import read_measurements
     from jeat_graph.tracking.records import record_measurements
 
-    record = _complete_record(folder)
+    record = complete_record(folder)
     if MEASUREMENTS in record["files"]:
         config = _config_of(folder, record)
         _unchanged(folder / MEASUREMENTS, record)
@@ -150,7 +150,7 @@ def _image(config: Config) -> tuple[float, float]:
     return config.image.width, config.image.height
 
 
-def _complete_record(folder: Path) -> dict[str, Any]:
+def complete_record(folder: Path) -> dict[str, Any]:
     """Return `run.json`, with all that is needed of it."""
     path = folder / RUN_JSON
     record = read_record(folder)

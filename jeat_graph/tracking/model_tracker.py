@@ -25,6 +25,7 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.filters import box_sides, singer
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.filters.score_calibration import logit
+from jeat_graph.tracking.hypotheses import Hypotheses, hypotheses_of
 from jeat_graph.tracking.classes import ClassTally, Votes, check_names
 from jeat_graph.tracking.reference_model import ModelRows, ReferenceModel
 from jeat_graph.tracking.scans import ScanLike, as_scans
@@ -190,6 +191,12 @@ class ModelTracker:
             rows = self._in_order(self._model.finish())
         self._finished = True
         return rows
+
+    def hypotheses(self) -> Hypotheses:
+        """Return what the living tracks are taken for, and why (`jeat-graph explain`)."""
+        learnt, columns = self._model.learnt(), self._model.tracks()
+        t = 0.0 if self._t is None else self._t
+        return hypotheses_of(columns, learnt, self.constants, t, self._causal.track_id)
 
     def sensor_states(self) -> dict[str, SensorState]:
         """Return what has been learnt of each sensor, by name; offsets and lags are not told."""

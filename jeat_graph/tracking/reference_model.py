@@ -157,6 +157,11 @@ class ReferenceModel:
         """Return the smoothed rows of all tracks."""
         return self.smoothed()
 
+    def tracks(self) -> Mapping[str, Any]:
+        """Return the columns of the living tracks by name, as the core does."""
+        own = self._state.tracks.columns()
+        return {**own, **own.pop("evidence").columns()}
+
     def learnt(self) -> Mapping[str, Any]:
         """Return what is believed of the sensors and the scene, by name."""
         state = self._state
