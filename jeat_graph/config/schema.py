@@ -26,6 +26,7 @@ from jeat_graph.config.lifecycle import (
 )
 from jeat_graph.config.live import LiveConfig
 from jeat_graph.config.output import OutputConfig
+from jeat_graph.config.paper import PaperConfig
 from jeat_graph.config.sensors import InputConfig, SensorConfig
 from jeat_graph.config.smoothing import SmootherConfig
 from jeat_graph.config.tracker import TrackerConfig
@@ -44,6 +45,7 @@ __all__ = [
     "MotionConfig",
     "NoiseConfig",
     "OutputConfig",
+    "PaperConfig",
     "SensorConfig",
     "SizeConfig",
     "SmootherConfig",
@@ -69,6 +71,7 @@ class Config:
     merge: MergeConfig = field(default_factory=MergeConfig)
     output: OutputConfig = field(default_factory=OutputConfig)
     tracker: TrackerConfig = field(default_factory=TrackerConfig, metadata={"kernels": False})
+    paper: PaperConfig = field(default_factory=PaperConfig, metadata={"kernels": False})
     smoother: SmootherConfig = field(default_factory=SmootherConfig, metadata={"kernels": False})
     live: LiveConfig = field(default_factory=LiveConfig, metadata={"kernels": False})
 

@@ -45,6 +45,9 @@ class SensorConfig(Section):
     memory_s: float = number(0.2, "s", "correlation time of that share", 1e-3, 1e4)
     sigma_log_width: float = number(0.08, "ln px", "noise of the logarithm of the width", open_low=True)
     sigma_log_height: float = number(0.08, "ln px", "noise of the logarithm of the height", open_low=True)
+    sigma_log_size: float = number(
+        0.1, "ln px", "noise of the logarithms of width and height; of the engine `paper` alone", open_low=True
+    )
     bias: tuple[float, float, float, float] = number(
         (0.0, 0.0, 0.0, 0.0),
         "1",

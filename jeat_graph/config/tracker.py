@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from jeat_graph.config.fields import Section, choice
 
-ENGINES = ("compiled", "core", "reference")
+ENGINES = ("compiled", "core", "reference", "paper")
 
 
 @dataclass(frozen=True)
@@ -18,5 +18,5 @@ class TrackerConfig(Section):
         ENGINES,
         "core: one model of what a sensor says, in C++, to replace `compiled`; of the other settings "
         "it takes the picture's size and the smoother's engine and lag alone; reference: the same in NumPy, "
-        "to be read",
+        "to be read; paper: the paper's method to the letter, with the settings of `paper`",
     )
