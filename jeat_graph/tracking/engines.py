@@ -30,6 +30,10 @@ class ChosenEngine:
         engine = config.tracker.engine if engine is None else engine
         if engine not in ENGINES:
             raise ConfigError(f"engine is one of {', '.join(ENGINES)}, not {engine!r}")
+        if engine == "paper":
+            from jeat_graph.tracking.paper.tracker import PaperTracker
+
+            return cast(Self, PaperTracker(config, **settings))
         if engine != "compiled":
             from jeat_graph.tracking.model_tracker import ModelTracker
 

@@ -1,54 +1,42 @@
-"""Whole-track smoothing with GTSAM: one linear factor graph, eliminated by QR in order of time.
-
-The elimination leaves a chain of conditionals p(x_k | x_{k+1}). Back-substitution over it gives the
-means, and the same recursion the covariances and the covariances between neighbours, exactly and in
-linear time, where `gtsam.Marginals` would ask for each one anew.
-"""
+"""GTSAM over a whole track: one linear factor graph of its segments, solved once."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
-from numba import njit
 
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.smoothers.gtsam.elimination import SegmentRows, prior_rows
 from jeat_graph.smoothers.gtsam.linear_graph import LinearGraph
-from jeat_graph.smoothers.gtsam.scaling import unscale_cov, unscale_gain, unscale_mean
-from jeat_graph.smoothers.gtsam.whitened import prior_rows, segment_rows
-from jeat_graph.smoothers.rts import filter_track, observations, steps
-from jeat_graph.smoothers.small_matrices import product
-from jeat_graph.smoothers.track_data import SmoothedTrack, TrackData
+from jeat_graph.smoothers.gtsam.scaling import unscale_mean
+from jeat_graph.smoothers.gtsam.window import GtsamError
 
 
-@njit(cache=True)
-def _marginals(cov: FloatArray, gain: FloatArray) -> None:
-    """Turn conditional covariances (K, 2, n, n) into marginal ones, in place, from the last key back."""
-    for k in range(len(gain) - 2, -1, -1):
-        for a in range(2):
-            cov[k, a] += product(product(gain[k, a], cov[k + 1, a]), gain[k, a].T)
-
-
-def smooth_full(track: TrackData, weights: FloatArray | None = None) -> SmoothedTrack:
-    """Smooth one whole track with GTSAM.
+def solve_track(
+    prior_cov: FloatArray, segments: Sequence[SegmentRows], reference: FloatArray
+) -> FloatArray:
+    """Return the means of the states at the ends of a track's segments, given all its measurements.
 
     Args:
-        track: the data.
-        weights: (M,) factor on the information of each measurement's white part (`robust.py`), 1 where None.
+        prior_cov: (3, 3) covariance of the first state, along either axis; its mean is its reference.
+        segments: the rows of each segment.
+        reference: (B + 1, 2, 3) what the states between B segments are counted from.
 
     Returns:
-        The smoothed states at all keys, with covariances and gains.
+        (B + 1, 2, 3).
 
     Raises:
-        RuntimeError: GTSAM's, if the system is indeterminate; `engine.py` meets it.
+        GtsamError: GTSAM could not solve for them.
     """
-    measured, size = observations(track, weights), track.size
-    reference, _ = filter_track(track, weights)
-    graph = LinearGraph(size)
-    of_prior = measured.select(slice(int(np.searchsorted(track.key, 0, side="right"))))
-    prior = prior_rows(track.prior_mean, track.prior_cov, reference[0], of_prior)
-    segments = segment_rows((0,) * size, np.arange(len(track)), steps(track), measured, reference)
-    graph.add_segments(0, *segments)
-    graph.add_prior(0, *prior)
-    vectors, conditional, gain = graph.solve(len(track))
-    cov, gain = unscale_cov(conditional), unscale_gain(gain)
-    _marginals(cov, gain)
-    return SmoothedTrack(track.t, track.jerk, unscale_mean(vectors, reference), cov, gain)
+    graph = LinearGraph(reference.shape[-1])
+    graph.add_prior(0, *prior_rows(prior_cov))
+    for key, rows in enumerate(segments):
+        graph.add_segment(key, rows)
+    try:
+        means = unscale_mean(graph.solve(len(reference)), reference)
+    except RuntimeError as error:
+        raise GtsamError(str(error)) from error
+    if not np.isfinite(means).all():
+        raise GtsamError("GTSAM gave a mean that is not finite")
+    return means

@@ -1,4 +1,4 @@
-"""GTSAM's linear factor graphs, filled from arrays of whitened rows (`whitened.py`)."""
+"""GTSAM's linear factor graphs, filled from whitened rows (`elimination.py`)."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.smoothers.gtsam.scaling import axis_blocks
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.smoothers.gtsam.elimination import SegmentRows
 
 
 def load_gtsam() -> None:
@@ -16,7 +16,7 @@ def load_gtsam() -> None:
 
 
 class LinearGraph:
-    """A GTSAM linear factor graph on numbered states, filled from arrays of rows.
+    """A GTSAM linear factor graph on numbered states.
 
     Args:
         size: components of a state per axis, n.
@@ -37,16 +37,12 @@ class LinearGraph:
         return self._unit[rows]
 
     def add_prior(self, key: int, A: FloatArray, b: FloatArray) -> None:
-        """Add the rows of `prior_rows` on state `key`, after all segments: its rows are light."""
+        """Add the rows of `prior_rows` on state `key`."""
         self.graph.add(key, A, b, self._noise(len(b)))
 
-    def add_segments(
-        self, first: int, A0: FloatArray, A1: FloatArray, b: FloatArray, counts: IntArray
-    ) -> None:
-        """Add the rows of `segment_rows` on the states `first`, `first` + 1 and so on."""
-        add = self.graph.add
-        for i, count in enumerate(counts.tolist()):
-            add(first + i, A0[i, :count], first + i + 1, A1[i, :count], b[i, :count], self._noise(count))
+    def add_segment(self, key: int, rows: SegmentRows) -> None:
+        """Add the rows of a segment from the state `key` to the one after it."""
+        self.graph.add(key, rows.A0, key + 1, rows.A1, rows.b, self._noise(len(rows.b)))
 
     def as_nonlinear(self) -> Any:
         """Convert for GTSAM's smoothers, which take nonlinear factors only.
@@ -57,12 +53,11 @@ class LinearGraph:
             self.graph, zero_values(self.graph.keyVector(), self._size)
         )
 
-    def solve(self, keys: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def solve(self, keys: int) -> FloatArray:
         """Solve for the states 0 to `keys` - 1 by QR elimination in order of time.
 
         Returns:
-            vectors (K, 2 n), conditional covariances (K, 2, n, n) of each state given its successor, and
-            gains (K, 2, n, n), the last zero, all scaled: y_k = G_k y_{k+1} + constant + noise.
+            (K, 2 n) the scaled states.
 
         Raises:
             RuntimeError: GTSAM's, if the system is indeterminate.
@@ -71,18 +66,7 @@ class LinearGraph:
         for k in range(keys):
             ordering.push_back(k)
         net = self.graph.eliminateSequential(ordering, self._gtsam.EliminateQR)
-        width = 2 * self._size
-        vectors = net.optimize().vector().reshape(keys, width)
-        R, S = np.empty((keys, width, width)), np.zeros((keys, width, width))
-        for k in range(keys):
-            conditional = net.at(k)
-            R[k] = conditional.R()
-            if k < keys - 1:
-                S[k] = conditional.S()
-        root = np.linalg.inv(R)
-        gain = -(root @ S)
-        cov = root @ root.transpose(0, 2, 1)
-        return vectors, axis_blocks(cov), axis_blocks(gain)
+        return np.asarray(net.optimize().vector().reshape(keys, 2 * self._size))
 
 
 def zero_values(keys: Any, size: int) -> Any:

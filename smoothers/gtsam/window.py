@@ -50,12 +50,18 @@ class GtsamWindow:
         params.findUnusedFactorSlots = True
         params.relinearizeSkip = 2**30  # the problem is linear
         params.enableRelinearization = False
+        self._leaving: list[int] = []
         self._smoother: Any = gtsam.IncrementalFixedLagSmoother(_LAG, params)
 
-    def update(self, graph: LinearGraph, first: int, count: int, leaving: Iterable[int]) -> None:
+    def leaving(self, states: Iterable[int]) -> None:
+        """Have states marginalised with the next update."""
+        self._leaving.extend(states)
+
+    def update(self, graph: LinearGraph, first: int, count: int) -> None:
         """Add factors and the states `first`, …, `first` + `count` - 1, and marginalise those leaving."""
         stamps = dict.fromkeys(range(first, first + count), _STAYS)
-        stamps.update(dict.fromkeys(leaving, _LEAVES))
+        stamps.update(dict.fromkeys(self._leaving, _LEAVES))
+        self._leaving = []
         values = zero_values(range(first, first + count), self._size)
         factors = graph.as_nonlinear()
         try:
