@@ -57,8 +57,6 @@ class RunSteps:
         record: RunRecord,
         options: RunOptions,
     ) -> None:
-        if options.resume and config.smoother.worker:
-            raise ConfigError("--resume does not go with smoother.worker: its state is in another process")
         self._detections, self._config, self._run = detections, config, run
         self._record, self._options = record, options
         self._instants = np.unique(detections.scan_t)
@@ -74,7 +72,7 @@ class RunSteps:
             raise ConfigError(
                 f"--resume does not go with tracker.engine={config.tracker.engine}: it is not saved"
             )
-        if len(self._instants) > STEPS_PER_SAVE and not config.smoother.worker and self._tracker.can_save:
+        if len(self._instants) > STEPS_PER_SAVE and self._tracker.can_save:
             self._unfinished = UnfinishedRun(run.folder / RESUME, self._identity())
             saved = self._unfinished.load() if options.resume else None
         self._kept: ConfirmedMeasurements | None = None
