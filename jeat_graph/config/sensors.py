@@ -33,6 +33,21 @@ class SensorConfig(Section):
     """What is known of one sensor and its detector. `calibrate` estimates all of it from data."""
 
     rate_hz: float = number(20.0, "Hz", "nominal rate of its scans", open_low=True)
+    kind: str = choice(
+        "any",
+        ("any", "event"),
+        "any: it may see whatever is in the picture; event: it sees changes alone, so that what stands still is "
+        "not missed where it finds nothing (engines core and reference)",
+    )
+    even_score: float | None = number(
+        None,
+        "1",
+        "score at which its box is as likely of an object as not; none: it is learnt from which boxes come "
+        "again (engines core and reference)",
+        0.0,
+        1.0,
+        open_low=True,
+    )
     sigma_px: float = number(2.0, "px", "noise of the box centre that does not depend on size", open_low=True)
     rho_x: float = number(0.03, "1", "noise of the box centre in x as a fraction of the width (method: rho)")
     rho_y: float = number(0.03, "1", "noise of the box centre in y as a fraction of the height (method: rho)")

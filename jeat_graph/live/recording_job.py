@@ -96,7 +96,8 @@ def _track(job: Job) -> None:
     request = job.request
     # Where smoothing has a process of its own, a recording begins anew.
     config = load_config(request.config, request.overrides)
-    resumes = config.tracker.engine == "compiled" and not config.smoother.worker
+    engine = config.tracker.engine
+    resumes = engine == "core" or (engine == "compiled" and not config.smoother.worker)
     options = replace(request.options, progress=False, resume=resumes)
     if job.camera is not None:
         options = replace(options, diagnostics=True, after=run_tables(job.camera))

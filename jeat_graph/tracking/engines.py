@@ -16,6 +16,8 @@ class ChosenEngine:
 
     #: Whether a run that was broken off can go on.
     can_save = True
+    #: Whether a sensor that is met late changes nothing of what was before.
+    meets_as_it_goes = False
     _chosen: Config  # loaded once
 
     def __new__(

@@ -10,7 +10,6 @@ import numpy as np
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.data.errors import DataError
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.smoothing.access import SmoothedTracks
 from jeat_graph.tracking.snapshot import Snapshot
@@ -64,15 +63,10 @@ class SavedTracks(SmoothedTracks):
             DataError: no such file, or one that holds no tracker, or one that takes late scans.
             JeatGraphError: it was saved by another version, or with other settings.
         """
-        from jeat_graph.tracking.checkpoint import load_state
-        from jeat_graph.tracking.state_check import refusing_damage
+        from jeat_graph.tracking.checkpoint import load_tracker
 
-        kept, state = load_state(path, config)
-        if "policy" in state:
-            # Scans that may be taken again are apart there, and identities are not those that were given out.
-            raise DataError("holds a tracker that takes late scans; LiveTracker.load goes on from it", path)
-        with refusing_damage(path):
-            return cls.from_state(kept, state)
+        made: Self = load_tracker(path, config)
+        return made
 
     def begin_anew(self, t: float) -> None:
         """End all tracks and let time go on from another moment, an earlier one too (s).

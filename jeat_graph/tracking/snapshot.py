@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from jeat_graph.data.arrays import IntArray
 from jeat_graph.tracking.appearance import Looks
 from jeat_graph.tracking.classes import ClassTally
 from jeat_graph.tracking.state import SceneState, TrackArrays
@@ -44,6 +45,10 @@ class Snapshot(NamedTuple):
     def num_tracks(self) -> int:
         """Number of living tracks N."""
         return len(self.tracks.track_id)
+
+    def living(self) -> tuple[IntArray, int]:
+        """Return the identities (N,) of the living tracks, and that of the next one to be born."""
+        return self.tracks.track_id, self.next_id
 
     def copy_to(self, tracks: TrackArrays, scene: SceneState) -> None:
         """Write the copy into arrays of at least N rows, and into a scene."""

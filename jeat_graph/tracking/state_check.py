@@ -7,9 +7,6 @@ number or an identity given out twice would go into every answer from there on.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +14,7 @@ import numpy.typing as npt
 
 from jeat_graph.config.kernel_form import kernel_model
 from jeat_graph.config.schema import Config
-from jeat_graph.data.errors import DataError, JeatGraphError
+from jeat_graph.data.errors import DataError
 from jeat_graph.tracking.compaction import allocate
 from jeat_graph.tracking.snapshot import Snapshot
 from jeat_graph.tracking.state import start_scene
@@ -32,23 +29,6 @@ _PROBABILITIES = frozenset(
 ) | {"blind", "unproven", "vain", "gap_share"}
 _POSITIVE = ("scale",)
 _ROUNDING = 1e-6  # by how much a probability may be off, and a variance relative to the largest
-
-
-@contextmanager
-def refusing_damage(path: str | Path) -> Iterator[None]:
-    """Turn what goes wrong while a tracker is made of a file's content into an error that names the file.
-
-    Raises:
-        DataError: names the file.
-    """
-    try:
-        yield
-    except DataError as error:
-        raise DataError(error.message, path) if error.path is None else error from None
-    except JeatGraphError as error:
-        raise DataError(f"is damaged: {error}", path) from None
-    except Exception as error:  # what is missing or of another kind shows wherever it is used first
-        raise DataError(f"is damaged: {type(error).__name__}: {error}", path) from None
 
 
 def checked_snapshot(snapshot: Snapshot, config: Config) -> Snapshot:

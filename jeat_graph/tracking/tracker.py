@@ -23,13 +23,14 @@ from jeat_graph.rig.common_picture import CommonPicture, with_map_noise
 from jeat_graph.tracking.appearance import Compared, Looks, compare, embeddings_of, remember
 from jeat_graph.tracking.classes import ClassTally, check_names, count_votes, number_classes
 from jeat_graph.tracking.compaction import allocate, grow
+from jeat_graph.tracking.compiled_prediction import predict_reported
 from jeat_graph.tracking.detector_results import DetectorResults
 from jeat_graph.tracking.direct_call import DirectCall
 from jeat_graph.tracking.engines import ChosenEngine
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.learnt import begin_with, learnt_of
 from jeat_graph.tracking.notice import notice_if_cold
-from jeat_graph.tracking.prediction import Prediction, predict_reported
+from jeat_graph.tracking.prediction import Prediction
 from jeat_graph.tracking.reporting import as_table, longest_gaps_s, report
 from jeat_graph.tracking.scans import ScanLike, arrivals_of, as_scans
 from jeat_graph.tracking.sensor_state import SensorState, sensor_states
@@ -187,7 +188,9 @@ class Tracker(ChosenEngine, DetectorResults):
         self._classes, votes = count_votes(self._classes, batch, self._log, living)
         self._class_ids = number_classes(self._class_ids, batch)
         if compared is not None:
-            self._looks = remember(compared, self._log, living)
+            taken = int(self._log.count[0])
+            takers, detection = self._log.rows["track_id"][:taken], self._log.detection[:taken]
+            self._looks = remember(compared, takers, detection, living)
         if self._smoothers is None:
             return None
         n, births = self._num_tracks, self._next_id - first_id
@@ -219,6 +222,14 @@ class Tracker(ChosenEngine, DetectorResults):
         self._classes, self._looks = snapshot.classes, snapshot.looks
         self._tracks = grow(self._tracks, 0, self._num_tracks)
         snapshot.copy_to(self._tracks, self._scene)
+
+    def living(self) -> tuple[IntArray, int]:
+        """Return the identities (N,) of the living tracks, and that of the next one to be born."""
+        return self._tracks.track_id[: self._num_tracks].copy(), self._next_id
+
+    def last_looks(self) -> dict[str, float]:
+        """Return when each sensor looked last (s), minus infinity for never."""
+        return dict(zip(self.sensor_names, self._scene.last_look.tolist(), strict=True))
 
     def sensor_states(self) -> dict[str, SensorState]:
         """Return what has been learnt of each sensor: clutter, detection probability, noise."""
