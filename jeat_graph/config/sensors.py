@@ -42,6 +42,7 @@ class SensorConfig(Section):
         "score at which a box is as likely real as not; without it that is learnt while tracking",
         0.0,
         1.0,
+        open_low=True,
     )
     sigma_px: float = number(
         3.0, "px", "engine `paper`: standard deviation of a box's centre", open_low=True

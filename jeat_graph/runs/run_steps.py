@@ -24,7 +24,8 @@ from jeat_graph.runs.latency import late_clocks
 from jeat_graph.runs.run_options import RunOptions, RunRecord
 from jeat_graph.runs.unfinished import UnfinishedRun
 from jeat_graph.tracking.measured import ConfirmedMeasurements
-from jeat_graph.tracking.state_check import refusing_damage
+from jeat_graph.tracking.checkpoint import tracker_of
+from jeat_graph.tracking.damage import refusing_damage
 from jeat_graph.tracking.tracker import Tracker
 
 #: So many steps go by before smoothed rows that have become final are written.
@@ -78,7 +79,7 @@ class RunSteps:
         self._kept: ConfirmedMeasurements | None = None
         with refusing_damage(run.folder / RESUME):
             if saved is not None:
-                self._tracker = Tracker.from_state(config, saved["tracker"])
+                self._tracker = tracker_of(config, saved["tracker"])
                 self._done, self._rows = saved["done"], saved["counts"]
                 self._reported = set(saved["reported"].tolist())
             if options.diagnostics:

@@ -1,3 +1,67 @@
-"""Temporary."""
-from jeat_graph.tracking.model_tracker import ModelTracker as Tracker
-__all__ = ["Tracker"]
+"""The online tracker: scans in, the tracks of the moment out, nothing kept that grows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Self, cast
+
+from jeat_graph.config.reading import as_config
+from jeat_graph.config.schema import Config
+from jeat_graph.config.tracker import ENGINES
+from jeat_graph.data.errors import ConfigError
+from jeat_graph.filters.model_constants import ModelConstants
+from jeat_graph.tracking.model_tracker import ModelTracker
+
+
+class Tracker(ModelTracker):
+    """Joint tracker of all objects over any number of asynchronous sensors.
+
+    Feed it scans in time order. Each step sees only what has arrived: the table it returns is causal. Memory
+    does not grow with time, if the smoother has a fixed lag and its rows are fetched (`drain_smoothed`).
+    Sensors may have any names and are known from their first scan on.
+
+    Args:
+        config: sensors and settings, from `load_config`; or the name of a preset, or of a YAML file.
+        image: width and height of the picture (px), also as "1920x1080", if not those of the configuration.
+        diagnostics: take down how well each detection fitted its track, for `last_updates`.
+        engine: "core", "reference" or "paper", if not that of the configuration.
+        constants: of the model, if not the usual ones; not for "paper".
+
+    Example:
+        >>> from jeat_graph import Tracker
+        >>> tracker = Tracker(image=(1920, 1080))
+        >>> table = tracker.step((0.0, "rgb", [[100, 100, 40, 30]], [0.9]))
+        >>> tracker.num_tracks
+        1
+    """
+
+    def __new__(
+        cls, config: Config | str | Path = "default", *, engine: str | None = None, **settings: Any
+    ) -> Self:
+        """Return a tracker of an engine.
+
+        Raises:
+            ConfigError: no such engine.
+        """
+        engine = as_config(config).tracker.engine if engine is None else engine
+        if engine not in ENGINES:
+            raise ConfigError(f"engine is one of {', '.join(ENGINES)}, not {engine!r}")
+        if engine == "paper":
+            from jeat_graph.tracking.paper.tracker import PaperTracker
+
+            # It has the methods of a tracker, or says that it lacks one: for callers' types it is one.
+            return cast(Self, PaperTracker(config, **settings))
+        return super().__new__(cls)
+
+    def __init__(
+        self,
+        config: Config | str | Path = "default",
+        *,
+        image: tuple[float, float] | str | None = None,
+        diagnostics: bool = False,
+        engine: str | None = None,
+        constants: ModelConstants | None = None,
+    ) -> None:
+        config = as_config(config)
+        engine = config.tracker.engine if engine is None else engine
+        super().__init__(config, image=image, diagnostics=diagnostics, engine=engine, constants=constants)

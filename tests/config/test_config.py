@@ -105,7 +105,7 @@ def test_an_unknown_preset_names_the_nearest_one():
     [
         ("paper.adaptation_rate=2", ["paper.adaptation_rate", "2", "[0.0, 1.0]"]),
         ("paper.scale_min=6", ["paper.scale_min", "scale_max"]),
-        ("sensors.evt.even_score=1.5", ["sensors.evt.even_score", "1.5", "[0.0, 1.0]"]),
+        ("sensors.evt.even_score=1.5", ["sensors.evt.even_score", "1.5", "(0.0, 1.0]"]),
         ("sensors.evt.sigma_px=.nan", ["sensors.evt.sigma_px", "nan"]),
         ("sensors.evt.rate_hz=.inf", ["sensors.evt.rate_hz", "inf"]),
         ("sensors.evt.rate_hz=0", ["sensors.evt.rate_hz", "(0.0, 1e+16]", "(Hz)"]),
