@@ -19,6 +19,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from jeat_graph.data.private_folder import open_to_others
+
 _CACHING = "numba.core.caching"
 _WRITE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
@@ -30,28 +32,6 @@ def guard_compiler() -> None:
         _guard(loaded)
     elif not any(isinstance(finder, _OnLoading) for finder in sys.meta_path):
         sys.meta_path.insert(0, _OnLoading())
-
-
-def is_private(folder: Path) -> bool:
-    """Whether only this user and the administrator can put files into a folder, or another in its place.
-
-    Where the system knows no users, it is.
-    """
-    if not hasattr(os, "getuid"):
-        return True
-    place = Path(os.path.realpath(folder))
-    try:
-        for path in (place, *place.parents):
-            found = path.stat()
-            if found.st_uid not in (os.getuid(), 0):
-                return False
-            # In a folder like /tmp everybody may make files, but nobody may replace another's.
-            sticky = path != place and found.st_mode & stat.S_ISVTX
-            if not sticky and _open_to_others(found):
-                return False
-    except OSError:
-        return False
-    return True
 
 
 def is_as_sources(path: Path, sources: Path) -> bool:
@@ -70,25 +50,7 @@ def is_as_sources(path: Path, sources: Path) -> bool:
     if found.st_uid not in (os.getuid(), 0, there.st_uid):
         return False
     more = found.st_mode & ~there.st_mode & _WRITE_BY_OTHERS
-    return not more or not _open_to_others(found)
-
-
-def _open_to_others(found: os.stat_result) -> bool:
-    """Whether others may write there; a group that is the user's alone is no other."""
-    if found.st_mode & stat.S_IWOTH:
-        return True
-    return bool(found.st_mode & stat.S_IWGRP) and not _is_own_group(found.st_gid)
-
-
-def _is_own_group(gid: int) -> bool:
-    import grp
-    import pwd
-
-    try:
-        group, user = grp.getgrgid(gid), pwd.getpwuid(os.getuid())
-    except KeyError:
-        return False
-    return group.gr_name == user.pw_name and set(group.gr_mem) <= {user.pw_name}
+    return not more or not open_to_others(found)
 
 
 class _OnLoading(MetaPathFinder):

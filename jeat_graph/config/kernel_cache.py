@@ -13,8 +13,9 @@ import stat
 import tempfile
 from pathlib import Path
 
-from jeat_graph.config.compiler_guard import guard_compiler, is_as_sources, is_private
+from jeat_graph.config.compiler_guard import guard_compiler, is_as_sources
 from jeat_graph.config.stale_kernels import drop_stale
+from jeat_graph.data.private_folder import is_private
 
 _VARIABLE = "NUMBA_CACHE_DIR"
 _PARTS = ("filters", "association", "smoothers", "eval")

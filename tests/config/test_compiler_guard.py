@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from jeat_graph.config import kernel_cache, stale_kernels
-from jeat_graph.config.compiler_guard import is_as_sources, is_private
+from jeat_graph.config.compiler_guard import is_as_sources
 
 CACHED = "from numba import njit\n@njit(cache=True)\ndef twice(x):\n    return 2 * x\n"
 SCRIPT = "import jeat_graph, cached; print(cached.twice(21), sum(cached.twice.stats.cache_hits.values()))"
@@ -85,29 +85,6 @@ def test_settings_that_lie_beside_the_data_do_not_count(cache, tmp_path):
         [sys.executable, "-P", "-c", script], cwd=tmp_path, capture_output=True, text=True, env=environment
     )
     assert done.stdout == "[''] 0\n", done.stderr
-
-
-@POSIX
-def test_a_folder_is_private_if_nobody_else_can_put_anything_there_or_in_its_place(tmp_path):
-    folder = tmp_path / "home" / "cache"
-    folder.mkdir(parents=True)
-    folder.chmod(0o755)
-    (tmp_path / "home").chmod(0o755)
-    assert is_private(folder)
-    folder.chmod(0o777)
-    assert not is_private(folder)
-    folder.chmod(0o1777)  # /tmp: others cannot replace files, but put new ones beside them
-    assert not is_private(folder)
-    folder.chmod(0o700)
-    (tmp_path / "home").chmod(0o777)  # others can put another folder in its place
-    assert not is_private(folder)
-    (tmp_path / "home").chmod(0o1777)
-    assert is_private(folder)
-    link = tmp_path / "link"
-    link.symlink_to(tmp_path / "home")
-    (tmp_path / "home").chmod(0o777)
-    assert not is_private(link / "cache")
-    assert not is_private(tmp_path / "missing")
 
 
 @POSIX
