@@ -1,4 +1,4 @@
-"""Compile what the tests call beside the tracker: the renderer, with a lens and without, and the road.
+"""Compile what the tests call beside the tracker: the renderer, with a lens and without.
 
 `make test` runs this while `jeat_graph.tracking.warm_up` compiles the tracker on the other core: each takes
 about as long. What is left, the tests compile by themselves.
@@ -10,7 +10,6 @@ import contextlib
 import io
 import tempfile
 
-from benchmarks.road_cost import causal_cost, lag_cost
 from jeat_graph.cli.main import main
 from jeat_graph_sehn.simulation.imaging.config import load_imaging
 from jeat_graph_sehn.simulation.imaging.source import RenderedSource
@@ -20,7 +19,7 @@ _SMALL = ("--sensors", "pictures", "--frames", "3", "--size", "64x48", "--worker
 
 
 def compile_beside() -> None:
-    """Render three pictures, one through a lens, and put some vehicles on a road."""
+    """Render three pictures, and one through a lens."""
     said = io.StringIO()
     with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stderr(said):
         with contextlib.redirect_stdout(said):
@@ -28,8 +27,6 @@ def compile_beside() -> None:
         tree = {"render": {"width": 160, "height": 96, "lamp_flicker": 0.5}, "lens": {"k1": -0.2}}
         for _ in RenderedSource(load_scenario("night"), load_imaging(tree), frames=1).segment(0):
             pass
-        causal_cost(1.2)
-        lag_cost(1.6)
 
 
 if __name__ == "__main__":
