@@ -18,6 +18,7 @@ from typing import Any
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.notes import note
+from jeat_graph.data.private_folder import is_private
 from jeat_graph.data.secrets import without_logins
 from jeat_graph.detection.known_networks import KnownNetwork
 from jeat_graph.io.atomic import atomic_path
