@@ -35,44 +35,39 @@ SOURCES := $(shell find jeat_graph filters association smoothers eval -name '*.p
 # What is no part of the tracker's distribution: the simulator and training, and the benchmarks.
 BESIDE := $(shell find sehn/jeat_graph_sehn benchmarks -name '*.py' -o -name '*.yaml')
 
-# Other kernels than this machine would choose: the oldest of OpenBLAS, none of NumPy's for newer processors, and
-# numba's for any processor of this kind, in a folder of their own.
-NUMERICAL := tests/association tests/calibration tests/config tests/eval tests/filters sehn/tests/simulation \
+# Other kernels than this machine would choose: the oldest of OpenBLAS, none of NumPy's for newer processors.
+NUMERICAL := tests/association tests/calibration tests/config tests/eval tests/filters \
 	tests/smoothers tests/tracking
 SEED ?= $(shell date +%s)
 OTHER_KERNELS = OPENBLAS_CORETYPE=$(if $(filter x86_64 AMD64,$(shell uname -m)),Prescott,ARMV8) \
-	NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python .ci/kernels.py names)" \
-	NUMBA_CPU_NAME=generic NUMBA_CACHE_DIR=$(CURDIR)/$(VENV)/numba-generic
+	NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python .ci/kernels.py names)"
 
 DOCUMENTED := jeat_graph filters association smoothers eval configs sehn/jeat_graph_sehn benchmarks
 
-.PHONY: demo test test-slow test-all compiled-for-tests test-portable benchmark licences live fuzz lint types bounds core \
+.PHONY: demo test test-slow test-all installed-for-tests test-portable benchmark licences live fuzz lint types bounds core \
 	sanitize build docs clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.core $(VENV)/.sehn
 	@$(BIN)/jeat-graph demo --from-raw --out demo
 
-test: compiled-for-tests
+test: installed-for-tests
 	@echo "make: running the tests"
 	@$(BIN)/python -m pytest -p no:randomly -n 2 --dist worksteal -m "not slow"
 	@$(BIN)/python -m pytest -p no:randomly -n 0 -m "not slow" tests/performance/test_time.py
 
-test-slow: compiled-for-tests
+test-slow: installed-for-tests
 	@echo "make: running the slow tests"
 	@$(BIN)/python -m pytest -p no:randomly -n 2 --dist worksteal -m slow
 	@$(BIN)/python -m pytest -p no:randomly -n 0 -m slow tests/performance/test_time.py
 
-# The tracker on one core, what the tests call beside it on the other.
-compiled-for-tests: $(VENV)/.test $(VENV)/.core
-	@$(MAKE) --no-print-directory -j 2 $(VENV)/.compiled $(VENV)/.compiled-beside
+installed-for-tests: $(VENV)/.test $(VENV)/.core
 
 # One after the other, also with make -j: both would wait for each other's processor time.
 test-all: test
 	@$(MAKE) --no-print-directory test-slow
 
-test-portable: $(VENV)/.test $(VENV)/.compiled
-	@rm -rf $(VENV)/numba-generic
+test-portable: $(VENV)/.test $(VENV)/.core
 	@echo "make: running the numerical tests with other kernels, SEED=$(SEED)"
 	@$(OTHER_KERNELS) $(BIN)/python .ci/kernels.py check
 	@$(OTHER_KERNELS) $(BIN)/python -m pytest -n 2 --randomly-seed=$(SEED) $(NUMERICAL)
@@ -83,10 +78,10 @@ benchmark: $(VENV)/.run $(VENV)/.sehn
 licences: $(VENV)/.test
 	@$(BIN)/python .ci/licences.py
 
-live: $(VENV)/.test $(VENV)/.compiled
+live: $(VENV)/.test $(VENV)/.core
 	@JEAT_GRAPH_FULL=1 $(BIN)/python -m pytest tests/live
 
-fuzz: $(VENV)/.test $(VENV)/.compiled
+fuzz: $(VENV)/.test $(VENV)/.core
 	@JEAT_GRAPH_FULL=1 $(BIN)/python -m pytest -n 2 tests/fuzz tests/tracking/test_invariants.py
 
 lint: $(VENV)/.lint $(VENV)/.core $(VENV)/.sehn
@@ -168,15 +163,6 @@ $(VENV)/.lint: pyproject.toml | $(BIN)/python
 	@$(BIN)/python -c "import tomllib; extras = tomllib.load(open('pyproject.toml', 'rb'))['project']; \
 		print(*extras['optional-dependencies']['lint'], sep='\n')" > $(VENV)/lint.txt
 	@$(PIP) -r $(VENV)/lint.txt
-	@touch $@
-
-# Code that no longer fits its sources is thrown away at the first import (config/stale_kernels.py).
-$(VENV)/.compiled: $(SOURCES) $(VENV)/.core
-	@$(BIN)/python -m jeat_graph.tracking.warm_up
-	@touch $@
-
-$(VENV)/.compiled-beside: $(SOURCES) $(BESIDE) $(VENV)/.test
-	@$(BIN)/python -m tests.loaded.compile_beside
 	@touch $@
 
 build/.wheel: $(SOURCES) $(CORE) $(BESIDE) $(shell find configs -type f -not -name '*.pyc') pyproject.toml sehn/pyproject.toml | $(BIN)/python

@@ -17,8 +17,7 @@ _TESTS = Path(__file__).parent / "tests"
 # This is before anything that loads it.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# The first call of a compiled function compiles it, which no deadline of a test should include. Examples
-# follow from the test and from the constants in the modules that are loaded, not from a clock: what a test
+# Examples follow from the test and from the constants in the modules that are loaded, not from a clock: what a test
 # counts over its examples still differs a little with what ran before it, and its bound must allow for that.
 settings.register_profile("jeat-graph", deadline=None, derandomize=True)
 settings.load_profile("jeat-graph")
@@ -132,4 +131,3 @@ def forked_workers(loaded, monkeypatch):
         return loaded if method == "spawn" else ours(method)
 
     monkeypatch.setattr("multiprocessing.get_context", context)
-    monkeypatch.setattr("jeat_graph.tracking.smoothing.worker.get_context", context)

@@ -1,4 +1,4 @@
-"""Which of NumPy's, OpenBLAS's and numba's kernels run: name those to switch off, or check that they are off.
+"""Which of NumPy's and OpenBLAS's kernels run: name those to switch off, or check that they are off.
 
 `python kernels.py names` prints what NPY_DISABLE_CPU_FEATURES may hold for the NumPy installed: the names
 change from release to release, and NumPy warns of those that it does not know. `python kernels.py check`
@@ -13,7 +13,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numba
 import numpy as np
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
@@ -41,8 +40,6 @@ def problems() -> list[str]:
     mine = blas_kernels()
     if mine is not None and mine == usual_blas_kernels():
         found.append(f"OpenBLAS works for {mine}, as it does without OPENBLAS_CORETYPE")
-    if numba.config.CPU_NAME != "generic" or numba.config.CPU_FEATURES:
-        found.append(f"numba compiles for {numba.config.CPU_NAME} {numba.config.CPU_FEATURES}")
     return found
 
 

@@ -6,60 +6,21 @@ Boxes are left, top, width, height in pixels, along the picture's axes.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from jeat_graph.data.arrays import FloatArray
 
 
-@njit(cache=True)
-def intersection(a: FloatArray, b: FloatArray) -> float:
-    """Area that two boxes share (px²).
+def pairwise_intersection(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Area that every box of `a` shares with every box of `b`: (A, B) in px².
 
     Args:
-        a: (4,) left, top, width, height (px).
-        b: (4,) the same.
+        a: (A, 4) left, top, width, height (px).
+        b: (B, 4) the same.
     """
-    width = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])
-    if width <= 0.0:
-        return 0.0
-    height = min(a[1] + a[3], b[1] + b[3]) - max(a[1], b[1])
-    if height <= 0.0:
-        return 0.0
-    return float(width * height)
-
-
-@njit(cache=True)
-def overlap(a: FloatArray, b: FloatArray) -> float:
-    """Intersection over union of two boxes, 0 where both are without area.
-
-    Args:
-        a: (4,) left, top, width, height (px).
-        b: (4,) the same.
-    """
-    common = intersection(a, b)
-    if common == 0.0:
-        return 0.0
-    return float(common / (a[2] * a[3] + b[2] * b[3] - common))
-
-
-@njit(cache=True)
-def _all_overlaps(a: FloatArray, b: FloatArray) -> FloatArray:
-    out = np.empty((len(a), len(b)))
-    for i in range(len(a)):
-        for j in range(len(b)):
-            out[i, j] = overlap(a[i], b[j])
-    return out
-
-
-@njit(cache=True)
-def _all_covered(a: FloatArray, b: FloatArray) -> FloatArray:
-    out = np.zeros((len(a), len(b)))
-    for i in range(len(a)):
-        area = a[i, 2] * a[i, 3]
-        if area > 0.0:
-            for j in range(len(b)):
-                out[i, j] = intersection(a[i], b[j]) / area
-    return out
+    first, second = a[:, None, :], b[None, :, :]
+    end = np.minimum(first[..., :2] + first[..., 2:], second[..., :2] + second[..., 2:])
+    side = np.maximum(end - np.maximum(first[..., :2], second[..., :2]), 0.0)
+    return np.asarray(side[..., 0] * side[..., 1])
 
 
 def pairwise_iou(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -72,7 +33,9 @@ def pairwise_iou(a: FloatArray, b: FloatArray) -> FloatArray:
     Returns:
         (A, B) values in [0, 1]; 0 where both boxes are without area.
     """
-    return np.asarray(_all_overlaps(_rows(a), _rows(b)))
+    common = pairwise_intersection(a, b)
+    union = (a[:, 2] * a[:, 3])[:, None] + (b[:, 2] * b[:, 3])[None] - common
+    return np.divide(common, union, out=np.zeros_like(common), where=common > 0.0)
 
 
 def pairwise_covered(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -82,8 +45,6 @@ def pairwise_covered(a: FloatArray, b: FloatArray) -> FloatArray:
         a: (A, 4) left, top, width, height (px).
         b: (B, 4) the same.
     """
-    return np.asarray(_all_covered(_rows(a), _rows(b)))
-
-
-def _rows(boxes: FloatArray) -> FloatArray:
-    return np.ascontiguousarray(boxes, dtype=np.float64)
+    common = pairwise_intersection(a, b)
+    area = np.broadcast_to((a[:, 2] * a[:, 3])[:, None], common.shape)
+    return np.divide(common, area, out=np.zeros_like(common), where=area > 0.0)

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from jeat_graph.data.arrays import BoolArray, FloatArray
-from jeat_graph.data.measured_track import MeasuredTrack
 from jeat_graph.data.progress import progress_span
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.consistency import consistency
@@ -21,6 +20,7 @@ from jeat_graph.eval.samples import (
     with_centres,
 )
 from jeat_graph.eval.tables import Cell, Table
+from jeat_graph.smoothers.filtered_track import FilteredTrack
 
 #: Lags of the curve (s).
 LAGS_S = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0)
@@ -49,7 +49,7 @@ class Comparison:
 
 
 def compare(
-    tracks: Sequence[MeasuredTrack],
+    tracks: Sequence[FilteredTrack],
     sensors: Sequence[str],
     *,
     truth: GroundTruth | None = None,
@@ -64,7 +64,7 @@ def compare(
     All of them see the same measurements, those that the tracker accepted.
 
     Args:
-        tracks: confirmed tracks with their measurements.
+        tracks: tracks, as the filter went through them.
         sensors: names of the sensors.
         truth: true boxes; without them only consistency is judged. Where they have no motion, positions are
             judged by their centres, and velocities and accelerations are not.

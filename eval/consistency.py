@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.data.measured_track import MeasuredTrack
 from jeat_graph.data.progress import with_progress
-from jeat_graph.eval.lagged import Innovations, States, states_at
+from jeat_graph.eval.lagged import States, states_at
 from jeat_graph.eval.tables import Cell, Table
+from jeat_graph.smoothers.filtered_track import FilteredTrack
 
 #: Autocorrelations of the innovations are taken up to this many steps.
 WHITENESS_STEPS = 5
@@ -19,24 +19,24 @@ WHITENESS_STEPS = 5
 PARTS = {"position": slice(0, 1), "velocity": slice(1, 2), "acceleration": slice(2, 3)}
 
 
-def consistency(tracks: Sequence[MeasuredTrack]) -> tuple[dict[str, Any], Table]:
+def consistency(tracks: Sequence[FilteredTrack]) -> tuple[dict[str, Any], Table]:
     """Judge without truth: the innovations, and the smoother against the filter.
 
     Args:
-        tracks: confirmed tracks with their measurements.
+        tracks: tracks, as the filter went through them.
 
     Returns:
         Values for JSON, and the same as a table.
     """
-    innovations: list[Innovations] = []
+    innovations: list[FloatArray] = []
     ratio: list[FloatArray] = []
     for track in with_progress(tracks):
-        filtered, _, full, innovation = states_at(track.data, track.data.t, [])
-        innovations.append(innovation)
+        filtered, _, full = states_at(track, track.t, [])
+        innovations.append(track.normalised_innovations()[1])
         ratio.append(_disagreement(filtered, full))
-    nis = np.concatenate([one.nis() for one in innovations]) if innovations else np.zeros(0)
+    nis = (np.concatenate(innovations) ** 2).sum(axis=1) if innovations else np.zeros(0)
     low, high = chi2_bounds(len(nis), 2)
-    white = whiteness([one.normalised() for one in innovations])
+    white = whiteness(innovations)
     bound = 1.96 / np.sqrt(max(2 * len(nis), 1))
     square = np.concatenate(ratio) if ratio else np.zeros((0, 3))
     values: dict[str, Any] = {

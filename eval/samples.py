@@ -9,19 +9,21 @@ from itertools import pairwise
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
-from jeat_graph.data.measured_track import MeasuredTrack
 from jeat_graph.data.progress import with_progress
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.breakdown import DISTANCE_BINS_M
 from jeat_graph.eval.consistency import PARTS, chi2_bounds
 from jeat_graph.eval.frames import build_frames
 from jeat_graph.eval.kinematics import matched_errors
-from jeat_graph.eval.lagged import States, states_at
+from jeat_graph.eval.lagged import States, last_record, states_at
+from jeat_graph.smoothers.filtered_track import FilteredTrack
 
 #: A sensor counts as available to a track if it gave it a detection within this time before (s).
 RECENT_S = 0.1
 #: A true box this near to an edge of the picture (px) is taken to be cut by it.
 EDGE_PX = 1.0
+# A time of the truth further from the last scan than this is not judged (s).
+_FURTHEST_S = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +81,7 @@ def with_centres(truth: GroundTruth, image: tuple[float, float] | None = None) -
 
 
 def collect_samples(
-    tracks: Sequence[MeasuredTrack],
+    tracks: Sequence[FilteredTrack],
     truth: GroundTruth,
     causal: Trajectories,
     lags_s: Sequence[float],
@@ -90,7 +92,7 @@ def collect_samples(
     """Estimate each track at those times of the truth at which the causal table matches it to an object.
 
     Args:
-        tracks: confirmed tracks with their measurements.
+        tracks: tracks, as the filter went through them.
         truth: true boxes with positions, and perhaps with motion (`with_centres`).
         causal: the causal table, with the same identities.
         lags_s: lags (s).
@@ -112,9 +114,10 @@ def collect_samples(
     parts: list[tuple[IntArray, IntArray, list[States]]] = []
     for track in with_progress(tracks):
         mine = np.flatnonzero(identity == track.track_id)
-        mine = mine[(t[mine] >= track.data.t[0]) & (t[mine] <= track.data.t[-1])]
+        mine = mine[(t[mine] >= track.t[0]) & (t[mine] <= track.t[-1])]
+        mine = mine[t[mine] - track.t[last_record(track, t[mine])] <= _FURTHEST_S]
         if len(mine):
-            filtered, lagged, full, _ = states_at(track.data, t[mine], lags_s)
+            filtered, lagged, full = states_at(track, t[mine], lags_s)
             parts.append((mine, _available(track, t[mine]), [filtered, *lagged, full]))
     order = np.concatenate([mine for mine, _, _ in parts]) if parts else np.zeros(0, dtype=np.int64)
     states = {
@@ -135,13 +138,11 @@ def collect_samples(
     )
 
 
-def _available(track: MeasuredTrack, t: FloatArray) -> IntArray:
+def _available(track: FilteredTrack, t: FloatArray) -> IntArray:
     """Bits (T,) of the sensors that gave the track a detection within `RECENT_S` before each time."""
     out = np.zeros(len(t), dtype=np.int64)
-    measured = np.concatenate([track.data.t[:1], track.data.t[track.data.key]])
-    sensor = np.concatenate([[track.birth_sensor], track.sensor])
-    for s in np.unique(sensor).tolist():
-        times = np.sort(measured[sensor == s])
+    for s in np.unique(track.sensor[track.sensor >= 0]).tolist():
+        times = track.t[track.sensor == s]
         last = np.searchsorted(times, t + 1e-6, side="right") - 1
         recent = (last >= 0) & (t - times[np.maximum(last, 0)] <= RECENT_S)
         out |= recent.astype(np.int64) << int(s)

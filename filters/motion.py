@@ -8,12 +8,10 @@ cross-axis covariances, exactly zero, are neither stored nor computed.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from jeat_graph.data.arrays import FloatArray
 
 
-@njit(cache=True)
 def transition(dt: float) -> FloatArray:
     """Transition matrix of [p, v, a] over `dt` seconds (paper eq. 2).
 
@@ -32,7 +30,6 @@ def transition(dt: float) -> FloatArray:
     return F
 
 
-@njit(cache=True)
 def process_noise(dt: float, jerk: float) -> FloatArray:
     """Covariance that white jerk adds to [p, v, a] over `dt` seconds (paper eq. 2).
 
@@ -56,26 +53,4 @@ def process_noise(dt: float, jerk: float) -> FloatArray:
     Q[1, 1] = q * d3 / 3.0
     Q[1, 2] = Q[2, 1] = q * d2 / 2.0
     Q[2, 2] = q * dt
-    return Q
-
-
-@njit(cache=True)
-def size_transition(dt: float) -> FloatArray:
-    """Transition matrix (2, 2) of [ln s, rate] over `dt` seconds: a constant rate of growth."""
-    F = np.eye(2)
-    F[0, 1] = dt
-    return F
-
-
-@njit(cache=True)
-def size_process_noise(dt: float, density: float) -> FloatArray:
-    """Covariance (2, 2) that a randomly driven rate adds to [ln s, rate] over `dt` seconds.
-
-    Q = q² [[Δ³/3, Δ²/2], [Δ²/2, Δ]] with q the root spectral density (1/s^1.5).
-    """
-    q = density * density
-    Q = np.empty((2, 2))
-    Q[0, 0] = q * dt * dt * dt / 3.0
-    Q[0, 1] = Q[1, 0] = q * dt * dt / 2.0
-    Q[1, 1] = q * dt
     return Q

@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import betaln, expit
 
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.filters.evidence import Evidence
 from jeat_graph.filters.model_constants import ModelConstants
 
@@ -59,6 +59,34 @@ class SensorBelief(NamedTuple):
     indifference: FloatArray
     prior_odds: FloatArray
     noise_share: float
+
+
+class LogOddsTerms(NamedTuple):
+    """Why tracks are taken for what they are: terms whose sum is the log odds of being real.
+
+    They compare "real" with the most probable of the other hypotheses.
+
+    Attributes:
+        other: (N,) that hypothesis: a sensor's index where it is a persistent false object of that sensor,
+            −1 where it is noise.
+        looks: (N, S) hits and misses of each sensor, and what its finding something is worth.
+        scores: (N, S) the scores of its boxes.
+        second_box: (N,) overlap with a better track, ≤ 0.
+        motion: (N,) how well later detections lay where they were predicted; 0 where the other is no noise.
+        rest: (N,) the other hypotheses together, ≤ 0.
+    """
+
+    other: IntArray
+    looks: FloatArray
+    scores: FloatArray
+    second_box: FloatArray
+    motion: FloatArray
+    rest: FloatArray
+
+    def total(self) -> FloatArray:
+        """Return the sum (N,), the log odds."""
+        sums = self.looks.sum(axis=1) + self.scores.sum(axis=1)
+        return np.asarray(sums + self.second_box + self.motion + self.rest)
 
 
 class Posterior(NamedTuple):
@@ -110,6 +138,30 @@ def duplicate_log_odds(overlap: FloatArray, scores: FloatArray, c: ModelConstant
 
 def posterior(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> Posterior:
     """Weigh the hypotheses of each track by Bayes' rule, as the head of this module says."""
+    w = _weights(evidence, sensors, c)
+    real = w.object_seen.sum(axis=1) + w.scores.sum(axis=1) + w.second_box
+    not_real = np.logaddexp(np.logaddexp.reduce(w.false, axis=1), w.noise)
+    log_odds = real - not_real
+    return Posterior(
+        expit(log_odds), log_odds, np.exp(w.noise - not_real), np.exp(w.never - w.object_seen), w.scores
+    )
+
+
+class _Weights(NamedTuple):
+    """Logarithms of what the hypotheses weigh: (N, S) each, but second_box and noise (N,)."""
+
+    seen: FloatArray
+    never: FloatArray
+    object_seen: FloatArray
+    shared: FloatArray
+    prior: FloatArray
+    scores: FloatArray
+    false: FloatArray
+    second_box: FloatArray
+    noise: FloatArray
+
+
+def _weights(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> _Weights:
     found, rows = evidence.found, np.arange(len(evidence))
     seen = beta_binomial(evidence.hits, evidence.misses, sensors.p_detect, c)
     chance = evidence.hits * math.log(c.chance_hit) + evidence.misses * math.log1p(-c.chance_hit)
@@ -118,14 +170,37 @@ def posterior(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> P
     shared = np.logaddexp(math.log1p(-c.shared_false) + chance, math.log(c.shared_false) + seen)
     scores = score_log_odds(evidence, sensors, c)
     prior = np.where(found, sensors.prior_odds, 0.0)
-    real = object_seen.sum(axis=1) + scores.sum(axis=1) + duplicate_log_odds(evidence.overlap, scores, c)
     others = (shared + prior).sum(axis=1)[:, None] - shared - prior
-    false = np.logaddexp.reduce(np.where(found, others + seen, -np.inf), axis=1)
+    false = np.where(found, others + seen, -np.inf)
     odds = math.log(sensors.noise_share / (1.0 - sensors.noise_share))
     noise = odds - evidence.gained + prior.sum(axis=1) - prior[rows, evidence.owner]
-    not_real = np.logaddexp(false, noise)
-    log_odds = real - not_real
-    return Posterior(expit(log_odds), log_odds, np.exp(noise - not_real), np.exp(never - object_seen), scores)
+    second_box = duplicate_log_odds(evidence.overlap, scores, c)
+    return _Weights(seen, never, object_seen, shared, prior, scores, false, second_box, noise)
+
+
+def log_odds_terms(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> LogOddsTerms:
+    """Split the log odds of each track's `posterior` into terms."""
+    rows = np.arange(len(evidence))
+    w = _weights(evidence, sensors, c)
+    sides = np.column_stack([w.false, w.noise])
+    best = sides.argmax(axis=1)
+    is_noise = best == w.false.shape[1]
+    other = np.where(is_noise, -1, best)
+    # What each sensor's looks weigh under the other hypothesis.
+    against = w.shared + w.prior
+    against[rows[~is_noise], other[~is_noise]] = w.seen[rows[~is_noise], other[~is_noise]]
+    found_first = np.zeros_like(w.prior)
+    found_first[rows, evidence.owner] = w.prior[rows, evidence.owner]
+    against[is_noise] = (w.prior - found_first)[is_noise]
+    odds = math.log(sensors.noise_share / (1.0 - sensors.noise_share))
+    return LogOddsTerms(
+        other=other,
+        looks=w.object_seen - against,
+        scores=w.scores,
+        second_box=w.second_box,
+        motion=np.where(is_noise, evidence.gained - odds, 0.0),
+        rest=sides[rows, best] - np.logaddexp.reduce(sides, axis=1),
+    )
 
 
 def learn_sensors(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> SensorBelief:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 if not (_FOLDER := Path(__file__).parent).joinpath("filters").is_dir():
     __path__.append(str(_FOLDER.parent))
 
-from jeat_graph.config.kernel_cache import choose_cache
 from jeat_graph.version import __version__
 
 if TYPE_CHECKING:
@@ -24,8 +23,6 @@ if TYPE_CHECKING:
     from jeat_graph.io.detections_io import read_detections
     from jeat_graph.io.truth_io import read_truth
     from jeat_graph.tracking.tracker import Tracker
-
-choose_cache()
 
 _HOMES = {
     "Config": "config.schema",
@@ -72,7 +69,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    # Loaded on first use: the tracker brings the compiler along, which a reader of files does not need.
+    # Loaded on first use: a reader of files needs no tracker.
     if name in _HOMES:
         from importlib import import_module
 
@@ -81,4 +78,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted(set(globals()) | set(__all__))
+    return sorted(__all__)

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.association.boxes import occluded_fraction
 from jeat_graph.association.overlap import pairwise_covered, pairwise_iou
 from jeat_graph.config.schema import ImageConfig
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
@@ -15,10 +14,11 @@ from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.eval.frames import IGNORE_COVERED, match
-from jeat_graph.filters.cut_boxes import WHOLE, cut_of
 
 # A detection is of a vehicle if it overlaps its true box by at least this IoU.
 MATCH_IOU = 0.5
+# A side so near to the edge of the picture is where the picture ends (px).
+_EDGE_PX = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,6 @@ class SensorMatches:
         hit_score: (C,) its score.
         seen: (G,) for each true box in view of a scan, whether it was detected.
         speed: (G,) its image speed (px/s), NaN where not known.
-        visible: (G,) the part of it that no nearer vehicle hides, by the rule of the tracker.
     """
 
     scans: int
@@ -52,7 +51,6 @@ class SensorMatches:
     hit_score: FloatArray
     seen: BoolArray
     speed: FloatArray
-    visible: FloatArray
 
     @staticmethod
     def pool(parts: list[SensorMatches]) -> SensorMatches:
@@ -66,19 +64,11 @@ class SensorMatches:
         """Leave out of the correct detections those that the picture's edge cuts: they have no centre.
 
         Args:
-            image: its size, and how near to its edge a side lies there.
+            image: its size.
         """
-        far = self.box[:, :2] + self.box[:, 2:]
-        whole = np.array(
-            [
-                all(
-                    cut_of(low[k], high[k], (image.width, image.height)[k], image.edge_px) == WHOLE
-                    for k in range(2)
-                )
-                for low, high in zip(self.box[:, :2], far, strict=True)
-            ],
-            dtype=bool,
-        )
+        low, far = self.box[:, :2], self.box[:, :2] + self.box[:, 2:]
+        inside = (low > _EDGE_PX) & (far < np.array([image.width, image.height]) - _EDGE_PX)
+        whole = inside.all(axis=1)
         columns = ("residual", "side", "key", "t", "box", "hit_score")
         rows = {name: getattr(self, name)[whole] for name in columns}
         return replace(self, **rows)
@@ -138,8 +128,6 @@ def match_sensor(detections: Detections, truth: GroundTruth, sensor: str, sequen
         columns["hit_score"].append(scan.scores[good])
         columns["seen"].append(seen[~ignored])
         columns["speed"].append(speed[~ignored])
-        visible = 1.0 - occluded_fraction(boxes, np.ones(len(boxes)))
-        columns["visible"].append(visible[~ignored])
     if not scans:
         raise DataError(f"no scan of sensor {sensor!r} lies within the time span of the truth")
     pooled: dict[str, Any] = {name: np.concatenate(parts) for name, parts in columns.items()}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,8 +19,6 @@ from jeat_graph.runs.declaring import own_picture
 from jeat_graph.tracking.whole import track
 
 _MIN_ROWS = 50
-# Tracks are followed through gaps as long as this.
-_REPORT_GAP_S = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,21 +45,12 @@ def follow(recordings: Sequence[Detections], config: Config) -> TrackedDetection
         recordings: detections.
         config: declares all their sensors.
     """
-    # Reported from birth on; afterwards those are kept that were confirmed at some time.
-    eager = replace(
-        config,
-        lifecycle=replace(config.lifecycle, confirm_existence=0.0),
-        output=replace(config.output, min_existence=0.0, max_gap_s=_REPORT_GAP_S, max_gap_scans=0.0),
-    )
     names = config.sensor_names
     cols: dict[str, list[npt.NDArray[Any]]] = {name: [] for name in ("t", "track", "sensor", "box")}
     first_track = 0
     for detections in with_progress(recordings):
         with progress_span(0.0, 0.6):
-            table = track(own_picture(eager, detections), detections)
-        sure = table.existence >= config.lifecycle.confirm_existence
-        kept = np.isin(table.track_id, np.unique(table.track_id[sure]))
-        table = table.take(kept)
+            table = track(own_picture(config, detections), detections)
         _, number = np.unique(table.track_id, return_inverse=True)
         for s, name in enumerate(names):
             for rows, scan, j in taken_in_scan(table, detections, name, s):

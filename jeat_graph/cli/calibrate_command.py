@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from jeat_graph.runs.beside import Facts
 
 WRITES = ("out",)
-HELP = "Estimate sensors and motion from recordings, with or without truth, and write a configuration."
+HELP = "Find sensors, clocks and what scores mean from recordings, with or without truth; write a configuration."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,12 +45,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="VIDEO|DIR",
         help="pictures of one of the recordings: tell the picture's size and the frame rate of all",
     )
-    add("--no-tune", action="store_true", help="do not choose the rest by tracking the recordings")
+    add(
+        "--no-tune",
+        action="store_true",
+        help="keep what the scores were found to mean without tracking the recordings with it",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Calibrate, write the configuration, and print what was estimated."""
-    from jeat_graph.calibration.rounding import rounded
     from jeat_graph.config.reading import as_config, load_config
     from jeat_graph.io.atomic import check_writable
     from jeat_graph.io.config_io import save_config
@@ -69,11 +72,6 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(f"--out {args.out}: the name of a configuration must end in .yaml")
     check_writable(args.out)
     given = base = load_config(args.config, rig=args.rig)
-    if base.tracker.engine != "compiled":
-        raise ConfigError(
-            f"tracker.engine={base.tracker.engine} learns what it needs while it tracks: there is nothing to "
-            "calibrate; take another --config"
-        )
     if args.image is not None:
         given = as_config(base, args.image)
     shown = None if args.frames is None else facts_of_frames(args.frames)
@@ -101,7 +99,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         found = _without_truth(recordings, base)
     _say_lags(found, "the truth" if args.gt else "the sensor that sees most")
-    config = with_ways_of(rounded(found.config), given)
+    config = with_ways_of(found.config, given)
     save_config(config, args.out, comment=describe(args, picture, found))
     sys.stdout.write("\n".join(table.render("text") for table in summary(config, found)))
     print(f"written: {args.out}", file=sys.stderr)
@@ -180,33 +178,18 @@ def with_image(base: Config, recordings: list[Detections], size: tuple[int, int]
 
 
 def _with_truth(recordings: list[tuple[Detections, GroundTruth]], base: Config, tuned: bool) -> Calibration:
-    from tqdm import tqdm
+    from jeat_graph.calibration.procedure import calibrate_with_truth
 
-    from jeat_graph.calibration.procedure import calibrate_with_truth, steps_with_truth
-
-    say("calibrate", "estimating sensors and motion from matched detections")
-    if not tuned:
-        with stages("calibrate", 1) as stage:
-            stage("estimating")
-            return calibrate_with_truth(recordings, base, tuned=False)
-    steps = steps_with_truth(base)
-    with tqdm(total=steps, desc="tuning", unit="setting", disable=None, file=sys.stderr) as bar:
-
-        def advance(line: str) -> None:
-            bar.set_postfix_str(line, refresh=False)
-            bar.update()
-
-        return calibrate_with_truth(recordings, base, progress=advance)
+    say("calibrate", "estimating clocks and what scores mean from detections matched with the truth")
+    with stages("calibrate", 1) as stage:
+        stage("estimating")
+        return calibrate_with_truth(recordings, base, tuned=tuned)
 
 
 def _without_truth(recordings: list[Detections], base: Config) -> Calibration:
     from jeat_graph.calibration.procedure import calibrate_without_truth
 
-    say(
-        "calibrate",
-        "no --gt: noise, reliability and motion cannot be known, and stay as in the base; what tracking "
-        "teaches of the sensors is taken along",
-    )
+    say("calibrate", "no --gt: sensors, their rates and clocks are found; what scores mean is not")
     with stages("calibrate", 1) as stage:
         stage("estimating")
         return calibrate_without_truth(recordings, base)
@@ -241,85 +224,29 @@ def describe(args: argparse.Namespace, picture: str, found: Calibration) -> str:
     names = ", ".join(f"{path.parent.name}/{path.name}" for path in files)
     lines = [f"Made by jeat-graph calibrate {__version__} from {len(args.detections)} recording(s):", names]
     if args.gt:
-        base = [choice.part for choice in found.parts if not choice.kept]
-        lines += [
-            "sensors (but tempering), motion, size, births: from detections matched with the truth"
-            + (f", but {', '.join(base)}: as in the base, which did better." if base else "."),
-            "chosen by tracking these recordings: " + ", ".join(c.name for c in found.choices) + "."
-            if found.choices
-            else "tempering, lifecycle and output: not tuned (--no-tune), as in the base configuration.",
-        ]
+        lines.append("rates, clocks and what scores mean (even_score): from detections matched with the truth.")
     else:
-        lines += [
-            "which sensors there are, their rates and their clocks: from the recordings, without truth.",
-            "noise, reliability and motion cannot be known without truth and stay as in the base;",
-            "sensors.*.learnt: what tracking these recordings taught of the sensors, to begin with.",
-        ]
+        lines.append("which sensors there are, their rates and their clocks: from the recordings, without truth.")
     lines += [f"image: from {picture}; all else from the base configuration {Path(args.config).name}."]
     return "\n".join(lines)
 
 
 def summary(config: Config, found: Calibration) -> list[Table]:
-    """Tables of what was estimated: one row a sensor; motion and size; what was kept and what was chosen."""
+    """Tables of what was estimated: one row a sensor."""
     from jeat_graph.eval.tables import Table
 
-    sensors: list[dict[str, Cell]] = [
-        {
+    scores = {one.sensor: one for one in found.even_scores}
+    rows: list[dict[str, Cell]] = []
+    for name, sensor in sorted(config.sensors.items()):
+        row: dict[str, Cell] = {
             "sensor": name,
-            "rate_hz": s.rate_hz,
-            "sigma_px": s.sigma_px,
-            "rho_x": s.rho_x,
-            "rho_y": s.rho_y,
-            "rho_size": s.rho_size,
-            "late (ms)": 1e3 * s.latency_s,
-            "share": s.correlated_share,
-            "memory (s)": s.memory_s if s.correlated_share else None,
-            "sigma_ln_w": s.sigma_log_width,
-            "sigma_ln_h": s.sigma_log_height,
-            "p_detect": s.p_detect,
-            "clutter": s.clutter_per_scan,
-            "precision": s.precision,
-            "blind_px_s": s.blind_speed,
-            "tempering": s.tempering,
+            "rate_hz": sensor.rate_hz,
+            "late (ms)": 1e3 * sensor.latency_s,
         }
-        for name, s in sorted(config.sensors.items())
-    ]
-    digits = dict.fromkeys(("rho_x", "rho_y", "rho_size", "sigma_ln_w", "sigma_ln_h"), 4)
-    m = config.motion
-    motion: dict[str, Cell] = {
-        "jerk_per_size": m.jerk_per_size,
-        "jerk_per_growth": m.jerk_per_growth,
-        "velocity_std_per_size": m.velocity_std_per_size,
-        "acceleration_std_per_size": m.acceleration_std_per_size,
-        "size_rate_density": config.size.rate_density,
-        "arrivals_hz": config.birth.arrival_rate_hz,
-    }
-    tables = [
-        Table.from_records(sensors, title="Sensors", digits=digits),
-        Table.from_records([motion], title="Motion"),
-    ]
-    learnt: list[dict[str, Cell]] = [
-        {
-            "sensor": name,
-            "seen by others (s)": known.agreed_s,
-            "by it alone (s)": known.lonely_s,
-            "came to nothing (%)": 100.0 * known.vain,
-            "trust": known.trust,
-        }
-        for name, s in sorted(config.sensors.items())
-        if (known := s.learnt) is not None
-    ]
-    if learnt:
-        tables.append(Table.from_records(learnt, title="What tracking taught of the sensors"))
-    if found.parts:
-        parts: list[dict[str, Cell]] = [
-            {"part": c.part, "gain on recordings left out": c.gain, "kept": "yes" if c.kept else "no"}
-            for c in found.parts
-        ]
-        tables.append(Table.from_records(parts, title="Estimates against the base, (MOTA+IDF1+HOTA)/3"))
-    if found.choices:
-        rows: list[dict[str, Cell]] = [
-            {"setting": c.name, "value": c.value, "(MOTA+IDF1+HOTA)/3": c.score} for c in found.choices
-        ]
-        tables.append(Table.from_records(rows, title="Chosen by tracking", digits={"value": 3}))
-    return tables
+        one = scores.get(name)
+        if one is not None:
+            row["even score"] = one.score
+            row["accuracy without (%)"], row["with (%)"] = one.before, one.after
+            row["kept"] = "yes" if one.kept else "no"
+        rows.append(row)
+    return [Table.from_records(rows, title="Sensors", digits={"even score": 3})]

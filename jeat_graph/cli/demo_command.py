@@ -56,18 +56,12 @@ def run(args: argparse.Namespace) -> int:
         _show(args, out)
         _say_next()
         return 0
-    from jeat_graph.cli.demo_raw import raw_meanwhile, render_clip, tell
-    from jeat_graph.tracking.compiling import do_without
+    from jeat_graph.cli.demo_raw import go_the_whole_way
 
     find(COMMAND_GROUP, "simulate", "--from-raw")  # says so now if it is not installed
-    if code := render_clip(out):
+    _show(args, out)
+    if code := go_the_whole_way(out):
         return code
-    with raw_meanwhile(out) as process:
-        if not _is_simulated(args):
-            do_without()  # so short a recording is tracked before the tracker would be compiled
-        _show(args, out)
-        if code := tell(process, out):
-            return code
     _say_next()
     return 0
 
@@ -106,7 +100,6 @@ def _show(args: argparse.Namespace, out: Path) -> None:
     from jeat_graph.runs.inputs import describe_inputs
     from jeat_graph.runs.run_options import RunOptions, RunRecord
     from jeat_graph.runs.tracking_run import write_run
-    from jeat_graph.tracking.notice import notice_if_cold
 
     config = load_config(args.config)
     recording = _recording(args)
@@ -121,7 +114,6 @@ def _show(args: argparse.Namespace, out: Path) -> None:
     origin = {"config_name": args.config, "inputs": describe_inputs([source])}
     origin["reading"] = {"detections": [str(source)]}  # as `track` has it: `compare` reads the inputs again
     details = RunRecord(source=origin, warnings=warnings)
-    notice_if_cold()
     with directory:
         write_run(recording.detections, config, directory, details, RunOptions(progress=sys.stderr.isatty()))
     table = read_trajectories(out / "run" / "causal.csv")

@@ -15,11 +15,9 @@ from jeat_graph.api.beside import COMMAND_GROUP, HOW_TO_GET, find
 from jeat_graph.cli import leave_current_folder
 from jeat_graph.cli.held_outputs import holding
 from jeat_graph.cli.terminal import Terminated, describe, in_good_order, say, write_anything
-from jeat_graph.config import kernel_cache
 from jeat_graph.data.errors import ConfigError, JeatGraphError
 from jeat_graph.data.notes import listening
 from jeat_graph.io.outputs import check_named
-from jeat_graph.tracking import notice
 from jeat_graph.version import __version__
 
 # Each module has HELP (one line), add_arguments(parser) and run(args); maybe WRITES and WRITES_INTO, the
@@ -38,6 +36,7 @@ COMMANDS = (
     "eval",
     "compare",
     "count",
+    "explain",
     "draw",
     "frame",
     "export",
@@ -53,20 +52,8 @@ COMMANDS = (
 _BESIDE = ("simulate", "train")
 
 
-# These begin to track at once where the tracker is not compiled; the others track so much, or are so much
-# about time, that they wait for it.
-_AT_ONCE = ("demo", "track", "stream")
 # For these, `--out -` is standard output.
 _TO_STDOUT = ("detect",)
-
-
-def _compile_for(command: str) -> None:
-    """Have other processors compile the tracker, and this one help or track meanwhile."""
-    compiling = import_module("jeat_graph.tracking.compiling")
-    if command in _AT_ONCE:
-        compiling.work_meanwhile(live=command == "stream")
-    else:
-        compiling.wait_with_help()
 
 
 def build_parser(command: str | None = None) -> argparse.ArgumentParser:
@@ -152,20 +139,14 @@ def carry_out(command: str | None, parse: Callable[[], argparse.Namespace]) -> i
 
 
 def _run(args: argparse.Namespace) -> int:
-    if kernel_cache.notice:
-        print(f"jeat-graph: {kernel_cache.notice}", file=sys.stderr)
-    notice.when_cold = partial(_compile_for, args.command)
-    try:
-        if getattr(args, "out", None) is not None:
-            check_named(args.out, stdout=args.command in _TO_STDOUT)
-        # A command may come with another distribution, so what it writes is asked of where its function lies.
-        held = holding(args, sys.modules[args.run.__module__])
-        with held, listening(partial(say, args.command)):
-            code = int(args.run(args) or 0)
-        sys.stdout.flush()  # what cannot be written is noticed here, not at exit
-        return code
-    finally:
-        notice.forget()
+    if getattr(args, "out", None) is not None:
+        check_named(args.out, stdout=args.command in _TO_STDOUT)
+    # A command may come with another distribution, so what it writes is asked of where its function lies.
+    held = holding(args, sys.modules[args.run.__module__])
+    with held, listening(partial(say, args.command)):
+        code = int(args.run(args) or 0)
+    sys.stdout.flush()  # what cannot be written is noticed here, not at exit
+    return code
 
 
 if __name__ == "__main__":

@@ -118,11 +118,9 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.live.session import Ends, Session
     from jeat_graph.live.smoothed_file import SmoothedFile
     from jeat_graph.live.transport.patience import UnconfirmedError
-    from jeat_graph.live.warm_up import warm_up
 
     config = _config(args)
     live, more = _tracker(args, config)
-    warm_up(config)
     with contextlib.ExitStack() as stack:
         interrupts = stack.enter_context(Interrupts())
         source, sink = _ends(args, stack, interrupts)
@@ -162,8 +160,6 @@ def _config(args: argparse.Namespace) -> Config:
     from jeat_graph.live.transport.ends import check_addresses
 
     config = load_config(args.config, [*made_by(args, _say), *overrides(args)], args.rig)
-    if args.checkpoint is not None and config.smoother.worker:
-        raise ConfigError("--checkpoint does not go with smoother.worker: its state is in another process")
     if args.every is not None and args.checkpoint is None:
         raise ConfigError("--every is the time between checkpoints: it needs --checkpoint FILE")
     if args.sink is not None and args.format == "csv":

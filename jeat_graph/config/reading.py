@@ -23,8 +23,8 @@ from jeat_graph.config.section_tree import (
 )
 from jeat_graph.data.errors import ConfigError
 
-# Sections of a sensor that it need not have.
-_PARTS_OF_SENSOR = ("clock",)
+# Sections that configurations had once.
+_FORMER = ("motion", "standing", "size", "noise", "boxes", "association", "lifecycle", "birth", "merge")
 
 
 def preset_names() -> list[str]:
@@ -42,7 +42,7 @@ def load_config(
 
     Args:
         name_or_path: a preset (`default`, `paper`, …) or the path of a YAML file.
-        overrides: texts such as `motion.jerk_per_size=4` or `sensors.rgb.rate_hz=30`, or one such text.
+        overrides: texts such as `smoother.lag_s=2` or `sensors.rgb.rate_hz=30`, or one such text.
         rig: a file of `register`, with the pictures and clocks of the sensors (`config.rig_file`).
 
     Raises:
@@ -56,8 +56,6 @@ def load_config(
         tree = merge(tree, read_rig(rig))
     for text in [overrides] if isinstance(overrides, str) else overrides:
         _apply_override(tree, text)
-    preset = merged([layer for source, layer in layers if source in presets])
-    _assume(tree, set(preset.get("sensors", {})))
     return config_from_dict(tree)
 
 
@@ -96,9 +94,12 @@ def config_from_dict(tree: Mapping[str, Any]) -> Config:
     Raises:
         ConfigError: names the unknown key and the nearest known one, or the bad value.
     """
-    sensors = tree.get("sensors")
-    if not isinstance(sensors, Mapping) or not sensors:
-        raise ConfigError("sensors: at least one sensor must be declared")
+    for key in tree:
+        if key in _FORMER:
+            raise ConfigError(f"{key}: no setting any more: what it set is learnt while tracking, or fixed")
+    sensors = tree.get("sensors") or {}
+    if not isinstance(sensors, Mapping):
+        raise ConfigError("sensors: must hold a mapping for each sensor")
     parts: dict[str, Any] = {
         "sensors": {
             str(name): build(SensorConfig, value, f"sensors.{name}.") for name, value in sensors.items()
@@ -109,29 +110,9 @@ def config_from_dict(tree: Mapping[str, Any]) -> Config:
     for f in dataclasses.fields(Config):
         if f.name != "sensors" and f.name in tree:
             parts[f.name] = build(hints[f.name], tree[f.name], f.name + ".")
-    sized = {"width", "height"} & set(tree.get("image") or {})
-    if sized and "input" in parts:
-        parts["input"] = dataclasses.replace(parts["input"], picture="given")
+    if {"width", "height"} & set(tree.get("image") or {}):
+        parts["input"] = dataclasses.replace(parts.get("input", InputConfig()), picture="given")
     return Config(**parts)
-
-
-def _assume(tree: dict[str, Any], known: set[str]) -> None:
-    """Fill in what is assumed of sensors that a preset does not know, where they do not say otherwise.
-
-    Where undeclared sensors are declared by what is seen of them, whoever declares one by its rate alone says
-    nothing else of it, so all else is as for an undeclared one.
-
-    Args:
-        tree: nested mappings, changed.
-        known: names of the sensors that the preset itself declares.
-    """
-    sensors, given = tree.get("sensors"), build(InputConfig, tree.get("input", {}), "input.")
-    if given.undeclared == "declare" and isinstance(sensors, dict):
-        assumed = given.of_any_sensor()
-        tree["sensors"] = {
-            name: {**assumed, **value} if name not in known and isinstance(value, dict) else value
-            for name, value in sensors.items()
-        }
 
 
 def config_to_dict(config: Config) -> dict[str, Any]:
@@ -161,14 +142,11 @@ def _apply_override(tree: dict[str, Any], text: str) -> None:
         child = node.get(step)
         if child is None and node is tree:
             child = {}  # a section the preset leaves at its defaults; an unknown one is refused later
-        elif child is None and node is not tree and path[0] == "sensors" and step in _PARTS_OF_SENSOR:
-            child = {}
+        elif child is None and path[0] == "sensors":
+            child = {}  # a sensor that is declared by this alone, or a part of one
         elif child is None:
             near = difflib.get_close_matches(step, [str(k) for k in node], 1)
             hint = f"; did you mean {near[0]}?" if near else ""
-            if not hint and path[0] == "sensors":
-                rate = "" if last == "rate_hz" else "rate_hz: 20, "
-                hint = f"; declare it as a whole: --set 'sensors.{step}={{{rate}{last}: {value}}}'"
             raise ConfigError(f"--set {key}: {step!r} is not declared{hint}")
         if not isinstance(child, dict):
             raise ConfigError(f"--set {key}: {step!r} has no keys below it")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from jeat_graph.config.fields import Section, choice
 
-ENGINES = ("compiled", "core", "reference", "paper")
+ENGINES = ("core", "reference", "paper")
 
 
 @dataclass(frozen=True)
@@ -14,9 +14,8 @@ class TrackerConfig(Section):
     """What computes the tracks."""
 
     engine: str = choice(
-        "compiled",
+        "core",
         ENGINES,
-        "core: one model of what a sensor says, in C++, to replace `compiled`; of the other settings "
-        "it takes the picture's size and the smoother's engine and lag alone; reference: the same in NumPy, "
-        "to be read; paper: the paper's method to the letter, with the settings of `paper`",
+        "core: the model of docs/method.md in C++; reference: the same in NumPy, to be read and stepped "
+        "through; paper: the paper's filter to the letter, with the settings of the section `paper`",
     )

@@ -55,5 +55,4 @@ def most_late_s(config: Config, sensor: str) -> float:
 
 def looked_last(tracker: Tracker) -> list[str]:
     """Names of the sensors that gave the scans of a tracker's last step."""
-    last_look = tracker.snapshot().scene.last_look
-    return [name for name, t in zip(tracker.sensor_names, last_look, strict=True) if t == tracker.time]
+    return [name for name, t in tracker.last_looks().items() if t == tracker.time]

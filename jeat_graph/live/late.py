@@ -26,10 +26,11 @@ from jeat_graph.live.repetition import Repetition
 from jeat_graph.live.rewinding import Rewinding, TakenStep
 from jeat_graph.live.time_base import Decision, TimeBase
 from jeat_graph.rig.common_picture import CommonPicture
-from jeat_graph.tracking.checkpoint import load_state, refusing_damage, save_state
+from jeat_graph.tracking.checkpoint import load_state, save_state, tracker_of
+from jeat_graph.tracking.damage import refusing_damage
 from jeat_graph.tracking.first_sight import ToldSoFar
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
-from jeat_graph.tracking.step_record import StepRecord
+from jeat_graph.tracking.model_tracker import TakenStep as StepRecord
 from jeat_graph.tracking.tracker import Tracker
 
 REWIND, SKIP, REFUSE = "rewind", "skip", "refuse"
@@ -60,10 +61,10 @@ class LiveTracker(MetSensors):
         config = tracker.config
         self.tracker = tracker
         self._told = ToldSoFar()
-        if config.input.undeclared != "declare":
+        if config.input.undeclared != "declare" or tracker.meets_as_it_goes:
             self._told.forget()
         self.policy = policy
-        self.lateness = LatenessCounter(tracker.sensor_names)
+        self.lateness = LatenessCounter(config.sensor_names)
         self.measured: list[tuple[float, RecordArray]] = []
         self._base = TimeBase(config.live.jump_s)
         self._repetition = Repetition(self._base, whole=tracker.time is None)
@@ -75,9 +76,14 @@ class LiveTracker(MetSensors):
         # Of a tracker that has taken scans: to before its time nobody can go back.
         self._begun = -math.inf if tracker.time is None else tracker.time, self._newest
         self._common = CommonPicture.of(config)
+        self.know(config)
+
+    def know(self, config: Config) -> None:
+        """Go by what a configuration says of its sensors: at first, and when one more has been met."""
         self._latency = {name: sensor.latency_s for name, sensor in config.sensors.items()}
         self._late_s = {name: most_late_s(config, name) for name in config.sensors}
-        self._keep_s = max(self._late_s.values()) + 2.0 * _ROUNDING_S if policy == REWIND else 0.0
+        rewinds = self.policy == REWIND
+        self._keep_s = max(self._late_s.values(), default=0.0) + 2.0 * _ROUNDING_S if rewinds else 0.0
 
     @property
     def time(self) -> float | None:
@@ -113,7 +119,7 @@ class LiveTracker(MetSensors):
         self.meet(given)
         batch = [self._corrected(self._common.scan(scan)) for scan in given]
         for scan in batch:
-            sensor_index(scan.sensor, self.tracker.sensor_names)  # refused before anything is done
+            sensor_index(scan.sensor, self.tracker.config.sensor_names)  # refused before anything is done
         self.measured = []
         before = self.tracker.time
         repeated, new = self._repetition.sort(batch, self._was_taken)
@@ -166,8 +172,7 @@ class LiveTracker(MetSensors):
         late = not any(self._may_come(scan) for scan in batch)
         last_look = {}
         if late or not self._base.near(t, now):
-            looks = self.tracker.snapshot().scene.last_look.tolist()
-            last_look = dict(zip(self.tracker.sensor_names, looks, strict=True))
+            last_look = self.tracker.last_looks()
         decision = self._base.decide(batch, now, late, last_look)
         if decision.leapt or decision.anew:
             self._repetition.begins()
@@ -217,7 +222,7 @@ class LiveTracker(MetSensors):
         if "policy" not in state:
             raise DataError("holds a tracker, but not one that takes late scans", path)
         with refusing_damage(path):
-            live = LiveTracker(Tracker.from_state(kept, state), state["policy"])
+            live = LiveTracker(tracker_of(kept, state), state["policy"])
             live._told.forget()
             live._newest = state["newest"]
             live.lateness.set_state(state["lateness"])

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from jeat_graph.config.schema import Config
 from jeat_graph.data.scan import Scan
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.first_sight import ToldSoFar, wider
@@ -34,6 +35,9 @@ class MetSensors:
         def __init__(self, tracker: Tracker, policy: str = "rewind") -> None:
             """Make a tracker of late scans."""
 
+        def know(self, config: Config) -> None:
+            """Go by what a configuration says of its sensors."""
+
         def _hand_over(self) -> None:
             """Tell the smoothers of all that cannot be taken again."""
 
@@ -41,6 +45,11 @@ class MetSensors:
         """Declare the sensors that are met for the first time, as `Tracker.meet` does."""
         config = wider(self.tracker.config, (scan.sensor for scan in scans))
         if config is None:
+            return
+        if self.tracker.meets_as_it_goes:
+            self.tracker.meet(scans)
+            self.know(self.tracker.config)
+            self.lateness = self.lateness.among(self.tracker.config.sensor_names)
             return
         told = self._told
         if told.is_known:

@@ -94,9 +94,7 @@ def _track(job: Job) -> None:
     from jeat_graph.runs.track_files import track_files
 
     request = job.request
-    # Where smoothing has a process of its own, a recording begins anew.
-    config = load_config(request.config, request.overrides)
-    resumes = config.tracker.engine == "compiled" and not config.smoother.worker
+    resumes = load_config(request.config, request.overrides).tracker.engine == "core"
     options = replace(request.options, progress=False, resume=resumes)
     if job.camera is not None:
         options = replace(options, diagnostics=True, after=run_tables(job.camera))

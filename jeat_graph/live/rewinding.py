@@ -13,8 +13,8 @@ import numpy as np
 from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.detections import Scan
 from jeat_graph.live.identities import Identities
-from jeat_graph.tracking.snapshot import Snapshot
-from jeat_graph.tracking.step_record import StepRecord
+from jeat_graph.tracking.model_saving import ModelSnapshot
+from jeat_graph.tracking.model_tracker import TakenStep as StepRecord
 from jeat_graph.tracking.tracker import Tracker
 
 
@@ -32,7 +32,7 @@ class TakenStep:
 
     t: float
     scans: list[Scan]
-    before: Snapshot
+    before: ModelSnapshot
     taken: StepRecord | None
     known: IntArray
 
@@ -40,7 +40,7 @@ class TakenStep:
 class Mark(NamedTuple):
     """What `Rewinding.go_back` takes."""
 
-    now: Snapshot
+    now: ModelSnapshot
     steps: list[TakenStep]
     replayed: int
     identities: dict[str, Any]
@@ -60,12 +60,11 @@ class Rewinding:
     """
 
     def __init__(self, tracker: Tracker) -> None:
-        now = tracker.snapshot()
         self._tracker = tracker
         self.steps: list[TakenStep] = []
         self.replayed = 0
         self.settled = -math.inf
-        self.identities = Identities(now.tracks.track_id, now.next_id)
+        self.identities = Identities(*tracker.living())
 
     def place(self, t: float) -> int:
         """Return the place among the steps of the first that is not before a time (s)."""
@@ -107,8 +106,8 @@ class Rewinding:
             raise
         again = self.steps[k:]
         known = [step.known for step in again]
-        births = before.next_id, tracker.num_born + 1
-        known = self.identities.follow(*births, takers, known, self.steps[0].before.next_id)
+        births = before.living()[1], tracker.num_born + 1
+        known = self.identities.follow(*births, takers, known, self.steps[0].before.living()[1])
         for step, identities in zip(again, known, strict=True):
             step.known = identities
         self.replayed += len(again) - 1
@@ -122,8 +121,8 @@ class Rewinding:
             self.settled = step.t
         del self.steps[:count]
         if count:
-            oldest = self.steps[0].before if self.steps else self._tracker.snapshot()
-            self.identities.forget(oldest.tracks.track_id, oldest.next_id)
+            oldest = self.steps[0].before if self.steps else self._tracker
+            self.identities.forget(*oldest.living())
 
     def mark(self) -> Mark:
         """Return what `go_back` needs."""

@@ -17,7 +17,7 @@ from jeat_graph.live.late import LiveTracker
 from jeat_graph.live.messages import Duplicates, ScanMessage
 from jeat_graph.live.told import Told
 from jeat_graph.live.transport.patience import UnconfirmedError
-from jeat_graph.tracking.checkpoint import refusing_damage
+from jeat_graph.tracking.damage import refusing_damage
 from jeat_graph.version import __version__
 
 #: Smoothed rows are fetched, and the sensors judged, at one arrival in so many.

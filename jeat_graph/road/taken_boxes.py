@@ -15,16 +15,16 @@ from jeat_graph.road.box_rows import BoxConfig, SensorErrors, rows_of_log
 from jeat_graph.road.boxes_road import TrackBoxes, each_track
 from jeat_graph.road.camera import RoadCamera
 
+# Of the variance of real detectors' boxes about half persists for half a second to a second (s).
+_LASTING_SHARE, _MEMORY_S = 0.5, 0.7
 _SAME_TRACK = 0.5  # share of a fragment's detections that lie on a track for it to be a part of it
 _FEW = 3  # fewer detections in a row that lie beside their track's boxes are errors, not another's
 
 
 def sensor_errors(config: Config) -> SensorErrors:
-    """Memory of the sensors' errors as a configuration has it, in the tracker's order of sensors."""
-    sensors = [config.sensors[name] for name in config.sensor_names]
-    return SensorErrors(
-        np.array([one.memory_s for one in sensors]), np.array([one.correlated_share for one in sensors])
-    )
+    """Memory of the errors of a configuration's sensors, in the order of their names."""
+    count = len(config.sensor_names)
+    return SensorErrors(np.full(count, _MEMORY_S), np.full(count, _LASTING_SHARE))
 
 
 def boxes_of_log(

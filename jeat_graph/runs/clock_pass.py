@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jeat_graph.config.schema import Config
+from jeat_graph.config.schema import Config, SensorConfig
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
@@ -136,7 +136,7 @@ def with_clocks(
                 "same in all recordings: that is no setting of the sensor, and left out"
             )
             continue
-        known = sensors.get(sensor, config.input.undeclared_sensor())
+        known = sensors.get(sensor, SensorConfig())
         sensors[sensor] = replace(known, latency_s=round(float(np.median(lags)), 4))
     return replace(config, sensors=sensors), lines
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config, SensorConfig
-from jeat_graph.config.slow_scans import fastest_hz, for_slow_scans
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.rates import median_rate_hz
@@ -46,14 +45,6 @@ def fit_input(config: Config, *recordings: Detections) -> tuple[Config, list[str
     notes: list[str] = []
     if config.input.undeclared == "declare" and any(d.num_scans for d in recordings):
         config, notes = _declare_sensors(config, recordings)
-    if config.input.slow_scans == "bound" and config.sensors:
-        slow = for_slow_scans(config)
-        if slow != config:
-            notes.append(
-                f"scans come at {fastest_hz(config):.3g} Hz: among others, what moves further than about its "
-                "own length between two of them may be lost"
-            )
-        config = slow
     if config.output.clip and config.input.picture == "given" and _reach_beyond(config, recordings):
         config = replace(config, output=replace(config.output, clip=False))
         notes.append("boxes reach beyond the picture: tracks are not clipped to it either")
@@ -121,7 +112,7 @@ def _declare_sensors(config: Config, recordings: Sequence[Detections]) -> tuple[
     sensors: dict[str, SensorConfig] = {}
     for name in sorted({name for d in recordings for name in d.sensors}):
         known = config.sensors.get(name)
-        sensor = config.input.undeclared_sensor() if known is None else known
+        sensor = SensorConfig() if known is None else known
         rate = scan_rate_hz(recordings, name)
         other = rate is not None and not 1.0 / _SAME_RATE < rate / sensor.rate_hz < _SAME_RATE
         if rate is not None and (known is None or other):
@@ -131,9 +122,7 @@ def _declare_sensors(config: Config, recordings: Sequence[Detections]) -> tuple[
         elif other:
             notes.append(f"sensor {name!r} scans at {rate:.3g} Hz, not at {known.rate_hz:g}")
         sensors[name] = sensor
-    association = config.association
-    priority = tuple(name for name in association.priority if name in sensors)
-    return replace(config, sensors=sensors, association=replace(association, priority=priority)), notes
+    return replace(config, sensors=sensors), notes
 
 
 def scan_rate_hz(recordings: Sequence[Detections], sensor: str) -> float | None:

@@ -1,4 +1,4 @@
-"""All that the tracks of a run took in, for other smoothers: as the run kept it, or tracked again."""
+"""What a run's tracks took in, and how its filter went through them: kept by the run, or tracked again."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, RecordArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError, DataError
-from jeat_graph.data.measured_track import MeasuredTrack
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.io.beside import check_beside
 from jeat_graph.io.hashing import sha256_of
@@ -22,23 +21,24 @@ from jeat_graph.rig.common_picture import by_recorded_ways
 from jeat_graph.runs.directory import MEASUREMENTS, RUN_JSON, read_record
 from jeat_graph.runs.inputs import find_input
 from jeat_graph.runs.latency import at_measurement, taken_off
+from jeat_graph.smoothers.filtered_track import FilteredTrack
 
 if TYPE_CHECKING:
     from jeat_graph.eval.compare import Comparison
 
 
 class MeasuredRun(NamedTuple):
-    """A run with all that its confirmed tracks took in.
+    """A run with the records of its filter.
 
     Attributes:
-        tracks: confirmed tracks with their measurements.
+        tracks: the reported tracks, as the filter went through them.
         causal: the causal table, with the same identities.
         instants: (I,) times at which the tracker gave output (s), or None if that is not known.
         sensors: names of the sensors.
         image: width and height of the picture (px), or None if that is not known.
     """
 
-    tracks: list[MeasuredTrack]
+    tracks: list[FilteredTrack]
     causal: Trajectories
     instants: FloatArray | None
     sensors: tuple[str, ...]
@@ -46,25 +46,23 @@ class MeasuredRun(NamedTuple):
 
 
 def measured_run(folder: Path, moved: list[str] | None = None, *, progress: bool = False) -> MeasuredRun:
-    """Return a run's measurements: from `measurements.parquet` if it kept them, else by tracking again.
+    """Track a run's inputs again, for the records of its filter.
 
     Args:
         folder: the run directory.
-        moved: where the inputs are now, in their order; they are then tracked again in any case.
+        moved: where the inputs are now, in their order, if not where they were.
         progress: whether to show a progress bar on stderr while tracking.
 
     Raises:
-        DataError: there is no run, or a file of it, or an input, is missing or has changed since.
+        DataError: there is no run, or an input is missing or has changed since.
+        ConfigError: its engine keeps no such records.
     """
-    record = _complete_record(folder)
-    if moved is None and MEASUREMENTS in record["files"]:
-        return _kept(folder, record)
-    config, detections = recorded_inputs(folder, record, moved)
+    config, detections = recorded_inputs(folder, complete_record(folder), moved)
     return track_measured(config, detections, progress=progress)
 
 
 def track_measured(config: Config, detections: Detections, *, progress: bool = False) -> MeasuredRun:
-    """Track a recording, and keep all that its confirmed tracks took in.
+    """Track a recording, and keep the records of the filter.
 
     Args:
         config: of this recording.
@@ -114,7 +112,7 @@ def measurement_rows(folder: Path, *, progress: bool = False) -> tuple[RecordArr
     from jeat_graph.io.measurements_io import read_measurements
     from jeat_graph.tracking.records import record_measurements
 
-    record = _complete_record(folder)
+    record = complete_record(folder)
     if MEASUREMENTS in record["files"]:
         config = _config_of(folder, record)
         _unchanged(folder / MEASUREMENTS, record)
@@ -131,26 +129,11 @@ def _unchanged(path: Path, record: dict[str, Any]) -> None:
         raise DataError("has changed since the run; track it again", path)
 
 
-def _kept(folder: Path, record: dict[str, Any]) -> MeasuredRun:
-    from jeat_graph.io.measurements_io import read_measurements
-    from jeat_graph.io.trajectories_io import read_trajectories
-    from jeat_graph.tracking.measured import measured_tracks
-
-    config = _config_of(folder, record)
-    table = folder / "causal.csv"
-    for path in (folder / MEASUREMENTS, table):
-        _unchanged(path, record)
-    rows = read_measurements(folder / MEASUREMENTS, config.sensor_names)
-    tracks = measured_tracks(rows, config)
-    causal, instants = read_trajectories(table), read_instants(folder)
-    return MeasuredRun(tracks, causal, instants, config.sensor_names, _image(config))
-
-
 def _image(config: Config) -> tuple[float, float]:
     return config.image.width, config.image.height
 
 
-def _complete_record(folder: Path) -> dict[str, Any]:
+def complete_record(folder: Path) -> dict[str, Any]:
     """Return `run.json`, with all that is needed of it."""
     path = folder / RUN_JSON
     record = read_record(folder)

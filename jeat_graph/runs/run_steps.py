@@ -24,7 +24,8 @@ from jeat_graph.runs.latency import late_clocks
 from jeat_graph.runs.run_options import RunOptions, RunRecord
 from jeat_graph.runs.unfinished import UnfinishedRun
 from jeat_graph.tracking.measured import ConfirmedMeasurements
-from jeat_graph.tracking.state_check import refusing_damage
+from jeat_graph.tracking.checkpoint import tracker_of
+from jeat_graph.tracking.damage import refusing_damage
 from jeat_graph.tracking.tracker import Tracker
 
 #: So many steps go by before smoothed rows that have become final are written.
@@ -57,8 +58,6 @@ class RunSteps:
         record: RunRecord,
         options: RunOptions,
     ) -> None:
-        if options.resume and config.smoother.worker:
-            raise ConfigError("--resume does not go with smoother.worker: its state is in another process")
         self._detections, self._config, self._run = detections, config, run
         self._record, self._options = record, options
         self._instants = np.unique(detections.scan_t)
@@ -74,13 +73,13 @@ class RunSteps:
             raise ConfigError(
                 f"--resume does not go with tracker.engine={config.tracker.engine}: it is not saved"
             )
-        if len(self._instants) > STEPS_PER_SAVE and not config.smoother.worker and self._tracker.can_save:
+        if len(self._instants) > STEPS_PER_SAVE and self._tracker.can_save:
             self._unfinished = UnfinishedRun(run.folder / RESUME, self._identity())
             saved = self._unfinished.load() if options.resume else None
         self._kept: ConfirmedMeasurements | None = None
         with refusing_damage(run.folder / RESUME):
             if saved is not None:
-                self._tracker = Tracker.from_state(config, saved["tracker"])
+                self._tracker = tracker_of(config, saved["tracker"])
                 self._done, self._rows = saved["done"], saved["counts"]
                 self._reported = set(saved["reported"].tolist())
             if options.diagnostics:

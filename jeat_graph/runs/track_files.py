@@ -162,7 +162,6 @@ def track_files(
     from jeat_graph.runs.directory import RunDirectory
     from jeat_graph.runs.input_checks import check_detections, check_units
     from jeat_graph.runs.latency import at_measurement
-    from jeat_graph.tracking.notice import notice_if_cold
 
     begin = time.perf_counter()
     config, notes = request.configured()
@@ -198,8 +197,6 @@ def track_files(
     detections = at_measurement(detections, config)
     record.timings["read_s"] = round(time.perf_counter() - begin, 4)
     record.counts = {"scans": detections.num_scans, "detections": len(detections)}
-    if config.tracker.engine == "compiled":
-        notice_if_cold()
     with directory:
         write_run(detections, config, directory, record, request.options)
     return record

@@ -17,7 +17,7 @@ from jeat_graph.data.errors import DataError, JeatGraphError, OtherRunError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.packing import pack, plain_codec, unpack
 from jeat_graph.tracking.checkpoint import load_state, save_state
-from jeat_graph.tracking.state_check import refusing_damage
+from jeat_graph.tracking.damage import refusing_damage
 
 _STATE, _ROWS = "state.npz", "rows.bin"
 _CODECS = {kind.__name__: plain_codec(kind) for kind in (Trajectories, Diagnostics)}

@@ -23,7 +23,6 @@ from jeat_graph.data.embeddings import EmbeddingArray, join_embeddings
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.scan import Scan
 from jeat_graph.tracking.by_track import carried_over, places
-from jeat_graph.tracking.update_log import UpdateLog
 
 _KEPT = 0.9  # of a track's mean from one detection to the next
 # Before anything was seen, cosines of one vehicle and of two are alike: this many of each, spread so widely.
@@ -57,6 +56,12 @@ class Looks(NamedTuple):
             return self
         living = living.copy()
         return Looks(living, carried_over(self.mean, self.track_id, living), self.moments)
+
+    def among(self, num_sensors: int) -> Looks:
+        """Return the same where there are more sensors, which have seen nothing yet."""
+        more = num_sensors - len(self.moments)
+        mean = np.pad(self.mean, ((0, 0), (0, more), (0, 0)))
+        return Looks(self.track_id, mean, np.pad(self.moments, ((0, more), (0, 0), (0, 0))))
 
     def ratio(self) -> tuple[FloatArray, FloatArray]:
         """Return the slope (S,) of ln of the likelihood ratio over the cosine, and where (S,) that is 0."""
@@ -122,16 +127,15 @@ def compare(looks: Looks, embeddings: EmbeddingArray, sensor: IntArray, most: fl
     return Compared(looks, found, sensor, cosine, np.clip(ratio, -most, most))
 
 
-def remember(compared: Compared, log: UpdateLog, living: IntArray) -> Looks:
+def remember(compared: Compared, takers: IntArray, detection: IntArray, living: IntArray) -> Looks:
     """Return what is known after a step.
 
     Args:
         compared: its detections beside the tracks before it.
-        log: what the tracks took in of them.
+        takers: (K,) tracks that took a detection each.
+        detection: (K,) its index among all.
         living: (N,) the tracks after it, ascending.
     """
-    taken = int(log.count[0])
-    takers, detection = log.rows["track_id"][:taken], log.detection[:taken]
     now = compared.looks.of(living)
     mean, found = now.mean.copy(), compared.embeddings
     row, there = places(takers, living)

@@ -1,8 +1,7 @@
 """The state of a tracker, smoothers included, in one file from which it goes on as if nothing had happened.
 
 The file is an `.npz` of two arrays: a text that says what is there, and a block with all numbers. It holds
-our own arrays and nothing of GTSAM's: the windows inside GTSAM are built anew from them, in the tracker that
-was saved and in the one that is loaded alike, so that both give the same bytes from there on.
+our own arrays: the tracker that was saved and the one that is loaded give the same bytes from there on.
 """
 
 from __future__ import annotations
@@ -15,114 +14,23 @@ from jeat_graph.config.reading import config_from_dict, config_to_dict
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError, JeatGraphError
-from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.packing import Codec, pack, plain_codec, unpack
 from jeat_graph.io.state_file import read_state_file, write_state_file
-from jeat_graph.smoothers.engine import WholeTrackSmoother
-from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
-from jeat_graph.smoothers.track_data import Prior, SmoothedTrack
-from jeat_graph.smoothers.window import Window
 from jeat_graph.tracking.appearance import Looks
-from jeat_graph.tracking.classes import ClassTally, Votes
+from jeat_graph.tracking.classes import ClassTally
+from jeat_graph.tracking.damage import refusing_damage
 from jeat_graph.tracking.first_sight import wider
-from jeat_graph.tracking.smoothing.behind import InProcessSmoothing
-from jeat_graph.tracking.smoothing.history import TrackHistory
-from jeat_graph.tracking.smoothing.observation_times import ObservationTimes
-from jeat_graph.tracking.smoothing.online import TrackSmoothers
-from jeat_graph.tracking.smoothing.priors import ErrorStates
-from jeat_graph.tracking.smoothing.recorder import StepRecorder
-from jeat_graph.tracking.smoothing.shares import Share
-from jeat_graph.tracking.smoothing.sizes import SizeWindow
-from jeat_graph.tracking.smoothing.waiting import WaitingRows
-from jeat_graph.tracking.snapshot import Snapshot
-from jeat_graph.tracking.state import SceneState, TrackArrays
-from jeat_graph.tracking.state_check import checked_snapshot, made_with
-from jeat_graph.tracking.state_check import refusing_damage as refusing_damage
-from jeat_graph.tracking.step_record import StepRecord
+from jeat_graph.tracking.model_measured import StepBoxes
 from jeat_graph.version import __version__
 
 #: Raised with every change of what is saved: a file of another format is refused, not guessed at.
-FORMAT = 26
+FORMAT = 27
 _MAGIC, _WHAT = "jeat-graph tracker", "saved tracker"
-_PLAIN = (
-    ClassTally,
-    InProcessSmoothing,
-    Looks,
-    ObservationTimes,
-    Prior,
-    Scan,
-    SceneState,
-    SizeWindow,
-    SmoothedTrack,
-    StepRecord,
-    StepRecorder,
-    TrackArrays,
-    TrackHistory,
-    TrackSmoothers,
-    Trajectories,
-    Votes,
-    WholeTrackSmoother,
-)
 
 
-def pack_smoothers(config: Config, smoothers: TrackSmoothers) -> tuple[str, bytes]:
-    """Return the state of smoothers as plain text and bytes; they themselves stay as they are."""
-    return pack(smoothers, _codecs(config, forget=False))
-
-
-def unpack_smoothers(config: Config, state: tuple[str, bytes]) -> TrackSmoothers:
-    """Make smoothers of what `pack_smoothers` returned."""
-    made: TrackSmoothers = unpack(*state, _codecs(config))
-    return made
-
-
-def _codecs(config: Config, forget: bool = True) -> dict[str, Codec]:
-    """All classes that a file may name; `forget` has the saved smoothers build GTSAM's windows anew too."""
-    plain = {kind.__name__: _whole_codec(kind) for kind in _PLAIN}
-    lag = plain_codec(FixedLagSmoother)
-
-    def lag_apart(one: FixedLagSmoother) -> dict[str, Any]:
-        if forget:
-            one.forget_gtsam()
-        return one.saved()
-
-    return plain | {
-        "Snapshot": Codec(
-            Snapshot,
-            lambda one: one._asdict(),
-            lambda saved: checked_snapshot(Snapshot(**saved), config),
-        ),
-        "FixedLagSmoother": Codec(FixedLagSmoother, lag_apart, lag.together),
-        "Window": Codec(Window, Window.saved, Window.from_saved),
-        "WaitingRows": Codec(WaitingRows, _rows_apart, lambda saved: _rows_together(config, saved)),
-        "Share": Codec(Share, Share.saved, Share.from_saved),
-        "Config": Codec(type(config), lambda _: {}, lambda _: config),
-        "ErrorStates": Codec(ErrorStates, lambda _: {}, lambda _: ErrorStates.of(config)),
-    }
-
-
-def _whole_codec(kind: type[Any]) -> Codec:
-    """Codec of objects that are their attributes, all of which must be there."""
-    plain, needed = plain_codec(kind), made_with(kind)
-
-    def together(saved: dict[str, Any]) -> Any:
-        missing = needed - saved.keys()
-        if missing:
-            raise DataError(f"is damaged: {kind.__name__} without {min(missing)}")
-        return plain.together(saved)
-
-    return Codec(kind, plain.apart, together)
-
-
-def _rows_apart(rows: WaitingRows) -> dict[str, Any]:
-    return {"tables": rows.peek()}
-
-
-def _rows_together(config: Config, saved: dict[str, Any]) -> WaitingRows:
-    rows = WaitingRows(config.sensor_names)
-    for table in saved["tables"]:
-        rows.append(table)
-    return rows
+def _codecs() -> dict[str, Codec]:
+    """All classes that a file may name."""
+    return {kind.__name__: plain_codec(kind) for kind in (ClassTally, Looks, Scan, StepBoxes)}
 
 
 def save_state(path: str | Path, config: Config, state: dict[str, Any]) -> None:
@@ -135,13 +43,8 @@ def save_state(path: str | Path, config: Config, state: dict[str, Any]) -> None:
         path: the file.
         config: the configuration of the tracker.
         state: what to keep, of plain data and the classes that `_codecs` names.
-
-    Raises:
-        JeatGraphError: the smoothers are in a process of their own.
     """
-    if config.smoother.worker:
-        raise JeatGraphError("a smoothing worker's state cannot be saved: set smoother.worker to false")
-    text, block = pack(state, _codecs(config))
+    text, block = pack(state, _codecs())
     described = _head(config) + b"\n" + text.encode()
     write_state_file(path, described, block)
 
@@ -202,7 +105,7 @@ def load_state(path: str | Path, config: Config | None = None) -> tuple[Config, 
         kept = config_from_dict(settings)
         if config is not None and config.sensors.keys() == kept.sensors.keys():
             kept = config
-        state = unpack(text, block, _codecs(kept))
+        state = unpack(text, block, _codecs())
         if not isinstance(state, dict):
             raise DataError("is damaged: it holds no state")
     return kept, state
@@ -215,3 +118,33 @@ def _difference(saved: Any, wanted: Any, where: str = "") -> str:
             if saved.get(key) != wanted.get(key):
                 return _difference(saved.get(key), wanted.get(key), f"{where}.{key}" if where else str(key))
     return f"{where} was {saved}, not {wanted}"
+
+
+def tracker_of(config: Config, state: dict[str, Any]) -> Any:
+    """Make the tracker of the engine that a state was saved by, of what its `state` returned.
+
+    Raises:
+        DataError: no tracker can be in that state.
+    """
+    from jeat_graph.tracking.tracker import Tracker
+
+    return Tracker.from_state(config, state)
+
+
+def load_tracker(path: str | Path, config: Config | None = None) -> Any:
+    """Return the tracker that was saved to a file, of whatever engine.
+
+    Args:
+        path: the file.
+        config: the configuration that it must have had; None takes the file's.
+
+    Raises:
+        DataError: no such file, or one that holds no tracker, or one that takes late scans.
+        JeatGraphError: it was saved by another version, or with other settings.
+    """
+    kept, state = load_state(path, config)
+    if "policy" in state:
+        # Scans that may be taken again are apart there, and identities are not those that were given out.
+        raise DataError("holds a tracker that takes late scans; LiveTracker.load goes on from it", path)
+    with refusing_damage(path):
+        return tracker_of(kept, state)

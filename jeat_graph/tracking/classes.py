@@ -18,7 +18,6 @@ from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.to_supervision import numbered
 from jeat_graph.tracking.by_track import carried_over, places
-from jeat_graph.tracking.update_log import UpdateLog
 
 #: Most names of classes that are kept; the largest data sets of detectors have 1,200.
 MOST_CLASSES = 4096
@@ -171,24 +170,3 @@ def number_classes(known: dict[str, int], batch: Sequence[Scan]) -> dict[str, in
     del out[""]
     return out
 
-
-def count_votes(
-    tally: ClassTally | None, batch: Sequence[Scan], log: UpdateLog, living: IntArray
-) -> tuple[ClassTally | None, Votes | None]:
-    """Let the detections that tracks took in a step say what these are.
-
-    Args:
-        tally: the votes before, or None if there has been none.
-        batch: scans of the step.
-        log: what the tracks took in of them.
-        living: (N,) tracks after the step, ascending; copied where it is kept.
-
-    Returns:
-        The votes after the step, and those of the step alone: None where no class has been named.
-    """
-    taken = int(log.count[0])
-    votes = Votes.of_batch(batch, log.detection[:taken])
-    if votes is None and tally is None:
-        return None, None
-    before = ClassTally.start() if tally is None else tally
-    return before.after(living, log.rows["track_id"][:taken], votes), votes

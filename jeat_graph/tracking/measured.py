@@ -10,11 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import IntArray, RecordArray
-from jeat_graph.data.measured_track import MeasuredTrack
 from jeat_graph.filters.measurement import MEASUREMENT
-from jeat_graph.tracking.smoothing.priors import ErrorStates, track_data
 from jeat_graph.tracking.tracker import Tracker
 
 
@@ -55,20 +52,3 @@ class ConfirmedMeasurements:
         self._confirmed = [np.intersect1d(confirmed, self._living)]
         return np.asarray(rows[chosen])
 
-
-def measured_tracks(rows: RecordArray, config: Config) -> list[MeasuredTrack]:
-    """Return confirmed tracks with their measurements, by identity, ascending.
-
-    Args:
-        rows: (M,) records (`MEASUREMENT`), each track's in order of time, its birth first.
-        config: the configuration that they were tracked with.
-    """
-    errors = ErrorStates.of(config)
-    rows = rows[np.argsort(rows["track_id"], kind="stable")]
-    cuts = np.flatnonzero(np.diff(rows["track_id"])) + 1
-    out = []
-    for part in np.split(rows, cuts) if len(rows) else []:
-        sensor = part["sensor"].copy()
-        identity = int(part["track_id"][0])
-        out.append(MeasuredTrack(identity, track_data(part, errors), sensor[1:], int(sensor[0])))
-    return out

@@ -7,54 +7,82 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, NoReturn, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
-import numpy.typing as npt
 
 from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config
 from jeat_graph.core import _core
-from jeat_graph.data.arrays import IntArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, RecordArray
 from jeat_graph.data.detections import Detections, Scan
-from jeat_graph.data.embeddings import unit_embeddings
+from jeat_graph.data.diagnostics import Diagnostics
 from jeat_graph.data.errors import DataError, JeatGraphError, TimeOrderError
-from jeat_graph.data.interop import boxes_of
+from jeat_graph.data.scan import time_of
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.filters import box_sides, singer
+from jeat_graph.filters import singer
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.filters.score_calibration import logit
-from jeat_graph.tracking.classes import ClassTally, Votes, check_names
+from jeat_graph.rig.common_picture import CommonPicture
+from jeat_graph.tracking.appearance import Compared, Looks, compare, embeddings_of, remember
+from jeat_graph.tracking.classes import ClassTally, Votes, check_names, number_classes
+from jeat_graph.tracking.first_sight import wider
+from jeat_graph.tracking.hypotheses import Hypotheses, hypotheses_of
+from jeat_graph.tracking.input_watch import InputWatch
+from jeat_graph.tracking.model_measured import StepBoxes, diagnostics_of, records_of
+from jeat_graph.tracking.model_saving import ModelSnapshot, SavedModel
+from jeat_graph.tracking.model_tables import in_order, table_of, with_classes
+from jeat_graph.tracking.prediction import Prediction, of_motion, predicted, still_there
 from jeat_graph.tracking.reference_model import ModelRows, ReferenceModel
-from jeat_graph.tracking.scans import ScanLike, as_scans
+from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
 from jeat_graph.tracking.sensor_state import SensorState
+from jeat_graph.tracking.updates import Updates
 
 #: Most sensors: the columns of `Trajectories.used` are the bits of a signed number.
 _MOST_SENSORS = 63
-_MOTION = [singer.POSITION, singer.VELOCITY, singer.ACCELERATION]
+#: Greatest absolute value of ln of what looks say of a pair.
+_MOST_ALIKE = 6.0
+_FINISHED = "this tracker has been finished; make another one for another recording"
 
 
-class ModelTracker:
+class TakenStep(NamedTuple):
+    """A step that the smoothers are to be told of when nothing can come before it any more.
+
+    Attributes:
+        record: the model's, of N tracks.
+        ids: (N,) their identities.
+        label: (N,) numbers of their classes, or None.
+        share: (N,) of the votes that speak for these, or None.
+        given: (N,) identities that the tables are to have in their place, or None.
+    """
+
+    record: Any
+    ids: IntArray
+    label: IntArray | None = None
+    share: FloatArray | None = None
+    given: IntArray | None = None
+
+
+class ModelTracker(Updates, SavedModel):
     """The model as a tracker.
 
     Sensors have any names and are known from their first scan on. Boxes are reported as they are, beyond the
-    picture too. Of the configuration it takes the size of the picture, if that was given, and the smoother
-    (with a fixed lag rows are final after twice `smoother.lag_s`, else when their track has ended).
+    picture too. Of the configuration it takes the size of the picture, if that was given, the smoother (with
+    a fixed lag rows are final after twice `smoother.lag_s`, else when their track has ended), and of a sensor
+    its own picture, what kind it is and at which score its boxes are as likely real as not.
 
     Args:
         config: a configuration, the name of a preset, or of a YAML file.
         image: width and height of the picture (px), also as "1920x1080".
-        diagnostics: must be False.
+        diagnostics: take down how well each detection fitted its track, for `last_updates`.
         engine: "core" or "reference", which smooths whole tracks only.
         constants: of the model.
-
-    Raises:
-        JeatGraphError: diagnostics are asked for.
     """
 
-    #: Whether a run that was broken off can go on: it cannot yet.
-    can_save = False
+    #: Whether a sensor that is met late changes nothing of what was before.
+    meets_as_it_goes = True
 
     def __init__(
         self,
@@ -65,22 +93,29 @@ class ModelTracker:
         engine: str = "core",
         constants: ModelConstants | None = None,
     ) -> None:
-        self._engine = engine
-        if diagnostics:
-            self._refuse("diagnostics")
-        self.config = config = as_config(config, image)
+        config = as_config(config, image)
+        if config.tracker.engine != engine:
+            config = replace(config, tracker=replace(config.tracker, engine=engine))
+        self.config = config
         self.constants = constants or ModelConstants()
         self.sensor_names: tuple[str, ...] = ()
+        self.logs_takers = True
+        self._diagnostics = diagnostics
         self._smooths = config.smoother.engine != "none"
         # The core's has the methods of the reference.
         make = cast(type[ReferenceModel], _core.tracking.Model) if engine == "core" else ReferenceModel
         known = config.input.picture == "given"
         size = (float(config.image.width), float(config.image.height)) if known else (1.0, 1.0)
         self._model = make(self.constants, *size, known, self._lag_s())
-        self._t: float | None = None
+        self._common = CommonPicture.of(config)
+        self._watch = InputWatch(config)
         self._classes: ClassTally | None = None
-        self._called: dict[int, tuple[str, float]] = {}  # class and its share of each track so far
-        self._causal = Trajectories.empty()
+        self._class_ids: dict[str, int] = {}
+        self._called: list[str] = []  # names of classes by number
+        self._looks: Looks | None = None
+        self._causal: Trajectories | None = None
+        self._order: IntArray = np.zeros(0, dtype=np.int64)
+        self._boxes = StepBoxes.none()
         self._finished = False
 
     @property
@@ -94,9 +129,14 @@ class ModelTracker:
         return self._model.born()
 
     @property
+    def has_diagnostics(self) -> bool:
+        """Whether `last_updates` and `last_measurements` have something to say."""
+        return self._diagnostics
+
+    @property
     def time(self) -> float | None:
         """Time of the last step (s), or None before the first."""
-        return self._t
+        return self._model.time()
 
     @property
     def smoother_counts(self) -> dict[str, int]:
@@ -107,55 +147,188 @@ class ModelTracker:
         """Take in one scan, or several of one and the same time; see `Tracker.step`.
 
         Raises:
-            DataError: boxes or scores that are not valid, embeddings, or too many sensors.
-            TimeOrderError: a time before that of the last step. In both cases the state is as before.
+            DataError: boxes, scores or embeddings that are not valid, or too many sensors.
+            UnknownSensorError: a sensor that the configuration does not declare, if it has such refused.
+            TimeOrderError: a time before that of the last step. In all three cases the state is as before.
             JeatGraphError: after `finish`.
         """
-        if self._finished:
-            raise JeatGraphError("this tracker has been finished; make another one for another recording")
         batch = as_scans(scans)
-        t = float(batch[0].t)
-        if self._t is not None and t < self._t:
-            raise TimeOrderError(f"scan at t = {t} s is older than the last one at {self._t} s")
-        if any(scan.embeddings is not None for scan in batch):
-            raise DataError("this engine compares no embeddings; leave them or the engine away")
+        self.meet(batch)
+        if self._common.ways:
+            batch = [self._common.boxes(scan) for scan in batch]
+        self._take_in(batch)
+        if self._smooths:
+            self._model.hand_over(None, None, *self._called_now())
+        return self.causal()
+
+    def take_in(self, batch: Sequence[Scan]) -> TakenStep | None:
+        """Do a step for a caller who may have to take it back, and hands it to the smoothers later.
+
+        Args:
+            batch: scans of one and the same time, in the common picture.
+
+        Returns:
+            What `hand_over` takes; None without a smoother. `causal` has the tracks that are reported.
+
+        Raises:
+            DataError, UnknownSensorError, TimeOrderError: as `step`.
+            JeatGraphError: after `finish`.
+        """
+        self.meet(batch)
+        self._take_in(batch)
+        if not self._smooths:
+            return None
+        return TakenStep(self._model.record(), self._model.living(), *self._called_now())
+
+    def _take_in(self, batch: Sequence[Scan]) -> None:
+        if self._finished:
+            raise JeatGraphError(_FINISHED)
+        t, now = float(batch[0].t), self.time
+        if now is not None and t < now:
+            raise TimeOrderError(f"scan at t = {t} s is older than the last one at {now} s")
         check_names(self._classes, batch)
+        embeddings = embeddings_of(self._looks, batch)
+        self._watch.look(batch)  # before anything changes: a user may have made warnings errors
         self._declare(batch)
         # Several scans of one sensor at one time are one.
-        sensor = np.repeat([self.sensor_names.index(s.sensor) for s in batch], [len(s) for s in batch])
+        codes = [self.sensor_names.index(scan.sensor) for scan in batch]
+        sensor = np.repeat(codes, [len(scan) for scan in batch]).astype(np.int64)
         order = np.argsort(sensor, kind="stable")
-        looking = np.array(sorted({self.sensor_names.index(s.sensor) for s in batch}), dtype=np.int64)
-        boxes = np.concatenate([s.boxes for s in batch])[order]
-        scores = np.concatenate([s.scores for s in batch])[order]
+        looking = np.array(sorted(set(codes)), dtype=np.int64)
+        boxes = np.concatenate([scan.boxes for scan in batch])[order]
+        scores = np.concatenate([scan.scores for scan in batch])[order]
         numbers = np.bincount(sensor, minlength=len(self.sensor_names))[looking].astype(np.int64)
         sides = np.concatenate([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]], axis=1)
-        self._model.take(t, looking, numbers, sides, logit(scores))
-        self._t = t
-        taker = np.zeros(len(boxes), dtype=np.int64)
-        taker[order] = self._model.takers()
-        self._count_classes(batch, taker)
-        self._causal = self._table(self._model.rows())
-        return self._causal
+        compared = None if embeddings is None else self._compare(embeddings, sensor)
+        alike = None if compared is None else np.ascontiguousarray(compared.log_ratio[:, order])
+        self._model.take(t, looking, numbers, sides, logit(scores), alike)
+        self._order, self._causal = order, None
+        if self._diagnostics:
+            self._boxes = StepBoxes(t, sensor[order], boxes)
+        self._count_classes(batch)
+        if compared is not None:
+            detection = np.arange(len(order), dtype=np.int64)
+            self._looks = remember(compared, self.takers(len(order)), detection, self._model.identities())
 
-    def update(
-        self,
-        source: Any,
-        *,
-        t: float,
-        sensor: str,
-        scores: npt.ArrayLike | None = None,
-        classes: npt.ArrayLike | None = None,
-        embeddings: npt.ArrayLike | None = None,
-        format: str | None = None,
-    ) -> Trajectories:
-        """Take in what a detector returned for one picture; see `Tracker.update`. Embeddings are refused."""
-        found = boxes_of(source, scores, classes, format)
-        looks = None if embeddings is None else unit_embeddings(embeddings, len(found.kept))[found.kept]
-        return self.step(Scan(t, sensor, found.boxes, found.scores, found.classes, looks))
+    def hand_over(self, taken: TakenStep | None) -> None:
+        """Give the smoothers what a step took in; in order of time, and once."""
+        if taken is not None:
+            self._model.hand_over(taken.record, taken.given, taken.label, taken.share)
+
+    def snapshot(self) -> ModelSnapshot:
+        """Copy all that the next step depends on; the smoothers are not part of it."""
+        return ModelSnapshot(
+            self._model.snapshot(), self.sensor_names, self._classes, self._looks, self._order, self._boxes
+        )
+
+    def restore(self, snapshot: ModelSnapshot) -> None:
+        """Go back to a snapshot of this tracker."""
+        moment, self.sensor_names, self._classes, self._looks, self._order, self._boxes = snapshot
+        self._model.restore(moment)
+        self._causal = None
+
+    def begin_anew(self, t: float) -> None:
+        """End all tracks and let time go on from another moment, an earlier one too (s).
+
+        Identities go on, and so does what was learnt of the scene: it is as if no time had passed.
+        """
+        if self.time is not None:
+            self._model.begin_anew(t)
+            self._causal = None
+
+    def number_on_from(self, identity: int) -> None:
+        """Give no track that begins from now on an identity below this."""
+        self._model.number_on_from(identity)
+
+    def takers(self, count: int) -> IntArray:
+        """Return which track took each of the `count` detections (M,) of the last step, 0 where none did."""
+        out = np.zeros(count, dtype=np.int64)
+        if count == len(self._order):
+            out[self._order] = self._model.takers()
+        return out
+
+    def living(self) -> tuple[IntArray, int]:
+        """Return the identities (N,) of the living tracks, and that of the next one to be born."""
+        return self._model.identities(), self._model.born() + 1
+
+    def last_looks(self) -> dict[str, float]:
+        """Return when each declared sensor looked last (s), minus infinity for never."""
+        looks = np.nan_to_num(self._model.last_looks(), nan=-math.inf, neginf=-math.inf)
+        never = dict.fromkeys(self.config.sensor_names, -math.inf)
+        return never | dict(zip(self.sensor_names, looks.tolist(), strict=True))
+
+    def meet(self, scans: Sequence[Scan]) -> None:
+        """Have the configuration declare the sensors of some scans, if it lets it.
+
+        Raises:
+            UnknownSensorError: a name that is not declared and may not be, or too many sensors.
+        """
+        known = self.config.sensors
+        if all(scan.sensor in known for scan in scans):
+            return
+        config = wider(self.config, (scan.sensor for scan in scans))
+        if config is not None:
+            self.config = config
+            self._watch.know(config)
+        for scan in scans:
+            sensor_index(scan.sensor, self.config.sensor_names)
 
     def causal(self) -> Trajectories:
         """Return the tracks that are reported now, as the last step did."""
+        if self._causal is None:
+            names = None if self._classes is None else self._called
+            rows = with_classes(self._model.rows(), self._classes, self._called)
+            at = None if self.time is None else np.array([self.time])
+            table = table_of(rows, self.sensor_names, names)
+            self._causal = replace(table, instants=at, class_ids=self._class_ids or None)
         return self._causal
+
+    def predict(self, t: float) -> Prediction:
+        """Say where the tracks that are reported now will be at a time; see `Tracker.predict`.
+
+        Raises:
+            DataError: a time that is not finite.
+            TimeOrderError: a time before that of the last step.
+        """
+        t, now = time_of(t), self.time
+        if now is not None and t < now:
+            raise TimeOrderError(f"t = {t} s is before the last scan at {now} s: that is past")
+        rows = with_classes(self._model.rows(), self._classes, self._called)
+        q = singer.ProcessNoise(*self._model.learnt()["process_noise"])
+        rows, covariance = predicted(rows, self._model.covariances(), t, q, self.constants)
+        names = None if self._classes is None else self._called
+        there = still_there(rows, self._model.picture())
+        table = table_of(rows, self.sensor_names, names).take(there)
+        table = replace(table, class_ids=self._class_ids or None)
+        return Prediction(**vars(table), cov=of_motion(covariance[there]))
+
+    def last_updates(self) -> Diagnostics:
+        """Return what the last step gave to the tracks, those too that are not reported.
+
+        Raises:
+            JeatGraphError: the tracker was not made with `diagnostics`.
+        """
+        self._check_diagnostics()
+        takers, living = self._model.takers(), self._model.living()
+        return diagnostics_of(self._boxes, takers, living, self._model.fit(), self.sensor_names)
+
+    def last_measurements(self) -> tuple[RecordArray, IntArray, BoolArray]:
+        """Return what the last step gave to the tracks, for other smoothers.
+
+        Returns:
+            Records (M,) (`MEASUREMENT`), whose sensors are those of `config.sensor_names`; identities (N,) of
+            the tracks, whether each is taken for real.
+
+        Raises:
+            JeatGraphError: the tracker was not made with `diagnostics`.
+        """
+        self._check_diagnostics()
+        names = self.config.sensor_names
+        place = np.array([names.index(name) for name in self.sensor_names], dtype=np.int64)
+        told = self._boxes._replace(sensor=place[self._boxes.sensor]) if len(place) else self._boxes
+        q, fit = singer.ProcessNoise(*self._model.learnt()["process_noise"]), self._model.fit()
+        rows = records_of(told, self._model.takers(), fit, q, self.constants)
+        return rows, self._model.living(), fit[2] > self.constants.report
 
     def run(self, detections: Detections) -> Iterator[Trajectories]:
         """Step through a recording and yield the table of each time; scans of one time are taken jointly."""
@@ -169,7 +342,7 @@ class ModelTracker:
             JeatGraphError: the configuration asks for no smoother.
         """
         self._check_smooths()
-        return self._in_order(self._model.smoothed())
+        return self._smoothed_table(self._model.smoothed())
 
     def drain_smoothed(self) -> Trajectories:
         """Return the smoothed rows that are final and forget them.
@@ -178,7 +351,7 @@ class ModelTracker:
             JeatGraphError: the configuration asks for no smoother.
         """
         self._check_smooths()
-        return self._in_order(self._model.drain())
+        return self._smoothed_table(self._model.drain())
 
     def settle(self) -> None:
         """Do nothing: no smoother works behind."""
@@ -187,15 +360,22 @@ class ModelTracker:
         """End all tracks and return their smoothed trajectories; empty when called again."""
         rows = Trajectories.empty(self.sensor_names)
         if self._smooths and not self._finished:
-            rows = self._in_order(self._model.finish())
+            rows = self._smoothed_table(self._model.finish())
         self._finished = True
         return rows
 
+    def hypotheses(self) -> Hypotheses:
+        """Return what the living tracks are taken for, and why (`jeat-graph explain`)."""
+        learnt, columns = self._model.learnt(), self._model.tracks()
+        t = 0.0 if self.time is None else self.time
+        return hypotheses_of(columns, learnt, self.constants, t, self.causal().track_id)
+
     def sensor_states(self) -> dict[str, SensorState]:
-        """Return what has been learnt of each sensor, by name; offsets and lags are not told."""
+        """Return what has been learnt of each sensor, by name; lags are not told."""
         learnt = self._model.learnt()
         noise = np.exp(learnt["log_side_variance"]) / self.constants.side_std**2
         believed = 1.0 / (1.0 + np.exp(-learnt["prior_odds"]))
+        offsets = learnt["offsets"].tolist()
         return {
             name: SensorState(
                 clutter=float(learnt["leftovers"][k]),
@@ -203,37 +383,15 @@ class ModelTracker:
                 trust=float(believed[k]),
                 blind=0.0,
                 noise_scale=float(noise[k]),
+                offset_centre_share=(offsets[k][0], offsets[k][1]),
+                offset_log_size=(offsets[k][2], offsets[k][3]),
             )
             for k, name in enumerate(self.sensor_names)
         }
 
-    def save(self, path: str | Path) -> NoReturn:
-        """Refuse: see `_refuse`."""
-        self._refuse("save")
-
-    def snapshot(self) -> NoReturn:
-        """Refuse: see `_refuse`."""
-        self._refuse("snapshot")
-
-    def take_in(self, batch: Sequence[Scan]) -> NoReturn:
-        """Refuse: see `_refuse`."""
-        self._refuse("take_in")
-
-    def restore(self, snapshot: object) -> NoReturn:
-        """Refuse: see `_refuse`."""
-        self._refuse("restore")
-
-    def predict(self, t: float) -> NoReturn:
-        """Refuse: see `_refuse`."""
-        self._refuse("predict")
-
-    def _refuse(self, name: str) -> NoReturn:
-        """Say that the engine lacks something.
-
-        Raises:
-            JeatGraphError: always.
-        """
-        raise JeatGraphError(f"engine {self._engine} has no {name} yet; tracker.engine=compiled has it")
+    def learnt(self) -> dict[str, SensorState]:
+        """Return what has been learnt of each sensor, as `sensor_states` does."""
+        return self.sensor_states()
 
     def _lag_s(self) -> float:
         if not self._smooths:
@@ -244,49 +402,48 @@ class ModelTracker:
         if not self._smooths:
             raise JeatGraphError("the configuration asks for no smoother: smoother.engine is none")
 
+    def _check_diagnostics(self) -> None:
+        if not self._diagnostics:
+            raise JeatGraphError("make the tracker with diagnostics=True to be told of its updates")
+
     def _declare(self, batch: Sequence[Scan]) -> None:
         """Make the sensors known that look for the first time."""
         new = sorted({scan.sensor for scan in batch} - set(self.sensor_names))
         if len(self.sensor_names) + len(new) > _MOST_SENSORS:
             raise DataError(f"at most {_MOST_SENSORS} sensors can be tracked together")
         for name in new:
-            self._model.declare_sensor()
+            said = self.config.sensors[name]
+            even = math.nan if said.even_score is None else float(logit(np.array(said.even_score)))
+            self._model.declare_sensor(even, said.kind == "event")
             self.sensor_names = (*self.sensor_names, name)
 
-    def _count_classes(self, batch: Sequence[Scan], taker: IntArray) -> None:
-        """Let the boxes of a step vote for the classes of their tracks; ended ones keep theirs."""
-        votes = Votes.of_batch(batch, np.arange(len(taker), dtype=np.int64))
+    def _compare(self, embeddings: FloatArray, sensor: IntArray) -> Compared:
+        """Compare the embeddings (M, E) of a step's detections with the living tracks."""
+        looks, number = self._looks, len(self.sensor_names)
+        looks = looks.among(number) if looks is not None else Looks.start(number, embeddings.shape[1])
+        return compare(looks.of(self._model.identities()), embeddings, sensor, _MOST_ALIKE)
+
+    def _count_classes(self, batch: Sequence[Scan]) -> None:
+        """Let the boxes of a step vote for the classes of their tracks."""
+        self._class_ids = number_classes(self._class_ids, batch)
+        votes = Votes.of_batch(batch, np.arange(len(self._order), dtype=np.int64))
         if votes is None and self._classes is None:
             return
-        living = self._model.living()
-        self._classes = (self._classes or ClassTally.start()).after(living, taker, votes)
-        names, shares = self._classes.columns(living)
-        called = zip(names.tolist(), shares.tolist(), strict=True)
-        self._called.update(zip(living.tolist(), called, strict=True))
+        tally = self._classes or ClassTally.start()
+        self._classes = tally.after(self._model.living(), self.takers(len(self._order)), votes)
+        self._called += [name for name in self._classes.names.tolist() if name not in self._called]
 
-    def _in_order(self, rows: ModelRows) -> Trajectories:
-        """Return rows in order of time, then of identity."""
-        order = np.lexsort((rows[1], rows[0]))
-        t, ids, mean, variance, real, used = rows
-        return self._table((t[order], ids[order], mean[order], variance[order], real[order], used[order]))
+    def _called_now(self) -> tuple[IntArray | None, FloatArray | None]:
+        """Return numbers of the classes (N,) and their shares (N,) of the tracks of the last step."""
+        if self._classes is None:
+            return None, None
+        called, share = self._classes.columns(self._model.living())
+        number = {name: k for k, name in enumerate(self._called)}
+        label = np.array([number.get(name, -1) for name in called.tolist()], dtype=np.int64)
+        return label, np.nan_to_num(share)
 
-    def _table(self, rows: ModelRows) -> Trajectories:
-        """Return rows as a table."""
-        t, ids, mean, variance, real, used = rows
-        state, spread = mean.reshape(-1, 2, singer.STATES), variance.reshape(-1, 2, singer.STATES)
-        sides, size = box_sides.corners(state), singer.box_size(state)
-        called = [self._called.get(track, ("", np.nan)) for track in ids.tolist()]
-        known = self._classes is not None
-        return Trajectories(
-            t=t,
-            track_id=ids,
-            boxes=np.concatenate([sides[:, :2], size], axis=1),
-            existence=real,
-            mean=state[:, :, _MOTION].transpose(0, 2, 1).reshape(-1, 6),
-            var=spread[:, :, _MOTION].transpose(0, 2, 1).reshape(-1, 6),
-            used=used,
-            sensors=self.sensor_names,
-            classes=np.array([name for name, _ in called], dtype=np.str_) if known else None,
-            class_probability=np.array([share for _, share in called], dtype=np.float64) if known else None,
-            size_var=size**2 * spread[:, :, singer.LOG_SIZE],
-        )
+    def _smoothed_table(self, rows: ModelRows) -> Trajectories:
+        """Return rows of the smoother in order of time, then of identity."""
+        names = None if self._classes is None else self._called
+        table = table_of(in_order(rows), self.sensor_names, names)
+        return replace(table, class_ids=self._class_ids) if self._class_ids else table

@@ -6,22 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jeat_graph.association.boxes import track_boxes
-from jeat_graph.config.kernel_form import Model
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.tracking.reporting import (
-    as_table,
-    columns_of,
-    longest_gaps_s,
-    remain,
-    reported_rows,
-    written_scale,
-)
-from jeat_graph.tracking.snapshot import Snapshot
-from jeat_graph.tracking.stages.predicting import predict_all
+from jeat_graph.filters import box_sides, singer
+from jeat_graph.filters.model_constants import ModelConstants
+from jeat_graph.tracking.reference_model import ModelRows
 
-_MOTION = 3  # the errors with memory stand behind position, velocity and acceleration
+_MOTION = [singer.POSITION, singer.VELOCITY, singer.ACCELERATION]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -35,32 +26,47 @@ class Prediction(Trajectories):
     cov: FloatArray = ()  # type: ignore[assignment]
 
 
-def predict_reported(now: Snapshot, t: float, model: Model, sensors: tuple[str, ...]) -> Prediction:
-    """Predict the tracks that are reported now to time `t`, but those that will have left the picture.
+def predicted(
+    rows: ModelRows, covariances: FloatArray, t: float, q: singer.ProcessNoise, c: ModelConstants
+) -> tuple[ModelRows, FloatArray]:
+    """Predict rows of one time to another, by the filter's own model of motion.
 
     Args:
-        now: the state; it is used up.
-        t: time (s), finite and not before that of the state.
-        model: sensors and settings.
-        sensors: names of the sensors.
+        rows: the tracks (N,) now.
+        covariances: (N, 50) of these.
+        t: time (s), not before theirs.
+        q: process noise of the scene.
+        c: constants.
+
+    Returns:
+        The rows then, which no sensor has seen, and the covariances (N, 2, 5, 5).
     """
-    here = 0.0 if now.t is None else now.t
-    settings, tracks = model.settings, now.tracks
-    sections = (settings.image, settings.output)
-    gaps = longest_gaps_s(now.scene, model, here)
-    # Who is reported is decided now: what has just been detected is no less there for looking ahead.
-    boxes = track_boxes(tracks.mean[: now.num_tracks], tracks.size_mean[: now.num_tracks])
-    rows = reported_rows(tracks, boxes, here, gaps, *sections, settings.lifecycle.by_existence)
-    predict_all(tracks, now.num_tracks, max(t - here, 0.0), now.scene, model)
-    boxes = track_boxes(tracks.mean[rows], tracks.size_mean[rows])
-    left = remain(boxes, *sections)
-    rows, boxes = rows[left], boxes[left]
-    table = as_table(columns_of(tracks, rows, boxes, t, *sections), sensors, now.classes)
-    cov = np.zeros((len(table), 6, 6))
+    shape = (len(rows[0]), 2, singer.STATES)
+    mean, covariance = rows[2].reshape(shape), covariances.reshape(*shape, singer.STATES)
+    dt = float(t - rows[0][0]) if len(rows[0]) else 0.0
+    if dt > 0.0:
+        model = singer.discretise(dt, c)
+        F = singer.in_perspective(model.F, mean, dt, c)
+        mean, covariance = singer.predict(mean, covariance, model, F, q, c)
+    variance = np.diagonal(covariance, axis1=2, axis2=3).reshape(len(mean), -1)
+    flat = mean.reshape(len(mean), -1)
+    _, ids, _, _, real, used, label, share = rows
+    return (np.full(len(mean), t), ids, flat, variance, real, 0 * used, label, share), covariance
+
+
+def still_there(rows: ModelRows, picture: tuple[float, float]) -> FloatArray:
+    """Return which rows (N,) have a box that some part of the picture (px) shows."""
+    boxes = box_sides.corners(rows[2].reshape(-1, 2, singer.STATES))
+    return np.asarray(((boxes[:, 2:] > 0.0) & (boxes[:, :2] < picture)).all(axis=1))
+
+
+def of_motion(covariance: FloatArray) -> FloatArray:
+    """Return the covariance (N, 6, 6) of position, velocity and acceleration, x and y in turn, as `mean` is.
+
+    Args:
+        covariance: (N, 2, 5, 5) of the states.
+    """
+    out = np.zeros((len(covariance), 6, 6))
     for axis in range(2):
-        # D P D with a diagonal D stays positive definite, and so does what errors that last are added to.
-        D = np.ones((len(table), _MOTION))
-        D[:, 0] = np.sqrt([written_scale(cut, settings.output) for cut in tracks.cut[rows, axis]])
-        cov[:, axis::2, axis::2] = D[:, :, None] * tracks.cov[rows, axis, :_MOTION, :_MOTION] * D[:, None]
-        cov[:, axis, axis] = table.var[:, axis]
-    return Prediction(**vars(table), cov=cov)
+        out[:, axis::2, axis::2] = covariance[:, axis][:, _MOTION][:, :, _MOTION]
+    return out

@@ -51,6 +51,10 @@ _PERIOD_MEMORY = 0.9
 _GAP_PERIODS, _LONGEST_PERIOD_S = 1.5, 0.1
 # Tracks that show the camera's motion: really there, with so many detections, the last so recent (s).
 _CAMERA_DETECTIONS, _CAMERA_AGE_S = 2, 0.5
+# What an event camera misses though it is there: what moves less than this in the picture (px/s).
+_LEAST_SPEED = 10.0
+# A pair that is possible is so however little it looks alike.
+_LEAST_GAIN = 1e-9
 
 
 class AssociatedPairs(NamedTuple):
@@ -61,6 +65,7 @@ class AssociatedPairs(NamedTuple):
         ratio: (K,) ln L of each.
         p_detect: (N,) each track's own P_D.
         innovation: of all boxes from all tracks.
+        nis: (K,) squared distance of each centre in standard deviations, χ² of two degrees of freedom.
     """
 
     track: IntArray
@@ -68,6 +73,7 @@ class AssociatedPairs(NamedTuple):
     ratio: FloatArray
     p_detect: FloatArray
     innovation: box_sides.SideInnovations
+    nis: FloatArray
 
 
 class Reported(NamedTuple):
@@ -78,18 +84,23 @@ class Reported(NamedTuple):
         reported: (N,) which are reported.
         takers: per scan (M,) identity of the track that took each box; every box has one.
         records: per scan, for the smoother.
+        nis: per scan (M,) of `AssociatedPairs`, NaN where a box began a track.
+        noise_scale: per scan, variance of the sensor's sides as it was, 1 before anything was learnt.
     """
 
     tracks: ReferenceTracks
     reported: BoolArray
     takers: list[IntArray]
     records: list[FilterRecord]
+    nis: list[FloatArray]
+    noise_scale: list[float]
 
 
 def step(state: ReferenceState, t: float, scans: Sequence[SensorScan], c: ModelConstants) -> Reported:
     """Take in all scans of one time (s), at most one of each sensor."""
     state.tracks = replace(state.tracks, used=np.zeros_like(state.tracks.used))
     takers, records = [np.zeros(0, dtype=np.int64) for _ in scans], []
+    nis, noise_scale = [np.full(len(scan.boxes), np.nan) for scan in scans], [1.0 for _ in scans]
     for place in order_of_scans(state, scans):
         given = scans[place]
         clock = look(state, t, given, c)
@@ -98,7 +109,9 @@ def step(state: ReferenceState, t: float, scans: Sequence[SensorScan], c: ModelC
         scan = correct_boxes(state, given, c)
         follow_camera(state, scan, dt, c)
         before = state.tracks
+        noise_scale[place] = math.exp(state.log_side_variance[given.sensor]) / c.side_std**2
         pairs = associate(state, scan, c)
+        nis[place][pairs.box] = pairs.nis
         count_gaps(state, scan, pairs, c)
         learn_noise(state, scan, pairs, clock, c)
         update(state, pairs, c)
@@ -111,7 +124,7 @@ def step(state: ReferenceState, t: float, scans: Sequence[SensorScan], c: ModelC
     compare_overlaps(state)
     judge(state, c)
     learn(state, t, c)
-    out = Reported(state.tracks, report(state, t, c), takers, records)
+    out = Reported(state.tracks, report(state, t, c), takers, records, nis, noise_scale)
     end_tracks(state, t, c)
     return out
 
@@ -136,7 +149,9 @@ def look(state: ReferenceState, t: float, scan: SensorScan, c: ModelConstants) -
     state.last_look_s[k] = t
     counts = score_calibration.count_repetition(state.repetition[k], scan.boxes, scan.logits, c)
     state.repetition = (*state.repetition[:k], counts, *state.repetition[k + 1 :])
-    state.sensors.indifference[k] = score_calibration.indifference(counts, c)
+    even = state.even_logit[k]
+    learnt = score_calibration.indifference(counts, c)
+    state.sensors.indifference[k] = learnt if math.isnan(even) else -even
     period = c.first_period_s if math.isnan(state.period_s[k]) else float(state.period_s[k])
     return ScanClock(t, period, min(1.0, period / c.correlation_time_s))
 
@@ -189,8 +204,20 @@ def associate(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> Ass
     clutter = likelihood_ratio.clutter_log_density(size, float(state.leftovers[k]), state.picture, c)
     present = tracks.presence[:, VISIBLE] * p_detect
     ratio = likelihood_ratio.pair_log_ratio(density, present, score, clutter)
-    track, box = likelihood_ratio.assign(ratio)
-    return AssociatedPairs(track, box, ratio[track, box], p_detect, innovation)
+    track, box = likelihood_ratio.assign(by_looks(ratio, scan.alike))
+    seen = innovation.y[track, box].reshape(-1, 2, 2), innovation.S[track]
+    nis = (seen[0].mean(axis=2) ** 2 / seen[1].mean(axis=(2, 3))).sum(axis=1)
+    return AssociatedPairs(track, box, ratio[track, box], p_detect, innovation, nis)
+
+
+def by_looks(ratio: FloatArray, alike: FloatArray | None) -> FloatArray:
+    """Return ln L (N, M) with what looks say: who takes a box, and not whether there is an object."""
+    if alike is None:
+        return ratio
+    out = ratio.copy()
+    known = out[: len(alike)]
+    known[:] = np.where(known > 0.0, np.maximum(known + alike, _LEAST_GAIN), known)
+    return out
 
 
 def count_gaps(state: ReferenceState, scan: SensorScan, pairs: AssociatedPairs, c: ModelConstants) -> None:
@@ -243,6 +270,8 @@ def count_hits_and_misses(
     """Write down what the sensor found and what it did not: evidence, the track's own P_D, presence."""
     tracks, k, hit = state.tracks, scan.sensor, pairs.track
     missed = np.setdiff1d(np.arange(len(tracks)), hit)
+    if state.sees_changes[k]:  # what stands still is not missed
+        missed = missed[np.linalg.norm(tracks.mean[missed, :, singer.VELOCITY], axis=1) >= _LEAST_SPEED]
     presence = tracks.presence.copy()
     visible = presence[missed, VISIBLE]
     presence[hit] = visibility.seen(len(hit))

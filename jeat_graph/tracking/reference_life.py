@@ -19,6 +19,8 @@ _SAME_TIME_S = 1e-6
 # Before this share of the shortest period is over no sensor has had the time to miss a track.
 _DUE = 0.9
 _LEAST_AREA = 1e-9
+# Longer ago than this is no longer told apart (s).
+_LONGEST_AGO_S = 1e9
 
 
 def begin_tracks(
@@ -108,6 +110,20 @@ def end_tracks(state: ReferenceState, t: float, c: ModelConstants) -> None:
         ended = state.ended.append(state.tracks.evidence.take(ends))
         state.ended = ended.take(slice(-c.remembered_tracks, None))
         state.tracks = state.tracks.take(~ends)
+
+
+def begin_anew(state: ReferenceState, t: float, c: ModelConstants) -> None:
+    """End all tracks and go on from another time (s), as if none had passed; what was learnt stays."""
+    ended = state.ended.append(state.tracks.evidence)
+    state.ended = ended.take(slice(-c.remembered_tracks, None))
+    state.tracks = state.tracks.take(slice(0, 0))
+    if state.t is None:
+        return
+    # A sensor has not looked again since: not for less than the time between two of its scans.
+    period = np.where(np.isnan(state.period_s), c.first_period_s, state.period_s)
+    state.last_look_s = t - np.clip(state.t - state.last_look_s, period, _LONGEST_AGO_S)
+    state.learnt_s = t - min(max(state.t - state.learnt_s, 0.0), _LONGEST_AGO_S)
+    state.t = None
 
 
 def unseen_for(state: ReferenceState) -> FloatArray:

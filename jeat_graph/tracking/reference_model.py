@@ -2,40 +2,85 @@
 
 from __future__ import annotations
 
+import copy
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.filters import gap_survival
+from jeat_graph.filters import gap_survival, sensor_offsets
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.smoothers.state_rts import FilterRecord, smooth
 from jeat_graph.tracking.reference import step
-from jeat_graph.tracking.reference_state import SensorScan, declare_sensor, initial_state
+from jeat_graph.tracking.reference_life import begin_anew
+from jeat_graph.tracking.reference_state import ReferenceState, SensorScan, declare_sensor, initial_state
 
 #: Numbers of the state of a track: two axes of five.
 _WIDTH = 10
-#: Time, identity, mean (N, 10), variance (N, 10), posterior, sensors that found it at that time.
-ModelRows = tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray, IntArray]
+#: After so long without any scan all tracks are over (s).
+_LONGEST_SILENCE_S = 300.0
+#: Time, identity, mean (N, 10), variance (N, 10), posterior, sensors that found it at that time, number of the
+#: class, and its share of the votes.
+ModelRows = tuple[
+    FloatArray, IntArray, FloatArray, FloatArray, FloatArray, IntArray, IntArray, FloatArray
+]
 
 
-class Moment(NamedTuple):
+class Called(NamedTuple):
+    """What a track is called in smoothed rows: the identity given out, number and share of its class."""
+
+    given: int
+    label: int
+    share: float
+
+
+class Step(NamedTuple):
     """What is kept of a step for the smoothed table.
 
     Attributes:
         t: time (s).
-        record: number of the step's last record.
+        records: of its scans.
         track_id: (N,) the tracks then.
         real: (N,) their posterior.
         used: (N,) the sensors that found them.
     """
 
     t: float
-    record: int
+    records: list[FilterRecord]
     track_id: IntArray
     real: FloatArray
     used: IntArray
+
+    def track_ids(self) -> IntArray:
+        """Return the identities (N,) of the tracks after it, before any ended."""
+        return self.track_id
+
+
+class Answer(NamedTuple):
+    """What the last step told; see the methods of `ReferenceModel`."""
+
+    rows: ModelRows
+    covariances: FloatArray
+    takers: IntArray
+    living: IntArray
+    fit: tuple[FloatArray, FloatArray, FloatArray]
+
+
+class Moment(NamedTuple):
+    """All that the next step depends on; the smoother is no part of it."""
+
+    state: ReferenceState
+    answer: Answer
+
+    def identities(self) -> IntArray:
+        """Return the identities (N,) of the living tracks."""
+        return self.state.tracks.track_id
+
+    def born(self) -> int:
+        """Return the number of tracks started before it."""
+        return self.state.next_id - 1
 
 
 class ReferenceModel:
@@ -54,16 +99,23 @@ class ReferenceModel:
         self.constants = constants
         self._state = initial_state((width, height) if known else None, constants)
         self._smooths = lag_s >= 0.0
-        self._records: list[FilterRecord] = []
-        self._moments: list[Moment] = []
-        self._rows, self._takers, self._living = _joined([]), np.zeros(0, np.int64), np.zeros(0, np.int64)
+        self._steps: list[Step] = []
+        self._called: dict[int, Called] = {}
+        self._last: Step | None = None
+        self._answer = _no_answer()
 
-    def declare_sensor(self) -> None:
+    def declare_sensor(self, even_logit: float = math.nan, sees_changes: bool = False) -> None:
         """Add a sensor that has not looked yet."""
-        declare_sensor(self._state, self.constants)
+        declare_sensor(self._state, self.constants, even_logit, sees_changes)
 
     def take(
-        self, t: float, sensors: IntArray, numbers: IntArray, boxes: FloatArray, logits: FloatArray
+        self,
+        t: float,
+        sensors: IntArray,
+        numbers: IntArray,
+        boxes: FloatArray,
+        logits: FloatArray,
+        alike: FloatArray | None = None,
     ) -> None:
         """Take in the scans of one time.
 
@@ -73,33 +125,111 @@ class ReferenceModel:
             numbers: (K,) of boxes of each.
             boxes: (M, 4) left, top, right, bottom (px), sensor by sensor.
             logits: (M,) of their scores.
+            alike: (N, M) how much more likely each box is of a living track than of another by what both look
+                like, as ln of the ratio.
         """
         ends = np.cumsum(numbers)
+        if self._state.t is not None and t - self._state.t >= _LONGEST_SILENCE_S:
+            begin_anew(self._state, t, self.constants)
+            alike = None
         scans = [
-            SensorScan(int(k), boxes[end - n : end], logits[end - n : end])
+            SensorScan(
+                int(k),
+                boxes[end - n : end],
+                logits[end - n : end],
+                None if alike is None else alike[:, end - n : end],
+            )
             for k, n, end in zip(sensors, numbers, ends, strict=True)
         ]
         done = step(self._state, t, scans, self.constants)
-        self._takers = np.concatenate([*done.takers, np.zeros(0, np.int64)])
-        self._living = done.tracks.track_id
-        told = done.tracks.take(done.reported)
-        self._rows = _rows(t, told.track_id, told.mean, told.covariance, told.real, told.used)
-        if self._smooths:
-            self._records += done.records
-            kept = done.tracks
-            self._moments.append(Moment(t, len(self._records) - 1, kept.track_id, kept.real, kept.used))
+        told, tracks = done.tracks.take(done.reported), done.tracks
+        scale = [np.full(len(one), value) for one, value in zip(done.nis, done.noise_scale, strict=True)]
+        nothing = np.zeros(0)
+        self._answer = Answer(
+            _rows(t, told.track_id, told.mean, told.covariance, told.real, told.used),
+            told.covariance.reshape(-1, 5 * _WIDTH),
+            np.concatenate([*done.takers, np.zeros(0, np.int64)]),
+            tracks.track_id,
+            (np.concatenate([nothing, *done.nis]), np.concatenate([nothing, *scale]), tracks.real),
+        )
+        self._last = Step(t, done.records, tracks.track_id, tracks.real, tracks.used)
+
+    def record(self) -> Step:
+        """Return what the last step gave the smoother."""
+        assert self._last is not None, "a step has been taken"
+        return self._last
+
+    def hand_over(
+        self,
+        record: Step | None = None,
+        given: IntArray | None = None,
+        label: IntArray | None = None,
+        share: FloatArray | None = None,
+    ) -> None:
+        """Tell the smoother of a step (of the last one without a record), in order of time.
+
+        Args:
+            record: of `record`.
+            given: (N,) identity given out for each of its tracks.
+            label: (N,) number of each one's class, below 0 for none.
+            share: (N,) share of the votes that speak for it.
+        """
+        told = self.record() if record is None else record
+        if not self._smooths:
+            return
+        self._steps.append(told)
+        for k, track in enumerate(told.track_id.tolist()):
+            self._called[track] = Called(
+                track if given is None else int(given[k]),
+                -1 if label is None else int(label[k]),
+                0.0 if share is None else float(share[k]),
+            )
+
+    def begin_anew(self, t: float) -> None:
+        """End all tracks and go on from another time (s), as if none had passed; what was learnt stays."""
+        begin_anew(self._state, t, self.constants)
+        self._answer = _no_answer()
+
+    def snapshot(self) -> Moment:
+        """Return a copy of all that the next step depends on."""
+        return Moment(copy.deepcopy(self._state), self._answer)
+
+    def restore(self, moment: Moment) -> None:
+        """Go back to a snapshot of this model."""
+        self._state, self._answer = copy.deepcopy(moment.state), moment.answer
+
+    def number_on_from(self, identity: int) -> None:
+        """Give no new track a smaller identity."""
+        self._state.next_id = max(self._state.next_id, identity)
 
     def rows(self) -> ModelRows:
         """Return the tracks that the last step reports."""
-        return self._rows
+        return self._answer.rows
+
+    def covariances(self) -> FloatArray:
+        """Return the covariances (N, 50) of these: two axes of 5 x 5."""
+        return self._answer.covariances
 
     def takers(self) -> IntArray:
         """Return the identity of the track (M,) that took each box of the last step."""
-        return self._takers
+        return self._answer.takers
 
     def living(self) -> IntArray:
         """Return the identities (N,) of the tracks of the last step, before any ended."""
-        return self._living
+        return self._answer.living
+
+    def fit(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return how well the boxes of the last step fitted.
+
+        Returns:
+            Squared distance of each centre (M,), NaN where it began a track; the scale of the sensor's noise
+            (M,); the posteriors (N,) of the tracks in `living`.
+        """
+        return self._answer.fit
+
+    def identities(self) -> IntArray:
+        """Return the identities (N,) of the living tracks."""
+        return self._state.tracks.track_id
 
     def size(self) -> int:
         """Return the number of living tracks."""
@@ -108,6 +238,26 @@ class ReferenceModel:
     def born(self) -> int:
         """Return the number of tracks started so far."""
         return self._state.next_id - 1
+
+    def sensors(self) -> int:
+        """Return the number of sensors."""
+        return self._state.num_sensors
+
+    def time(self) -> float | None:
+        """Return the time of the last step (s); None before the first."""
+        return self._state.t
+
+    def picture(self) -> tuple[float, float]:
+        """Return width and height of the picture (px), as far as is known."""
+        return self._state.picture
+
+    def last_looks(self) -> FloatArray:
+        """Return when each sensor (S,) looked last (s), NaN for never."""
+        return self._state.last_look_s
+
+    def waiting(self) -> int:
+        """Return the number of smoothed rows that have become final: none before the end."""
+        return 0
 
     def smoothed(self) -> ModelRows:
         """Return the smoothed rows so far, of each track from its first to its last detection.
@@ -121,8 +271,9 @@ class ReferenceModel:
         before = self._last_seen_by_moment()
         seen_next, final = np.full(size, np.inf), np.zeros(size)
         told = {}
-        for number in range(len(self._moments) - 1, -1, -1):
-            moment = self._moments[number]
+        last_records = np.cumsum([len(one.records) for one in self._steps]) - 1
+        for number in range(len(self._steps) - 1, -1, -1):
+            moment = self._steps[number]
             ids, found = moment.track_id, moment.used != 0
             last = found & np.isinf(seen_next[ids])
             final[ids[last]] = moment.real[last]
@@ -130,20 +281,21 @@ class ReferenceModel:
             real = np.where(final[ids] > c.sure, np.maximum(moment.real, final[ids]), moment.real)
             nearer = np.minimum(moment.t - before[number], seen_next[ids] - moment.t)
             real = np.where(found, real, real * gap_survival.survival(self._state.gaps, nearer, c))
-            told[moment.record] = moment, np.where(np.isinf(seen_next[ids]), 0.0, real)
+            told[int(last_records[number])] = moment, np.where(np.isinf(seen_next[ids]), 0.0, real)
         parts = []
-        for record, mean, covariance in smooth(self._records):
+        for record, mean, covariance in smooth([one for step in self._steps for one in step.records]):
             if record in told:
                 moment, real = told[record]
                 rows = real > c.report
                 state = mean[rows], covariance[rows], real[rows], moment.used[rows]
-                parts.append(_rows(moment.t, moment.track_id[rows], *state))
+                called = [self._called[track] for track in moment.track_id[rows].tolist()]
+                parts.append(_rows(moment.t, moment.track_id[rows], *state, called))
         return _joined(parts[::-1])
 
     def _last_seen_by_moment(self) -> list[FloatArray]:
         """Return when the tracks (N,) of each moment had been seen last (s)."""
         last, out = np.full(self._state.next_id, -np.inf), []
-        for moment in self._moments:
+        for moment in self._steps:
             found = moment.track_id[moment.used != 0]
             last[found] = moment.t
             out.append(last[moment.track_id])
@@ -157,6 +309,11 @@ class ReferenceModel:
         """Return the smoothed rows of all tracks."""
         return self.smoothed()
 
+    def tracks(self) -> Mapping[str, Any]:
+        """Return the columns of the living tracks by name, as the core does."""
+        own = self._state.tracks.columns()
+        return {**own, **own.pop("evidence").columns()}
+
     def learnt(self) -> Mapping[str, Any]:
         """Return what is believed of the sensors and the scene, by name."""
         state = self._state
@@ -164,24 +321,35 @@ class ReferenceModel:
             **state.sensors._asdict(),
             "log_side_variance": state.log_side_variance,
             "leftovers": state.leftovers,
+            "offsets": sensor_offsets.offsets(state.offsets, state.log_side_variance, self.constants),
             "process_noise": tuple(state.process_noise),
         }
 
 
 def _rows(
-    t: float, ids: IntArray, mean: FloatArray, covariance: FloatArray, real: FloatArray, used: IntArray
+    t: float,
+    ids: IntArray,
+    mean: FloatArray,
+    covariance: FloatArray,
+    real: FloatArray,
+    used: IntArray,
+    called: Sequence[Called] | None = None,
 ) -> ModelRows:
     """Return tracks (N,) at one time."""
     variance = np.diagonal(covariance, axis1=2, axis2=3)
     flat = mean.reshape(-1, _WIDTH), variance.reshape(-1, _WIDTH)
-    return np.full(len(ids), t), ids, *flat, real, used
+    if called is None:
+        called = [Called(track, -1, 0.0) for track in ids.tolist()]
+    given, label = (np.array([one[k] for one in called], dtype=np.int64) for k in (0, 1))
+    share = np.array([one.share for one in called], dtype=np.float64)
+    return np.full(len(ids), t), given, *flat, real, used, label, share
 
 
 def _joined(parts: Sequence[ModelRows]) -> ModelRows:
     """Return tables one behind the other."""
-    nothing, state = np.zeros(0), np.zeros((0, _WIDTH))
-    none: ModelRows = (nothing, np.zeros(0, np.int64), state, state, nothing, np.zeros(0, np.int64))
-    t, ids, mean, variance, real, used = zip(none, *parts, strict=True)
+    nothing, whole, state = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, _WIDTH))
+    none: ModelRows = (nothing, whole, state, state, nothing, whole, whole, nothing)
+    t, ids, mean, variance, real, used, label, share = zip(none, *parts, strict=True)
     return (
         np.concatenate(t),
         np.concatenate(ids),
@@ -189,4 +357,12 @@ def _joined(parts: Sequence[ModelRows]) -> ModelRows:
         np.concatenate(variance),
         np.concatenate(real),
         np.concatenate(used),
+        np.concatenate(label),
+        np.concatenate(share),
     )
+
+
+def _no_answer() -> Answer:
+    """Return what is told before the first step."""
+    nothing, whole = np.zeros(0), np.zeros(0, np.int64)
+    return Answer(_joined([]), np.zeros((0, 5 * _WIDTH)), whole, whole, (nothing, nothing, nothing))

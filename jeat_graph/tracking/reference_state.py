@@ -104,11 +104,20 @@ class ReferenceTracks(ArrayTable):
 
 
 class SensorScan(NamedTuple):
-    """One look of a sensor: its index, boxes (M, 4) left, top, right, bottom (px), logits (M,)."""
+    """One look of a sensor.
+
+    Attributes:
+        sensor: its index.
+        boxes: (M, 4) left, top, right, bottom (px).
+        logits: (M,) of their scores.
+        alike: (N, M) ln of how much more likely each box is of a track than of another by what both look
+            like, of the first N tracks; None where nothing is known of that.
+    """
 
     sensor: int
     boxes: FloatArray
     logits: FloatArray
+    alike: FloatArray | None = None
 
 
 @dataclass
@@ -133,6 +142,9 @@ class ReferenceState:
         period_s: (S,) running mean of the time between two scans (s); NaN before the second. `look`
         last_look_s: (S,) time of the last scan (s); NaN before it. `look`
         repetition: of S sensors, which boxes come again. `look`
+        even_logit: (S,) logit of the score at which the user says that a box is as likely real as not; NaN
+            where it is learnt.
+        sees_changes: (S,) whether the sensor sees changes alone, as an event camera does.
     """
 
     tracks: ReferenceTracks
@@ -152,6 +164,8 @@ class ReferenceState:
     period_s: FloatArray
     last_look_s: FloatArray
     repetition: tuple[RepeatCounts, ...]
+    even_logit: FloatArray
+    sees_changes: BoolArray
 
     @property
     def time(self) -> float:
@@ -186,11 +200,15 @@ def initial_state(picture: tuple[float, float] | None, c: ModelConstants) -> Ref
         period_s=none,
         last_look_s=none,
         repetition=(),
+        even_logit=none,
+        sees_changes=np.zeros(0, dtype=np.bool_),
     )
 
 
-def declare_sensor(state: ReferenceState, c: ModelConstants) -> None:
-    """Add a sensor that has not looked yet, of which what is usual is believed."""
+def declare_sensor(
+    state: ReferenceState, c: ModelConstants, even_logit: float = math.nan, sees_changes: bool = False
+) -> None:
+    """Add a sensor that has not looked yet, of which what is usual is believed but for what the user says."""
     new, old = object_probability.initial_sensor(c), state.sensors
     columns = [np.append(a, b) for a, b in zip(old[:-1], new[:-1], strict=True)]
     state.sensors = SensorBelief(columns[0], columns[1], columns[2], columns[3], old.noise_share)
@@ -201,3 +219,5 @@ def declare_sensor(state: ReferenceState, c: ModelConstants) -> None:
     state.period_s = np.append(state.period_s, np.nan)
     state.last_look_s = np.append(state.last_look_s, np.nan)
     state.repetition = (*state.repetition, score_calibration.no_repetition())
+    state.even_logit = np.append(state.even_logit, even_logit)
+    state.sees_changes = np.append(state.sees_changes, sees_changes)

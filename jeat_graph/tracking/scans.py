@@ -6,14 +6,10 @@ import difflib
 from collections.abc import Iterable, Sequence
 from typing import Any, TypeAlias
 
-import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.data.arrays import FloatArray
-from jeat_graph.data.boxes import plain_floats
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError, TimeOrderError, UnknownSensorError
-from jeat_graph.tracking.batch import Arrivals
 
 ScanLike: TypeAlias = (
     Scan
@@ -64,40 +60,6 @@ def _scan_of(scan: Any) -> Scan:
 def _refusal(scan: Any) -> DataError:
     count = f" of {len(scan)}" if isinstance(scan, (tuple, list)) else ""
     return DataError(f"{_TAKEN}, not a {type(scan).__name__}{count}; boxes alone are for Tracker.update")
-
-
-def arrivals_of(batch: Sequence[Scan], sensor_names: Sequence[str]) -> Arrivals:
-    """Join the scans of one time.
-
-    Args:
-        batch: scans, at least one.
-        sensor_names: names of all sensors, in the order of per-sensor arrays.
-
-    Raises:
-        UnknownSensorError: a sensor that is not among them.
-    """
-    codes = [sensor_index(scan.sensor, sensor_names) for scan in batch]
-    if len(batch) == 1:
-        boxes, scores = _plain(batch[0].boxes, 2), _plain(batch[0].scores, 1)
-        sensor = np.full(len(scores), codes[0], dtype=np.int64)
-    else:
-        boxes = _plain(np.concatenate([scan.boxes for scan in batch]), 2)
-        scores = _plain(np.concatenate([scan.scores for scan in batch]), 1)
-        sensor = np.repeat(np.array(codes, dtype=np.int64), [len(scan) for scan in batch])
-    present = np.zeros(len(sensor_names), dtype=np.bool_)
-    present[codes] = True
-    return Arrivals(batch[0].t, boxes, scores, sensor, present, np.zeros((0, 0)))
-
-
-def _plain(values: FloatArray, ndim: int) -> FloatArray:
-    """Return the numbers as the kernels' machine code takes them; scans of unchecked columns may differ.
-
-    Raises:
-        DataError: they have another number of dimensions.
-    """
-    if values.ndim != ndim:
-        raise DataError(f"boxes must have shape (M, 4) and scores shape (M,), not {values.shape}")
-    return plain_floats(values)
 
 
 def sensor_index(name: str, names: Sequence[str]) -> int:

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from math import inf
 from typing import NamedTuple
 
-from jeat_graph.filters.box_offsets import lags_of, middle_of
-from jeat_graph.tracking.snapshot import Snapshot
 
 
 class SensorState(NamedTuple):
@@ -41,29 +38,3 @@ class SensorState(NamedTuple):
     lag_s: float = 0.0
     lag_std_s: float | None = None
 
-
-def sensor_states(now: Snapshot, sensors: tuple[str, ...]) -> dict[str, SensorState]:
-    """Return the state of each sensor, by name."""
-    middle_x, middle_y = middle_of(now.scene.pair_sums)
-    offsets = now.scene.offsets.copy()
-    offsets[:, :, 1] += offsets[:, :, 3] * middle_x + offsets[:, :, 4] * middle_y
-    lag_s, lag_std_s = lags_of(now.scene.pair_sums, now.scene.pair_factors, now.scene.offsets)
-    scale = now.tracks.scale[now.tracks.confirmed]
-    states = {}
-    for s, name in enumerate(sensors):
-        share, px, log_size, place_x, place_y = [(float(x), float(y)) for x, y in offsets[s, :, :5].T]
-        states[name] = SensorState(
-            clutter=float(now.scene.clutter[s]),
-            p_detect=float(now.scene.p_detect[s]),
-            trust=float(now.scene.trust[s]),
-            blind=float(now.scene.blind[s]),
-            noise_scale=float(scale[:, s].mean()) if len(scale) else 1.0,
-            offset_centre_share=share,
-            offset_centre_px=px,
-            offset_log_size=log_size,
-            offset_place_x=place_x,
-            offset_place_y=place_y,
-            lag_s=float(lag_s[s]),
-            lag_std_s=float(lag_std_s[s]) if lag_std_s[s] < inf else None,
-        )
-    return states

@@ -42,5 +42,5 @@ def test_solved_it_is_the_smoothed_table(run):
 def test_one_track_can_be_chosen_and_a_strange_one_is_refused(run):
     number = int(pd.read_csv(run / "smoothed.csv").track_id[0])
     assert list(jeat_graph.factor_graph(run, number).times_s) == [number]
-    with pytest.raises(DataError, match=f"has no confirmed track 99; there are {number}"):
+    with pytest.raises(DataError, match=f"has no reported track 99; there are {number}"):
         jeat_graph.factor_graph(run, tracks=[99])

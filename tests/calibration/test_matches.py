@@ -71,13 +71,6 @@ def test_one_that_drives_further_than_its_length_between_two_frames_counts_neith
     assert m.correct.tolist() == [True]
 
 
-def test_the_box_behind_another_is_known_to_be_hidden():
-    # The second reaches further down, so it stands nearer; it covers half of the first.
-    g = truth([(0.0, 1, (0, 0, 40, 40)), (0.0, 2, (20, 0, 40, 60))])
-    m = match_sensor(scans((0.0, [])), g, "rgb")
-    np.testing.assert_allclose(np.sort(m.visible), [0.5, 1.0])
-
-
 def test_scans_outside_the_truth_are_not_judged():
     g = truth([(1.0, 1, (0, 0, 40, 40)), (1.1, 1, (0, 0, 40, 40))])
     with pytest.raises(DataError, match="'rgb' lies within the time span"):

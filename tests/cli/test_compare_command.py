@@ -5,13 +5,11 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-import shutil
 
 import pandas as pd
 import pytest
 
 from jeat_graph.cli.main import main
-from jeat_graph.tracking import records
 
 
 @pytest.fixture(scope="module")
@@ -30,14 +28,6 @@ def shown(folder, small_plots):
     with small_plots(), contextlib.redirect_stdout(io.StringIO()) as printed:
         assert main(["compare", str(folder / "run"), "--gt", truth, "--out", str(folder / "out")]) == 0
     return printed.getvalue()
-
-
-@pytest.fixture(scope="module")
-def kept(folder):
-    """A run that kept its measurements."""
-    detections = str(folder / "sim" / "detections.csv")
-    assert main(["track", detections, "--out", str(folder / "kept"), "--diagnostics"]) == 0
-    return folder / "kept"
 
 
 def test_it_prints_tables_and_writes_json_and_pictures(folder, shown):
@@ -88,31 +78,6 @@ def test_inputs_that_have_moved_can_be_named(folder, tmp_path):
 def test_a_folder_that_holds_no_run_is_refused(tmp_path, capsys):
     assert main(["compare", str(tmp_path)]) == 2
     assert "run.json" in capsys.readouterr().err
-
-
-def test_a_run_that_kept_its_measurements_is_not_tracked_again_and_compares_the_same(
-    folder, kept, tmp_path, monkeypatch
-):
-    detections, truth = str(folder / "sim" / "detections.csv"), str(folder / "sim" / "gt.csv")
-    out, again = (str(tmp_path / name) for name in ("out", "again"))
-    tracked = ["compare", str(kept), "--gt", truth, "--no-plots", "--out", again, "--detections", detections]
-    assert main(tracked) == 0
-    monkeypatch.setattr(records, "record_tracks", None)
-    assert main(["compare", str(kept), "--gt", truth, "--no-plots", "--out", out]) == 0
-    assert (tmp_path / "out" / "compare.json").read_bytes() == (
-        tmp_path / "again" / "compare.json"
-    ).read_bytes()
-
-
-@pytest.mark.parametrize("name", ["measurements.parquet", "causal.csv"])
-def test_a_file_of_the_run_that_has_changed_is_refused(kept, tmp_path, capsys, name):
-    run = shutil.copytree(kept, tmp_path / "run")
-    (run / name).write_bytes((run / name).read_bytes()[:-1])
-    assert main(["compare", str(run)]) == 2
-    assert f"{name}: has changed since the run" in capsys.readouterr().err
-    (run / name).unlink()
-    assert main(["compare", str(run)]) == 2
-    assert f"{name}: is missing from the run" in capsys.readouterr().err
 
 
 def test_boxes_without_velocities_give_errors_of_positions(folder, small_plots, capsys):

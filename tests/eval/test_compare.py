@@ -7,15 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from jeat_graph.data.measured_track import MeasuredTrack
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.compare import compare
 from jeat_graph.eval.consistency import chi2_bounds, whiteness
-from jeat_graph.eval.lagged import states_at, with_times
+from jeat_graph.eval.lagged import states_at
 from jeat_graph.eval.samples import lag_name
-from jeat_graph.smoothers.measurements import measurements
-from jeat_graph.smoothers.rts import filter_track, smooth_rts
-from jeat_graph.smoothers.track_data import Prior, TrackData
+from jeat_graph.smoothers.filtered_track import FilteredTrack
 
 JERK = 60.0
 NOISE = 2.0
@@ -35,89 +32,61 @@ def path(rng, n, dt):
     return x
 
 
-def track(rng, n=120, dt=0.02):
-    """One track and its truth; the prior is the first measurement."""
-    t = dt * np.arange(n)
-    x = path(rng, n, dt)
-    z = x[:, :, 0] + rng.normal(0.0, NOISE, (n, 2))
-    prior = np.zeros((2, 3))
-    prior[:, 0] = z[0]
-    cov = np.tile(np.diag([NOISE**2, 30.0**2, 20.0**2]), (2, 1, 1))
-    r, q = np.full((n - 1, 2), NOISE**2), np.full(n - 1, JERK)
-    return TrackData.from_measurements(Prior(0.0, prior, cov), measurements(t[1:], z[1:], r, q)), t, x
-
-
-def part(data, until):
-    """The same track, without the measurements after `until`."""
-    keep = data.t[data.key] <= until + 1e-9
-    return TrackData.from_measurements(data.prior, data.measurements()[keep])
-
-
-def test_further_times_change_no_estimate():
-    data, t, _ = track(np.random.default_rng(0))
-    longer, at = with_times(data, np.array([0.0, 0.011, 0.5, 1.2345, t[-1]]))
-    assert np.allclose(longer.t[at], [0.0, 0.011, 0.5, 1.2345, t[-1]])
-    old = np.searchsorted(longer.t, data.t)
-    assert np.allclose(smooth_rts(longer).mean[old], smooth_rts(data).mean, rtol=1e-9, atol=1e-6)
-    assert np.allclose(filter_track(longer)[1][old], filter_track(data)[1], rtol=1e-9)
-
-
-@pytest.mark.parametrize("lag", [0.0, 0.05, 0.3])
-def test_a_lag_is_the_smoother_of_all_that_had_arrived_by_then(lag):
-    data, _, _ = track(np.random.default_rng(1))
-    times = np.array([0.1, 0.74, 1.31])
-    _, [lagged], _, _ = states_at(data, times, [lag])
-    for k, t in enumerate(times):
-        longer, at = with_times(part(data, t + lag), np.array([t]))
-        expected = smooth_rts(longer)
-        assert np.allclose(lagged.mean[k], expected.mean[at[0]], rtol=1e-8, atol=1e-6)
-        assert np.allclose(lagged.cov[k], expected.cov[at[0]], rtol=1e-6)
-
-
-def test_no_lag_is_the_filter_and_a_long_one_the_whole_track():
-    data, t, _ = track(np.random.default_rng(2))
-    filtered, [none, long], full, _ = states_at(data, t, [0.0, 99.0])
-    assert np.allclose(none.mean, filtered.mean)
-    assert np.allclose(long.mean, full.mean, rtol=1e-9, atol=1e-6)
-    assert np.allclose(long.cov, full.cov, rtol=1e-6)
-
-
-def test_innovations_are_those_of_a_kalman_filter_written_out():
-    data, _, _ = track(np.random.default_rng(3), n=12)
-    _, _, _, surprise = states_at(data, data.t, [])
-    dt, q = 0.02, JERK**2
+def track(rng, n=120, dt=0.02, claimed=NOISE, identity=1):
+    """A Kalman filter's records of one path, and the path; the first measurement begins the track."""
     F = np.array([[1.0, dt, dt * dt / 2], [0, 1, dt], [0, 0, 1]])
-    Q = q * np.array(
+    Q = JERK**2 * np.array(
         [[dt**5 / 20, dt**4 / 8, dt**3 / 6], [dt**4 / 8, dt**3 / 3, dt**2 / 2], [dt**3 / 6, dt**2 / 2, dt]]
     )
-    for axis in range(2):
-        m, P = data.prior_mean[axis], data.prior_cov[axis]
-        for k in range(11):
-            m, P = F @ m, F @ P @ F.T + Q
-            S = P[0, 0] + data.r[k, axis]
-            e = data.z[k, axis] - m[0]
-            assert surprise.error[k, axis] == pytest.approx(e, abs=1e-8)
-            assert surprise.var[k, axis] == pytest.approx(S, rel=1e-9)
-            K = P[:, 0] / S
-            m, P = m + K * e, P - np.outer(K, P[0])
+    t, x = dt * np.arange(n), path(rng, n, dt)
+    z = x[:, :, 0] + rng.normal(0.0, NOISE, (n, 2))
+    mean = np.zeros((2, 3))
+    mean[:, 0] = z[0]
+    P = np.tile(np.diag([claimed**2, 30.0**2, 20.0**2]), (2, 1, 1))
+    rows = [(mean, P, mean, P)]
+    for k in range(1, n):
+        mean, P = mean @ F.T, F @ P @ F.T + Q
+        before = mean, P
+        K = P[:, :, 0] / (P[:, 0, 0] + claimed**2)[:, None]
+        mean = mean + K * (z[k] - mean[:, 0])[:, None]
+        P = P - K[:, :, None] * P[:, None, 0, :]
+        rows.append((*before, mean, P))
+    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    sensor = (np.arange(n) + 1) % 2
+    return FilteredTrack(identity, t, np.tile(F, (n, 2, 1, 1)), *columns, sensor), t, x
 
 
-def many(count=30, seed=4):
+def test_a_lag_counts_what_had_arrived_by_then():
+    one, t, _ = track(np.random.default_rng(1))
+    filtered, [none, some, long], full = states_at(one, t, [0.0, 0.1, 99.0])
+    assert np.allclose(none.mean, filtered.mean)
+    until = np.minimum(np.arange(len(t)) + 5, len(t) - 1)
+    assert np.allclose(some.mean, one.smoothed_until(np.arange(len(t)), until)[0])
+    assert np.allclose(long.mean, full.mean)
+    assert np.allclose(full.cov, one.smoothed()[1])
+
+
+def test_a_time_between_two_records_is_reached_by_constant_acceleration():
+    one, t, _ = track(np.random.default_rng(2))
+    filtered, _, _ = states_at(one, t[50:51] + 0.01, [])
+    p, v, a = one.mean[50].T
+    assert np.allclose(filtered.mean[0, :, 0], p + 0.01 * v + 0.5 * 0.01**2 * a)
+    assert (filtered.cov[0, :, 0, 0] > one.covariance[50, :, 0, 0]).all()
+
+
+def many(count=30, seed=4, claimed=NOISE):
     """Tracks that move and are measured as modelled, their truth, and the table that matches them."""
     rng = np.random.default_rng(seed)
-    tracks, truths, tables = [], [], []
+    tracks, truths = [], []
     for identity in range(1, count + 1):
-        data, t, x = track(rng)
-        tracks.append(MeasuredTrack(identity, data, np.arange(len(data.z)) % 2, 1))
-        centre = np.stack([x[:, 0, 0] + 40.0 * identity * 100, x[:, 1, 0]], axis=1)
+        one, t, x = track(rng, claimed=claimed, identity=identity)
         moved = np.zeros((2, 3))
         moved[0, 0] = 4000.0 * identity
-        shifted = replace(data, prior_mean=data.prior_mean + moved, z=data.z + moved[:, 0])
-        tracks[-1] = MeasuredTrack(identity, shifted, tracks[-1].sensor, 1)
-        motion = x.transpose(0, 2, 1).reshape(-1, 6).copy()
-        motion[:, :2] = centre
-        truths.append((t, np.full(len(t), identity), centre, motion))
-        tables.append(shifted)
+        tracks.append(
+            replace(one, mean=one.mean + moved, predicted_mean=one.predicted_mean + moved)
+        )
+        motion = (x + moved).transpose(0, 2, 1).reshape(-1, 6)
+        truths.append((t, np.full(len(t), identity), motion[:, :2], motion))
     t, ids, centre, motion = (np.concatenate(column) for column in zip(*truths, strict=True))
     boxes = np.concatenate([centre - 50.0, np.full((len(t), 2), 100.0)], axis=1)
     distance = np.where(ids % 2 == 0, 20.0, 50.0)
@@ -168,11 +137,7 @@ def test_instants_are_grouped_by_the_sensors_that_saw_the_track_and_by_distance(
 
 
 def test_measurements_noisier_than_claimed_show_in_nis_and_nees():
-    tracks, truth, table = many(count=6)
-    for k, one in enumerate(tracks):
-        d = one.data
-        shy = replace(d, r=d.r / 9.0)
-        tracks[k] = MeasuredTrack(one.track_id, shy, one.sensor, one.birth_sensor)
+    tracks, truth, table = many(count=6, claimed=NOISE / 3.0)
     values = compare(tracks, ("a", "b"), truth=truth, causal=table, lags_s=(0.0,)).values
     assert values["consistency"]["nis"] > 2.0
     assert values["errors"]["full"]["anees_position"] > 2.0

@@ -1,4 +1,4 @@
-"""Constant acceleration with white jerk, and the model of sizes, for any time step."""
+"""Constant acceleration with white jerk, for any time step."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad_vec
 from scipy.linalg import expm, expm_cond
 
-from jeat_graph.filters.motion import process_noise, size_process_noise, size_transition, transition
+from jeat_graph.filters.motion import process_noise, transition
 
 STEPS = [1e-4, 0.01, 0.05, 1.0, 7.5]
 EPS = np.finfo(np.float64).eps
@@ -39,9 +39,7 @@ def test_transition_moves_by_the_closed_form_of_constant_acceleration(dt):
 
 def test_no_time_moves_nothing_and_adds_no_noise():
     assert np.array_equal(transition(0.0), np.eye(3))
-    assert np.array_equal(size_transition(0.0), np.eye(2))
     assert not process_noise(0.0, 3.0).any()
-    assert not size_process_noise(0.0, 3.0).any()
 
 
 # In units of the step (px, px per step, px per step²) every step is the same well-conditioned problem, and
@@ -68,23 +66,12 @@ def test_process_noise_is_the_integral_of_what_each_moment_adds(dt):
     assert np.allclose(process_noise(dt, 2.5), 2.5**2 * integral, rtol=1e-12, atol=0.0)
 
 
-@pytest.mark.parametrize("dt", STEPS)
-def test_size_model_is_the_exact_discretisation_of_a_driven_rate(dt):
-    F, Q, bound = van_loan(np.diag([1.0], k=1), np.array([0.0, 1.0]))
-    unit = np.array([1.0, dt])
-    assert np.abs(unit[:, None] * size_transition(dt) / unit - F).max() < bound
-    assert np.abs(np.outer(unit, unit) * size_process_noise(dt, 0.7) / (0.7**2 * dt**3) - Q).max() < bound
-    assert bound < 1e-12, "a wrong digit is seen"
-
-
 @given(a=st.floats(0.0, 10.0), b=st.floats(0.0, 10.0))
 def test_two_steps_are_one_long_step(a, b):
     # All terms are positive: nothing cancels, and each entry is right to some roundings (1e-12 is 4,500).
     assert np.allclose(transition(b) @ transition(a), transition(a + b), rtol=1e-12, atol=1e-30)
     two = transition(b) @ process_noise(a, 2.0) @ transition(b).T + process_noise(b, 2.0)
     assert np.allclose(two, process_noise(a + b, 2.0), rtol=1e-12, atol=1e-30)
-    two = size_transition(b) @ size_process_noise(a, 2.0) @ size_transition(b).T + size_process_noise(b, 2.0)
-    assert np.allclose(two, size_process_noise(a + b, 2.0), rtol=1e-12, atol=1e-30)
 
 
 @given(dt=st.floats(1e-6, 100.0), jerk=st.floats(1e-3, 1e4))

@@ -1,6 +1,6 @@
 """What processes of the tests begin with that need not begin from nothing: all that `track` needs is loaded.
 
-Python, what it imports and the kernels take one to two seconds of each process that is started as a user
+Python and what it imports take one to two seconds of each process that is started as a user
 starts it. A fork server loads them once, and the processes that it forks are at work at once. What is about
 the start itself is tested with processes that start as a user's do.
 """

@@ -83,7 +83,9 @@ def test_every_step_is_the_references(seed, sensors, known):
         reference.declare_sensor()
     for k, scans in enumerate(drawn_stream(seed, sensors, 25)):
         core.take(*scans)
+        core.hand_over()
         reference.take(*scans)
+        reference.hand_over()
         assert_alike(core.rows(), reference.rows(), f"step {k}")
         np.testing.assert_array_equal(core.takers(), reference.takers())
         np.testing.assert_array_equal(core.living(), reference.living())
@@ -103,6 +105,7 @@ def test_whole_tracks_are_smoothed_as_by_the_reference(seed):
         model.declare_sensor()
         for scans in drawn_stream(seed, 2, 40):
             model.take(*scans)
+            model.hand_over()
     ours, theirs = sorted_rows(core.finish()), sorted_rows(reference.finish())
     # How gaps end is known as of a track's end in the one, and as of the very end in the other: they may
     # differ in the rows that no sensor saw.
@@ -213,21 +216,11 @@ def test_commands_track_with_it_and_say_nothing_of_a_compiler(tmp_path, capsys):
     assert {path.name for path in out.iterdir()} >= {"causal.csv", "smoothed.csv"}
 
 
-@pytest.mark.parametrize("asked", [["--diagnostics"], ["--resume"]])
-def test_what_the_engine_lacks_is_one_line(tmp_path, capsys, asked):
+def test_the_reference_is_not_saved_and_says_so_in_one_line(tmp_path, capsys):
     source = tmp_path / "detections.csv"
     source.write_text("t,sensor,left,top,width,height,score\n0,cam,1,2,30,40,.9\n.1,cam,1,2,30,40,.9\n")
-    command = [
-        "track",
-        str(source),
-        "--config",
-        "core",
-        "--image",
-        "1280x720",
-        "--out",
-        str(tmp_path / "run"),
-    ]
-    assert main([*command, *asked]) == 2
+    how = ["--config", "core", "--set", "tracker.engine=reference", "--image", "1280x720"]
+    assert main(["track", str(source), *how, "--out", str(tmp_path / "run"), "--resume"]) == 2
     assert "tracker.engine" in capsys.readouterr().err.splitlines()[-1]
 
 

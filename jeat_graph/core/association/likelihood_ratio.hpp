@@ -15,6 +15,8 @@ using filters::Sides;
 using filters::SidesExpected;
 
 inline constexpr double kLeastPDetect = 0.01, kMostPDetect = 0.99, kLeastPosterior = 0.02;
+// Of a pair that is possible, however little it looks alike.
+inline constexpr double kLeastGain = 1e-9;
 
 // What holds for all pairs of one scan.
 struct ScanTerms {

@@ -24,6 +24,16 @@ inline Innovation normalised_innovation(const std::array<double, 4>& y, const Si
     return out;
 }
 
+// Squared distance of a box's centre from the expected one, in standard deviations: χ² of two degrees of freedom.
+inline double centre_distance(const std::array<double, 4>& y, const SidesExpected& expected) {
+    double out = 0.0;
+    for (int axis = 0; axis < 2; ++axis) {
+        const Pair2& S = expected.S[axis];
+        out += square((y[2 * axis] + y[2 * axis + 1]) / 2.0) / ((S.ll + 2.0 * S.lr + S.rr) / 4.0);
+    }
+    return out;
+}
+
 // What the well known tracks of one scan say together.
 struct InnovationSums {
     double teachers = 0.0, squares = 0.0, lag_centre = 0.0, lag_extent = 0.0;

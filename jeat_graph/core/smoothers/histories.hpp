@@ -8,6 +8,8 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <span>
+#include <stdexcept>
 #include <vector>
 
 #include "filters/gap_survival.hpp"
@@ -21,20 +23,29 @@ using filters::kCovariance;
 using filters::kMean;
 using filters::ModelConstants;
 
+// What a track is called in the rows that are given out.
+struct Called {
+    std::int64_t track_id = 0;  // the identity that was given out for it
+    std::int64_t label = -1;    // number of its class, below 0 where there is none
+    double share = 0.0;         // of the votes that speak for the class
+};
+
 // Rows of a table, in columns.
 struct Rows {
-    std::vector<double> t, mean, variance, real;
-    std::vector<std::int64_t> track_id, used;
+    std::vector<double> t, mean, variance, real, share;
+    std::vector<std::int64_t> track_id, used, label;
 
     std::size_t size() const { return track_id.size(); }
     void clear() {
-        t.clear(), mean.clear(), variance.clear(), real.clear();
-        track_id.clear(), used.clear();
+        t.clear(), mean.clear(), variance.clear(), real.clear(), share.clear();
+        track_id.clear(), used.clear(), label.clear();
     }
-    void add(double at, std::int64_t id, const double* state, const double* covariance, double probability,
+    void add(double at, const Called& called, const double* state, const double* covariance, double probability,
              std::int64_t sensors) {
         t.push_back(at);
-        track_id.push_back(id);
+        track_id.push_back(called.track_id);
+        label.push_back(called.label);
+        share.push_back(called.share);
         real.push_back(probability);
         used.push_back(sensors);
         mean.insert(mean.end(), state, state + kMean);
@@ -53,8 +64,40 @@ struct Entry {
     std::array<double, kCovariance> predicted_covariance, covariance;
 };
 
+// What the filter did in one step. It is kept apart until no step can come before this one any more.
+struct Record {
+    double t = 0.0;
+    bool begins_anew = false;            // all tracks had ended before the step
+    std::vector<std::int64_t> track_id;  // of the tracks after it, before any of them ended
+    std::vector<std::size_t> tracks;     // how many there were after each scan
+    std::vector<std::size_t> sensors;    // whose scan each was
+    std::vector<Entry> entries;          // scan by scan, in the order of the tracks
+    std::vector<std::uint8_t> kept;      // which of the tracks live on
+    GapCounts gaps, gaps_after;          // before and after tracks ended
+
+    void begin(double time) {
+        t = time;
+        begins_anew = false;
+        track_id.clear(), tracks.clear(), sensors.clear(), entries.clear(), kept.clear();
+    }
+    // The entries of a scan of so many tracks; more may be born in it.
+    Entry* begin_scan(std::size_t number, std::size_t sensor) {
+        sensors.push_back(sensor);
+        entries.resize(entries.size() + number);
+        tracks.push_back(number);
+        return entries.data() + entries.size() - number;
+    }
+    Entry* grow_scan(std::size_t number) {
+        entries.resize(entries.size() + number - tracks.back());
+        tracks.back() = number;
+        return entries.data() + entries.size() - number;
+    }
+    Entry* last_scan() { return tracks.empty() ? nullptr : entries.data() + entries.size() - tracks.back(); }
+};
+
 struct History {
     std::int64_t track_id = 0;
+    Called called;
     double last_seen = -std::numeric_limits<double>::infinity();  // before the first entry (s)
     std::vector<Entry> entries;
 };
@@ -65,6 +108,27 @@ public:
 
     std::vector<History>& living() { return living_; }
     Rows& rows() { return rows_; }
+
+    // Take a step in, in order of time; `called` is of its tracks.
+    void take(const Record& record, std::span<const Called> called, const ModelConstants& c) {
+        if (record.begins_anew) end_all(record.gaps, c);
+        check_order(record);
+        std::size_t at = 0;
+        for (const std::size_t number : record.tracks) {
+            while (living_.size() < number) {
+                const std::int64_t id = record.track_id[living_.size()];
+                living_.emplace_back().track_id = id;
+            }
+            for (std::size_t i = 0; i < number; ++i) living_[i].entries.push_back(record.entries[at++]);
+        }
+        for (std::size_t i = 0; i < living_.size(); ++i) living_[i].called = called[i];
+        advance(record.t, record.gaps, c);
+        end(record.kept, record.gaps_after, c);
+    }
+
+    void end_all(const GapCounts& gaps, const ModelConstants& c) {
+        end(std::vector<std::uint8_t>(living_.size(), 0), gaps, c);
+    }
 
     // Give out what has become final while tracks live on.
     void advance(double now, const GapCounts& gaps, const ModelConstants& c) {
@@ -97,6 +161,13 @@ public:
     }
 
 private:
+    // Whether a step is the one behind the last that was taken in.
+    void check_order(const Record& record) const {
+        bool fits = living_.size() <= record.track_id.size();
+        for (std::size_t i = 0; fits && i < living_.size(); ++i) fits = living_[i].track_id == record.track_id[i];
+        if (!fits) throw std::invalid_argument("steps must be handed over once, and in order of time");
+    }
+
     void give_out(History& history, double until, const GapCounts& gaps, const ModelConstants& c, Rows& out,
                   bool forget) {
         std::vector<Entry>& entries = history.entries;
@@ -137,7 +208,7 @@ private:
             if (!std::isfinite(until_seen_[given])) continue;  // not seen again
             if (!e.used) real *= gaps.survival(std::min(e.t - last_seen, until_seen_[given]), c);
             if (real > c.report)
-                out.add(e.t, history.track_id, mean_[given].data(), covariance_[given].data(), real, e.used);
+                out.add(e.t, history.called, mean_[given].data(), covariance_[given].data(), real, e.used);
         }
         if (!forget) return;
         history.last_seen = last_seen;

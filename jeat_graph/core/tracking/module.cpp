@@ -1,103 +1,202 @@
 // Binds the tracker's step.
+#include <optional>
+
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/tuple.h>
 
 #include "arrays.hpp"
 #include "smoothers/histories.hpp"
+#include "tracking/saved.hpp"
 #include "tracking/step.hpp"
 
 namespace jeat::tracking {
 
 namespace {
 
-using smoothers::Rows;
-// Time, identity, mean, variance, posterior, sensors.
-using Table = std::tuple<Out<double>, Out<std::int64_t>, Out2<double>, Out2<double>, Out<double>, Out<std::int64_t>>;
+using smoothers::Called;
+// Time, identity, mean, variance, posterior, sensors, number of the class, its share.
+using Table = std::tuple<Out<double>, Out<std::int64_t>, Out2<double>, Out2<double>, Out<double>, Out<std::int64_t>,
+                         Out<std::int64_t>, Out<double>>;
 using Named = nb::typed<nb::dict, nb::str, nb::any>;
 
-template <class T> Buffer<T> copied(const std::vector<T>& source) {
-    Buffer<T> out(source.size());
-    std::copy(source.begin(), source.end(), out.data.get());
-    return out;
-}
+// After so long without any scan all tracks are over: longer predictions outgrow a double's digits (s).
+constexpr double kLongestSilenceS = 300.0;
 
-template <class T> Out<T> array_of(const std::vector<T>& source) { return handed_over(copied(source)); }
-template <class T> Out2<T> array_of(const std::vector<T>& source, std::size_t columns) {
-    return handed_over(copied(source), columns ? source.size() / columns : 0, columns);
+// All that the next step depends on, and what the last one told.
+struct Moment {
+    State state;
+    Answer answer;
+};
+
+using Scans = std::tuple<Out<std::int64_t>, Out<std::int64_t>, Out2<double>, Out2<double>, Out2<double>,
+                         Out2<double>>;
+
+Scans scans_of(const Record& record) {
+    std::vector<double> predicted, predicted_covariance, mean, covariance;
+    for (const smoothers::Entry& entry : record.entries) {
+        predicted.insert(predicted.end(), entry.predicted_mean.begin(), entry.predicted_mean.end());
+        predicted_covariance.insert(predicted_covariance.end(), entry.predicted_covariance.begin(),
+                                    entry.predicted_covariance.end());
+        mean.insert(mean.end(), entry.mean.begin(), entry.mean.end());
+        covariance.insert(covariance.end(), entry.covariance.begin(), entry.covariance.end());
+    }
+    const std::vector<std::int64_t> sensors(record.sensors.begin(), record.sensors.end());
+    const std::vector<std::int64_t> tracks(record.tracks.begin(), record.tracks.end());
+    return {array_of(sensors), array_of(tracks), array_of(predicted, kMean),
+            array_of(predicted_covariance, kCovariance), array_of(mean, kMean), array_of(covariance, kCovariance)};
 }
 
 // A tracker of the model: its state, its step, and what it keeps for the smoother.
 class Model {
 public:
     Model(const nb::object& constants, double width, double height, bool known, double lag_s)
-        : state_(constants_of(constants)), step_(state_), smooths_(lag_s >= 0.0), histories_(lag_s) {
-        if (known) state_.width = width, state_.height = height, state_.picture_known = true;
+        : now_{State(constants_of(constants)), {}}, step_(now_.state), smooths_(lag_s >= 0.0), histories_(lag_s) {
+        if (known) now_.state.width = width, now_.state.height = height, now_.state.picture_known = true;
     }
     Model(const Model&) = delete;
     Model& operator=(const Model&) = delete;
 
-    void declare_sensor() { state_.declare_sensor(); }
+    void declare_sensor(double even_logit, bool sees_changes) {
+        now_.state.declare_sensor(even_logit, sees_changes);
+    }
 
-    void take(double t, In<std::int64_t> sensors, In<std::int64_t> numbers, In2<double> boxes, In<double> logits) {
+    void take(double t, In<std::int64_t> sensors, In<std::int64_t> numbers, In2<double> boxes, In<double> logits,
+              const std::optional<In2<double>>& alike) {
+        State& state = now_.state;
         check_lengths({sensors.size(), numbers.size()});
         check_lengths({boxes.shape(0), logits.size()});
         check(boxes.shape(1) == 4, "boxes have four sides");
+        if (alike) check(alike->shape(0) == state.tracks.size(), "another number of tracks is compared");
+        if (alike) check_lengths({alike->shape(1), logits.size()});
         scans_.resize(sensors.size());
         std::size_t at = 0;
         for (std::size_t k = 0; k < sensors.size(); ++k) {
             Scan& scan = scans_[k];
             const auto number = static_cast<std::size_t>(numbers.data()[k]);
             scan.sensor = static_cast<std::size_t>(sensors.data()[k]);
-            check(scan.sensor < state_.sensors.size(), "no such sensor");
+            check(scan.sensor < state.sensors.size(), "no such sensor");
             check(number <= logits.size() - at, "fewer boxes than said");
             const Sides* const first = reinterpret_cast<const Sides*>(boxes.data()) + at;
             scan.boxes.assign(first, first + number);
             scan.logits.assign(logits.data() + at, logits.data() + at + number);
+            scan.alike = {nullptr, 0, 0};
+            if (alike) scan.alike = {alike->data() + at, alike->shape(0), alike->shape(1)};
             at += number;
         }
         check(at == logits.size(), "more boxes than said");
         const nb::gil_scoped_release release;
-        Histories* const histories = smooths_ ? &histories_ : nullptr;
-        step_.run(t, scans_, reported_, histories);
-        takers_.clear();
-        for (const Scan& scan : scans_) takers_.insert(takers_.end(), scan.takers.begin(), scan.takers.end());
-        Tracks& tracks = state_.tracks;
-        living_ = tracks.track_id;
-        rows_.clear();
-        for (std::size_t i = 0; i < tracks.size(); ++i)
-            if (reported_[i])
-                rows_.add(t, tracks.track_id[i], tracks.mean_of(i), tracks.covariance_of(i), tracks.real[i], tracks.used[i]);
-        step_.end_tracks(histories);
+        Record* const record = smooths_ ? &record_ : nullptr;
+        const bool begins_anew = state.started && t - state.t >= kLongestSilenceS;
+        record_.begin(t);
+        if (begins_anew) record_.begins_anew = true, step_.begin_anew(t);
+        for (Scan& scan : scans_)
+            if (begins_anew) scan.alike = {nullptr, 0, 0};
+        step_.run(t, scans_, reported_, record);
+        write_answer(t);
+        step_.end_tracks(record);
     }
 
-    Table rows() const { return table(rows_); }
-    Out<std::int64_t> takers() const { return array_of(takers_); }
-    Out<std::int64_t> living() const { return array_of(living_); }
-    std::size_t size() const { return state_.tracks.size(); }
-    std::int64_t born() const { return state_.next_id - 1; }
+    // Keep what the last step gave the smoother, for hand_over.
+    Record record() { return std::move(record_); }
 
-    Table smoothed() { return table(histories_.preview(state_.gaps, state_.constants)); }
+    // Tell the smoother of a step that nothing can come before any more; of the last one without a record.
+    void hand_over(const Record* record, std::optional<In<std::int64_t>> given, std::optional<In<std::int64_t>> label,
+                   std::optional<In<double>> share) {
+        const Record& told = record ? *record : record_;
+        const std::size_t n = told.track_id.size();
+        if (given) check_lengths({n, given->size()});
+        if (label) check_lengths({n, label->size()});
+        if (share) check_lengths({n, share->size()});
+        called_.resize(n);
+        for (std::size_t i = 0; i < n; ++i)
+            called_[i] = {given ? given->data()[i] : told.track_id[i], label ? label->data()[i] : -1,
+                          share ? share->data()[i] : 0.0};
+        const nb::gil_scoped_release release;
+        histories_.take(told, called_, now_.state.constants);
+    }
+
+    void begin_anew(double t) {
+        step_.begin_anew(t);
+        now_.answer = {};
+        histories_.end_all(now_.state.gaps, now_.state.constants);
+    }
+
+    Moment snapshot() const { return now_; }
+    void restore(const Moment& moment) { now_ = moment; }
+    void number_on_from(std::int64_t identity) { now_.state.next_id = std::max(now_.state.next_id, identity); }
+
+    // The state by name, or that at a moment; with what the smoother holds.
+    Named state(const Moment* moment) {
+        StateWriter writer;
+        Moment copy = moment ? *moment : now_;
+        visit_state(writer, copy.state);
+        visit_answer(writer, copy.answer);
+        visit_histories(writer, histories_);
+        return Named(writer.out);
+    }
+    void set_state(const nb::dict& state) {
+        StateReader reader(state);
+        Moment read{State(now_.state.constants), {}};
+        Histories histories = histories_;
+        visit_state(reader, read.state);
+        visit_answer(reader, read.answer);
+        visit_histories(reader, histories);
+        check_state(read.state, read.answer);
+        check_histories(histories, read.state, smooths_);
+        now_ = std::move(read);
+        histories_ = std::move(histories);
+    }
+
+    Table rows() const { return table(now_.answer.rows); }
+    Out2<double> covariances() const { return array_of(now_.answer.covariance, kCovariance); }
+    Out<std::int64_t> takers() const { return array_of(now_.answer.takers); }
+    Out<std::int64_t> living() const { return array_of(now_.answer.living); }
+    std::tuple<Out<double>, Out<double>, Out<double>> fit() const {
+        return {array_of(now_.answer.nis), array_of(now_.answer.noise_scale), array_of(now_.answer.real)};
+    }
+    Out<std::int64_t> identities() const { return array_of(now_.state.tracks.track_id); }
+    std::size_t size() const { return now_.state.tracks.size(); }
+    std::int64_t born() const { return now_.state.next_id - 1; }
+    std::size_t sensors() const { return now_.state.sensors.size(); }
+    std::optional<double> time() const { return now_.state.started ? std::optional(now_.state.t) : std::nullopt; }
+    std::tuple<double, double> picture() const { return {now_.state.width, now_.state.height}; }
+    Out<double> last_looks() const {
+        std::vector<double> out;
+        for (const Sensor& sensor : now_.state.sensors) out.push_back(sensor.last_look_s);
+        return array_of(out);
+    }
+
+    Table smoothed() { return table(histories_.preview(now_.state.gaps, now_.state.constants)); }
+    std::size_t waiting() { return histories_.rows().size(); }
     Table drain() {
         Table out = table(histories_.rows());
         histories_.rows().clear();
         return out;
     }
     Table finish() {
-        histories_.end(std::vector<std::uint8_t>(histories_.living().size(), 0), state_.gaps, state_.constants);
+        histories_.end_all(now_.state.gaps, now_.state.constants);
         return drain();
     }
 
     Named learnt() const {
+        const State& state = now_.state;
         Named out;
-        out["p_detect"] = array_of(state_.belief.p_detect);
-        out["unseen"] = array_of(state_.belief.unseen);
-        out["indifference"] = array_of(state_.belief.indifference);
-        out["prior_odds"] = array_of(state_.belief.prior_odds);
+        out["p_detect"] = array_of(state.belief.p_detect);
+        out["unseen"] = array_of(state.belief.unseen);
+        out["indifference"] = array_of(state.belief.indifference);
+        out["prior_odds"] = array_of(state.belief.prior_odds);
         std::vector<double> leftovers;
-        for (const Sensor& sensor : state_.sensors) leftovers.push_back(sensor.leftovers);
+        for (const Sensor& sensor : state.sensors) leftovers.push_back(sensor.leftovers);
         out["leftovers"] = array_of(leftovers);
-        out["noise_share"] = state_.belief.noise_share;
-        out["log_side_variance"] = array_of(state_.log_side_variance);
-        const ProcessNoise& q = state_.process_noise;
+        out["noise_share"] = state.belief.noise_share;
+        out["log_side_variance"] = array_of(state.log_side_variance);
+        std::vector<double> offsets;
+        for (std::size_t k = 0; k < state.sensors.size(); ++k) {
+            const auto offset = state.offsets.offset(k, state.log_side_variance, state.constants);
+            offsets.insert(offsets.end(), offset.begin(), offset.end());
+        }
+        out["offsets"] = array_of(offsets, 4);
+        const ProcessNoise& q = state.process_noise;
         out["process_noise"] = nb::make_tuple(q.jerk, q.growth, q.position, q.size);
         return out;
     }
@@ -105,7 +204,7 @@ public:
     // The tracks as they are now, column by column, for tests: (N, width) each.
     Named tracks() {
         Named out;
-        state_.tracks.columns([&](const char* name, const auto& column, std::size_t width) {
+        now_.state.tracks.columns([&](const char* name, const auto& column, std::size_t width) {
             using Column = std::remove_cvref_t<decltype(column)>;
             if constexpr (!std::is_same_v<Column, std::vector<Sides>>) out[name] = array_of(column, width);
         });
@@ -113,35 +212,97 @@ public:
     }
 
 private:
-    static Table table(const Rows& rows) {
-        return std::make_tuple(array_of(rows.t), array_of(rows.track_id), array_of(rows.mean, kMean),
-                              array_of(rows.variance, kMean), array_of(rows.real), array_of(rows.used));
+    void write_answer(double t) {
+        Tracks& tracks = now_.state.tracks;
+        Answer& answer = now_.answer;
+        answer.takers.clear(), answer.nis.clear(), answer.noise_scale.clear();
+        for (const Scan& scan : scans_) {
+            answer.takers.insert(answer.takers.end(), scan.takers.begin(), scan.takers.end());
+            answer.nis.insert(answer.nis.end(), scan.nis.begin(), scan.nis.end());
+            answer.noise_scale.insert(answer.noise_scale.end(), scan.boxes.size(), scan.noise_scale);
+        }
+        answer.living = tracks.track_id;
+        answer.real = tracks.real;
+        answer.rows.clear();
+        answer.covariance.clear();
+        for (std::size_t i = 0; i < tracks.size(); ++i) {
+            if (!reported_[i]) continue;
+            const double* const covariance = tracks.covariance_of(i);
+            answer.rows.add(t, {tracks.track_id[i]}, tracks.mean_of(i), covariance, tracks.real[i], tracks.used[i]);
+            answer.covariance.insert(answer.covariance.end(), covariance, covariance + kCovariance);
+        }
     }
 
-    State state_;
+    static Table table(const Rows& rows) {
+        return std::make_tuple(array_of(rows.t), array_of(rows.track_id), array_of(rows.mean, kMean),
+                              array_of(rows.variance, kMean), array_of(rows.real), array_of(rows.used),
+                              array_of(rows.label), array_of(rows.share));
+    }
+
+    Moment now_;
     Step step_;
     bool smooths_;
     Histories histories_;
+    Record record_;
+    std::vector<Called> called_;
     std::vector<Scan> scans_;
     std::vector<std::uint8_t> reported_;
-    std::vector<std::int64_t> takers_, living_;
-    Rows rows_;
 };
 
 }  // namespace
 
 void bind(nb::module_& module) {
+    nb::class_<Record>(module, "Record", "What the filter did in a step, for the smoother.")
+        .def("track_ids", [](const Record& record) { return array_of(record.track_id); },
+             "Identities of the tracks after it, before any ended (N,).")
+        .def("scans", &scans_of,
+             "Scan by scan, in the order they were taken in: index of the sensor (K,) and number of tracks after it (K,);\n"
+             "of these, one scan after the other, mean (E, 10) and covariance (E, 50) before the update, and after it.");
+    nb::class_<Moment>(module, "Moment", "All that the next step depends on; the smoother is no part of it.")
+        .def("identities", [](const Moment& moment) { return array_of(moment.state.tracks.track_id); },
+             "Identities of the living tracks (N,).")
+        .def("born", [](const Moment& moment) { return moment.state.next_id - 1; },
+             "Number of tracks started before it.");
     nb::class_<Model>(module, "Model", "The tracker's state and its step; see jeat_graph.tracking.reference.")
         .def(nb::init<const nb::object&, double, double, bool, double>(), nb::arg("constants"), nb::arg("width"),
              nb::arg("height"), nb::arg("known"), nb::arg("lag_s"),
              "constants: a ModelConstants; width, height: of the picture (px), if known; lag_s: of the smoother (s),\n"
              "infinite for whole tracks, negative for none.")
-        .def("declare_sensor", &Model::declare_sensor, "Add a sensor that has not looked yet.")
+        .def("declare_sensor", &Model::declare_sensor,
+             nb::arg("even_logit") = std::numeric_limits<double>::quiet_NaN(), nb::arg("sees_changes") = false,
+             "Add a sensor that has not looked yet. even_logit: of the score at which a box is as likely real as not,\n"
+             "NaN where it is to be learnt; sees_changes: whether it sees nothing of what stands still.")
         .def("take", &Model::take, nb::arg("t"), nb::arg("sensors").noconvert(), nb::arg("numbers").noconvert(),
-             nb::arg("boxes").noconvert(), nb::arg("logits").noconvert(),
+             nb::arg("boxes").noconvert(), nb::arg("logits").noconvert(), nb::arg("alike").noconvert() = nb::none(),
              "Take in the scans of one time t (s): sensors (K,), numbers of boxes of each (K,), all boxes (M, 4) left,\n"
-             "top, right, bottom (px), logits of their scores (M,).")
-        .def("rows", &Model::rows, "Reported tracks: t, identity, mean (N, 10), variance (N, 10), posterior, sensors.")
+             "top, right, bottom (px), logits of their scores (M,); alike (N, M): how much more likely each box is of a\n"
+             "living track than of another by what both look like, as ln of the ratio.")
+        .def("record", &Model::record, "What the last step gave the smoother; once.")
+        .def("hand_over", &Model::hand_over, nb::arg("record").none() = nb::none(),
+             nb::arg("given").noconvert() = nb::none(), nb::arg("label").noconvert() = nb::none(),
+             nb::arg("share").noconvert() = nb::none(),
+             "Tell the smoother of a step (of the last one without a record), in order of time: the identity given out\n"
+             "for each of its tracks (N,), the number of its class, below 0 for none, and the share of its votes.")
+        .def("begin_anew", &Model::begin_anew, nb::arg("t"),
+             "End all tracks and go on from another time (s), as if none had passed; what was learnt stays.")
+        .def("snapshot", &Model::snapshot, "A copy of all that the next step depends on.")
+        .def("restore", &Model::restore, nb::arg("moment"), "Go back to a snapshot of this model.")
+        .def("number_on_from", &Model::number_on_from, nb::arg("identity"), "Give no new track a smaller identity.")
+        .def("state", &Model::state, nb::arg("moment").none() = nb::none(),
+             "Everything as arrays by name, the smoother's too; that at a moment, if one is given.")
+        .def("set_state", &Model::set_state, nb::arg("state"),
+             "Go on from what state() returned. ValueError: it is not what a model can be in; nothing is changed then.")
+        .def("rows", &Model::rows, "Reported tracks: t, identity, mean (N, 10), variance (N, 10), posterior, sensors, class, its share.")
+        .def("covariances", &Model::covariances, "Their covariances (N, 50): two axes of 5 x 5.")
+        .def("fit", &Model::fit,
+             "Of the boxes of the last step the squared distance of the centre (M,), NaN where it began a track, and\n"
+             "the scale of the sensor's noise (M,); the posteriors (N,) of the tracks in living().")
+        .def("identities", &Model::identities, "Identities of the living tracks (N,).")
+        .def("sensors", &Model::sensors, "Number of sensors.")
+        .def("time", &Model::time, "Time of the last step (s); None before the first.")
+        .def("picture", &Model::picture, "Width and height of the picture (px), as far as is known.")
+        .def("last_looks", &Model::last_looks, "When each sensor looked last (s), NaN for never.")
+        .def("waiting", &Model::waiting, "Number of smoothed rows that have become final.")
         .def("takers", &Model::takers, "Identity of the track that took each box of the last step (M,).")
         .def("living", &Model::living, "Identities of the tracks of the last step, before any ended (N,).")
         .def("size", &Model::size, "Number of living tracks.")

@@ -76,6 +76,10 @@ struct Sensor {
     double period_s = std::numeric_limits<double>::quiet_NaN();   // look
     double last_look_s = std::numeric_limits<double>::quiet_NaN();
     RepeatCounts repetition;                                      // look
+    // What the user says of it: the logit of the score at which a box is as likely real as not, NaN where it is to
+    // be learnt; and whether it sees changes alone, as an event camera does.
+    double even_logit = std::numeric_limits<double>::quiet_NaN();
+    bool sees_changes = false;
 };
 
 struct State {
@@ -104,7 +108,7 @@ struct State {
         belief.noise_share = c.noise_share;
     }
 
-    void declare_sensor() {
+    void declare_sensor(double even_logit, bool sees_changes) {
         belief.widen(constants);
         tracks.widen();
         ended.widen();
@@ -112,6 +116,8 @@ struct State {
         log_side_variance.push_back(2.0 * log_of(constants.side_std));
         Sensor sensor;
         sensor.leftovers = constants.first_leftovers;
+        sensor.even_logit = even_logit;
+        sensor.sees_changes = sees_changes;
         sensors.push_back(std::move(sensor));
     }
 };

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <vector>
 
+#include "arrays.hpp"
 #include "association/assignment.hpp"
 #include "association/likelihood_ratio.hpp"
 #include "filters/noise_learning.hpp"
@@ -19,15 +20,23 @@ namespace jeat::tracking {
 
 inline constexpr double kPeriodMemory = 0.9, kGapPeriods = 1.5, kLongestPeriodS = 0.1;
 inline constexpr double kCameraDetections = 2.0, kCameraAgeS = 0.5, kSameTimeS = 1e-6, kDue = 0.9;
+// What an event camera misses though it is there: what moves less than this in the picture (px/s).
+inline constexpr double kLeastSpeed = 10.0;
+// Longer ago than this is no longer told apart (s).
+inline constexpr double kLongestAgoS = 1e9;
 
-using smoothers::Histories;
+using smoothers::Record;
 
 // One look of a sensor.
 struct Scan {
     std::size_t sensor = 0;
     std::vector<Sides> boxes;
     std::vector<double> logits;
+    // How much more likely each box is of a track than of another by its looks: ln ratio, (tracks, boxes).
+    View2<const double> alike{nullptr, 0, 0};
     std::vector<std::int64_t> takers;  // written: the track that each box went to
+    std::vector<double> nis;           // written: squared distance of its centre, NaN where it began a track
+    double noise_scale = 1.0;          // written: variance of the sensor's sides, 1 before anything was learnt
 };
 
 class Step {
@@ -35,7 +44,7 @@ public:
     explicit Step(State& state) : s_(state), c_(state.constants) {}
 
     // Take in all scans of one time, at most one of each sensor; `reported` is written.
-    void run(double t, std::vector<Scan>& scans, std::vector<std::uint8_t>& reported, Histories* histories) {
+    void run(double t, std::vector<Scan>& scans, std::vector<std::uint8_t>& reported, Record* record) {
         std::fill(s_.tracks.used.begin(), s_.tracks.used.end(), 0);
         for (const std::size_t place : order_of(scans)) {
             Scan& scan = scans[place];
@@ -43,7 +52,7 @@ public:
             predict(t);
             correct_boxes(scan);
             follow_camera(scan);
-            if (histories) write_predictions(*histories);
+            if (record) write_predictions(*record, scan.sensor);
             associate(scan);
             count_gaps();
             learn_noise(scan, clock);
@@ -52,24 +61,25 @@ public:
             count_clutter(scan);
             begin_tracks(scan, clock);
             compare_sensors(scan);
-            if (histories) write_updates(*histories);
+            if (record) write_updates(*record);
         }
         compare_overlaps();
         judge();
         learn(t);
         report(reported);
-        if (!histories) return;
-        for (std::size_t i = 0; i < s_.tracks.size(); ++i) {
-            smoothers::Entry& entry = histories->living()[i].entries.back();
-            entry.real = s_.tracks.real[i];
-            entry.used = s_.tracks.used[i];
-            entry.last_of_step = true;
+        if (!record) return;
+        record->gaps = s_.gaps;
+        record->track_id = s_.tracks.track_id;
+        smoothers::Entry* const entries = record->last_scan();
+        for (std::size_t i = 0; entries && i < s_.tracks.size(); ++i) {
+            entries[i].real = s_.tracks.real[i];
+            entries[i].used = s_.tracks.used[i];
+            entries[i].last_of_step = true;
         }
-        histories->advance(t, s_.gaps, c_);
     }
 
     // End the tracks that are false, gone, outside, or unseen for too long; their evidence stays.
-    void end_tracks(Histories* histories) {
+    void end_tracks(Record* record) {
         Tracks& tracks = s_.tracks;
         std::vector<std::uint8_t> ends(tracks.size()), kept(tracks.size());
         bool any = false;
@@ -84,18 +94,37 @@ public:
             any = true;
             if (real > c_.report) s_.gaps.count_loss();
         }
-        if (!any) return;
-        s_.ended.append(tracks.evidence, ends);
+        if (record) record->kept = kept, record->gaps_after = s_.gaps;
+        if (any) end(ends, kept);
+    }
+
+    // End all tracks and go on from another time, as if none had passed; what was learnt stays.
+    void begin_anew(double t) {
+        Tracks& tracks = s_.tracks;
+        end(std::vector<std::uint8_t>(tracks.size(), 1), std::vector<std::uint8_t>(tracks.size(), 0));
+        if (!s_.started) return;
+        for (Sensor& sensor : s_.sensors) {
+            // It has not looked again since: not for less than the time between two of its scans.
+            const double period = std::isnan(sensor.period_s) ? c_.first_period_s : sensor.period_s;
+            sensor.last_look_s = t - clamp(s_.t - sensor.last_look_s, period, kLongestAgoS);
+        }
+        s_.learnt_s = t - clamp(s_.t - s_.learnt_s, 0.0, kLongestAgoS);
+        s_.t = t;
+        s_.started = false;
+    }
+
+private:
+    // End the marked tracks: their evidence is kept.
+    void end(const std::vector<std::uint8_t>& ends, const std::vector<std::uint8_t>& kept) {
+        s_.ended.append(s_.tracks.evidence, ends);
         if (const auto most = static_cast<std::size_t>(c_.remembered_tracks); s_.ended.size() > most) {
             std::vector<std::uint8_t> last(s_.ended.size(), 1);
             std::fill(last.begin(), last.end() - static_cast<std::ptrdiff_t>(most), 0);
             keep_rows(s_.ended, last);
         }
-        if (histories) histories->end(kept, s_.gaps, c_);
-        keep_rows(tracks, kept);
+        keep_rows(s_.tracks, kept);
     }
 
-private:
     std::vector<std::size_t> order_of(const std::vector<Scan>& scans) const {
         std::vector<std::size_t> order(scans.size());
         std::iota(order.begin(), order.end(), std::size_t{0});
@@ -130,7 +159,8 @@ private:
         }
         sensor.last_look_s = t;
         sensor.repetition.count(scan.boxes, scan.logits, c_);
-        s_.belief.indifference[scan.sensor] = sensor.repetition.indifference(c_);
+        s_.belief.indifference[scan.sensor] =
+            std::isnan(sensor.even_logit) ? sensor.repetition.indifference(c_) : -sensor.even_logit;
         const double period = std::isnan(sensor.period_s) ? c_.first_period_s : sensor.period_s;
         return {t, period, c_};
     }
@@ -181,10 +211,11 @@ private:
             compensate(tracks.mean_of(i), tracks.covariance_of(i), motion, s_.width, s_.height);
     }
 
-    void associate(const Scan& scan) {
+    void associate(Scan& scan) {
         Tracks& tracks = s_.tracks;
         const std::size_t n = tracks.size(), S = s_.sensors.size(), k = scan.sensor;
         const double rho2 = exp_of(s_.log_side_variance[k]);
+        scan.noise_scale = rho2 / square(c_.side_std);
         expected_.resize(n);
         p_detect_.resize(n);
         q_.resize(boxes_.size());
@@ -215,7 +246,17 @@ private:
                 if (gain > 0.0) pairs_.push_back({i, j, gain});
             });
         }
-        made_ = assignment_.solve(pairs_, n, boxes_.size());
+        made_ = assignment_.solve(by_looks(scan), n, boxes_.size());
+    }
+
+    // The pairs with what their looks say. That tells who takes a box, and not whether there is an object.
+    const std::vector<association::Pair>& by_looks(const Scan& scan) {
+        if (!scan.alike.data) return pairs_;
+        alike_ = pairs_;
+        for (association::Pair& pair : alike_)
+            if (pair.row < scan.alike.rows)
+                pair.gain = std::max(pair.gain + scan.alike[pair.row][pair.column], association::kLeastGain);
+        return alike_;
     }
 
     void count_gaps() {
@@ -272,6 +313,7 @@ private:
             hits *= keep;
             misses *= keep;
             if (pair_of_[i] == pairs_.size()) {
+                if (blind_to(scan.sensor, i)) continue;
                 const double visible = presence[kVisible];
                 miss_presence(presence, p_detect_[i]);
                 tracks.evidence.count_miss(i, k, visible, clock.weight);
@@ -322,6 +364,11 @@ private:
             see_presence(tracks.presence.data() + row * kPresences);
             tracks.evidence.begin(row, clock.t, k, scan.logits[j], overlap, clock.weight);
             taken_by_[j] = row;
+        }
+        scan.nis.assign(boxes_.size(), std::numeric_limits<double>::quiet_NaN());
+        for (std::size_t m = 0; m < made_.size(); ++m) {
+            const association::Pair& pair = pairs_[made_[m]];
+            scan.nis[pair.column] = centre_distance(innovations_[m], expected_[pair.row]);
         }
         scan.takers.resize(boxes_.size());
         for (std::size_t j = 0; j < boxes_.size(); ++j) scan.takers[j] = tracks.track_id[taken_by_[j]];
@@ -397,34 +444,34 @@ private:
         }
     }
 
-    void write_predictions(Histories& histories) {
+    void write_predictions(Record& record, std::size_t sensor) {
         Tracks& tracks = s_.tracks;
+        smoothers::Entry* const entries = record.begin_scan(tracks.size(), sensor);
+        for (std::size_t i = 0; i < tracks.size(); ++i) begin_entry(entries[i], i, static_cast<double>(ticks_) / 1e6);
+    }
+    void write_updates(Record& record) {
+        Tracks& tracks = s_.tracks;
+        const std::size_t before = record.tracks.back();
+        smoothers::Entry* const entries = record.grow_scan(tracks.size());
+        for (std::size_t i = before; i < tracks.size(); ++i) begin_entry(entries[i], i, 0.0);
         for (std::size_t i = 0; i < tracks.size(); ++i) {
-            smoothers::Entry& entry = histories.living()[i].entries.emplace_back();
-            entry.t = s_.t;
-            entry.dt = static_cast<double>(ticks_) / 1e6;
-            std::copy_n(tracks.mean_of(i), kMean, entry.predicted_mean.begin());
-            std::copy_n(tracks.covariance_of(i), kCovariance, entry.predicted_covariance.begin());
+            std::copy_n(tracks.mean_of(i), kMean, entries[i].mean.begin());
+            std::copy_n(tracks.covariance_of(i), kCovariance, entries[i].covariance.begin());
         }
     }
-    void write_updates(Histories& histories) {
-        Tracks& tracks = s_.tracks;
-        auto& living = histories.living();
-        for (std::size_t i = 0; i < tracks.size(); ++i) {
-            if (i == living.size()) {
-                living.emplace_back().track_id = tracks.track_id[i];
-                smoothers::Entry& first = living[i].entries.emplace_back();
-                first.t = s_.t;
-                first.dt = 0.0;
-                std::copy_n(tracks.mean_of(i), kMean, first.predicted_mean.begin());
-                std::copy_n(tracks.covariance_of(i), kCovariance, first.predicted_covariance.begin());
-            }
-            smoothers::Entry& entry = living[i].entries.back();
-            std::copy_n(tracks.mean_of(i), kMean, entry.mean.begin());
-            std::copy_n(tracks.covariance_of(i), kCovariance, entry.covariance.begin());
-        }
+    void begin_entry(smoothers::Entry& entry, std::size_t row, double dt) {
+        entry.t = s_.t;
+        entry.dt = dt;
+        std::copy_n(s_.tracks.mean_of(row), kMean, entry.predicted_mean.begin());
+        std::copy_n(s_.tracks.covariance_of(row), kCovariance, entry.predicted_covariance.begin());
     }
 
+    // Whether a sensor that sees changes alone says nothing of a track: it stands still.
+    bool blind_to(std::size_t sensor, std::size_t row) {
+        if (!s_.sensors[sensor].sees_changes) return false;
+        const double* const m = s_.tracks.mean_of(row);
+        return square(m[kVelocity]) + square(m[kStates + kVelocity]) < square(kLeastSpeed);
+    }
     double unseen_for(std::size_t row) const { return s_.t - s_.tracks.evidence.last_s[row]; }
     double share_inside(std::size_t row) {
         const Sides box = corners(s_.tracks.mean_of(row));
@@ -437,7 +484,7 @@ private:
     Discretised step_{};
     PresenceTransition presence_step_{};
     association::Assignment assignment_;
-    std::vector<association::Pair> pairs_;
+    std::vector<association::Pair> pairs_, alike_;
     std::vector<std::size_t> made_, free_, taken_by_, pair_of_;
     std::vector<SidesExpected> expected_;
     std::vector<double> p_detect_, q_, of_clutter_;

@@ -219,7 +219,7 @@ def _stop(process: Any, orders: Outbox) -> None:
 def _serve(config: Config, orders: Connection, answers: Connection, most_waiting: int) -> None:
     """Do what the tracker's process orders until it says `finish`, or is there no more."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a Ctrl-C is the other process's to deal with
-    from jeat_graph.tracking.checkpoint import pack_smoothers, unpack_smoothers
+    from jeat_graph.tracking.compiled_codecs import pack_smoothers, unpack_smoothers
 
     smoothers, before = TrackSmoothers(config), 0
     bounded = config.smoother.engine not in WHOLE  # else the state holds all that has ever been measured

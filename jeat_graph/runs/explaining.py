@@ -1,0 +1,207 @@
+"""Why something is a track, or is not: a recording tracked again, with the terms of each track's log odds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import expit
+
+from jeat_graph.config.schema import Config
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.detections import Detections, Scan
+from jeat_graph.data.errors import ConfigError, DataError
+from jeat_graph.runs.measured import complete_record, recorded_inputs
+from jeat_graph.tracking.hypotheses import Hypotheses
+from jeat_graph.tracking.tracker import Tracker
+
+#: Boxes and tracks count as being at a time within so much of it (s).
+NEAR_S = 0.15
+
+
+class Moment(NamedTuple):
+    """One track at one step.
+
+    Attributes:
+        t: time (s).
+        log_odds: of being real.
+        terms: what makes them up, by name; their sum, but for what was learnt in this very step.
+        other: the most probable other hypothesis, in words.
+        reported: whether the causal table has the track.
+        visible: probability that it is there and not hidden.
+        unseen_s: time since a sensor found it last (s).
+    """
+
+    t: float
+    log_odds: float
+    terms: dict[str, float]
+    other: str
+    reported: bool
+    visible: float
+    unseen_s: float
+
+    @property
+    def existence(self) -> float:
+        """Probability of being real."""
+        return float(expit(self.log_odds))
+
+    @property
+    def reason(self) -> str:
+        """Why the table has the track here, or has not."""
+        if self.reported:
+            return "reported"
+        if self.log_odds <= 0.0:
+            worst = min(self.terms, key=lambda name: self.terms[name])
+            return f"more likely {self.other}; most against it: {worst} ({self.terms[worst]:+.1f})"
+        if self.unseen_s > 0.0:
+            return f"unseen for {self.unseen_s:.2f} s: not likely to be there still"
+        return "outside the picture"
+
+
+class BoxThere(NamedTuple):
+    """A box at a place.
+
+    Attributes:
+        t: time (s).
+        sensor: its name.
+        score: of the box.
+        box: (4,) left, top, width, height (px).
+        taker: the track that took it.
+    """
+
+    t: float
+    sensor: str
+    score: float
+    box: FloatArray
+    taker: int
+
+
+class Place(NamedTuple):
+    """What is at a place at a time.
+
+    Attributes:
+        boxes: that contain it, in order of time.
+        tracks: the last moment of each track that took one of them, or whose own box contains it.
+    """
+
+    boxes: list[BoxThere]
+    tracks: dict[int, Moment]
+
+
+class _Step(NamedTuple):
+    t: float
+    batch: list[Scan]
+    takers: list[IntArray]
+    found: Hypotheses
+    sensors: tuple[str, ...]
+
+
+def explain_track(config: Config, detections: Detections, track_id: int) -> list[Moment]:
+    """Return the moments of a track, from its first box to its end.
+
+    Args:
+        config: of the recording.
+        detections: as they were tracked.
+        track_id: identity of a track, be it reported or not.
+
+    Raises:
+        DataError: there is no such track.
+        ConfigError: the configuration's engine has no hypotheses.
+    """
+    out: list[Moment] = []
+    for step in _steps(config, detections):
+        row = np.flatnonzero(step.found.track_id == track_id)
+        if len(row):
+            out.append(_moment(step, int(row[0])))
+        elif out:
+            break
+    if not out:
+        raise DataError(f"there is no track {track_id}")
+    return out
+
+
+def explain_place(
+    config: Config, detections: Detections, t: float, x: float, y: float, within_s: float = NEAR_S
+) -> Place:
+    """Return what lies at a place in the picture around a time.
+
+    Args:
+        config: of the recording.
+        detections: as they were tracked.
+        t: time (s).
+        x, y: the place (px).
+        within_s: how far from the time boxes and tracks may be (s).
+
+    Raises:
+        ConfigError: the configuration's engine has no hypotheses.
+    """
+    boxes: list[BoxThere] = []
+    tracks: dict[int, Moment] = {}
+    for step in _steps(config, detections):
+        if step.t < t - within_s:
+            continue
+        if step.t > t + within_s:
+            break
+        for scan, takers in zip(step.batch, step.takers, strict=True):
+            for k in np.flatnonzero(_contain(scan.boxes, x, y)):
+                score, taker = float(scan.scores[k]), int(takers[k])
+                boxes.append(BoxThere(scan.t, scan.sensor, score, scan.boxes[k], taker))
+        wanted = _contain(step.found.boxes, x, y)
+        wanted |= np.isin(step.found.track_id, [one.taker for one in boxes])
+        for row in np.flatnonzero(wanted):
+            tracks[int(step.found.track_id[row])] = _moment(step, int(row))
+    return Place(boxes, tracks)
+
+
+def run_to_explain(folder: Path, moved: list[str] | None = None) -> tuple[Config, Detections]:
+    """Return a run's configuration and its detections.
+
+    Args:
+        folder: the run directory.
+        moved: where the inputs are now, if they have moved.
+
+    Raises:
+        DataError: there is no run, or an input is missing or has changed since.
+    """
+    return recorded_inputs(folder, complete_record(folder), moved)
+
+
+def _steps(config: Config, detections: Detections) -> Iterator[_Step]:
+    tracker = Tracker(config)
+    if not hasattr(tracker, "hypotheses"):
+        raise ConfigError(f"tracker.engine={config.tracker.engine} weighs no hypotheses: nothing to explain")
+    for batch in detections.batches():
+        tracker.step(batch)
+        ends = np.cumsum([len(scan) for scan in batch])[:-1]
+        takers = np.split(tracker.takers(sum(map(len, batch))), ends)
+        yield _Step(batch[0].t, list(batch), takers, tracker.hypotheses(), tracker.sensor_names)
+
+
+def _moment(step: _Step, row: int) -> Moment:
+    found, terms = step.found, step.found.terms
+    named = {}
+    for k, name in enumerate(step.sensors):
+        named[f"{name}: looks"] = float(terms.looks[row, k])
+        named[f"{name}: scores"] = float(terms.scores[row, k])
+    named["motion"] = float(terms.motion[row])
+    named["second box"] = float(terms.second_box[row])
+    named["other hypotheses"] = float(terms.rest[row])
+    other = int(terms.other[row])
+    return Moment(
+        t=step.t,
+        log_odds=float(found.log_odds[row]),
+        terms=named,
+        other="noise" if other < 0 else f"a false object of {step.sensors[other]!r}",
+        reported=bool(found.reported[row]),
+        visible=float(found.visible[row]),
+        unseen_s=float(found.unseen_s[row]),
+    )
+
+
+def _contain(boxes: FloatArray, x: float, y: float) -> BoolArray:
+    """Whether boxes (M, 4) contain a place: (M,)."""
+    place = np.array([x, y])
+    low, side = boxes[:, :2], boxes[:, 2:]
+    return np.asarray(((low <= place) & (place <= low + side)).all(axis=1))

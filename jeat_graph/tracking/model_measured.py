@@ -1,0 +1,110 @@
+"""What the boxes of a step of the model said of their tracks: diagnostics, and records for other smoothers."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
+from jeat_graph.data.diagnostics import Diagnostics
+from jeat_graph.filters import box_sides, singer
+from jeat_graph.filters.measurement import MEASUREMENT
+from jeat_graph.filters.model_constants import ModelConstants
+from jeat_graph.tracking.by_track import places
+
+#: No error of a sensor that lasts.
+_NO_ERROR = -1
+
+
+class StepBoxes(NamedTuple):
+    """The boxes of the last step, in the order of `ReferenceModel.takers`.
+
+    Attributes:
+        t: its time (s).
+        sensor: (M,) index of each box's sensor.
+        boxes: (M, 4) left, top, width, height (px).
+    """
+
+    t: float
+    sensor: IntArray
+    boxes: FloatArray
+
+    @staticmethod
+    def none() -> StepBoxes:
+        """Return what there is before the first step."""
+        return StepBoxes(0.0, np.zeros(0, dtype=np.int64), np.zeros((0, 4)))
+
+
+def diagnostics_of(
+    told: StepBoxes,
+    takers: IntArray,
+    living: IntArray,
+    fit: tuple[FloatArray, FloatArray, FloatArray],
+    sensors: tuple[str, ...],
+) -> Diagnostics:
+    """Return how well each box of a step fitted its track.
+
+    Args:
+        told: the boxes.
+        takers: (M,) tracks that took them.
+        living: (N,) tracks after the step, ascending.
+        fit: of `ReferenceModel.fit`.
+        sensors: names of the sensors.
+    """
+    nis, scale, real = fit
+    row, there = places(takers, living)
+    return Diagnostics(
+        t=np.full(len(takers), told.t),
+        track_id=takers,
+        sensor=told.sensor,
+        nis=nis,
+        noise_scale=scale,
+        existence=np.where(there, real[row], np.nan) if len(living) else np.full(len(takers), np.nan),
+        sensors=sensors,
+    )
+
+
+def records_of(
+    told: StepBoxes,
+    takers: IntArray,
+    fit: tuple[FloatArray, FloatArray, FloatArray],
+    q: singer.ProcessNoise,
+    c: ModelConstants,
+) -> RecordArray:
+    """Return the boxes of a step as `MEASUREMENT` (M,), as the filter weighed them.
+
+    Args:
+        told: the boxes; sensors as the caller counts them.
+        takers: (M,) tracks that took them.
+        fit: of `ReferenceModel.fit`.
+        q: process noise of the scene.
+        c: constants.
+    """
+    nis, scale, _ = fit
+    rows = np.zeros(len(takers), dtype=MEASUREMENT)
+    size = told.boxes[:, 2:]
+    side = np.array(
+        [
+            box_sides.side_variance(one[None], math.log(s * c.side_std**2), c)[0]
+            for one, s in zip(size, scale.tolist(), strict=True)
+        ]
+    ).reshape(-1, 2)
+    whole, born = np.sqrt(size.prod(axis=1)), np.isnan(nis)
+    rows["t"], rows["track_id"], rows["sensor"], rows["birth"] = told.t, takers, told.sensor, born
+    rows["z"] = told.boxes[:, :2] + size / 2.0
+    # The centre is the mean of two sides, the size their difference.
+    rows["r"] = rows["noise"] = side / 2.0
+    rows["error"] = _NO_ERROR
+    rows["jerk"] = np.exp(q.jerk / 2.0) * whole
+    rows["size_density"] = math.exp(q.growth / 2.0)
+    rows["log_size"], rows["size_var"] = np.log(size), 2.0 * side / size**2
+    if born.any():
+        corners = np.concatenate([told.boxes[:, :2], told.boxes[:, :2] + size], axis=1)
+        _, first = box_sides.initial_state(corners[born], 0.0, c)
+        rows["velocity_var"][born] = first[:, :, singer.VELOCITY, singer.VELOCITY]
+        rows["acceleration_var"][born] = first[:, :, singer.ACCELERATION, singer.ACCELERATION]
+        rows["rate_var"][born] = first[:, :, singer.GROWTH, singer.GROWTH].mean(axis=1)
+    rows["nis"], rows["scale"] = nis, scale
+    return rows

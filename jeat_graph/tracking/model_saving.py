@@ -1,0 +1,195 @@
+"""The model's tracker to and from files, and back to an earlier moment."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
+
+import numpy as np
+
+from jeat_graph.config.schema import Config
+from jeat_graph.data.arrays import IntArray
+from jeat_graph.data.errors import DataError, JeatGraphError
+from jeat_graph.tracking.appearance import Looks
+from jeat_graph.tracking.classes import ClassTally
+from jeat_graph.tracking.input_watch import InputWatch
+from jeat_graph.tracking.model_measured import StepBoxes
+
+if TYPE_CHECKING:
+    from jeat_graph.tracking.reference_model import ReferenceModel
+
+
+class ModelSnapshot(NamedTuple):
+    """All that the next step of a tracker depends on.
+
+    Attributes:
+        moment: the model's.
+        sensors: names of those that had looked.
+        classes: votes on the tracks' classes, or None.
+        looks: what the tracks look like, or None.
+        order: of the last step's boxes among those given.
+        boxes: of the last step, for diagnostics.
+    """
+
+    moment: Any
+    sensors: tuple[str, ...]
+    classes: ClassTally | None
+    looks: Looks | None
+    order: IntArray
+    boxes: StepBoxes
+
+    def living(self) -> tuple[IntArray, int]:
+        """Return the identities (N,) of the living tracks, and that of the next one to be born."""
+        return self.moment.identities(), self.moment.born() + 1
+
+
+class SavedModel:
+    """A tracker's state to and from files; see `ModelTracker`."""
+
+    if TYPE_CHECKING:
+        config: Config
+        sensor_names: tuple[str, ...]
+        _model: ReferenceModel
+        _diagnostics: bool
+        _finished: bool
+        _watch: InputWatch
+        _class_ids: dict[str, int]
+        _called: list[str]
+
+        def __init__(self, config: Config, *, diagnostics: bool = False, engine: str = "core") -> None:
+            """Make a tracker."""
+
+        def snapshot(self) -> ModelSnapshot:
+            """Copy all that the next step depends on."""
+
+        def restore(self, snapshot: ModelSnapshot) -> None:
+            """Go back to a snapshot."""
+
+    @property
+    def can_save(self) -> bool:
+        """Whether a run that was broken off can go on: the reference is not saved."""
+        return self.config.tracker.engine == "core"
+
+    def save(self, path: str | Path) -> None:
+        """Write the whole state to a file (`.npz`), smoothers included, for `load` to go on from.
+
+        This tracker and the loaded one give the same bytes from here on.
+
+        Raises:
+            JeatGraphError: the engine is the reference.
+        """
+        from jeat_graph.tracking.checkpoint import save_state
+
+        save_state(path, self.config, self.state())
+
+    @classmethod
+    def load(cls, path: str | Path, config: Config | None = None) -> Self:
+        """Return the tracker that was saved to a file; see `Tracker.load`."""
+        from jeat_graph.tracking.checkpoint import load_tracker
+
+        made: Self = load_tracker(path, config)
+        return made
+
+    def state(self, snapshot: ModelSnapshot | None = None) -> dict[str, Any]:
+        """Return what `from_state` takes: the state now, or at a snapshot, with the smoother's of now.
+
+        Raises:
+            JeatGraphError: the engine is the reference.
+        """
+        if not self.can_save:
+            raise JeatGraphError(f"engine {self.config.tracker.engine} is not saved; tracker.engine=core is")
+        now = self.snapshot() if snapshot is None else snapshot
+        model: Any = self._model
+        return {
+            "diagnostics": self._diagnostics,
+            "finished": self._finished,
+            "model": model.state(now.moment),
+            "sensors": list(now.sensors),
+            "classes": now.classes,
+            "looks": now.looks,
+            "order": now.order,
+            "boxes": now.boxes,
+            "class_ids": self._class_ids,
+            "called": self._called,
+        }
+
+    @classmethod
+    def from_state(cls, config: Config, state: dict[str, Any]) -> Self:
+        """Make a tracker of what `state` returned.
+
+        Raises:
+            DataError: no tracker can be in that state.
+        """
+        tracker = cls(config, diagnostics=bool(state["diagnostics"]), engine=config.tracker.engine)
+        model: Any = tracker._model
+        try:
+            model.set_state(state["model"])
+        except ValueError as error:
+            raise DataError(f"is damaged: {error}") from None
+        sensors, called = tuple(state["sensors"]), list(state["called"])
+        if len(set(sensors)) != model.sensors() or not set(sensors) <= set(config.sensors):
+            raise DataError("is damaged: its sensors are not those of its state")
+        if not all(isinstance(name, str) for name in called):
+            raise DataError("is damaged: names of classes are none")
+        order, boxes = _whole_order(state["order"], len(model.takers())), state["boxes"]
+        _check_boxes(boxes, len(order), len(sensors), bool(state["diagnostics"]))
+        classes, looks = _checked_tally(state["classes"], called), _checked_looks(state["looks"], len(sensors))
+        tracker.restore(ModelSnapshot(model.snapshot(), sensors, classes, looks, order, boxes))
+        tracker._finished, tracker._called = bool(state["finished"]), called
+        tracker._class_ids = {str(name): int(number) for name, number in state["class_ids"].items()}
+        _check_labels(state["model"], len(called))
+        if model.time() is not None:
+            tracker._watch.end()
+        return tracker
+
+
+def _whole_order(order: Any, count: int) -> IntArray:
+    if not _is_array(order, np.int64, (count,)) or not np.array_equal(np.sort(order), np.arange(count)):
+        raise DataError("is damaged: the order of boxes is none")
+    return np.asarray(order)
+
+
+def _is_array(values: Any, kind: type[np.generic], shape: tuple[int, ...]) -> bool:
+    return isinstance(values, np.ndarray) and values.dtype == kind and values.shape == shape
+
+
+def _check_boxes(boxes: Any, count: int, sensors: int, kept: bool) -> None:
+    count = count if kept else 0
+    good = isinstance(boxes, StepBoxes) and isinstance(boxes.t, float)
+    good = good and _is_array(boxes.sensor, np.int64, (count,)) and _is_array(boxes.boxes, np.float64, (count, 4))
+    if not good or not ((boxes.sensor >= 0) & (boxes.sensor < sensors)).all() or not np.isfinite(boxes.boxes).all():
+        raise DataError("is damaged: the boxes of the last step are none")
+
+
+def _checked_tally(tally: Any, called: list[str]) -> ClassTally | None:
+    if tally is None:
+        return None
+    good = isinstance(tally, ClassTally) and isinstance(tally.names, np.ndarray) and tally.names.dtype.kind == "U"
+    good = good and tally.names.ndim == 1 and _ascending(tally.track_id)
+    good = good and _is_array(tally.weight, np.float64, (len(tally.track_id), len(tally.names)))
+    if not good or not np.isfinite(tally.weight).all() or not set(tally.names.tolist()) <= set(called):
+        raise DataError("is damaged: the votes on classes are none")
+    return tally
+
+
+def _checked_looks(looks: Any, sensors: int) -> Looks | None:
+    if looks is None:
+        return None
+    good = isinstance(looks, Looks) and _ascending(looks.track_id) and isinstance(looks.mean, np.ndarray)
+    good = good and looks.mean.ndim == 3 and looks.mean.shape[:2] == (len(looks.track_id), len(looks.moments))
+    good = good and looks.mean.dtype == np.float64 and len(looks.moments) <= sensors
+    good = good and _is_array(looks.moments, np.float64, (len(looks.moments), 2, 3))
+    if not good or not np.isfinite(looks.mean).all() or not np.isfinite(looks.moments).all():
+        raise DataError("is damaged: what tracks look like is nothing of the kind")
+    return looks
+
+
+def _ascending(ids: Any) -> bool:
+    return isinstance(ids, np.ndarray) and ids.dtype == np.int64 and ids.ndim == 1 and bool((np.diff(ids) > 0).all())
+
+
+def _check_labels(model: dict[str, Any], classes: int) -> None:
+    """Refuse numbers of classes that are not there."""
+    for name in ("histories.label", "final.label"):
+        if len(model[name]) and int(model[name].max()) >= classes:
+            raise DataError("is damaged: classes are missing")

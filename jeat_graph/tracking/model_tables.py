@@ -1,0 +1,77 @@
+"""Rows of the model as tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.filters import box_sides, singer
+from jeat_graph.tracking.classes import ClassTally
+from jeat_graph.tracking.reference_model import ModelRows
+
+_MOTION = [singer.POSITION, singer.VELOCITY, singer.ACCELERATION]
+
+
+def in_order(rows: ModelRows) -> ModelRows:
+    """Return rows in order of time, then of identity."""
+    order = np.lexsort((rows[1], rows[0]))
+    t, ids, mean, variance, real, used, label, share = rows
+    return (
+        t[order],
+        ids[order],
+        mean[order],
+        variance[order],
+        real[order],
+        used[order],
+        label[order],
+        share[order],
+    )
+
+
+def table_of(rows: ModelRows, sensors: tuple[str, ...], names: Sequence[str] | None) -> Trajectories:
+    """Return rows as a table.
+
+    Args:
+        rows: of the model.
+        sensors: their names.
+        names: of the classes, by number; None for a table without classes.
+    """
+    t, ids, mean, variance, real, used, label, share = rows
+    state, spread = mean.reshape(-1, 2, singer.STATES), variance.reshape(-1, 2, singer.STATES)
+    sides, size = box_sides.corners(state), singer.box_size(state)
+    classes = None
+    if names is not None:
+        # The last one is for those below 0.
+        classes = np.array([*names, ""], dtype=np.str_)[label], np.where(label >= 0, share, np.nan)
+    return Trajectories(
+        t=t,
+        track_id=ids,
+        boxes=np.concatenate([sides[:, :2], size], axis=1),
+        existence=real,
+        mean=state[:, :, _MOTION].transpose(0, 2, 1).reshape(-1, 6),
+        var=spread[:, :, _MOTION].transpose(0, 2, 1).reshape(-1, 6),
+        used=used,
+        sensors=sensors,
+        classes=None if classes is None else classes[0],
+        class_probability=None if classes is None else classes[1],
+        size_var=size**2 * spread[:, :, singer.LOG_SIZE],
+    )
+
+
+def with_classes(rows: ModelRows, tally: ClassTally | None, names: Sequence[str]) -> ModelRows:
+    """Return rows of tracks of the last step with what their votes say of their classes.
+
+    Args:
+        rows: of the model.
+        tally: the votes; None for no classes.
+        names: of the classes, by number.
+    """
+    if tally is None or not len(rows[1]):
+        return rows
+    called, share = tally.columns(rows[1])
+    number = {name: k for k, name in enumerate(names)}
+    label = np.array([number.get(name, -1) for name in called.tolist()], dtype=np.int64)
+    t, ids, mean, variance, real, used, _, _ = rows
+    return t, ids, mean, variance, real, used, label, np.nan_to_num(share)

@@ -1,0 +1,81 @@
+"""`jeat-graph explain`: a track and a place of a run, in words and as a plot."""
+
+from __future__ import annotations
+
+import pytest
+
+from jeat_graph.cli.main import main
+
+RATE_HZ, SCANS = 10, 30
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A car that a camera sees well, and a window that it takes for one at a low score."""
+    path = tmp_path_factory.mktemp("explain")
+    rows = ["t,sensor,left,top,width,height,score"]
+    for k in range(SCANS):
+        t = k / RATE_HZ
+        rows.append(f"{t},cam,{100 + 8 * k},300,80,50,0.9")
+        rows.append(f"{t},cam,900,200,40,60,0.12")
+    (path / "d.csv").write_text("\n".join(rows) + "\n")
+    assert main(["track", str(path / "d.csv"), "--out", str(path / "run"), "--image", "1280x720"]) == 0
+    return path
+
+
+def explained(folder, capsys, *arguments: str) -> str:
+    capsys.readouterr()
+    assert main(["explain", str(folder / "run"), *arguments]) == 0
+    return capsys.readouterr().out
+
+
+def test_a_car_is_reported_because_of_its_scores_and_looks(folder, capsys):
+    text = explained(folder, capsys, "--track", "1")
+    assert "track 1: from 0.000 to 2.900 s" in text
+    assert "reported first at" in text
+    assert "cam: scores +" in text
+    assert "cam: looks" in text
+
+
+def test_a_window_is_not_and_the_reason_is_said(folder, capsys):
+    text = explained(folder, capsys, "--track", "2")
+    assert "never reported" in text
+    assert "cam: scores (-" in text
+
+
+def test_a_place_tells_boxes_and_their_tracks(folder, capsys):
+    text = explained(folder, capsys, "--at", "1.0,920,230")
+    assert "3 boxes of sensors, 1 tracks" in text
+    assert "0.12" in text
+    assert "track 2, existence 0.0" in text
+
+
+def test_a_place_where_nothing_is(folder, capsys):
+    assert "no sensor has a box, and no track is there" in explained(folder, capsys, "--at", "1,600,600")
+
+
+def test_the_plot_is_the_same_each_time(folder, capsys, tmp_path):
+    for name in ("a.png", "b.png"):
+        explained(folder, capsys, "--track", "1", "--out", str(tmp_path / name))
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--track", "99"], "there is no track 99"),
+        (["--at", "1,2,3", "--out", "x.png"], "needs --track"),
+        (["--track", "1", "--out", "x.txt"], "must end in .png"),
+    ],
+)
+def test_wrong_use_is_one_line_and_exit_2(folder, capsys, arguments, words):
+    assert main(["explain", str(folder / "run"), *arguments]) == 2
+    error = capsys.readouterr().err.strip()
+    assert words in error
+    assert len(error.splitlines()) == 1
+
+
+def test_a_place_must_read_as_one(folder):
+    with pytest.raises(SystemExit) as stop:
+        main(["explain", str(folder / "run"), "--at", "1;2;3"])
+    assert stop.value.code == 2
