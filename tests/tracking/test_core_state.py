@@ -7,21 +7,23 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jeat_graph import LiveTracker, Tracker, load_config
+from jeat_graph import Tracker, load_config
 from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.io.packing import pack, unpack
 from jeat_graph.io.state_file import read_state_file, write_state_file
+from jeat_graph.live.late import LiveTracker
 from jeat_graph.tracking.checkpoint import _codecs, save_state
 from jeat_graph.tracking.model_tracker import ModelTracker
 
 _SIZE = (1280, 720)
+_PICTURE = ["image.width=1280", "image.height=720", "input.picture=given"]
 _SMOOTHERS = {"none": ["smoother.engine=none"], "lag": ["smoother.lag_s=.4"], "whole": ["smoother.engine=rts"]}
 
 
 def traffic(seed=0, times=60, classes=False, embeddings=False):
     """Scans of a camera and an event camera, which begins to look later; objects come and go."""
     rng = np.random.default_rng(seed)
-    place, speed = rng.uniform(0, 600, (12, 2)), rng.normal(0, 90, (12, 2))
+    place, speed = rng.uniform(200, 500, (12, 2)), rng.normal(0, 60, (12, 2))
     looks = rng.normal(size=(12, 8))
     for k in range(times):
         t = 0.05 * k
@@ -111,13 +113,13 @@ def _as_scan(scan):
 
 
 def test_the_reference_goes_back_too_and_says_that_it_is_not_saved(tmp_path):
-    scans = list(traffic(times=12))
+    scans = list(traffic(times=20))
     straight, tracker = (Tracker("core", engine="reference", image=_SIZE) for _ in range(2))
     for scan in scans[:6]:
         straight.step(scan)
         tracker.step(scan)
     moment = tracker.snapshot()
-    tracker.take_in([_as_scan(scans[8])])
+    tracker.take_in([_as_scan(scans[7])])
     tracker.restore(moment)
     for scan in scans[6:]:
         straight.step(scan)
@@ -130,7 +132,7 @@ def test_the_reference_goes_back_too_and_says_that_it_is_not_saved(tmp_path):
 
 def test_steps_are_handed_over_once_and_in_order():
     tracker = tracker_with("lag")
-    taken = [tracker.take_in([_as_scan(scan)]) for scan in list(traffic(times=12))]
+    taken = [tracker.take_in([_as_scan(scan)]) for scan in traffic(times=20)]
     tracker.hand_over(taken[6])
     with pytest.raises(ValueError, match="in order of time"):
         tracker.hand_over(taken[0])
@@ -273,7 +275,7 @@ def test_what_no_tracker_has_beside_its_model_is_refused(tmp_path, part, value):
 def test_a_file_of_other_settings_or_of_another_version_is_refused(tmp_path):
     _, path = saved(tmp_path)
     with pytest.raises(JeatGraphError, match="lag_s"):
-        Tracker.load(path, load_config("core", ["smoother.lag_s=2"]))
+        Tracker.load(path, load_config("core", ["smoother.lag_s=2", *_PICTURE]))
     text, block = read_state_file(path, "state")
     write_state_file(path, text.replace(b'"format": ', b'"format": 9'), block)
     with pytest.raises(JeatGraphError, match="begin anew"):
