@@ -48,7 +48,6 @@ class SavedModel:
 
     if TYPE_CHECKING:
         config: Config
-        sensor_names: tuple[str, ...]
         _model: ReferenceModel
         _diagnostics: bool
         _finished: bool
