@@ -132,7 +132,10 @@ class SavedModel:
             raise DataError("is damaged: names of classes are none")
         order, boxes = _whole_order(state["order"], len(model.takers())), state["boxes"]
         _check_boxes(boxes, len(order), len(sensors), bool(state["diagnostics"]))
-        classes, looks = _checked_tally(state["classes"], called), _checked_looks(state["looks"], len(sensors))
+        classes, looks = (
+            _checked_tally(state["classes"], called),
+            _checked_looks(state["looks"], len(sensors)),
+        )
         tracker.restore(ModelSnapshot(model.snapshot(), sensors, classes, looks, order, boxes))
         tracker._finished, tracker._called = bool(state["finished"]), called
         tracker._class_ids = {str(name): int(number) for name, number in state["class_ids"].items()}
@@ -155,15 +158,27 @@ def _is_array(values: Any, kind: type[np.generic], shape: tuple[int, ...]) -> bo
 def _check_boxes(boxes: Any, count: int, sensors: int, kept: bool) -> None:
     count = count if kept else 0
     good = isinstance(boxes, StepBoxes) and isinstance(boxes.t, float)
-    good = good and _is_array(boxes.sensor, np.int64, (count,)) and _is_array(boxes.boxes, np.float64, (count, 4))
-    if not good or not ((boxes.sensor >= 0) & (boxes.sensor < sensors)).all() or not np.isfinite(boxes.boxes).all():
+    good = (
+        good
+        and _is_array(boxes.sensor, np.int64, (count,))
+        and _is_array(boxes.boxes, np.float64, (count, 4))
+    )
+    if (
+        not good
+        or not ((boxes.sensor >= 0) & (boxes.sensor < sensors)).all()
+        or not np.isfinite(boxes.boxes).all()
+    ):
         raise DataError("is damaged: the boxes of the last step are none")
 
 
 def _checked_tally(tally: Any, called: list[str]) -> ClassTally | None:
     if tally is None:
         return None
-    good = isinstance(tally, ClassTally) and isinstance(tally.names, np.ndarray) and tally.names.dtype.kind == "U"
+    good = (
+        isinstance(tally, ClassTally)
+        and isinstance(tally.names, np.ndarray)
+        and tally.names.dtype.kind == "U"
+    )
     good = good and tally.names.ndim == 1 and _ascending(tally.track_id)
     good = good and _is_array(tally.weight, np.float64, (len(tally.track_id), len(tally.names)))
     if not good or not np.isfinite(tally.weight).all() or not set(tally.names.tolist()) <= set(called):
@@ -184,7 +199,12 @@ def _checked_looks(looks: Any, sensors: int) -> Looks | None:
 
 
 def _ascending(ids: Any) -> bool:
-    return isinstance(ids, np.ndarray) and ids.dtype == np.int64 and ids.ndim == 1 and bool((np.diff(ids) > 0).all())
+    return (
+        isinstance(ids, np.ndarray)
+        and ids.dtype == np.int64
+        and ids.ndim == 1
+        and bool((np.diff(ids) > 0).all())
+    )
 
 
 def _check_labels(model: dict[str, Any], classes: int) -> None:

@@ -23,9 +23,7 @@ _WIDTH = 10
 _LONGEST_SILENCE_S = 300.0
 #: Time, identity, mean (N, 10), variance (N, 10), posterior, sensors that found it at that time, number of the
 #: class, and its share of the votes.
-ModelRows = tuple[
-    FloatArray, IntArray, FloatArray, FloatArray, FloatArray, IntArray, IntArray, FloatArray
-]
+ModelRows = tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray, IntArray, IntArray, FloatArray]
 
 
 class Called(NamedTuple):

@@ -17,7 +17,11 @@ from jeat_graph.tracking.model_tracker import ModelTracker
 
 _SIZE = (1280, 720)
 _PICTURE = ["image.width=1280", "image.height=720", "input.picture=given"]
-_SMOOTHERS = {"none": ["smoother.engine=none"], "lag": ["smoother.lag_s=.4"], "whole": ["smoother.engine=rts"]}
+_SMOOTHERS = {
+    "none": ["smoother.engine=none"],
+    "lag": ["smoother.lag_s=.4"],
+    "whole": ["smoother.engine=rts"],
+}
 
 
 def traffic(seed=0, times=60, classes=False, embeddings=False):
@@ -34,7 +38,9 @@ def traffic(seed=0, times=60, classes=False, embeddings=False):
             seen = there[rng.random(len(there)) < 0.9]
             corner = (place + speed * t)[seen] + rng.normal(0, 1.0, (len(seen), 2))
             stray = rng.uniform(0, 600, (rng.poisson(0.5), 2))
-            boxes = np.concatenate([np.concatenate([corner, stray]), np.full((len(seen) + len(stray), 2), 40.0)], axis=1)
+            boxes = np.concatenate(
+                [np.concatenate([corner, stray]), np.full((len(seen) + len(stray), 2), 40.0)], axis=1
+            )
             more = []
             if classes or embeddings:
                 more.append([("car", "van", "bus")[n % 3] for n in seen] + [""] * len(stray))
@@ -46,7 +52,16 @@ def traffic(seed=0, times=60, classes=False, embeddings=False):
 
 def bytes_of(table):
     """All columns of a table as bytes."""
-    columns = (table.t, table.track_id, table.boxes, table.existence, table.mean, table.var, table.used, table.size_var)
+    columns = (
+        table.t,
+        table.track_id,
+        table.boxes,
+        table.existence,
+        table.mean,
+        table.var,
+        table.used,
+        table.size_var,
+    )
     classes = () if table.classes is None else (table.classes.tolist(), table.class_probability.tobytes())
     return (*(column.tobytes() for column in columns), *classes)
 
@@ -85,7 +100,12 @@ def test_a_tracker_that_is_loaded_goes_on_with_the_same_bytes(smoother, cut, tmp
 
 
 @settings(max_examples=30)
-@given(seed=st.integers(0, 10**6), cut=st.integers(0, 30), back=st.integers(0, 20), smoother=st.sampled_from([*_SMOOTHERS]))
+@given(
+    seed=st.integers(0, 10**6),
+    cut=st.integers(0, 30),
+    back=st.integers(0, 20),
+    smoother=st.sampled_from([*_SMOOTHERS]),
+)
 def test_a_tracker_that_goes_back_is_where_it_was(seed, cut, back, smoother):
     scans = list(traffic(seed, 40))
     straight, tracker = tracker_with(smoother), tracker_with(smoother)
