@@ -36,8 +36,8 @@ class SensorConfig(Section):
     kind: str = choice(
         "any",
         ("any", "event"),
-        "any: it may see whatever is in the picture; event: it sees changes alone, so that what stands still is "
-        "not missed where it finds nothing (engines core and reference)",
+        "any: it may see whatever is in the picture; event: it sees changes alone, so that it does not speak "
+        "against what stands still (engines core and reference)",
     )
     even_score: float | None = number(
         None,

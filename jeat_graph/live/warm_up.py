@@ -13,7 +13,9 @@ _STEP_S = 0.05
 
 
 def warm_up(config: Config) -> None:
-    """Track a vehicle that is not there."""
+    """Track a vehicle that is not there, where something is compiled at its first call."""
+    if config.tracker.engine != "compiled":
+        return
     notice_if_cold()
     spare = Tracker(replace(config, smoother=replace(config.smoother, worker=False)))
     box = [0.4 * config.image.width, 0.4 * config.image.height, 40.0, 30.0]

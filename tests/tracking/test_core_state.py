@@ -1,4 +1,4 @@
-"""The state of the core's tracker: to a file and back, to an earlier moment and back; what is damaged is refused."""
+"""The state of the core's tracker: to a file and back, to an earlier moment; what is damaged is refused."""
 
 from __future__ import annotations
 
@@ -196,6 +196,15 @@ def saved(tmp_path, smoother="lag", **more):
     return tracker, path
 
 
+def refusal(path):
+    """What is said of a file that is refused; None of one that is not."""
+    try:
+        Tracker.load(path)
+    except JeatGraphError as error:
+        return str(error)
+    return None
+
+
 def test_a_file_of_which_any_byte_was_changed_is_refused_in_one_line(tmp_path):
     _, path = saved(tmp_path)
     content, rng = path.read_bytes(), np.random.default_rng(1)
@@ -203,11 +212,8 @@ def test_a_file_of_which_any_byte_was_changed_is_refused_in_one_line(tmp_path):
         broken = bytearray(content)
         broken[place] ^= 1 << int(rng.integers(8))
         path.write_bytes(broken)
-        try:
-            Tracker.load(path)
-        except JeatGraphError as error:
-            assert str(path) in str(error)
-            assert "\n" not in str(error)
+        said = refusal(path)
+        assert said is None or (str(path) in said and "\n" not in said)
     for length in rng.integers(0, len(content), 40).tolist():
         path.write_bytes(content[:length])
         with pytest.raises(JeatGraphError):
@@ -250,12 +256,12 @@ def test_a_state_with_any_wrong_array_is_refused_or_harms_nobody(tmp_path, smoot
         state["model"] = dict(state["model"])
         drawn_damage(rng, state["model"])
         save_state(path, tracker.config, state)
-        try:
-            loaded = Tracker.load(path)
-        except DataError as error:
+        said = refusal(path)
+        if said is not None:
             refused += 1
-            assert str(path) in str(error)
+            assert str(path) in said
             continue
+        loaded = Tracker.load(path)
         # What could be goes on, whatever comes of it.
         try:
             for scan in traffic(5, 3):
