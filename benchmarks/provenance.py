@@ -12,7 +12,7 @@ from jeat_graph.config.reading import config_to_dict
 from jeat_graph.config.schema import Config
 from jeat_graph.version import __version__
 
-_PACKAGES = ("numpy", "scipy", "numba", "gtsam", "trackers", "norfair", "supervision")
+_PACKAGES = ("numpy", "scipy", "gtsam", "trackers", "norfair", "supervision")
 
 
 def provenance(settings: Mapping[str, Any], configs: Mapping[str, Config]) -> dict[str, Any]:
