@@ -10,13 +10,12 @@ from statistics import stdev
 from typing import TYPE_CHECKING, Any
 
 from benchmarks import common
+from benchmarks.baselines import peers_here
 from benchmarks.judging import METRICS, in_processes
-from benchmarks.peer_search import peers_here
 from benchmarks.provenance import provenance
 from benchmarks.raw_options import add_raw, detectors_of, findings
 from benchmarks.raw_segments import SENSORS, RawFound, RawSegment, described, find_in, segments_in
 from benchmarks.recordings import JudgedRecording
-from benchmarks.steps import start
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError
@@ -229,8 +228,7 @@ def _config(row: Row, seen: Detections, size_px: tuple[int, int]) -> Config:
     changes = [f"image.width={width}", f"image.height={height}"]
     if row.tracker == "default":
         changes += declared_settings(row.request())
-    fitted, _ = fit_input(load_config("default" if row.tracker == PAPER else row.tracker, changes), seen)
-    return start(load_config(PAPER), fitted) if row.tracker == PAPER else fitted
+    return fit_input(load_config(row.tracker, changes), seen)[0]
 
 
 def _scores(group: Sequence[JudgedRecording], found: Sequence[Any], row: Row, kind: Any) -> dict[str, Any]:
