@@ -39,7 +39,15 @@ def compiled_components() -> list[dict[str, Any]]:
 def main() -> int:
     """Write the list; the exit code."""
     python, out = sys.argv[1:]
-    command = [sys.executable, "-m", "cyclonedx_py", "environment", "--output-reproducible", "--spec-version", "1.6"]
+    command = [
+        sys.executable,
+        "-m",
+        "cyclonedx_py",
+        "environment",
+        "--output-reproducible",
+        "--spec-version",
+        "1.6",
+    ]
     command += ["--pyproject", "pyproject.toml", "--mc-type", "library", "--output-format", "JSON", python]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:

@@ -35,17 +35,6 @@ CAUSAL, SMOOTHED = "causal", "smoothed"
 _ALL = "all"
 
 
-@dataclass(frozen=True, eq=False)
-class SizedRecording(JudgedRecording):
-    """Detections with their truth, and the picture that they were found in.
-
-    Attributes:
-        size_px: its width and height.
-    """
-
-    size_px: tuple[int, int]
-
-
 @dataclass(frozen=True)
 class Row:
     """A row of the table.
@@ -144,13 +133,13 @@ def fused_rows(detector: str, presets: Sequence[str], with_peers: bool) -> list[
     return [Row((detector, detector), tracker, (FUSED_SENSOR,)) for tracker in trackers]
 
 
-def _recordings(found: Sequence[RawFound]) -> dict[tuple[str, str], dict[str, list[SizedRecording]]]:
+def _recordings(found: Sequence[RawFound]) -> dict[tuple[str, str], dict[str, list[JudgedRecording]]]:
     """Return recordings by data set, by pair of detectors with the detections of both sensors.
 
     A network of both sensors stands as `fused` and its name.
     """
     by_sensor: dict[str, dict[tuple[str, str, str], RawFound]] = {sensor: {} for sensor in SENSORS}
-    out: dict[tuple[str, str], dict[str, list[SizedRecording]]] = {}
+    out: dict[tuple[str, str], dict[str, list[JudgedRecording]]] = {}
     for one in found:
         asked = one.finding
         if asked.sensor == FUSED_SENSOR:
@@ -169,11 +158,11 @@ def _recordings(found: Sequence[RawFound]) -> dict[tuple[str, str], dict[str, li
     return out
 
 
-def _recording(segment: RawSegment, found: Detections) -> SizedRecording:
-    return SizedRecording(f"{segment.source}/{segment.name}", found, segment.truth(), segment.size_px())
+def _recording(segment: RawSegment, found: Detections) -> JudgedRecording:
+    return JudgedRecording(f"{segment.source}/{segment.name}", found, segment.truth(), segment.size_px())
 
 
-def _judge(job: tuple[Row, dict[str, list[SizedRecording]]]) -> list[dict[str, Any]]:
+def _judge(job: tuple[Row, dict[str, list[JudgedRecording]]]) -> list[dict[str, Any]]:
     """Judge one row in all data sets: a record for each, and for what it reports (causal, smoothed)."""
     row, by_source = job
     everything = {**by_source, _ALL: [one for group in by_source.values() for one in group]}
@@ -201,7 +190,7 @@ def _judge(job: tuple[Row, dict[str, list[SizedRecording]]]) -> list[dict[str, A
     return out
 
 
-def _tracked(row: Row, recording: SizedRecording) -> dict[str, Any]:
+def _tracked(row: Row, recording: JudgedRecording) -> dict[str, Any]:
     """Return the tables of a tracker, by what they are."""
     from benchmarks.baselines import run_baseline
     from jeat_graph.runs.latency import at_measurement
@@ -210,7 +199,7 @@ def _tracked(row: Row, recording: SizedRecording) -> dict[str, Any]:
     if row.tracker == BYTETRACK:
         return {CAUSAL: run_baseline("bytetrack", recording.detections, row.sensors)}
     seen = recording.only(row.sensors)
-    config = _config(row, seen, recording.size_px)
+    config = _config(row, seen, recording.image)
     seen = at_measurement(seen, config)
     if row.tracker == PAPER:
         return {CAUSAL: track(config, seen)}
