@@ -1,8 +1,8 @@
-"""Write the software bill of materials of the wheel: its packages as they are installed, and what its core holds.
+"""Write the software bill of materials of the wheel: the packages it needs, and what its core holds.
 
 `python .ci/sbom.py PYTHON OUT.cdx.json` lists the environment of a Python in which the wheel is installed
-(`cyclonedx-py`, CycloneDX 1.6), and adds the libraries that are compiled into the core, which no metadata of Python's
-packages names. The same environment gives the same bytes.
+(`cyclonedx-py`, CycloneDX 1.6), and adds the libraries that are compiled into the core, which no metadata of
+Python's packages names. The same environment gives the same bytes.
 """
 
 from __future__ import annotations

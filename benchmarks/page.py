@@ -153,4 +153,5 @@ def _plot(path: Path, result: Mapping[str, Any]) -> None:
     figure.legend(handles, labels, loc="outside upper center", ncols=5, frameon=False, fontsize="small")
     path.parent.mkdir(parents=True, exist_ok=True)
     with mpl.rc_context({"svg.hashsalt": "jeat-graph", "svg.fonttype": "none"}):
-        FigureCanvasSVG(figure).print_svg(str(path), metadata={"Date": None, "Creator": None})
+        canvas: Any = FigureCanvasSVG(figure)
+        canvas.print_svg(str(path), metadata={"Date": None, "Creator": None})

@@ -206,15 +206,14 @@ def _tracked(row: Row, recording: JudgedRecording) -> dict[str, Any]:
     return dict(zip((CAUSAL, SMOOTHED), both_tables(config, seen), strict=True))
 
 
-def _config(row: Row, seen: Detections, size_px: tuple[int, int]) -> Config:
+def _config(row: Row, seen: Detections, image: tuple[float, float] | None) -> Config:
     """Return a preset for what is seen: what is known of the networks, their rates, and their picture.
 
     As in `track`, files beside the networks count with `default` alone.
     """
     from jeat_graph.runs.declaring import fit_input
 
-    width, height = size_px
-    changes = [f"image.width={width}", f"image.height={height}"]
+    changes = [] if image is None else [f"image.width={image[0]:g}", f"image.height={image[1]:g}"]
     if row.tracker == "default":
         changes += declared_settings(row.request())
     return fit_input(load_config(row.tracker, changes), seen)[0]

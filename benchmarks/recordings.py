@@ -63,7 +63,7 @@ class RecordingSet:
     @property
     def streams(self) -> list[tuple[str, ...]]:
         """What a tracker is given in turn: all detectors, then each alone."""
-        alone = [(name,) for name in self.sensors]
+        alone: list[tuple[str, ...]] = [(name,) for name in self.sensors]
         return alone if len(alone) == 1 else [self.sensors, *alone]
 
 

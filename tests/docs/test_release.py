@@ -1,4 +1,4 @@
-"""What a release needs: one version everywhere, the licences of what is compiled in, files that hosts read."""
+"""What a release needs: one version everywhere, licences of what is compiled in, files that hosts read."""
 
 from __future__ import annotations
 
