@@ -62,7 +62,7 @@ def test_the_slowest_sensor_comes_first_and_all_are_given_before_each_alone():
 
 def test_ours_is_judged_by_both_tables_with_motion_and_consistency_and_a_peer_by_its_one():
     group = RecordingSet("day", (simulated("day-sparse", 5, 2.0),))
-    ours = judge(Job(Subject("core", "core"), group, ("rgb",), copies=2))
+    ours = judge(Job(Subject("default", "default", ("tracker.engine=core",)), group, ("rgb",), copies=2))
     for kind in ("causal", "smoothed"):
         assert 0.0 < ours[kind]["HOTA"] <= 100.0
         assert ours[kind]["position_rmse"] > 0.0

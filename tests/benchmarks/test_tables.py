@@ -16,7 +16,7 @@ from jeat_graph.io.config_io import save_config
 from jeat_graph.io.detections_io import write_detections
 from jeat_graph.io.truth_io import write_truth
 
-FEW = ["--config", "core", "--no-peers", "--jobs", "1"]
+FEW = ["--set", "tracker.engine=core", "--no-peers", "--jobs", "1"]
 
 
 @pytest.fixture(scope="module")
@@ -47,18 +47,18 @@ def test_every_stream_of_every_set_has_a_row_a_table(result):
         (name, *stream) for name in ("first", "second") for stream in (("rgb", "evt"), ("rgb",), ("evt",))
     }
     text = (result / "mot.md").read_text()
-    assert text.count("| core, causal | rgb + evt |") == 4  # of both sets, plain and over copies
+    assert text.count("| default, causal | rgb + evt |") == 4  # of both sets, plain and over copies
     assert "±" in text
 
 
 def test_the_result_holds_what_is_needed_to_repeat_it(data, result):
     found = json.loads((result / "mot.json").read_text())
-    command = f"python -m benchmarks mot {data} --config core --copies 2 --no-peers"
+    command = f"python -m benchmarks mot {data} --copies 2 --set tracker.engine=core --no-peers"
     assert found["settings"]["command"] == command
     words = command.split()[3:]
-    assert vars(build_parser().parse_args(words))["config"] == ["core"]
+    assert vars(build_parser().parse_args(words))["changes"] == ["tracker.engine=core"]
     assert found["packages"]["numpy"]
-    assert found["configs"]["core"]["tracker"]["engine"] == "core"
+    assert found["configs"]["default"]["tracker"]["engine"] == "core"
     assert found["commit"]
 
 
@@ -85,7 +85,7 @@ def test_recordings_that_were_in_view_are_counted(tmp_path):
 
 def test_a_configuration_chosen_without_a_set_has_a_row_in_that_set_alone(data, tmp_path):
     held_out = tmp_path / "without-first.yaml"
-    save_config(load_config("core"), held_out)
+    save_config(load_config("default", ["tracker.engine=core"]), held_out)
     argument = ["--left-out", f"first={held_out}"]
     assert main(["mot", str(data), *FEW, "--quick", *argument, "--out", str(tmp_path)]) == 0
     records = json.loads((tmp_path / "mot.json").read_text())["records"]
