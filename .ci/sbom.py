@@ -8,6 +8,7 @@ Python's packages names. The same environment gives the same bytes.
 from __future__ import annotations
 
 import json
+import runpy
 import subprocess
 import sys
 from importlib.metadata import version
@@ -56,6 +57,7 @@ def main() -> int:
     bill = json.loads(done.stdout)
     added = compiled_components()
     bill["components"] = sorted([*bill.get("components", []), *added], key=lambda one: str(one["bom-ref"]))
+    bill["metadata"]["component"]["version"] = runpy.run_path("jeat_graph/version.py")["__version__"]
     root = bill["metadata"]["component"]["bom-ref"]
     for entry in bill.get("dependencies", []):
         if entry["ref"] == root:

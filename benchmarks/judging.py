@@ -29,7 +29,7 @@ _Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True)
-class Subject:
+class Contender:
     """A tracker that is judged.
 
     Attributes:
@@ -46,7 +46,7 @@ class Subject:
 
 
 @dataclass(frozen=True, eq=False)
-class Job:
+class JudgeJob:
     """A tracker on one stream of a set.
 
     Attributes:
@@ -56,13 +56,13 @@ class Job:
         copies: altered copies of the recordings to judge it on, too.
     """
 
-    subject: Subject
+    subject: Contender
     group: RecordingSet
     stream: tuple[str, ...]
     copies: int = 0
 
 
-def judge(job: Job) -> dict[str, Any]:
+def judge(job: JudgeJob) -> dict[str, Any]:
     """Track the recordings of a set and judge the tables, pooled and each by itself.
 
     Returns:
@@ -91,7 +91,7 @@ def judge(job: Job) -> dict[str, Any]:
     return record | ({"copies": found} if found else {})
 
 
-def tracked(subject: Subject, recording: JudgedRecording, stream: Sequence[str]) -> dict[str, Trajectories]:
+def tracked(subject: Contender, recording: JudgedRecording, stream: Sequence[str]) -> dict[str, Trajectories]:
     """Tables of a tracker, by kind; a peer has no smoothed one."""
     seen = recording.only(stream)
     if subject.peer is not None:

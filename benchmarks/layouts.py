@@ -37,7 +37,7 @@ _MEVDT_RATE = re.compile(r"(\d+)\s*-?_?\s*hz", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundRecording:
     """Where a recording lies.
 
     Attributes:
@@ -60,7 +60,7 @@ class Found:
     forms: tuple[str | None, str | None] = (None, None)
 
 
-def mot(root: Path) -> Iterator[Found]:
+def mot(root: Path) -> Iterator[FoundRecording]:
     """Recordings in MOTChallenge's layout (`gt/gt.txt`, `det/det.txt`, `seqinfo.ini`) or in ours.
 
     Ours is `gt.csv`, `detections.csv` and, optional, `meta.json` with `width`, `height`, `rate_hz`. Text
@@ -72,7 +72,9 @@ def mot(root: Path) -> Iterator[Found]:
         if ours.is_file():
             facts = _meta(folder / "meta.json")
             files = {"": folder / "detections.csv"}
-            found = Found(_group(root, folder), folder.name, ours, files, facts.get("rate_hz"), _image(facts))
+            found = FoundRecording(
+                _group(root, folder), folder.name, ours, files, facts.get("rate_hz"), _image(facts)
+            )
         else:
             truth = next((p for p in (folder / "gt" / "gt.txt", folder / "gt.txt") if p.is_file()), None)
             if truth is None or folder.name == "gt":
@@ -84,21 +86,23 @@ def mot(root: Path) -> Iterator[Found]:
                 "rgb": next((p for p in (folder / "det/det.txt", folder / "det.txt") if p.is_file()), folder)
             }
             form = ("motchallenge", "motchallenge")
-            found = Found(group, folder.name, truth, files, facts.get("rate_hz"), _image(facts), form)
+            found = FoundRecording(
+                group, folder.name, truth, files, facts.get("rate_hz"), _image(facts), form
+            )
         yield replace(found, detections={name: p for name, p in files.items() if p.is_file()})
 
 
-def kitti(root: Path) -> Iterator[Found]:
+def kitti(root: Path) -> Iterator[FoundRecording]:
     """KITTI tracking: `label_02/SEQ.txt`, and `det_02/SEQ.txt` where there are public detections."""
     for labels in sorted(root.rglob("label_02")):
         for truth in sorted(labels.glob("*.txt")):
             beside = labels.parent / "det_02" / truth.name
             held = {"rgb": beside} if beside.is_file() else {}
             form = ("kitti", "kitti")
-            yield Found("KITTI", truth.stem, truth, held, _KITTI_RATE_HZ, _KITTI_IMAGE, form)
+            yield FoundRecording("KITTI", truth.stem, truth, held, _KITTI_RATE_HZ, _KITTI_IMAGE, form)
 
 
-def mevdt(root: Path) -> Iterator[Found]:
+def mevdt(root: Path) -> Iterator[FoundRecording]:
     """MEVDT: `labels/tracking_labels/SPLIT/SCENE/SEQ/…-mot.txt`, one file a rate of 24 to 384 Hz."""
     for truth in sorted(root.rglob("tracking_labels/**/*mot.txt")):
         rate = _MEVDT_RATE.search(truth.name)
@@ -106,27 +110,27 @@ def mevdt(root: Path) -> Iterator[Found]:
             raise DataError("its name does not say the rate of its labels (…24Hz…-mot.txt)", truth)
         group = f"MEVDT {truth.parent.parent.name} {rate[1]} Hz"
         form = ("motchallenge", None)
-        yield Found(group, truth.parent.name, truth, {}, float(rate[1]), _MEVDT_IMAGE, form)
+        yield FoundRecording(group, truth.parent.name, truth, {}, float(rate[1]), _MEVDT_IMAGE, form)
 
 
-def etram(root: Path) -> Iterator[Found]:
+def etram(root: Path) -> Iterator[FoundRecording]:
     """Boxes of eTraM: `SEQ_bbox.npy`, structured arrays with `t` in µs and `track_id`."""
     for truth in sorted(root.rglob("*_bbox.npy")):
         name = truth.name.removesuffix("_bbox.npy")
-        yield Found(
+        yield FoundRecording(
             f"eTraM {_group(root, truth.parent)}", name, truth, {}, None, _ETRAM_IMAGE, ("prophesee", None)
         )
 
 
-def dsec(root: Path) -> Iterator[Found]:
+def dsec(root: Path) -> Iterator[FoundRecording]:
     """DSEC-Det: `SEQ/object_detections/left/tracks.npy`, structured arrays with `t` in µs and `track_id`."""
     for truth in sorted(root.rglob("object_detections/left/tracks.npy")):
         name = truth.parents[2].name
         group = f"DSEC-Det {_group(root, truth.parents[2])}"
-        yield Found(group, name, truth, {}, None, _DSEC_IMAGE, ("prophesee", None))
+        yield FoundRecording(group, name, truth, {}, None, _DSEC_IMAGE, ("prophesee", None))
 
 
-LAYOUTS: dict[str, Callable[[Path], Iterator[Found]]] = {
+LAYOUTS: dict[str, Callable[[Path], Iterator[FoundRecording]]] = {
     "mot": mot,
     "kitti": kitti,
     "mevdt": mevdt,
@@ -136,7 +140,7 @@ LAYOUTS: dict[str, Callable[[Path], Iterator[Found]]] = {
 
 
 @dataclass(frozen=True)
-class Reading:
+class LayoutOptions:
     """What the user says of the files.
 
     Attributes:
@@ -154,7 +158,7 @@ class Reading:
     sets: tuple[str, ...] = ()
 
 
-def read_sets(layout: str, root: Path, how: Reading) -> list[RecordingSet]:
+def read_sets(layout: str, root: Path, how: LayoutOptions) -> list[RecordingSet]:
     """Read all recordings below a folder, by set.
 
     Args:
@@ -168,7 +172,7 @@ def read_sets(layout: str, root: Path, how: Reading) -> list[RecordingSet]:
     """
     if not root.is_dir():
         raise DataError("is no folder", root)
-    groups: dict[str, list[Found]] = {}
+    groups: dict[str, list[FoundRecording]] = {}
     for one in LAYOUTS[layout](root):
         groups.setdefault(one.group, []).append(one)
     if not groups:
@@ -183,7 +187,7 @@ def read_sets(layout: str, root: Path, how: Reading) -> list[RecordingSet]:
     ]
 
 
-def _read(one: Found, how: Reading) -> JudgedRecording:
+def _read(one: FoundRecording, how: LayoutOptions) -> JudgedRecording:
     from jeat_graph.eval.load import restrict_classes
     from jeat_graph.io.detections_io import read_detections
     from jeat_graph.io.truth_io import read_truth
@@ -222,7 +226,7 @@ def _with_empty_frames(truth: GroundTruth, detections: Detections) -> GroundTrut
     return replace(truth, frames=np.unique(np.concatenate([frames, scans])))
 
 
-def _given(one: Found, how: Reading) -> Iterator[tuple[str, Path]]:
+def _given(one: FoundRecording, how: LayoutOptions) -> Iterator[tuple[str, Path]]:
     for name, folder in how.detections:
         choices = [folder / f"{one.name}{ending}" for ending in _ENDINGS] + [
             folder / one.name / "detections.csv"

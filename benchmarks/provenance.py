@@ -17,6 +17,8 @@ from jeat_graph.version import __version__
 
 _PACKAGES = ("numpy", "scipy", "gtsam", "trackers", "norfair", "supervision")
 _ROOT = Path(__file__).resolve().parents[1]
+#: Folders that a benchmark imports from.
+_IMPORTED = ("jeat_graph", "filters", "association", "smoothers", "eval", "configs", "benchmarks", "sehn")
 
 
 def provenance(settings: Mapping[str, Any], configs: Mapping[str, Config]) -> dict[str, Any]:
@@ -51,7 +53,7 @@ def commit() -> str:
         done = subprocess.run([git, "-C", str(_ROOT), *words], capture_output=True, text=True, check=False)
         return done.stdout.strip()
 
-    changed = ask("status", "--porcelain", "--untracked-files=no", "--", ":!docs", ":!tests")
+    changed = ask("status", "--porcelain", "--untracked-files=no", "--", *_IMPORTED)
     return f"commit `{ask('rev-parse', '--short=12', 'HEAD')}`" + (" with changes" if changed else "")
 
 

@@ -14,8 +14,17 @@ from typing import TYPE_CHECKING, Any
 
 from benchmarks import common
 from benchmarks.baselines import NAMES, peers_here
-from benchmarks.judging import CAUSAL, HEADLINE, SMOOTHED, Job, Subject, in_processes, judge, spread_text
-from benchmarks.layouts import Reading, read_sets
+from benchmarks.judging import (
+    CAUSAL,
+    HEADLINE,
+    SMOOTHED,
+    Contender,
+    JudgeJob,
+    in_processes,
+    judge,
+    spread_text,
+)
+from benchmarks.layouts import LayoutOptions, read_sets
 from benchmarks.page import write_page
 from benchmarks.provenance import provenance
 from benchmarks.recordings import DURATION_S, SEEDS, RecordingSet
@@ -106,14 +115,14 @@ def run(args: argparse.Namespace) -> int:
 
 def measure(args: argparse.Namespace) -> dict[str, Any]:
     """Track and judge everything."""
-    subjects = [Subject(Path(name).stem, name, tuple(args.changes)) for name in args.config]
+    subjects = [Contender(Path(name).stem, name, tuple(args.changes)) for name in args.config]
     for one in subjects:
         load_config(one.config or "default", one.changes)  # a wrong key is said before hours of tracking
     groups = _sets(args)
     left_out = _left_out(args.left_out, groups)
-    peers = [] if args.no_peers or args.quick else [Subject(NAMES[key], peer=key) for key in peers_here()]
+    peers = [] if args.no_peers or args.quick else [Contender(NAMES[key], peer=key) for key in peers_here()]
     jobs = [
-        Job(subject, group, stream, args.copies)
+        JudgeJob(subject, group, stream, args.copies)
         for group in groups
         for stream in group.streams
         for subject in (*subjects, *left_out.get(group.name, ()), *peers)
@@ -143,7 +152,7 @@ def _sets(args: argparse.Namespace) -> list[RecordingSet]:
         return simulated_sets(args.worlds, seeds, args.duration or (_QUICK_S if args.quick else DURATION_S))
     folders = tuple(_named(text) for text in args.detections)
     layout = "mot" if args.kind == "real" else args.kind
-    how = Reading(folders, args.rate, tuple(args.classes), most, tuple(args.sets or ()))
+    how = LayoutOptions(folders, args.rate, tuple(args.classes), most, tuple(args.sets or ()))
     return read_sets(layout, Path(args.root), how)
 
 
@@ -156,15 +165,15 @@ def _named(text: str) -> tuple[str, Path]:
     return name, Path(folder)
 
 
-def _left_out(texts: Sequence[str], groups: Sequence[RecordingSet]) -> dict[str, list[Subject]]:
-    out: dict[str, list[Subject]] = {}
+def _left_out(texts: Sequence[str], groups: Sequence[RecordingSet]) -> dict[str, list[Contender]]:
+    out: dict[str, list[Contender]] = {}
     for text in texts:
         name, sign, file = text.partition("=")
         if not sign or name not in {group.name for group in groups}:
             there = ", ".join(group.name for group in groups)
             raise ConfigError(f"--left-out {text}: must be SET=FILE, with one of the sets {there}")
         load_config(file)
-        out.setdefault(name, []).append(Subject(f"{Path(file).stem}, chosen without this set", file))
+        out.setdefault(name, []).append(Contender(f"{Path(file).stem}, chosen without this set", file))
     return out
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.baselines import peers_here
-from benchmarks.judging import LEFT_OUT, MOVED, Job, Subject, altered, in_processes, judge, spread_text
+from benchmarks.judging import LEFT_OUT, MOVED, Contender, JudgeJob, altered, in_processes, judge, spread_text
 from benchmarks.recordings import RecordingSet, simulated
 
 
@@ -62,7 +62,9 @@ def test_the_slowest_sensor_comes_first_and_all_are_given_before_each_alone():
 
 def test_ours_is_judged_by_both_tables_with_motion_and_consistency_and_a_peer_by_its_one():
     group = RecordingSet("day", (simulated("day-sparse", 5, 2.0),))
-    ours = judge(Job(Subject("default", "default", ("tracker.engine=core",)), group, ("rgb",), copies=2))
+    ours = judge(
+        JudgeJob(Contender("default", "default", ("tracker.engine=core",)), group, ("rgb",), copies=2)
+    )
     for kind in ("causal", "smoothed"):
         assert 0.0 < ours[kind]["HOTA"] <= 100.0
         assert ours[kind]["position_rmse"] > 0.0
@@ -70,6 +72,6 @@ def test_ours_is_judged_by_both_tables_with_motion_and_consistency_and_a_peer_by
         assert ours["by_recording"]["day-sparse/5"][kind]["HOTA"] == ours[kind]["HOTA"]
     assert len(ours["copies"]) == 2
     pytest.importorskip("trackers", reason="needs the package trackers (extra baselines)")
-    theirs = judge(Job(Subject("SORT", peer="sort"), group, ("rgb",)))
+    theirs = judge(JudgeJob(Contender("SORT", peer="sort"), group, ("rgb",)))
     assert "smoothed" not in theirs
     assert "anees" not in theirs["causal"]

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from benchmarks.layouts import Reading, read_sets
+from benchmarks.layouts import LayoutOptions, read_sets
 from jeat_graph.data.errors import DataError
 
 BOX = (100.0, 50.0, 40.0, 80.0)
@@ -55,7 +55,7 @@ def test_motchallenge_sets_are_splits_and_a_detector_of_mot17_each(tmp_path):
     for name in ("MOT17-02-FRCNN", "MOT17-02-SDP", "MOT17-04-FRCNN"):
         mot_sequence(tmp_path / "MOT17" / "train" / name)
     seqinfo(tmp_path / "MOT17" / "test" / "MOT17-01-FRCNN")  # without truth
-    sets = {one.name: one for one in read_sets("mot", tmp_path, Reading())}
+    sets = {one.name: one for one in read_sets("mot", tmp_path, LayoutOptions())}
     assert {name: len(one.recordings) for name, one in sets.items()} == {
         "MOT17 train FRCNN": 2,
         "MOT17 train SDP": 1,
@@ -70,9 +70,9 @@ def test_motchallenge_sets_are_splits_and_a_detector_of_mot17_each(tmp_path):
 def test_a_sequence_itself_and_its_split_may_be_the_root(tmp_path):
     folder = tmp_path / "DanceTrack" / "val"
     mot_sequence(folder / "dancetrack0004")
-    (whole,) = read_sets("mot", folder, Reading())
+    (whole,) = read_sets("mot", folder, LayoutOptions())
     assert (whole.name, whole.recordings[0].name) == ("DanceTrack val", "dancetrack0004")
-    (alone,) = read_sets("mot", folder / "dancetrack0004", Reading())
+    (alone,) = read_sets("mot", folder / "dancetrack0004", LayoutOptions())
     assert alone.recordings[0].name == "dancetrack0004"
 
 
@@ -81,13 +81,13 @@ def test_detections_that_a_set_does_not_hold_come_from_a_folder_with_a_file_a_re
     seqinfo(folder)
     mot_text(folder / "gt" / "gt.txt", 1)
     mot_text(tmp_path / "yolox" / "dancetrack0004.txt", -1, tail="0.9,-1,-1,-1")
-    (found,) = read_sets("mot", tmp_path / "DanceTrack", Reading((("yolox", tmp_path / "yolox"),)))
+    (found,) = read_sets("mot", tmp_path / "DanceTrack", LayoutOptions((("yolox", tmp_path / "yolox"),)))
     assert found.sensors == ("yolox",)
     with pytest.raises(DataError, match="has no detections: give --detections"):
-        read_sets("mot", tmp_path / "DanceTrack", Reading())
+        read_sets("mot", tmp_path / "DanceTrack", LayoutOptions())
     (tmp_path / "empty").mkdir()
     with pytest.raises(DataError, match="holds no detections of dancetrack0004"):
-        read_sets("mot", tmp_path / "DanceTrack", Reading((("yolox", tmp_path / "empty"),)))
+        read_sets("mot", tmp_path / "DanceTrack", LayoutOptions((("yolox", tmp_path / "empty"),)))
 
 
 def test_our_own_layout_keeps_the_names_of_sensors_and_takes_the_size_from_meta(tmp_path):
@@ -95,7 +95,7 @@ def test_our_own_layout_keeps_the_names_of_sensors_and_takes_the_size_from_meta(
     contract_text(folder / "detections.csv")
     (folder / "gt.csv").write_text(CONTRACT_TRUTH)
     (folder / "meta.json").write_text(json.dumps({"width": 800, "height": 600, "rate_hz": 20}))
-    (found,) = read_sets("mot", tmp_path, Reading())
+    (found,) = read_sets("mot", tmp_path, LayoutOptions())
     assert (found.name, found.sensors, found.recordings[0].image) == ("street", ("evt",), (800.0, 600.0))
     # The scan at 0.10 s lies on the truth's clock and saw no object there: it is a frame, too.
     np.testing.assert_allclose(found.recordings[0].truth.frame_times(), [0.0, 0.05, 0.1])
@@ -105,7 +105,7 @@ def test_scans_on_another_clock_are_no_frames_of_the_truth(tmp_path):
     folder = tmp_path / "street" / "monday"
     contract_text(folder / "detections.csv", count=6, period_s=0.013)
     (folder / "gt.csv").write_text(CONTRACT_TRUTH)
-    (found,) = read_sets("mot", tmp_path, Reading())
+    (found,) = read_sets("mot", tmp_path, LayoutOptions())
     np.testing.assert_allclose(found.recordings[0].truth.frame_times(), [0.0, 0.05])
 
 
@@ -113,8 +113,8 @@ def test_text_files_side_by_side_need_a_rate(tmp_path):
     mot_text(tmp_path / "tud" / "campus" / "gt.txt", 1, tail="1,-1,-1,-1")
     mot_text(tmp_path / "tud" / "campus" / "det.txt", -1, tail="0.9,-1,-1,-1")
     with pytest.raises(DataError, match="give --rate HZ"):
-        read_sets("mot", tmp_path, Reading())
-    (found,) = read_sets("mot", tmp_path, Reading(rate_hz=25.0))
+        read_sets("mot", tmp_path, LayoutOptions())
+    (found,) = read_sets("mot", tmp_path, LayoutOptions(rate_hz=25.0))
     np.testing.assert_allclose(np.diff(found.recordings[0].truth.frame_times()), 1 / 25)
 
 
@@ -133,7 +133,7 @@ def test_kitti_takes_labels_public_detections_and_the_classes_asked_for(tmp_path
     training = tmp_path / "training"
     kitti_lines(training / "label_02" / "0000.txt", ["Car", "Pedestrian"])
     kitti_lines(training / "det_02" / "0000.txt", ["Car"], score=" 0.8")
-    (found,) = read_sets("kitti", tmp_path, Reading(classes=("Car",)))
+    (found,) = read_sets("kitti", tmp_path, LayoutOptions(classes=("Car",)))
     recording = found.recordings[0]
     assert (found.name, recording.name, recording.image) == ("KITTI", "0000", (1242.0, 375.0))
     ignored = dict(zip(recording.truth.classes, recording.truth.ignore, strict=True))
@@ -146,7 +146,7 @@ def test_mevdt_has_a_set_a_scene_and_a_rate_of_its_labels(tmp_path):
     for rate in (24, 48):
         mot_text(labels / f"1581956422-{rate}Hz-mot.txt", 1)
     contract_text(tmp_path / "boxes" / "1581956422.csv")
-    how = Reading((("evt", tmp_path / "boxes"),))
+    how = LayoutOptions((("evt", tmp_path / "boxes"),))
     sets = read_sets("mevdt", tmp_path, how)
     assert [one.name for one in sets] == ["MEVDT Scene_A 24 Hz", "MEVDT Scene_A 48 Hz"]
     np.testing.assert_allclose(np.diff(sets[1].recordings[0].truth.frame_times()), 1 / 48)
@@ -172,7 +172,7 @@ def test_boxes_of_event_cameras_come_from_arrays_with_times_in_microseconds(
 ):
     boxes_of(tmp_path / "data" / place)
     contract_text(tmp_path / "boxes" / f"{name}.csv")
-    (found,) = read_sets(layout, tmp_path / "data", Reading((("evt", tmp_path / "boxes"),)))
+    (found,) = read_sets(layout, tmp_path / "data", LayoutOptions((("evt", tmp_path / "boxes"),)))
     (recording,) = found.recordings
     assert (recording.name, recording.image) == (name, image)
     np.testing.assert_allclose(recording.truth.t, [0.0, 0.05, 0.1])
@@ -181,12 +181,12 @@ def test_boxes_of_event_cameras_come_from_arrays_with_times_in_microseconds(
 
 def test_what_is_wrong_with_a_folder_is_said(tmp_path):
     with pytest.raises(DataError, match="is no folder"):
-        read_sets("mot", tmp_path / "nowhere", Reading())
+        read_sets("mot", tmp_path / "nowhere", LayoutOptions())
     with pytest.raises(DataError, match="holds no recording with truth in the layout 'kitti'"):
-        read_sets("kitti", tmp_path, Reading())
+        read_sets("kitti", tmp_path, LayoutOptions())
     mot_sequence(tmp_path / "MOT20" / "train" / "MOT20-01")
     with pytest.raises(DataError, match="holds no set 'MOT21'; there are: MOT20 train"):
-        read_sets("mot", tmp_path, Reading(sets=("MOT21",)))
+        read_sets("mot", tmp_path, LayoutOptions(sets=("MOT21",)))
     (tmp_path / "MOT20" / "train" / "MOT20-01" / "seqinfo.ini").write_text("[Sequence]\nframeRate=fast\n")
     with pytest.raises(DataError, match=r"seqinfo.ini: cannot be read"):
-        read_sets("mot", tmp_path, Reading())
+        read_sets("mot", tmp_path, LayoutOptions())
