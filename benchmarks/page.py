@@ -49,20 +49,20 @@ _TITLES = {
     "dsec-det": "DSEC-Det",
     "simulated": "Simulated recordings",
 }
-_HOW = """Scores are those of `jeat-graph eval`, pooled over the recordings of a set: MOTA and MOTP (CLEAR), HOTA,
-DetA and AssA, IDF1, in per cent, at the frames of the truth. The challenges' servers differ in details: they
-count tracks on some ignored classes as false, and KITTI's leaves out small and occluded objects. *Causal* rows
-use past data only. *Smoothed* rows use the whole recording. ANEES is the normalised estimation error squared of
-the position, averaged, per degree of freedom: 1 if the variances are right. The next column is the share of
-errors inside the 95 % ellipses.
+_HOW = """Scores are those of `jeat-graph eval`, pooled over the recordings of a set: MOTA and MOTP
+(CLEAR), HOTA, DetA and AssA, IDF1, in per cent, at the frames of the truth. The challenges' servers
+differ in details: they count tracks on some ignored classes as false, and KITTI's leaves out small and
+occluded objects. *Causal* rows use past data only. *Smoothed* rows use the whole recording. ANEES is the
+normalised estimation error squared of the position, averaged, per degree of freedom: 1 if the variances
+are right. The next column is the share of errors inside the 95 % ellipses.
 
-Our tracker has the settings of its preset, and the other trackers have the defaults of their packages. They get
-no images: BoT-SORT and McByte run without camera-motion compensation and without masks. Of several detectors the
-slowest sets their frames, and non-maximum suppression merges the boxes.
+Our tracker has the settings of its preset, and the other trackers have the defaults of their packages.
+They get no images: BoT-SORT and McByte run without camera-motion compensation and without masks. Of
+several detectors the slowest sets their frames, and non-maximum suppression merges the boxes.
 
-A preset should not be judged on a set that it was chosen on. The column *in view* counts the recordings that
-were looked at while the constants were chosen. `--left-out SET=FILE` adds a row for a configuration that was
-chosen without a set."""
+A preset should not be judged on a set that it was chosen on. The column *in view* counts the recordings
+that were looked at while the constants were chosen. `--left-out SET=FILE` adds a row for a configuration
+that was chosen without a set."""
 
 
 def write_page(path: Path, result: Mapping[str, Any], tables: Mapping[str, Table]) -> None:
