@@ -130,7 +130,9 @@ def scan(t, sensor="rgb"):
 
 
 def test_what_comes_too_late_or_twice_is_passed_over_and_counted():
-    config = load_config("core", [*PICTURE, "live.late_s=0.2", "sensors.evt.late_s=0.05", "smoother.engine=none"])
+    config = load_config(
+        "core", [*PICTURE, "live.late_s=0.2", "sensors.evt.late_s=0.05", "smoother.engine=none"]
+    )
     live = LiveTracker(Tracker(config))
     live.step(scan(1.0))
     assert not live.step(scan(0.8)).dropped
@@ -362,7 +364,9 @@ def test_a_tracker_that_goes_on_takes_nothing_from_before_its_time(policy, tmp_p
 def test_of_scans_that_are_refused_together_none_has_come(policy):
     """Sensors of other delays are steps of their own: the first is fine, the second is not."""
     settings_ = ["sensors.rgb.latency_s=0.05", "smoother.lag_s=0.3"]
-    asked, plain = (LiveTracker(Tracker(load_config("core", [*PICTURE, *settings_])), policy) for _ in range(2))
+    asked, plain = (
+        LiveTracker(Tracker(load_config("core", [*PICTURE, *settings_])), policy) for _ in range(2)
+    )
     for k in range(8):
         for live in (asked, plain):
             live.step(replace(scan(1.0 + 0.1 * k, "evt"), embeddings=np.eye(4)[:1]))

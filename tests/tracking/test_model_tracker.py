@@ -104,7 +104,7 @@ def test_each_box_of_a_step_tells_how_well_it_fitted(engine):
     assert 0.3 < nis.mean() < 4.0  # χ² of two degrees of freedom has the mean 2
     assert (told[-1].existence > 0.8).all()
     np.testing.assert_array_equal(told[-1].track_id, tracker.causal().track_id)
-    assert told[0].noise_scale.tolist() == [1.0, 1.0]
+    assert told[0].noise_scale.tolist() == pytest.approx([1.0, 1.0])
     rows, living, real = tracker.last_measurements()
     np.testing.assert_allclose(rows["z"][0], scan[2][0, :2] + scan[2][0, 2:] / 2.0)
     np.testing.assert_array_equal(rows["nis"], told[-1].nis)
@@ -210,7 +210,7 @@ def test_what_is_compared_must_be_of_the_tracks_and_the_boxes():
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_score_at_which_a_box_is_as_likely_real_as_not_is_believed(engine):
     born = {}
-    for even in ("none", ".2", ".95"):
+    for even in ("null", ".2", ".95"):
         tracker = made(
             engine, f"sensors.cam={{rate_hz: 20, even_score: {'null' if even == 'none' else even}}}"
         )
