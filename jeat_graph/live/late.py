@@ -26,7 +26,7 @@ from jeat_graph.live.repetition import Repetition
 from jeat_graph.live.rewinding import Rewinding, TakenStep
 from jeat_graph.live.time_base import Decision, TimeBase
 from jeat_graph.rig.common_picture import CommonPicture
-from jeat_graph.tracking.checkpoint import load_state, save_state, tracker_of
+from jeat_graph.tracking.checkpoint import load_state, save_state
 from jeat_graph.tracking.damage import refusing_damage
 from jeat_graph.tracking.first_sight import ToldSoFar
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
@@ -222,7 +222,7 @@ class LiveTracker(MetSensors):
         if "policy" not in state:
             raise DataError("holds a tracker, but not one that takes late scans", path)
         with refusing_damage(path):
-            live = LiveTracker(tracker_of(kept, state), state["policy"])
+            live = LiveTracker(Tracker.from_state(kept, state), state["policy"])
             live._told.forget()
             live._newest = state["newest"]
             live.lateness.set_state(state["lateness"])

@@ -34,7 +34,7 @@ def in_order(rows: ModelRows) -> ModelRows:
     )
 
 
-class Called(NamedTuple):
+class ClassNames(NamedTuple):
     """The classes of a table.
 
     Attributes:
@@ -50,7 +50,7 @@ def table_of(
     rows: ModelRows,
     sensors: tuple[str, ...],
     places: Places,
-    called: Called | None,
+    called: ClassNames | None,
     instants: FloatArray | None = None,
 ) -> Trajectories:
     """Return rows as a table.

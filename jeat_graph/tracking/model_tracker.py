@@ -19,6 +19,7 @@ from jeat_graph.core import _core
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, RecordArray
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.diagnostics import Diagnostics
+from jeat_graph.data.embeddings import EmbeddingArray
 from jeat_graph.data.errors import DataError, JeatGraphError, TimeOrderError
 from jeat_graph.data.scan import time_of
 from jeat_graph.data.trajectories import Trajectories
@@ -32,7 +33,7 @@ from jeat_graph.tracking.first_sight import wider
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.model_measured import StepBoxes, diagnostics_of, records_of
 from jeat_graph.tracking.model_saving import ModelSnapshot, SavedModel
-from jeat_graph.tracking.model_tables import Called, Places, in_order, table_of, with_classes
+from jeat_graph.tracking.model_tables import ClassNames, Places, in_order, table_of, with_classes
 from jeat_graph.tracking.prediction import Prediction, of_motion, predicted, still_there
 from jeat_graph.tracking.reference_model import ModelRows, ReferenceModel
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
@@ -46,7 +47,7 @@ _MOST_ALIKE = 6.0
 _FINISHED = "this tracker has been finished; make another one for another recording"
 
 
-class TakenStep(NamedTuple):
+class PendingStep(NamedTuple):
     """A step that the smoothers are to be told of when nothing can come before it any more.
 
     Attributes:
@@ -162,7 +163,7 @@ class ModelTracker(Updates, SavedModel):
             self._model.hand_over(None, None, *self._called_now())
         return self.causal()
 
-    def take_in(self, batch: Sequence[Scan]) -> TakenStep | None:
+    def take_in(self, batch: Sequence[Scan]) -> PendingStep | None:
         """Do a step for a caller who may have to take it back, and hands it to the smoothers later.
 
         Args:
@@ -179,7 +180,7 @@ class ModelTracker(Updates, SavedModel):
         self._take_in(batch)
         if not self._smooths:
             return None
-        return TakenStep(self._model.record(), self._model.living(), *self._called_now())
+        return PendingStep(self._model.record(), self._model.living(), *self._called_now())
 
     def _take_in(self, batch: Sequence[Scan]) -> None:
         if self._finished:
@@ -212,7 +213,7 @@ class ModelTracker(Updates, SavedModel):
             detection = np.arange(len(order), dtype=np.int64)
             self._looks = remember(compared, self.takers(len(order)), detection, self._model.identities())
 
-    def hand_over(self, taken: TakenStep | None) -> None:
+    def hand_over(self, taken: PendingStep | None) -> None:
         """Give the smoothers what a step took in; in order of time, and once."""
         if taken is not None:
             self._model.hand_over(taken.record, taken.given, taken.label, taken.share)
@@ -411,7 +412,7 @@ class ModelTracker(Updates, SavedModel):
         if new:
             self._find_places()
 
-    def _compare(self, embeddings: FloatArray, sensor: IntArray) -> Compared:
+    def _compare(self, embeddings: EmbeddingArray, sensor: IntArray) -> Compared:
         """Compare the embeddings (M, E) of a step's detections with the living tracks."""
         looks, number = self._looks, len(self._looked)
         looks = looks.among(number) if looks is not None else Looks.start(number, embeddings.shape[1])
@@ -442,7 +443,7 @@ class ModelTracker(Updates, SavedModel):
 
     def _table(self, rows: ModelRows, instants: FloatArray | None = None) -> Trajectories:
         """Return rows as a table, whose sensors are those of the configuration."""
-        names = None if self._classes is None else Called(self._called, self._class_ids)
+        names = None if self._classes is None else ClassNames(self._called, self._class_ids)
         return table_of(rows, self.sensor_names, self._places, names, instants)
 
     def _find_places(self) -> None:

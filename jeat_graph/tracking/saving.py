@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.tracking.damage import refusing_damage
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.smoothing.access import SmoothedTracks
 from jeat_graph.tracking.snapshot import Snapshot
@@ -63,10 +64,11 @@ class SavedTracks(SmoothedTracks):
             DataError: no such file, or one that holds no tracker, or one that takes late scans.
             JeatGraphError: it was saved by another version, or with other settings.
         """
-        from jeat_graph.tracking.checkpoint import load_tracker
+        from jeat_graph.tracking.checkpoint import load_plain_state
 
-        made: Self = load_tracker(path, config)
-        return made
+        kept, state = load_plain_state(path, config)
+        with refusing_damage(path):
+            return cls.from_state(kept, state)
 
     def begin_anew(self, t: float) -> None:
         """End all tracks and let time go on from another moment, an earlier one too (s).
@@ -106,7 +108,11 @@ class SavedTracks(SmoothedTracks):
 
     @classmethod
     def from_state(cls, config: Config, state: dict[str, Any]) -> Self:
-        """Make a tracker of what `state` returned."""
+        """Make a tracker of what `state` returned, of the engine that it was saved by."""
+        if config.tracker.engine != "compiled":
+            from jeat_graph.tracking.model_tracker import ModelTracker
+
+            return cast(Self, ModelTracker.from_state(config, state))
         without = replace(config, smoother=replace(config.smoother, engine="none"))
         tracker = cls(without, diagnostics=state["diagnostics"])
         tracker.config, tracker._smoothers, tracker._past = config, state["smoothing"], state["past"]
