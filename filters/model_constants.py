@@ -118,6 +118,8 @@ class ModelConstants:
     velocity_time_s: float = 20.0
     acceleration_time_s: float = 0.5
     growth_time_s: float = 1.0
+    error_time_s: float = 0.5
+    error_share: float = 0.5
     jerk: float = 2.0
     growth_noise: float = 0.5
     position_walk: float = 0.05
@@ -140,6 +142,9 @@ class ModelConstants:
     outlier_share: float = 0.2
     outlier_std: float = 0.3
 
+    edge_px: float = 3.0
+    edge_std: float = 0.4
+    edge_birth: float = 0.5
     offset_count: float = 10.0
     offset_clip: float = 0.2
     offset_age_s: float = 0.011
@@ -217,6 +222,7 @@ class ModelConstants:
     camera_shift_bounds: tuple[float, float] = (1e-3, 0.2**0.5)
     camera_scale_bounds: tuple[float, float] = (1e-4, 0.1)
     camera_memory: float = 0.97
+    camera_time_s: float = 0.3
 
     report: float = 0.5
     inside_share: float = 0.8

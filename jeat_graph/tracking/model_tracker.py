@@ -273,7 +273,7 @@ class ModelTracker:
     def _table(self, rows: ModelRows) -> Trajectories:
         """Return rows as a table."""
         t, ids, mean, variance, real, used = rows
-        state, spread = mean.reshape(-1, 2, singer.STATES), variance.reshape(-1, 2, singer.STATES)
+        state, spread = mean.reshape(-1, 2, singer.MOTION), variance.reshape(-1, 2, singer.MOTION)
         sides, size = box_sides.corners(state), singer.box_size(state)
         called = [self._called.get(track, ("", np.nan)) for track in ids.tolist()]
         known = self._classes is not None

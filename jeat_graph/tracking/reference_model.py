@@ -10,12 +10,13 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.filters import gap_survival
 from jeat_graph.filters.model_constants import ModelConstants
+from jeat_graph.filters.singer import MOTION
 from jeat_graph.smoothers.state_rts import FilterRecord, smooth
 from jeat_graph.tracking.reference import step
 from jeat_graph.tracking.reference_state import SensorScan, declare_sensor, initial_state
 
-#: Numbers of the state of a track: two axes of five.
-_WIDTH = 10
+#: Numbers of what is told of a track: two axes of five.
+_WIDTH = 2 * MOTION
 #: Time, identity, mean (N, 10), variance (N, 10), posterior, sensors that found it at that time.
 ModelRows = tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray, IntArray]
 
@@ -164,6 +165,8 @@ class ReferenceModel:
             **state.sensors._asdict(),
             "log_side_variance": state.log_side_variance,
             "leftovers": state.leftovers,
+            "boxes_at_edge": state.boxes_at_edge,
+            "boxes_beyond": state.boxes_beyond,
             "process_noise": tuple(state.process_noise),
         }
 
@@ -173,7 +176,7 @@ def _rows(
 ) -> ModelRows:
     """Return tracks (N,) at one time."""
     variance = np.diagonal(covariance, axis1=2, axis2=3)
-    flat = mean.reshape(-1, _WIDTH), variance.reshape(-1, _WIDTH)
+    flat = mean[..., :MOTION].reshape(-1, _WIDTH), variance[..., :MOTION].reshape(-1, _WIDTH)
     return np.full(len(ids), t), ids, *flat, real, used
 
 

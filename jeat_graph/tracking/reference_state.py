@@ -36,9 +36,9 @@ class ReferenceTracks(ArrayTable):
 
     Attributes:
         track_id: (N,) identities, from 1 on.
-        mean: (N, 2, 5) per axis position (px), velocity (px/s), acceleration (px/s²), ln size, its rate
-            (1/s).
-        covariance: (N, 2, 5, 5).
+        mean: (N, 2, 7) per axis position (px), velocity (px/s), acceleration (px/s²), ln size, its rate
+            (1/s), lasting errors of position (px) and of ln size.
+        covariance: (N, 2, 7, 7).
         presence: (N, 3) probabilities of visible, hidden, gone.
         recent_hits, recent_misses: (N, S) with a memory, for the track's own P_D, in correlation times.
         last_box: (N, S, 4) the last box of each sensor (left, top, right, bottom in px), as it was given; 0
@@ -104,11 +104,15 @@ class ReferenceTracks(ArrayTable):
 
 
 class SensorScan(NamedTuple):
-    """One look of a sensor: its index, boxes (M, 4) left, top, right, bottom (px), logits (M,)."""
+    """One look of a sensor: its index, boxes (M, 4) left, top, right, bottom (px), logits (M,).
+
+    `edges` (M, 2, 2), by axis and side: which sides end at the edge of the picture. `correct_boxes` writes it.
+    """
 
     sensor: int
     boxes: FloatArray
     logits: FloatArray
+    edges: BoolArray = np.zeros((0, 2, 2), dtype=np.bool_)
 
 
 @dataclass
@@ -132,6 +136,7 @@ class ReferenceState:
         leftovers: (S,) running mean of boxes a scan that no track takes. `count_clutter`
         period_s: (S,) running mean of the time between two scans (s); NaN before the second. `look`
         last_look_s: (S,) time of the last scan (s); NaN before it. `look`
+        boxes_at_edge, boxes_beyond: (S,) boxes that end at the edge of the picture, and beyond it. `look`
         repetition: of S sensors, which boxes come again. `look`
     """
 
@@ -151,6 +156,8 @@ class ReferenceState:
     leftovers: FloatArray
     period_s: FloatArray
     last_look_s: FloatArray
+    boxes_at_edge: FloatArray
+    boxes_beyond: FloatArray
     repetition: tuple[RepeatCounts, ...]
 
     @property
@@ -158,6 +165,11 @@ class ReferenceState:
         """Time that the tracks are predicted to (s)."""
         assert self.t is not None, "tracks are predicted before anything else"
         return self.t
+
+    @property
+    def log_scene_variance(self) -> float:
+        """Mean of ln ρ² of the sensors that have looked: of the errors that last, which no sensor has alone."""
+        return float(self.log_side_variance[~np.isnan(self.last_look_s)].mean())
 
     @property
     def num_sensors(self) -> int:
@@ -185,6 +197,8 @@ def initial_state(picture: tuple[float, float] | None, c: ModelConstants) -> Ref
         leftovers=none,
         period_s=none,
         last_look_s=none,
+        boxes_at_edge=none,
+        boxes_beyond=none,
         repetition=(),
     )
 
@@ -200,4 +214,6 @@ def declare_sensor(state: ReferenceState, c: ModelConstants) -> None:
     state.leftovers = np.append(state.leftovers, c.first_leftovers)
     state.period_s = np.append(state.period_s, np.nan)
     state.last_look_s = np.append(state.last_look_s, np.nan)
+    state.boxes_at_edge = np.append(state.boxes_at_edge, 0.0)
+    state.boxes_beyond = np.append(state.boxes_beyond, 0.0)
     state.repetition = (*state.repetition, score_calibration.no_repetition())

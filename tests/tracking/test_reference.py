@@ -29,10 +29,10 @@ def tracker(**settings):
 
 
 def covariances(made):
-    """Covariances (N, 2, 5, 5) of the living tracks."""
+    """Covariances (N, 2, 7, 7) of the living tracks."""
     model = made._model
     state = model.tracks()["covariance"] if ENGINE == "core" else model._state.tracks.covariance
-    return state.reshape(-1, 2, 5, 5)
+    return state.reshape(-1, 2, 7, 7)
 
 
 def scene(seed=0, times=50, period=0.1, vehicles=4):

@@ -95,6 +95,10 @@ public:
         std::vector<double> leftovers;
         for (const Sensor& sensor : state_.sensors) leftovers.push_back(sensor.leftovers);
         out["leftovers"] = array_of(leftovers);
+        std::vector<double> at_edge, beyond;
+        for (const Sensor& sensor : state_.sensors) at_edge.push_back(sensor.boxes_at_edge), beyond.push_back(sensor.boxes_beyond);
+        out["boxes_at_edge"] = array_of(at_edge);
+        out["boxes_beyond"] = array_of(beyond);
         out["noise_share"] = state_.belief.noise_share;
         out["log_side_variance"] = array_of(state_.log_side_variance);
         const ProcessNoise& q = state_.process_noise;
@@ -114,8 +118,8 @@ public:
 
 private:
     static Table table(const Rows& rows) {
-        return std::make_tuple(array_of(rows.t), array_of(rows.track_id), array_of(rows.mean, kMean),
-                              array_of(rows.variance, kMean), array_of(rows.real), array_of(rows.used));
+        return std::make_tuple(array_of(rows.t), array_of(rows.track_id), array_of(rows.mean, 2 * kMotion),
+                              array_of(rows.variance, 2 * kMotion), array_of(rows.real), array_of(rows.used));
     }
 
     State state_;

@@ -73,6 +73,7 @@ struct Tracks {
 // One sensor, beside what SensorBelief and OffsetSums have of it.
 struct Sensor {
     double leftovers;                                             // count_clutter
+    double boxes_at_edge = 0.0, boxes_beyond = 0.0;                // look
     double period_s = std::numeric_limits<double>::quiet_NaN();   // look
     double last_look_s = std::numeric_limits<double>::quiet_NaN();
     RepeatCounts repetition;                                      // look
