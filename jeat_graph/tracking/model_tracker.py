@@ -38,9 +38,10 @@ _MOTION = [singer.POSITION, singer.VELOCITY, singer.ACCELERATION]
 class ModelTracker:
     """The model as a tracker.
 
-    Sensors have any names and are known from their first scan on. Boxes are reported as they are, beyond the
-    picture too. Of the configuration it takes the size of the picture, if that was given, and the smoother
-    (with a fixed lag rows are final after twice `smoother.lag_s`, else when their track has ended).
+    Sensors have any names and are known from their first scan on. Boxes are reported up to the edge of the
+    picture where the detectors' end there, and else as they are (`output.clip` false: always). Of the
+    configuration it takes besides the size of the picture, if that was given, and the smoother (with a fixed
+    lag rows are final after twice `smoother.lag_s`, else when their track has ended).
 
     Args:
         config: a configuration, the name of a preset, or of a YAML file.
@@ -275,12 +276,15 @@ class ModelTracker:
         t, ids, mean, variance, real, used = rows
         state, spread = mean.reshape(-1, 2, singer.MOTION), variance.reshape(-1, 2, singer.MOTION)
         sides, size = box_sides.corners(state), singer.box_size(state)
+        if self.config.output.clip and self._model.boxes_end_at_edge():
+            picture = [self.config.image.width, self.config.image.height]
+            sides = np.clip(sides, 0.0, np.array([*picture, *picture], dtype=np.float64))
         called = [self._called.get(track, ("", np.nan)) for track in ids.tolist()]
         known = self._classes is not None
-        return Trajectories(
+        table = Trajectories(
             t=t,
             track_id=ids,
-            boxes=np.concatenate([sides[:, :2], size], axis=1),
+            boxes=np.concatenate([sides[:, :2], sides[:, 2:] - sides[:, :2]], axis=1),
             existence=real,
             mean=state[:, :, _MOTION].transpose(0, 2, 1).reshape(-1, 6),
             var=spread[:, :, _MOTION].transpose(0, 2, 1).reshape(-1, 6),
@@ -290,3 +294,5 @@ class ModelTracker:
             class_probability=np.array([share for _, share in called], dtype=np.float64) if known else None,
             size_var=size**2 * spread[:, :, singer.LOG_SIZE],
         )
+        left = (table.boxes[:, 2:] > 0.0).all(axis=1)
+        return table if left.all() else table.take(np.flatnonzero(left))

@@ -197,9 +197,7 @@ def associate(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> Ass
     )
     p_detect = np.clip(p_detect, *c.track_p_detect_bounds)
     noise = float(state.log_side_variance[k])
-    innovation = box_sides.innovations(
-        tracks.mean, tracks.covariance, scan.boxes, scan.edges, noise, c
-    )
+    innovation = box_sides.innovations(tracks.mean, tracks.covariance, scan.boxes, scan.edges, noise, c)
     size = singer.expected_size(tracks.mean)
     density = likelihood_ratio.sides_log_density(innovation, size, c)
     score = likelihood_ratio.score_log_ratio(tracks.real, state.sensors.indifference[k] + scan.logits, c)
@@ -252,7 +250,9 @@ def update(state: ReferenceState, pairs: AssociatedPairs, c: ModelConstants) -> 
     """Update the states of tracks by their boxes: heavy tails, and sides that are cut, have less weight."""
     tracks, i, seen = state.tracks, pairs.track, pairs.innovation
     y, S, gone = seen.y[i, pairs.box], seen.S[i, pairs.box], seen.gone[i, pairs.box]
-    R = box_sides.measured_variance(y, S, seen.side_variance[i], singer.expected_size(tracks.mean[i]), gone, c)
+    R = box_sides.measured_variance(
+        y, S, seen.side_variance[i], singer.expected_size(tracks.mean[i]), gone, c
+    )
     mean, covariance = tracks.mean.copy(), tracks.covariance.copy()
     m, P, y = box_sides.uncover(mean[i], covariance[i], y, S, gone, c)
     H = box_sides.measurement_matrix(singer.expected_size(m))

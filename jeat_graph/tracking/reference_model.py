@@ -110,6 +110,11 @@ class ReferenceModel:
         """Return the number of tracks started so far."""
         return self._state.next_id - 1
 
+    def boxes_end_at_edge(self) -> bool:
+        """Return whether boxes end at the edge of the picture more often than they reach beyond it."""
+        state = self._state
+        return state.picture_known and bool(state.boxes_at_edge.sum() >= state.boxes_beyond.sum())
+
     def smoothed(self) -> ModelRows:
         """Return the smoothed rows so far, of each track from its first to its last detection.
 

@@ -74,6 +74,7 @@ public:
     Out<std::int64_t> living() const { return array_of(living_); }
     std::size_t size() const { return state_.tracks.size(); }
     std::int64_t born() const { return state_.next_id - 1; }
+    bool boxes_end_at_edge() const { return state_.boxes_end_at_edge(); }
 
     Table smoothed() { return table(histories_.preview(state_.gaps, state_.constants)); }
     Table drain() {
@@ -150,6 +151,8 @@ void bind(nb::module_& module) {
         .def("living", &Model::living, "Identities of the tracks of the last step, before any ended (N,).")
         .def("size", &Model::size, "Number of living tracks.")
         .def("born", &Model::born, "Number of tracks started so far.")
+        .def("boxes_end_at_edge", &Model::boxes_end_at_edge,
+             "Whether boxes end at the edge of the picture more often than they reach beyond it.")
         .def("smoothed", &Model::smoothed, "Smoothed rows so far, columns as those of rows.")
         .def("drain", &Model::drain, "Smoothed rows that have become final; they are forgotten.")
         .def("finish", &Model::finish, "The same, all tracks being ended.")
