@@ -8,7 +8,8 @@ Errors have heavy tails (Student's t, Roth, Özkan and Gustafsson, ICASSP 2013: 
 (ν + 4)/(ν + d²)), and an occluder may cut one side inwards, whose error says nothing of the object: both
 sides measure, or only the left, or only the right one (a mixture, whose probabilities divide R side by side).
 Where a detector's boxes end at the edge of the picture, a side there that lies inwards of what is expected
-measures nothing but that the object reaches as far (`unmeasured`). Shapes: N tracks, M boxes; axis 0 is x, side 0 is left or top; boxes here are left, top, right, bottom (px).
+measures nothing but that the object reaches as far (`unmeasured`). Shapes: N tracks, M boxes; axis 0 is x,
+side 0 is left or top; boxes here are left, top, right, bottom (px).
 """
 
 from __future__ import annotations
@@ -181,7 +182,7 @@ def beyond_edge(boxes: FloatArray, picture: tuple[float, float], c: ModelConstan
 
 
 def unmeasured(y: FloatArray, edges: BoolArray) -> BoolArray:
-    """Return which sides (..., 2, 2) measure nothing: those at the edge that lie inwards of the expected ones.
+    """Return which sides (..., 2, 2) measure nothing: those at the edge, inwards of the expected ones.
 
     Args:
         y: (..., 2, 2) innovations by axis and side.
@@ -301,7 +302,7 @@ def uncover(
 
 
 def variance_along_side(d: FloatArray, along: FloatArray) -> FloatArray:
-    """Return the covariance (N, 2, 7, 7) of a side that is off by d (N, 2) px: d² ∂ ∂ᵀ, ∂[p, l] = [1/2, along]."""
+    """Return d² ∂ ∂ᵀ (N, 2, 7, 7), ∂[p, l] = [1/2, along]: what a side that is off by d (N, 2) px adds to P."""
     direction = np.zeros((*d.shape, STATES))
     direction[..., POSITION], direction[..., LOG_SIZE] = 0.5, along
     return np.asarray((d**2)[..., None, None] * direction[..., :, None] * direction[..., None, :])

@@ -43,8 +43,8 @@ class ModelConstants:
         outlier_share: share of boxes that cover a part of the object, or more than it.
         outlier_std: standard deviation of a side of these (sizes).
         edge_px: a side that is no further from the edge of the picture lies there (px).
-        edge_std: standard deviation of a side that the edge has cut (sizes): 1/√(2π), of which the density at 0
-            is one over the size.
+        edge_std: standard deviation of a side that the edge has cut (sizes): 1/√(2π), of which the density at
+            0 is one over the size.
         edge_birth: how far a track may reach beyond the edge that it begins at (sizes).
         offset_count: pairs of boxes that the prior of two sensors' mean difference counts for.
         offset_clip: difference from the mean (sizes, or ln size) from which on a pair counts for less.

@@ -106,7 +106,7 @@ class ReferenceTracks(ArrayTable):
 class SensorScan(NamedTuple):
     """One look of a sensor: its index, boxes (M, 4) left, top, right, bottom (px), logits (M,).
 
-    `edges` (M, 2, 2), by axis and side: which sides end at the edge of the picture. `correct_boxes` writes it.
+    `edges` (M, 2, 2) tells by axis and side which end at the edge of the picture; `correct_boxes` writes it.
     """
 
     sensor: int
@@ -168,7 +168,7 @@ class ReferenceState:
 
     @property
     def log_scene_variance(self) -> float:
-        """Mean of ln ρ² of the sensors that have looked: of the errors that last, which no sensor has alone."""
+        """Mean of ln ρ² of the sensors that have looked: the scale of the errors that last."""
         return float(self.log_side_variance[~np.isnan(self.last_look_s)].mean())
 
     @property

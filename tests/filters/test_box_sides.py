@@ -168,8 +168,8 @@ def test_sides_at_the_edge_and_boxes_beyond_it_are_told_apart():
 
 @pytest.mark.parametrize("shown", [0.9, 0.6, 0.3])
 def test_a_box_that_leaves_keeps_its_size_and_its_other_sides_measure(shown):
-    """An object of 100 px of which the left edge leaves a part: where its right side is, tells where it is."""
-    box = np.array([[0.0, 300.0, 100.0, 360.0]]) + [60.0, 0.0, 60.0, 0.0]
+    """An object of 100 px of which the left edge leaves a part: its right side tells where it is."""
+    box = np.array([[60.0, 300.0, 160.0, 360.0]])
     mean, covariance = tracked(box)
     mean[0, 0, singer.POSITION] += 100.0 * (shown - 1.0) - 60.0  # where it is by now, and known to be
     cut = np.array([[0.0, 300.0, 100.0 * shown, 360.0]])
