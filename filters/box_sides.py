@@ -302,7 +302,7 @@ def uncover(
 
 
 def variance_along_side(d: FloatArray, along: FloatArray) -> FloatArray:
-    """Return d² ∂ ∂ᵀ (N, 2, 7, 7), ∂[p, l] = [1/2, along]: what a side that is off by d (N, 2) px adds to P."""
+    """Return d² ∂ ∂ᵀ (N, 2, 7, 7), ∂[p, l] = [1/2, along]: what a side that is off by d (N, 2) adds to P."""
     direction = np.zeros((*d.shape, STATES))
     direction[..., POSITION], direction[..., LOG_SIZE] = 0.5, along
     return np.asarray((d**2)[..., None, None] * direction[..., :, None] * direction[..., None, :])
