@@ -54,7 +54,7 @@ def test_the_window_knows_all_that_came_and_keeps_what_left(chains):
     chain = FixedLagChain(reference[0], chains.PRIOR_COV)
     left = 0
     for number in range(1, len(ends)):
-        chain.append(rows[number - 1], reference[number])
+        chain.append(rows[number - 1 : number], reference[number : number + 1])
         until = ends[number] + 1
         F, Q, z, information, prior = track
         seen = F[: until - 1], Q[: until - 1], z[:until], information[:until], prior
@@ -71,9 +71,9 @@ def test_what_has_left_cannot_be_asked_for(chains):
     rows, reference = segments_of(chains, track, [0, 10, 20, 30])
     chain = FixedLagChain(reference[0], chains.PRIOR_COV)
     for number in (1, 2):
-        chain.append(rows[number - 1], reference[number])
+        chain.append(rows[number - 1 : number], reference[number : number + 1])
     chain.leave(1)
-    chain.append(rows[2], reference[3])
+    chain.append(rows[2:], reference[3:])
     with pytest.raises(GtsamError):
         chain._window.means([0], reference[:1])
 

@@ -155,10 +155,9 @@ class TrackPath:
         """Return GTSAM's window with all segments in it."""
         if self._chain is None:
             self._chain = FixedLagChain(*self._prior)
-        for piece in self.pieces[self._told :]:
-            if piece.rows is not None:
-                self._chain.append(piece.rows, piece.motion.mean[-1])
-            self._told += 1
+        new = self.pieces[self._told :]
+        self._chain.append([one.rows for one in new if one.rows], [one.motion.mean[-1] for one in new])
+        self._told += len(new)
         return self._chain
 
 

@@ -23,6 +23,8 @@ from jeat_graph.tracking.paper.table import boxes_at
 
 #: Steps in a segment: GTSAM solves for one state in so many. More would hardly be faster.
 STRIDE = 24
+# So many segments of a track become final at a time: the pass back over the lag's is the same for one or more.
+_TOGETHER = 2
 # A time that is an interval's begin but for rounding is in it.
 _ROUNDING = 1e-9
 
@@ -175,7 +177,7 @@ class PaperSmoothers:
         until = np.minimum(taken.tracks.t_update[at], taken.t - self._lag_s)
         paths = [self._paths[identity] for identity in taken.ids[at].tolist()]
         counts = [path.before(t) for path, t in zip(paths, until.tolist(), strict=True)]
-        ready = [(path, count) for path, count in zip(paths, counts, strict=True) if count]
+        ready = [(path, count) for path, count in zip(paths, counts, strict=True) if count >= _TOGETHER]
         if not ready:
             return
         paths, counts = [path for path, _ in ready], [count for _, count in ready]
