@@ -29,21 +29,21 @@ class FixedLagChain:
         self._oldest = self._newest = 0  # numbers of the first and the last state in it
         self._begun = False
 
-    def append(self, segments: Sequence[SegmentRows], references: Sequence[FloatArray]) -> None:
+    def append(self, factors: Sequence[FloatArray], references: Sequence[FloatArray]) -> None:
         """Take in segments behind the newest state.
 
         Args:
-            segments: the rows of each.
+            factors: (6, 8) each (`gtsam.elimination`).
             references: (2, 3) each: what its last state is counted from.
         """
-        if not segments:
+        if not factors:
             return
         graph, first = LinearGraph(references[0].shape[-1]), self._newest + 1
         if not self._begun:
             graph.add_prior(0, *prior_rows(self._prior))
             self._begun, first = True, 0
-        for rows in segments:
-            graph.add_segment(self._newest, rows)
+        for factor in factors:
+            graph.add_segment(self._newest, SegmentRows.of(factor))
             self._newest += 1
         self._references.extend(references)
         self._window.update(graph, first, self._newest - first + 1)

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from jeat_graph.smoothers.fixed_lag import FixedLagChain
-from jeat_graph.smoothers.gtsam.elimination import eliminate
+from jeat_graph.smoothers.gtsam.elimination import SegmentRows, eliminate, join
 from jeat_graph.smoothers.gtsam.full import solve_track
 from jeat_graph.smoothers.gtsam.scaling import scale
 from jeat_graph.smoothers.gtsam.window import GtsamError
@@ -22,7 +22,8 @@ def segments_of(chains, track, ends):
         here = slice(first, last + 1)
         told = information[here].copy()
         told[0] = 0.0
-        rows += eliminate(F[first:last], Q[first:last], mean[None, here], z[None, here], told[None])
+        steps = F[None, first:last], Q[None, first:last]
+        rows += list(eliminate(*steps, mean[None, here], z[None, here], told[None]))
     return rows, mean[ends]
 
 
@@ -30,7 +31,8 @@ def test_a_segment_of_two_keys_is_its_motion_and_its_measurement(chains):
     F, Q, z, information, prior = chains.drawn(1, 2)
     information[1] = 0.25
     reference = np.stack([prior, prior + 1.0])
-    (rows,) = eliminate(F, Q, reference[None], z[None], information[None])
+    (factor,) = eliminate(F[None], Q[None], reference[None], z[None], information[None])
+    rows = SegmentRows.of(factor)
     D, x = np.tile(scale(3), 2), np.random.default_rng(0).normal(size=(2, 2, 3))
     y = [D * (x[k] - reference[k]).ravel() for k in range(2)]
     residual = rows.A0 @ y[0] + rows.A1 @ y[1] - rows.b
@@ -76,6 +78,15 @@ def test_what_has_left_cannot_be_asked_for(chains):
     chain.append(rows[2:], reference[3:])
     with pytest.raises(GtsamError):
         chain._window.means([0], reference[:1])
+
+
+def test_two_segments_joined_are_one(chains):
+    track = chains.drawn(6, 21)
+    (whole,), _ = segments_of(chains, track, [0, 20])
+    (first, second), _ = segments_of(chains, track, [0, 7, 20])
+    one, other = whole[:, :6], join(first[None], second[None])[0][:, :6]
+    information = one.T @ one
+    assert np.abs(other.T @ other - information).max() < 1e-8 * np.abs(information).max()
 
 
 @settings(max_examples=15, deadline=None)

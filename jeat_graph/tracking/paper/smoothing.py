@@ -108,12 +108,9 @@ class PaperSmoothers:
             self._forget_steps()
 
     def drain(self, sensors: tuple[str, ...]) -> Trajectories:
-        """Return, and forget, final rows, in order of time over all calls."""
-        horizon = min((path.open_from for path in self._paths.values()), default=math.inf)
-        rows = Trajectories.concatenate([Trajectories.empty(sensors), *self._final])
-        ready = rows.t < horizon
-        self._final = [] if ready.all() else [rows.take(~ready)]
-        return _in_order(rows.take(ready))
+        """Return, and forget, final rows, in order of time."""
+        rows, self._final = Trajectories.concatenate([Trajectories.empty(sensors), *self._final]), []
+        return _in_order(rows)
 
     def smoothed(self, sensors: tuple[str, ...]) -> Trajectories:
         """Return all rows not drained yet, those too that may still change."""

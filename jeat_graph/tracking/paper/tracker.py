@@ -230,7 +230,7 @@ class PaperTracker:
         return self._wanted_smoothers().smoothed(self.sensor_names)
 
     def drain_smoothed(self) -> Trajectories:
-        """Return the smoothed rows that are final and forget them, in order of time over all calls.
+        """Return the smoothed rows that are final and forget them.
 
         Raises:
             JeatGraphError: the configuration asks for no smoother.
