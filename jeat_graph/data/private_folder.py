@@ -1,12 +1,10 @@
-"""Folders whose files are believed: only their owner and the administrator can write them."""
+"""Whose a folder is: whether others than this user could put files into it."""
 
 from __future__ import annotations
 
 import os
 import stat
 from pathlib import Path
-
-_WRITE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
 def is_private(folder: Path) -> bool:
@@ -24,14 +22,14 @@ def is_private(folder: Path) -> bool:
                 return False
             # In a folder like /tmp everybody may make files, but nobody may replace another's.
             sticky = path != place and found.st_mode & stat.S_ISVTX
-            if not sticky and _open_to_others(found):
+            if not sticky and open_to_others(found):
                 return False
     except OSError:
         return False
     return True
 
 
-def _open_to_others(found: os.stat_result) -> bool:
+def open_to_others(found: os.stat_result) -> bool:
     """Whether others may write there; a group that is the user's alone is no other."""
     if found.st_mode & stat.S_IWOTH:
         return True
