@@ -5,16 +5,16 @@ For a filter with states m_k, P_k and predictions m⁻_{k+1} = F m_k, P⁻_{k+1}
     x_k | x_{k+1} ~ N(m_k + G_k (x_{k+1} − m⁻_{k+1}), Γ_k),
     G_k = P_k Fᵀ (P⁻_{k+1})⁻¹,   Γ_k = (I − G_k F) P_k (I − G_k F)ᵀ + G_k Q G_kᵀ
 
-(Särkkä, *Bayesian Filtering and Smoothing*, theorem 8.2; Γ in Joseph form). Such conditionals combine, so that
-of a segment of K steps x_k | x_K ~ N(a_k + E_k (x_K − m_K), L_k) with
+(Särkkä, *Bayesian Filtering and Smoothing*, theorem 8.2; Γ in Joseph form). Such conditionals combine, so
+that of a segment of K steps x_k | x_K ~ N(a_k + E_k (x_K − m_K), L_k) with
 
     a_k = (m_k − G_k m⁻_{k+1}) + G_k a_{k+1},   E_k = G_k E_{k+1},   L_k = Γ_k + G_k L_{k+1} G_kᵀ
 
 and (a, E, L)_K = (m_K, I, 0). Whatever follows the segment tells of x_K alone: once its smoothed mean and
 covariance are known, those of all states before it follow at once, without a pass.
 
-Arrays are those of n tracks that share the times of the steps; a state has A independent axes of D components,
-all with the same covariance.
+Arrays are those of n tracks that share the times of the steps; a state has A independent axes of D
+components, all with the same covariance.
 """
 
 from __future__ import annotations

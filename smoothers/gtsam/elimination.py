@@ -1,12 +1,12 @@
 """The factor between the first and the last state of a segment: all states between them eliminated by QR.
 
-GTSAM solves for one state a segment. What the motion and the measurements of a segment say of its two ends is a
+GTSAM solves for one state a segment. What motion and measurements of a segment say of its two ends is a
 linear factor, exactly: whitened rows of all states between are stacked and triangularised, and the rows that
 are left hold the ends alone (square-root information; Dellaert, Kaess, *Factor Graphs for Robot Perception*,
 ch. 3). Long segments are halved first, whose factors are then joined in the same way.
 
-A factor of either axis is an array of `ROWS` rows [A0 A1 b]: A0 y0 + A1 y1 − b is white, with y the scaled states
-(`scaling.py`), and b has a column for each axis.
+A factor of either axis is an array of `ROWS` rows [A0 A1 b]: A0 y0 + A1 y1 − b is white, with y the scaled
+states (`scaling.py`), and b has a column for each axis.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ def _eliminate_at_once(
 
 
 def prior_rows(cov: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return whitened rows A (6, 6) and b (6,) of a first state of covariance (3, 3), counted from its mean."""
+    """Return whitened rows A (6, 6), b (6,) of a first state of covariance (3, 3), counted from its mean."""
     D = scale(_SIZE)
     root = np.linalg.inv(np.linalg.cholesky(cov * (D[:, None] * D)))
-    return np.kron(np.eye(_AXES), root), np.zeros(_AXES * _SIZE)
+    return np.asarray(np.kron(np.eye(_AXES), root)), np.zeros(_AXES * _SIZE)

@@ -13,9 +13,7 @@ from jeat_graph.smoothers.gtsam.scaling import unscale_mean
 from jeat_graph.smoothers.gtsam.window import GtsamError
 
 
-def solve_track(
-    prior_cov: FloatArray, factors: Sequence[FloatArray], reference: FloatArray
-) -> FloatArray:
+def solve_track(prior_cov: FloatArray, factors: Sequence[FloatArray], reference: FloatArray) -> FloatArray:
     """Return the means of the states at the ends of a track's segments, given all its measurements.
 
     Args:

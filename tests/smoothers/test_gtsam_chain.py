@@ -1,4 +1,6 @@
-"""GTSAM on segments, with a lag and over whole tracks: the least squares solution, whatever the segments are."""
+"""GTSAM on segments, with a lag and over whole tracks: the least squares solution, wherever they are cut."""
+
+import itertools
 
 import numpy as np
 import pytest
@@ -18,7 +20,7 @@ def segments_of(chains, track, ends):
     mean, _ = chains.filtered(*track)
     mean[0] = prior
     rows = []
-    for first, last in zip(ends[:-1], ends[1:], strict=True):
+    for first, last in itertools.pairwise(ends):
         here = slice(first, last + 1)
         told = information[here].copy()
         told[0] = 0.0

@@ -194,6 +194,15 @@ def _joined(factors: list[FloatArray]) -> FloatArray:
     return np.asarray(out[0])
 
 
+class _Ends(NamedTuple):
+    """Smoothed states of n tracks at the ends of their segments: motion and size, means and covariances."""
+
+    mean: FloatArray
+    cov: FloatArray
+    size_mean: FloatArray
+    size_cov: FloatArray
+
+
 def solve(paths: Sequence[TrackPath], counts: Sequence[int], whole: bool = False) -> list[list[Rows]]:
     """Return the states of tracks given all that they have been told: each segment's, without its last one.
 
@@ -206,30 +215,50 @@ def solve(paths: Sequence[TrackPath], counts: Sequence[int], whole: bool = False
     """
     out: list[list[Rows]] = [[] for _ in paths]
     order = sorted(range(len(paths)), key=lambda i: -paths[i].number)
-    solved = [paths[i].solved_ends() for i in order]
-    state: list[FloatArray] = []
-    for j in range(max((path.number for path in paths), default=0)):
-        active = [i for i in order if paths[i].number > j]
-        pieces = [paths[i].pieces[-1 - j] for i in active]
-        ends = [np.stack([piece.motion.mean[-1] for piece in pieces]), None]
-        ends[1] = np.stack([piece.size.mean[-1] for piece in pieces])
-        if j == 0:
-            state = [ends[0].copy(), np.stack([p.cov for p in pieces]), ends[1], np.stack([p.size_cov for p in pieces])]
-        mean, cov, size_mean, size_cov = (one[: len(active)] for one in state)
-        for n, known in enumerate(solved[: len(active)]):
-            place = paths[active[n]].number - 1 - j
-            if place in known:
-                mean[n] = known[place]
-        for n, (i, piece) in enumerate(zip(active, pieces, strict=True)):
-            if paths[i].number - 1 - j < counts[i]:
-                motion = smoothed_by(piece.motion, piece.motion.mean[-1], mean[n], cov[n])
-                size = smoothed_by(piece.size, piece.size.mean[-1], size_mean[n], size_cov[n])
-                stop = len(piece.t) if whole and j == 0 else -1
-                out[i].append(Rows(*(one[:stop] for one in (piece.t, piece.used, *motion, *size))))
-        first = Given(*(np.stack(part) for part in zip(*((a[0] for a in p.motion) for p in pieces), strict=True)))
-        first_size = Given(*(np.stack(part) for part in zip(*((a[0] for a in p.size) for p in pieces), strict=True)))
-        state = [
-            *smoothed_by(first, ends[0], mean, cov),
-            *smoothed_by(first_size, ends[1], size_mean, size_cov),
-        ]
+    known = [path.solved_ends() for path in paths]
+    state: _Ends | None = None
+    for back in range(max((path.number for path in paths), default=0)):
+        # Tracks that have more segments stand first.
+        active = [i for i in order if paths[i].number > back]
+        pieces = [paths[i].pieces[-1 - back] for i in active]
+        filtered = _filtered_ends(pieces)
+        state = filtered if state is None else _Ends(*(one[: len(active)] for one in state))
+        state = state._replace(mean=state.mean.copy())
+        for n, i in enumerate(active):
+            place = paths[i].number - 1 - back
+            state.mean[n] = known[i].get(place, state.mean[n])
+            if place < counts[i]:
+                stop = None if whole and back == 0 else -1
+                out[i].append(_rows(pieces[n], _Ends(*(one[n] for one in state)), stop))
+        motion = smoothed_by(_firsts([one.motion for one in pieces]), filtered.mean, state.mean, state.cov)
+        firsts = _firsts([one.size for one in pieces])
+        size = smoothed_by(firsts, filtered.size_mean, state.size_mean, state.size_cov)
+        state = _Ends(*motion, *size)
     return [rows[::-1] for rows in out]
+
+
+def _filtered_ends(pieces: Sequence[Piece]) -> _Ends:
+    """Return the filtered last states of segments."""
+    return _Ends(
+        np.stack([one.motion.mean[-1] for one in pieces]),
+        np.stack([one.cov for one in pieces]),
+        np.stack([one.size.mean[-1] for one in pieces]),
+        np.stack([one.size_cov for one in pieces]),
+    )
+
+
+def _firsts(parts: Sequence[Given]) -> Given:
+    """Return the first states of segments."""
+    return Given(
+        np.stack([one.mean[0] for one in parts]),
+        np.stack([one.gain[0] for one in parts]),
+        np.stack([one.cov[0] for one in parts]),
+    )
+
+
+def _rows(piece: Piece, end: _Ends, stop: int | None) -> Rows:
+    """Return the states of a segment, up to one of them, from its smoothed last one."""
+    mean, cov = smoothed_by(piece.motion, piece.motion.mean[-1], end.mean, end.cov)
+    size, size_cov = smoothed_by(piece.size, piece.size.mean[-1], end.size_mean, end.size_cov)
+    here = slice(stop)
+    return Rows(piece.t[here], piece.used[here], mean[here], cov[here], size[here], size_cov[here])

@@ -65,8 +65,8 @@ def cut_segments(
     t, dt = t[last], np.diff(t[last])
     mean, cov = stacked("mean")[:, last], stacked("cov")[:, last]
     size_mean, size_cov = stacked("size_mean")[:, last], stacked("size_cov")[:, last]
-    used = np.zeros((len(identities), len(t)), dtype=np.int64)
-    np.bitwise_or.at(used, (slice(None), key), stacked("used"))
+    opens = np.flatnonzero(np.diff(key, prepend=-1))
+    used = np.bitwise_or.reduceat(stacked("used"), opens, axis=1)
     F, Q = motion_model(dt, engine.settings.jerk_px)
     motion = given_last(F, Q, mean, cov)
     size = given_last(*size_model(dt, engine.settings.size_rate_density), size_mean, size_cov)
@@ -75,9 +75,8 @@ def cut_segments(
         told = np.stack([s.information[k] for s, k in zip(steps, at, strict=True)], axis=1)
         told[:, 0] = 0.0  # what the first step measured belongs to the segment before, or to the birth
         z = np.stack([s.z[k] for s, k in zip(steps, at, strict=True)], axis=1)
-        information, weighed = np.zeros((len(told), len(t))), np.zeros((len(told), len(t), 2))
-        np.add.at(information, (slice(None), key), told)
-        np.add.at(weighed, (slice(None), key), told[..., None] * z)
+        information = np.add.reduceat(told, opens, axis=1)
+        weighed = np.add.reduceat(told[..., None] * z, opens, axis=1)
         z = weighed / np.where(information > 0.0, information, 1.0)[..., None]
         origin = np.concatenate([np.stack(reference)[:, None], mean[:, 1:]], axis=1)
         factors = list(eliminate(F[None], Q[None], origin, z, information))

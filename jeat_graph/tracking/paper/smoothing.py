@@ -23,7 +23,7 @@ from jeat_graph.tracking.paper.table import boxes_at
 
 #: Steps in a segment: GTSAM solves for one state in so many. More would hardly be faster.
 STRIDE = 24
-# So many segments of a track become final at a time: the pass back over the lag's is the same for one or more.
+# So many segments of a track become final at a time: the pass back over the lag's is the same for one.
 _TOGETHER = 2
 # A time that is an interval's begin but for rounding is in it.
 _ROUNDING = 1e-9
@@ -60,9 +60,9 @@ class StepTaken(NamedTuple):
 class PaperSmoothers:
     """Takes the steps of a tracker in and gives smoothed trajectories of the tracks that were confirmed.
 
-    A track has rows from its first to its last detection, those of the time before it was confirmed included. With
-    a fixed lag a row is final once measurements of `smoother.lag_s` have followed, else when its track has ended.
-    Final rows wait in memory until they are fetched.
+    A track has rows from its first to its last detection, also of the time before it was confirmed. With a
+    fixed lag a row is final when measurements of `smoother.lag_s` have followed, and at most 3 `STRIDE` steps
+    later; else when its track has ended. Final rows wait in memory until they are fetched.
 
     Args:
         config: settings of the smoother, the engine `paper` and the picture.
@@ -168,7 +168,7 @@ class PaperSmoothers:
             self._wanted = [t for t in self._wanted if t >= oldest]
 
     def _depart(self, taken: StepTaken, due: list[int]) -> None:
-        """Let segments of some living tracks become final: those behind the lag, and before a last detection."""
+        """Let segments of living tracks become final: those behind the lag and before a last detection."""
         at = np.searchsorted(taken.ids, due)
         at = at[taken.tracks.confirmed[at]]
         until = np.minimum(taken.tracks.t_update[at], taken.t - self._lag_s)
@@ -184,7 +184,7 @@ class PaperSmoothers:
         self._final += self._tables(paths, rows)
 
     def _remaining(self, identities: list[int]) -> list[Trajectories]:
-        """Return all rows that are not final of tracks of the newest step, up to each one's last detection."""
+        """Return all rows of tracks of the newest step that are not final, up to each last detection."""
         if not identities:
             return []
         newest = self._steps[-1]

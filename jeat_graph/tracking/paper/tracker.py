@@ -23,9 +23,10 @@ from jeat_graph.data.scan import time_of
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.rig.common_picture import CommonPicture
 from jeat_graph.tracking.classes import ClassTally, Votes, check_names
+from jeat_graph.tracking.paper.kalman import predict
 from jeat_graph.tracking.paper.smoothing import PaperSmoothers, StepTaken
 from jeat_graph.tracking.paper.state import Found, Tracks
-from jeat_graph.tracking.paper.step import predict, step
+from jeat_graph.tracking.paper.step import step
 from jeat_graph.tracking.paper.table import Prediction, predicted, table_of
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
 from jeat_graph.tracking.sensor_state import SensorState
@@ -249,12 +250,12 @@ class PaperTracker:
         return rows
 
     def sensor_states(self) -> dict[str, SensorState]:
-        """Return the mean factor on each sensor's noise, by name; the paper learns nothing else of sensors."""
+        """Return the mean factor on each sensor's noise, by name; the paper learns nothing else of them."""
         scale = self._tracks.scale[self._tracks.confirmed]
         mean = scale.mean(axis=0) if len(scale) else np.ones(len(self.sensor_names))
-        unknown = {"clutter": np.nan, "p_detect": np.nan, "trust": 1.0, "blind": 0.0}
+        unknown = float("nan")
         return {
-            name: SensorState(**unknown, noise_scale=float(mean[s]))
+            name: SensorState(unknown, unknown, 1.0, 0.0, float(mean[s]))
             for s, name in enumerate(self.sensor_names)
         }
 
