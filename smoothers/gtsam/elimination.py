@@ -88,7 +88,8 @@ def join(first: FloatArray, second: FloatArray) -> FloatArray:
     middle, begin, end, right = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 11)
     A[:, :ROWS, begin], A[:, :ROWS, middle], A[:, :ROWS, right] = np.split(first, [3, 6], axis=2)
     A[:, ROWS:, middle], A[:, ROWS:, end], A[:, ROWS:, right] = np.split(second, [3, 6], axis=2)
-    return np.asarray(np.linalg.qr(A, mode="r")[:, _SIZE : _SIZE + ROWS, _SIZE:])
+    R: FloatArray = np.asarray(np.linalg.qr(A, mode="r"))
+    return R[:, _SIZE : _SIZE + ROWS, _SIZE:]
 
 
 def _eliminate_at_once(
@@ -113,7 +114,8 @@ def _eliminate_at_once(
     A[:, measured, _SIZE * place] = weight
     A[:, measured, -_AXES:] = weight[..., None] * (z - reference[..., 0])
     inner = _SIZE * (keys - 2)
-    left = np.linalg.qr(A, mode="r")[:, inner : inner + ROWS, inner:]
+    R: FloatArray = np.asarray(np.linalg.qr(A, mode="r"))
+    left = R[:, inner : inner + ROWS, inner:]
     out = np.zeros((n, ROWS, ROWS + _AXES))
     out[:, : left.shape[1]] = left
     return out
