@@ -15,7 +15,7 @@ from jeat_graph.eval.tables import FORMATS
 
 if TYPE_CHECKING:
     from jeat_graph.eval.tables import Cell, Table
-    from jeat_graph.runs.explaining import Moment, Place
+    from jeat_graph.runs.explaining import TrackMoment, Place
 
 WRITES = ("out",)
 HELP = "say why something in a run is a track, or is not: the terms of its log odds over time"
@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _said_of_track(moments: Sequence[Moment], track_id: int, form: str) -> list[str]:
+def _said_of_track(moments: Sequence[TrackMoment], track_id: int, form: str) -> list[str]:
     first, last = moments[0], moments[-1]
     shown = [one for one in moments if one.reported]
     lines = [f"track {track_id}: from {first.t:.3f} to {last.t:.3f} s, {_share_reported(moments, shown)}"]
@@ -88,13 +88,13 @@ def _said_of_track(moments: Sequence[Moment], track_id: int, form: str) -> list[
     return [*lines, "", _table(rows).render(form).rstrip()]
 
 
-def _share_reported(moments: Sequence[Moment], shown: Sequence[Moment]) -> str:
+def _share_reported(moments: Sequence[TrackMoment], shown: Sequence[TrackMoment]) -> str:
     if not shown:
         return "never reported"
     return "always reported" if len(shown) == len(moments) else f"reported at {len(shown)} of {len(moments)} steps"
 
 
-def _table(moments: Sequence[Moment]) -> Table:
+def _table(moments: Sequence[TrackMoment]) -> Table:
     from jeat_graph.eval.tables import Table
 
     rows: list[dict[str, Cell]] = [

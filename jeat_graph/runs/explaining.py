@@ -21,7 +21,7 @@ from jeat_graph.tracking.tracker import Tracker
 NEAR_S = 0.15
 
 
-class Moment(NamedTuple):
+class TrackMoment(NamedTuple):
     """One track at one step.
 
     Attributes:
@@ -87,10 +87,10 @@ class Place(NamedTuple):
     """
 
     boxes: list[BoxThere]
-    tracks: dict[int, Moment]
+    tracks: dict[int, TrackMoment]
 
 
-class _Step(NamedTuple):
+class _ReplayedStep(NamedTuple):
     t: float
     batch: list[Scan]
     takers: list[IntArray]
@@ -98,7 +98,7 @@ class _Step(NamedTuple):
     sensors: tuple[str, ...]
 
 
-def explain_track(config: Config, detections: Detections, track_id: int) -> list[Moment]:
+def explain_track(config: Config, detections: Detections, track_id: int) -> list[TrackMoment]:
     """Return the moments of a track, from its first box to its end.
 
     Args:
@@ -110,7 +110,7 @@ def explain_track(config: Config, detections: Detections, track_id: int) -> list
         DataError: there is no such track.
         ConfigError: the configuration's engine has no hypotheses.
     """
-    out: list[Moment] = []
+    out: list[TrackMoment] = []
     for step in _steps(config, detections):
         row = np.flatnonzero(step.found.track_id == track_id)
         if len(row):
@@ -138,7 +138,7 @@ def explain_place(
         ConfigError: the configuration's engine has no hypotheses.
     """
     boxes: list[BoxThere] = []
-    tracks: dict[int, Moment] = {}
+    tracks: dict[int, TrackMoment] = {}
     for step in _steps(config, detections):
         if step.t < t - within_s:
             continue
@@ -168,7 +168,7 @@ def run_to_explain(folder: Path, moved: list[str] | None = None) -> tuple[Config
     return recorded_inputs(folder, complete_record(folder), moved)
 
 
-def _steps(config: Config, detections: Detections) -> Iterator[_Step]:
+def _steps(config: Config, detections: Detections) -> Iterator[_ReplayedStep]:
     tracker = Tracker(config)
     if not hasattr(tracker, "hypotheses"):
         raise ConfigError(f"tracker.engine={config.tracker.engine} weighs no hypotheses: nothing to explain")
@@ -176,10 +176,10 @@ def _steps(config: Config, detections: Detections) -> Iterator[_Step]:
         tracker.step(batch)
         ends = np.cumsum([len(scan) for scan in batch])[:-1]
         takers = np.split(tracker.takers(sum(map(len, batch))), ends)
-        yield _Step(batch[0].t, list(batch), takers, tracker.hypotheses(), tracker.sensor_names)
+        yield _ReplayedStep(batch[0].t, list(batch), takers, tracker.hypotheses(), tracker.sensor_names)
 
 
-def _moment(step: _Step, row: int) -> Moment:
+def _moment(step: _ReplayedStep, row: int) -> TrackMoment:
     found, terms = step.found, step.found.terms
     named = {}
     for k, name in enumerate(step.sensors):
@@ -189,7 +189,7 @@ def _moment(step: _Step, row: int) -> Moment:
     named["second box"] = float(terms.second_box[row])
     named["other hypotheses"] = float(terms.rest[row])
     other = int(terms.other[row])
-    return Moment(
+    return TrackMoment(
         t=step.t,
         log_odds=float(found.log_odds[row]),
         terms=named,
