@@ -27,7 +27,8 @@ from jeat_graph.tracking.paper.kalman import predict
 from jeat_graph.tracking.paper.smoothing import PaperSmoothers, StepTaken
 from jeat_graph.tracking.paper.state import Found, Tracks
 from jeat_graph.tracking.paper.step import step
-from jeat_graph.tracking.paper.table import Prediction, predicted, table_of
+from jeat_graph.tracking.paper.table import predicted, table_of
+from jeat_graph.tracking.prediction import Prediction
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
 from jeat_graph.tracking.sensor_state import SensorState
 
