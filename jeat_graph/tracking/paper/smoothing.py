@@ -124,9 +124,13 @@ class PaperSmoothers:
 
     def finish(self, sensors: tuple[str, ...]) -> Trajectories:
         """End all tracks and return all rows not drained yet."""
-        self._end(self._living.tolist())
-        self._living = np.zeros(0, dtype=np.int64)
+        self.begin_anew()
         return self.drain(sensors)
+
+    def begin_anew(self) -> None:
+        """End all tracks; times may begin again from any moment."""
+        self._end(self._living.tolist())
+        self._living, self._bin = np.zeros(0, dtype=np.int64), -math.inf
 
     def _end(self, ended: Iterable[int]) -> None:
         """Smooth what is left of tracks that are over since the newest step that is kept."""
