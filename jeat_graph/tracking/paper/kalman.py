@@ -153,7 +153,9 @@ def update(
 _WRITTEN = ("mean", "cov", "size_mean", "size_cov", "scale", "hits", "t_update", "used")
 
 
-def born(found: Found, detection: IntArray, t: float, first_id: int, sensors: int, config: PaperConfig) -> Tracks:
+def born(
+    found: Found, detection: IntArray, t: float, first_id: int, sensors: int, config: PaperConfig
+) -> Tracks:
     """Start a track at each of some detections (K,): at rest, as surely as the settings say."""
     n = len(detection)
     mean, size_mean = np.zeros((n, 2, 3)), np.zeros((n, 2, 2))

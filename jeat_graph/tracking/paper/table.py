@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from jeat_graph.config.schema import Config
@@ -11,17 +9,7 @@ from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.classes import ClassTally
 from jeat_graph.tracking.paper.state import Tracks
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Prediction(Trajectories):
-    """A table of predicted tracks, with the whole covariance of their motion.
-
-    Attributes:
-        cov: (N, 6, 6) covariance of `mean`, whose diagonal is `var`.
-    """
-
-    cov: FloatArray = ()  # type: ignore[assignment]
+from jeat_graph.tracking.prediction import Prediction
 
 
 def table_of(
