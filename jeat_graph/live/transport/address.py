@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 import ipaddress
-import os
 import re
 from collections.abc import Collection
 from dataclasses import dataclass
-from pathlib import Path
 from typing import NoReturn, TypeVar
 from urllib.parse import SplitResult, parse_qsl, unquote, urlsplit
 
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.secrets import Secret, shown_url
+from jeat_graph.io.credentials import PASSWORD_FILE, login_text, password_from
 from jeat_graph.live.transport.topics import wrong_name, wrong_topic
 
 PORTS = {"mqtt": 1883, "nats": 4222, "kafka": 9092}
-#: The option that every address has: a file with the password in its only line.
-PASSWORD_FILE = "password_file"
-#: More is no password (bytes).
-_PASSWORD_MOST = 4096
 #: Bound of how many messages may be open: what MQTT can say.
 NUMBER_MOST = 65_535
-_VARIABLE = re.compile(r"\$\{([A-Za-z_][A-Za-z0-9_]*)\}")
 #: Part of a machine's name between two dots.
 _LABEL = re.compile(r"(?!-)[A-Za-z0-9_-]{1,63}(?<!-)")
 _HOST_MOST = 253
@@ -115,7 +109,7 @@ def parse_address(url: str, known: Collection[str]) -> Address:
     if file is not None:
         if user is None or password is not None:
             _refuse(url, f"{PASSWORD_FILE} goes with a user and without a password: user@host")
-        password = _password_from(file)
+        password = password_from(file)
     return Address(parts.scheme, host, port, topic, user, password, options)
 
 
@@ -188,35 +182,7 @@ def _options(parts: SplitResult, url: str, known: Collection[str]) -> dict[str, 
 
 
 def _login(text: str | None, url: str) -> Secret | None:
-    """Return a user or a password as it is meant: `%` and two digits as a sign, `${NAME}` as a variable."""
-    if not text:
-        return None
-    found = []
-    for k, part in enumerate(_VARIABLE.split(text)):
-        if k % 2:  # the names of variables stand between what is around them
-            value = os.environ.get(part, "")
-            if not value:
-                _refuse(url, f"the environment variable {part} is not set")
-            found.append(value)
-        elif "${" in part:
-            _refuse(url, "a variable is written ${NAME}")
-        else:
-            found.append(unquote(part))
-    return Secret("".join(found))
-
-
-def _password_from(file: str) -> Secret:
-    """Read the only line of a file; its content is in no message."""
     try:
-        with Path(file).open("rb") as stream:
-            content = stream.read(_PASSWORD_MOST + 1)
-    except (OSError, ValueError) as error:
-        why = error.strerror if isinstance(error, OSError) else "is no file"
-        raise ConfigError(f"{PASSWORD_FILE}: {file}: {why}") from None
-    try:
-        text = content.decode().removesuffix("\n").removesuffix("\r")
-    except UnicodeDecodeError:
-        text = ""
-    if not text or len(content) > _PASSWORD_MOST or not text.isprintable():
-        raise ConfigError(f"{PASSWORD_FILE}: {file}: must hold one line, the password, in UTF-8")
-    return Secret(text)
+        return login_text(text)
+    except ConfigError as error:
+        _refuse(url, str(error))
