@@ -6,6 +6,7 @@ The detector always gets the newest picture. What it has no time for is dropped 
 from __future__ import annotations
 
 import contextvars
+import math
 import queue
 import threading
 import time
@@ -146,9 +147,11 @@ class LiveDetecting:
         return found
 
     def scans(self, until: Until = _never) -> Iterator[Scan]:
-        """Yield scans until an end is asked for, and say how many pictures were dropped."""
+        """Yield scans until an end is asked for, or the time of the request is over."""
         self.begin()
-        while not until():
+        longest_s = self.request.duration_s
+        end = math.inf if longest_s is None else time.monotonic() + longest_s
+        while not until() and time.monotonic() < end:
             scan = self.take(SLICE_S)
             if scan is not None:
                 yield scan
@@ -207,14 +210,7 @@ def detect_live(
         if live.size_px is None:
             return
         prepared(request, live.size_px)
-        begin = time.monotonic()
-
-        def over() -> bool:
-            return until() or (
-                request.duration_s is not None and time.monotonic() - begin >= request.duration_s
-            )
-
-        for scan in live.scans(over):
+        for scan in live.scans(until):
             on_time(scan.t)
             yield scan
         for line in live.dropped_lines():
