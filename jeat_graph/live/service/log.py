@@ -1,0 +1,48 @@
+"""What a service tells, as lines of JSON: one event a line, in the order of time, without secrets."""
+
+from __future__ import annotations
+
+import json
+import sys
+import threading
+import time
+from typing import Any, TextIO
+
+from jeat_graph.data.secrets import without_logins
+
+INFO, WARNING, ERROR = "info", "warning", "error"
+_WARNS = "warning: "
+_MS = 1e3
+
+
+class Log:
+    """Writes lines to stderr; from any thread.
+
+    Args:
+        service: name of the service, which every line has.
+        stream: where to; by default stderr.
+    """
+
+    def __init__(self, service: str, stream: TextIO | None = None) -> None:
+        self._service, self._stream = service, stream or sys.stderr
+        self._lock = threading.Lock()
+
+    def say(self, text: str) -> None:
+        """Write a line of what came from elsewhere; one that begins with `warning: ` is a warning."""
+        warns = text.startswith(_WARNS)
+        self.write(WARNING if warns else INFO, text.removeprefix(_WARNS))
+
+    def write(self, level: str, text: str, **more: Any) -> None:
+        """Write a line.
+
+        Args:
+            level: `info`, `warning` or `error`.
+            text: what happened.
+            more: further values of the line.
+        """
+        now = time.time()
+        stamp = time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime(now)) + f".{int(now % 1.0 * _MS):03d}Z"
+        line = {"time": stamp, "level": level, "service": self._service, "text": without_logins(text), **more}
+        with self._lock:
+            self._stream.write(json.dumps(line, ensure_ascii=False) + "\n")
+            self._stream.flush()
