@@ -74,7 +74,9 @@ class MjpegCamera:
         if self._login is not None:
             wanted = "Basic " + base64.b64encode(self._login.encode()).decode()
             if request.headers.get("Authorization") != wanted:
-                request.send_error(401)
+                request.send_response(401)
+                request.send_header("WWW-Authenticate", 'Basic realm="camera"')
+                request.end_headers()
                 return
         request.send_response(200)
         request.send_header("Content-Type", "multipart/x-mixed-replace; boundary=frame")
