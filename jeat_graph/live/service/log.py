@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import logging
 import sys
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, TextIO
 
 from jeat_graph.data.secrets import without_logins
@@ -13,6 +16,19 @@ from jeat_graph.data.secrets import without_logins
 INFO, WARNING, ERROR = "info", "warning", "error"
 _WARNS = "warning: "
 _MS = 1e3
+
+
+class _Handler(logging.Handler):
+    """Takes what libraries log."""
+
+    def __init__(self, log: Log) -> None:
+        super().__init__(logging.WARNING)
+        self._log = log
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write a record."""
+        level = ERROR if record.levelno >= logging.ERROR else WARNING
+        self._log.write(level, record.getMessage(), library=record.name)
 
 
 class Log:
@@ -26,6 +42,16 @@ class Log:
     def __init__(self, service: str, stream: TextIO | None = None) -> None:
         self._service, self._stream = service, stream or sys.stderr
         self._lock = threading.Lock()
+
+    @contextmanager
+    def of_libraries(self) -> Iterator[None]:
+        """Write what libraries log, too, as lines like the others."""
+        handler, root = _Handler(self), logging.getLogger()
+        root.addHandler(handler)
+        try:
+            yield
+        finally:
+            root.removeHandler(handler)
 
     def say(self, text: str) -> None:
         """Write a line of what came from elsewhere; one that begins with `warning: ` is a warning."""

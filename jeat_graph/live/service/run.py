@@ -37,8 +37,8 @@ from jeat_graph.tracking.tracker import Tracker
 _ALONE_S, _BESIDE_S = 0.2, 0.02
 #: A source is told what has been taken whenever it has nothing more, and after this part of what may be open.
 _COMMIT_PART = 0.5
-#: At one message in so many it is looked how many scans were passed over.
-_PER_LOOK = 32
+#: So many messages of one source are taken before the next one's turn.
+_IN_A_ROW = 16
 #: Exit codes: ended as asked; ended by trouble that a new start may mend.
 DONE, TROUBLE = 0, 1
 
@@ -80,12 +80,13 @@ class Service:
         config, log, status = self._config, self._log, self.status
         with ExitStack() as stack:
             stack.enter_context(self._interrupts)
+            stack.enter_context(log.of_libraries())
             for path in (config.state.checkpoint, config.state.smoothed):
                 if path is not None:
                     stack.enter_context(hold_file(path))
-            load_config(
-                config.tracker.config, list(config.tracker.set), config.tracker.rig
-            )  # before all else
+            tracker = config.tracker  # what is wrong of these is known before anything is opened
+            load_config(tracker.config, list(tracker.set), tracker.rig)
+            self._saved_tracker(None)
             if config.web.port:
                 web = stack.enter_context(Web(config.web.host, config.web.port, status))
                 log.write(INFO, f"/health and /metrics at http://{config.web.host}:{web.port}")
@@ -121,7 +122,12 @@ class Service:
         if self._stopped():
             return DONE
         settings = self._tracker_config(cameras)
-        live, more = self._tracker(settings)
+        live, more = self._saved_tracker(settings) or (
+            LiveTracker(Tracker(settings), config.tracker.late),
+            {},
+        )
+        if more:
+            log.write(INFO, f"goes on from {config.state.checkpoint}")
         warm_up(settings)
         smoothed = None
         if config.state.smoothed is not None:
@@ -168,16 +174,20 @@ class Service:
             raise ConfigError("state.smoothed needs a smoother, but smoother.engine is none")
         return made
 
-    def _tracker(self, settings: Config) -> tuple[LiveTracker, dict[str, Any]]:
-        """The tracker, new or from the checkpoint, and what was kept with it."""
+    def _saved_tracker(self, settings: Config | None) -> tuple[LiveTracker, dict[str, Any]] | None:
+        """The tracker from the checkpoint, and what was kept with it; None if there is none to go on from.
+
+        Raises:
+            ConfigError: it cannot be gone on from, and is not to be set aside.
+        """
         state, late = self._config.state, self._config.tracker.late
         path = state.checkpoint
         if path is not None and Path(path).is_file():
             try:
+                # Without settings it is only looked whether the file can be gone on from at all.
                 live, more = LiveTracker.load(path, settings)
                 if live.policy != late:
                     raise ConfigError(f"{path}: was saved with late: {live.policy}, not {late}")
-                self._log.write(INFO, f"goes on from {path}")
                 return live, more
             except JeatGraphError as error:
                 if state.of_another_version == "refuse":
@@ -187,7 +197,7 @@ class Service:
                 aside = f"{path}.{time.strftime('%Y%m%dT%H%M%SZ', time.gmtime())}"
                 Path(path).replace(aside)
                 self._log.say(f"warning: {error}; it is {aside} now, and the tracker begins anew")
-        return LiveTracker(Tracker(settings), late), {}
+        return None
 
     def _answering(self, sinks: Sinks) -> Any:
         status = self.status
@@ -209,17 +219,21 @@ class Service:
         several = len(running.sources) + bool(running.cameras) > 1
         wait_s = _BESIDE_S if several else _ALONE_S
         while not self._stopped():
+            # Where one has much, nobody waits for the others.
+            busy = False
             for one in running.sources:
-                self._take_from(one, running, wait_s)
+                taken = 0
+                while taken < _IN_A_ROW and self._take_from(one, running, wait_s):
+                    taken += 1
+                busy = busy or taken > 0
             if running.cameras:
-                scan = running.cameras.take(wait_s)
+                scan = running.cameras.take(0.0 if busy else wait_s)
                 while scan is not None and not self._stopped():
                     self._take(ScanMessage(ScanBatch([scan], [1]), "", None), "camera:1: ", running)
                     scan = running.cameras.take(0.0)
-                if not running.sources:
-                    continue
 
-    def _take_from(self, one: OpenedSource, running: _Running, wait_s: float) -> None:
+    def _take_from(self, one: OpenedSource, running: _Running, wait_s: float) -> bool:
+        """Take the next message of a broker, and tell it what has been taken; whether there was one."""
         payload = one.source.receive(wait_s)
         if payload is not None:
             one.number += 1
@@ -235,6 +249,7 @@ class Service:
                 self._take(message, place, running)
         if one.open and (payload is None or one.open >= _COMMIT_PART * one.source.most_open):
             running.session.save()
+        return payload is not None
 
     def _take(self, message: ScanMessage, place: str, running: _Running) -> None:
         self._came = time.monotonic()
@@ -249,9 +264,7 @@ class Service:
             name, _, line = place.removesuffix(": ").rpartition(":")
             self._bad(DataError(str(error), name, int(line)), running)
         counted.duplicates = session.duplicates
-        if counted.taken % _PER_LOOK == 0:
-            lateness = session.live.lateness.summary().values()
-            counted.passed_over = sum(one.dropped for one in lateness)
+        counted.passed_over = int(session.live.lateness.dropped.sum())
 
     def _bad(self, error: DataError, running: _Running) -> None:
         if self._config.on_error == "stop":

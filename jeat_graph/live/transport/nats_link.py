@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import threading
 import time
 from collections.abc import Coroutine
@@ -25,6 +26,17 @@ CONNECT_S, CALL_S = 10.0, 10.0
 _AGAIN_S = 0.5
 _FORBIDDEN = "permissions violation"
 _T = TypeVar("_T")
+
+
+class _NotOurs(logging.Filter):
+    """Passes over what asyncio says of the client each time when an encrypted connection ends."""
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Tell whether a record is to be told."""
+        return "eof_received" not in record.getMessage()
+
+
+_NOT_OURS = _NotOurs()
 
 
 class NatsLink:
@@ -55,6 +67,7 @@ class NatsLink:
         self.forbidden = ""
         self.client: Any = Client()
         self._connected = self._leaving = False
+        logging.getLogger("asyncio").addFilter(_NOT_OURS)
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
         self._thread.start()
