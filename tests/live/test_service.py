@@ -20,10 +20,11 @@ PATIENCE_S = 60.0
 SCANS_HZ = 20.0
 
 
-def wait_for(true, what, patience_s=PATIENCE_S):
+def wait_for(true, what, service=None, patience_s=PATIENCE_S):
     end = time.monotonic() + patience_s
     while not (found := true()):
-        assert time.monotonic() < end, what
+        said = getattr(service, "lines", [])[-5:]
+        assert time.monotonic() < end, f"{what}; last of what it said: {said}"
         time.sleep(0.05)
     return found
 
@@ -41,7 +42,7 @@ class Running:
 
     def _read(self):
         for line in self.process.stderr:
-            self.lines.append(json.loads(line))  # each line is JSON
+            self.lines.append(json.loads(line) if line.startswith("{") else {"text": line})
 
     def get(self, path):
         try:
@@ -57,6 +58,9 @@ class Running:
         health = json.loads(text)
         assert (code == 200) == health.get("ready", False)
         return health
+
+    def answered(self):
+        return self.health().get("messages", {}).get("answered", 0)
 
     def ready(self):
         return self.health().get("ready")
@@ -180,22 +184,24 @@ silent_s: 2
     found: list[dict] = []
     service = Running(path, web)
     try:
-        wait_for(lambda: service.said("running"), "the service runs")
+        wait_for(lambda: service.said("running"), "the service runs", service)
         publisher = Publisher(f"{begin}/scans?{options(keys)}")
-        wait_for(lambda: service.health()["messages"]["answered"] > 10, "it answers")
+        wait_for(lambda: service.answered() > 10, "it answers", service)
         for _ in range(2):
             kill(begin, server)
-            wait_for(lambda: service.problem("/tracks: not connected"), "the dead broker is told of")
+            wait_for(lambda: service.problem("/tracks: not connected"), "the dead broker is told of", service)
             assert service.metric("jeat_graph_ready") == {"": 0.0}
             server.start()
-            wait_for(service.ready, "it is ready again")
+            wait_for(service.ready, "it is ready again", service)
+            before = service.answered()
+            wait_for(lambda: service.answered() > before + SCANS_HZ, "it answers again", service)  # noqa: B023
         assert service.end() == 0
         service = Running(path, web)
-        wait_for(lambda: service.said("goes on from"), "it goes on from the checkpoint")
-        wait_for(lambda: service.health()["messages"]["answered"] > 10, "it answers")
+        wait_for(lambda: service.said("goes on from"), "it goes on from the checkpoint", service)
+        wait_for(lambda: service.answered() > 10, "it answers", service)
         service.process.kill()
         service = Running(path, web)
-        wait_for(lambda: service.health()["messages"]["answered"] > 10, "it answers")
+        wait_for(lambda: service.answered() > 10, "it answers", service)
         publisher.stop()
         answers_until(answers, publisher.count - 1, found)
         assert service.end() == 0
@@ -234,23 +240,29 @@ silent_s: 2
     found: list[dict] = []
     service = Running(path, web)
     try:
-        wait_for(lambda: service.said("running"), "the service runs")
+        wait_for(lambda: service.said("running"), "the service runs", service)
         publisher = Publisher(f"{begin}/scans?{options(keys)}")
-        wait_for(lambda: {"rgb", "evt"} <= service.health()["sensors"].keys(), "both sensors are seen")
-        wait_for(service.ready, "it is ready")
+        wait_for(
+            lambda: {"rgb", "evt"} <= service.health().get("sensors", {}).keys(),
+            "both sensors are seen",
+            service,
+        )
+        wait_for(service.ready, "it is ready", service)
 
         camera.stop()
-        wait_for(lambda: service.problem("sensor 'rgb': no scan for"), "the silent sensor is told of")
+        wait_for(
+            lambda: service.problem("sensor 'rgb': no scan for"), "the silent sensor is told of", service
+        )
         assert service.problem(f"127.0.0.1:{camera.port}/video: not connected")
         assert service.metric("jeat_graph_ready") == {"": 0.0}
         camera.start()
-        wait_for(service.ready, "it is ready again")
+        wait_for(service.ready, "it is ready again", service)
 
         kill(begin, server)
-        wait_for(lambda: service.problem("/tracks: not connected"), "the dead broker is told of")
+        wait_for(lambda: service.problem("/tracks: not connected"), "the dead broker is told of", service)
         server.start()
-        wait_for(service.ready, "it is ready again")
-        wait_for(lambda: service.health()["lag_s"] < 2.0, "it has caught up")
+        wait_for(service.ready, "it is ready again", service)
+        wait_for(lambda: service.health().get("lag_s", 99.0) < 2.0, "it has caught up", service)
         connected = service.metric("jeat_graph_connected")
         assert set(connected.values()) == {1.0}
         assert len(connected) == 3
@@ -280,7 +292,11 @@ def test_a_broker_that_is_not_there_yet_is_waited_for(tmp_path):
     )
     service = Running(path, web)
     try:
-        wait_for(lambda: service.problem("not connected (Connect call failed"), "it says what it waits for")
+        wait_for(
+            lambda: service.problem("Connect call failed"),
+            "it says what it waits for",
+            service,
+        )
         assert service.said("trying again in 1 s")
         assert service.health()["phase"] == "starting"
         assert service.end() == 0

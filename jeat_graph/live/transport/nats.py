@@ -245,6 +245,8 @@ class NatsSink:
         """Wait for the oldest until so many are open; what the server did not confirm is sent again."""
         link = self._link
         while len(self._open) > most:
+            if self._reconnects != link.reconnects and link.client.is_connected:
+                self._send_again()
             message, number, future = self._open[0]
             self._notices.tell()
             if not wait([future], SLICE_S).done:
@@ -259,6 +261,15 @@ class NatsSink:
                 if self._open and self._open[0][2] is future:
                     self._open[0] = (message, number, self._publish(message, number))
         self._notices.tell()
+
+    def _send_again(self) -> None:
+        """Send all that is on its way by the new connection; the server keeps what it has already once."""
+        self._reconnects = self._link.reconnects
+        for _, _, future in self._open:
+            future.cancel()
+        self._open = deque(
+            (message, number, self._publish(message, number)) for message, number, _ in self._open
+        )
 
     def _not_taken(self, size: int, error: Exception) -> None:
         """Deal with the oldest message, which the server did not take: drop it, wait a while, or end.
