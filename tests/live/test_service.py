@@ -297,7 +297,7 @@ def test_a_broker_that_is_not_there_yet_is_waited_for(tmp_path):
             "it says what it waits for",
             service,
         )
-        assert service.said("trying again in 1 s")
+        wait_for(lambda: service.said("trying again in 1 s"), "it tries again", service)
         assert service.health()["phase"] == "starting"
         assert service.end() == 0
     finally:

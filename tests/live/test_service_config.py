@@ -99,7 +99,7 @@ def test_a_password_that_others_may_read_is_warned_of_and_not_shown(tmp_path, ca
     path.chmod(0o644)
     assert main(["serve", "--check", str(path)]) == 0
     said = capsys.readouterr()
-    assert "chmod 600" in said.err
+    assert "chmod o-r" in said.err
     assert "canary" not in said.err + said.out
     path.chmod(0o600)
     assert read_service(path)[1] == []

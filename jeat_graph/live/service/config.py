@@ -279,9 +279,9 @@ def full_url(url: str, password_file: str | None, tls: TlsConfig | None) -> str:
 def _warnings(config: ServiceConfig, path: Path) -> list[str]:
     """Return what may not be as it was meant: a password in a file that others may read."""
     urls = [source.given[1] for source in config.sources] + [sink.url for sink in config.sinks]
-    open_to_others = path.stat().st_mode & (stat.S_IRGRP | stat.S_IROTH)
+    open_to_others = path.stat().st_mode & stat.S_IROTH
     return [
-        f"{path}: others may read this file, and {shown_url(url)} has a password in it; chmod 600, or take "
+        f"{path}: anybody may read this file, and {shown_url(url)} has a password in it; chmod o-r, or take "
         "password_file or ${NAME}"
         for url in urls
         if open_to_others and _password_in(url)
