@@ -16,7 +16,7 @@ from jeat_graph.detection.detecting import CLOCK_S, EVENTS_SENSOR, FRAMES_SENSOR
 from jeat_graph.detection.named import AUTO, FRAMES, MOTION, network_file
 from jeat_graph.detection.picture_detector import PictureDetector
 from jeat_graph.detection.request import DetectRequest
-from jeat_graph.io.capture.camera import Picture
+from jeat_graph.io.capture.camera import LivePicture
 from jeat_graph.io.capture.event_camera import LivePiece
 from jeat_graph.io.capture.reader import Item, LiveReader
 
@@ -50,7 +50,7 @@ class Worker(Generic[Item]):
         raise NotImplementedError
 
 
-class PictureWorker(Worker[Picture]):
+class PictureWorker(Worker[LivePicture]):
     """A camera of pictures.
 
     Attributes:
@@ -59,7 +59,7 @@ class PictureWorker(Worker[Picture]):
     """
 
     def __init__(
-        self, reader: LiveReader[Picture], request: DetectRequest, say: Callable[[str], object]
+        self, reader: LiveReader[LivePicture], request: DetectRequest, say: Callable[[str], object]
     ) -> None:
         super().__init__(reader, FRAMES_SENSOR)
         self._request, self._say = request, say
@@ -81,7 +81,7 @@ class PictureWorker(Worker[Picture]):
         if self.detector == AUTO and frames:
             self.detector = chosen_by(frames, np.array(times), self._request.settings, self._say)
 
-    def _fits(self, picture: Picture) -> bool:
+    def _fits(self, picture: LivePicture) -> bool:
         """Tell whether a picture has the size of the first one, and say it of the first that has not."""
         height, width = picture.frame.shape[:2]
         if self.size_px is None:
@@ -117,7 +117,7 @@ class PictureWorker(Worker[Picture]):
         assert self.size_px is not None
         return masks.on(self.size_px).scan(scan) if masks else scan
 
-    def _moving(self, pictures: Iterator[Picture]) -> Iterator[Scan]:
+    def _moving(self, pictures: Iterator[LivePicture]) -> Iterator[Scan]:
         """Yield what moves; the background is made of the first seconds."""
         masks = self._request.masks
         if self._request.find_clock:
@@ -172,7 +172,7 @@ class EventWorker(Worker[LivePiece]):
                 yield masks.on(piece.size_px).scan(scan) if mine else scan
 
 
-def _clock_in(pictures: Iterator[Picture]) -> tuple[int, int, int, int] | None:
+def _clock_in(pictures: Iterator[LivePicture]) -> tuple[int, int, int, int] | None:
     """Look for a burnt-in clock in the next seconds (left, top, width, height, px)."""
     import cv2
 

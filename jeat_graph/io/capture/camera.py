@@ -26,7 +26,7 @@ _MS_PER_S = 1e3
 _MOTION_JPEG = int.from_bytes(b"MJPG", "little")
 
 
-class Picture(NamedTuple):
+class LivePicture(NamedTuple):
     """A picture and its time.
 
     Attributes:
@@ -38,7 +38,7 @@ class Picture(NamedTuple):
     frame: RgbImage
 
 
-class _OpenCv:
+class _OpenCvCapture:
     """One connection (see `Capture`)."""
 
     def __init__(self, address: LiveAddress, clock: StreamClock, now: Callable[[], float]) -> None:
@@ -65,7 +65,7 @@ class _OpenCv:
     def _is_motion_jpeg(self) -> bool:
         return int(self._capture.get(self._cv2.CAP_PROP_FOURCC)) == _MOTION_JPEG
 
-    def read(self) -> Picture | None:
+    def read(self) -> LivePicture | None:
         """Wait for the next picture; None for one that had waited in a store of the stream."""
         if not self._capture.grab():
             raise LostError("no picture comes any more")
@@ -77,7 +77,7 @@ class _OpenCv:
         good, bgr = self._capture.retrieve()
         if not good:
             return None
-        return Picture(t, np.asarray(self._cv2.cvtColor(bgr, self._cv2.COLOR_BGR2RGB), dtype=np.uint8))
+        return LivePicture(t, np.asarray(self._cv2.cvtColor(bgr, self._cv2.COLOR_BGR2RGB), dtype=np.uint8))
 
     def close(self) -> None:
         """Let go of the camera."""
@@ -86,7 +86,7 @@ class _OpenCv:
 
 def open_camera(
     address: LiveAddress, tell: Callable[[str], object], now: Callable[[], float] | None = None
-) -> LiveReader[Picture]:
+) -> LiveReader[LivePicture]:
     """Return a reader of a camera's pictures, to be entered.
 
     Args:
@@ -95,7 +95,7 @@ def open_camera(
         now: the clock that times are given by (s); by default a `WallClock`.
     """
     clock, wall = StreamClock(), now or WallClock()
-    return LiveReader(address.shown, lambda: _OpenCv(address, clock, wall), tell)
+    return LiveReader(address.shown, lambda: _OpenCvCapture(address, clock, wall), tell)
 
 
 def _opened(cv2: Any, address: LiveAddress) -> Any:

@@ -68,7 +68,7 @@ class SinkConfig(Section):
 
 
 @dataclass(frozen=True)
-class TrackerConfig(Section):
+class TrackedBy(Section):
     """How is tracked: as `--config`, `--set`, `--image`, `--rig` and `--late` of `stream` say it."""
 
     config: str = "default"
@@ -103,7 +103,7 @@ class ServiceConfig(Section):
     """All that a service does."""
 
     name: str = "jeat-graph"
-    tracker: TrackerConfig = field(default_factory=TrackerConfig)
+    tracker: TrackedBy = field(default_factory=TrackedBy)
     state: StateConfig = field(default_factory=StateConfig)
     web: WebConfig = field(default_factory=WebConfig)
     silent_s: float = number(

@@ -18,7 +18,7 @@ _WARNS = "warning: "
 _MS = 1e3
 
 
-class _Handler(logging.Handler):
+class _LibraryHandler(logging.Handler):
     """Takes what libraries log."""
 
     def __init__(self, log: Log) -> None:
@@ -46,7 +46,7 @@ class Log:
     @contextmanager
     def of_libraries(self) -> Iterator[None]:
         """Write what libraries log, too, as lines like the others."""
-        handler, root = _Handler(self), logging.getLogger()
+        handler, root = _LibraryHandler(self), logging.getLogger()
         root.addHandler(handler)
         try:
             yield
