@@ -34,7 +34,7 @@ from jeat_graph.live.warm_up import warm_up
 from jeat_graph.tracking.tracker import Tracker
 
 #: How long one source is waited for, alone or beside others (s).
-_ALONE_S, _BESIDE_S = 0.2, 0.02
+_ALONE_S, _BESIDE_S = 0.2, 0.05
 #: A source is told what has been taken whenever it has nothing more, and after this part of what may be open.
 _COMMIT_PART = 0.5
 #: So many messages of one source are taken before the next one's turn.
