@@ -56,7 +56,7 @@ _BESIDE = ("simulate", "train")
 
 # These begin to track at once where the tracker is not compiled; the others track so much, or are so much
 # about time, that they wait for it.
-_AT_ONCE = ("demo", "track", "stream", "serve")
+_AT_ONCE = ("demo", "track", "stream")
 # For these, `--out -` is standard output.
 _TO_STDOUT = ("detect",)
 
@@ -65,7 +65,7 @@ def _compile_for(command: str) -> None:
     """Have other processors compile the tracker, and this one help or track meanwhile."""
     compiling = import_module("jeat_graph.tracking.compiling")
     if command in _AT_ONCE:
-        compiling.work_meanwhile(live=command in ("stream", "serve"))
+        compiling.work_meanwhile(live=command == "stream")
     else:
         compiling.wait_with_help()
 

@@ -14,11 +14,9 @@ _STEP_S = 0.05
 
 def warm_up(config: Config) -> None:
     """Track a vehicle that is not there."""
-    if config.tracker.engine == "compiled":  # others need not be
-        notice_if_cold()
+    notice_if_cold()
     spare = Tracker(replace(config, smoother=replace(config.smoother, worker=False)))
     box = [0.4 * config.image.width, 0.4 * config.image.height, 40.0, 30.0]
-    names = spare.sensor_names or ("rgb",)  # a configuration may meet its sensors when they come
     for k in range(_WARM_STEPS):
-        spare.step([(_STEP_S * k, name, [box], [0.9]) for name in names])
+        spare.step([(_STEP_S * k, name, [box], [0.9]) for name in spare.sensor_names])
     spare.finish()

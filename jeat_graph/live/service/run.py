@@ -30,7 +30,6 @@ from jeat_graph.live.session import Ends, Session
 from jeat_graph.live.smoothed_file import SmoothedFile
 from jeat_graph.live.told import BadLines
 from jeat_graph.live.transport.patience import UnconfirmedError
-from jeat_graph.live.warm_up import warm_up
 from jeat_graph.tracking.tracker import Tracker
 
 #: How long one source is waited for, alone or beside others (s).
@@ -128,7 +127,6 @@ class Service:
         )
         if more:
             log.write(INFO, f"goes on from {config.state.checkpoint}")
-        warm_up(settings)
         smoothed = None
         if config.state.smoothed is not None:
             smoothed = stack.enter_context(SmoothedFile(config.state.smoothed, more.get("smoothed")))
