@@ -252,8 +252,8 @@ class Service:
     def _take(self, message: ScanMessage, place: str, running: _Running) -> None:
         self._came = time.monotonic()
         session, counted = running.session, self.status.counted
-        self.status.came(message.batch.scans)
         counted.taken += 1
+        before = session.duplicates
         try:
             session.accept(message, place)
         except (DataError, UnknownSensorError, TimeOrderError) as error:
@@ -262,6 +262,8 @@ class Service:
             name, _, line = place.removesuffix(": ").rpartition(":")
             self._bad(DataError(str(error), name, int(line)), running)
         counted.duplicates = session.duplicates
+        if session.duplicates == before:
+            self.status.came(message.batch.scans)
         counted.passed_over = int(session.live.lateness.dropped.sum())
 
     def _bad(self, error: DataError, running: _Running) -> None:
