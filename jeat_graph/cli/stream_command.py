@@ -192,8 +192,6 @@ def _config(args: argparse.Namespace, cameras: LiveDetecting | None) -> Config:
 
     declared = made_by(args, _say) if cameras is None else camera_settings(args, cameras, _say)
     config = load_config(args.config, [*declared, *overrides(args)], args.rig)
-    if args.checkpoint is not None and config.smoother.worker:
-        raise ConfigError("--checkpoint does not go with smoother.worker: its state is in another process")
     if args.smoothed is None:
         return replace(config, smoother=replace(config.smoother, engine="none"))
     if config.smoother.engine == "none":

@@ -164,8 +164,6 @@ class Service:
         sides = [] if image is None else [f"image.width={image[0]}", f"image.height={image[1]}"]
         declared = cameras.settings(self._log) if tracker.config == "default" else []
         made = load_config(tracker.config, [*declared, *tracker.set, *sides], tracker.rig)
-        if self._config.state.checkpoint is not None and made.smoother.worker:
-            raise ConfigError("state.checkpoint does not go with smoother.worker")
         if self._config.state.smoothed is None:
             return replace(made, smoother=replace(made.smoother, engine="none"))
         if made.smoother.engine == "none":
