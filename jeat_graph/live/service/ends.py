@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import time
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from jeat_graph.data.errors import ConfigError, JeatGraphError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.capture.back_off import BackOff
 from jeat_graph.io.track_lines import json_line
+from jeat_graph.live.health import HealthChange
 from jeat_graph.live.messages import ScanMessage, encode_tracks
 from jeat_graph.live.service.config import STDOUT, ServiceConfig, full_url
 from jeat_graph.live.service.log import Log
@@ -58,7 +60,14 @@ class Sinks:
 
     def send(self, t: float, table: Trajectories, message: ScanMessage) -> None:
         """Give out the tracks after an arrival."""
-        line = json_line(t, table)
+        self._send(json_line(t, table), message)
+
+    def event(self, event: HealthChange) -> None:
+        """Give out that a sensor fails or is well again."""
+        line = json.dumps({"t": event.t, "event": f"sensor-{event.what}", "sensor": event.sensor})
+        self._send(line, None)
+
+    def _send(self, line: str, message: ScanMessage | None) -> None:
         for sink, encoding, status in self._opened:
             sink.send(encode_tracks(line, self.seq, message, encoding))
             status.messages += 1

@@ -134,18 +134,19 @@ class Service:
             live,
             Ends(
                 tracks=self._answering(sinks),
+                event=sinks.event,
                 warn=log.say,
                 smoothed=smoothed,
                 flush=sinks.flush,
                 commit=lambda: _commit(sources),
                 too_large=sinks.too_large,
-                kept=self._saved,
+                kept=lambda: self._saved(sinks),
             ),
             config.state.checkpoint,
             config.state.every_s,
             more,
         )
-        sinks.seq = more.get("count", 0)
+        sinks.seq = more.get("kept", {}).get("seq", 0)
         running = _Running(session, sources, cameras, sinks, BadLines(log.say))
         cameras.begin()
         status.phase = RUNNING
@@ -204,11 +205,11 @@ class Service:
 
         return answer
 
-    def _saved(self) -> dict[str, Any]:
-        """Called by the session when it writes a checkpoint: nothing more is to be kept."""
+    def _saved(self, sinks: Sinks) -> dict[str, Any]:
+        """Return what is to be kept beside the session's own state, which is being written."""
         self.status.saved = time.monotonic()
         self.status.counted.checkpoints += 1
-        return {}
+        return {"seq": sinks.seq}
 
     def _work(self, running: _Running) -> None:
         """Take what comes until a signal."""
