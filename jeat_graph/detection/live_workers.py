@@ -19,6 +19,7 @@ from jeat_graph.detection.request import DetectRequest
 from jeat_graph.io.capture.camera import LivePicture
 from jeat_graph.io.capture.event_camera import LivePiece
 from jeat_graph.io.capture.reader import Item, LiveReader
+from jeat_graph.io.decoders import RgbImage
 
 #: Between looks at whether to end (s).
 SLICE_S = 0.1
@@ -69,7 +70,8 @@ class PictureWorker(Worker[LivePicture]):
 
     def prepare(self, stopped: Until) -> None:
         """Wait for the first picture, and choose a detector if none is named."""
-        frames, times = [], []
+        frames: list[RgbImage] = []
+        times: list[float] = []
         for picture in self.items(stopped):
             if not self._fits(picture):
                 continue

@@ -13,6 +13,7 @@ from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.io.capture.back_off import BackOff
 
 Item = TypeVar("Item")
+_Given = TypeVar("_Given", covariant=True)
 
 #: So many items may wait for whoever takes them; when one more comes, the oldest is dropped.
 MOST_WAITING = 2
@@ -26,10 +27,10 @@ class LostError(JeatGraphError):
     """A camera that cannot be reached, or whose connection has broken off."""
 
 
-class Capture(Protocol[Item]):
+class Capture(Protocol[_Given]):
     """One connection to a camera, used by one thread."""
 
-    def read(self) -> Item | None:
+    def read(self) -> _Given | None:
         """Wait, a second at most, for what comes next; None if nothing has come that is to be taken.
 
         Raises:

@@ -155,7 +155,7 @@ def _built(tree: Mapping[str, Any]) -> ServiceConfig:
     """Make it of the tree; lists of sections are made one by one, for their numbers to be in messages."""
     lists = {"sources": SourceConfig, "sinks": SinkConfig}
     made: ServiceConfig = build(ServiceConfig, {k: v for k, v in tree.items() if k not in lists}, "")
-    found: dict[str, tuple[Any, ...]] = {}
+    found: dict[str, Any] = {}
     for name, kind in lists.items():
         entries = tree.get(name) or []
         if not isinstance(entries, list):

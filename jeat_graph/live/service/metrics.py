@@ -61,7 +61,7 @@ class Metrics:
         if status.lag_s is not None:
             yield family(gauge, "lag_seconds", "from a scan's time to its answer", [([], status.lag_s)])
         if status.saved is not None:
-            age = [([], now - status.saved)]
+            age: list[tuple[list[str], float]] = [([], now - status.saved)]
             yield family(gauge, "checkpoint_age_seconds", "since the newest checkpoint", age)
         for name, value in health["messages"].items():
             yield family(counter, name, f"messages or checkpoints {name.replace('_', ' ')}", [([], value)])
