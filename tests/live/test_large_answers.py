@@ -260,9 +260,9 @@ def counting(sink):
     count = [0]
     publish = sink._publish
 
-    def once_more(message: bytes):
+    def once_more(message: bytes, number: int):
         count[0] += 1
-        return publish(message)
+        return publish(message, number)
 
     sink._publish = once_more
     return lambda: count[0]
