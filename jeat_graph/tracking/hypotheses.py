@@ -41,7 +41,11 @@ class Hypotheses(NamedTuple):
 
 
 def hypotheses_of(
-    columns: Mapping[str, Any], learnt: Mapping[str, Any], constants: ModelConstants, t: float, shown: IntArray
+    columns: Mapping[str, Any],
+    learnt: Mapping[str, Any],
+    constants: ModelConstants,
+    t: float,
+    shown: IntArray,
 ) -> Hypotheses:
     """Collect what is believed of tracks.
 
@@ -55,7 +59,9 @@ def hypotheses_of(
     sensors = len(learnt["p_detect"])
     evidence = Evidence(
         **{
-            f.name: np.asarray(columns[f.name]).reshape((-1, sensors) if f.name in Evidence.PER_SENSOR else -1)
+            f.name: np.asarray(columns[f.name]).reshape(
+                (-1, sensors) if f.name in Evidence.PER_SENSOR else -1
+            )
             for f in fields(Evidence)
         }
     )

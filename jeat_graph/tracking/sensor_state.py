@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 
-
 class SensorState(NamedTuple):
     """Running estimates of one sensor; they weigh what it says.
 
@@ -37,4 +36,3 @@ class SensorState(NamedTuple):
     offset_place_y: tuple[float, float] = (0.0, 0.0)
     lag_s: float = 0.0
     lag_std_s: float | None = None
-
