@@ -378,7 +378,7 @@ class ModelTracker(Updates, SavedModel):
         offsets = learnt["offsets"].tolist()
         return {
             name: SensorState(
-                clutter=float(learnt["leftovers"][k]),
+                clutter=float(learnt["false_boxes"][k]),
                 p_detect=float(learnt["p_detect"][k]),
                 trust=float(believed[k]),
                 blind=0.0,
