@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
-from jeat_graph.config.schema import Config
+from jeat_graph.config.schema import Config, SensorConfig
 from jeat_graph.data.errors import ConfigError, UnknownSensorError
 
 #: What a tracker was told is remembered up to so many calls, and so many boxes.
@@ -72,7 +72,7 @@ def wider(config: Config, names: Iterable[str]) -> Config | None:
     fresh = sorted(set(names) - set(config.sensors))
     if not fresh or config.input.undeclared != "declare":
         return None
-    sensor = config.input.undeclared_sensor()
+    sensor = SensorConfig()
     try:
         return replace(config, sensors={**config.sensors, **dict.fromkeys(fresh, sensor)})
     except ConfigError as error:  # no fault of the configuration, but of a scan
