@@ -241,6 +241,6 @@ def test_the_page_on_the_layout_names_every_folder_and_files_that_are_there():
     tops = {"filters", "association", "smoothers", "eval", "configs", "sehn", "benchmarks"}
     parts = {f"jeat_graph/{p.parent.name}" for p in (ROOT / "jeat_graph").glob("*/__init__.py")}
     assert named == tops | parts
-    places = re.findall(r"^\| [^|`]+ \| `([\w/]+\.py)` \|", text, flags=re.MULTILINE)
-    assert len(places) >= 4
+    places = re.findall(r"^\| [^|]+ \| `([\w/]+\.[ch]?pp|[\w/]+\.py)` \|", text, flags=re.MULTILINE)
+    assert len(places) >= 8
     assert [place for place in places if not (ROOT / place).is_file()] == []
