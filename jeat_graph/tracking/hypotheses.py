@@ -52,6 +52,7 @@ def hypotheses_of(
         t: time of the last step (s).
         shown: (R,) identities of the tracks that are reported.
     """
+    sensors = len(np.asarray(learnt["p_detect"]).reshape(-1))
     evidence = Evidence(
         **{
             f.name: np.asarray(columns[f.name]).reshape(
