@@ -35,7 +35,7 @@ SEED = 7
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.add_argument("--out", default="demo", metavar="DIR", help="folder to write into (default demo)")
-    add_config(parser, "highway", settings=False)
+    add_config(parser, settings=False)
     simulated = parser.add_argument_group("beyond the recording that comes along (needs jeat-graph-sehn)")
     add = simulated.add_argument
     add("--scenario", metavar="NAME", help=f"a scenario of `simulate` (default {SCENARIO})")
