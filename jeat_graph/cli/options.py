@@ -266,8 +266,8 @@ def add_formats(parser: argparse.ArgumentParser) -> None:
     add(
         "--diagnostics",
         action="store_true",
-        help="also write diagnostics.csv (NIS and noise scale of every update) and measurements.parquet (all "
-        "that tracks took in), for `report` and `compare`",
+        help="also write diagnostics.csv (NIS and noise scale of every update) and measurements.parquet (the "
+        "detections that tracks took), for `report` and `road`",
     )
 
 
